@@ -1,0 +1,43 @@
+#pragma once
+// The errors gart throws. Each message says what was wrong, where, and what to do about it; the types let a program
+// react without reading the text.
+
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace gart {
+
+struct error : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+// A file that cannot be read or written as asked. `where` is the path, with the field or line where one is known.
+struct io_error : error {
+  io_error(std::string where, std::string const& what, std::string const& remedy = {})
+      : error(where + ": " + what + (remedy.empty() ? "" : " (" + remedy + ")")), place(std::move(where)) {}
+  std::string place;
+};
+
+// A request that this build or this machine cannot serve: a camera model, a backend, a row that is not instantiated.
+struct unsupported : error {
+  using error::error;
+};
+
+// An option or argument out of its range.
+struct invalid_argument : error {
+  using error::error;
+};
+
+// Memory that could not be had. `advice` names the options that lower the need.
+struct out_of_memory : error {
+  out_of_memory(std::string const& where, std::size_t asked_bytes, std::size_t free_bytes, std::string const& advice)
+      : error("out of " + where + " memory: asked for " + std::to_string(asked_bytes) + " bytes, " +
+              std::to_string(free_bytes) + " bytes free (" + advice + ")"),
+        asked(asked_bytes),
+        available(free_bytes) {}
+  std::size_t asked, available;
+};
+
+}  // namespace gart

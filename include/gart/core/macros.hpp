@@ -1,0 +1,26 @@
+#pragma once
+// Annotations that let one body compile for the host and for a CUDA device.
+// GART_HD marks a function both may call; GART_INLINE forces inlining, so that what decides a hit is compiled into
+// every kernel from one source.
+
+#if defined(__CUDACC__)
+#define GART_HD __host__ __device__
+#define GART_INLINE __forceinline__
+#else
+#define GART_HD
+#define GART_INLINE inline __attribute__((always_inline))
+#endif
+
+// A kernel body that is instantiated for one policy calls that policy's functions only; nvcc cannot see that from a
+// template and would warn on every instantiation.
+#if defined(__CUDACC__)
+#define GART_KERNEL _Pragma("nv_exec_check_disable") __host__ __device__
+#else
+#define GART_KERNEL
+#endif
+
+#if defined(__CUDACC__)
+#define GART_UNROLL _Pragma("unroll")
+#else
+#define GART_UNROLL
+#endif

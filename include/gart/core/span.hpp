@@ -1,0 +1,43 @@
+#pragma once
+// A pointer and a length that device code may hold: what kernels receive of a buffer.
+
+#include <gart/core/macros.hpp>
+#include <gart/core/types.hpp>
+
+#include <type_traits>
+#include <vector>
+
+namespace gart {
+
+template <class T>
+class span {
+ public:
+  using element_type = T;
+  using value_type = std::remove_const_t<T>;
+
+  constexpr span() = default;
+  GART_HD constexpr span(T* data, std::size_t size) : data_(data), size_(size) {}
+  template <class U>
+    requires std::is_same_v<U const, T>
+  GART_HD constexpr span(span<U> other) : data_(other.data()), size_(other.size()) {}
+  span(std::vector<value_type>& v)
+    requires(!std::is_const_v<T>)
+      : data_(v.data()), size_(v.size()) {}
+  span(std::vector<value_type> const& v)
+    requires(std::is_const_v<T>)
+      : data_(v.data()), size_(v.size()) {}
+
+  GART_HD constexpr T* data() const { return data_; }
+  GART_HD constexpr std::size_t size() const { return size_; }
+  GART_HD constexpr bool empty() const { return size_ == 0; }
+  GART_HD constexpr T& operator[](std::size_t i) const { return data_[i]; }
+  GART_HD constexpr T* begin() const { return data_; }
+  GART_HD constexpr T* end() const { return data_ + size_; }
+  GART_HD constexpr span subspan(std::size_t offset, std::size_t count) const { return {data_ + offset, count}; }
+
+ private:
+  T* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+}  // namespace gart

@@ -1,0 +1,94 @@
+#pragma once
+// Memory of a policy, owned: move-only, growing only, with slack, so that a size that changes a little every step does
+// not allocate. Its policy must outlive it.
+
+#include <gart/core/span.hpp>
+#include <gart/exec/concepts.hpp>
+
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace gart {
+
+template <class T, execution E>
+class buffer {
+  static_assert(std::is_trivially_copyable_v<T>);
+
+ public:
+  static constexpr double slack = 1.25;
+
+  buffer() = default;
+  explicit buffer(E& exec, std::size_t n = 0) : exec_(&exec) { resize(n); }
+  buffer(E& exec, std::vector<T> const& host) : exec_(&exec) { assign(host); }
+  buffer(buffer&& other) noexcept { swap(other); }
+  buffer& operator=(buffer&& other) noexcept {
+    buffer moved(std::move(other));
+    swap(moved);
+    return *this;
+  }
+  ~buffer() { release(); }
+
+  std::size_t size() const { return size_; }
+  std::size_t capacity() const { return capacity_; }
+  T* data() const { return data_; }
+  span<T> view() const { return {data_, size_}; }
+  operator span<T>() const { return view(); }
+  operator span<T const>() const { return {data_, size_}; }
+  E& exec() const { return *exec_; }
+
+  // Contents are undefined after a growth.
+  void resize(std::size_t n) {
+    if (n > capacity_) {
+      std::size_t const wanted = capacity_ ? static_cast<std::size_t>(static_cast<double>(n) * slack) : n;
+      release();
+      data_ = static_cast<T*>(exec_->allocate(wanted * sizeof(T)));
+      capacity_ = wanted;
+    }
+    size_ = n;
+  }
+  // Keeps what there is; the rest is undefined.
+  void resize_keep(std::size_t n) {
+    if (n > capacity_) {
+      buffer grown(*exec_);
+      grown.resize(static_cast<std::size_t>(static_cast<double>(n) * slack));
+      exec_->copy(grown.data_, data_, size_ * sizeof(T));
+      swap(grown);
+    }
+    size_ = n;
+  }
+  void zero() { exec_->zero(data_, size_ * sizeof(T)); }
+  void assign(span<T const> host) {
+    resize(host.size());
+    exec_->copy_in(data_, host.data(), host.size() * sizeof(T));
+  }
+  void assign(std::vector<T> const& host) { assign(span<T const>(host)); }
+  std::vector<T> to_host() const {
+    std::vector<T> out(size_);
+    if (size_) exec_->copy_out(out.data(), data_, size_ * sizeof(T));
+    return out;
+  }
+  T front() const {
+    T value;
+    exec_->copy_out(&value, data_, sizeof(T));
+    return value;
+  }
+  void release() {
+    if (data_) exec_->deallocate(data_, capacity_ * sizeof(T));
+    data_ = nullptr;
+    size_ = capacity_ = 0;
+  }
+
+ private:
+  void swap(buffer& other) noexcept {
+    std::swap(exec_, other.exec_);
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+    std::swap(capacity_, other.capacity_);
+  }
+  E* exec_ = nullptr;
+  T* data_ = nullptr;
+  std::size_t size_ = 0, capacity_ = 0;
+};
+
+}  // namespace gart

@@ -1,0 +1,59 @@
+#pragma once
+// Seam 1, the execution policy: a queue on which kernels run, and the memory they run in.
+//
+// A policy is the first argument of everything that computes. It offers
+//   static constexpr char const* name;   "serial", "openmp", "cuda"
+//   static constexpr bool device;        memory is not the host's
+//   void* allocate(bytes); void deallocate(void*, bytes);      stream-ordered; throws out_of_memory
+//   void copy_in(dst, host_src, bytes); void copy_out(host_dst, src, bytes); void copy(dst, src, bytes); void zero(p, bytes);
+//   void synchronize();
+//   void begin_stage(label); void end_stage();                 brackets of a timed stage, nested (see stage.hpp)
+//   template <class T> static T atomic_add(T*, T);             in kernels: returns the old value
+//   profiler profile; memory_use memory;
+// copy_out waits for the data; all else is ordered on the queue.
+//
+// Kernels are named, trivially copyable functors: void operator()(index_t) for an index kernel; a tile kernel names
+// `using scratch = struct {...}` and takes a team (see parallel.hpp).
+
+#include <gart/core/types.hpp>
+#include <gart/exec/profile.hpp>
+
+#include <concepts>
+#include <type_traits>
+
+namespace gart {
+
+template <class E>
+concept execution = requires(E& e, void* p, void const* q, std::size_t n, float* f) {
+  { E::name } -> std::convertible_to<char const*>;
+  { E::device } -> std::convertible_to<bool>;
+  { e.allocate(n) } -> std::same_as<void*>;
+  e.deallocate(p, n);
+  e.copy_in(p, q, n);
+  e.copy_out(p, q, n);
+  e.copy(p, q, n);
+  e.zero(p, n);
+  e.synchronize();
+  e.begin_stage("");
+  e.end_stage();
+  { E::atomic_add(f, 1.0f) } -> std::same_as<float>;
+  { e.profile } -> std::convertible_to<profiler&>;
+  { e.memory } -> std::convertible_to<memory_use&>;
+};
+
+template <class E>
+concept host_execution = execution<E> && !E::device;
+
+template <class K>
+concept index_kernel = std::is_trivially_copyable_v<K> && requires(K const& k, index_t i) { k(i); };
+
+template <class K>
+concept tile_kernel = std::is_trivially_copyable_v<K> && requires { typename K::scratch; };
+
+// `tiles` teams; each has at most `lanes` lanes on a device (a hint, a multiple of 32) and one on a host.
+struct tile_range {
+  index_t tiles = 0;
+  index_t lanes = 64;
+};
+
+}  // namespace gart

@@ -1,0 +1,71 @@
+#pragma once
+// Labelled launches on the host policies: parallel_for over indices and over tiles. The CUDA twins are in
+// cuda_launch.cuh; a tile kernel is the same source on both.
+//
+// A tile kernel is written in phases: team.for_each(n, f) shares f(0..n) out over the team's lanes, team.barrier() makes
+// what was written to team.scratch() visible to all. There is no lane id, so one lane is a correct host mapping.
+
+#include <gart/exec/openmp.hpp>
+#include <gart/exec/serial.hpp>
+#include <gart/exec/stage.hpp>
+
+#include <memory>
+
+namespace gart {
+
+template <class Scratch>
+class host_team {
+ public:
+  host_team(index_t tile, Scratch& scratch) : tile_(tile), scratch_(scratch) {}
+  index_t tile() const { return tile_; }
+  Scratch& scratch() const { return scratch_; }
+  void barrier() const {}
+  template <class F>
+  void for_each(index_t n, F&& f) const {
+    for (index_t i = 0; i < n; ++i) f(i);
+  }
+
+ private:
+  index_t tile_;
+  Scratch& scratch_;
+};
+
+template <index_kernel K>
+void parallel_for(serial_exec& exec, char const* label, index_t n, K const& kernel) {
+  stage_scope scope(exec, label);
+  for (index_t i = 0; i < n; ++i) kernel(i);
+}
+
+template <index_kernel K>
+void parallel_for(openmp_exec& exec, char const* label, index_t n, K const& kernel) {
+  stage_scope scope(exec, label);
+  // Dynamic chunks: rays differ in cost by orders of magnitude; 256 indices keep the overhead below a percent.
+#pragma omp parallel for schedule(dynamic, 256) num_threads(exec.threads())
+  for (index_t i = 0; i < n; ++i) kernel(i);
+}
+
+template <tile_kernel K>
+void parallel_for(serial_exec& exec, char const* label, tile_range range, K const& kernel) {
+  stage_scope scope(exec, label);
+  auto scratch = std::make_unique<typename K::scratch>();
+  for (index_t t = 0; t < range.tiles; ++t) {
+    host_team<typename K::scratch> team(t, *scratch);
+    kernel(team);
+  }
+}
+
+template <tile_kernel K>
+void parallel_for(openmp_exec& exec, char const* label, tile_range range, K const& kernel) {
+  stage_scope scope(exec, label);
+#pragma omp parallel num_threads(exec.threads())
+  {
+    auto scratch = std::make_unique<typename K::scratch>();
+#pragma omp for schedule(dynamic, 4)
+    for (index_t t = 0; t < range.tiles; ++t) {
+      host_team<typename K::scratch> team(t, *scratch);
+      kernel(team);
+    }
+  }
+}
+
+}  // namespace gart

@@ -1,0 +1,42 @@
+#pragma once
+// What a launch cost: wall time (CPU) or device time (events) summed per label. Off by default; when off it costs one
+// branch a launch. Labels are the ones given to parallel_for and to stage scopes.
+
+#include <map>
+#include <string>
+
+namespace gart {
+
+struct stage_time {
+  double milliseconds = 0;
+  long launches = 0;
+};
+
+class profiler {
+ public:
+  void enable(bool on) { enabled_ = on; }
+  bool enabled() const { return enabled_; }
+  void add(std::string const& label, double milliseconds) {
+    auto& stage = stages_[label];
+    stage.milliseconds += milliseconds;
+    ++stage.launches;
+  }
+  std::map<std::string, stage_time> const& stages() const { return stages_; }
+  void clear() { stages_.clear(); }
+
+ private:
+  bool enabled_ = false;
+  std::map<std::string, stage_time> stages_;
+};
+
+// Bytes that buffers of one policy hold now and held at most.
+struct memory_use {
+  std::size_t current = 0, peak = 0;
+  void allocated(std::size_t bytes) {
+    current += bytes;
+    if (current > peak) peak = current;
+  }
+  void released(std::size_t bytes) { current -= bytes; }
+};
+
+}  // namespace gart

@@ -1,0 +1,20 @@
+#pragma once
+// One thread, in index order: the policy whose results repeat bit for bit.
+
+#include <gart/exec/host_memory.hpp>
+
+namespace gart {
+
+class serial_exec : public host_memory {
+ public:
+  static constexpr char const* name = "serial";
+
+  template <class T>
+  static T atomic_add(T* p, T v) {
+    T const old = *p;
+    *p = old + v;
+    return old;
+  }
+};
+
+}  // namespace gart

@@ -1,0 +1,100 @@
+#pragma once
+// Float arithmetic whose rounding is fixed by the source, not by the compiler's choice to contract a*b+c.
+// Whatever decides a hit, an order or an address is written in these, so forward and backward, every traverser and (on
+// hosts with FMA) every policy compute the same bits. Host code that uses gart is built with -ffp-contract=off, which
+// the CMake target carries; on a device the intrinsics are never contracted.
+
+#include <gart/core/macros.hpp>
+#include <gart/core/types.hpp>
+
+#include <cmath>
+#include <cstring>
+
+namespace gart {
+
+GART_HD GART_INLINE float mul(float a, float b) {
+#if defined(__CUDA_ARCH__)
+  return __fmul_rn(a, b);
+#else
+  return a * b;
+#endif
+}
+
+GART_HD GART_INLINE float add(float a, float b) {
+#if defined(__CUDA_ARCH__)
+  return __fadd_rn(a, b);
+#else
+  return a + b;
+#endif
+}
+
+// a*b + c, in one rounding wherever the machine has it (two on a host built without FMA).
+GART_HD GART_INLINE float fma(float a, float b, float c) {
+#if defined(__CUDA_ARCH__)
+  return __fmaf_rn(a, b, c);
+#elif defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+  return __builtin_fmaf(a, b, c);
+#else
+  return a * b + c;
+#endif
+}
+
+GART_HD GART_INLINE float divide(float a, float b) {
+#if defined(__CUDA_ARCH__)
+  return __fdiv_rn(a, b);
+#else
+  return a / b;
+#endif
+}
+
+GART_HD GART_INLINE float square_root(float a) {
+#if defined(__CUDA_ARCH__)
+  return __fsqrt_rn(a);
+#else
+  return std::sqrt(a);
+#endif
+}
+
+GART_HD GART_INLINE float bits_to_float(u32 bits) {
+#if defined(__CUDA_ARCH__)
+  return __uint_as_float(bits);
+#else
+  float f;
+  std::memcpy(&f, &bits, sizeof f);
+  return f;
+#endif
+}
+
+GART_HD GART_INLINE u32 float_to_bits(float f) {
+#if defined(__CUDA_ARCH__)
+  return __float_as_uint(f);
+#else
+  u32 bits;
+  std::memcpy(&bits, &f, sizeof bits);
+  return bits;
+#endif
+}
+
+// By the exponent bits, so that no fast-math switch can remove it.
+GART_HD GART_INLINE bool is_finite(float f) { return (float_to_bits(f) & 0x7f800000u) != 0x7f800000u; }
+
+// exp(x) for x in [-87, 88]: Cody-Waite reduction and a polynomial of degree 6, the same operations on every policy.
+// Below -87 it is 0. Relative error under 2 ulp (tests/math.cpp).
+GART_HD GART_INLINE float exponential(float x) {
+  float const shift = 12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer in the low mantissa bits
+  float const biased = fma(x, 1.44269504f, shift);
+  float const n = add(biased, -shift);
+  float r = fma(n, -0.693359375f, x);
+  r = fma(n, 2.12194440e-4f, r);
+  float p = 1.9875691500e-4f;
+  p = fma(p, r, 1.3981999507e-3f);
+  p = fma(p, r, 8.3334519073e-3f);
+  p = fma(p, r, 4.1665795894e-2f);
+  p = fma(p, r, 1.6666665459e-1f);
+  p = fma(p, r, 5.0000001201e-1f);
+  p = add(fma(mul(r, r), p, r), 1.0f);
+  float const scale = bits_to_float((float_to_bits(biased) + 127u) << 23);
+  return x < -87.0f ? 0.0f : mul(p, scale);
+}
+
+}  // namespace gart

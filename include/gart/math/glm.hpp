@@ -1,0 +1,24 @@
+#pragma once
+// The only place that includes GLM: vectors and matrices, column-major, for host and device.
+
+#if defined(__CUDACC__)
+#include <cuda.h>  // GLM's CUDA support is an #error unless this comes first
+#endif
+#ifndef GLM_FORCE_XYZW_ONLY
+#define GLM_FORCE_XYZW_ONLY
+#endif
+#include <glm/mat3x3.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+namespace gart {
+
+using vec2 = glm::vec2;
+using vec3 = glm::vec3;
+using vec4 = glm::vec4;
+using vec3d = glm::dvec3;
+using mat3 = glm::mat3;  // m[column][row]
+using mat3d = glm::dmat3;
+
+}  // namespace gart

@@ -1,0 +1,95 @@
+#pragma once
+// A scene's parameters, structure of arrays, N Gaussians of SH degree D with K = (D + 1)^2 coefficients a channel:
+//   mean        [N][3]     world units
+//   log_scale   [N][3]     natural logarithm of the standard deviations
+//   quaternion  [N][4]     w, x, y, z; any norm, normalised where it is used
+//   opacity     [N]        logit
+//   sh          [N][K][3]  coefficient-major, colours interleaved (splat files are channel-major; io converts)
+// gaussian_model holds them on the host, gaussians<E> in a policy's memory; gradients and Adam's moments have the same
+// shape.
+
+#include <gart/core/span.hpp>
+#include <gart/exec/buffer.hpp>
+
+#include <vector>
+
+namespace gart {
+
+GART_HD constexpr int sh_coefficients(int degree) { return (degree + 1) * (degree + 1); }
+
+struct gaussian_model {
+  int sh_degree = 0;
+  std::vector<float> mean, log_scale, quaternion, opacity, sh;
+
+  std::size_t size() const { return opacity.size(); }
+  void resize(std::size_t n, int degree) {
+    sh_degree = degree;
+    mean.resize(n * 3), log_scale.resize(n * 3), quaternion.resize(n * 4), opacity.resize(n);
+    sh.resize(n * 3 * sh_coefficients(degree));
+  }
+};
+
+// T is float or float const.
+template <class T>
+struct gaussians_view {
+  T* mean = nullptr;
+  T* log_scale = nullptr;
+  T* quaternion = nullptr;
+  T* opacity = nullptr;
+  T* sh = nullptr;
+  index_t count = 0;
+  int sh_degree = 0;
+
+  GART_HD int sh_stride() const { return 3 * sh_coefficients(sh_degree); }
+  GART_HD operator gaussians_view<T const>() const
+    requires(!std::is_const_v<T>)
+  {
+    return {mean, log_scale, quaternion, opacity, sh, count, sh_degree};
+  }
+};
+
+template <execution E>
+class gaussians {
+ public:
+  gaussians() = default;
+  gaussians(E& exec, index_t n, int sh_degree)
+      : mean(exec), log_scale(exec), quaternion(exec), opacity(exec), sh(exec), degree_(sh_degree) {
+    resize_keep(n);
+  }
+  gaussians(E& exec, gaussian_model const& m) : gaussians(exec, 0, m.sh_degree) { assign(m); }
+
+  buffer<float, E> mean, log_scale, quaternion, opacity, sh;
+
+  index_t size() const { return static_cast<index_t>(opacity.size()); }
+  int sh_degree() const { return degree_; }
+  gaussians_view<float> view() {
+    return {mean.data(), log_scale.data(), quaternion.data(), opacity.data(), sh.data(), size(), degree_};
+  }
+  gaussians_view<float const> view() const {
+    return {mean.data(), log_scale.data(), quaternion.data(), opacity.data(), sh.data(), size(), degree_};
+  }
+  // Existing Gaussians stay; new ones are undefined.
+  void resize_keep(index_t n) {
+    mean.resize_keep(std::size_t{3} * n), log_scale.resize_keep(std::size_t{3} * n);
+    quaternion.resize_keep(std::size_t{4} * n), opacity.resize_keep(n);
+    sh.resize_keep(std::size_t{3} * sh_coefficients(degree_) * n);
+  }
+  void zero() { mean.zero(), log_scale.zero(), quaternion.zero(), opacity.zero(), sh.zero(); }
+  void assign(gaussian_model const& m) {
+    degree_ = m.sh_degree;
+    mean.assign(m.mean), log_scale.assign(m.log_scale), quaternion.assign(m.quaternion);
+    opacity.assign(m.opacity), sh.assign(m.sh);
+  }
+  gaussian_model to_host() const {
+    gaussian_model m;
+    m.sh_degree = degree_;
+    m.mean = mean.to_host(), m.log_scale = log_scale.to_host(), m.quaternion = quaternion.to_host();
+    m.opacity = opacity.to_host(), m.sh = sh.to_host();
+    return m;
+  }
+
+ private:
+  int degree_ = 0;
+};
+
+}  // namespace gart
