@@ -1,0 +1,42 @@
+#pragma once
+// The commands of the `gart` program. Each add_* puts one subcommand with its options and help on the app, and has the
+// subcommand, when the user names it, leave what is to be run in `selected`; main runs it after the whole command line
+// has been understood, so that no command starts work on a line with a mistake in it.
+//
+//   void add_thing(CLI::App& app, command& selected) {
+//     auto options = std::make_shared<thing_options>();
+//     CLI::App* thing = app.add_subcommand("thing", "One sentence: what it does.");
+//     thing->add_option("--out", options->out, "Folder that the thing goes to")->required();
+//     thing->footer("Writes ...\n\nExamples:\n  gart thing --out here\n");
+//     thing->callback([options, &selected] { selected = [options] { return run_thing(*options); }; });
+//   }
+//
+// A command returns the program's exit code: 0, or exit_interrupted. It fails by throwing: gart::error and its kin exit
+// with 1, usage_error with 2; main prints "gart: error: ...".
+
+#include <gart/core/error.hpp>
+
+#include <CLI/CLI.hpp>
+
+#include <functional>
+
+namespace gart_cli {
+
+using command = std::function<int()>;
+
+inline constexpr int exit_failed = 1;
+inline constexpr int exit_usage = 2;
+inline constexpr int exit_interrupted = 130;  // what a shell reports of a program that Ctrl-C ended
+
+// A command line whose options contradict each other or what they meet on disk.
+struct usage_error : gart::error {
+  using gart::error::error;
+};
+
+void add_train(CLI::App& app, command& selected);
+void add_render(CLI::App& app, command& selected);
+void add_eval(CLI::App& app, command& selected);
+void add_synth(CLI::App& app, command& selected);
+void add_info(CLI::App& app, command& selected);
+
+}  // namespace gart_cli
