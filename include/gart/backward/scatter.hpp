@@ -1,0 +1,77 @@
+#pragma once
+// The backward pass by pixel: every ray is traced again and adds each hit's gradient to its Gaussian, atomically.
+// What it adds is chosen by terms: 3 K floats of colour (K SH coefficients a channel), the 10 moments of geometry
+// (math/hit_gradient.hpp). Cost: a second trace, and a row of atomics a hit and term.
+
+#include <gart/backward/terms.hpp>
+#include <gart/math/hit_gradient.hpp>
+#include <gart/math/sh.hpp>
+#include <gart/render/options.hpp>
+#include <gart/render/pixels.hpp>
+#include <gart/scene/gaussians.hpp>
+#include <gart/trace/ray_program.hpp>
+
+namespace gart {
+
+template <int ShDegree, class Terms, execution E>
+struct scatter_program {
+  using ray_type = primary_ray;
+  static constexpr int sh_stride = 3 * sh_basis<ShDegree>::size;
+  struct state {
+    vec3 direction;
+    sh_basis<ShDegree> basis;
+    ray_gradient gradient;
+  };
+
+  camera view;
+  pixel_order order;
+  float const* sh = nullptr;
+  int active_degree = ShDegree;
+  float transmittance_min = 0;
+  ray_gaussian const* records = nullptr;
+  float const* color = nullptr;           // [H][W][3], as the forward pass left it, background in it
+  float const* color_gradient = nullptr;  // [H][W][3]
+  float* sh_gradient = nullptr;           // [N][K][3]
+  float* moments_out = nullptr;           // [N][moment_stride]
+
+  GART_HD bool active(index_t i) const { return order.inside(order.at(i)); }
+  GART_HD state begin(index_t i) const {
+    state s;
+    pixel const at = order.at(i);
+    s.direction = pixel_ray(view, at).direction;
+    s.basis = sh_basis<ShDegree>(s.direction);
+    float const* c = color + 3 * order.address(at);
+    float const* g = color_gradient + 3 * order.address(at);
+    s.gradient.g = {g[0], g[1], g[2]};
+    s.gradient.behind = c[0] * g[0] + c[1] * g[1] + c[2] * g[2];
+    return s;
+  }
+  GART_HD primary_ray ray_of(index_t, state const& s) const { return {s.direction}; }
+
+  GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h) const {
+    vec3 const unclamped = s.basis.unclamped(sh + static_cast<std::size_t>(sh_stride) * h.id, active_degree);
+    float weight;
+    float const alpha_gradient = s.gradient.pass(h.alpha, clamped_color(unclamped), weight);
+    if constexpr (Terms::color) {
+      vec3 const g = color_gradient_of(unclamped, s.gradient.g, weight);
+      float row[sh_stride] = {};
+      GART_UNROLL
+      for (int k = 0; k < sh_basis<ShDegree>::size; ++k) {
+        if (k == sh_coefficients(active_degree)) break;
+        row[3 * k] = s.basis.y[k] * g.x;
+        row[3 * k + 1] = s.basis.y[k] * g.y;
+        row[3 * k + 2] = s.basis.y[k] * g.z;
+      }
+      E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * h.id, row, 3 * sh_coefficients(active_degree));
+    }
+    if constexpr (Terms::geometry) {
+      ray_gaussian const g = records[h.id];
+      moments const m = hit_moments(g, evaluate(g, primary_ray{s.direction}), alpha_gradient);
+      E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * h.id, m.v, moment_count);
+    }
+    return s.gradient.transmittance >= transmittance_min;
+  }
+  GART_HD void end(index_t, state const&) const {}
+};
+
+}  // namespace gart

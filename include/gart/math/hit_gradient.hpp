@@ -1,0 +1,83 @@
+#pragma once
+// Gradients of one hit and of one Gaussian: the only gradient code of the renderer.
+//
+// With w = T alpha, a hit of colour c adds w c to its ray and leaves T (1 - alpha); for the image gradient g,
+//   dL/dalpha = T (c.g) - (what lies behind the hit).g / (1 - alpha),   dL/dc = w g.
+// alpha = sigma exp(-|p|^2 / 2), so with a = alpha dL/dalpha the geometry of a Gaussian needs only ten sums over its
+// hits, the moments, all in the Gaussian's own space:
+//   m0 = sum a,  m1 = sum a p,  m2 = sum a p p^T
+//   dL/d logit = (1 - sigma) m0          dL/d mean = M^T m1           dL/d log s_k = m2_kk
+//   dL/d rotation (body frame)_i = m2_jk (s_j / s_k - s_k / s_j), (i, j, k) cyclic
+// for x = mean + R S p is the point of largest response and dL/dM = -(sum a p p^T)(R S)^T. Where a clamp is active (alpha
+// at alpha_max, a colour at 0) the derivative through it is zero.
+
+#include <gart/math/quaternion.hpp>
+#include <gart/math/ray_gaussian.hpp>
+
+namespace gart {
+
+// The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy, and two of padding (16-byte words).
+inline constexpr int moment_count = 10;
+inline constexpr int moment_stride = 12;
+
+struct moments {
+  float v[moment_stride];
+};
+
+// The front-to-back walk of a ray's gradient: what a hit's derivative needs of the hits before and behind it.
+struct ray_gradient {
+  vec3 g;              // dL/d colour of the pixel
+  float behind;        // (colour of all hits not yet passed, and the background).g
+  float transmittance = 1;
+
+  // dL/dalpha of the hit; moves past it. `weight` returns w.
+  GART_HD GART_INLINE float pass(float alpha, vec3 color, float& weight) {
+    float const cg = color.x * g.x + color.y * g.y + color.z * g.z;
+    weight = transmittance * alpha;
+    behind -= weight * cg;
+    float const gradient = transmittance * cg - behind / (1.0f - alpha);
+    transmittance *= 1.0f - alpha;
+    return gradient;
+  }
+};
+
+GART_HD GART_INLINE moments hit_moments(ray_gaussian const& gaussian, response const& r, float alpha_gradient) {
+  float const raw = unclamped_alpha(gaussian, r);
+  float const a = raw < alpha_max ? raw * alpha_gradient : 0.0f;
+  vec3 const ap = a * r.p;
+  return {{a, ap.x, ap.y, ap.z, ap.x * r.p.x, ap.y * r.p.y, ap.z * r.p.z, ap.y * r.p.z, ap.x * r.p.z, ap.x * r.p.y, 0, 0}};
+}
+
+struct geometry_gradient {
+  vec3 mean, log_scale;
+  quaternion rotation;
+  float opacity;
+};
+
+// From the sums over all hits to the stored parameters.
+GART_HD GART_INLINE geometry_gradient from_moments(float const* m, gaussian_parameters const& p, ray_gaussian const& g) {
+  geometry_gradient out;
+  out.opacity = m[0] * (1.0f - g.sigma);
+  for (int j = 0; j < 3; ++j) {
+    float const column[3] = {j == 0 ? g.m[0].x : j == 1 ? g.m[0].y : g.m[0].z,
+                             j == 0 ? g.m[1].x : j == 1 ? g.m[1].y : g.m[1].z,
+                             j == 0 ? g.m[2].x : j == 1 ? g.m[2].y : g.m[2].z};
+    out.mean[j] = column[0] * m[1] + column[1] * m[2] + column[2] * m[3];
+  }
+  out.log_scale = {m[4], m[5], m[6]};
+  auto const anisotropy = [&](int j, int k) {
+    float const ratio = exponential(p.log_scale[j] - p.log_scale[k]);
+    return ratio - 1.0f / ratio;
+  };
+  vec3 const body(m[7] * anisotropy(1, 2), m[8] * anisotropy(2, 0), m[9] * anisotropy(0, 1));
+  out.rotation = pull_back(p.rotation, body);
+  return out;
+}
+
+// A colour channel passes its gradient where it is not clamped at zero.
+GART_HD GART_INLINE vec3 color_gradient_of(vec3 unclamped, vec3 g, float weight) {
+  return {unclamped.x > 0 ? weight * g.x : 0.0f, unclamped.y > 0 ? weight * g.y : 0.0f,
+          unclamped.z > 0 ? weight * g.z : 0.0f};
+}
+
+}  // namespace gart

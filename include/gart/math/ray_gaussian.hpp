@@ -1,0 +1,141 @@
+#pragma once
+// A Gaussian as a ray meets it. In the Gaussian's own space (unit sphere, axes of the ellipsoid) a ray o + t d is
+//   o_g = M (o - mu),  d_g = M d,  M = S^-1 R^T;
+// the response is largest at t = -o_g.d_g / d_g.d_g, where p = o_g + t d_g is the offset from the centre and the
+// response rho = exp(-|p|^2 / 2). The ray hits where sigma * rho >= alpha_min, that is where |p|^2 is at most
+// cutoff = 2 ln(sigma / alpha_min), and t > near.
+//
+// Everything is relative to a frame, a point of the world held in double (the camera's centre for primary rays): mu is
+// subtracted from it in double, so that scenes far from the origin lose nothing. This file is the only place that decides
+// what is a hit, at which t and with which alpha; its arithmetic is fixed (arith.hpp).
+
+#include <gart/math/arith.hpp>
+#include <gart/math/glm.hpp>
+#include <gart/math/quaternion.hpp>
+
+namespace gart {
+
+inline constexpr float alpha_max = 0.99f;
+
+// From the frame's origin: what a camera casts.
+struct primary_ray {
+  vec3 direction;  // unit
+};
+
+// From anywhere; `origin` relative to the frame.
+struct ray {
+  vec3 origin;
+  vec3 direction;  // unit
+};
+
+GART_HD constexpr vec3 origin_of(primary_ray const&) { return vec3(0.0f); }
+GART_HD constexpr vec3 origin_of(ray const& r) { return r.origin; }
+
+// One Gaussian in one frame, 64 bytes, loaded as four 16-byte words.
+struct alignas(16) ray_gaussian {
+  struct alignas(16) row {
+    float x, y, z;  // of M
+    float o;        // of M (frame - mu)
+  };
+  row m[3];
+  float cutoff = -1;  // largest |p|^2 of a hit; negative: culled, never a hit
+  float sigma = 0;
+  float unused[2] = {0, 0};
+};
+
+// The parameters of one Gaussian as stored.
+struct gaussian_parameters {
+  vec3 mean;
+  vec3 log_scale;
+  quaternion rotation;
+  float opacity;  // logit
+};
+
+GART_HD GART_INLINE float sigmoid(float x) {
+  float const clamped = x < -80.0f ? -80.0f : x;  // below, sigma is under any alpha_min
+  return divide(1.0f, add(1.0f, exponential(-clamped)));
+}
+
+// The mean in the frame.
+GART_HD GART_INLINE vec3 relative_mean(vec3 const& mean, vec3d const& frame) {
+  return {static_cast<float>(mean.x - frame.x), static_cast<float>(mean.y - frame.y),
+          static_cast<float>(mean.z - frame.z)};
+}
+
+// Largest |p|^2 of a hit; negative where the Gaussian is never hit (too weak, or its parameters are not finite).
+GART_HD GART_INLINE float hit_cutoff(gaussian_parameters const& g, float alpha_min) {
+  float const sigma = sigmoid(g.opacity);
+  bool const valid = is_finite(g.mean.x) && is_finite(g.mean.y) && is_finite(g.mean.z) && is_finite(g.opacity) &&
+                     is_finite(norm2(g.rotation)) && norm2(g.rotation) > quaternion_norm2_min &&
+                     g.log_scale.x > -40.0f && g.log_scale.x < 40.0f && g.log_scale.y > -40.0f && g.log_scale.y < 40.0f &&
+                     g.log_scale.z > -40.0f && g.log_scale.z < 40.0f;
+  if (!valid || !(sigma >= alpha_min)) return -1.0f;
+  return mul(2.0f, logarithm(divide(sigma, alpha_min)));
+}
+
+GART_HD GART_INLINE vec3 scale_of(gaussian_parameters const& g) {
+  return {exponential(g.log_scale.x), exponential(g.log_scale.y), exponential(g.log_scale.z)};
+}
+
+GART_HD GART_INLINE ray_gaussian prepare(gaussian_parameters const& g, vec3d const& frame, float alpha_min) {
+  ray_gaussian out;
+  out.cutoff = hit_cutoff(g, alpha_min);
+  out.sigma = sigmoid(g.opacity);
+  if (out.cutoff < 0) {
+    for (auto& row : out.m) row = {0, 0, 0, 0};
+    return out;
+  }
+  mat3 const rotation = to_matrix(g.rotation);
+  vec3 const to_frame = -relative_mean(g.mean, frame);
+  for (int k = 0; k < 3; ++k) {
+    float const inverse = exponential(-g.log_scale[k]);
+    vec3 const axis = rotation[k];
+    float const along = fma(axis.x, to_frame.x, fma(axis.y, to_frame.y, mul(axis.z, to_frame.z)));
+    out.m[k] = {mul(axis.x, inverse), mul(axis.y, inverse), mul(axis.z, inverse), mul(along, inverse)};
+  }
+  return out;
+}
+
+struct response {
+  float t;   // distance of the largest response along the ray
+  float d2;  // |p|^2 there
+  vec3 p;    // offset from the centre, in standard deviations along the Gaussian's axes
+};
+
+GART_HD GART_INLINE float gaussian_origin(ray_gaussian::row const& m, primary_ray const&) { return m.o; }
+GART_HD GART_INLINE float gaussian_origin(ray_gaussian::row const& m, ray const& r) {
+  return fma(m.x, r.origin.x, fma(m.y, r.origin.y, fma(m.z, r.origin.z, m.o)));
+}
+
+template <class Ray>
+GART_HD GART_INLINE response evaluate(ray_gaussian const& g, Ray const& r) {
+  vec3 o, d;
+  GART_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    o[k] = gaussian_origin(g.m[k], r);
+    d[k] = fma(g.m[k].x, r.direction.x, fma(g.m[k].y, r.direction.y, mul(g.m[k].z, r.direction.z)));
+  }
+  float const od = fma(o.x, d.x, fma(o.y, d.y, mul(o.z, d.z)));
+  float const dd = fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)));
+  response out;
+  out.t = divide(-od, dd);
+  out.p = {fma(out.t, d.x, o.x), fma(out.t, d.y, o.y), fma(out.t, d.z, o.z)};
+  out.d2 = fma(out.p.x, out.p.x, fma(out.p.y, out.p.y, mul(out.p.z, out.p.z)));
+  return out;
+}
+
+// NaN compares false: what cannot be evaluated is no hit.
+GART_HD GART_INLINE bool is_hit(ray_gaussian const& g, response const& r, float near) {
+  return r.d2 <= g.cutoff && r.t > near;
+}
+
+GART_HD GART_INLINE float unclamped_alpha(ray_gaussian const& g, response const& r) {
+  return mul(g.sigma, exponential(mul(-0.5f, r.d2)));
+}
+
+GART_HD GART_INLINE float hit_alpha(ray_gaussian const& g, response const& r) {
+  float const a = unclamped_alpha(g, r);
+  return a < alpha_max ? a : alpha_max;
+}
+
+}  // namespace gart

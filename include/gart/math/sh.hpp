@@ -1,0 +1,60 @@
+#pragma once
+// Real spherical harmonics to degree 3 with the signs and order of the 3DGS files: colour is
+// max(0, 0.5 + sum_k c_k Y_k(d)), d the unit direction of the ray.
+
+#include <gart/core/macros.hpp>
+#include <gart/math/glm.hpp>
+
+namespace gart {
+
+template <int Degree>
+struct sh_basis {
+  static constexpr int size = (Degree + 1) * (Degree + 1);
+  float y[size];
+
+  sh_basis() = default;
+  GART_HD GART_INLINE explicit sh_basis(vec3 d) {
+    y[0] = 0.28209479177387814f;
+    if constexpr (Degree >= 1) {
+      y[1] = -0.4886025119029199f * d.y;
+      y[2] = 0.4886025119029199f * d.z;
+      y[3] = -0.4886025119029199f * d.x;
+    }
+    float const xx = d.x * d.x, yy = d.y * d.y, zz = d.z * d.z;
+    if constexpr (Degree >= 2) {
+      y[4] = 1.0925484305920792f * d.x * d.y;
+      y[5] = -1.0925484305920792f * d.y * d.z;
+      y[6] = 0.31539156525252005f * (2 * zz - xx - yy);
+      y[7] = -1.0925484305920792f * d.x * d.z;
+      y[8] = 0.5462742152960396f * (xx - yy);
+    }
+    if constexpr (Degree >= 3) {
+      y[9] = -0.5900435899266435f * d.y * (3 * xx - yy);
+      y[10] = 2.890611442640554f * d.x * d.y * d.z;
+      y[11] = -0.4570457994644658f * d.y * (4 * zz - xx - yy);
+      y[12] = 0.3731763325901154f * d.z * (2 * zz - 3 * xx - 3 * yy);
+      y[13] = -0.4570457994644658f * d.x * (4 * zz - xx - yy);
+      y[14] = 1.445305721320277f * d.z * (xx - yy);
+      y[15] = -0.5900435899266435f * d.x * (xx - 3 * yy);
+    }
+  }
+
+  // Before the clamp at zero; `coefficients` is [size][3]. Bands above
+  // `active` are left out: a schedule raises the degree while the storage stays.
+  GART_HD GART_INLINE vec3 unclamped(float const* coefficients, int active) const {
+    vec3 c(0.5f);
+    GART_UNROLL
+    for (int k = 0; k < size; ++k) {
+      if (k == (active + 1) * (active + 1)) break;
+      c.x += y[k] * coefficients[3 * k];
+      c.y += y[k] * coefficients[3 * k + 1];
+      c.z += y[k] * coefficients[3 * k + 2];
+    }
+    return c;
+  }
+};
+
+// The colour a hit shows.
+GART_HD GART_INLINE vec3 clamped_color(vec3 c) { return {c.x > 0 ? c.x : 0.0f, c.y > 0 ? c.y : 0.0f, c.z > 0 ? c.z : 0.0f}; }
+
+}  // namespace gart

@@ -1,0 +1,75 @@
+#pragma once
+// The forward ray program: front-to-back compositing of the hits of a pixel,
+//   C += T alpha c,  T *= 1 - alpha,
+// colour from spherical harmonics on the ray's direction, until T < transmittance_min (the hit that crosses counts). The
+// background is added with what transmittance is left.
+
+#include <gart/math/sh.hpp>
+#include <gart/render/options.hpp>
+#include <gart/render/record.hpp>
+#include <gart/scene/gaussians.hpp>
+
+namespace gart {
+
+// Row-major, one entry a pixel; null where not wanted.
+struct image_targets {
+  float* color = nullptr;          // [3], background composited
+  float* transmittance = nullptr;  // after the last hit
+  float* depth = nullptr;          // sum of weight * t
+  u32* hits = nullptr;             // composited
+};
+
+template <int ShDegree, class Record>
+struct composite {
+  using ray_type = primary_ray;
+  struct state {
+    pixel at;
+    vec3 direction;
+    sh_basis<ShDegree> basis;
+    vec3 color{0.0f};
+    float transmittance = 1;
+    float depth = 0;
+    u32 hits = 0;
+  };
+
+  camera view;
+  pixel_order order;
+  float const* sh = nullptr;
+  int active_degree = ShDegree;
+  render_options options;
+  image_targets out;
+  Record record;
+
+  GART_HD bool active(index_t i) const { return order.inside(order.at(i)); }
+  GART_HD state begin(index_t i) const {
+    state s;
+    s.at = order.at(i);
+    s.direction = pixel_ray(view, s.at).direction;
+    s.basis = sh_basis<ShDegree>(s.direction);
+    return s;
+  }
+  GART_HD primary_ray ray_of(index_t, state const& s) const { return {s.direction}; }
+  GART_HD GART_INLINE bool on_hit(state& s, hit const& h) const {
+    constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
+    vec3 const c = clamped_color(s.basis.unclamped(sh + stride * h.id, active_degree));
+    float const weight = s.transmittance * h.alpha;
+    s.color += weight * c;
+    s.depth += weight * h.t;
+    s.transmittance *= 1.0f - h.alpha;
+    ++s.hits;
+    record(s.at, h, s.color, s.transmittance);
+    return s.transmittance >= options.transmittance_min;
+  }
+  GART_HD void end(index_t, state const& s) const {
+    std::size_t const a = order.address(s.at);
+    if (out.color) {
+      vec3 const c = s.color + s.transmittance * options.background;
+      out.color[3 * a] = c.x, out.color[3 * a + 1] = c.y, out.color[3 * a + 2] = c.z;
+    }
+    if (out.transmittance) out.transmittance[a] = s.transmittance;
+    if (out.depth) out.depth[a] = s.depth;
+    if (out.hits) out.hits[a] = s.hits;
+  }
+};
+
+}  // namespace gart

@@ -1,0 +1,52 @@
+#pragma once
+// The forward pass: Gaussians into a frame (64 bytes each), the tracer's structure over them, rays through every pixel.
+//
+//   frame_records<E> records(exec);
+//   bvh_tracer<E> tracer(exec);
+//   records.prepare(exec, scene, view.position, options.alpha_min);
+//   tracer.prepare(exec, scene, records.view(), view.position, options.alpha_min, options.near);
+//   forward<3>(exec, tracer, scene, view, options, 3, targets, record_none{});
+
+#include <gart/exec/stage.hpp>
+#include <gart/render/composite.hpp>
+#include <gart/scene/parameters.hpp>
+#include <gart/trace/ray_program.hpp>
+
+namespace gart {
+
+namespace render_kernels {
+
+struct prepare_records {
+  gaussians_view<float const> scene;
+  vec3d frame;
+  float alpha_min;
+  span<ray_gaussian> records;
+  GART_KERNEL void operator()(index_t i) const { records[i] = prepare(load_parameters(scene, i), frame, alpha_min); }
+};
+
+}  // namespace render_kernels
+
+template <execution E>
+class frame_records {
+ public:
+  explicit frame_records(E& exec) : records_(exec) {}
+  void prepare(E& exec, gaussians_view<float const> scene, vec3d frame, float alpha_min) {
+    records_.resize(scene.count);
+    parallel_for(exec, "preprocess", scene.count, render_kernels::prepare_records{scene, frame, alpha_min, records_});
+  }
+  span<ray_gaussian const> view() const { return records_; }
+
+ private:
+  buffer<ray_gaussian, E> records_;
+};
+
+// ShDegree is the degree the coefficients are stored with; bands above active_degree are not evaluated.
+template <int ShDegree, execution E, class Tracer, class Record>
+void forward(E& exec, Tracer& tracer, gaussians_view<float const> scene, camera const& view, render_options const& options,
+             int active_degree, image_targets const& targets, Record const& record) {
+  pixel_order const order{view.width, view.height};
+  composite<ShDegree, Record> const program{view, order, scene.sh, active_degree, options, targets, record};
+  tracer.trace(exec, "forward", order.launch_size(), program);
+}
+
+}  // namespace gart

@@ -1,0 +1,15 @@
+#pragma once
+// What the forward pass leaves of each hit for the backward pass to find. A record is called once a hit, after it has been
+// composited, with the ray's accumulated colour and transmittance; it is part of a strategy (backward/strategies.hpp).
+
+#include <gart/render/pixels.hpp>
+#include <gart/trace/hit.hpp>
+
+namespace gart {
+
+// Nothing: the backward pass traces again.
+struct record_none {
+  GART_HD GART_INLINE void operator()(pixel, hit const&, vec3 const& /*color*/, float /*transmittance*/) const {}
+};
+
+}  // namespace gart

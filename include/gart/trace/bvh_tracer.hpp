@@ -1,0 +1,77 @@
+#pragma once
+// The traverser on gart's own BVH, on every policy: one ray a thread, a window of the nearest hits, resumed until the ray
+// ends. prepare() fits the tree to the Gaussians of a frame: built anew, or refitted when their number has not changed and
+// `rebuild_every` says so.
+
+#include <gart/bvh/walk.hpp>
+#include <gart/scene/gaussians.hpp>
+#include <gart/scene/parameters.hpp>
+#include <gart/trace/window_visitor.hpp>
+
+namespace gart {
+
+namespace trace_kernels {
+
+struct bound_ellipsoids {
+  gaussians_view<float const> scene;
+  vec3d frame;
+  float alpha_min;
+  span<box> boxes;
+  GART_KERNEL void operator()(index_t i) const { boxes[i] = ellipsoid_box(load_parameters(scene, i), frame, alpha_min); }
+};
+
+template <int Capacity, ray_program P>
+struct walk_rays {
+  static constexpr int block_size = 128;
+  bvh_view tree;
+  traced_scene scene;
+  P program;
+  GART_KERNEL void operator()(index_t i) const {
+    if (!program.active(i)) return;
+    trace_windows<Capacity>(scene, program, i, [this](auto const& r, auto& visitor) { walk(tree, r, visitor); });
+  }
+};
+
+}  // namespace trace_kernels
+
+template <execution E>
+class bvh_tracer {
+ public:
+  static constexpr char const* name = "bvh";
+  static constexpr int window = 16;
+
+  explicit bvh_tracer(E& exec) : boxes_(exec), tree_(exec) {}
+
+  // Steps between rebuilds; 1 builds at every prepare.
+  int rebuild_every = 1;
+
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, vec3d frame,
+               float alpha_min, float near) {
+    boxes_.resize(scene.count);
+    parallel_for(exec, "bvh/boxes", scene.count,
+                 trace_kernels::bound_ellipsoids{scene, frame, alpha_min, boxes_});
+    bool const rebuild = tree_.view().count != scene.count || ++age_ >= rebuild_every;
+    if (rebuild) {
+      tree_.build(exec, boxes_);
+      age_ = 0;
+    } else {
+      tree_.refit(exec, boxes_);
+    }
+    scene_ = {records.data(), scene.count, near};
+  }
+
+  template <ray_program P>
+  void trace(E& exec, char const* label, index_t rays, P const& program) {
+    parallel_for(exec, label, rays, trace_kernels::walk_rays<window, P>{tree_.view(), scene_, program});
+  }
+
+  bvh<E> const& tree() const { return tree_; }
+
+ private:
+  buffer<box, E> boxes_;
+  bvh<E> tree_;
+  traced_scene scene_;
+  int age_ = 0;
+};
+
+}  // namespace gart

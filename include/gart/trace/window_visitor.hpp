@@ -1,0 +1,57 @@
+#pragma once
+// Turns candidates into a window of hits: shared by every traverser that proposes Gaussians one at a time and in no
+// particular order.
+
+#include <gart/trace/hit_window.hpp>
+#include <gart/trace/ray_program.hpp>
+
+namespace gart {
+
+template <int Capacity, class Ray>
+struct window_visitor {
+  traced_scene scene;
+  Ray ray;
+  // The last hit passed on: only hits strictly after it are taken. At first (near, largest id): t > near.
+  float last_t;
+  u32 last_id = 0xffffffffu;
+  hit_window<Capacity> window;
+
+  GART_HD GART_INLINE window_visitor(traced_scene const& s, Ray const& r) : scene(s), ray(r), last_t(s.near) {}
+
+  GART_HD GART_INLINE float near() const { return last_t; }
+  GART_HD GART_INLINE float far() const { return window.far(); }
+  GART_HD GART_INLINE void leaf(u32 id) {
+    ray_gaussian const g = scene.gaussians[id];
+    response const r = evaluate(g, ray);
+    if (is_hit(g, r, scene.near) && before(last_t, last_id, r.t, id) && window.wants(r.t, id))
+      window.insert({r.t, id, hit_alpha(g, r)});
+  }
+};
+
+// Feeds `program` the hits of ray i; `gather` proposes candidates to the visitor (at least all whose hits lie in
+// [near(), far()]) and is called again until a window is not full.
+template <int Capacity, ray_program P, class Gather>
+GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& program, index_t i, Gather const& gather) {
+  auto state = program.begin(i);
+  auto const r = program.ray_of(i, state);
+  window_visitor<Capacity, std::remove_const_t<decltype(r)>> visitor(scene, r);
+  bool more = true;
+  while (more) {
+    visitor.window.clear();
+    gather(r, visitor);
+    more = visitor.window.full();
+    GART_UNROLL
+    for (int k = 0; k < Capacity; ++k) {
+      if (k >= visitor.window.size()) break;
+      hit const h = visitor.window[k];
+      visitor.last_t = h.t, visitor.last_id = h.id;
+      if (!program.on_hit(state, h)) {
+        more = false;
+        break;
+      }
+    }
+  }
+  program.end(i, state);
+}
+
+}  // namespace gart

@@ -1,0 +1,159 @@
+#pragma once
+// Renders, gradients and hit lists of a small scene through the library's templates, for comparison with the oracle.
+
+#include <gart/backward/backward.hpp>
+#include <gart/trace/bvh_tracer.hpp>
+#if defined(GART_WITH_EMBREE)
+#include <gart/trace/embree_tracer.hpp>
+#endif
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace gart_test {
+
+enum class tracer_kind { bvh, embree };
+
+template <class E>
+struct traced {
+  std::vector<float> color, transmittance, depth;  // [H][W][3], [H][W], [H][W]
+  std::vector<gart::u32> hits;                     // [H][W]
+};
+
+// Counts with a null list, then writes into the places found by the count.
+struct list_program {
+  using ray_type = gart::primary_ray;
+  struct state {
+    gart::vec3 direction;
+    gart::u32 count = 0;
+    gart::u32 at = 0;
+    float transmittance = 1;
+  };
+  gart::camera view;
+  gart::pixel_order order;
+  float transmittance_min;
+  gart::u32* counts;
+  gart::u32 const* offsets;
+  gart::hit* list;
+
+  GART_HD bool active(gart::index_t i) const { return order.inside(order.at(i)); }
+  GART_HD state begin(gart::index_t i) const {
+    state s;
+    s.direction = gart::pixel_ray(view, order.at(i)).direction;
+    if (list) s.at = offsets[order.address(order.at(i))];
+    return s;
+  }
+  GART_HD gart::primary_ray ray_of(gart::index_t, state const& s) const { return {s.direction}; }
+  GART_HD bool on_hit(state& s, gart::hit const& h) const {
+    if (list) list[s.at + s.count] = h;
+    ++s.count;
+    s.transmittance *= 1.0f - h.alpha;
+    return s.transmittance >= transmittance_min;
+  }
+  GART_HD void end(gart::index_t i, state const& s) const { counts[order.address(order.at(i))] = s.count; }
+};
+
+namespace detail {
+
+template <class E, class F>
+auto with_tracer(E& exec, tracer_kind kind, F&& body) {
+  if (kind == tracer_kind::bvh) {
+    gart::bvh_tracer<E> tracer(exec);
+    return body(tracer);
+  }
+#if defined(GART_WITH_EMBREE)
+  if constexpr (!E::device) {
+    gart::embree_tracer<E> tracer(exec);
+    return body(tracer);
+  }
+#endif
+  throw std::runtime_error("no such tracer for this policy");
+}
+
+template <class F>
+auto with_degree(int degree, F&& body) {
+  switch (degree) {
+    case 0: return body(std::integral_constant<int, 0>{});
+    case 1: return body(std::integral_constant<int, 1>{});
+    case 2: return body(std::integral_constant<int, 2>{});
+    default: return body(std::integral_constant<int, 3>{});
+  }
+}
+
+}  // namespace detail
+
+template <class E>
+traced<E> render_scene(E& exec, gart::gaussian_model const& model, gart::camera const& view,
+                       gart::render_options const& options, int active_degree, tracer_kind kind) {
+  return detail::with_tracer(exec, kind, [&](auto& tracer) {
+    gart::gaussians<E> scene(exec, model);
+    gart::frame_records<E> records(exec);
+    std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
+    gart::buffer<float, E> color(exec, 3 * pixels), transmittance(exec, pixels), depth(exec, pixels);
+    gart::buffer<gart::u32, E> hits(exec, pixels);
+    auto const constant = std::as_const(scene).view();
+    records.prepare(exec, constant, view.position, options.alpha_min);
+    tracer.prepare(exec, constant, records.view(), view.position, options.alpha_min, options.near);
+    detail::with_degree(model.sh_degree, [&](auto degree) {
+      gart::forward<degree>(exec, tracer, constant, view, options, active_degree,
+                            {color.data(), transmittance.data(), depth.data(), hits.data()}, gart::record_none{});
+    });
+    return traced<E>{color.to_host(), transmittance.to_host(), depth.to_host(), hits.to_host()};
+  });
+}
+
+template <class E>
+gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model, gart::camera const& view,
+                                     gart::render_options const& options, int active_degree, tracer_kind kind,
+                                     std::string const& strategy, std::vector<float> const& color_gradient) {
+  return detail::with_tracer(exec, kind, [&](auto& tracer) {
+    gart::gaussians<E> scene(exec, model);
+    gart::gaussians<E> gradients(exec, scene.size(), model.sh_degree);
+    gart::frame_records<E> records(exec);
+    gart::backward<E> pass(exec);
+    std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
+    gart::buffer<float, E> color(exec, 3 * pixels), gradient(exec, color_gradient);
+    auto const constant = std::as_const(scene).view();
+    records.prepare(exec, constant, view.position, options.alpha_min);
+    tracer.prepare(exec, constant, records.view(), view.position, options.alpha_min, options.near);
+    detail::with_degree(model.sh_degree, [&](auto degree) {
+      if (strategy != "pixel") throw std::runtime_error("no such strategy: " + strategy);
+      gart::forward<degree>(exec, tracer, constant, view, options, active_degree, {color.data()}, gart::record_none{});
+      pass.template run<degree>(exec, gart::pixel_strategy{}, tracer, constant, records.view(), view, options,
+                                active_degree, color, gradient, gradients);
+    });
+    return gradients.to_host();
+  });
+}
+
+template <class E>
+std::vector<std::vector<gart::hit>> hit_lists(E& exec, gart::gaussian_model const& model, gart::camera const& view,
+                                              gart::render_options const& options, tracer_kind kind) {
+  return detail::with_tracer(exec, kind, [&](auto& tracer) {
+    gart::gaussians<E> scene(exec, model);
+    gart::frame_records<E> records(exec);
+    std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
+    gart::buffer<gart::u32, E> counts(exec, pixels), starts(exec);
+    gart::buffer<gart::hit, E> list(exec);
+    auto const constant = std::as_const(scene).view();
+    records.prepare(exec, constant, view.position, options.alpha_min);
+    tracer.prepare(exec, constant, records.view(), view.position, options.alpha_min, options.near);
+    gart::pixel_order const order{view.width, view.height};
+    list_program program{view, order, options.transmittance_min, counts.data(), nullptr, nullptr};
+    tracer.trace(exec, "count", order.launch_size(), program);
+    std::vector<gart::u32> const count = counts.to_host();
+    std::vector<gart::u32> offset(pixels + 1, 0);
+    for (std::size_t i = 0; i < pixels; ++i) offset[i + 1] = offset[i] + count[i];
+    starts.assign(offset);
+    list.resize(offset.back() + 1);
+    program.offsets = starts.data(), program.list = list.data();
+    tracer.trace(exec, "list", order.launch_size(), program);
+    std::vector<gart::hit> const flat = list.to_host();
+    std::vector<std::vector<gart::hit>> lists(pixels);
+    for (std::size_t i = 0; i < pixels; ++i) lists[i].assign(flat.begin() + offset[i], flat.begin() + offset[i + 1]);
+    return lists;
+  });
+}
+
+}  // namespace gart_test
