@@ -1,0 +1,320 @@
+#include "oracle.hpp"
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <unsupported/Eigen/AutoDiff>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace oracle {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+double const alpha_max = 0.99;
+
+// Direction (x, y, z) of the pixel's ray before the lens, by fixed-point iteration on the forward model.
+Vector3d camera_direction(gart::camera const& c, int i, int j) {
+  double const xd = (i + 0.5 - double(c.cx)) / double(c.fx), yd = (j + 0.5 - double(c.cy)) / double(c.fy);
+  double const k1 = c.lens.k1, k2 = c.lens.k2, p1 = c.lens.p1, p2 = c.lens.p2;
+  double x = xd, y = yd;
+  for (int step = 0; step < 2000; ++step) {
+    double const r2 = x * x + y * y, radial = 1 + k1 * r2 + k2 * r2 * r2;
+    double const tx = 2 * p1 * x * y + p2 * (r2 + 2 * x * x), ty = p1 * (r2 + 2 * y * y) + 2 * p2 * x * y;
+    double const ex = x * radial + tx - xd, ey = y * radial + ty - yd;
+    if (std::abs(ex) + std::abs(ey) < 1e-14) return {x, y, 1};
+    x = (xd - tx) / radial, y = (yd - ty) / radial;
+  }
+  throw std::runtime_error("oracle: this lens cannot be inverted at this pixel; use a weaker distortion");
+}
+
+Vector3d world_direction(gart::camera const& c, int i, int j) {
+  Matrix3d r;
+  for (int column = 0; column < 3; ++column)
+    for (int row = 0; row < 3; ++row) r(row, column) = c.rotation[column][row];
+  return (r * camera_direction(c, i, j)).normalized();
+}
+
+// The real spherical harmonics up to degree 3 in the order and signs of splat files.
+void harmonics(Vector3d const& d, double y[16]) {
+  double const a = d.x(), b = d.y(), c = d.z();
+  y[0] = 0.28209479177387814;
+  y[1] = -0.4886025119029199 * b;
+  y[2] = 0.4886025119029199 * c;
+  y[3] = -0.4886025119029199 * a;
+  y[4] = 1.0925484305920792 * a * b;
+  y[5] = -1.0925484305920792 * b * c;
+  y[6] = 0.31539156525252005 * (2 * c * c - a * a - b * b);
+  y[7] = -1.0925484305920792 * a * c;
+  y[8] = 0.5462742152960396 * (a * a - b * b);
+  y[9] = -0.5900435899266435 * b * (3 * a * a - b * b);
+  y[10] = 2.890611442640554 * a * b * c;
+  y[11] = -0.4570457994644658 * b * (4 * c * c - a * a - b * b);
+  y[12] = 0.3731763325901154 * c * (2 * c * c - 3 * a * a - 3 * b * b);
+  y[13] = -0.4570457994644658 * a * (4 * c * c - a * a - b * b);
+  y[14] = 1.445305721320277 * c * (a * a - b * b);
+  y[15] = -0.5900435899266435 * a * (a * a - 3 * b * b);
+}
+
+template <class S>
+Eigen::Matrix<S, 3, 3> rotation_of(S w, S x, S y, S z) {
+  S const norm = sqrt(S(w * w + x * x + y * y + z * z));
+  w /= norm, x /= norm, y /= norm, z /= norm;
+  Eigen::Matrix<S, 3, 3> r;
+  r << S(1 - 2 * (y * y + z * z)), S(2 * (x * y - w * z)), S(2 * (x * z + w * y)),  //
+      S(2 * (x * y + w * z)), S(1 - 2 * (x * x + z * z)), S(2 * (y * z - w * x)),   //
+      S(2 * (x * z - w * y)), S(2 * (y * z + w * x)), S(1 - 2 * (x * x + y * y));
+  return r;
+}
+
+struct prepared {
+  Vector3d from_mean;  // o - mean
+  Matrix3d to_unit;    // S^-1 R^T
+  double sigma;
+};
+
+std::vector<prepared> prepare(parameters const& m, Vector3d const& origin) {
+  using std::sqrt;
+  std::vector<prepared> out(m.size());
+  for (std::size_t i = 0; i < m.size(); ++i) {
+    double const* q = &m.quaternion[4 * i];
+    Matrix3d const r = rotation_of(q[0], q[1], q[2], q[3]);
+    Vector3d const inverse_scale = Vector3d(-m.log_scale[3 * i], -m.log_scale[3 * i + 1], -m.log_scale[3 * i + 2]).array().exp();
+    out[i].from_mean = origin - Vector3d(m.mean[3 * i], m.mean[3 * i + 1], m.mean[3 * i + 2]);
+    out[i].to_unit = inverse_scale.asDiagonal() * r.transpose();
+    out[i].sigma = 1 / (1 + std::exp(-m.opacity[i]));
+  }
+  return out;
+}
+
+// Rounding of a float ray and of a float S^-1 R^T: a few units in the last place of each product.
+double const ulps = 3 * std::ldexp(1.0, -24);
+double const alpha_ulps = 1e-6;    // exp, sigmoid and their product, relative
+double const decision_slack = 1e-5;  // and what a decision on alpha or T is given beyond that, relative
+
+std::vector<hit> hits_of(std::vector<prepared> const& gaussians, Vector3d const& d, gart::render_options const& options) {
+  std::vector<hit> list;
+  double const alpha_min = options.alpha_min, near = options.near;
+  for (std::size_t i = 0; i < gaussians.size(); ++i) {
+    prepared const& g = gaussians[i];
+    Vector3d const o_g = g.to_unit * g.from_mean, d_g = g.to_unit * d;
+    double const t = -o_g.dot(d_g) / d_g.squaredNorm();
+    Vector3d const p = o_g + t * d_g;
+    double const response = g.sigma * std::exp(-0.5 * p.squaredNorm());
+    if (response < 0.5 * alpha_min) continue;
+
+    Matrix3d const magnitude = g.to_unit.cwiseAbs();
+    Vector3d const o_error = ulps * (magnitude * g.from_mean.cwiseAbs()), d_error = ulps * (magnitude * d.cwiseAbs());
+    hit h;
+    h.t = t, h.id = static_cast<std::uint32_t>(i);
+    h.alpha = std::min(alpha_max, response);
+    h.t_slack = 1e-7 * std::abs(t) + (o_error.dot(d_g.cwiseAbs()) + d_error.dot((o_g.cwiseAbs() + 2 * std::abs(t) * d_g.cwiseAbs()))) / d_g.squaredNorm();
+    h.alpha_slack = alpha_ulps + p.cwiseAbs().dot(o_error + std::abs(t) * d_error);
+    h.clamps = response > alpha_max ? 8u : 0u;
+    h.marginal = std::abs(response - alpha_min) <= (decision_slack + h.alpha_slack) * alpha_min || std::abs(t - near) <= h.t_slack;
+    h.counted = h.alpha >= alpha_min && t > near;
+    if (h.counted || (h.marginal && t > near - h.t_slack)) list.push_back(h);
+  }
+  std::sort(list.begin(), list.end(), [](hit const& a, hit const& b) { return a.t < b.t || (a.t == b.t && a.id < b.id); });
+  return list;
+}
+
+struct shaded {
+  Vector3d color;
+  unsigned clamps;
+  bool kink;
+};
+
+shaded shade(parameters const& m, std::uint32_t id, double const y[16], int active_degree) {
+  std::size_t const all = std::size_t(m.sh_degree + 1) * (m.sh_degree + 1), active = std::size_t(active_degree + 1) * (active_degree + 1);
+  double const* sh = &m.sh[3 * all * id];
+  shaded s{Vector3d::Constant(0.5), 0, false};
+  for (std::size_t k = 0; k < active; ++k) s.color += y[k] * Vector3d(sh[3 * k], sh[3 * k + 1], sh[3 * k + 2]);
+  for (int c = 0; c < 3; ++c) {
+    s.kink |= std::abs(s.color[c]) < 4e-6;
+    if (s.color[c] <= 0) s.clamps |= 1u << c, s.color[c] = 0;
+  }
+  return s;
+}
+
+// The hits of one ray that count, with what compositing front to back gives each.
+struct step {
+  hit h;
+  Vector3d color;
+  double transmittance;  // before it
+  Vector3d behind;       // the colour of all that follows, background included, seen with T = 1
+  double clear_behind;   // the transmittance of all that follows
+};
+
+// Hits past the end of the ray are cut from `list`.
+std::vector<step> composite(parameters const& m, std::vector<hit>& list, double const y[16], int active_degree,
+                            gart::render_options const& options, pixel& out) {
+  std::vector<step> steps;
+  double const t_min = options.transmittance_min;
+  Vector3d const background(options.background[0], options.background[1], options.background[2]);
+  double transmittance = 1, relative_error = 0, brightest = std::max(1.0, background.maxCoeff());
+  std::size_t end = 0;
+  for (; end < list.size(); ++end) {
+    hit& h = list[end];
+    shaded const s = shade(m, h.id, y, active_degree);
+    h.clamps |= s.clamps;
+    steps.push_back({h, s.color, transmittance, Vector3d::Zero(), 0});
+    brightest = std::max(brightest, s.color.maxCoeff());
+    out.edge |= h.marginal;
+    out.kink |= s.kink || std::abs(h.alpha / alpha_max - 1) * (h.clamps & 8 ? 0 : 1) < h.alpha_slack;
+    if (!h.counted) continue;
+    transmittance *= 1 - h.alpha;
+    relative_error += h.alpha / (1 - h.alpha) * h.alpha_slack;
+    if (t_min > 0 && std::abs(transmittance / t_min - 1) < decision_slack + relative_error) {
+      out.edge = true;
+      out.rounding += transmittance * brightest;
+    }
+    if (transmittance < t_min) {
+      ++end;
+      break;
+    }
+  }
+  list.resize(end);
+  out.transmittance = transmittance;
+  Vector3d behind = background;
+  double clear_behind = 1;
+  for (std::size_t i = steps.size(); i-- > 0;) {
+    step& s = steps[i];
+    s.behind = behind, s.clear_behind = clear_behind;
+    double const weight = s.transmittance * s.h.alpha;
+    out.rounding += weight * (s.h.marginal ? 1 : s.h.alpha_slack) * (s.color - behind).cwiseAbs().maxCoeff();
+    if (!s.h.counted) continue;
+    behind = s.h.alpha * s.color + (1 - s.h.alpha) * behind;
+    clear_behind *= 1 - s.h.alpha;
+    out.depth += weight * s.h.t;
+    ++out.hits;
+  }
+  for (int c = 0; c < 3; ++c) out.color[c] = behind[c];
+
+  double widest = 0;
+  for (step const& s : steps) widest = std::max(widest, s.h.t_slack);
+  for (std::size_t i = 0; i < steps.size(); ++i)
+    for (std::size_t j = i + 1; j < steps.size() && steps[j].h.t - steps[i].h.t <= steps[i].h.t_slack + widest; ++j) {
+      step const &a = steps[i], &b = steps[j];
+      // Equal in every bit: the same geometry twice, ordered by id in any arithmetic.
+      if (a.h.t == b.h.t || b.h.t - a.h.t > a.h.t_slack + b.h.t_slack) continue;
+      out.rounding += a.transmittance * a.h.alpha * b.h.alpha * (a.color - b.color).cwiseAbs().maxCoeff();
+    }
+  steps.erase(std::remove_if(steps.begin(), steps.end(), [](step const& s) { return !s.h.counted; }), steps.end());
+  return steps;
+}
+
+// alpha below its clamp and its derivatives by mean, log-scale, quaternion and opacity, by forward differentiation of the
+// definition.
+using dual = Eigen::AutoDiffScalar<Eigen::Matrix<double, 11, 1>>;
+
+dual response_of(parameters const& m, std::size_t i, Vector3d const& origin, Vector3d const& d) {
+  using Vector = Eigen::Matrix<dual, 3, 1>;
+  Vector mean, scale;
+  for (int a = 0; a < 3; ++a) {
+    mean[a] = dual(m.mean[3 * i + a], 11, a);
+    scale[a] = exp(dual(m.log_scale[3 * i + a], 11, 3 + a));
+  }
+  double const* q = &m.quaternion[4 * i];
+  auto const r = rotation_of<dual>(dual(q[0], 11, 6), dual(q[1], 11, 7), dual(q[2], 11, 8), dual(q[3], 11, 9));
+  Vector o_g, d_g;
+  for (int a = 0; a < 3; ++a) {
+    o_g[a] = dual(0.0), d_g[a] = dual(0.0);
+    for (int b = 0; b < 3; ++b) {
+      o_g[a] += dual(r(b, a) * (origin[b] - mean[b]));
+      d_g[a] += dual(r(b, a) * d[b]);
+    }
+    o_g[a] /= scale[a], d_g[a] /= scale[a];
+  }
+  dual od(0.0), dd(0.0), pp(0.0);
+  for (int a = 0; a < 3; ++a) od += dual(o_g[a] * d_g[a]), dd += dual(d_g[a] * d_g[a]);
+  dual const t = -od / dd;
+  for (int a = 0; a < 3; ++a) {
+    dual const p = o_g[a] + t * d_g[a];
+    pp += dual(p * p);
+  }
+  dual const sigma = 1.0 / (1.0 + exp(dual(-dual(m.opacity[i], 11, 10))));
+  return sigma * exp(dual(-0.5 * pp));
+}
+
+void check_degree(parameters const& m, int active_degree) {
+  if (active_degree < 0 || active_degree > m.sh_degree || m.sh_degree > 3)
+    throw std::invalid_argument("oracle: active_degree must lie in [0, the model's degree], and that in [0, 3]");
+}
+
+Vector3d origin_of(gart::camera const& c) { return {c.position[0], c.position[1], c.position[2]}; }
+
+}  // namespace
+
+parameters::parameters(gart::gaussian_model const& m)
+    : sh_degree(m.sh_degree),
+      mean(m.mean.begin(), m.mean.end()),
+      log_scale(m.log_scale.begin(), m.log_scale.end()),
+      quaternion(m.quaternion.begin(), m.quaternion.end()),
+      opacity(m.opacity.begin(), m.opacity.end()),
+      sh(m.sh.begin(), m.sh.end()) {}
+
+direction ray_through(gart::camera const& c, int i, int j) {
+  Vector3d const d = world_direction(c, i, j);
+  return {d.x(), d.y(), d.z()};
+}
+
+picture render(parameters const& m, gart::camera const& c, gart::render_options const& options, int active_degree) {
+  check_degree(m, active_degree);
+  auto const gaussians = prepare(m, origin_of(c));
+  picture out{c.width, c.height, std::vector<pixel>(std::size_t(c.width) * c.height)};
+  for (int j = 0; j < c.height; ++j)
+    for (int i = 0; i < c.width; ++i) {
+      pixel& p = out.pixels[std::size_t(j) * c.width + i];
+      Vector3d const d = world_direction(c, i, j);
+      double y[16];
+      harmonics(d, y);
+      p.list = hits_of(gaussians, d, options);
+      composite(m, p.list, y, active_degree, options, p);
+    }
+  return out;
+}
+
+parameters gradients(parameters const& m, gart::camera const& c, gart::render_options const& options, int active_degree,
+                     std::vector<double> const& color_gradient, std::vector<double> const& transmittance_gradient) {
+  check_degree(m, active_degree);
+  std::size_t const pixels = std::size_t(c.width) * c.height;
+  if (color_gradient.size() != 3 * pixels || (!transmittance_gradient.empty() && transmittance_gradient.size() != pixels))
+    throw std::invalid_argument("oracle: a gradient image must have the size of the camera's image");
+  parameters g = m;
+  for (auto* group : {&g.mean, &g.log_scale, &g.quaternion, &g.opacity, &g.sh}) std::fill(group->begin(), group->end(), 0.0);
+  std::size_t const all = std::size_t(m.sh_degree + 1) * (m.sh_degree + 1), active = std::size_t(active_degree + 1) * (active_degree + 1);
+
+  Vector3d const origin = origin_of(c);
+  auto const gaussians = prepare(m, origin);
+  for (std::size_t at = 0; at < pixels; ++at) {
+    Vector3d const by_color(color_gradient[3 * at], color_gradient[3 * at + 1], color_gradient[3 * at + 2]);
+    double const by_transmittance = transmittance_gradient.empty() ? 0.0 : transmittance_gradient[at];
+    if (by_color.isZero(0) && by_transmittance == 0) continue;
+    Vector3d const d = world_direction(c, int(at % c.width), int(at / c.width));
+    double y[16];
+    harmonics(d, y);
+    pixel ignored;
+    auto list = hits_of(gaussians, d, options);
+    for (step const& s : composite(m, list, y, active_degree, options, ignored)) {
+      std::size_t const i = s.h.id;
+      double const weight = s.transmittance * s.h.alpha;
+      for (int channel = 0; channel < 3; ++channel)
+        if (!(s.h.clamps >> channel & 1))
+          for (std::size_t k = 0; k < active; ++k) g.sh[3 * (all * i + k) + channel] += by_color[channel] * weight * y[k];
+      if (s.h.clamps & 8) continue;
+      double const by_alpha = s.transmittance * (by_color.dot(s.color - s.behind) - by_transmittance * s.clear_behind);
+      auto const slope = (by_alpha * response_of(m, i, origin, d).derivatives()).eval();
+      for (int a = 0; a < 3; ++a) g.mean[3 * i + a] += slope[a], g.log_scale[3 * i + a] += slope[3 + a];
+      for (int a = 0; a < 4; ++a) g.quaternion[4 * i + a] += slope[6 + a];
+      g.opacity[i] += slope[10];
+    }
+  }
+  return g;
+}
+
+}  // namespace oracle
