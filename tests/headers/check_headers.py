@@ -1,0 +1,64 @@
+"""Compiles every public header alone, included twice: .hpp by the host compiler; by nvcc, where there is one, each .cuh
+and all .hpp together. First it shows that a header that is not self-contained, and one without `#pragma once`, is seen.
+"""
+import argparse
+import concurrent.futures
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+HOST = ["-std=c++20", "-Wall", "-Wextra", "-Werror", "-fopenmp", "-ffp-contract=off", "-fsyntax-only", "-x", "c++"]
+# PTX of one architecture: no host compilation and no assembler, because what is looked for is front-end errors.
+CUDA = ["-std=c++20", "--expt-relaxed-constexpr", "-diag-suppress=20012", "-arch=sm_90", "-ptx", "-o", "/dev/null",
+        "-x", "cu"]
+
+
+def failure(command, include, names, folder):
+    """What the compiler says of a file that includes `names` twice; empty when it compiles."""
+    with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".cc") as source:
+        source.write("".join(f"#include <{name}>\n" for name in names) * 2)
+        source.flush()
+        done = subprocess.run([*command, f"-I{include}", source.name], capture_output=True, text=True)
+    what = names[0] if len(names) == 1 else "all headers together"
+    return f"{what}: does not compile with {command[0]}\n{done.stdout}{done.stderr}" if done.returncode else ""
+
+
+def self_check(host, folder):
+    headers = {
+        "good.hpp": ("#pragma once\n#include <cstddef>\ninline std::size_t good() { return 0; }\n", True),
+        "alone.hpp": ("#pragma once\ninline std::size_t alone() { return 0; }\n", False),
+        "twice.hpp": ("struct twice {};\n", False),
+    }
+    for name, (text, compiles) in headers.items():
+        (pathlib.Path(folder) / name).write_text(text)
+        if (failure(host, folder, [name], folder) == "") != compiles:
+            sys.exit(f"the check itself is broken: {name} should {'' if compiles else 'not '}compile")
+
+
+parser = argparse.ArgumentParser()
+parser.add_argument("include", type=pathlib.Path)
+parser.add_argument("--cxx", required=True)
+parser.add_argument("--nvcc")
+parser.add_argument("--jobs", type=int, default=1)
+a = parser.parse_args()
+include = a.include.resolve()
+
+with tempfile.TemporaryDirectory() as folder:
+    host = [a.cxx, *HOST]
+    self_check(host, folder)
+    headers = sorted(str(p.relative_to(include)) for p in (include / "gart").rglob("*") if p.suffix in (".hpp", ".cuh"))
+    plain = [name for name in headers if name.endswith(".hpp")]
+    if not plain:
+        sys.exit(f"no headers in {include}/gart")
+    with concurrent.futures.ThreadPoolExecutor(max(1, a.jobs)) as pool:
+        jobs = []
+        if a.nvcc:
+            units = [[name] for name in headers if name.endswith(".cuh")]
+            jobs += [pool.submit(failure, [a.nvcc, *CUDA], include, unit, folder) for unit in [plain, *units]]
+        jobs += [pool.submit(failure, host, include, [name], folder) for name in plain]
+    failures = [message for job in jobs if (message := job.result())]
+
+print("\n".join(failures) or f"{len(headers if a.nvcc else plain)} headers compile" +
+      ("" if a.nvcc else "; .cuh files were not tried: no nvcc"))
+sys.exit(1 if failures else 0)

@@ -1,0 +1,93 @@
+"""Holds the includes of include/gart and backends to cmake/layers.txt, and first shows that it would see a violation.
+
+What it asks for: every folder has a line in layers.txt; a header includes only folders its line names; nothing in
+include/gart includes a backend; GLM is included in math/glm.hpp alone; x.hpp, which must be safe for any host compiler,
+includes no .cuh; what is included is there.
+"""
+import pathlib
+import re
+import sys
+import tempfile
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
+SUFFIXES = {".hpp", ".cuh", ".cpp", ".cu", ".h"}
+
+
+def read_layers(path):
+    layers = {}
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        line = line.split("#")[0].strip()
+        if not line:
+            continue
+        folder, colon, allowed = line.partition(":")
+        if not colon or folder in layers:
+            sys.exit(f"{path}:{number}: expected one `folder: folders` line for each folder, got `{line}`")
+        layers[folder] = {folder, *allowed.split()}
+        unknown = layers[folder] - layers.keys()
+        if unknown:
+            sys.exit(f"{path}:{number}: {folder} may include {', '.join(sorted(unknown))}, not above it: that is a cycle")
+    return layers
+
+
+def violations(root, layers):
+    found = []
+    headers = root / "include" / "gart"
+    for path in sorted([*headers.rglob("*"), *(root / "backends").rglob("*")]):
+        if path.suffix not in SUFFIXES:
+            continue
+        inside = path.is_relative_to(headers)
+        relative = path.relative_to(headers) if inside else path.relative_to(root)
+        folder = "gart" if inside and len(relative.parts) == 1 else relative.parts[0]
+        if folder not in layers:
+            found.append(f"{path}: folder {folder} has no line in cmake/layers.txt")
+            continue
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            match = INCLUDE.match(line)
+            if not match:
+                continue
+            name, where = match.group(1), f"{path}:{number}"
+            if name.startswith("glm/") and inside and str(relative) != "math/glm.hpp":
+                found.append(f"{where}: includes {name}; include gart/math/glm.hpp")
+            if inside and path.suffix == ".hpp" and name.endswith(".cuh"):
+                found.append(f"{where}: a .hpp is for any host compiler and may not include {name}")
+            if inside and (name.startswith(("backends/", "..")) or '"' in line):
+                found.append(f"{where}: include/gart includes with <gart/...>, and no backend")
+            if not name.startswith("gart/"):
+                continue
+            if not (root / "include" / name).exists():
+                found.append(f"{where}: {name} is not there")
+            parts = name.split("/")
+            target = parts[1] if len(parts) > 2 else "gart"
+            if target not in layers[folder]:
+                found.append(f"{where}: {folder} may not include {target} ({name})")
+    return found
+
+
+def self_check(layers):
+    """A small tree with every kind of violation, each of which has to be seen."""
+    wrong = {
+        "include/gart/core/a.hpp": "#include <gart/train/b.hpp>\n",
+        "include/gart/train/b.hpp": "#include <gart/core/a.hpp>\n  # include <glm/vec3.hpp>\n",
+        "include/gart/math/c.hpp": '#include "../../../backends/cpu/d.hpp"\n',
+        "include/gart/exec/e.hpp": "#include <gart/exec/f.cuh>\n",
+        "include/gart/exec/f.cuh": "#include <gart/core/nowhere.hpp>\n",
+        "include/gart/attic/g.hpp": "\n",
+        "backends/cpu/d.hpp": "#include <gart/train/b.hpp>\n",
+    }
+    expected = {"core/a.hpp:1", "train/b.hpp:2", "math/c.hpp:1", "exec/e.hpp:1", "exec/f.cuh:1", "attic/g.hpp"}
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        for name, text in wrong.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text(text)
+        seen = {v.removeprefix(f"{root}/include/gart/").split(": ")[0] for v in violations(root, layers)}
+    if seen != expected:
+        sys.exit(f"the check itself is broken: of a tree with violations at {sorted(expected)} it saw {sorted(seen)}")
+
+
+root = pathlib.Path(sys.argv[1])
+layers = read_layers(root / "cmake" / "layers.txt")
+self_check(layers)
+found = violations(root, layers)
+print("\n".join(found) or "includes follow cmake/layers.txt")
+sys.exit(1 if found else 0)
