@@ -1,0 +1,7 @@
+// The serial policy with gart's own BVH.
+#include <gart/exec/parallel.hpp>
+#include <gart/trace/bvh_tracer.hpp>
+#include <gart/train/compiled_rows.hpp>
+
+GART_REGISTER_ROWS(gart_serial_rows,
+                   gart::register_rows<gart::serial_exec, gart::bvh_tracer<gart::serial_exec>, gart::pixel_strategy>(0))

@@ -1,0 +1,12 @@
+// The CUDA policy with gart's own BVH.
+#include <gart/exec/cuda_launch.cuh>
+#include <gart/trace/bvh_tracer.hpp>
+#include <gart/train/compiled_rows.hpp>
+
+namespace {
+bool device_available(std::string* reason) { return !gart::cuda_devices(reason).empty(); }
+}  // namespace
+
+GART_REGISTER_ROWS(gart_cuda_rows,
+                   gart::register_rows<gart::cuda_exec, gart::bvh_tracer<gart::cuda_exec>, gart::pixel_strategy>(
+                       20, device_available))

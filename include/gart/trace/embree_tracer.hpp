@@ -1,0 +1,90 @@
+#pragma once
+// The traverser on Embree, for the host policies: user geometry over the ellipsoids' boxes, a window of the nearest hits a
+// ray, resumed until the ray ends. Embree proposes, math/ray_gaussian.hpp decides: the hits are those of the BVH tracer, bit
+// for bit. Link gart::embree; this header itself needs no Embree.
+
+#include <gart/bvh/box.hpp>
+#include <gart/scene/parameters.hpp>
+#include <gart/trace/bvh_tracer.hpp>
+#include <gart/trace/window_visitor.hpp>
+
+#include <memory>
+
+namespace gart {
+
+// An Embree scene over boxes. intersect calls `leaf` for every box the ray may cross between near and *far, in no
+// particular order; `leaf` may shorten *far.
+class embree_scene {
+ public:
+  embree_scene();
+  ~embree_scene();
+  embree_scene(embree_scene&&) noexcept;
+  embree_scene& operator=(embree_scene&&) noexcept;
+
+  // The boxes are read until the next build.
+  void build(span<box const> boxes);
+
+  using leaf_function = void (*)(void* visitor, u32 id, float* far);
+  void intersect(vec3 origin, vec3 direction, float near, float far, leaf_function leaf, void* visitor) const;
+
+  static char const* version();
+
+ private:
+  struct handles;
+  std::unique_ptr<handles> handles_;
+};
+
+namespace trace_kernels {
+
+template <int Capacity, ray_program P>
+struct embree_rays {
+  embree_scene const* tree;
+  traced_scene scene;
+  P program;
+  void operator()(index_t i) const {
+    if (!program.active(i)) return;
+    trace_windows<Capacity>(scene, program, i, [this](auto const& r, auto& visitor) {
+      using visitor_type = std::remove_reference_t<decltype(visitor)>;
+      tree->intersect(
+          origin_of(r), r.direction, visitor.near(), visitor.far(),
+          [](void* v, u32 id, float* far) {
+            auto& visitor = *static_cast<visitor_type*>(v);
+            visitor.leaf(id);
+            *far = visitor.far();
+          },
+          &visitor);
+    });
+  }
+};
+
+}  // namespace trace_kernels
+
+template <host_execution E>
+class embree_tracer {
+ public:
+  static constexpr char const* name = "embree";
+  static constexpr int window = 16;
+
+  explicit embree_tracer(E& exec) : boxes_(exec) {}
+
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, vec3d frame,
+               float alpha_min, float near) {
+    boxes_.resize(scene.count);
+    parallel_for(exec, "embree/boxes", scene.count, trace_kernels::bound_ellipsoids{scene, frame, alpha_min, boxes_});
+    stage_scope stage(exec, "embree/build");
+    tree_.build(boxes_);
+    scene_ = {records.data(), scene.count, near};
+  }
+
+  template <ray_program P>
+  void trace(E& exec, char const* label, index_t rays, P const& program) {
+    parallel_for(exec, label, rays, trace_kernels::embree_rays<window, P>{&tree_, scene_, program});
+  }
+
+ private:
+  buffer<box, E> boxes_;
+  embree_scene tree_;
+  traced_scene scene_;
+};
+
+}  // namespace gart

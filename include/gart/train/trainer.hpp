@@ -1,0 +1,84 @@
+#pragma once
+// Training, one step at a time: a view, the forward pass, the loss, the backward pass by the strategy, Adam, densification.
+// Composed from the parts; each can be replaced. A loss of one's own is a callable given to step().
+//
+//   openmp_exec exec;
+//   trainer<openmp_exec, scene_traits<3>, bvh_tracer<openmp_exec>, pixel_strategy> run(exec, options, data, start);
+//   while (run.steps_done() < options.iterations) run.step();
+//   write_splat_ply("model.ply", run.model());
+//
+// The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step), so a
+// checkpoint holds parameters, moments and counters only.
+
+#include <gart/backward/backward.hpp>
+#include <gart/loss/image_loss.hpp>
+#include <gart/optim/adam.hpp>
+#include <gart/optim/adc.hpp>
+#include <gart/optim/mcmc.hpp>
+#include <gart/optim/schedule.hpp>
+#include <gart/render/forward.hpp>
+#include <gart/scene/traits.hpp>
+#include <gart/train/checkpoint.hpp>
+#include <gart/train/render_image.hpp>
+#include <gart/train/session.hpp>
+#include <gart/train/training_images.hpp>
+#include <gart/train/view_order.hpp>
+
+namespace gart {
+
+// What a loss sees: the rendered image and its view, in the policy's memory. It writes dL/d image and, into value[0..1],
+// the loss and the mean squared error.
+template <execution E>
+struct loss_input {
+  E& exec;
+  dataset_view const& view;
+  truth_view truth;
+  int width, height;
+  span<float const> image;   // [H][W][3]
+  span<float> gradient;      // [H][W][3]
+  span<float> value;         // [2]
+};
+
+template <execution E, class Traits, class Tracer, class Strategy>
+class trainer {
+ public:
+  static constexpr int sh_degree = Traits::sh_degree;
+
+  trainer(E& exec, train_options const& options, dataset const& data, gaussian_model const& start);
+
+  step_report step();
+  template <class Loss>
+  step_report step(Loss&& loss);
+
+  int steps_done() const { return step_; }
+  gaussian_model model() const { return scene_.to_host(); }
+  rendered render(camera const& view, vec3 background);
+  void save(std::filesystem::path const& path) const;
+  void load(std::filesystem::path const& path);
+  gaussians<E>& scene() { return scene_; }
+  gaussians<E> const& gradients() const { return gradients_; }
+
+ private:
+  void densify(dataset_view const& view, int degree);
+  vec3 background_of(int step) const;
+
+  E& exec_;
+  train_options options_;
+  dataset const& data_;
+  gaussians<E> scene_, gradients_;
+  optimizer_state<E> state_;
+  frame_records<E> records_;
+  Tracer tracer_;
+  backward<E> backward_;
+  image_loss<E> loss_;
+  training_images<E> images_;
+  view_order order_;
+  adc_statistics<E> adc_;
+  buffer<float, E> color_, color_gradient_, value_;
+  buffer<u32, E> skipped_;
+  int step_ = 0;
+};
+
+}  // namespace gart
+
+#include <gart/train/trainer_impl.hpp>

@@ -1,0 +1,163 @@
+#pragma once
+// Template bodies of trainer.hpp.
+
+#include <gart/train/trainer.hpp>
+
+#include <cmath>
+
+namespace gart {
+
+template <execution E, class Traits, class Tracer, class Strategy>
+trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& options, dataset const& data,
+                                              gaussian_model const& start)
+    : exec_(exec),
+      options_(options),
+      data_(data),
+      scene_(exec, start),
+      gradients_(exec, static_cast<index_t>(start.size()), sh_degree),
+      state_(exec, static_cast<index_t>(start.size()), sh_degree),
+      records_(exec),
+      tracer_(exec),
+      backward_(exec),
+      loss_(exec),
+      images_(data),
+      order_(data.train.size(), options.seed),
+      adc_(exec),
+      color_(exec),
+      color_gradient_(exec),
+      value_(exec, 2),
+      skipped_(exec, 1) {
+  if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
+  if (data.train.empty()) throw invalid_argument("trainer: the dataset has no training views");
+  skipped_.zero();
+}
+
+template <execution E, class Traits, class Tracer, class Strategy>
+step_report trainer<E, Traits, Tracer, Strategy>::step() {
+  return step([this](loss_input<E> const& in) {
+    loss_.evaluate(in.image, in.truth, in.width, in.height, options_.ssim_weight, in.gradient, in.value);
+  });
+}
+
+template <execution E, class Traits, class Tracer, class Strategy>
+template <class Loss>
+step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
+  std::size_t const index = order_.at(step_);
+  dataset_view const& view = data_.train[index];
+  int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
+  render_options render = options_.render;
+  render.background = background_of(step_);
+  auto const constant = std::as_const(scene_).view();
+  std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
+  color_.resize(floats), color_gradient_.resize(floats);
+
+  records_.prepare(exec_, constant, view.view.position, render.alpha_min);
+  tracer_.prepare(exec_, constant, records_.view(), view.view.position, render.alpha_min, render.near);
+  forward<sh_degree>(exec_, tracer_, constant, view.view, render, degree, {color_.data()},
+                     typename Strategy::record{});
+  {
+    stage_scope stage(exec_, "loss");
+    loss(loss_input<E>{exec_, view, images_.get(exec_, index, render.background), view.view.width, view.view.height,
+                       color_, color_gradient_, value_});
+  }
+  backward_.template run<sh_degree>(exec_, Strategy{}, tracer_, constant, records_.view(), view.view, render, degree,
+                                    color_, color_gradient_, gradients_);
+  densify(view, degree);
+  ++step_;
+
+  step_report report;
+  report.step = step_;
+  report.gaussians = scene_.size();
+  report.view = view.name;
+  std::vector<float> const value = value_.to_host();
+  report.loss = value[0];
+  report.psnr = value[1] > 0 ? -10.0f * std::log10(value[1]) : 99.0f;
+  return report;
+}
+
+// The optimizer's step and what grows, moves and prunes the Gaussians.
+template <execution E, class Traits, class Tracer, class Strategy>
+void trainer<E, Traits, Tracer, Strategy>::densify(dataset_view const& view, int degree) {
+  learning_rates const rates = rates_at(options_.rates, data_.extent, step_, options_.iterations);
+  if (options_.densify == densify_kind::mcmc) add_mcmc_penalties(exec_, scene_, gradients_, options_.mcmc);
+  if (options_.densify == densify_kind::adc) adc_.accumulate(exec_, scene_, gradients_, view.view);
+  adam_step(exec_, scene_, gradients_, state_, rates, step_ + 1, degree, skipped_);
+  density_change change;
+  if (options_.densify == densify_kind::mcmc) {
+    change = mcmc_step(exec_, scene_, state_, options_.mcmc, rates.mean, step_, options_.iterations,
+                       options_.max_gaussians, options_.seed);
+  } else if (options_.densify == densify_kind::adc) {
+    change = adc_step(exec_, scene_, state_, adc_, options_.adc, data_.extent, step_, options_.iterations,
+                      options_.max_gaussians, options_.seed);
+  }
+  if (change.any()) gradients_ = gaussians<E>(exec_, scene_.size(), sh_degree);
+}
+
+template <execution E, class Traits, class Tracer, class Strategy>
+vec3 trainer<E, Traits, Tracer, Strategy>::background_of(int step) const {
+  switch (options_.background) {
+    case background_kind::black: return vec3(0.0f);
+    case background_kind::white: return vec3(1.0f);
+    default: {
+      auto const w = random_source{options_.seed ^ 0x6261636bu, static_cast<u32>(step), random_use::user}.words(0);
+      return {uniform(w.v[0]), uniform(w.v[1]), uniform(w.v[2])};
+    }
+  }
+}
+
+template <execution E, class Traits, class Tracer, class Strategy>
+rendered trainer<E, Traits, Tracer, Strategy>::render(camera const& view, vec3 background) {
+  render_options options = options_.render;
+  options.background = background;
+  return render_image<sh_degree>(exec_, tracer_, records_, std::as_const(scene_).view(), view, options);
+}
+
+template <execution E, class Traits, class Tracer, class Strategy>
+void trainer<E, Traits, Tracer, Strategy>::save(std::filesystem::path const& path) const {
+  checkpoint_writer out;
+  auto const add = [&](std::string const& prefix, gaussians<E> const& g) {
+    gaussian_model const m = g.to_host();
+    out.add(prefix + "mean", m.mean), out.add(prefix + "log_scale", m.log_scale);
+    out.add(prefix + "quaternion", m.quaternion), out.add(prefix + "opacity", m.opacity), out.add(prefix + "sh", m.sh);
+  };
+  add("", scene_), add("first/", state_.first), add("second/", state_.second);
+  out.add("step", std::vector<int>{step_});
+  out.add("sh_degree", std::vector<int>{sh_degree});
+  out.add("seed", std::vector<u64>{options_.seed});
+  adc_.save(out);
+  out.write(path);
+}
+
+template <execution E, class Traits, class Tracer, class Strategy>
+void trainer<E, Traits, Tracer, Strategy>::load(std::filesystem::path const& path) {
+  checkpoint_reader in(path);
+  std::vector<int> const degree = in.get<int>("sh_degree"), step = in.get<int>("step");
+  std::vector<u64> const seed = in.get<u64>("seed");
+  if (degree.size() != 1 || step.size() != 1 || seed.size() != 1) in.fail("a counter is not one number");
+  if (degree[0] != sh_degree)
+    in.fail("is of SH degree " + std::to_string(degree[0]) + ", this run of " + std::to_string(sh_degree) +
+            ": give --sh-degree " + std::to_string(degree[0]));
+  auto const get = [&](std::string const& prefix) {
+    gaussian_model m;
+    m.sh_degree = sh_degree;
+    m.mean = in.get<float>(prefix + "mean"), m.log_scale = in.get<float>(prefix + "log_scale");
+    m.quaternion = in.get<float>(prefix + "quaternion"), m.opacity = in.get<float>(prefix + "opacity");
+    m.sh = in.get<float>(prefix + "sh");
+    gaussian_model shape;
+    shape.resize(m.size(), sh_degree);
+    if (m.mean.size() != shape.mean.size() || m.log_scale.size() != shape.log_scale.size() ||
+        m.quaternion.size() != shape.quaternion.size() || m.sh.size() != shape.sh.size())
+      in.fail("its arrays " + prefix + "* differ in length");
+    return m;
+  };
+  gaussian_model const scene = get(""), first = get("first/"), second = get("second/");
+  if (first.size() != scene.size() || second.size() != scene.size()) in.fail("its moments differ in number from its Gaussians");
+  scene_.assign(scene), state_.first.assign(first), state_.second.assign(second);
+  gradients_ = gaussians<E>(exec_, scene_.size(), sh_degree);
+  adc_.load(in);
+  options_.seed = seed[0];
+  order_ = view_order(data_.train.size(), options_.seed);
+  step_ = step[0];
+}
+
+}  // namespace gart

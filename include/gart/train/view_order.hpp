@@ -1,0 +1,37 @@
+#pragma once
+// Every training view once an epoch, in an order shuffled by (seed, epoch): a function of the step alone.
+
+#include <gart/optim/random.hpp>
+
+#include <utility>
+#include <vector>
+
+namespace gart {
+
+class view_order {
+ public:
+  view_order(std::size_t views, u64 seed) : order_(views), seed_(seed) {}
+
+  std::size_t at(int step) {
+    int const epoch = step / static_cast<int>(order_.size());
+    if (epoch != epoch_) shuffle(epoch);
+    return order_[static_cast<std::size_t>(step) % order_.size()];
+  }
+
+ private:
+  void shuffle(int epoch) {
+    random_source const source{seed_, static_cast<u32>(epoch), random_use::user};
+    for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = i;
+    for (std::size_t i = order_.size(); i > 1; --i) {
+      auto const words = source.words(i);
+      std::swap(order_[i - 1], order_[below(words.v[0], words.v[1], i)]);
+    }
+    epoch_ = epoch;
+  }
+
+  std::vector<std::size_t> order_;
+  u64 seed_;
+  int epoch_ = -1;
+};
+
+}  // namespace gart
