@@ -59,7 +59,7 @@ class trainer {
   gaussians<E> const& gradients() const { return gradients_; }
 
  private:
-  void densify(dataset_view const& view, int degree);
+  void update(dataset_view const& view, int degree);
   vec3 background_of(int step) const;
 
   E& exec_;
@@ -73,7 +73,8 @@ class trainer {
   image_loss<E> loss_;
   training_images<E> images_;
   view_order order_;
-  adc_statistics<E> adc_;
+  mcmc<E> mcmc_;
+  adaptive_density<E> adc_;
   buffer<float, E> color_, color_gradient_, value_;
   buffer<u32, E> skipped_;
   int step_ = 0;

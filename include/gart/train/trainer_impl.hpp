@@ -22,7 +22,8 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       loss_(exec),
       images_(data),
       order_(data.train.size(), options.seed),
-      adc_(exec),
+      mcmc_(exec, options.mcmc, options.max_gaussians, options.iterations, options.seed),
+      adc_(exec, options.adc, options.max_gaussians, options.iterations, data.extent, options.seed),
       color_(exec),
       color_gradient_(exec),
       value_(exec, 2),
@@ -62,8 +63,8 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   }
   backward_.template run<sh_degree>(exec_, Strategy{}, tracer_, constant, records_.view(), view.view, render, degree,
                                     color_, color_gradient_, gradients_);
-  densify(view, degree);
   ++step_;
+  update(view, degree);
 
   step_report report;
   report.step = step_;
@@ -77,20 +78,16 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
 
 // The optimizer's step and what grows, moves and prunes the Gaussians.
 template <execution E, class Traits, class Tracer, class Strategy>
-void trainer<E, Traits, Tracer, Strategy>::densify(dataset_view const& view, int degree) {
-  learning_rates const rates = rates_at(options_.rates, data_.extent, step_, options_.iterations);
-  if (options_.densify == densify_kind::mcmc) add_mcmc_penalties(exec_, scene_, gradients_, options_.mcmc);
-  if (options_.densify == densify_kind::adc) adc_.accumulate(exec_, scene_, gradients_, view.view);
-  adam_step(exec_, scene_, gradients_, state_, rates, step_ + 1, degree, skipped_);
+void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, int degree) {
+  learning_rates const rates = rates_at(options_.rates, data_.extent, step_ - 1, options_.iterations);
+  bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
+  if (use_mcmc) mcmc_.add_penalties(scene_, gradients_);
+  if (use_adc) adc_.accumulate(scene_, gradients_, view.view);
+  adam_step(exec_, scene_, gradients_, state_, rates, step_, degree, skipped_.view());
   density_change change;
-  if (options_.densify == densify_kind::mcmc) {
-    change = mcmc_step(exec_, scene_, state_, options_.mcmc, rates.mean, step_, options_.iterations,
-                       options_.max_gaussians, options_.seed);
-  } else if (options_.densify == densify_kind::adc) {
-    change = adc_step(exec_, scene_, state_, adc_, options_.adc, data_.extent, step_, options_.iterations,
-                      options_.max_gaussians, options_.seed);
-  }
-  if (change.any()) gradients_ = gaussians<E>(exec_, scene_.size(), sh_degree);
+  if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean);
+  if (use_adc) change = adc_.after_step(scene_, state_, step_);
+  if (change.added || change.removed) gradients_.resize_keep(scene_.size());
 }
 
 template <execution E, class Traits, class Tracer, class Strategy>
@@ -124,7 +121,7 @@ void trainer<E, Traits, Tracer, Strategy>::save(std::filesystem::path const& pat
   out.add("step", std::vector<int>{step_});
   out.add("sh_degree", std::vector<int>{sh_degree});
   out.add("seed", std::vector<u64>{options_.seed});
-  adc_.save(out);
+  out.add("adc/gradient_sum", adc_.gradient_sum.to_host()), out.add("adc/touched", adc_.touched.to_host());
   out.write(path);
 }
 
@@ -154,7 +151,7 @@ void trainer<E, Traits, Tracer, Strategy>::load(std::filesystem::path const& pat
   if (first.size() != scene.size() || second.size() != scene.size()) in.fail("its moments differ in number from its Gaussians");
   scene_.assign(scene), state_.first.assign(first), state_.second.assign(second);
   gradients_ = gaussians<E>(exec_, scene_.size(), sh_degree);
-  adc_.load(in);
+  adc_.gradient_sum.assign(in.get<float>("adc/gradient_sum")), adc_.touched.assign(in.get<u32>("adc/touched"));
   options_.seed = seed[0];
   order_ = view_order(data_.train.size(), options_.seed);
   step_ = step[0];

@@ -1,0 +1,134 @@
+#pragma once
+// Where on the image a Gaussian can be hit: the perspective-correct bounds of its ellipsoid |p|^2 <= cutoff, for a pinhole.
+//
+// In camera space the ellipsoid is m + A s, |s| <= 1, A = c W R S with c^2 the cutoff and rows A_x, A_y, A_z. Planes
+// x = u z through the camera touch it where (m_x - u m_z)^2 = |A_x - u A_z|^2, a quadratic in u: the roots are the bounds of
+// x / z when the ellipsoid lies in front of the camera (the paper's centre p and half-extent h in another form). When it
+// crosses the near plane z = n only the part in front counts: a root is a bound if it touches at z >= n, and the section
+// with the near plane, an ellipse, gives the others. So a Gaussian beside the camera, or around it, gets the box of what can
+// be seen of it, never more than the section demands.
+//
+// All in double: the quadratic of a small far ellipsoid cancels to a few digits in float. Then widened by what float
+// arithmetic can move a hit (32 roundings of the distance) and a hundredth of a pixel: no pixel that hits lies outside.
+
+#include <gart/math/ray_gaussian.hpp>
+
+#include <cmath>
+
+namespace gart {
+
+// Half-open: pixels x0 <= x < x1, y0 <= y < y1. Images go to 65535 a side.
+struct pixel_box {
+  u16 x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  GART_HD constexpr bool empty() const { return x1 <= x0 || y1 <= y0; }
+  GART_HD constexpr u32 width() const { return empty() ? 0u : u32{x1} - x0; }
+  GART_HD constexpr u32 height() const { return empty() ? 0u : u32{y1} - y0; }
+  GART_HD constexpr u32 area() const { return width() * height(); }
+};
+
+struct footprint {
+  pixel_box box;
+  float depth = 0;  // no hit has a smaller z in camera space: conservative near depth
+};
+
+// The pinhole a footprint is for.
+struct footprint_view {
+  mat3d to_camera;  // world to camera rotation
+  double fx, fy, cx, cy;
+  int width, height;
+  double near;      // smallest z of a hit: the ray's near distance times the least cosine of a pixel
+};
+
+namespace detail {
+
+struct interval {
+  double lo = 1e300, hi = -1e300;
+  GART_HD void add(double v) {
+    lo = v < lo ? v : lo;
+    hi = v > hi ? v : hi;
+  }
+};
+
+// Bounds of x / z over the part of the ellipsoid with z >= n. (mx, ax): centre and row of the axis; (mz, az): of depth.
+GART_HD inline interval slope_bounds(double mx, vec3d const& ax, double mz, vec3d const& az, double n) {
+  auto const dot = [](vec3d const& a, vec3d const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
+  double const zz = dot(az, az), xz = dot(ax, az), xx = dot(ax, ax);
+  interval out;
+  double const depth = sqrt(zz);
+  bool const crosses = mz - depth < n;
+  // Tangents, in slopes relative to the centre's where the centre lies in front: there nothing cancels.
+  double const base = mz > depth ? mx / mz : 0.0;
+  vec3d const bx = ax - base * az;
+  double const b0 = mx - base * mz;  // zero but for rounding where base is the centre's slope
+  double const qa = (mz - depth) * (mz + depth);
+  double const qb = b0 * mz - dot(bx, az);
+  double const qc = (b0 - sqrt(dot(bx, bx))) * (b0 + sqrt(dot(bx, bx)));
+  double const discriminant = qb * qb - qa * qc;
+  if (discriminant >= 0 && qa != 0) {
+    double const root = sqrt(discriminant);
+    double const q = qb >= 0 ? qb + root : qb - root;
+    double const slopes[2] = {q / qa, q != 0 ? qc / q : 0.0};
+    for (double const u : slopes) {
+      vec3d const normal = bx - u * az;
+      double const offset = b0 - u * mz, length2 = dot(normal, normal);
+      double const z = length2 > 0 ? mz - offset * dot(normal, az) / length2 : mz;
+      if (!crosses || z >= n) out.add(base + u);
+    }
+  }
+  if (crosses && zz > 0) {
+    // The section with z = n: centre and half-width of its x.
+    double const e = n - mz;
+    double const share = 1 - e * e / zz;
+    double const across2 = xx - xz * xz / zz;
+    double const half = share > 0 && across2 > 0 ? sqrt(share * across2) : 0.0;
+    double const center = mx + xz * e / zz;
+    out.add((center - half) / n);
+    out.add((center + half) / n);
+  }
+  return out;
+}
+
+GART_HD inline u16 first_pixel(double edge, int size) {
+  double const p = ceil(edge - 0.5);
+  return static_cast<u16>(p <= 0 ? 0 : p >= size ? size : p);
+}
+
+}  // namespace detail
+
+// `center` and `axes` (columns c R S) in world axes relative to the camera.
+GART_HD inline footprint project(footprint_view const& v, vec3d const& center, mat3d const& axes) {
+  footprint out;
+  vec3d const m = v.to_camera * center;
+  mat3d const a = v.to_camera * axes;
+  vec3d const ax(a[0][0], a[1][0], a[2][0]), ay(a[0][1], a[1][1], a[2][1]), az(a[0][2], a[1][2], a[2][2]);
+  double const depth = sqrt(az.x * az.x + az.y * az.y + az.z * az.z);
+  double const reach = fabs(center.x) + fabs(center.y) + fabs(center.z) + depth +
+                       sqrt(ax.x * ax.x + ax.y * ax.y + ax.z * ax.z) + sqrt(ay.x * ay.x + ay.y * ay.y + ay.z * ay.z);
+  double const error = 4e-6 * reach;
+  if (!(m.z + depth + error >= v.near)) return out;
+  double const nearest = m.z - depth - error > v.near ? m.z - depth - error : v.near;
+  detail::interval const u = detail::slope_bounds(m.x, ax, m.z, az, v.near);
+  detail::interval const w = detail::slope_bounds(m.y, ay, m.z, az, v.near);
+  double const pad_x = 0.01 + v.fx * error / nearest, pad_y = 0.01 + v.fy * error / nearest;
+  out.box.x0 = detail::first_pixel(v.fx * u.lo + v.cx - pad_x, v.width);
+  out.box.x1 = detail::first_pixel(v.fx * u.hi + v.cx + pad_x, v.width);
+  out.box.y0 = detail::first_pixel(v.fy * w.lo + v.cy - pad_y, v.height);
+  out.box.y1 = detail::first_pixel(v.fy * w.hi + v.cy + pad_y, v.height);
+  if (out.box.empty()) out.box = {};
+  out.depth = static_cast<float>(nearest * (1 - 1e-6));
+  return out;
+}
+
+GART_HD inline footprint gaussian_footprint(footprint_view const& v, gaussian_parameters const& g, vec3d const& frame,
+                                            float alpha_min) {
+  float const cutoff = hit_cutoff(g, alpha_min);
+  if (cutoff < 0) return {};
+  mat3 const rotation = to_matrix(g.rotation);
+  vec3 const scale = scale_of(g);
+  double const c = sqrt(static_cast<double>(cutoff));
+  mat3d axes;
+  for (int k = 0; k < 3; ++k) axes[k] = vec3d(rotation[k]) * (c * static_cast<double>(scale[k]));
+  return project(v, vec3d(g.mean) - frame, axes);
+}
+
+}  // namespace gart
