@@ -112,7 +112,8 @@ TEST_CASE("a ray goes through the point that the lens sends to its pixel") {
       for (int i = 0; i < c.width; ++i) {
         auto const d = oracle::ray_through(c, i, j);
         double camera[3];  // R^T d, R a rotation to float rounding
-        for (int a = 0; a < 3; ++a) camera[a] = c.rotation[a][0] * d.x + c.rotation[a][1] * d.y + c.rotation[a][2] * d.z;
+        for (int a = 0; a < 3; ++a)
+          camera[a] = c.rotation[a][0] * d.x + c.rotation[a][1] * d.y + c.rotation[a][2] * d.z;
         double const x = camera[0] / camera[2], y = camera[1] / camera[2], r2 = x * x + y * y;
         double const radial = 1 + c.lens.k1 * r2 + c.lens.k2 * r2 * r2;
         double const u = c.fx * (x * radial + 2 * c.lens.p1 * x * y + c.lens.p2 * (r2 + 2 * x * x)) + c.cx;

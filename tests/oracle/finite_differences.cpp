@@ -57,7 +57,8 @@ void check(oracle::scene const& s) {
       x = kept;
       difference d{doubles(3 * pixels), doubles(pixels)};
       for (std::size_t p = 0; p < pixels; ++p) {
-        usable[p] = usable[p] && same_branches(base.pixels[p], plus.pixels[p]) && same_branches(base.pixels[p], minus.pixels[p]);
+        usable[p] = usable[p] && same_branches(base.pixels[p], plus.pixels[p]) &&
+                    same_branches(base.pixels[p], minus.pixels[p]);
         for (int c = 0; c < 3; ++c) d.color[3 * p + c] = (plus.pixels[p].color[c] - minus.pixels[p].color[c]) / (2 * h);
         d.transmittance[p] = (plus.pixels[p].transmittance - minus.pixels[p].transmittance) / (2 * h);
       }

@@ -83,7 +83,8 @@ std::vector<prepared> prepare(parameters const& m, Vector3d const& origin) {
   for (std::size_t i = 0; i < m.size(); ++i) {
     double const* q = &m.quaternion[4 * i];
     Matrix3d const r = rotation_of(q[0], q[1], q[2], q[3]);
-    Vector3d const inverse_scale = Vector3d(-m.log_scale[3 * i], -m.log_scale[3 * i + 1], -m.log_scale[3 * i + 2]).array().exp();
+    Vector3d const inverse_scale =
+        Vector3d(-m.log_scale[3 * i], -m.log_scale[3 * i + 1], -m.log_scale[3 * i + 2]).array().exp();
     out[i].from_mean = origin - Vector3d(m.mean[3 * i], m.mean[3 * i + 1], m.mean[3 * i + 2]);
     out[i].to_unit = inverse_scale.asDiagonal() * r.transpose();
     out[i].sigma = 1 / (1 + std::exp(-m.opacity[i]));
@@ -93,10 +94,11 @@ std::vector<prepared> prepare(parameters const& m, Vector3d const& origin) {
 
 // Rounding of a float ray and of a float S^-1 R^T: a few units in the last place of each product.
 double const ulps = 3 * std::ldexp(1.0, -24);
-double const alpha_ulps = 1e-6;    // exp, sigmoid and their product, relative
+double const alpha_ulps = 1e-6;      // exp, sigmoid and their product, relative
 double const decision_slack = 1e-5;  // and what a decision on alpha or T is given beyond that, relative
 
-std::vector<hit> hits_of(std::vector<prepared> const& gaussians, Vector3d const& d, gart::render_options const& options) {
+std::vector<hit> hits_of(std::vector<prepared> const& gaussians, Vector3d const& d,
+                         gart::render_options const& options) {
   std::vector<hit> list;
   double const alpha_min = options.alpha_min, near = options.near;
   for (std::size_t i = 0; i < gaussians.size(); ++i) {
@@ -112,14 +114,18 @@ std::vector<hit> hits_of(std::vector<prepared> const& gaussians, Vector3d const&
     hit h;
     h.t = t, h.id = static_cast<std::uint32_t>(i);
     h.alpha = std::min(alpha_max, response);
-    h.t_slack = 1e-7 * std::abs(t) + (o_error.dot(d_g.cwiseAbs()) + d_error.dot((o_g.cwiseAbs() + 2 * std::abs(t) * d_g.cwiseAbs()))) / d_g.squaredNorm();
+    h.t_slack = 1e-7 * std::abs(t) +
+                (o_error.dot(d_g.cwiseAbs()) + d_error.dot((o_g.cwiseAbs() + 2 * std::abs(t) * d_g.cwiseAbs()))) /
+                    d_g.squaredNorm();
     h.alpha_slack = alpha_ulps + p.cwiseAbs().dot(o_error + std::abs(t) * d_error);
     h.clamps = response > alpha_max ? 8u : 0u;
-    h.marginal = std::abs(response - alpha_min) <= (decision_slack + h.alpha_slack) * alpha_min || std::abs(t - near) <= h.t_slack;
+    h.marginal = std::abs(response - alpha_min) <= (decision_slack + h.alpha_slack) * alpha_min ||
+                 std::abs(t - near) <= h.t_slack;
     h.counted = h.alpha >= alpha_min && t > near;
     if (h.counted || (h.marginal && t > near - h.t_slack)) list.push_back(h);
   }
-  std::sort(list.begin(), list.end(), [](hit const& a, hit const& b) { return a.t < b.t || (a.t == b.t && a.id < b.id); });
+  std::sort(list.begin(), list.end(),
+            [](hit const& a, hit const& b) { return a.t < b.t || (a.t == b.t && a.id < b.id); });
   return list;
 }
 
@@ -130,7 +136,8 @@ struct shaded {
 };
 
 shaded shade(parameters const& m, std::uint32_t id, double const y[16], int active_degree) {
-  std::size_t const all = std::size_t(m.sh_degree + 1) * (m.sh_degree + 1), active = std::size_t(active_degree + 1) * (active_degree + 1);
+  std::size_t const all = std::size_t(m.sh_degree + 1) * (m.sh_degree + 1),
+                    active = std::size_t(active_degree + 1) * (active_degree + 1);
   double const* sh = &m.sh[3 * all * id];
   shaded s{Vector3d::Constant(0.5), 0, false};
   for (std::size_t k = 0; k < active; ++k) s.color += y[k] * Vector3d(sh[3 * k], sh[3 * k + 1], sh[3 * k + 2]);
@@ -178,21 +185,33 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
       break;
     }
   }
+  // Equal in every bit is the same geometry twice, ordered by id in any arithmetic: no tie.
+  auto const tied = [](hit const& a, hit const& b) { return a.t != b.t && b.t - a.t <= a.t_slack + b.t_slack; };
+  // Where the last hit may trade places with a neighbour, the ray may end one hit sooner or later.
+  if (transmittance < t_min) {
+    if (end > 1) out.edge |= tied(list[end - 2], list[end - 1]);
+    if (end < list.size()) out.edge |= tied(list[end - 1], list[end]);
+  }
   list.resize(end);
   out.transmittance = transmittance;
   Vector3d behind = background;
-  double clear_behind = 1;
+  double clear_behind = 1, alpha_rounding = 0;  // the latter squared: the hits' roundings are independent
   for (std::size_t i = steps.size(); i-- > 0;) {
     step& s = steps[i];
     s.behind = behind, s.clear_behind = clear_behind;
     double const weight = s.transmittance * s.h.alpha;
-    out.rounding += weight * (s.h.marginal ? 1 : s.h.alpha_slack) * (s.color - behind).cwiseAbs().maxCoeff();
+    double const contrast = weight * (s.color - behind).cwiseAbs().maxCoeff();
+    if (s.h.marginal)
+      out.rounding += contrast;
+    else
+      alpha_rounding += contrast * contrast * s.h.alpha_slack * s.h.alpha_slack;
     if (!s.h.counted) continue;
     behind = s.h.alpha * s.color + (1 - s.h.alpha) * behind;
     clear_behind *= 1 - s.h.alpha;
     out.depth += weight * s.h.t;
     ++out.hits;
   }
+  out.rounding += std::sqrt(alpha_rounding);
   for (int c = 0; c < 3; ++c) out.color[c] = behind[c];
 
   double widest = 0;
@@ -200,16 +219,15 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
   for (std::size_t i = 0; i < steps.size(); ++i)
     for (std::size_t j = i + 1; j < steps.size() && steps[j].h.t - steps[i].h.t <= steps[i].h.t_slack + widest; ++j) {
       step const &a = steps[i], &b = steps[j];
-      // Equal in every bit: the same geometry twice, ordered by id in any arithmetic.
-      if (a.h.t == b.h.t || b.h.t - a.h.t > a.h.t_slack + b.h.t_slack) continue;
+      if (!tied(a.h, b.h)) continue;
       out.rounding += a.transmittance * a.h.alpha * b.h.alpha * (a.color - b.color).cwiseAbs().maxCoeff();
     }
   steps.erase(std::remove_if(steps.begin(), steps.end(), [](step const& s) { return !s.h.counted; }), steps.end());
   return steps;
 }
 
-// alpha below its clamp and its derivatives by mean, log-scale, quaternion and opacity, by forward differentiation of the
-// definition.
+// alpha below its clamp and its derivatives by mean, log-scale, quaternion and opacity, by forward differentiation of
+// the definition.
 using dual = Eigen::AutoDiffScalar<Eigen::Matrix<double, 11, 1>>;
 
 dual response_of(parameters const& m, std::size_t i, Vector3d const& origin, Vector3d const& d) {
@@ -283,11 +301,14 @@ parameters gradients(parameters const& m, gart::camera const& c, gart::render_op
                      std::vector<double> const& color_gradient, std::vector<double> const& transmittance_gradient) {
   check_degree(m, active_degree);
   std::size_t const pixels = std::size_t(c.width) * c.height;
-  if (color_gradient.size() != 3 * pixels || (!transmittance_gradient.empty() && transmittance_gradient.size() != pixels))
+  if (color_gradient.size() != 3 * pixels ||
+      (!transmittance_gradient.empty() && transmittance_gradient.size() != pixels))
     throw std::invalid_argument("oracle: a gradient image must have the size of the camera's image");
   parameters g = m;
-  for (auto* group : {&g.mean, &g.log_scale, &g.quaternion, &g.opacity, &g.sh}) std::fill(group->begin(), group->end(), 0.0);
-  std::size_t const all = std::size_t(m.sh_degree + 1) * (m.sh_degree + 1), active = std::size_t(active_degree + 1) * (active_degree + 1);
+  for (auto* group : {&g.mean, &g.log_scale, &g.quaternion, &g.opacity, &g.sh})
+    std::fill(group->begin(), group->end(), 0.0);
+  std::size_t const all = std::size_t(m.sh_degree + 1) * (m.sh_degree + 1),
+                    active = std::size_t(active_degree + 1) * (active_degree + 1);
 
   Vector3d const origin = origin_of(c);
   auto const gaussians = prepare(m, origin);
@@ -305,7 +326,8 @@ parameters gradients(parameters const& m, gart::camera const& c, gart::render_op
       double const weight = s.transmittance * s.h.alpha;
       for (int channel = 0; channel < 3; ++channel)
         if (!(s.h.clamps >> channel & 1))
-          for (std::size_t k = 0; k < active; ++k) g.sh[3 * (all * i + k) + channel] += by_color[channel] * weight * y[k];
+          for (std::size_t k = 0; k < active; ++k)
+            g.sh[3 * (all * i + k) + channel] += by_color[channel] * weight * y[k];
       if (s.h.clamps & 8) continue;
       double const by_alpha = s.transmittance * (by_color.dot(s.color - s.behind) - by_transmittance * s.clear_behind);
       auto const slope = (by_alpha * response_of(m, i, origin, d).derivatives()).eval();

@@ -6,7 +6,8 @@
 // For a ray o + t d, |d| = 1, and a Gaussian with M = S^-1 R^T:
 //   o_g = M (o - mean), d_g = M d, t = -o_g.d_g / d_g.d_g, p = o_g + t d_g,
 //   alpha = min(0.99, sigmoid(opacity) exp(-|p|^2 / 2)), a hit when alpha >= alpha_min and t > near,
-//   colour = sum_i T_i alpha_i c_i + T background, T_(i+1) = T_i (1 - alpha_i), in the order (t, id), until T < transmittance_min.
+//   colour = sum_i T_i alpha_i c_i + T background, T_(i+1) = T_i (1 - alpha_i), in the order (t, id), until T <
+//   transmittance_min.
 //
 // Every decision is also asked how far it is from going the other way in float: see pixel.
 
@@ -34,9 +35,9 @@ struct hit {
   double t = 0, t_slack = 0;
   std::uint32_t id = 0;
   double alpha = 0, alpha_slack = 0;
-  bool counted = true;   // false: just misses a threshold, and is listed because float may see a hit
-  bool marginal = false; // within rounding of alpha_min or near, on either side
-  unsigned clamps = 0;   // bits 0-2: colour channel held at 0; bit 3: alpha held at 0.99
+  bool counted = true;    // false: just misses a threshold, and is listed because float may see a hit
+  bool marginal = false;  // within rounding of alpha_min or near, on either side
+  unsigned clamps = 0;    // bits 0-2: colour channel held at 0; bit 3: alpha held at 0.99
 };
 
 struct pixel {
@@ -44,9 +45,10 @@ struct pixel {
   double transmittance = 1, depth = 0;  // depth = sum of weight * t
   std::uint32_t hits = 0;
   std::vector<hit> list;  // in order, up to the end of the ray, with the marginal misses in between
-  double rounding = 0;    // bound on what rounding, each undecided order and each undecided hit may do to a colour channel
-  bool edge = false;      // some hit is marginal, or T is within rounding of transmittance_min
-  bool kink = false;      // some alpha is within rounding of 0.99, or some colour of 0: the derivative may jump
+  double rounding = 0;    // what float rounding, each undecided order and each undecided hit may do to a colour channel
+  bool edge =
+      false;  // a hit is marginal, T within rounding of transmittance_min, or the order at the ray's end undecided
+  bool kink = false;  // some alpha is within rounding of 0.99, or some colour of 0: the derivative may jump
 };
 
 struct picture {
@@ -57,11 +59,10 @@ struct picture {
 // `active_degree` <= the model's degree limits the bands evaluated.
 picture render(parameters const&, gart::camera const&, gart::render_options const&, int active_degree);
 
-// Gradient of L given dL/dcolour [height][width][3] and, where not empty, dL/dtransmittance [height][width]. A clamp that
-// holds has derivative zero.
+// Gradient of L given dL/dcolour [height][width][3] and, where not empty, dL/dtransmittance [height][width]. A clamp
+// that holds has derivative zero.
 parameters gradients(parameters const&, gart::camera const&, gart::render_options const&, int active_degree,
-                     std::vector<double> const& color_gradient,
-                     std::vector<double> const& transmittance_gradient = {});
+                     std::vector<double> const& color_gradient, std::vector<double> const& transmittance_gradient = {});
 
 // Unit direction, in the world, of the ray through the centre of pixel (i, j). Throws where the lens has no inverse.
 struct direction {

@@ -97,8 +97,7 @@ gart::render_options options_of(random& rng) {
 
 scene cloud(random& rng, std::string name, int degree, int active_degree, vec3d centre) {
   builder b(rng, degree);
-  for (int i = 0; i < 80; ++i)
-    b.add(vec3(centre) + b.inside(1.0f), b.axes(0.05f, 0.6f), rng.uniform(-3.0f, 3.0f));
+  for (int i = 0; i < 80; ++i) b.add(vec3(centre) + b.inside(1.0f), b.axes(0.05f, 0.6f), rng.uniform(-3.0f, 3.0f));
   return {name, b.model, look_at(rng, centre, 3.0f, 37, 23, 0.9f), options_of(rng), active_degree};
 }
 
@@ -128,7 +127,7 @@ std::vector<scene> scenes(std::uint64_t seed) {
     // One axis a thousand times the others, then one a thousandth of the others.
     builder needles(rng, 3), pancakes(rng, 2);
     for (int i = 0; i < 60; ++i) {
-      float const thin = std::exp(rng.uniform(std::log(0.008f), std::log(0.05f)));
+      float const thin = std::exp(rng.uniform(std::log(0.02f), std::log(0.06f)));
       float const wide = thin * std::exp(rng.uniform(std::log(30.0f), std::log(1000.0f)));
       needles.add(needles.inside(1.0f), {wide, thin, thin * rng.uniform(1.0f, 2.0f)}, rng.uniform(-1.0f, 4.0f));
       pancakes.add(pancakes.inside(1.0f), {wide, wide * rng.uniform(0.5f, 1.0f), thin}, rng.uniform(-3.0f, 1.0f));
@@ -150,7 +149,8 @@ std::vector<scene> scenes(std::uint64_t seed) {
   {
     builder b(rng, 2);
     for (int i = 0; i < 50; ++i) b.add(b.inside(5.0f), b.axes(1.0f, 20.0f), rng.uniform(-4.0f, 0.0f));
-    all.push_back({"huge, around the camera", b.model, look_at(rng, {0, 0, 0}, 0.1f, 37, 23, 0.4f), options_of(rng), 2});
+    all.push_back(
+        {"huge, around the camera", b.model, look_at(rng, {0, 0, 0}, 0.1f, 37, 23, 0.4f), options_of(rng), 2});
   }
   {
     // Rays end after two hits at the clamp; the threshold keeps clear of 0.01^2.
@@ -161,13 +161,15 @@ std::vector<scene> scenes(std::uint64_t seed) {
     all.push_back(s);
   }
   {
+    // Faint, so that the few orders which rounding decides do not show.
     builder b(rng, 1);
-    for (int i = 0; i < 3000; ++i) b.add(b.inside(1.0f), b.axes(0.2f, 0.7f), rng.uniform(-5.0f, -3.5f));
-    scene s{"thousands on a ray", b.model, look_at(rng, {0, 0, 0}, 4.0f, 7, 5, 6.0f), options_of(rng), 1};
+    for (int i = 0; i < 2400; ++i) b.add(b.inside(1.0f), b.axes(0.3f, 1.0f), rng.uniform(-6.5f, -4.5f));
+    scene s{"thousands on a ray", b.model, look_at(rng, {0, 0, 0}, 4.0f, 3, 3, 6.0f), options_of(rng), 1};
+    s.options.alpha_min = 5e-4f;
     s.options.transmittance_min = 0;
     all.push_back(s);
     s.name = "thousands on a ray, ended early";
-    s.options.transmittance_min = 1e-4f;
+    s.options.transmittance_min = 0.02f;
     all.push_back(s);
   }
   {
