@@ -1,0 +1,315 @@
+#pragma once
+// The training loss of an image x against the truth y, and its gradient in x:
+//   L = (1 - w) mean|x - y| + w (1 - mean SSIM(x, y)),
+// means over all pixels and the three channels. The image is taken as it is, not clamped to [0, 1].
+//
+// SSIM is written in d = x - y, because near the optimum x and y agree and their difference is what must not cancel:
+//   SSIM = (1 - m_d^2 / B1) (1 - s_dd / B2),  B1 = m_x^2 + m_y^2 + C1,  B2 = s_xx + s_yy + C2
+// with m the window's means and s its variances, which is the usual formula, as 2ab = a^2 + b^2 - (a - b)^2. Four
+// convolutions are then enough (y, d, x^2 + y^2, d^2), taken of x - 1/2 and y - 1/2 so that the variances of bright
+// flat areas survive float; where x = y in the whole window the gradient is exactly zero. With S = l c the two factors,
+//   dS/dm_x = 2 l (m_d - (1 - c)(m_x - 1/2)) / B2 - 2 c (m_d - (1 - l) m_x) / B1,
+//   dS/de = l (1 - c) / B2,  dS/df = -l / B2  for e, f the windowed means of x^2 + y^2 and d^2,
+// and the gradient at a pixel is the windowed sum of dS/dm_x + 2 (x - 1/2) dS/de + 2 d dS/df.
+//
+// Three launches: differences; SSIM with its three partials; their convolution. Memory: 60 bytes a pixel.
+
+#include <gart/algorithm/reduce.hpp>
+#include <gart/exec/buffer.hpp>
+#include <gart/loss/ssim_window.hpp>
+#include <gart/math/arith.hpp>
+#include <gart/math/glm.hpp>
+
+namespace gart {
+
+// The truth in the policy's memory, 8 bits a channel, row-major.
+struct truth_view {
+  u8 const* pixels = nullptr;  // [H][W][channels]
+  int channels = 3;            // 3, or 4 with straight alpha: rgb * a + background * (1 - a)
+  u8 const* mask = nullptr;    // [H][W], or null; where it is 0 the image counts as equal to the truth: no loss, no
+                               // gradient, and the means still divide by all pixels
+  vec3 background{0.0f};
+};
+
+namespace detail {
+
+// Planes are [3][H][W]: one a channel.
+struct loss_image {
+  int width = 0, height = 0;
+  GART_HD std::size_t pixels() const { return static_cast<std::size_t>(width) * height; }
+};
+
+struct difference_kernel {
+  float const* image;
+  truth_view truth;
+  loss_image size;
+  float* centred_truth;  // y - 1/2
+  float* difference;     // x - y
+
+  GART_HD void operator()(index_t pixel) const {
+    u8 const* const t = truth.pixels + std::size_t{pixel} * truth.channels;
+    bool const used = !truth.mask || truth.mask[pixel] != 0;
+    float const alpha = truth.channels == 4 ? static_cast<float>(t[3]) * (1.0f / 255.0f) : 1.0f;
+    for (int c = 0; c < 3; ++c) {
+      float const y = fma(static_cast<float>(t[c]) * (1.0f / 255.0f), alpha, truth.background[c] * (1.0f - alpha));
+      std::size_t const at = c * size.pixels() + pixel;
+      centred_truth[at] = y - 0.5f;
+      difference[at] = used ? image[std::size_t{pixel} * 3 + c] - y : 0.0f;
+    }
+  }
+};
+
+// Tiles of 32 x 16 pixels of one channel, with a halo of the window's radius. A lane of a device takes one pixel at a
+// time, a host's takes 16, which its compiler puts in vector registers.
+template <execution E>
+struct loss_tiles {
+  static constexpr int block = E::device ? 1 : 16;
+  static constexpr int width = 32, height = 16;
+  static constexpr int halo_width = width + 2 * ssim_window::radius, halo_height = height + 2 * ssim_window::radius;
+  static constexpr int halo_pitch = (halo_width + block - 1) / block * block;
+  static constexpr int halo_size = halo_pitch * halo_height;
+  static constexpr int rows_size = width * halo_height;
+
+  loss_image image;
+  GART_HD int across() const { return (image.width + width - 1) / width; }
+  GART_HD int down() const { return (image.height + height - 1) / height; }
+  GART_HD index_t count() const { return static_cast<index_t>(3) * across() * down(); }
+
+  struct place {
+    int channel, x, y;
+  };
+  GART_HD place operator()(index_t tile) const {
+    index_t const plane = static_cast<index_t>(across()) * down(), in_plane = tile % plane;
+    return {static_cast<int>(tile / plane), static_cast<int>(in_plane % across()) * width,
+            static_cast<int>(in_plane / across()) * height};
+  }
+
+  // f(cell, i, inside) for every cell of the haloed tile; i is its pixel's place in [3][H][W] where it is inside.
+  template <class Team, class F>
+  GART_KERNEL void each_halo_cell(Team const& team, place const& at, F const& f) const {
+    constexpr int blocks = halo_pitch / block;
+    team.for_each(blocks * halo_height, [&](index_t item) {
+      int const row = item / blocks, first = item % blocks * block, y = at.y + row - ssim_window::radius;
+      bool const row_inside = y >= 0 && y < image.height;
+      std::ptrdiff_t const start = at.channel * image.pixels() + static_cast<std::ptrdiff_t>(y) * image.width;
+      for (int v = 0; v < block; ++v) {
+        int const x = at.x + first + v - ssim_window::radius;
+        f(row * halo_pitch + first + v, start + x, row_inside && x >= 0 && x < image.width);
+      }
+    });
+  }
+
+  // The window's sum of 11 values `step` apart, the middle one at p[5 * step].
+  static GART_HD GART_INLINE float windowed(float const* p, int step) {
+    constexpr float w[6] = {weight<0>, weight<1>, weight<2>, weight<3>, weight<4>, weight<5>};
+    float sum = w[5] * p[5 * step];
+    sum = fma(w[4], p[4 * step] + p[6 * step], sum);
+    sum = fma(w[3], p[3 * step] + p[7 * step], sum);
+    sum = fma(w[2], p[2 * step] + p[8 * step], sum);
+    sum = fma(w[1], p[step] + p[9 * step], sum);
+    return fma(w[0], p[0] + p[10 * step], sum);
+  }
+  template <int Tap>
+  static constexpr float weight = static_cast<float>(ssim_window::weight(Tap));
+
+  template <int Planes>
+  static GART_HD GART_INLINE void convolve(float const* in, int plane, int step, float (&sums)[Planes][block]) {
+    for (int p = 0; p < Planes; ++p)
+      for (int v = 0; v < block; ++v) sums[p][v] = windowed(in + p * plane + v, step);
+  }
+
+  // Along rows: from haloed planes to planes of `width` by halo_height.
+  template <int Planes, class Team>
+  static GART_KERNEL void convolve_rows(Team const& team, float const* halo, float* rows) {
+    team.for_each(rows_size / block, [&](index_t item) {
+      int const row = item * block / width, x = item * block % width;
+      float sums[Planes][block];
+      convolve<Planes>(halo + row * halo_pitch + x, halo_size, 1, sums);
+      for (int p = 0; p < Planes; ++p)
+        for (int v = 0; v < block; ++v) rows[p * rows_size + row * width + x + v] = sums[p][v];
+    });
+  }
+};
+
+template <execution E>
+struct ssim_kernel {
+  using tiles = loss_tiles<E>;
+  struct scratch {
+    float halo[4][tiles::halo_size];  // y - 1/2, d, (x - 1/2)^2 + (y - 1/2)^2, d^2
+    float rows[4][tiles::rows_size];
+    float loss[tiles::height * tiles::width], square[tiles::height * tiles::width];
+    float column_loss[tiles::width], column_square[tiles::width];
+  };
+  tiles grid;
+  float const* centred_truth;
+  float const* difference;
+  float* partials;     // [3 partials][3][H][W]
+  float* tile_loss;    // [tiles], divided by the count of values
+  float* tile_square;
+  float weight;
+
+  template <class Team>
+  GART_KERNEL void operator()(Team const& team) const {
+    scratch& s = team.scratch();
+    auto const at = grid(team.tile());
+    std::size_t const pixels = grid.image.pixels(), plane = at.channel * pixels;
+    int const image_width = grid.image.width, image_height = grid.image.height;
+
+    grid.each_halo_cell(team, at, [&](int cell, std::ptrdiff_t i, bool inside) {
+      float const truth = inside ? centred_truth[i] : -0.5f, d = inside ? difference[i] : 0.0f;
+      float const value = truth + d;
+      s.halo[0][cell] = truth, s.halo[1][cell] = d;
+      s.halo[2][cell] = fma(value, value, truth * truth), s.halo[3][cell] = d * d;
+    });
+    team.barrier();
+    tiles::template convolve_rows<4>(team, &s.halo[0][0], &s.rows[0][0]);
+    team.barrier();
+
+    team.for_each(tiles::height * tiles::width / tiles::block, [&](index_t item) {
+      int const row = item * tiles::block / tiles::width, column = item * tiles::block % tiles::width;
+      float sums[4][tiles::block];
+      tiles::template convolve<4>(&s.rows[0][row * tiles::width + column], tiles::rows_size, tiles::width, sums);
+      float out[3][tiles::block];
+      float const* const d =
+          &s.halo[1][(row + ssim_window::radius) * tiles::halo_pitch + column + ssim_window::radius];
+      for (int v = 0; v < tiles::block; ++v) {
+        float const difference_mean = sums[1][v], centred = sums[0][v] + difference_mean;
+        float const mean = centred + 0.5f, truth_mean = sums[0][v] + 0.5f;
+        float const spread = sums[2][v] - centred * centred - sums[0][v] * sums[0][v];
+        float const spread_d = sums[3][v] - difference_mean * difference_mean;
+        float const inverse_b1 = 1.0f / (mean * mean + truth_mean * truth_mean + c1);
+        float const inverse_b2 = 1.0f / ((spread > 0 ? spread : 0.0f) + c2);
+        float const missing_l = difference_mean * difference_mean * inverse_b1;
+        float const missing_c = (spread_d > 0 ? spread_d : 0.0f) * inverse_b2;
+        float const l = 1.0f - missing_l, c = 1.0f - missing_c;
+        out[0][v] = 2.0f * (l * (difference_mean - missing_c * centred) * inverse_b2 -
+                            c * (difference_mean - missing_l * mean) * inverse_b1);
+        out[1][v] = l * missing_c * inverse_b2;
+        out[2][v] = -l * inverse_b2;
+        float const error = missing_l + missing_c - missing_l * missing_c;  // 1 - SSIM
+        s.loss[row * tiles::width + column + v] = weight * error + (1.0f - weight) * fabsf(d[v]);
+        s.square[row * tiles::width + column + v] = d[v] * d[v];
+      }
+      int const y = at.y + row;
+      for (int v = 0; v < tiles::block; ++v) {
+        int const x = at.x + column + v;
+        if (y < image_height && x < image_width) {
+          std::size_t const i = plane + static_cast<std::size_t>(y) * image_width + x;
+          for (int p = 0; p < 3; ++p) partials[p * 3 * pixels + i] = out[p][v];
+        } else {
+          s.loss[row * tiles::width + column + v] = s.square[row * tiles::width + column + v] = 0;
+        }
+      }
+    });
+    team.barrier();
+
+    team.for_each(tiles::width, [&](index_t column) {
+      float loss = 0, square = 0;
+      for (int row = 0; row < tiles::height; ++row)
+        loss += s.loss[row * tiles::width + column], square += s.square[row * tiles::width + column];
+      s.column_loss[column] = loss, s.column_square[column] = square;
+    });
+    team.barrier();
+    team.for_each(1, [&](index_t) {
+      float loss = 0, square = 0;
+      for (int column = 0; column < tiles::width; ++column)
+        loss += s.column_loss[column], square += s.column_square[column];
+      float const share = 1.0f / (3.0f * static_cast<float>(pixels));
+      tile_loss[team.tile()] = loss * share, tile_square[team.tile()] = square * share;
+    });
+  }
+
+  static constexpr float c1 = static_cast<float>(ssim_window::c1), c2 = static_cast<float>(ssim_window::c2);
+};
+
+template <execution E>
+struct loss_gradient_kernel {
+  using tiles = loss_tiles<E>;
+  struct scratch {
+    float halo[3][tiles::halo_size];
+    float rows[3][tiles::rows_size];
+  };
+  tiles grid;
+  float const* centred_truth;
+  float const* difference;
+  float const* partials;
+  u8 const* mask;
+  float* gradient;
+  float weight;
+
+  template <class Team>
+  GART_KERNEL void operator()(Team const& team) const {
+    scratch& s = team.scratch();
+    auto const at = grid(team.tile());
+    std::size_t const pixels = grid.image.pixels(), plane = at.channel * pixels;
+    int const image_width = grid.image.width, image_height = grid.image.height;
+
+    grid.each_halo_cell(team, at, [&](int cell, std::ptrdiff_t i, bool inside) {
+      for (int p = 0; p < 3; ++p) s.halo[p][cell] = inside ? partials[p * 3 * pixels + i] : 0.0f;
+    });
+    team.barrier();
+    tiles::template convolve_rows<3>(team, &s.halo[0][0], &s.rows[0][0]);
+    team.barrier();
+
+    float const share = 1.0f / (3.0f * static_cast<float>(pixels));
+    team.for_each(tiles::height * tiles::width / tiles::block, [&](index_t item) {
+      int const row = item * tiles::block / tiles::width, column = item * tiles::block % tiles::width;
+      float sums[3][tiles::block];
+      tiles::template convolve<3>(&s.rows[0][row * tiles::width + column], tiles::rows_size, tiles::width, sums);
+      int const y = at.y + row, x = at.x + column;
+      if (y >= image_height) return;
+      int const inside = image_width - x < tiles::block ? image_width - x : tiles::block;
+      std::size_t const pixel = static_cast<std::size_t>(y) * image_width + x;
+      float const* const d_row = difference + plane + pixel;
+      float const* const truth_row = centred_truth + plane + pixel;
+      float out[tiles::block];
+      for (int v = 0; v < inside; ++v) {
+        float const d = d_row[v], value = truth_row[v] + d;
+        float const sign = d > 0 ? 1.0f : d < 0 ? -1.0f : d;  // a NaN stays one
+        float const structure = sums[0][v] + 2.0f * (value * sums[1][v] + d * sums[2][v]);
+        out[v] = ((1.0f - weight) * sign - weight * structure) * share;
+      }
+      for (int v = 0; v < inside; ++v)
+        gradient[(pixel + v) * 3 + at.channel] = !mask || mask[pixel + v] != 0 ? out[v] : 0.0f;
+    });
+  }
+};
+
+}  // namespace detail
+
+template <execution E>
+class image_loss {
+ public:
+  explicit image_loss(E& exec) : exec_(&exec), planes_(exec), partials_(exec), sums_(exec) {}
+
+  // `image` and `gradient` are [H][W][3]; `loss` is two floats of the policy's memory: L, and the mean squared error.
+  void evaluate(span<float const> image, truth_view truth, int width, int height, float ssim_weight,
+                span<float> gradient, span<float> loss) {
+    E& exec = *exec_;
+    stage_scope stage(exec, "loss");
+    detail::loss_tiles<E> const grid{{width, height}};
+    std::size_t const values = 3 * grid.image.pixels();
+    planes_.resize(2 * values), partials_.resize(3 * values), sums_.resize(std::size_t{2} * grid.count());
+    float* const truth_plane = planes_.data();
+    float* const difference = planes_.data() + values;
+    span<float> const tile_loss = sums_.view().subspan(0, grid.count());
+    span<float> const tile_square = sums_.view().subspan(grid.count(), grid.count());
+
+    parallel_for(exec, "loss_difference", static_cast<index_t>(grid.image.pixels()),
+                 detail::difference_kernel{image.data(), truth, grid.image, truth_plane, difference});
+    parallel_for(exec, "loss_ssim", tile_range{grid.count(), 256},
+                 detail::ssim_kernel<E>{grid, truth_plane, difference, partials_.data(), tile_loss.data(),
+                                        tile_square.data(), ssim_weight});
+    parallel_for(exec, "loss_gradient", tile_range{grid.count(), 256},
+                 detail::loss_gradient_kernel<E>{grid, truth_plane, difference, partials_.data(), truth.mask,
+                                                 gradient.data(), ssim_weight});
+    reduce(exec, span<float const>(tile_loss), loss.subspan(0, 1));
+    reduce(exec, span<float const>(tile_square), loss.subspan(1, 1));
+  }
+
+ private:
+  E* exec_;
+  buffer<float, E> planes_, partials_, sums_;
+};
+
+}  // namespace gart

@@ -1,0 +1,157 @@
+#include <support/policies.hpp>
+
+#include <gart/loss/image_loss.hpp>
+
+#include "oracle.hpp"
+
+using namespace gart;
+
+namespace {
+
+struct case_data {
+  int width, height;
+  std::vector<float> image;
+  std::vector<u8> truth, mask;
+  int channels = 3;
+  vec3 background{0.0f};
+
+  // What the loss compares, in double.
+  std::vector<double> truth_values() const {
+    std::vector<double> y(image.size());
+    for (std::size_t p = 0; p < image.size() / 3; ++p)
+      for (int c = 0; c < 3; ++c) {
+        double const alpha = channels == 4 ? truth[p * 4 + 3] / 255.0 : 1.0;
+        y[p * 3 + c] = truth[p * channels + c] / 255.0 * alpha + background[c] * (1 - alpha);
+      }
+    return y;
+  }
+  std::vector<double> image_values(std::vector<double> const& y) const {
+    std::vector<double> x(image.begin(), image.end());
+    for (std::size_t i = 0; i < x.size(); ++i)
+      if (!mask.empty() && mask[i / 3] == 0) x[i] = y[i];
+    return x;
+  }
+};
+
+// A smooth image with noise of the given size around the truth: what training sees.
+case_data make_case(int width, int height, int channels, bool masked, double noise, std::mt19937_64& random) {
+  std::uniform_real_distribution<double> u(0, 1);
+  case_data d{width, height, {}, {}, {}, channels, vec3(0.2f, 0.9f, 0.5f)};
+  d.image.resize(static_cast<std::size_t>(width) * height * 3);
+  d.truth.resize(static_cast<std::size_t>(width) * height * channels);
+  for (auto& t : d.truth) t = static_cast<u8>(u(random) < 0.5 ? 200 : 255 * u(random));
+  if (masked) {
+    d.mask.resize(static_cast<std::size_t>(width) * height);
+    for (auto& m : d.mask) m = u(random) < 0.3 ? 0 : 255;
+  }
+  auto const y = d.truth_values();
+  for (std::size_t i = 0; i < y.size(); ++i) d.image[i] = static_cast<float>(y[i] + noise * (2 * u(random) - 1) + 0.01);
+  return d;
+}
+
+struct result {
+  std::vector<float> gradient, loss;
+};
+
+template <class E>
+result evaluate(E& exec, case_data const& d, float weight) {
+  buffer<float, E> image(exec, d.image), gradient(exec, d.image.size()), loss(exec, 2);
+  buffer<u8, E> truth(exec, d.truth), mask(exec, d.mask);
+  image_loss<E> l(exec);
+  l.evaluate(image, {truth.data(), d.channels, d.mask.empty() ? nullptr : mask.data(), d.background}, d.width, d.height,
+             weight, gradient, loss);
+  return {gradient.to_host(), loss.to_host()};
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("loss and gradient are those of the definition", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  E exec;
+  struct {
+    int width, height, channels;
+    bool masked;
+    double noise;
+    float weight;
+  } const cases[] = {{37, 21, 3, false, 0.5, 0.2f}, {33, 17, 4, false, 0.02, 0.2f}, {32, 16, 3, true, 0.3, 0.5f},
+                     {5, 40, 4, true, 0.3, 1.0f},   {1, 1, 3, false, 0.5, 0.2f},     {70, 3, 3, false, 0.2, 0.0f}};
+  for (auto const& c : cases) {
+    CAPTURE(c.width);
+    CAPTURE(c.height);
+    case_data const d = make_case(c.width, c.height, c.channels, c.masked, c.noise, random);
+    result const got = evaluate(exec, d, c.weight);
+    auto const y = d.truth_values();
+    auto x = d.image_values(y);
+    auto const expected = gart_test::naive_loss(x, y, c.width, c.height);
+    CHECK(got.loss[0] == doctest::Approx(expected.total(c.weight)).epsilon(1e-5));
+    CHECK(got.loss[1] == doctest::Approx(expected.mse).epsilon(1e-5));
+
+    // Central differences of the definition, at some pixels; relative to the largest gradient.
+    double largest = 0, worst = 0;
+    for (float const g : got.gradient) largest = std::max(largest, std::abs(static_cast<double>(g)));
+    CHECK(largest > 0);
+    for (int sample = 0; sample < 60; ++sample) {
+      std::size_t const i = random() % x.size();
+      if (!d.mask.empty() && d.mask[i / 3] == 0) {
+        CHECK(got.gradient[i] == 0.0f);
+        continue;
+      }
+      double const h = 1e-6, kept = x[i];
+      if (std::abs(kept - y[i]) < 2 * h) continue;
+      x[i] = kept + h;
+      double const above = gart_test::naive_loss(x, y, c.width, c.height).total(c.weight);
+      x[i] = kept - h;
+      double const below = gart_test::naive_loss(x, y, c.width, c.height).total(c.weight);
+      x[i] = kept;
+      worst = std::max(worst, std::abs((above - below) / (2 * h) - got.gradient[i]));
+    }
+    CHECK(worst < 1e-4 * largest);
+  }
+}
+
+TEST_CASE_TEMPLATE("an image that equals the truth has no loss and no gradient at all", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  E exec;
+  case_data d = make_case(45, 30, 3, false, 0, random);
+  for (std::size_t i = 0; i < d.image.size(); ++i) d.image[i] = static_cast<float>(d.truth[i]) * (1.0f / 255.0f);
+  result const got = evaluate(exec, d, 0.2f);
+  CHECK(got.loss[0] == 0.0f);
+  CHECK(got.loss[1] == 0.0f);
+  for (float const g : got.gradient) REQUIRE(g == 0.0f);
+}
+
+TEST_CASE_TEMPLATE("a mask that hides everything leaves nothing", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  E exec;
+  case_data d = make_case(20, 20, 3, true, 0.4, random);
+  for (auto& m : d.mask) m = 0;
+  d.image[7] = NAN;
+  result const got = evaluate(exec, d, 0.2f);
+  CHECK(got.loss[0] == 0.0f);
+  for (float const g : got.gradient) REQUIRE(g == 0.0f);
+}
+
+TEST_CASE_TEMPLATE("the same image gives the same bits, and the object serves images of any size", E,
+                   GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  E exec;
+  case_data const d = make_case(100, 75, 4, true, 0.4, random), small = make_case(9, 9, 3, false, 0.4, random);
+  result const a = evaluate(exec, d, 0.2f), b = evaluate(exec, d, 0.2f);
+  CHECK(a.loss == b.loss);
+  CHECK(a.gradient == b.gradient);
+
+  image_loss<E> reused(exec);
+  for (case_data const* each : {&d, &small, &d}) {
+    buffer<float, E> image(exec, each->image), gradient(exec, each->image.size()), loss(exec, 2);
+    buffer<u8, E> truth(exec, each->truth), mask(exec, each->mask);
+    reused.evaluate(image, {truth.data(), each->channels, each->mask.empty() ? nullptr : mask.data(), each->background},
+                    each->width, each->height, 0.2f, gradient, loss);
+    result const fresh = evaluate(exec, *each, 0.2f);
+    CHECK(gradient.to_host() == fresh.gradient);
+    CHECK(loss.to_host() == fresh.loss);
+  }
+}
