@@ -1,0 +1,29 @@
+// Trains on a capture (COLMAP, Blender, nerfstudio) and writes the scene: train_scene DATASET MODEL.ply [ITERATIONS]
+#include <gart/io/ply.hpp>
+#include <gart/train/session.hpp>
+
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+
+int main(int argc, char** argv) try {
+  if (argc < 3) return std::fprintf(stderr, "usage: train_scene DATASET MODEL.ply [ITERATIONS]\n"), 2;
+  gart::dataset_options reading;
+  reading.downscale = 4;
+  gart::dataset const data = gart::load_dataset(argv[1], reading);
+  gart::train_options options;
+  options.iterations = argc > 3 ? std::atoi(argv[3]) : 2000;
+  options.max_gaussians = 20'000;
+  options.background = data.alpha ? gart::background_kind::white : gart::background_kind::black;
+
+  auto const training = gart::make_session({}, options, data);
+  while (training->steps_done() < options.iterations) {
+    gart::step_report const done = training->step();
+    if (done.step % 100 == 0)
+      std::printf("%5d  loss %.4f  psnr %.2f dB  %u Gaussians\n", done.step, done.loss, done.psnr, done.gaussians);
+  }
+  gart::write_splat_ply(argv[2], training->model());
+  return 0;
+} catch (std::exception const& e) {
+  return std::fprintf(stderr, "train_scene: %s\n", e.what()), 1;
+}
