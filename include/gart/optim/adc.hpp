@@ -1,0 +1,288 @@
+#pragma once
+// Adaptive density control (Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023): Gaussians
+// whose image-space gradient is large on average are cloned (small ones) or split in two (large ones); transparent and
+// oversized ones are removed; opacities are reset now and then.
+//
+// The statistic. 3DGS thresholds the gradient of the loss in the mean's place on the screen, in coordinates from -1 to 1.
+// Ray tracing has no such variable, but sideways motion acts through it: with the mean at (x, y, z) in the camera,
+// ndc_x = 2 (fx x / z + cx) / W - 1, so dL/dx = dL/dndc_x * 2 fx / (W z), hence
+//   dL/dndc = (dL/dx * z W / (2 fx), dL/dy * z H / (2 fy)),
+// whose length is added up at every step that gives the Gaussian a gradient; the mean over those steps meets the same
+// threshold as in 3DGS. A Gaussian whose mean is behind the camera adds nothing in that step.
+//
+// Past the budget the largest statistics grow and the rest stay as they are. New Gaussians begin with zero moments.
+// Gaussians that are not finite are removed. Cost: one small launch a step; O(N) with one host read (two at the budget) a
+// densification, and a second copy of the parameters while it runs. A split moves its halves by draws from itself.
+
+#include <gart/algorithm/exclusive_scan.hpp>
+#include <gart/algorithm/sort_pairs.hpp>
+#include <gart/optim/adam.hpp>
+#include <gart/optim/options.hpp>
+#include <gart/optim/random.hpp>
+#include <gart/optim/rows.hpp>
+#include <gart/scene/camera.hpp>
+
+#include <cmath>
+#include <utility>
+
+namespace gart {
+
+namespace detail {
+
+struct adc_accumulate_kernel {
+  gaussians_view<float const> model, gradient;
+  vec3 right, down, forward, centre;
+  float scale_x, scale_y;  // W / (2 fx), H / (2 fy)
+  float* sum;
+  u32* touched;
+
+  GART_HD void operator()(index_t i) const {
+    std::size_t const r = std::size_t{3} * i;
+    vec3 const g(gradient.mean[r], gradient.mean[r + 1], gradient.mean[r + 2]);
+    if (g.x == 0 && g.y == 0 && g.z == 0 && gradient.opacity[i] == 0) return;
+    vec3 const p = vec3(model.mean[r], model.mean[r + 1], model.mean[r + 2]) - centre;
+    float const z = p.x * forward.x + p.y * forward.y + p.z * forward.z;
+    float const x = (g.x * right.x + g.y * right.y + g.z * right.z) * scale_x * z;
+    float const y = (g.x * down.x + g.y * down.y + g.z * down.z) * scale_y * z;
+    float const length = sqrtf(x * x + y * y);
+    if (!(z > 0) || !is_finite(length)) return;
+    sum[i] += length;
+    touched[i] += 1;
+  }
+};
+
+// What becomes of a Gaussian, by how many it leaves: 0 removed, 1 kept, 2 cloned or split.
+struct adc_rule {
+  gaussians_view<float const> model;
+  float const* sum;
+  u32 const* touched;
+  float gradient, prune_opacity;
+  float split_scale;   // larger ones split
+  float prune_scale;   // larger ones go
+
+  GART_HD float statistic(index_t i) const { return touched[i] ? sum[i] / static_cast<float>(touched[i]) : 0.0f; }
+  GART_HD float largest_scale(index_t i) const {
+    float const* const s = model.log_scale + std::size_t{3} * i;
+    return expf(fmaxf(s[0], fmaxf(s[1], s[2])));
+  }
+  GART_HD u32 outcome(index_t i) const {
+    bool finite = is_finite(model.opacity[i]);
+    for (index_t c = 0; c < 10; ++c) finite = finite && is_finite(row_element(model, i, c));
+    float const opacity = 1.0f / (1.0f + expf(-model.opacity[i])), scale = largest_scale(i);
+    if (!finite || !(opacity >= prune_opacity)) return 0;
+    bool const grows = statistic(i) >= gradient;
+    bool const split = grows && scale > split_scale;
+    if ((split ? scale / 1.6f : scale) > prune_scale) return 0;
+    return grows ? 2 : 1;
+  }
+};
+
+struct adc_plan_kernel {
+  adc_rule rule;
+  u32* copies;
+  u32* grows;
+  GART_HD void operator()(index_t i) const {
+    copies[i] = rule.outcome(i);
+    grows[i] = copies[i] == 2;
+  }
+};
+
+// Keys that sort the growing Gaussians first, the largest statistic first: the bits of a positive float are ordered.
+struct adc_key_kernel {
+  adc_rule rule;
+  u32 const* copies;
+  u32* key;
+  u32* id;
+  GART_HD void operator()(index_t i) const {
+    key[i] = copies[i] == 2 ? ~float_to_bits(rule.statistic(i)) : 0xffffffffu;
+    id[i] = i;
+  }
+};
+
+struct adc_demote_kernel {
+  u32 const* id;
+  u32* copies;
+  index_t first;
+  GART_HD void operator()(index_t rank) const { copies[id[first + rank]] = 1; }
+};
+
+// Where a row of the new arrays comes from, with two marks.
+inline constexpr u32 adc_fresh = 1u << 31, adc_split = 1u << 30, adc_row = adc_split - 1;
+
+struct adc_place_kernel {
+  adc_rule rule;
+  u32 const* copies;
+  u64 const* offset;
+  u32* origin;
+  GART_HD void operator()(index_t i) const {
+    if (copies[i] == 0) return;
+    bool const split = copies[i] == 2 && rule.largest_scale(i) > rule.split_scale;
+    origin[offset[i]] = split ? i | adc_fresh | adc_split : i;
+    if (copies[i] == 2) origin[offset[i] + 1] = split ? i | adc_fresh | adc_split : i | adc_fresh;
+  }
+};
+
+struct adc_gather_body {
+  gaussians_view<float const> from;
+  gaussians_view<float> to;
+  u32 const* origin;
+  bool clear_fresh;
+  GART_HD void operator()(index_t row, index_t column) const {
+    u32 const o = origin[row];
+    row_element(to, row, column) = clear_fresh && (o & adc_fresh) ? 0.0f : row_element(from, o & adc_row, column);
+  }
+};
+
+struct adc_split_kernel {
+  gaussians_view<float> model;
+  u32 const* origin;
+  random_source random;
+  GART_HD void operator()(index_t i) const {
+    if (!(origin[i] & adc_split)) return;
+    float const* const q = model.quaternion + std::size_t{4} * i;
+    float* const mean = model.mean + std::size_t{3} * i;
+    float* const log_scale = model.log_scale + std::size_t{3} * i;
+    random_normals const n = normals(random.words(i));
+    float const norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    vec3 v(n.v[0] * expf(log_scale[0]), n.v[1] * expf(log_scale[1]), n.v[2] * expf(log_scale[2]));
+    if (norm > 1e-16f) {
+      // v + 2 w (u x v) + 2 u x (u x v), for the unit quaternion (w, u).
+      float const inverse = 1.0f / sqrtf(norm), w = q[0] * inverse;
+      vec3 const u(q[1] * inverse, q[2] * inverse, q[3] * inverse);
+      vec3 const a(u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x);
+      vec3 const b(u.y * a.z - u.z * a.y, u.z * a.x - u.x * a.z, u.x * a.y - u.y * a.x);
+      v = v + 2.0f * (w * a + b);
+    }
+    mean[0] += v.x, mean[1] += v.y, mean[2] += v.z;
+    for (int c = 0; c < 3; ++c) log_scale[c] -= 0.470003629f;  // log 1.6
+  }
+};
+
+struct adc_reset_kernel {
+  float* opacity;
+  GART_HD void operator()(index_t i) const {
+    float const most = -4.59511985f;  // the logit of 0.01
+    if (opacity[i] > most) opacity[i] = most;
+  }
+};
+
+}  // namespace detail
+
+// Steps count from 1.
+template <execution E>
+class adaptive_density {
+ public:
+  // The statistic since the last densification: what a checkpoint must hold. [N] each.
+  buffer<float, E> gradient_sum;
+  buffer<u32, E> touched;
+
+  // `extent` is the scene's, in world units.
+  adaptive_density(E& exec, adc_options const& options, index_t max_gaussians, int iterations, float extent, u64 seed)
+      : gradient_sum(exec), touched(exec), exec_(&exec), options_(options), max_gaussians_(max_gaussians),
+        iterations_(iterations), extent_(extent), seed_(seed), copies_(exec), grows_(exec), origin_(exec),
+        offset_(exec), totals_(exec, 2) {}
+
+  // Every step, with the gradient of the step's view.
+  void accumulate(gaussians<E> const& model, gaussians<E> const& gradient, camera const& view) {
+    if (touched.size() != model.size()) clear_statistic(model.size());
+    parallel_for(*exec_, "adc_accumulate", model.size(),
+                 detail::adc_accumulate_kernel{model.view(), gradient.view(), view.rotation[0], view.rotation[1],
+                                               view.rotation[2], vec3(view.position),
+                                               0.5f * static_cast<float>(view.width) / view.fx,
+                                               0.5f * static_cast<float>(view.height) / view.fy,
+                                               gradient_sum.data(), touched.data()});
+  }
+
+  bool due(int step) const {
+    return options_.every > 0 && step > options_.from && running(step) && step % options_.every == 0;
+  }
+
+  // After the optimizer's step: densification and the reset of opacities, where they are due.
+  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step) {
+    density_change change;
+    if (due(step)) change = densify(model, state, step);
+    if (options_.opacity_reset_every > 0 && running(step) && step % options_.opacity_reset_every == 0)
+      reset_opacity(model, state);
+    return change;
+  }
+
+  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step) {
+    stage_scope stage(*exec_, "densify");
+    density_change change;
+    index_t const n = model.size();
+    if (n == 0) return change;
+    if (touched.size() != n) clear_statistic(n);
+
+    bool const was_reset = options_.opacity_reset_every > 0 && step > options_.opacity_reset_every;
+    detail::adc_rule const rule{std::as_const(model).view(), gradient_sum.data(), touched.data(), options_.gradient,
+                                options_.prune_opacity, options_.dense * extent_,
+                                was_reset ? options_.prune_scale * extent_ : INFINITY};
+    copies_.resize(n), grows_.resize(n), offset_.resize(n);
+    parallel_for(*exec_, "adc_plan", n, detail::adc_plan_kernel{rule, copies_.data(), grows_.data()});
+    exclusive_scan(*exec_, span<u32 const>(grows_), offset_.view(), totals_.view().subspan(0, 1));
+    exclusive_scan(*exec_, span<u32 const>(copies_), offset_.view(), totals_.view().subspan(1, 1));
+    u64 totals[2];
+    exec_->copy_out(totals, totals_.data(), sizeof totals);
+    u64 growing = totals[0], total = totals[1];
+    u64 const kept = total - growing;
+
+    if (total > max_gaussians_ && growing > 0) {
+      u64 const room = max_gaussians_ > kept ? max_gaussians_ - kept : 0;
+      origin_.resize(n);
+      parallel_for(*exec_, "adc_keys", n,
+                   detail::adc_key_kernel{rule, copies_.data(), grows_.data(), origin_.data()});
+      sort_pairs(*exec_, grows_.view(), origin_.view(), 32);
+      parallel_for(*exec_, "adc_demote", static_cast<index_t>(growing - room),
+                   detail::adc_demote_kernel{origin_.data(), copies_.data(), static_cast<index_t>(room)});
+      exclusive_scan(*exec_, span<u32 const>(copies_), offset_.view(), totals_.view().subspan(1, 1));
+      growing = room, total = kept + room;
+    }
+
+    change.added = static_cast<index_t>(growing);
+    change.removed = static_cast<index_t>(n - kept);
+    if (change.any()) {
+      index_t const next = static_cast<index_t>(total);
+      origin_.resize(next);
+      parallel_for(*exec_, "adc_place", n,
+                   detail::adc_place_kernel{rule, copies_.data(), offset_.data(), origin_.data()});
+      gather(model, next, false), gather(state.first, next, true), gather(state.second, next, true);
+      parallel_for(*exec_, "adc_split", next,
+                   detail::adc_split_kernel{model.view(), origin_.data(),
+                                            {seed_, static_cast<u32>(step), random_use::split}});
+    }
+    clear_statistic(model.size());
+    return change;
+  }
+
+  // Opacities above 0.01 become 0.01.
+  void reset_opacity(gaussians<E>& model, optimizer_state<E>& state) {
+    parallel_for(*exec_, "adc_reset", model.size(), detail::adc_reset_kernel{model.opacity.data()});
+    state.first.opacity.zero(), state.second.opacity.zero();
+  }
+
+ private:
+  bool running(int step) const { return step < options_.until * static_cast<float>(iterations_); }
+
+  void clear_statistic(index_t n) {
+    gradient_sum.resize(n), touched.resize(n);
+    gradient_sum.zero(), touched.zero();
+  }
+
+  void gather(gaussians<E>& rows, index_t count, bool clear_fresh) {
+    gaussians<E> next(*exec_, count, rows.sh_degree());
+    for_each_element(*exec_, "adc_gather", count, rows.sh_degree(),
+                     detail::adc_gather_body{std::as_const(rows).view(), next.view(), origin_.data(), clear_fresh});
+    rows = std::move(next);
+  }
+
+  E* exec_;
+  adc_options options_;
+  index_t max_gaussians_;
+  int iterations_;
+  float extent_;
+  u64 seed_;
+  buffer<u32, E> copies_, grows_, origin_;
+  buffer<u64, E> offset_, totals_;
+};
+
+}  // namespace gart

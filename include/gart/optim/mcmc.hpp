@@ -1,0 +1,278 @@
+#pragma once
+// Densification as Markov chain Monte Carlo (Kheradmand et al., 3D Gaussian Splatting as Markov Chain Monte Carlo, 2024;
+// constants as in gsplat): dead Gaussians move onto live ones, drawn in proportion to opacity; the count grows to a
+// budget in the same way; the means take a random step every step; opacity and size carry a small penalty.
+//
+// A Gaussian of opacity o that becomes N in one place (its copies and itself; N is cut at 51) keeps what they render:
+//   o' = 1 - (1 - o)^(1/N),  scale' = scale * o / sum_{j=1..N} C(N, j) (-1)^(j-1) o'^j / sqrt(j),
+// which keeps the integral of the composited opacity across a line through the centre. (The paper's double sum, with
+// sum_i C(i-1, j-1) = C(N, j).) Moments of copies and sources are cleared.
+//
+// Weights are 32-bit fixed point and their sums 64-bit integers, so the draws are exact for any count and have the same
+// bits on every policy. A Gaussian whose opacity or geometry is not finite counts as dead. Where none is alive nothing
+// is relocated or grown. Cost: one host read and O(N) work a densification; a step in between is two small launches.
+
+#include <gart/algorithm/exclusive_scan.hpp>
+#include <gart/optim/adam.hpp>
+#include <gart/optim/options.hpp>
+#include <gart/optim/random.hpp>
+#include <gart/optim/rows.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace gart {
+
+struct relocated_shape {
+  double opacity, scale_factor;
+};
+
+// Of each of `copies` Gaussians that replace one of opacity `o`. In double: the sum alternates.
+GART_HD inline relocated_shape relocation(double o, u32 copies) {
+  double const n = copies < 51 ? copies : 51;
+  double const p = -expm1(log1p(-o) / n);
+  double term = 1, sum = 0;
+  for (int j = 1; j <= static_cast<int>(n); ++j) {
+    term *= (n - j + 1) / j * p * (j > 1 ? -1 : 1);
+    sum += term / sqrt(static_cast<double>(j));
+  }
+  return {p, o / sum};
+}
+
+namespace detail {
+
+GART_HD inline float sigmoid(float x) { return 1.0f / (1.0f + expf(-x)); }
+
+struct mcmc_weight_kernel {
+  gaussians_view<float const> model;
+  float dead_opacity;
+  u32* weight;  // 0 for the dead
+  u32* dead;
+
+  GART_HD void operator()(index_t i) const {
+    float const o = sigmoid(model.opacity[i]);
+    bool alive = o > dead_opacity && is_finite(model.opacity[i]);
+    for (index_t c = 0; c < 10; ++c) alive = alive && is_finite(row_element(model, i, c));
+    dead[i] = !alive;
+    u32 const fixed = static_cast<u32>(static_cast<double>(o < 1 ? o : 1.0f) * 4294967295.0 * alive);
+    weight[i] = alive && fixed == 0 ? 1u : fixed;
+  }
+};
+
+struct mcmc_list_kernel {
+  u32 const* dead;
+  u64 const* place;
+  u32* target;
+  GART_HD void operator()(index_t i) const {
+    if (dead[i]) target[place[i]] = i;
+  }
+};
+
+struct mcmc_append_kernel {
+  u32* target;
+  index_t first;
+  GART_HD void operator()(index_t i) const { target[i] = first + i; }
+};
+
+template <execution E>
+struct mcmc_draw_kernel {
+  u64 const* before;  // exclusive sums of the weights
+  u64 const* total;
+  index_t count;
+  random_source random;
+  u32* source;
+  u32* copies;
+
+  GART_KERNEL void operator()(index_t draw) const {
+    random_words const w = random.words(draw);
+    u64 const at = below(w.v[0], w.v[1], *total);
+    // The last Gaussian whose sum is at most `at`: its weight is not zero.
+    index_t low = 0, high = count;
+    while (high - low > 1) {
+      index_t const middle = low + (high - low) / 2;
+      (before[middle] <= at ? low : high) = middle;
+    }
+    source[draw] = low;
+    E::atomic_add(copies + low, 1u);
+  }
+};
+
+struct mcmc_share_kernel {
+  gaussians_view<float> model;
+  u32 const* copies;
+  float least_opacity;
+
+  GART_HD void operator()(index_t i) const {
+    if (copies[i] == 0) return;
+    double const o = fmin(1 / (1 + exp(-static_cast<double>(model.opacity[i]))), 1 - 1e-7);
+    relocated_shape const shape = relocation(o, copies[i] + 1);
+    double const opacity = fmin(fmax(shape.opacity, static_cast<double>(least_opacity)), 1 - 1e-7);
+    model.opacity[i] = static_cast<float>(log(opacity / (1 - opacity)));
+    float const shift = static_cast<float>(log(shape.scale_factor));
+    for (int c = 0; c < 3; ++c) model.log_scale[i * std::size_t{3} + c] += shift;
+  }
+};
+
+struct mcmc_copy_body {
+  gaussians_view<float> model, first, second;
+  u32 const* source;
+  u32 const* target;
+
+  GART_HD void operator()(index_t draw, index_t column) const {
+    index_t const from = source[draw], to = target[draw];
+    row_element(model, to, column) = row_element(model, from, column);
+    row_element(first, to, column) = row_element(second, to, column) = 0;
+    row_element(first, from, column) = row_element(second, from, column) = 0;
+  }
+};
+
+struct mcmc_noise_kernel {
+  gaussians_view<float> model;
+  random_source random;
+  float amount;
+
+  GART_HD void operator()(index_t i) const {
+    float const o = sigmoid(model.opacity[i]);
+    float const gate = amount / (1.0f + expf(100.0f * (0.995f - (1.0f - o))));
+    float const* const q = model.quaternion + std::size_t{4} * i;
+    float const norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    if (!(gate > 0) || !(norm > 1e-16f)) return;
+    float const inverse = 1.0f / sqrtf(norm), w = q[0] * inverse, x = q[1] * inverse, y = q[2] * inverse,
+                z = q[3] * inverse;
+    float const r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+                           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+                           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+    random_normals const n = normals(random.words(i));
+    float local[3], moved[3];
+    for (int c = 0; c < 3; ++c)
+      local[c] = (r[0][c] * n.v[0] + r[1][c] * n.v[1] + r[2][c] * n.v[2]) *
+                 expf(2 * model.log_scale[std::size_t{3} * i + c]);
+    bool finite = true;
+    for (int c = 0; c < 3; ++c) {
+      moved[c] = model.mean[std::size_t{3} * i + c] +
+                 gate * (r[c][0] * local[0] + r[c][1] * local[1] + r[c][2] * local[2]);
+      finite = finite && is_finite(moved[c]);
+    }
+    for (int c = 0; c < 3 && finite; ++c) model.mean[std::size_t{3} * i + c] = moved[c];
+  }
+};
+
+struct mcmc_penalty_kernel {
+  gaussians_view<float const> model;
+  gaussians_view<float> gradient;
+  float opacity_share, scale_share;
+
+  GART_HD void operator()(index_t i) const {
+    float const o = sigmoid(model.opacity[i]);
+    gradient.opacity[i] += opacity_share * o * (1.0f - o);
+    for (std::size_t c = 3 * std::size_t{i}; c < 3 * std::size_t{i} + 3; ++c)
+      gradient.log_scale[c] += scale_share * expf(model.log_scale[c]);
+  }
+};
+
+}  // namespace detail
+
+// It has no state: what it draws depends on the seed and the step only. Steps count from 1.
+template <execution E>
+class mcmc {
+ public:
+  mcmc(E& exec, mcmc_options const& options, index_t max_gaussians, int iterations, u64 seed)
+      : exec_(&exec), options_(options), max_gaussians_(max_gaussians), iterations_(iterations), seed_(seed),
+        weight_(exec), dead_(exec), target_(exec), source_(exec), before_(exec), dead_before_(exec), totals_(exec, 2) {}
+
+  // Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale); before the optimizer's step.
+  void add_penalties(gaussians<E> const& model, gaussians<E>& gradient) {
+    if (model.size() == 0) return;
+    float const n = static_cast<float>(model.size());
+    parallel_for(*exec_, "mcmc_penalties", model.size(),
+                 detail::mcmc_penalty_kernel{model.view(), gradient.view(), options_.opacity_penalty / n,
+                                             options_.scale_penalty / (3 * n)});
+  }
+
+  bool due(int step) const {
+    return options_.every > 0 && step > options_.from && step < options_.until * static_cast<float>(iterations_) &&
+           step % options_.every == 0;
+  }
+
+  // After the optimizer's step: relocation and growth where they are due, and the noise. `mean_rate` is the rate the
+  // means had in this step.
+  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, float mean_rate) {
+    density_change change;
+    if (due(step)) change = densify(model, state, step);
+    add_noise(model, step, mean_rate);
+    return change;
+  }
+
+  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step) {
+    stage_scope stage(*exec_, "densify");
+    density_change change;
+    index_t const n = model.size();
+    if (n == 0) return change;
+    weigh(model, options_.dead_opacity);
+    u64 totals[2];
+    exec_->copy_out(totals, totals_.data(), sizeof totals);
+    if (totals[0] == 0) return change;
+
+    change.relocated = static_cast<index_t>(totals[1]);
+    if (change.relocated) {
+      target_.resize(change.relocated);
+      parallel_for(*exec_, "mcmc_list", n, detail::mcmc_list_kernel{dead_.data(), dead_before_.data(), target_.data()});
+      draw(model, state, n, change.relocated, {seed_, static_cast<u32>(step), random_use::relocation});
+    }
+
+    double const wanted = std::ceil(static_cast<double>(options_.growth) * n);
+    index_t const goal = wanted < max_gaussians_ ? static_cast<index_t>(wanted) : max_gaussians_;
+    if (goal > n) {
+      change.added = goal - n;
+      // Relocation may have left Gaussians at the opacity that counts as dead; all but broken ones may be drawn here.
+      weigh(model, 0);
+      model.resize_keep(goal), state.first.resize_keep(goal), state.second.resize_keep(goal);
+      target_.resize(change.added);
+      parallel_for(*exec_, "mcmc_append", change.added, detail::mcmc_append_kernel{target_.data(), n});
+      draw(model, state, n, change.added, {seed_, static_cast<u32>(step), random_use::growth});
+    }
+    return change;
+  }
+
+  // mean += noise * mean_rate * sigmoid(-100 (opacity - 0.005)) * covariance * normal.
+  void add_noise(gaussians<E>& model, int step, float mean_rate) {
+    if (options_.noise == 0) return;
+    parallel_for(*exec_, "mcmc_noise", model.size(),
+                 detail::mcmc_noise_kernel{model.view(), {seed_, static_cast<u32>(step), random_use::noise},
+                                           options_.noise * mean_rate});
+  }
+
+ private:
+  void weigh(gaussians<E> const& model, float dead_opacity) {
+    index_t const n = model.size();
+    weight_.resize(n), dead_.resize(n), before_.resize(n), dead_before_.resize(n);
+    parallel_for(*exec_, "mcmc_weights", n,
+                 detail::mcmc_weight_kernel{model.view(), dead_opacity, weight_.data(), dead_.data()});
+    exclusive_scan(*exec_, span<u32 const>(weight_), before_.view(), totals_.view().subspan(0, 1));
+    exclusive_scan(*exec_, span<u32 const>(dead_), dead_before_.view(), totals_.view().subspan(1, 1));
+  }
+
+  // `draws` copies of Gaussians among the first n, by weight, into the rows of target_.
+  void draw(gaussians<E>& model, optimizer_state<E>& state, index_t n, index_t draws, random_source const& random) {
+    buffer<u32, E>& copies = dead_;
+    source_.resize(draws);
+    copies.zero();
+    parallel_for(*exec_, "mcmc_draw", draws,
+                 detail::mcmc_draw_kernel<E>{before_.data(), totals_.data(), n, random, source_.data(), copies.data()});
+    parallel_for(*exec_, "mcmc_share", n,
+                 detail::mcmc_share_kernel{model.view(), copies.data(), options_.dead_opacity});
+    for_each_element(*exec_, "mcmc_copy", draws, model.sh_degree(),
+                     detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(),
+                                            target_.data()});
+  }
+
+  E* exec_;
+  mcmc_options options_;
+  index_t max_gaussians_;
+  int iterations_;
+  u64 seed_;
+  buffer<u32, E> weight_, dead_, target_, source_;
+  buffer<u64, E> before_, dead_before_, totals_;
+};
+
+}  // namespace gart

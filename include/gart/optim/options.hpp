@@ -1,0 +1,35 @@
+#pragma once
+// The options of the optimizer and of the two ways to densify, with the defaults of the literature (3DGS, 3DGS-MCMC,
+// gsplat).
+
+namespace gart {
+
+struct learning_rates {
+  float mean = 1.6e-4f;        // times the scene's extent; decays exponentially to mean_final over the run
+  float mean_final = 1.6e-6f;
+  float log_scale = 5e-3f;
+  float quaternion = 1e-3f;
+  float opacity = 5e-2f;
+  float sh_dc = 2.5e-3f;
+  float sh_rest = 2.5e-3f / 20;
+};
+
+struct mcmc_options {
+  int from = 500, every = 100;
+  float until = 5.0f / 6;           // share of the run
+  float growth = 1.05f;             // a step of growth, up to max_gaussians
+  float dead_opacity = 0.005f;
+  float noise = 5e5f;               // times the learning rate of the means
+  float opacity_penalty = 0.01f, scale_penalty = 0.01f;
+};
+
+struct adc_options {
+  int from = 500, every = 100, opacity_reset_every = 3000;
+  float until = 0.5f;
+  float gradient = 2e-4f;           // mean length of the gradient of a Gaussian's mean, in the image, that makes it grow
+  float dense = 0.01f;              // times the extent: larger ones split, smaller ones are cloned
+  float prune_opacity = 0.005f;
+  float prune_scale = 0.1f;         // times the extent, after the first opacity reset
+};
+
+}  // namespace gart

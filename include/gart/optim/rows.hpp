@@ -1,0 +1,58 @@
+#pragma once
+// A Gaussian as one row of floats across the parameter arrays: columns 0-2 mean, 3-5 log_scale, 6-9 quaternion,
+// 10 opacity, 11.. sh. What moves, copies or clears whole Gaussians is one launch over (row, column), coalesced on a
+// device.
+
+#include <gart/exec/concepts.hpp>
+#include <gart/scene/gaussians.hpp>
+
+namespace gart {
+
+GART_HD constexpr index_t row_width(int sh_degree) { return 11 + 3 * sh_coefficients(sh_degree); }
+
+template <class T>
+GART_HD GART_INLINE T& row_element(gaussians_view<T> const& g, index_t row, index_t column) {
+  std::size_t const r = row;
+  if (column >= 11) return g.sh[r * g.sh_stride() + (column - 11)];
+  if (column < 3) return g.mean[r * 3 + column];
+  if (column < 6) return g.log_scale[r * 3 + (column - 3)];
+  if (column < 10) return g.quaternion[r * 4 + (column - 6)];
+  return g.opacity[r];
+}
+
+namespace detail {
+
+template <class Body>
+struct row_kernel {
+  static constexpr index_t rows_per_tile = 64;
+  struct scratch {};
+  Body body;
+  index_t rows, width;
+
+  template <class Team>
+  GART_KERNEL void operator()(Team const& team) const {
+    index_t const first = team.tile() * rows_per_tile;
+    index_t const count = rows - first < rows_per_tile ? rows - first : rows_per_tile;
+    team.for_each(count * width, [&](index_t e) { body(first + e / width, e % width); });
+  }
+};
+
+}  // namespace detail
+
+// body(row, column) for every element of `rows` rows; a tile of rows at a time, so that the count of elements may pass
+// 2^32.
+template <execution E, class Body>
+void for_each_element(E& exec, char const* label, index_t rows, int sh_degree, Body const& body) {
+  if (rows == 0) return;
+  using kernel = detail::row_kernel<Body>;
+  index_t const tiles = rows / kernel::rows_per_tile + (rows % kernel::rows_per_tile != 0);
+  parallel_for(exec, label, tile_range{tiles, 256}, kernel{body, rows, row_width(sh_degree)});
+}
+
+// What a densification did. Where the count changed, gradients and other per-Gaussian buffers have a new size.
+struct density_change {
+  index_t relocated = 0, added = 0, removed = 0;
+  bool any() const { return relocated || added || removed; }
+};
+
+}  // namespace gart

@@ -1,0 +1,33 @@
+#pragma once
+// What changes with the step: the rate of the means and the SH degree in use. Steps count from 0, before the step runs.
+
+#include <gart/optim/options.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace gart {
+
+// from * (to / from)^(step / steps): log-linear, `to` at and after `steps`. Both must be positive; where one is not,
+// the rate stays at `from`.
+inline float exponential_decay(float from, float to, int step, int steps) {
+  if (!(from > 0) || !(to > 0) || steps <= 0) return from;
+  double const share = std::clamp(static_cast<double>(step) / steps, 0.0, 1.0);
+  return static_cast<float>(from * std::pow(static_cast<double>(to) / from, share));
+}
+
+// The rates of one step; `extent` is the scene's.
+inline learning_rates rates_at(learning_rates rates, float extent, int step, int steps) {
+  rates.mean = exponential_decay(rates.mean, rates.mean_final, step, steps) * extent;
+  return rates;
+}
+
+// One degree more every `every` steps, sooner where the run is too short for that: the full degree is reached within the
+// first third of any run.
+inline int sh_degree_at(int step, int degree, int every, int steps) {
+  if (degree <= 0) return 0;
+  int const interval = std::max(1, std::min(every, steps / (3 * degree)));
+  return std::min(degree, step / interval);
+}
+
+}  // namespace gart

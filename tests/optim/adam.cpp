@@ -1,0 +1,101 @@
+#include <support/policies.hpp>
+
+#include <gart/optim/adam.hpp>
+
+#include "models.hpp"
+
+using namespace gart;
+
+namespace {
+
+// The textbook's Adam of one element, in double.
+struct textbook {
+  double m = 0, v = 0;
+  double step(double p, double g, double rate, int t) {
+    double const b1 = 0.9f, b2 = 0.999f;
+    m = b1 * m + (1 - b1) * g;
+    v = b2 * v + (1 - b2) * g * g;
+    return p - rate * (m / (1 - std::pow(b1, t))) / (std::sqrt(v / (1 - std::pow(b2, t))) + 1e-15);
+  }
+};
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("Adam follows the textbook, with a rate per group", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  E exec;
+  index_t const n = 517;
+  int const degree = 2;
+  gaussian_model start = gart_test::random_model(n, degree, random);
+  gaussians<E> model(exec, start);
+  optimizer_state<E> state(exec, n, degree);
+  learning_rates rates;
+  rates.mean = 1e-3f;
+  index_t const width = row_width(degree);
+  std::vector<textbook> oracle(n * width);
+  std::vector<double> expected(n * width);
+  for (index_t i = 0; i < n; ++i)
+    for (index_t c = 0; c < width; ++c) expected[i * width + c] = gart_test::row(start, i)[c];
+
+  for (int step = 1; step <= 6; ++step) {
+    int const active = step <= 3 ? 1 : 2;
+    gaussian_model g = gart_test::random_model(n, degree, random);
+    for (float& v : g.mean) v *= 1e-6f;
+    gaussians<E> const gradient(exec, g);
+    adam_step(exec, model, gradient, state, rates, step, active);
+    for (index_t i = 0; i < n; ++i) {
+      auto const row = gart_test::row(g, i);
+      for (index_t c = 0; c < width; ++c) {
+        if (c >= 11 + 3u * sh_coefficients(active)) continue;
+        double const rate = c < 3    ? rates.mean
+                            : c < 6  ? rates.log_scale
+                            : c < 10 ? rates.quaternion
+                            : c < 11 ? rates.opacity
+                            : c < 14 ? rates.sh_dc
+                                     : rates.sh_rest;
+        auto const at = i * width + c;
+        expected[at] = oracle[at].step(expected[at], row[c], rate, step);
+      }
+    }
+  }
+  gaussian_model got = model.to_host();
+  double worst = 0;
+  for (index_t i = 0; i < n; ++i)
+    for (index_t c = 0; c < width; ++c)
+      worst = std::max(worst, std::abs(gart_test::row(got, i)[c] - expected[i * width + c]));
+  CHECK(worst < 2e-6);  // values up to 4, six roundings
+}
+
+TEST_CASE_TEMPLATE("elements whose gradient is not finite stay, and are counted", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  E exec;
+  gaussian_model const start = gart_test::random_model(300, 0, random);
+  gaussian_model g = gart_test::random_model(300, 0, random);
+  g.mean[5] = NAN, g.opacity[299] = INFINITY, g.sh[17] = 3e30f;  // the last squares to infinity
+  gaussians<E> model(exec, start);
+  gaussians<E> const gradient(exec, g);
+  optimizer_state<E> state(exec, 300, 0);
+  buffer<u32, E> skipped(exec, std::vector<u32>{0});
+  adam_step(exec, model, gradient, state, {}, 1, 0, skipped.view());
+  adam_step(exec, model, gradient, state, {}, 2, 0);
+  gaussian_model const got = model.to_host(), first = state.first.to_host(), second = state.second.to_host();
+  CHECK(skipped.front() == 3);
+  CHECK(got.mean[5] == start.mean[5]);
+  CHECK(got.opacity[299] == start.opacity[299]);
+  CHECK(got.sh[17] == start.sh[17]);
+  CHECK(first.mean[5] == 0);
+  CHECK(second.sh[17] == 0);
+  CHECK(got.mean[4] != start.mean[4]);
+  CHECK(got.opacity[298] != start.opacity[298]);
+}
+
+TEST_CASE_TEMPLATE("Adam of nothing", E, GART_TEST_POLICIES) {
+  E exec;
+  gaussians<E> model(exec, 0, 3);
+  gaussians<E> const gradient(exec, 0, 3);
+  optimizer_state<E> state(exec, 0, 3);
+  adam_step(exec, model, gradient, state, {}, 1, 3);
+  CHECK(model.size() == 0);
+}
