@@ -2,8 +2,13 @@
 // One CUDA stream of one device. This header is safe without nvcc: memory and queue are compiled into gart::cuda;
 // kernel launches are templates in cuda_launch.cuh and need nvcc.
 //
+// Memory comes from a pool of the policy's own that keeps what is freed, so that allocation after the first steps is a
+// list operation on the host and never waits for the device. copy_in goes through a ring of pinned blocks: it does not
+// wait for the kernels before it, and its source may be reused on return, pageable or pinned.
+//
 // Errors: unsupported where no device or driver is found; out_of_memory with the bytes asked and free; gart::error for
-// any failed launch, with the label of the launch where it is known.
+// any failed launch, with the label of the launch. A kernel that fails while it runs is noticed by a later call, which
+// cannot know its label: with GART_CUDA_SYNC=1 in the environment every launch is waited for and the label is exact.
 
 #include <gart/core/error.hpp>
 #include <gart/core/macros.hpp>
@@ -11,6 +16,7 @@
 
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace gart {
@@ -32,7 +38,7 @@ class cuda_exec {
   profiler profile;
   memory_use memory;
 
-  explicit cuda_exec(int device = 0);
+  explicit cuda_exec(int device_index = 0);
   ~cuda_exec();
   cuda_exec(cuda_exec const&) = delete;
   cuda_exec& operator=(cuda_exec const&) = delete;
@@ -43,33 +49,61 @@ class cuda_exec {
   void copy_out(void* dst, void const* src, std::size_t bytes);
   void copy(void* dst, void const* src, std::size_t bytes);
   void zero(void* p, std::size_t bytes);
-  void synchronize();  // also folds pending event times into `profile`
+  void synchronize();
 
   void* stream() const { return stream_; }  // a cudaStream_t
   int multiprocessors() const { return multiprocessors_; }
+  void make_current() const;  // launches go to the calling thread's current device, which must be the stream's
 
-  // Brackets of a timed stage; stage_scope calls them.
+  // Brackets of a timed stage; stage_scope calls them. The times, by events, reach `profile` at the next synchronize()
+  // or copy_out().
   void begin_stage(char const* label);
-  void end_stage();
+  void end_stage() noexcept;
   void check_launch(char const* label);
 
   template <class T>
   GART_HD static T atomic_add(T* p, T v) {
 #if defined(__CUDA_ARCH__)
-    return atomicAdd(p, v);
+    if constexpr (std::is_same_v<T, u64>)
+      return atomicAdd(reinterpret_cast<unsigned long long*>(p), static_cast<unsigned long long>(v));
+    else
+      return atomicAdd(p, v);
 #else
     T const old = *p;
     *p = old + v;
     return old;
 #endif
   }
+  template <int N>
+  GART_HD static void atomic_add_row(float* row, float const (&values)[N], int n) {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
+    if constexpr (N % 4 == 0) {
+      GART_UNROLL
+      for (int i = 0; i < N; i += 4)
+        if (i < n)
+          atomicAdd(reinterpret_cast<float4*>(row + i),
+                    make_float4(values[i], values[i + 1], values[i + 2], values[i + 3]));
+    } else
+#endif
+    {
+      GART_UNROLL
+      for (int i = 0; i < N; ++i)
+        if (i < n) atomic_add(row + i, values[i]);
+    }
+  }
+  GART_HD static void fence() {
+#if defined(__CUDA_ARCH__)
+    __threadfence();
+#endif
+  }
 
  private:
-  struct events;
+  struct resources;
+  void fold_stages();
   void* stream_ = nullptr;
-  int device_ = 0;
+  int device_index_ = 0;
   int multiprocessors_ = 0;
-  std::unique_ptr<events> events_;
+  std::unique_ptr<resources> resources_;
 };
 
 }  // namespace gart

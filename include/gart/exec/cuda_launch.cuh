@@ -1,7 +1,8 @@
 #pragma once
 // parallel_for on cuda_exec: one thread an index, one block a tile. Needs nvcc.
-// A kernel may name `static constexpr int block_size` (default 256 for index kernels) and, for its registers,
-// `static constexpr int min_blocks` (blocks a multiprocessor, default 1).
+// A kernel may name `static constexpr int block_size` (default 256: the threads of a block of an index kernel, the most
+// lanes of a tile kernel, to which tile_range::lanes is lowered) and, for its registers, `static constexpr int
+// min_blocks` (blocks a multiprocessor, default 1).
 
 #include <gart/exec/cuda.hpp>
 #include <gart/exec/stage.hpp>
@@ -45,12 +46,13 @@ class cuda_team {
 
 template <class K>
 __global__ void __launch_bounds__(block_size_of<K>(), min_blocks_of<K>()) run_index_kernel(index_t n, K const kernel) {
-  index_t const i = blockIdx.x * block_size_of<K>() + threadIdx.x;
-  if (i < n) kernel(i);
+  u64 const i = u64{blockIdx.x} * block_size_of<K>() + threadIdx.x;
+  if (i < n) kernel(static_cast<index_t>(i));
 }
 
 template <class K>
-__global__ void run_tile_kernel(K const kernel) {
+__global__ void __launch_bounds__(block_size_of<K>(), min_blocks_of<K>()) run_tile_kernel(K const kernel) {
+  static_assert(alignof(typename K::scratch) <= 16);
   extern __shared__ __align__(16) unsigned char memory[];
   cuda_team<typename K::scratch> team(*reinterpret_cast<typename K::scratch*>(memory));
   kernel(team);
@@ -63,7 +65,8 @@ void parallel_for(cuda_exec& exec, char const* label, index_t n, K const& kernel
   if (n == 0) return;
   stage_scope scope(exec, label);
   constexpr int block = detail::block_size_of<K>();
-  detail::run_index_kernel<K><<<(n + block - 1) / block, block, 0, static_cast<cudaStream_t>(exec.stream())>>>(n, kernel);
+  exec.make_current();
+  detail::run_index_kernel<K><<<(n - 1) / block + 1, block, 0, static_cast<cudaStream_t>(exec.stream())>>>(n, kernel);
   exec.check_launch(label);
 }
 
@@ -72,10 +75,15 @@ void parallel_for(cuda_exec& exec, char const* label, tile_range range, K const&
   if (range.tiles == 0) return;
   stage_scope scope(exec, label);
   constexpr std::size_t bytes = sizeof(typename K::scratch);
+  constexpr index_t most = detail::block_size_of<K>();
+  exec.make_current();
   if constexpr (bytes > 48 * 1024)
-    cudaFuncSetAttribute(detail::run_tile_kernel<K>, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes));
-  detail::run_tile_kernel<K>
-      <<<range.tiles, range.lanes, bytes, static_cast<cudaStream_t>(exec.stream())>>>(kernel);
+    cudaFuncSetAttribute(detail::run_tile_kernel<K>, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                         static_cast<int>(bytes));
+  index_t const lanes = range.lanes < most ? range.lanes : most;
+  // clang-format off
+  detail::run_tile_kernel<K><<<range.tiles, lanes, bytes, static_cast<cudaStream_t>(exec.stream())>>>(kernel);
+  // clang-format on
   exec.check_launch(label);
 }
 

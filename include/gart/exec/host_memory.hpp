@@ -1,5 +1,6 @@
 #pragma once
-// What the two host policies share: memory is the host's, copies are memcpy.
+// What the two host policies share: memory is the host's, copies are memcpy, stage times are wall times.
+// A policy is used by one thread at a time; what it runs may use many.
 
 #include <gart/core/error.hpp>
 #include <gart/exec/concepts.hpp>
@@ -7,7 +8,10 @@
 #include <chrono>
 #include <cstring>
 #include <new>
+#include <utility>
 #include <vector>
+
+#include <unistd.h>
 
 namespace gart {
 
@@ -20,16 +24,17 @@ class host_memory {
   host_memory() = default;
   host_memory(host_memory const&) = delete;
   host_memory& operator=(host_memory const&) = delete;
+  ~host_memory() { deallocate(workspace_, workspace_bytes_); }
 
   void* allocate(std::size_t bytes) {
-    void* p = ::operator new(bytes, std::align_val_t{64}, std::nothrow);
-    if (!p) throw out_of_memory("host", bytes, 0, "lower --max-gaussians or raise --downscale");
+    void* p = ::operator new (bytes, std::align_val_t{64}, std::nothrow);
+    if (!p) throw out_of_memory("host", bytes, free_bytes(), "lower --max-gaussians or raise --downscale");
     memory.allocated(bytes);
     return p;
   }
   void deallocate(void* p, std::size_t bytes) {
     if (!p) return;
-    ::operator delete(p, std::align_val_t{64});
+    ::operator delete (p, std::align_val_t{64});
     memory.released(bytes);
   }
   void copy_in(void* dst, void const* src, std::size_t bytes) { copy(dst, src, bytes); }
@@ -42,6 +47,18 @@ class host_memory {
   }
   void synchronize() {}
 
+  // A block that the policy keeps and lends to the algorithm that is running, so that sorting at every step does not
+  // allocate at every step. The next call lends the same block again; it grows only, and counts in `memory`.
+  void* workspace(std::size_t bytes) {
+    if (bytes > workspace_bytes_) {
+      deallocate(std::exchange(workspace_, nullptr), std::exchange(workspace_bytes_, 0));
+      std::size_t const wanted = bytes + bytes / 4;
+      workspace_ = allocate(wanted);
+      workspace_bytes_ = wanted;
+    }
+    return workspace_;
+  }
+
   void begin_stage(char const* label) { open_.push_back({label, std::chrono::steady_clock::now()}); }
   void end_stage() {
     std::chrono::duration<double, std::milli> const elapsed = std::chrono::steady_clock::now() - open_.back().start;
@@ -50,11 +67,17 @@ class host_memory {
   }
 
  private:
+  static std::size_t free_bytes() {
+    long const pages = sysconf(_SC_AVPHYS_PAGES), page = sysconf(_SC_PAGESIZE);
+    return pages > 0 && page > 0 ? static_cast<std::size_t>(pages) * static_cast<std::size_t>(page) : 0;
+  }
   struct open_stage {
     char const* label;
     std::chrono::steady_clock::time_point start;
   };
   std::vector<open_stage> open_;
+  void* workspace_ = nullptr;
+  std::size_t workspace_bytes_ = 0;
 };
 
 }  // namespace gart

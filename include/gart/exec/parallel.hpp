@@ -2,8 +2,11 @@
 // Labelled launches on the host policies: parallel_for over indices and over tiles. The CUDA twins are in
 // cuda_launch.cuh; a tile kernel is the same source on both.
 //
-// A tile kernel is written in phases: team.for_each(n, f) shares f(0..n) out over the team's lanes, team.barrier() makes
-// what was written to team.scratch() visible to all. There is no lane id, so one lane is a correct host mapping.
+// A tile kernel is written in phases: team.for_each(n, f) shares f(0..n) out over the team's lanes, team.barrier()
+// makes what was written to team.scratch() visible to all. There is no lane id, so one lane is a correct host mapping.
+// Scratch is undefined when a tile begins. Nothing to do is no launch, on every policy.
+//
+// Kernels run on many threads and must not throw.
 
 #include <gart/exec/openmp.hpp>
 #include <gart/exec/serial.hpp>
@@ -32,22 +35,25 @@ class host_team {
 
 template <index_kernel K>
 void parallel_for(serial_exec& exec, char const* label, index_t n, K const& kernel) {
+  if (n == 0) return;
   stage_scope scope(exec, label);
   for (index_t i = 0; i < n; ++i) kernel(i);
 }
 
 template <index_kernel K>
 void parallel_for(openmp_exec& exec, char const* label, index_t n, K const& kernel) {
+  if (n == 0) return;
   stage_scope scope(exec, label);
-  // Dynamic chunks: rays differ in cost by orders of magnitude; 256 indices keep the overhead below a percent.
+  // Dynamic chunks: rays differ in cost by orders of magnitude; 256 indices amortise the fetch of a chunk.
 #pragma omp parallel for schedule(dynamic, 256) num_threads(exec.threads())
   for (index_t i = 0; i < n; ++i) kernel(i);
 }
 
 template <tile_kernel K>
 void parallel_for(serial_exec& exec, char const* label, tile_range range, K const& kernel) {
+  if (range.tiles == 0) return;
   stage_scope scope(exec, label);
-  auto scratch = std::make_unique<typename K::scratch>();
+  auto scratch = std::make_unique_for_overwrite<typename K::scratch>();
   for (index_t t = 0; t < range.tiles; ++t) {
     host_team<typename K::scratch> team(t, *scratch);
     kernel(team);
@@ -56,10 +62,11 @@ void parallel_for(serial_exec& exec, char const* label, tile_range range, K cons
 
 template <tile_kernel K>
 void parallel_for(openmp_exec& exec, char const* label, tile_range range, K const& kernel) {
+  if (range.tiles == 0) return;
   stage_scope scope(exec, label);
 #pragma omp parallel num_threads(exec.threads())
   {
-    auto scratch = std::make_unique<typename K::scratch>();
+    auto scratch = std::make_unique_for_overwrite<typename K::scratch>();
 #pragma omp for schedule(dynamic, 4)
     for (index_t t = 0; t < range.tiles; ++t) {
       host_team<typename K::scratch> team(t, *scratch);

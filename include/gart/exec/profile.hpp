@@ -2,6 +2,7 @@
 // What a launch cost: wall time (CPU) or device time (events) summed per label. Off by default; when off it costs one
 // branch a launch. Labels are the ones given to parallel_for and to stage scopes.
 
+#include <cstddef>
 #include <map>
 #include <string>
 

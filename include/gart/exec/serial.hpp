@@ -15,6 +15,11 @@ class serial_exec : public host_memory {
     *p = old + v;
     return old;
   }
+  template <int N>
+  static void atomic_add_row(float* row, float const (&values)[N], int n) {
+    for (int i = 0; i < n; ++i) row[i] += values[i];
+  }
+  static void fence() {}
 };
 
 }  // namespace gart
