@@ -1,0 +1,107 @@
+#include "commands.hpp"
+#include "evaluate.hpp"
+#include "options.hpp"
+#include "output.hpp"
+#include "progress.hpp"
+
+#include <gart/io/dataset.hpp>
+#include <gart/io/image_file.hpp>
+
+#include <cstdio>
+#include <memory>
+
+namespace gart_cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct eval_arguments {
+  fs::path model, dataset, out, renders;
+  row_options row;
+  std::string background = "auto";
+  int downscale = 1, test_every = 8;
+  bool quiet = false;
+};
+
+int run_eval(eval_arguments const& a) {
+  use_threads(a.row.threads);
+  model_file file = load_model(a.model);
+  auto request = a.row.request;
+  request.sh_degree = file.model.sh_degree;
+  auto const renderer = gart::make_renderer(request);
+  prepare_file(a.out);
+  if (!a.renders.empty()) prepare_folder(a.renders);
+  gart::dataset_options load;
+  load.downscale = a.downscale;
+  load.test_every = a.test_every;
+  gart::dataset const data = gart::load_dataset(a.dataset, load);
+  if (data.test.empty()) {
+    throw gart::io_error(a.dataset.string(), "has no test views (" + data.split + ")", "--test-every 8 keeps each 8th view");
+  }
+  std::string const background = resolve_background(a.background, data.alpha);
+  gart::render_options options = file.render;
+  options.background = background_color(background);
+  renderer->set_model(file.model);
+
+  progress say(a.quiet);
+  scores const result = evaluate(
+      data.test, options.background, [&](gart::camera const& view) { return renderer->render(view, options); },
+      [&](std::size_t i, view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
+        if (!a.renders.empty()) {
+          gart::write_png(a.renders / (s.name + ".png"), gart::to_8bit(render));
+          gart::write_png(a.renders / (s.name + "_truth.png"), gart::to_8bit(truth));
+        }
+        say.state("scored " + std::to_string(i + 1) + "/" + std::to_string(data.test.size()) + "  " + s.name + " " +
+                      fixed(s.psnr, 2) + " dB",
+                  static_cast<double>(i + 1) / static_cast<double>(data.test.size()));
+      });
+  auto const row = renderer->row();
+  nlohmann::json metrics = to_json(result);
+  metrics["format"] = data.format, metrics["split"] = data.split, metrics["resize_filter"] = data.resize_filter;
+  metrics["background"] = background, metrics["notes"] = data.notes;
+  metrics["gaussians"] = file.model.size(), metrics["sh_degree"] = file.model.sh_degree;
+  metrics["backend"] = row.backend, metrics["tracer"] = row.tracer;
+  metrics["approximations"] = {{"alpha_min", options.alpha_min}, {"t_min", options.transmittance_min}};
+  metrics["peak_bytes"] = renderer->peak_bytes();
+  write_json(a.out, metrics);
+  say.clear();
+  if (!a.quiet) {
+    std::printf("test PSNR %.2f dB, SSIM %.4f over %zu views (%s; %s background)\n", result.psnr, result.ssim,
+                result.views.size(), data.split.c_str(), background.c_str());
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_eval(CLI::App& app, command& selected) {
+  auto a = std::make_shared<eval_arguments>();
+  CLI::App* eval = app.add_subcommand("eval", "Score a model against the test views of a capture: PSNR and SSIM.");
+  eval->add_option("MODEL.ply", a->model, "Gaussians, from gart or another program")->type_name("")->required();
+  eval->add_option("DATASET", a->dataset, "The capture, as gart train reads it")->type_name("")->required();
+  eval->add_option("--out", a->out, "Where the scores go")->type_name("METRICS.json")->required();
+  eval->add_option("--renders", a->renders, "Also keep NAME.png and NAME_truth.png of each view here")->type_name("DIR");
+  eval->add_option("--background", a->background, "white or black; auto: white for images with alpha, else black")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(one_of({"auto", "white", "black"}));
+  eval->add_option("--downscale", a->downscale, "Shrink images by this whole factor")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 64));
+  eval->add_option("--test-every", a->test_every, "Each Nth view is for testing, where the capture does not say")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 1e6));
+  eval->add_flag("--quiet", a->quiet, "Say nothing but errors");
+  add_row_options(*eval, a->row);
+  eval->footer(
+      "\nWrites METRICS.json: psnr (dB) and ssim, their means over the test views and each view's, and how they were taken.\n"
+      "\nExamples:\n"
+      "  gart eval run/model.ply lego --out metrics.json\n"
+      "  gart eval other.ply garden --downscale 4 --out scores.json --renders images");
+  eval->callback([a, &selected] { selected = [a] { return run_eval(*a); }; });
+}
+
+}  // namespace gart_cli

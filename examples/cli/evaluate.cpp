@@ -1,0 +1,88 @@
+#include "evaluate.hpp"
+
+#include <gart/core/error.hpp>
+#include <gart/loss/metrics.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace gart_cli {
+
+namespace {
+
+// Makes excluded pixels equal to the truth; the share of pixels that count.
+double apply_mask(gart::image8 const& mask, gart::image_float const& truth, gart::image_float& render) {
+  if (mask.empty()) return 1;
+  std::size_t const pixels = static_cast<std::size_t>(truth.width) * truth.height;
+  std::size_t kept = 0;
+  for (std::size_t p = 0; p < pixels; ++p) {
+    if (mask.data[p * mask.channels] != 0) {
+      ++kept;
+      continue;
+    }
+    for (int c = 0; c < 3; ++c) render.data[3 * p + c] = truth.data[3 * p + c];
+  }
+  return static_cast<double>(kept) / static_cast<double>(pixels);
+}
+
+}  // namespace
+
+gart::image_float composited(gart::image8 const& image, gart::vec3 background) {
+  gart::image_float result(image.width, image.height, 3);
+  std::size_t const pixels = static_cast<std::size_t>(image.width) * image.height;
+  for (std::size_t p = 0; p < pixels; ++p) {
+    gart::u8 const* const from = image.data.data() + p * image.channels;
+    float const alpha = image.channels == 4 ? from[3] / 255.0f : 1.0f;
+    for (int c = 0; c < 3; ++c) {
+      float const value = from[image.channels >= 3 ? c : 0] / 255.0f;
+      result.data[3 * p + c] = value * alpha + background[c] * (1 - alpha);
+    }
+  }
+  return result;
+}
+
+scores evaluate(std::vector<gart::dataset_view> const& views, gart::vec3 background, render_view const& render,
+                keep_view const& keep) {
+  scores result;
+  double psnr_sum = 0, ssim_sum = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    auto const& view = views[i];
+    view_score score;
+    score.name = view.name;
+    auto const start = std::chrono::steady_clock::now();
+    gart::image_float image = render(view.view).color;
+    score.milliseconds = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    for (float& v : image.data) v = std::clamp(v, 0.0f, 1.0f);
+
+    gart::image_float const truth = composited(view.image, background);
+    if (image.data.size() != truth.data.size()) {
+      throw gart::error(view.name + ": rendered at " + std::to_string(image.width) + " x " + std::to_string(image.height) +
+                        ", but its photograph has " + std::to_string(truth.width) + " x " + std::to_string(truth.height));
+    }
+    gart::image_float scored = image;
+    double const share = apply_mask(view.mask, truth, scored);
+    // The mean of the squares over all pixels, the excluded ones zero, is `share` times the mean over those that count.
+    score.psnr = gart::psnr(scored, truth) + 10 * std::log10(share);
+    score.ssim = gart::ssim(scored, truth);
+    psnr_sum += score.psnr, ssim_sum += score.ssim;
+    if (keep) keep(i, score, image, truth);
+    result.views.push_back(std::move(score));
+  }
+  if (!views.empty()) {
+    result.psnr = psnr_sum / static_cast<double>(views.size());
+    result.ssim = ssim_sum / static_cast<double>(views.size());
+  }
+  return result;
+}
+
+nlohmann::json to_json(scores const& result) {
+  nlohmann::json all = {{"psnr", result.psnr}, {"ssim", result.ssim}, {"test_views", result.views.size()}};
+  all["views"] = nlohmann::json::array();
+  for (auto const& v : result.views) {
+    all["views"].push_back({{"name", v.name}, {"psnr", v.psnr}, {"ssim", v.ssim}, {"milliseconds", v.milliseconds}});
+  }
+  return all;
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,43 @@
+#pragma once
+// Scores of rendered views against photographs: PSNR and SSIM on [0, 1], the render clamped to it, the mean over views.
+// Straight alpha of the truth is composited on the background. Pixels that a mask excludes count in neither sum of
+// PSNR; for SSIM, whose windows need them, they hold the truth in both images.
+
+#include <gart/io/dataset.hpp>
+#include <gart/train/session.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace gart_cli {
+
+struct view_score {
+  std::string name;
+  double psnr = 0, ssim = 0;
+  double milliseconds = 0;  // of rendering, to an image in host memory
+};
+
+struct scores {
+  double psnr = std::numeric_limits<double>::quiet_NaN();  // stays so where there are no views
+  double ssim = std::numeric_limits<double>::quiet_NaN();
+  std::vector<view_score> views;
+};
+
+using render_view = std::function<gart::rendered(gart::camera const&)>;
+// Sees each view as it was scored, in order.
+using keep_view = std::function<void(std::size_t index, view_score const&, gart::image_float const& render,
+                                     gart::image_float const& truth)>;
+
+scores evaluate(std::vector<gart::dataset_view> const& views, gart::vec3 background, render_view const& render,
+                keep_view const& keep = {});
+
+gart::image_float composited(gart::image8 const& image, gart::vec3 background);
+
+// "psnr", "ssim", "test_views" and "views"; null where there is no number.
+nlohmann::json to_json(scores const& result);
+
+}  // namespace gart_cli

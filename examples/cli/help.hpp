@@ -1,0 +1,62 @@
+#pragma once
+// How options look in --help ("--iterations N   Steps (default: 30000)"), and checks whose messages say what is wanted.
+
+#include <CLI/CLI.hpp>
+
+#include <string>
+#include <vector>
+
+namespace gart_cli {
+
+class help_formatter : public CLI::Formatter {
+ public:
+  help_formatter() { column_width(34); }
+  std::string make_option_opts(CLI::Option const* option) const override {
+    if (option->get_type_size() == 0) return "";
+    return " " + option->get_type_name() + (option->get_required() ? " (required)" : "");
+  }
+  std::string make_option_desc(CLI::Option const* option) const override {
+    std::string const value = option->get_default_str();
+    return option->get_description() + (value.empty() ? "" : " (default: " + value + ")");
+  }
+  // The usage line names the files and folders in order; CLI11's own would put "[OPTIONS]" before them.
+  std::string make_usage(CLI::App const* app, std::string name) const override {
+    std::string usage = "\nUsage: " + (name.empty() ? app->get_name() : name);
+    for (CLI::Option const* option : app->get_options([](CLI::Option const* o) { return o->get_positional(); })) {
+      usage += option->get_required() ? " " + option->get_name(true) : " [" + option->get_name(true) + "]";
+    }
+    for (CLI::Option const* option : app->get_options([](CLI::Option const* o) { return o->get_required(); })) {
+      if (!option->get_positional()) usage += " " + option->get_name() + " " + option->get_type_name();
+    }
+    return usage + (app->get_subcommands({}).empty() ? " [options]\n" : " COMMAND [options]\n");
+  }
+};
+
+inline CLI::Validator one_of(std::vector<std::string> const& names) {
+  return CLI::Validator(
+      [names](std::string& value) {
+        std::string list;
+        for (auto const& name : names) {
+          if (value == name) return std::string();
+          list += (list.empty() ? "" : ", ") + name;
+        }
+        return "'" + value + "' is none of " + list;
+      },
+      "");
+}
+
+inline CLI::Validator between(double low, double high) {
+  return CLI::Validator(
+      [low, high](std::string& text) {
+        double value = 0;
+        if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
+        auto const show = [](double v) {
+          std::string s = v == static_cast<long long>(v) ? std::to_string(static_cast<long long>(v)) : std::to_string(v);
+          return s;
+        };
+        return "'" + text + "' is not a number from " + show(low) + " to " + show(high);
+      },
+      "");
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,47 @@
+#include "history.hpp"
+
+#include <algorithm>
+
+namespace gart_cli {
+
+void history::add(gart::step_report const& report) {
+  sum_.step = report.step, sum_.gaussians = report.gaussians;
+  sum_.loss += report.loss, sum_.psnr += report.psnr;
+  if (++pending_ >= spacing_) close_point();
+}
+
+void history::close_point() {
+  if (pending_ == 0) return;
+  sum_.seconds = seconds, sum_.loss /= pending_, sum_.psnr /= pending_;
+  train.push_back(sum_);
+  sum_ = {}, pending_ = 0;
+}
+
+nlohmann::json history::to_json() const {
+  nlohmann::json all = {{"seconds", seconds},
+                        {"train_columns", {"step", "seconds", "loss", "psnr", "gaussians"}},
+                        {"train", nlohmann::json::array()},
+                        {"test_columns", {"step", "psnr", "ssim"}},
+                        {"test", nlohmann::json::array()}};
+  for (auto const& p : train) all["train"].push_back({p.step, p.seconds, p.loss, p.psnr, p.gaussians});
+  for (auto const& p : test) all["test"].push_back({p.step, p.psnr, p.ssim});
+  return all;
+}
+
+void history::restore(nlohmann::json const& saved, int step) {
+  // A loss that was not finite is null in the file, and no point of a curve.
+  auto const usable = [step](nlohmann::json const& row, std::size_t columns) {
+    return row.is_array() && row.size() == columns && row[0].is_number() && row[0].get<int>() <= step &&
+           std::all_of(row.begin(), row.end(), [](auto const& v) { return v.is_number(); });
+  };
+  train.clear(), test.clear();
+  for (auto const& row : saved.value("train", nlohmann::json::array())) {
+    if (usable(row, 5)) train.push_back({row[0], row[1], row[2], row[3], row[4]});
+  }
+  for (auto const& row : saved.value("test", nlohmann::json::array())) {
+    if (usable(row, 3)) test.push_back({row[0], row[1], row[2]});
+  }
+  seconds = train.empty() ? 0 : train.back().seconds;
+}
+
+}  // namespace gart_cli

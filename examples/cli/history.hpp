@@ -1,0 +1,40 @@
+#pragma once
+// The course of a training run, for the curves of its report: a few hundred points whatever the number of steps, kept in
+// history.json beside the checkpoint so that a resumed run has the whole curve.
+
+#include <gart/train/session.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <vector>
+
+namespace gart_cli {
+
+class history {
+ public:
+  struct train_point {  // loss and PSNR are means over the steps since the point before
+    int step = 0;
+    double seconds = 0, loss = 0, psnr = 0, gaussians = 0;
+  };
+  struct test_point {
+    int step = 0;
+    double psnr = 0, ssim = 0;
+  };
+  std::vector<train_point> train;
+  std::vector<test_point> test;
+  double seconds = 0;  // of training, evaluation and saving left out
+
+  explicit history(int iterations) : spacing_(iterations > 400 ? iterations / 400 : 1) {}
+  void add(gart::step_report const& report);
+  // Ends the mean that is being formed, so that nothing is lost by stopping here.
+  void close_point();
+  nlohmann::json to_json() const;
+  // Forgets what came after `step`: a checkpoint may be older than the history beside it.
+  void restore(nlohmann::json const& saved, int step);
+
+ private:
+  int spacing_, pending_ = 0;
+  train_point sum_;
+};
+
+}  // namespace gart_cli

@@ -1,0 +1,72 @@
+#include "commands.hpp"
+#include "progress.hpp"
+
+#include <gart/core/version.hpp>
+#include <gart/train/session.hpp>
+
+#if defined(GART_WITH_CUDA)
+#include <gart/exec/cuda.hpp>
+#endif
+
+#include <cstdio>
+#include <map>
+#include <set>
+#include <thread>
+#include <tuple>
+
+namespace gart_cli {
+
+namespace {
+
+void print_devices() {
+  std::printf("cpu        %u threads\n", std::thread::hardware_concurrency());
+#if defined(GART_WITH_CUDA)
+  std::string reason;
+  auto const devices = gart::cuda_devices(&reason);
+  if (devices.empty()) std::printf("cuda       no device (%s)\n", reason.c_str());
+  for (auto const& d : devices) {
+    std::printf("cuda       %s, sm_%d%d, %d multiprocessors, %s\n", d.name.c_str(), d.compute_major, d.compute_minor,
+                d.multiprocessors, as_bytes(static_cast<double>(d.total_bytes)).c_str());
+  }
+#else
+  std::puts("cuda       not in this build");
+#endif
+#if defined(GART_EMBREE_VERSION)
+  std::puts("embree     " GART_EMBREE_VERSION);
+#else
+  std::puts("embree     not in this build");
+#endif
+}
+
+int run_info() {
+  std::printf("gart       %s\n", gart::version);
+  print_devices();
+  // Rows that differ only in the degree of the spherical harmonics share a line.
+  std::map<std::tuple<std::string, std::string, std::string>, std::set<int>> rows;
+  for (auto const& r : gart::compiled_rows()) rows[{r.backend, r.tracer, r.backward}].insert(r.sh_degree);
+  std::puts("\nbackend    tracer     backward   SH degrees");
+  for (auto const& [names, degrees] : rows) {
+    auto const& [backend, tracer, backward] = names;
+    std::printf("%-10s %-10s %-10s", backend.c_str(), tracer.c_str(), backward.c_str());
+    for (int const degree : degrees) std::printf(" %d", degree);
+    std::puts("");
+  }
+  auto const best = gart::resolve({});
+  std::printf("\nauto means %s, %s, %s here.\n", best.backend.c_str(), best.tracer.c_str(), best.backward.c_str());
+  return 0;
+}
+
+}  // namespace
+
+void add_info(CLI::App& app, command& selected) {
+  CLI::App* info = app.add_subcommand("info", "Say what this build and this machine can do.");
+  info->footer(
+      "\nPrints the version, the devices found, and the rows that were compiled: which backend, tracer and backward pass\n"
+      "go together, for which degrees of spherical harmonics. Writes nothing.\n"
+      "\nExamples:\n"
+      "  gart info\n"
+      "  gart info | grep cuda");
+  info->callback([&selected] { selected = run_info; });
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,63 @@
+// The `gart` program: trains, renders and scores scenes of ray-traced 3D Gaussians from the command line.
+
+#include "commands.hpp"
+#include "help.hpp"
+
+#include <gart/core/version.hpp>
+
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <new>
+#include <string>
+
+namespace {
+
+int fail(std::string const& what, int code) {
+  std::fprintf(stderr, "gart: error: %s\n", what.c_str());
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace gart_cli;
+  CLI::App app{"gart trains and renders scenes of ray-traced 3D Gaussians.", "gart"};
+  app.formatter(std::make_shared<help_formatter>());
+  app.set_version_flag("--version", std::string("gart ") + gart::version, "Print the version and leave");
+  app.require_subcommand(0, 1);
+  app.footer(
+      "\nExamples:\n"
+      "  gart synth --out capture                 a small capture to try things on\n"
+      "  gart train capture --out run             train on it; run/report.html shows how it went\n"
+      "  gart train --help                        every option of a command\n"
+      "\nExit codes: 0 done, 1 failed, 2 the command line is wrong, 130 stopped by Ctrl-C or SIGTERM (train: saved, resumable).");
+  command selected;
+  add_train(app, selected);
+  add_render(app, selected);
+  add_eval(app, selected);
+  add_synth(app, selected);
+  add_info(app, selected);
+
+  try {
+    app.parse(argc, argv);
+  } catch (CLI::ParseError const& e) {
+    if (e.get_exit_code() == 0) return app.exit(e);
+    std::string topic = "gart";
+    for (CLI::App const* sub : app.get_subcommands()) topic += " " + sub->get_name();
+    return fail(std::string(e.what()) + " (see " + topic + " --help)", exit_usage);
+  }
+  if (!selected) {
+    std::fputs(app.help().c_str(), stderr);
+    return exit_usage;
+  }
+  try {
+    return selected();
+  } catch (usage_error const& e) {
+    return fail(e.what(), exit_usage);
+  } catch (std::bad_alloc const&) {
+    return fail("out of host memory (lower --max-gaussians, or raise --downscale)", exit_failed);
+  } catch (std::exception const& e) {
+    return fail(e.what(), exit_failed);
+  }
+}

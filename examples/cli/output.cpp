@@ -1,0 +1,48 @@
+#include "output.hpp"
+
+#include <gart/core/error.hpp>
+#include <gart/io/file.hpp>
+
+#include <unistd.h>
+
+namespace gart_cli {
+
+namespace fs = std::filesystem;
+
+void prepare_folder(fs::path const& folder) {
+  std::error_code failure;
+  fs::create_directories(folder, failure);
+  if (failure || !fs::is_directory(folder)) {
+    throw gart::io_error(folder.string(), "cannot be made a folder: " + (failure ? failure.message() : "a file is there"),
+                         "choose another --out");
+  }
+  fs::path const probe = folder / (".gart_probe_" + std::to_string(getpid()));
+  try {
+    gart::write_file(probe, "x");
+  } catch (gart::io_error const& e) {
+    throw gart::io_error(folder.string(), std::string("files cannot be written there: ") + e.what(),
+                         "choose another --out, or free some space");
+  }
+  fs::remove(probe, failure);
+}
+
+void prepare_file(fs::path const& file) {
+  if (fs::is_directory(file)) throw gart::io_error(file.string(), "is a folder", "name a file");
+  prepare_folder(file.has_parent_path() ? file.parent_path() : fs::path("."));
+}
+
+void write_json(fs::path const& file, nlohmann::json const& value) {
+  // File names may hold bytes that are not UTF-8: replaced, since a report is better than none.
+  gart::write_file(file, value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
+
+nlohmann::json read_json(fs::path const& file) {
+  auto const bytes = gart::read_file(file);
+  try {
+    return nlohmann::json::parse(bytes.begin(), bytes.end());
+  } catch (nlohmann::json::exception const& e) {
+    throw gart::io_error(file.string(), std::string("is not JSON: ") + e.what(), "restore it, or start anew");
+  }
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,246 @@
+#include "report.hpp"
+
+#include "progress.hpp"
+#include "report_style.hpp"
+#include "svg_chart.hpp"
+
+#include <gart/core/version.hpp>
+#include <gart/io/image_file.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace gart_cli {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t most_views = 12;
+constexpr int widest_image = 480;
+
+std::string base64(std::vector<gart::u8> const& bytes) {
+  static constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::size_t const n = std::min<std::size_t>(3, bytes.size() - i);
+    unsigned word = bytes[i] << 16;
+    if (n > 1) word |= bytes[i + 1] << 8;
+    if (n > 2) word |= bytes[i + 2];
+    for (std::size_t k = 0; k < 4; ++k) text += k <= n ? digits[word >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
+// Dark violet over red to pale yellow: lightness rises with the error, so that it also reads in grey.
+struct color_stop {
+  float r, g, b;
+};
+constexpr color_stop error_colors[] = {{10, 8, 26}, {74, 20, 96}, {150, 38, 96}, {218, 76, 62}, {249, 149, 54}, {252, 240, 170}};
+constexpr int last_color = 5;
+
+void put_error_color(float share, gart::u8* rgb) {
+  float const at = std::clamp(share, 0.0f, 1.0f) * last_color;
+  int const i = std::min(static_cast<int>(at), last_color - 1);
+  float const f = at - static_cast<float>(i);
+  color_stop const &a = error_colors[i], &b = error_colors[i + 1];
+  rgb[0] = static_cast<gart::u8>(a.r + f * (b.r - a.r));
+  rgb[1] = static_cast<gart::u8>(a.g + f * (b.g - a.g));
+  rgb[2] = static_cast<gart::u8>(a.b + f * (b.b - a.b));
+}
+
+std::string error_gradient() {
+  std::string css = "linear-gradient(90deg";
+  for (auto const& c : error_colors) css += ", rgb(" + fixed(c.r, 0) + "," + fixed(c.g, 0) + "," + fixed(c.b, 0) + ")";
+  return css + ")";
+}
+
+double number_of(json const& all, char const* key) {
+  return all.contains(key) && all[key].is_number() ? all[key].get<double>() : std::nan("");
+}
+
+std::string text_of(json const& all, char const* key) {
+  return all.contains(key) && all[key].is_string() ? html_escape(all[key].get<std::string>()) : "";
+}
+
+std::string count_of(json const& all, char const* key) {
+  double const v = number_of(all, key);
+  return std::isfinite(v) ? with_commas(static_cast<std::uint64_t>(v)) : "-";
+}
+
+std::string headline(std::string const& value, std::string const& unit, std::string const& label) {
+  return "<div><b>" + value + (unit.empty() ? "" : "<small>" + unit + "</small>") + "</b><span>" + label + "</span></div>";
+}
+
+std::string figures(json const& m) {
+  bool const tested = std::isfinite(number_of(m, "psnr"));
+  std::string html = "<section class=\"figures\">";
+  if (tested) {
+    html += headline(fixed(number_of(m, "psnr"), 2), "dB", "Test PSNR");
+    html += headline(fixed(number_of(m, "ssim"), 4), "", "Test SSIM");
+  }
+  html += headline(count_of(m, "gaussians"), "", "Gaussians");
+  html += headline(as_duration(number_of(m, "seconds")), "", "Training time");
+  html += headline(fixed(number_of(m, "iterations_per_second"), 1), "/s", "Iterations");
+  html += headline(as_bytes(number_of(m, "peak_bytes")), "", "Peak memory of the " + text_of(m, "backend") + " backend");
+  return html + "</section>";
+}
+
+std::string curves(history const& course, double iterations) {
+  chart loss{"Training loss", "", "iterations", {{"loss", {}, false}}, true, iterations};
+  chart psnr{"PSNR", "dB", "iterations", {{"training view", {}, false}, {"test", {}, true}}, false, iterations};
+  chart ssim{"Test SSIM", "", "iterations", {{"SSIM", {}, true}}, false, iterations};
+  chart count{"Gaussians", "", "iterations", {{"", {}, false}}, false, iterations};
+  for (auto const& p : course.train) {
+    loss.series[0].points.emplace_back(p.step, p.loss);
+    psnr.series[0].points.emplace_back(p.step, p.psnr);
+    count.series[0].points.emplace_back(p.step, p.gaussians);
+  }
+  for (auto const& p : course.test) {
+    psnr.series[1].points.emplace_back(p.step, p.psnr);
+    ssim.series[0].points.emplace_back(p.step, p.ssim);
+  }
+  std::string const plots = to_svg(psnr) + to_svg(loss) + to_svg(count) + to_svg(ssim);
+  return plots.empty() ? "" : "<h2>Course of the training</h2><section class=\"charts\">" + plots + "</section>";
+}
+
+std::string pictures(json const& m, std::vector<report_view> const& views) {
+  std::size_t const total = m.contains("views") ? m["views"].size() : 0;
+  std::string html = "<h2>Test views</h2>";
+  if (total == 0) {
+    return html + "<p class=\"soft\">The capture has no test views, so nothing here tells how well the model does on "
+           "photographs that it was not trained on.</p>";
+  }
+  html += "<p class=\"soft\">" +
+          (views.size() < total ? std::to_string(views.size()) + " of " + std::to_string(total) + " views, evenly spread; all are in renders/."
+                                : "All " + std::to_string(total) + ", also in renders/.") +
+          "</p><div class=\"heads\"><span>Render</span><span>Photograph</span><span>Absolute error 0"
+          "<i class=\"scale\" style=\"background:" + error_gradient() + "\"></i>" + fixed(report_error_scale, 2) + "</span></div>";
+  for (auto const& v : views) {
+    std::string const name = html_escape(v.name);
+    auto const image = [&](std::vector<gart::u8> const& jpeg, char const* what) {
+      return "<img loading=\"lazy\" alt=\"" + name + ", " + what + "\" src=\"data:image/jpeg;base64," + base64(jpeg) + "\">";
+    };
+    html += "<figure class=\"view\"><figcaption><b>" + name + "</b><span>" + fixed(v.psnr, 2) + " dB</span><span>SSIM " +
+            fixed(v.ssim, 4) + "</span></figcaption><div class=\"images\">" + image(v.render, "render") +
+            image(v.truth, "photograph") + image(v.error, "error") + "</div></figure>";
+  }
+  html += "<details><summary>Scores of every test view</summary><div class=\"columns\">"
+          "<table><tr><th>View</th><th class=\"n\">PSNR, dB</th><th class=\"n\">SSIM</th><th class=\"n\">Render, ms</th></tr>";
+  for (auto const& v : m["views"]) {
+    html += "<tr><td class=\"v\">" + text_of(v, "name") + "</td><td class=\"n\">" + fixed(number_of(v, "psnr"), 2) +
+            "</td><td class=\"n\">" + fixed(number_of(v, "ssim"), 4) + "</td><td class=\"n\">" +
+            fixed(number_of(v, "milliseconds"), 1) + "</td></tr>";
+  }
+  return html + "</table></div></details>";
+}
+
+std::string bars(std::vector<std::pair<std::string, double>> rows, std::string const& unit, double whole) {
+  std::sort(rows.begin(), rows.end(), [](auto const& a, auto const& b) { return a.second > b.second; });
+  std::string html = "<table>";
+  for (auto const& [name, value] : rows) {
+    double const share = whole > 0 ? std::clamp(value / whole, 0.0, 1.0) : 0;
+    html += "<tr><td>" + html_escape(name) + "</td><td class=\"n\">" + fixed(value, value < 10 ? 3 : 1) + " " + unit +
+            "</td><td class=\"n\">" + fixed(100 * share, 1) + " %</td><td class=\"bar\"><i style=\"width:" +
+            fixed(100 * share, 1) + "%\"></i></td></tr>";
+  }
+  return html + "</table>";
+}
+
+std::vector<std::pair<std::string, double>> rows_of(json const& all, char const* key, double* sum) {
+  std::vector<std::pair<std::string, double>> rows;
+  if (!all.contains(key)) return rows;
+  for (auto const& [name, value] : all[key].items()) {
+    rows.emplace_back(name, value.is_number() ? value.get<double>() : 0);
+    *sum += rows.back().second;
+  }
+  return rows;
+}
+
+std::string costs(json const& m) {
+  double stages = 0, phases = 0;
+  auto const stage_rows = rows_of(m, "stages_ms", &stages), phase_rows = rows_of(m, "wall_seconds", &phases);
+  double const step = number_of(m, "profiled_step_ms");
+  std::string html = "<h2>Where the time and memory went</h2>";
+  if (!stage_rows.empty()) {
+    html += "<p class=\"soft\">Stages of one training step, in the mean over " + count_of(m, "profiled_steps") +
+            " steps that were timed; such a step took " + fixed(step, 2) + " ms.</p><div class=\"box\">" +
+            bars(stage_rows, "ms", std::isfinite(step) ? step : stages) + "</div>";
+  }
+  html += "<p class=\"soft\">The run as a whole.</p><div class=\"box\">" + bars(phase_rows, "s", phases) + "</div>";
+  html += "<p>Buffers of the " + text_of(m, "backend") + " backend held " + as_bytes(number_of(m, "peak_bytes")) +
+          " at most; the process held " + as_bytes(number_of(m, "peak_process_bytes")) + " of host memory, images included.</p>";
+  return html;
+}
+
+std::string settings(json const& m, json const& config) {
+  std::string html = "<h2>Settings</h2><div class=\"settings\">";
+  auto const row = [&](std::string const& name, std::string const& value) {
+    html += "<div><span>" + html_escape(name) + "</span><b>" + html_escape(value) + "</b></div>";
+  };
+  json const options = config.value("options", json::object());
+  for (auto const& [name, value] : options.items()) {
+    bool const fraction = value.is_number_float();
+    char text[32];
+    if (fraction) std::snprintf(text, sizeof text, "%.6g", value.get<double>());
+    row("--" + name, fraction ? text : value.is_string() ? value.get<std::string>() : value.dump());
+  }
+  html += "</div><h2>How it was measured</h2><p>Split: " + text_of(m, "split") + "; " + count_of(m, "test_views") +
+          " test views. Images resized: " + text_of(m, "resize_filter") + ". Background: " + text_of(m, "background") +
+          ". A Gaussian is hit where its alpha is at least " + fixed(number_of(m["approximations"], "alpha_min"), 6) +
+          ", and a ray ends below a transmittance of " + fixed(number_of(m["approximations"], "t_min"), 6) +
+          ". PSNR and SSIM (11 x 11 Gaussian window, sigma 1.5) are taken per view on [0, 1] and averaged over views.</p>";
+  if (m.contains("notes") && !m["notes"].empty()) {
+    html += "<p class=\"soft\">Of the capture: ";
+    for (auto const& note : m["notes"]) html += html_escape(note.get<std::string>()) + (note == m["notes"].back() ? "" : "; ");
+    html += ".</p>";
+  }
+  return html;
+}
+
+}  // namespace
+
+bool in_report(std::size_t index, std::size_t total) {
+  if (total <= most_views) return true;
+  // The first of each of `most_views` equal parts.
+  return index == 0 || index * most_views / total != (index - 1) * most_views / total;
+}
+
+report_view make_report_view(std::string const& name, double psnr, double ssim, gart::image_float const& render,
+                             gart::image_float const& truth) {
+  gart::image8 error(render.width, render.height, 3);
+  std::size_t const pixels = static_cast<std::size_t>(render.width) * render.height;
+  for (std::size_t p = 0; p < pixels; ++p) {
+    float sum = 0;
+    for (int c = 0; c < 3; ++c) sum += std::abs(render.data[3 * p + c] - truth.data[3 * p + c]);
+    put_error_color(sum / 3 / report_error_scale, error.data.data() + 3 * p);
+  }
+  int const factor = std::max(1, (render.width + widest_image - 1) / widest_image);
+  auto const jpeg = [&](gart::image8 const& image) {
+    return gart::encode_jpeg(factor > 1 ? gart::box_downscale(image, factor) : image, 88);
+  };
+  return {name, psnr, ssim, jpeg(gart::to_8bit(render)), jpeg(gart::to_8bit(truth)), jpeg(error)};
+}
+
+std::string report_page(json const& metrics, json const& config, history const& course,
+                        std::vector<report_view> const& views) {
+  std::string const title = text_of(metrics, "scene");
+  std::string page = "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>" + title +
+                     " - gart</title><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><style>";
+  page += report_style;
+  page += "</style></head><body><main><header><h1>" + title + "</h1><p class=\"soft\">" + text_of(metrics, "format") +
+          " capture, " + count_of(metrics, "train_views") + " training views of " + text_of(metrics, "image_size") +
+          " pixels. " + count_of(metrics, "iterations") + " iterations with the " + text_of(metrics, "backend") +
+          " backend, the " + text_of(metrics, "tracer") + " tracer and the " + text_of(metrics, "backward") +
+          " backward pass.</p></header>";
+  page += figures(metrics);
+  page += curves(course, number_of(metrics, "iterations"));
+  page += pictures(metrics, views);
+  page += costs(metrics);
+  page += settings(metrics, config);
+  page += "<footer>gart " + std::string(gart::version) + "</footer></main></body></html>\n";
+  return page;
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,50 @@
+#pragma once
+// The style sheet of report.html: quiet greys and one accent, light or dark as the reader's system is.
+
+namespace gart_cli {
+
+inline constexpr char report_style[] = R"css(
+:root { color-scheme: light dark; --page: #fbfbfa; --card: #ffffff; --ink: #1c1e21; --soft: #667079; --rule: #e4e6e8;
+  --one: #2563c9; --two: #d9730d; --bar: #c9d8f0; }
+@media (prefers-color-scheme: dark) { :root { --page: #131517; --card: #1b1e21; --ink: #e6e8ea; --soft: #98a1aa;
+  --rule: #2d3236; --one: #74a7f5; --two: #f0a04b; --bar: #2c4468; } }
+* { box-sizing: border-box; }
+body { margin: 0; background: var(--page); color: var(--ink); font: 15px/1.5 system-ui, sans-serif; }
+main { max-width: 1180px; margin: 0 auto; padding: 40px 24px 64px; }
+h1 { font-size: 28px; font-weight: 650; letter-spacing: -0.01em; margin: 0; overflow-wrap: anywhere; }
+h2 { font-size: 17px; font-weight: 650; margin: 44px 0 12px; }
+p { margin: 6px 0; max-width: 80ch; } .soft, figcaption, th { color: var(--soft); }
+.figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 12px; margin-top: 26px; }
+.figures div, .chart, .box { background: var(--card); border: 1px solid var(--rule); border-radius: 10px; padding: 14px 16px; }
+.figures b { display: block; font-size: 25px; font-weight: 620; letter-spacing: -0.01em; font-variant-numeric: tabular-nums; }
+.figures small { font-size: 14px; font-weight: 450; color: var(--soft); margin-left: 3px; }
+.figures span { color: var(--soft); font-size: 13px; }
+.charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 420px), 1fr)); gap: 12px; }
+figure { margin: 0; } .chart figcaption { display: flex; flex-wrap: wrap; gap: 4px 16px; font-size: 13px; margin-bottom: 6px; }
+.chart figcaption b { color: var(--ink); font-size: 14px; font-weight: 600; margin-right: auto; }
+.key i { display: inline-block; width: 14px; height: 3px; border-radius: 2px; margin-right: 6px; vertical-align: middle; }
+.swatch-1 { background: var(--one); } .swatch-2 { background: var(--two); }
+svg { display: block; width: 100%; height: auto; } .grid { stroke: var(--rule); stroke-width: 1; }
+.tick { fill: var(--soft); font: 11px system-ui, sans-serif; font-variant-numeric: tabular-nums; }
+polyline { fill: none; stroke-width: 1.6; stroke-linejoin: round; stroke-linecap: round; }
+polyline.line-1 { stroke: var(--one); } polyline.line-2 { stroke: var(--two); }
+circle.line-1 { fill: var(--one); } circle.line-2 { fill: var(--two); }
+.view { margin-bottom: 22px; } .view .images { display: grid; grid-template-columns: repeat(3, 1fr); gap: 8px; }
+.view img { display: block; width: 100%; border-radius: 6px; border: 1px solid var(--rule); }
+.view figcaption { display: flex; gap: 14px; font-size: 13px; margin-bottom: 6px; } .view figcaption b { color: var(--ink); }
+.heads { display: grid; grid-template-columns: repeat(3, 1fr); gap: 8px; font-size: 13px; color: var(--soft); margin: 12px 0 8px; }
+.scale { display: inline-block; width: 84px; height: 9px; border-radius: 3px; margin: 0 6px; vertical-align: middle; }
+table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; font-size: 14px; }
+th { text-align: left; font-weight: 450; font-size: 13px; } th, td { padding: 5px 14px 5px 0; border-bottom: 1px solid var(--rule); }
+tr:last-child td { border-bottom: 0; } td.n, th.n { text-align: right; white-space: nowrap; width: 1%; }
+td.bar { width: 45%; padding-right: 0; } td.bar i { display: block; height: 9px; border-radius: 3px; background: var(--bar); }
+.columns { columns: 2 380px; column-gap: 40px; } .columns table { break-inside: avoid; } td.v { overflow-wrap: anywhere; }
+.settings { display: grid; grid-template-columns: repeat(auto-fit, minmax(290px, 1fr)); gap: 0 36px; }
+.settings div { display: flex; justify-content: space-between; gap: 16px; padding: 5px 0; border-bottom: 1px solid var(--rule);
+  font-size: 14px; } .settings span { color: var(--soft); } .settings b { font-weight: 500; overflow-wrap: anywhere; text-align: right; }
+summary { cursor: pointer; color: var(--soft); font-size: 14px; margin: 8px 0; }
+footer { margin-top: 48px; color: var(--soft); font-size: 13px; }
+@media (max-width: 560px) { main { padding: 24px 14px 40px; } }
+)css";
+
+}  // namespace gart_cli

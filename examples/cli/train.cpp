@@ -1,0 +1,325 @@
+#include "commands.hpp"
+#include "evaluate.hpp"
+#include "history.hpp"
+#include "interrupt.hpp"
+#include "output.hpp"
+#include "progress.hpp"
+#include "report.hpp"
+#include "train_arguments.hpp"
+
+#include <gart/io/file.hpp>
+#include <gart/io/image_file.hpp>
+#include <gart/io/ply.hpp>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <mutex>
+
+#include <sys/resource.h>
+
+namespace gart_cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// Timing each launch slows a step a little: one step in so many is timed.
+constexpr int profile_every = 16;
+
+class stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(clock::now() - start_).count(); }
+
+ private:
+  using clock = std::chrono::steady_clock;
+  clock::time_point start_ = clock::now();
+};
+
+double peak_process_bytes() {
+  rusage use{};
+  getrusage(RUSAGE_SELF, &use);
+#if defined(__APPLE__)
+  return static_cast<double>(use.ru_maxrss);
+#else
+  return 1024.0 * static_cast<double>(use.ru_maxrss);
+#endif
+}
+
+// The running means that the progress line shows.
+struct recent_steps {
+  double loss = 0, psnr = 0, seconds = 0;
+  void add(gart::step_report const& report, double step_seconds) {
+    double const keep = count_ < 50 ? count_ / (count_ + 1.0) : 0.98;
+    ++count_;
+    loss = keep * loss + (1 - keep) * report.loss;
+    psnr = keep * psnr + (1 - keep) * report.psnr;
+    seconds = keep * seconds + (1 - keep) * step_seconds;
+  }
+
+ private:
+  int count_ = 0;
+};
+
+class training_run {
+ public:
+  explicit training_run(train_arguments& a) : a_(a), say_(a.quiet), course_(a.iterations) {}
+
+  int run() {
+    prepare();
+    bool const finished = train();
+    stopwatch const saving;
+    save();
+    save_seconds_ += saving.seconds();
+    if (!finished) {
+      say_.note("Stopped after step " + with_commas(static_cast<std::uint64_t>(session_->steps_done())) + ". Saved " +
+                a_.checkpoint_file().string() + " and " + a_.model_file().string() + ".\nContinue with: gart train --resume --out " +
+                a_.out.string());
+      return exit_interrupted;
+    }
+    conclude();
+    return 0;
+  }
+
+ private:
+  void prepare() {
+    use_threads(a_.threads);
+    stopwatch const loading;
+    if (a_.resume) continue_run(a_);
+    if (a_.dataset.empty()) throw usage_error("DATASET is missing (see gart train --help)");
+    row_ = gart::resolve(row_request_of(a_));
+    a_.backend = row_.backend, a_.tracer = row_.tracer, a_.backward = row_.backward;
+    course_ = history(a_.iterations);
+    load();
+    a_.background = resolve_background(a_.background, data_.alpha);
+    eval_background_ = background_color(a_.background);
+    prepare_folder(a_.out);
+    prepare_folder(a_.out / "renders");
+
+    if (!a_.start.empty()) {
+      start_ = with_degree(gart::read_splat_ply(a_.start), a_.sh_degree);
+      if (start_.size() > a_.max_gaussians) {
+        throw usage_error("--start " + a_.start + ": has " + with_commas(start_.size()) + " Gaussians, more than --max-gaussians " +
+                          std::to_string(a_.max_gaussians));
+      }
+    }
+    session_ = gart::make_session(row_request_of(a_), train_options_of(a_), data_, a_.start.empty() ? nullptr : &start_);
+    if (a_.resume) {
+      check_same_dataset(a_, data_);
+      session_->load(a_.checkpoint_file());
+      if (fs::exists(a_.history_file())) course_.restore(read_json(a_.history_file()), session_->steps_done());
+    } else {
+      begin_anew();
+    }
+    say_.note(row_.backend + " backend, " + row_.tracer + " tracer, " + row_.backward + " backward pass");
+    load_seconds_ = loading.seconds();
+  }
+
+  void load() {
+    std::mutex mutex;  // images are decoded by several threads
+    gart::dataset_options options;
+    options.downscale = a_.downscale;
+    options.test_every = a_.test_every;
+    options.progress = [&](std::size_t done, std::size_t total) {
+      std::lock_guard const lock(mutex);
+      say_.state("loading " + std::to_string(done) + "/" + std::to_string(total) + " images",
+                 static_cast<double>(done) / static_cast<double>(std::max<std::size_t>(total, 1)));
+    };
+    data_ = gart::load_dataset(a_.dataset, options);
+    if (data_.train.empty()) {
+      throw gart::io_error(a_.dataset.string(), "has no training views", "raise --test-every, which keeps views for testing");
+    }
+    say_.note(data_.format + " capture: " + std::to_string(data_.train.size()) + " training views, " +
+              std::to_string(data_.test.size()) + " test views (" + data_.split + "), " + image_size() + ", " +
+              with_commas(data_.points.size()) + " points");
+    for (auto const& note : data_.notes) say_.note("  " + note);
+  }
+
+  // The first checkpoint is written before the first step: what cannot be saved is then known before it costs anything.
+  // An earlier run's results go, lest they be taken for this one's.
+  void begin_anew() {
+    for (char const* old : {"checkpoint.gart", "history.json", "metrics.json", "report.html"}) fs::remove(a_.out / old);
+    write_json(a_.config_file(), config_of(a_, data_));
+    session_->save(a_.checkpoint_file());
+  }
+
+  // True when all steps are done, false when it was asked to stop.
+  bool train() {
+    interrupt_guard const interrupt;
+    recent_steps recent;
+    stopwatch since_start;
+    double last_checkpoint = 0;
+    while (session_->steps_done() < a_.iterations) {
+      int const before = session_->steps_done();
+      if (interrupt.wanted() || (a_.stop_at > 0 && before >= a_.stop_at)) return false;
+      session_->profile().enable(before % profile_every == profile_every - 1);
+      stopwatch const step;
+      gart::step_report const report = session_->step();
+      double const seconds = step.seconds();
+      if (session_->profile().enabled()) ++profiled_steps_, profiled_seconds_ += seconds;
+      session_->profile().enable(false);
+      if (!std::isfinite(report.loss)) {
+        throw gart::error("step " + std::to_string(report.step) + ", view " + report.view +
+                          ": the loss is not a number (the last checkpoint is whole: " + a_.checkpoint_file().string() + ")");
+      }
+      ++steps_, step_seconds_ += seconds, course_.seconds += seconds, gaussians_ = report.gaussians;
+      course_.add(report);
+      recent.add(report, seconds);
+      show(report, recent);
+      int const between = a_.steps_between_tests();
+      if (between > 0 && report.step % between == 0 && report.step < a_.iterations) test(report.step);
+      if (a_.checkpoint_minutes > 0 && since_start.seconds() - last_checkpoint > 60 * a_.checkpoint_minutes) {
+        stopwatch const saving;
+        save_checkpoint();
+        save_seconds_ += saving.seconds();
+        last_checkpoint = since_start.seconds();
+      }
+    }
+    return true;
+  }
+
+  void show(gart::step_report const& report, recent_steps const& recent) {
+    double const share = static_cast<double>(report.step) / a_.iterations;
+    if (!say_.due(share)) return;
+    double const rate = recent.seconds > 0 ? 1 / recent.seconds : 0;
+    say_.state(with_commas(report.step) + "/" + with_commas(a_.iterations) + "  " + fixed(rate, rate < 10 ? 2 : 0) +
+                   " it/s  loss " + fixed(recent.loss, 4) + "  PSNR " + fixed(recent.psnr, 2) + " dB  " +
+                   with_commas(report.gaussians) + " Gaussians  " +
+                   as_duration((a_.iterations - report.step) * recent.seconds) + " left",
+               share);
+  }
+
+  scores test(int step, keep_view const& keep = {}) {
+    stopwatch const testing;
+    scores const result =
+        evaluate(data_.test, eval_background_, [this](gart::camera const& c) { return session_->render(c, eval_background_); }, keep);
+    if (!result.views.empty()) {
+      course_.test.push_back({step, result.psnr, result.ssim});
+      say_.note("step " + with_commas(step) + ": test PSNR " + fixed(result.psnr, 2) + " dB, SSIM " + fixed(result.ssim, 4));
+    }
+    test_seconds_ += testing.seconds();
+    return result;
+  }
+
+  void save_checkpoint() {
+    course_.close_point();
+    session_->save(a_.checkpoint_file());
+    write_json(a_.history_file(), course_.to_json());
+  }
+
+  void save() {
+    save_checkpoint();
+    gart::gaussian_model const model = session_->model();
+    gaussians_ = model.size();
+    gart::write_splat_ply(a_.model_file(), model, traits());
+  }
+
+  // Only what is not as everywhere goes into the header, so that an ordinary model is byte for byte an ordinary file.
+  gart::ply_traits traits() const {
+    gart::ply_traits result;
+    char text[32];
+    auto const put = [&](char const* key, float value, float usual) {
+      if (value == usual) return;
+      std::snprintf(text, sizeof text, "%.9g", value);
+      result[key] = text;
+    };
+    put("alpha_min", a_.alpha_min, a_.defaults.render.alpha_min);
+    put("t_min", a_.t_min, a_.defaults.render.transmittance_min);
+    return result;
+  }
+
+  void conclude() {
+    std::vector<report_view> shown;
+    stopwatch const writing;
+    double const tests_before = test_seconds_;
+    scores const result = test(a_.iterations, [&](std::size_t i, view_score const& s, gart::image_float const& render,
+                                                  gart::image_float const& truth) {
+      gart::write_png(a_.out / "renders" / (s.name + ".png"), gart::to_8bit(render));
+      gart::write_png(a_.out / "renders" / (s.name + "_truth.png"), gart::to_8bit(truth));
+      if (in_report(i, data_.test.size())) shown.push_back(make_report_view(s.name, s.psnr, s.ssim, render, truth));
+      say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
+                 static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
+    });
+    write_json(a_.history_file(), course_.to_json());
+    save_seconds_ += writing.seconds() - (test_seconds_ - tests_before);
+    nlohmann::json const metrics = metrics_of(result);
+    write_json(a_.out / "metrics.json", metrics);
+    gart::write_file(a_.out / "report.html", report_page(metrics, read_json(a_.config_file()), course_, shown));
+    if (a_.quiet) return;
+    say_.clear();
+    std::printf("trained %s steps in %s, %s Gaussians\n", with_commas(a_.iterations).c_str(), as_duration(course_.seconds).c_str(),
+                with_commas(gaussians_).c_str());
+    if (!result.views.empty()) {
+      std::printf("test PSNR %.2f dB, SSIM %.4f over %zu views\n", result.psnr, result.ssim, result.views.size());
+    }
+    std::printf("model   %s\nreport  %s\n", a_.model_file().string().c_str(), (a_.out / "report.html").string().c_str());
+  }
+
+  std::string image_size() const {
+    auto const& first = data_.train.front().image;
+    std::string const size = std::to_string(first.width) + " x " + std::to_string(first.height);
+    for (auto const& v : data_.train) {
+      if (v.image.width != first.width || v.image.height != first.height) return size + " and other sizes";
+    }
+    return size;
+  }
+
+  nlohmann::json metrics_of(scores const& result) {
+    nlohmann::json m = to_json(result);
+    fs::path const named = fs::absolute(a_.dataset).lexically_normal();
+    m["scene"] = (named.has_filename() ? named : named.parent_path()).filename().string();
+    m["format"] = data_.format, m["split"] = data_.split, m["resize_filter"] = data_.resize_filter;
+    m["train_views"] = data_.train.size(), m["image_size"] = image_size(), m["notes"] = data_.notes;
+    m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
+    m["iterations"] = a_.iterations, m["gaussians"] = gaussians_, m["sh_degree"] = row_.sh_degree;
+    m["backend"] = row_.backend, m["tracer"] = row_.tracer, m["backward"] = row_.backward;
+    m["approximations"] = {{"alpha_min", a_.alpha_min}, {"t_min", a_.t_min}};
+    m["seconds"] = course_.seconds;
+    m["iterations_per_second"] = course_.seconds > 0 ? a_.iterations / course_.seconds : 0;
+    m["wall_seconds"] = {{"loading", load_seconds_}, {"training", step_seconds_}, {"testing", test_seconds_}, {"saving", save_seconds_}};
+    m["stages_ms"] = nlohmann::json::object();
+    for (auto const& [label, time] : session_->profile().stages()) {
+      if (profiled_steps_ > 0) m["stages_ms"][label] = time.milliseconds / profiled_steps_;
+    }
+    m["profiled_steps"] = profiled_steps_;
+    m["profiled_step_ms"] = profiled_steps_ > 0 ? 1000 * profiled_seconds_ / profiled_steps_ : 0;
+    m["peak_bytes"] = session_->peak_bytes(), m["peak_process_bytes"] = peak_process_bytes();
+    return m;
+  }
+
+  train_arguments& a_;
+  progress say_;
+  history course_;
+  gart::row_info row_;
+  gart::dataset data_;
+  gart::gaussian_model start_;
+  gart::vec3 eval_background_{0.0f};
+  std::unique_ptr<gart::session> session_;
+  std::size_t gaussians_ = 0;
+  int steps_ = 0, profiled_steps_ = 0;
+  double load_seconds_ = 0, step_seconds_ = 0, test_seconds_ = 0, save_seconds_ = 0, profiled_seconds_ = 0;
+};
+
+}  // namespace
+
+void add_train(CLI::App& app, command& selected) {
+  auto a = std::make_shared<train_arguments>();
+  CLI::App* train = app.add_subcommand(
+      "train", "Train Gaussians on the photographs of a capture, test them on held-out views, and report.");
+  add_arguments(*train, *a);
+  train->footer(
+      "\nWrites into DIR:\n"
+      "  model.ply         the Gaussians, as other viewers read them\n"
+      "  report.html       one page: scores, curves, test views with their errors, where time and memory went\n"
+      "  metrics.json      the same in figures\n"
+      "  renders/          each test view: NAME.png, and NAME_truth.png beside it\n"
+      "  checkpoint.gart   all that the next step depends on; with config.json and history.json what --resume needs\n"
+      "A run that was in DIR before is replaced. Ctrl-C or SIGTERM finishes the step, saves, and exits with 130.\n"
+      "\nExamples:\n"
+      "  gart train lego --out run --downscale 4 --iterations 2000 --max-gaussians 20000\n"
+      "  gart train --resume --out run");
+  train->callback([a, &selected] { selected = [a] { return training_run(*a).run(); }; });
+}
+
+}  // namespace gart_cli

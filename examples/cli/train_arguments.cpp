@@ -1,0 +1,132 @@
+#include "train_arguments.hpp"
+
+#include "commands.hpp"
+#include "output.hpp"
+
+#include <gart/core/version.hpp>
+
+namespace gart_cli {
+
+namespace fs = std::filesystem;
+
+void add_arguments(CLI::App& train, train_arguments& a) {
+  auto& r = a.recorded;
+  train.add_option("DATASET", a.dataset,
+                   "Capture: a folder with COLMAP's sparse/ and images/, Blender's\n"
+                   "transforms_train.json, or a transforms.json; or such a file")
+      ->type_name("");
+  train.add_option("--out", a.out, "Folder of the results; made where there is none")->type_name("DIR")->required();
+  train.add_flag("--resume", a.resume, "Continue the run in DIR from its last checkpoint, with its\noptions; DATASET may be left out");
+  train.add_flag("--quiet", a.quiet, "Say nothing but errors");
+
+  std::string group = "Training";
+  auto const in_group = [&group](CLI::Option* option) { return option->group(group); };
+  in_group(r.add(train, "--iterations", a.iterations, "N", "Steps, one training view each"))->check(between(1, 1e9));
+  in_group(r.add(train, "--max-gaussians", a.max_gaussians, "N", "Gaussians at most; memory and time grow with them"))
+      ->check(between(1, 2147483647.0));
+  in_group(r.add(train, "--densify", a.densify, "NAME",
+                 "How Gaussians are added: mcmc (grows to --max-gaussians),\nadc (clones and splits by gradient) or none"))
+      ->check(one_of({"mcmc", "adc", "none"}));
+  in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3", "Degree of the spherical harmonics of colour"))->check(between(0, 3));
+  in_group(r.add(train, "--points", a.points, "N", "Gaussians placed at random where the capture has no points"))
+      ->check(between(1, 2147483647.0));
+  in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
+  in_group(r.add(train, "--seed", a.seed, "N", "Seed of everything random; on the serial backend the same\nseed gives the same bits"));
+
+  group = "Capture";
+  in_group(r.add(train, "--downscale", a.downscale, "N", "Shrink images by this whole factor"))->check(between(1, 64));
+  in_group(r.add(train, "--background", a.background, "NAME",
+                 "white, black, or random (another at each step; tests on black);\nauto: white for images with alpha, else black"))
+      ->check(one_of({"auto", "white", "black", "random"}));
+  in_group(r.add(train, "--test-every", a.test_every, "N",
+                 "Keep each Nth view for testing, 0: none; for captures that do\nnot say themselves which are for testing"))
+      ->check(between(0, 1e6));
+
+  group = "Machine";
+  in_group(r.add(train, "--backend", a.backend, "NAME", "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is"))
+      ->check(backend_names());
+  in_group(r.add(train, "--tracer", a.tracer, "NAME", "What finds the hits: bvh, or embree (CPU);\nthe images are the same"))
+      ->check(tracer_names());
+  in_group(r.add(train, "--backward", a.backward, "NAME", "How gradients are gathered: pixel; auto: the fastest there is"))
+      ->check(one_of({"auto", "pixel"}));
+  add_threads(train, a.threads);
+  in_group(train.get_option("--threads"));
+
+  group = "Accuracy";
+  in_group(r.add(train, "--alpha-min", a.alpha_min, "A", "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as others have it"))
+      ->check(between(1e-6, 0.99));
+  in_group(r.add(train, "--t-min", a.t_min, "T", "Transmittance below which a ray ends, 0 to 1"))->check(between(0, 0.99));
+
+  group = "Course";
+  in_group(r.add(train, "--eval-every", a.eval_every, "N", "Steps between tests on the test views, 0: only at the end,\n-1: five in the run"))
+      ->check(between(-1, 1e9));
+  in_group(train.add_option("--checkpoint-every", a.checkpoint_minutes, "Minutes between checkpoints, 0: only at the end"))
+      ->type_name("M")
+      ->capture_default_str()
+      ->check(between(0, 1e6));
+  in_group(train.add_option("--stop-at", a.stop_at, "Stop after this step as Ctrl-C would, 0: do not; the run can\nthen be resumed"))
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(0, 1e9));
+}
+
+void continue_run(train_arguments& a) {
+  for (auto const& file : {a.config_file(), a.checkpoint_file()}) {
+    if (!fs::exists(file)) {
+      throw gart::io_error(file.string(), "is not there: --resume needs the folder of a run that was started",
+                           "give that run's --out, or leave --resume out");
+    }
+  }
+  nlohmann::json const config = read_json(a.config_file());
+  if (!config.is_object() || !config.contains("options") || !config["options"].is_object()) {
+    throw gart::io_error(a.config_file().string(), "has no \"options\"", "start anew without --resume");
+  }
+  a.recorded.continue_from(config["options"], a.config_file());
+  if (a.dataset.empty()) {
+    if (!config.contains("dataset") || !config["dataset"].is_string()) {
+      throw gart::io_error(a.config_file().string(), "has no \"dataset\"", "name the dataset on the command line");
+    }
+    a.dataset = fs::path(config["dataset"].get<std::string>());
+  }
+}
+
+gart::row_request row_request_of(train_arguments const& a) { return {a.backend, a.tracer, a.backward, a.sh_degree}; }
+
+gart::train_options train_options_of(train_arguments const& a) {
+  gart::train_options o = a.defaults;
+  o.iterations = a.iterations;
+  o.max_gaussians = a.max_gaussians;
+  o.random_points = std::min(a.points, a.max_gaussians);
+  o.densify = a.densify == "mcmc" ? gart::densify_kind::mcmc
+              : a.densify == "adc" ? gart::densify_kind::adc
+                                   : gart::densify_kind::none;
+  o.sh_degree = a.sh_degree;
+  o.background = a.background == "white"    ? gart::background_kind::white
+                 : a.background == "random" ? gart::background_kind::random
+                                            : gart::background_kind::black;
+  o.seed = a.seed;
+  o.render.alpha_min = a.alpha_min;
+  o.render.transmittance_min = a.t_min;
+  return o;
+}
+
+nlohmann::json config_of(train_arguments const& a, gart::dataset const& data) {
+  return {{"gart", gart::version},
+          {"dataset", fs::absolute(a.dataset).lexically_normal().string()},
+          {"train_views", data.train.size()},
+          {"test_views", data.test.size()},
+          {"options", a.recorded.values()}};
+}
+
+void check_same_dataset(train_arguments const& a, gart::dataset const& data) {
+  nlohmann::json const config = read_json(a.config_file());
+  auto const now = config_of(a, data);
+  for (char const* key : {"train_views", "test_views"}) {
+    if (config.contains(key) && config[key] == now[key]) continue;
+    throw usage_error(a.dataset.string() + ": has " + now[key].dump() + " " + key + ", the run to be resumed had " +
+                      config.value(key, nlohmann::json()).dump() + " (" + a.config_file().string() +
+                      "; name the dataset it was started with)");
+  }
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,50 @@
+#pragma once
+// What `gart train` was asked for, and its way into config.json and back.
+
+#include "options.hpp"
+
+#include <gart/train/options.hpp>
+#include <gart/train/session.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <filesystem>
+#include <string>
+
+namespace gart_cli {
+
+struct train_arguments {
+  std::filesystem::path dataset, out;
+  bool resume = false, quiet = false;
+  int threads = 0, stop_at = 0;
+  float checkpoint_minutes = 10;
+
+  // What follows decides the result and is recorded.
+  std::string backend = "auto", tracer = "auto", backward = "auto", densify = "mcmc", background = "auto", start;
+  gart::train_options defaults;
+  int iterations = defaults.iterations;
+  gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
+  int sh_degree = defaults.sh_degree, downscale = 1, test_every = 8, eval_every = -1;
+  float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;
+  gart::u64 seed = defaults.seed;
+  recorded_options recorded;
+
+  std::filesystem::path config_file() const { return out / "config.json"; }
+  std::filesystem::path checkpoint_file() const { return out / "checkpoint.gart"; }
+  std::filesystem::path history_file() const { return out / "history.json"; }
+  std::filesystem::path model_file() const { return out / "model.ply"; }
+  int steps_between_tests() const { return eval_every >= 0 ? eval_every : std::max(1, iterations / 5); }
+};
+
+void add_arguments(CLI::App& train, train_arguments& a);
+// Takes the options of the run in `out`, and its dataset where none was named. io_error where there is no such run.
+void continue_run(train_arguments& a);
+gart::row_request row_request_of(train_arguments const& a);
+// `background` is a colour's name or "random".
+gart::train_options train_options_of(train_arguments const& a);
+// With "auto" replaced by what it came to, so that a resumed run cannot come to anything else.
+nlohmann::json config_of(train_arguments const& a, gart::dataset const& data);
+// usage_error where the dataset is not the one that config.json tells of.
+void check_same_dataset(train_arguments const& a, gart::dataset const& data);
+
+}  // namespace gart_cli
