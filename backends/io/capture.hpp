@@ -1,0 +1,62 @@
+#pragma once
+// A capture as its files describe it, before any photo is opened: what the format readers hand to load_dataset.
+
+#include <gart/io/dataset.hpp>
+#include <gart/scene/camera.hpp>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace gart::io {
+
+enum class part { unassigned, train, test, left_out };
+
+struct frame {
+  std::string name;                         // as in the files: a relative path
+  std::filesystem::path photo;              // empty where the readers found none
+  std::filesystem::path mask;               // empty where the capture names none
+  camera view;                              // width 0: the files do not say, the photo's size decides
+  double angle_x = 0, angle_y = 0;          // radians; 0: fx, fy are given
+  bool center_x = false, center_y = false;  // cx, cy are the middle of the image
+  part role = part::unassigned;
+
+  // Focal lengths and centre that follow from the size.
+  void set_size(int width, int height);
+};
+
+struct capture {
+  std::filesystem::path source;  // what errors name
+  std::string format;
+  std::string own_split;  // in words; empty: every nth view by name is a test view
+  std::vector<frame> frames;
+  point_cloud points;
+  std::vector<std::string> notes;
+  bool synthetic_bounds = false;  // Blender's box, not one around the cameras
+};
+
+// A COLMAP model folder: binary or text, whichever `text` says.
+capture read_colmap(std::filesystem::path const& model, bool text);
+bool has_colmap_model(std::filesystem::path const& folder, bool text);
+
+capture read_blender(std::filesystem::path const& folder);
+capture read_transforms(std::filesystem::path const& file);
+
+// Whether the JSON file's outermost value is a list: the camera JSON.
+bool is_json_list(std::filesystem::path const& file);
+std::vector<named_camera> read_camera_json(std::filesystem::path const& file);
+
+// Sizes and intrinsics that can be traced, a finite pose; `where` names the file and the camera in errors.
+void check_camera(camera const& view, std::string const& where);
+
+// Sets the pose from columns that must be the axes of a right-handed frame, up to one scale common to all.
+void set_pose(camera& view, mat3d const& camera_to_world, vec3d const& center, std::string const& where);
+
+// Names that are fit for files and differ from each other: folders flattened, extensions dropped.
+void make_file_names(std::vector<std::string*> const& names);
+
+inline std::string counted(std::size_t n, char const* noun) {
+  return std::to_string(n) + " " + noun + (n == 1 ? "" : "s");
+}
+
+}  // namespace gart::io

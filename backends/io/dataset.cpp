@@ -1,0 +1,474 @@
+#include "capture.hpp"
+#include "codec.hpp"
+
+#include <gart/core/error.hpp>
+#include <gart/io/dataset.hpp>
+#include <gart/io/image_file.hpp>
+
+#include <algorithm>
+#include <atomic>
+#include <cctype>
+#include <cmath>
+#include <exception>
+#include <mutex>
+#include <set>
+#include <system_error>
+#include <thread>
+
+namespace gart {
+namespace io {
+namespace fs = std::filesystem;
+
+void frame::set_size(int width, int height) {
+  view.width = width, view.height = height;
+  if (angle_x > 0) view.fx = static_cast<float>(0.5 * width / std::tan(0.5 * angle_x));
+  if (angle_y > 0) {
+    view.fy = static_cast<float>(0.5 * height / std::tan(0.5 * angle_y));
+  } else if (angle_x > 0) {
+    view.fy = view.fx;
+  }
+  if (center_x) view.cx = 0.5f * static_cast<float>(width);
+  if (center_y) view.cy = 0.5f * static_cast<float>(height);
+}
+
+void check_camera(camera const& c, std::string const& where) {
+  auto const finite = [](float v) { return std::isfinite(v); };
+  if (c.width < 1 || c.height < 1)
+    throw io_error(where, "the image size is not positive", "correct the width and height");
+  if (!(c.fx > 0 && c.fy > 0 && finite(c.fx) && finite(c.fy))) {
+    throw io_error(where, "the focal length is not a positive number", "correct fx and fy");
+  }
+  if (!finite(c.cx) || !finite(c.cy)) throw io_error(where, "the principal point is not finite", "correct cx and cy");
+  distortion const& d = c.lens;
+  if (!finite(d.k1) || !finite(d.k2) || !finite(d.p1) || !finite(d.p2)) {
+    throw io_error(where, "the lens distortion is not finite", "correct k1, k2, p1 and p2");
+  }
+}
+
+void set_pose(camera& view, mat3d const& axes, vec3d const& center, std::string const& where) {
+  auto const dot = [](vec3d const& a, vec3d const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
+  auto const cross = [](vec3d const& a, vec3d const& b) {
+    return vec3d(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+  };
+  double const length[3] = {std::sqrt(dot(axes[0], axes[0])), std::sqrt(dot(axes[1], axes[1])),
+                            std::sqrt(dot(axes[2], axes[2]))};
+  bool finite = true;
+  for (int i = 0; i < 3; ++i)
+    finite = finite && std::isfinite(length[i]) && std::isfinite(static_cast<float>(center[i]));
+  if (!finite) throw io_error(where, "the pose is not finite", "remove the image, or correct its pose");
+  bool rotation = length[0] > 1e-12;
+  for (int i = 1; i < 3; ++i) rotation = rotation && std::abs(length[i] - length[0]) <= 1e-2 * length[0];
+  if (rotation) {
+    vec3d const x = axes[0] / length[0];
+    vec3d y = axes[1] / length[1];
+    vec3d const z = axes[2] / length[2];
+    rotation = std::abs(dot(x, y)) < 1e-2 && std::abs(dot(x, z)) < 1e-2 && std::abs(dot(y, z)) < 1e-2 &&
+               dot(cross(x, y), z) > 0;
+    y = y - x * dot(x, y);
+    y = y / std::sqrt(dot(y, y));
+    view.rotation = mat3(mat3d(x, y, cross(x, y)));
+  }
+  if (!rotation) {
+    throw io_error(where, "the pose is not a rotation (its columns are not the axes of a right-handed frame)",
+                   "correct the pose");
+  }
+  view.position = center;
+}
+
+void make_file_names(std::vector<std::string*> const& names) {
+  std::set<std::string> taken;
+  for (std::string* name : names) {
+    std::string path = *name, flat;
+    std::replace(path.begin(), path.end(), '\\', '/');
+    fs::path parts = fs::path(path).relative_path().lexically_normal();
+    std::string const extension = parts.extension().string();
+    for (char const* known : {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
+      if (extension == known) parts.replace_extension();
+    }
+    bool first = true;
+    for (fs::path const& part : parts) {
+      std::string const text = part.string();
+      if (text.empty() || text == "." || text == ".." || (first && text == "images" && part != parts.filename()))
+        continue;
+      if (!flat.empty()) flat += '_';
+      flat += text;
+      first = false;
+    }
+    for (char& c : flat) {
+      bool const fit =
+          std::isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '-' || c == '_' || static_cast<u8>(c) >= 0x80;
+      if (!fit) c = '_';
+    }
+    if (flat.empty() || flat[0] == '.') flat = "view" + flat;
+    // NAME_truth is the true picture beside a render.
+    std::string unique = flat;
+    for (int n = 2; taken.count(unique) || taken.count(unique + "_truth"); ++n) unique = flat + "_" + std::to_string(n);
+    taken.insert(unique), taken.insert(unique + "_truth");
+    *name = unique;
+  }
+}
+
+namespace {
+
+// Which files a path means, and what to say about the choice.
+capture read_capture(fs::path const& path) {
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) throw io_error(path.string(), "there is no such file or folder", "check the path");
+  if (!fs::is_directory(path, ignored)) {
+    std::string const name = path.filename().string(), extension = path.extension().string();
+    fs::path const folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+    if (name == "transforms_train.json") return read_blender(folder);
+    if (extension == ".json") return read_transforms(path);
+    bool const model = path.stem() == "cameras" || path.stem() == "images" || path.stem() == "points3D";
+    if (model && (extension == ".bin" || extension == ".txt")) return read_colmap(folder, extension == ".txt");
+    throw io_error(path.string(), "is not a capture that gart reads",
+                   "name a folder, a transforms.json, or a COLMAP cameras.bin or cameras.txt");
+  }
+  fs::path const transforms = path / "transforms.json";
+  for (fs::path const& folder : {path / "sparse" / "0", path / "sparse", path}) {
+    for (bool text : {false, true}) {
+      if (!has_colmap_model(folder, text)) continue;
+      capture c = read_colmap(folder, text);
+      if (fs::exists(transforms, ignored)) {
+        c.notes.push_back(
+            "both a COLMAP model and transforms.json are there: COLMAP is used, for its points (to use the "
+            "other, name " +
+            transforms.string() + ")");
+      }
+      return c;
+    }
+  }
+  if (fs::exists(path / "transforms_train.json", ignored)) return read_blender(path);
+  if (fs::exists(transforms, ignored)) return read_transforms(transforms);
+  throw io_error(
+      path.string(), "holds no capture that gart reads",
+      "expected sparse/0 (COLMAP), transforms_train.json (Blender) or transforms.json (nerfstudio, instant-ngp)");
+}
+
+// f(i) for i < n on all processors; the first exception stops the rest and is thrown again here.
+template <class F>
+void for_each_parallel(std::size_t n, F const& f) {
+  std::atomic<std::size_t> next{0};
+  std::exception_ptr failure;
+  std::mutex guard;
+  auto const work = [&] {
+    for (std::size_t i; (i = next++) < n;) {
+      try {
+        f(i);
+      } catch (...) {
+        std::lock_guard const lock(guard);
+        if (!failure) failure = std::current_exception();
+        next = n;
+      }
+    }
+  };
+  std::vector<std::thread> threads;
+  std::size_t const processors = std::max(1u, std::thread::hardware_concurrency());
+  try {
+    for (std::size_t i = 1; i < std::min(n, processors); ++i) threads.emplace_back(work);
+  } catch (std::system_error const&) {
+    // Fewer threads than processors do the same work.
+  }
+  work();
+  for (std::thread& thread : threads) thread.join();
+  if (failure) std::rethrow_exception(failure);
+}
+
+// Makes the camera fit the photo's real size; true where that meant scaling it.
+bool fit_to_photo(frame& f, image_size size) {
+  camera const& c = f.view;
+  if (c.width == 0) {
+    f.set_size(size.width, size.height);
+    check_camera(f.view, f.photo.string());
+    return false;
+  }
+  if (c.width == size.width && c.height == size.height) return false;
+  double const sx = static_cast<double>(size.width) / c.width, sy = static_cast<double>(size.height) / c.height;
+  bool const within_rounding = std::abs(c.height * sx - size.height) <= 1 || std::abs(c.width * sy - size.width) <= 1;
+  if (std::abs(sx / sy - 1) > 0.01 && !within_rounding) {
+    throw io_error(f.photo.string(),
+                   "is " + std::to_string(size.width) + " x " + std::to_string(size.height) +
+                       " pixels, but its camera is for " + std::to_string(c.width) + " x " + std::to_string(c.height),
+                   "use the photos that were calibrated, or copies scaled alike in both directions");
+  }
+  f.view = resized(c, size.width, size.height);
+  return true;
+}
+
+// A block of which any pixel is ignored is ignored.
+image8 read_mask(fs::path const& path, image_size size, int factor) {
+  image8 const source = read_image(path);
+  if (source.width != size.width || source.height != size.height) {
+    throw io_error(path.string(),
+                   "the mask is " + std::to_string(source.width) + " x " + std::to_string(source.height) +
+                       " pixels, its photo " + std::to_string(size.width) + " x " + std::to_string(size.height),
+                   "make both the same size");
+  }
+  image8 mask(size.width / factor, size.height / factor, 1, 255);
+  int const colors = std::min(source.channels, 3);
+  for (int y = 0; y < mask.height * factor; ++y) {
+    for (int x = 0; x < mask.width * factor; ++x) {
+      bool used = false;
+      for (int c = 0; c < colors; ++c) used = used || source.at(x, y, c) != 0;
+      if (!used) mask.at(x / factor, y / factor, 0) = 0;
+    }
+  }
+  return mask;
+}
+
+image8 three_channels(image8 image) {
+  if (image.channels != 1) return image;
+  image8 result(image.width, image.height, 3);
+  for (std::size_t i = 0; i < image.data.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) result.data[3 * i + c] = image.data[i];
+  }
+  return result;
+}
+
+// The camera of a box-downscaled image: a partial last block is cropped, so the scale is exactly 1 / factor.
+camera downscaled(camera c, int factor, std::string const& where) {
+  int const width = c.width / factor, height = c.height / factor;
+  if (width < 1 || height < 1) {
+    throw invalid_argument("downscale " + std::to_string(factor) + " leaves nothing of " + where);
+  }
+  c.width = width * factor, c.height = height * factor;
+  return resized(c, width, height);
+}
+
+void drop_frames_without_photo(capture& c, bool load_images) {
+  std::size_t const before = c.frames.size();
+  auto const missing = [](frame const& f) { return f.photo.empty(); };
+  std::size_t const without = static_cast<std::size_t>(std::count_if(c.frames.begin(), c.frames.end(), missing));
+  if (before == 0) throw io_error(c.source.string(), "lists no image", "check that the reconstruction succeeded");
+  if (without == before) {
+    bool const sized = std::all_of(c.frames.begin(), c.frames.end(), [](frame const& f) { return f.view.width > 0; });
+    if (load_images || !sized) {
+      throw io_error(c.source.string(),
+                     "none of the " + counted(before, "image") + " it lists is there, such as " + c.frames.front().name,
+                     c.format == "COLMAP" ? "put the photos into a folder named images beside sparse"
+                                          : "put the photos where 'file_path' says");
+    }
+    c.notes.push_back("no photo is there: the cameras have the sizes the files state");
+  } else if (without) {
+    c.notes.push_back(std::to_string(without) + " of " + counted(before, "frame") + " skipped: no photo is there");
+    c.frames.erase(std::remove_if(c.frames.begin(), c.frames.end(), missing), c.frames.end());
+  }
+  std::size_t const left_out = static_cast<std::size_t>(
+      std::count_if(c.frames.begin(), c.frames.end(), [](frame const& f) { return f.role == part::left_out; }));
+  if (left_out) {
+    c.notes.push_back(counted(left_out, "frame") + " left out: in neither list of the file's split");
+    c.frames.erase(
+        std::remove_if(c.frames.begin(), c.frames.end(), [](frame const& f) { return f.role == part::left_out; }),
+        c.frames.end());
+  }
+}
+
+// Gives every frame its role; returns the rule in words.
+std::string split(capture& c, int test_every) {
+  if (!c.own_split.empty()) return c.own_split;
+  std::stable_sort(c.frames.begin(), c.frames.end(), [](frame const& a, frame const& b) { return a.name < b.name; });
+  for (std::size_t i = 0; i < c.frames.size(); ++i) {
+    bool const test = test_every > 0 && i % static_cast<std::size_t>(test_every) == 0;
+    c.frames[i].role = test ? part::test : part::train;
+  }
+  if (test_every == 0) return "no test views";
+  std::string const nth = std::to_string(test_every);
+  return "test = every " + nth +
+         (test_every == 1   ? "st"
+          : test_every == 2 ? "nd"
+          : test_every == 3 ? "rd"
+                            : "th") +
+         " by name (index % " + nth + " == 0)" + (c.format == "COLMAP" ? "" : "; the files name no split");
+}
+
+double length(vec3d const& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
+
+void measure_extent(dataset& data) {
+  vec3d mean(0.0);
+  for (dataset_view const& v : data.train) mean += v.view.position / static_cast<double>(data.train.size());
+  double radius = 0;
+  for (dataset_view const& v : data.train) radius = std::max(radius, length(v.view.position - mean));
+  float const extent = static_cast<float>(1.1 * radius);
+  if (extent > 0 && std::isfinite(extent)) {
+    data.extent = extent;
+  } else {
+    data.notes.push_back("the training cameras have no extent: 1 is assumed");
+  }
+}
+
+// The box around the point nearest to all view axes: the minimum of sum |(I - d d^T)(x - p)|^2, by Cramer's rule.
+void measure_bounds(dataset& data) {
+  std::vector<camera const*> cameras;
+  for (auto const* views : {&data.train, &data.test}) {
+    for (dataset_view const& v : *views) cameras.push_back(&v.view);
+  }
+  double const n = static_cast<double>(cameras.size());
+  vec3d mean(0.0), forward(0.0), b(0.0);
+  mat3d a(0.0);
+  for (camera const* c : cameras) mean += c->position / n;
+  for (camera const* c : cameras) {
+    vec3d const d(c->rotation[2]), p = c->position - mean;
+    forward += d / n;
+    double const along = d.x * p.x + d.y * p.y + d.z * p.z;
+    for (int i = 0; i < 3; ++i) {
+      b[i] += (p[i] - along * d[i]) / n;
+      for (int j = 0; j < 3; ++j) a[j][i] += ((i == j ? 1.0 : 0.0) - d[i] * d[j]) / n;
+    }
+  }
+  auto const determinant = [](mat3d const& m) {
+    return m[0][0] * (m[1][1] * m[2][2] - m[2][1] * m[1][2]) - m[1][0] * (m[0][1] * m[2][2] - m[2][1] * m[0][2]) +
+           m[2][0] * (m[0][1] * m[1][2] - m[1][1] * m[0][2]);
+  };
+  double const det = determinant(a);
+  vec3d center = mean + forward * static_cast<double>(data.extent);
+  double radius = data.extent;
+  bool looks_inwards = det > 1e-6;  // else the axes are parallel
+  if (looks_inwards) {
+    vec3d x(0.0);
+    for (int k = 0; k < 3; ++k) {
+      mat3d replaced = a;
+      replaced[k] = b;
+      x[k] = determinant(replaced) / det;
+    }
+    std::size_t in_front = 0;
+    double distance = 0;
+    for (camera const* c : cameras) {
+      vec3d const to = x + mean - c->position, d(c->rotation[2]);
+      distance += length(to) / n;
+      in_front += to.x * d.x + to.y * d.y + to.z * d.z > 0;
+    }
+    looks_inwards = distance > 0 && 2 * in_front > cameras.size();
+    if (looks_inwards) center = x + mean, radius = distance;
+  }
+  data.bounds_min = center - vec3d(radius), data.bounds_max = center + vec3d(radius);
+  if (data.points.size() == 0) {
+    data.notes.push_back(std::string("no starting points: random ones fill a box of half width ") +
+                         std::to_string(radius) +
+                         (looks_inwards ? " around the point the cameras look at" : " in front of the cameras"));
+  }
+}
+
+// A point in a camera's centre covers its whole image.
+void drop_points_in_cameras(dataset& data) {
+  std::vector<vec3d> centers;
+  for (auto const* views : {&data.train, &data.test}) {
+    for (dataset_view const& v : *views) centers.push_back(v.view.position);
+  }
+  auto const by_x = [](vec3d const& a, vec3d const& b) { return a.x < b.x; };
+  std::sort(centers.begin(), centers.end(), by_x);
+  double const near = 1e-6 * data.extent;
+  auto& position = data.points.position;
+  auto& color = data.points.color;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < data.points.size(); ++i) {
+    vec3d const p(position[3 * i], position[3 * i + 1], position[3 * i + 2]);
+    bool hit = false;
+    auto c = std::lower_bound(centers.begin(), centers.end(), vec3d(p.x - near, 0, 0), by_x);
+    for (; c != centers.end() && c->x <= p.x + near && !hit; ++c) hit = length(*c - p) <= near;
+    if (hit) continue;
+    std::copy_n(position.begin() + static_cast<std::ptrdiff_t>(3 * i), 3,
+                position.begin() + static_cast<std::ptrdiff_t>(3 * kept));
+    std::copy_n(color.begin() + static_cast<std::ptrdiff_t>(3 * i), 3,
+                color.begin() + static_cast<std::ptrdiff_t>(3 * kept));
+    ++kept;
+  }
+  if (std::size_t const dropped = data.points.size() - kept) {
+    data.notes.push_back(counted(dropped, "point") + " left out: in a camera's centre");
+    position.resize(3 * kept), color.resize(3 * kept);
+  }
+}
+
+// The views of the frames, in the frames' order.
+std::vector<dataset_view> load_views(capture& c, dataset_options const& options, std::size_t& scaled) {
+  std::vector<dataset_view> views(c.frames.size());
+  std::vector<std::string*> names;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    views[i].name = c.frames[i].name;
+    names.push_back(&views[i].name);
+  }
+  make_file_names(names);
+  std::mutex guard;
+  std::size_t done = 0;
+  for_each_parallel(views.size(), [&](std::size_t i) {
+    frame& f = c.frames[i];
+    dataset_view& view = views[i];
+    image_size size{f.view.width, f.view.height};
+    image8 image;
+    if (!f.photo.empty()) {
+      if (options.load_images) {
+        image = read_image(f.photo);
+        size = {image.width, image.height};
+      } else {
+        size = read_image_size(f.photo);
+      }
+    }
+    bool const resized_camera = fit_to_photo(f, size);
+    view.view = downscaled(f.view, options.downscale, f.photo.empty() ? f.name : f.photo.string());
+    if (options.load_images) {
+      view.image = three_channels(box_downscale(image, options.downscale));
+      if (!f.mask.empty()) view.mask = read_mask(f.mask, size, options.downscale);
+    }
+    std::lock_guard const lock(guard);
+    scaled += resized_camera;
+    ++done;
+    if (options.progress) options.progress(done, views.size());
+  });
+  return views;
+}
+
+dataset load(fs::path const& path, dataset_options const& options) {
+  if (options.downscale < 1) throw invalid_argument("downscale must be at least 1");
+  if (options.test_every < 0) throw invalid_argument("test_every must be 0 (no test views) or more");
+  capture c = read_capture(path);
+  drop_frames_without_photo(c, options.load_images);
+  dataset data;
+  data.format = c.format;
+  data.split = split(c, options.test_every);
+  data.resize_filter = options.downscale == 1 ? "none" : "box (1/" + std::to_string(options.downscale) + ")";
+  std::size_t scaled = 0;
+  std::vector<dataset_view> views = load_views(c, options, scaled);
+  data.notes = std::move(c.notes);
+  if (scaled) {
+    data.notes.push_back(counted(scaled, "photo") + " differ in size from their cameras: the intrinsics were scaled");
+  }
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    data.alpha = data.alpha || views[i].image.channels == 4;
+    (c.frames[i].role == part::test ? data.test : data.train).push_back(std::move(views[i]));
+  }
+  if (data.train.empty() && options.load_images) {
+    throw io_error(path.string(),
+                   "no view is left to train on, all " + counted(data.test.size(), "view") + " are test views",
+                   "ask for fewer: test_every 0 keeps every view for training");
+  }
+  data.points = std::move(c.points);
+  if (data.points.color.size() != data.points.position.size())
+    data.points.color.assign(data.points.position.size(), 128);
+  if (!data.train.empty()) measure_extent(data);
+  drop_points_in_cameras(data);
+  if (!c.synthetic_bounds) measure_bounds(data);
+  return data;
+}
+
+}  // namespace
+}  // namespace io
+
+dataset load_dataset(std::filesystem::path const& path, dataset_options const& options) {
+  return io::load(path, options);
+}
+
+std::vector<named_camera> load_cameras(std::filesystem::path const& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(path, ignored) && path.extension() == ".json" && io::is_json_list(path)) {
+    return io::read_camera_json(path);
+  }
+  dataset_options options;
+  options.load_images = false;
+  dataset const data = load_dataset(path, options);
+  std::vector<named_camera> cameras;
+  for (auto const* views : {&data.test, &data.train}) {
+    for (dataset_view const& v : *views) cameras.push_back({v.name, v.view});
+  }
+  return cameras;
+}
+
+}  // namespace gart

@@ -1,0 +1,85 @@
+#include "codec.hpp"
+
+#include <gart/core/error.hpp>
+#include <gart/io/file.hpp>
+#include <gart/io/image_file.hpp>
+
+#include <algorithm>
+#include <string_view>
+
+namespace gart {
+namespace {
+
+[[noreturn]] void refuse_kind(std::filesystem::path const& path) {
+  throw io_error(path.string(), "is neither PNG nor JPEG", "convert it to one of them");
+}
+
+}  // namespace
+
+image8 read_image(std::filesystem::path const& path) {
+  std::vector<u8> const bytes = read_file(path);
+  if (io::is_png(bytes)) return io::decode_png(bytes, path.string());
+  if (io::is_jpeg(bytes)) return io::decode_jpeg(bytes, path.string());
+  refuse_kind(path);
+}
+
+io::image_size io::read_image_size(std::filesystem::path const& path) {
+  std::vector<u8> const bytes = read_file(path);
+  if (is_png(bytes)) return png_size(bytes, path.string());
+  if (is_jpeg(bytes)) return jpeg_size(bytes, path.string());
+  refuse_kind(path);
+}
+
+void write_png(std::filesystem::path const& path, image8 const& image) {
+  std::vector<u8> const bytes = encode_png(image);
+  write_file(path, std::string_view(reinterpret_cast<char const*>(bytes.data()), bytes.size()));
+}
+
+image8 box_downscale(image8 const& image, int factor) {
+  if (factor < 1) throw invalid_argument("downscale must be at least 1");
+  if (factor == 1) return image;
+  int const width = image.width / factor, height = image.height / factor, channels = image.channels;
+  if (width < 1 || height < 1) {
+    throw invalid_argument("downscale " + std::to_string(factor) + " leaves nothing of an image of " +
+                           std::to_string(image.width) + " x " + std::to_string(image.height));
+  }
+  bool const alpha = channels == 4;
+  image8 result(width, height, channels);
+  u64 const area = static_cast<u64>(factor) * static_cast<u64>(factor);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      u64 sum[4] = {}, weight = 0;
+      for (int v = y * factor; v < (y + 1) * factor; ++v) {
+        u8 const* pixel = &image.at(x * factor, v, 0);
+        for (int u = 0; u < factor; ++u, pixel += channels) {
+          u64 const w = alpha ? pixel[3] : 1;
+          weight += w;
+          for (int c = 0; c < (alpha ? 3 : channels); ++c) sum[c] += w * pixel[c];
+        }
+      }
+      if (weight > 0) {
+        for (int c = 0; c < (alpha ? 3 : channels); ++c)
+          result.at(x, y, c) = static_cast<u8>((sum[c] + weight / 2) / weight);
+      }
+      if (alpha) result.at(x, y, 3) = static_cast<u8>((weight + area / 2) / area);
+    }
+  }
+  return result;
+}
+
+image_float to_float(image8 const& image) {
+  image_float result(image.width, image.height, image.channels);
+  std::transform(image.data.begin(), image.data.end(), result.data.begin(),
+                 [](u8 v) { return static_cast<float>(v) / 255.0f; });
+  return result;
+}
+
+image8 to_8bit(image_float const& image) {
+  image8 result(image.width, image.height, image.channels);
+  std::transform(image.data.begin(), image.data.end(), result.data.begin(), [](float v) {
+    return static_cast<u8>(v > 0 ? std::min(v, 1.0f) * 255.0f + 0.5f : 0.0f);  // NaN becomes 0
+  });
+  return result;
+}
+
+}  // namespace gart

@@ -1,0 +1,285 @@
+#include "support.hpp"
+
+#include <gart/io/ply.hpp>
+
+#include <cmath>
+#include <set>
+
+using namespace gart_test;
+
+namespace {
+
+// Camera to world in OpenGL axes: the camera stands at (0, 0, d) and looks along -z.
+std::string pose(double d) { return "[[1,0,0,0],[0,1,0,0],[0,0,1," + std::to_string(d) + "],[0,0,0,1]]"; }
+
+std::string frame(std::string const& path, double d, std::string const& more = "") {
+  return "{\"file_path\": \"" + path + "\", \"transform_matrix\": " + pose(d) + more + "}";
+}
+
+std::string scene(std::string const& keys, std::string const& frames) {
+  return "{" + keys + ", \"frames\": [" + frames + "]}";
+}
+
+gart::dataset_options all_train() {
+  gart::dataset_options options;
+  options.test_every = 0;
+  return options;
+}
+
+std::string const lens =
+    "\"fl_x\": 20, \"fl_y\": 21, \"cx\": 8, \"cy\": 7, \"w\": 16.0, \"h\": 12, \"k1\": 0.1, \"p2\": -0.01";
+
+}  // namespace
+
+TEST_CASE("Blender: the field of view, axes, alpha, and the files' own split") {
+  scratch_folder const folder;
+  double const angle = 0.7;
+  std::string const keys = "\"camera_angle_x\": 0.7";
+  folder.put("transforms_train.json", scene(keys, frame("./train/r_0", 4) + "," + frame("./train/r_1", 5)));
+  folder.put("transforms_test.json", scene(keys, frame("./test/r_0", 6)));
+  for (char const* name : {"train/r_0.png", "train/r_1.png", "test/r_0.png"}) folder.put_image(name, 16, 12, 4);
+  for (fs::path const& path : {folder.path, folder.path / "transforms_train.json"}) {
+    gart::dataset const data = gart::load_dataset(path);
+    CHECK(data.format == "Blender");
+    CHECK(holds(data.split, "own"));
+    CHECK(data.alpha);
+    REQUIRE(data.train.size() == 2);
+    REQUIRE(data.test.size() == 1);
+    CHECK(data.train[1].name == "train_r_1");
+    CHECK(data.test[0].name == "test_r_0");
+    gart::camera const& c = data.train[1].view;
+    CHECK(c.fx == doctest::Approx(8 / std::tan(angle / 2)));
+    CHECK(c.fy == c.fx);
+    CHECK(c.cx == 8);
+    CHECK(c.cy == 6);
+    CHECK(c.position.z == 5);
+    CHECK(c.rotation[0].x == 1);
+    CHECK(c.rotation[1].y == -1);  // down
+    CHECK(c.rotation[2].z == -1);  // forward
+    CHECK(data.train[1].image.channels == 4);
+    CHECK(data.bounds_max.x == 1.3);
+    CHECK(data.points.size() == 0);
+    CHECK(data.extent == doctest::Approx(0.55));
+  }
+  auto const cameras = gart::load_cameras(folder.path);
+  REQUIRE(cameras.size() == 3);
+  CHECK(cameras[0].name == "test_r_0");
+  gart::write_point_ply(folder.path / "points3d.ply", {{1, 2, 3}, {4, 5, 6}});
+  CHECK(gart::load_dataset(folder.path).points.size() == 1);
+}
+
+TEST_CASE("nerfstudio: intrinsics of file and frame, masks, points, missing photos, the every-8th rule") {
+  scratch_folder const folder;
+  std::string frames;
+  for (int i = 0; i < 18; ++i) {
+    std::string const name = "images/" + std::to_string(100 + 17 - i) + (i == 3 ? ".png" : "");
+    std::string const more = i == 3 ? ", \"fl_x\": 30, \"k1\": 0, \"mask_path\": \"masks/m.png\"" : "";
+    if (i) frames += ',';
+    frames += frame(name, i, more);
+    if (i == 5) continue;
+    folder.put_image("images/" + std::to_string(100 + 17 - i) + (i % 2 ? ".png" : ".jpg"), 16, 12);
+  }
+  gart::image8 mask(16, 12, 3, 255);
+  for (int c = 0; c < 3; ++c) mask.at(4, 3, c) = 0;
+  fs::create_directories(folder.path / "masks");
+  gart::write_png(folder.path / "masks/m.png", mask);
+  gart::write_point_ply(folder.path / "cloud.ply", {{1, 2, 3}, {4, 5, 6}});
+  fs::path const path = folder.put(
+      "transforms.json", scene(lens + ", \"camera_model\": \"OPENCV\", \"ply_file_path\": \"cloud.ply\"", frames));
+  gart::dataset const data = gart::load_dataset(folder.path);
+  CHECK(data.format == "nerfstudio");
+  CHECK(any_note(data, "1 of 18 frames skipped"));
+  CHECK(holds(data.split, "index % 8 == 0"));
+  CHECK(holds(data.split, "no split"));
+  REQUIRE(data.train.size() == 14);
+  REQUIRE(data.test.size() == 3);
+  CHECK(data.test[0].name == "100");
+  CHECK(data.test[1].name == "108");
+  CHECK(data.test[2].name == "117");  // 112 is the one without a photo
+  CHECK(data.points.position == std::vector<float>{1, 2, 3});
+  CHECK_FALSE(data.alpha);
+  int masks = 0;
+  for (gart::dataset_view const& v : data.train) {
+    bool const odd = v.name == "114";
+    masks += !v.mask.empty();
+    CHECK(v.view.fx == (odd ? 30 : 20));
+    CHECK(v.view.fy == 21);
+    CHECK(v.view.cy == 7);
+    CHECK(v.view.lens.k1 == (odd ? 0.0f : 0.1f));
+    CHECK(v.view.lens.p2 == -0.01f);
+    if (odd) {
+      REQUIRE(v.mask.data.size() == 16 * 12);
+      CHECK(v.mask.at(4, 3, 0) == 0);
+      CHECK(v.mask.at(5, 3, 0) == 255);
+    }
+  }
+  CHECK(masks == 1);
+  gart::dataset_options half;
+  half.downscale = 5;
+  std::size_t calls = 0, last = 0;
+  half.progress = [&](std::size_t done, std::size_t total) {
+    ++calls, last = done;
+    CHECK(total == 17);
+  };
+  gart::dataset const small = gart::load_dataset(path, half);
+  CHECK(calls == 17);
+  CHECK(last == 17);
+  for (gart::dataset_view const& v : small.train) {
+    CHECK(v.view.width == 3);  // 16 / 5, the last column of pixels dropped
+    CHECK(v.view.height == 2);
+    CHECK(v.image.width == 3);
+    CHECK(v.view.fy == doctest::Approx(21 / 5.0));
+    CHECK(v.view.cx == doctest::Approx(8 / 5.0));
+    if (!v.mask.empty()) CHECK(v.mask.data == std::vector<gart::u8>{0, 255, 255, 255, 255, 255});
+  }
+}
+
+TEST_CASE("transforms.json with a split of its own") {
+  scratch_folder const folder;
+  for (char const* name : {"a.png", "b.png", "c.png"}) folder.put_image(name, 16, 12);
+  folder.put("transforms.json", scene(lens + ", \"train_filenames\": [\"a.png\"], \"test_filenames\": [\"b.png\"]",
+                                      frame("a.png", 1) + "," + frame("b.png", 2) + "," + frame("c.png", 3)));
+  gart::dataset const data = gart::load_dataset(folder.path);
+  REQUIRE(data.train.size() == 1);
+  REQUIRE(data.test.size() == 1);
+  CHECK(data.train[0].name == "a");
+  CHECK(data.test[0].name == "b");
+  CHECK(holds(data.split, "own"));
+  CHECK(any_note(data, "1 frame left out"));
+}
+
+TEST_CASE("without points the box lies where the cameras look") {
+  scratch_folder const folder;
+  std::string frames;
+  for (int i = 0; i < 8; ++i) {
+    double const angle = i * 0.7853981633974483, s = std::sin(angle), c = std::cos(angle);
+    auto const text = [](double v) { return std::to_string(v); };
+    // On a circle of radius 3 around (5, 6, 7), the camera's +z axis (its back) pointing outwards.
+    if (i) frames += ',';
+    frames += "{\"file_path\": \"" + std::to_string(i) + ".png\", \"transform_matrix\": [[" + text(-s) + ",0," +
+              text(c) + "," + text(5 + 3 * c) + "],[" + text(c) + ",0," + text(s) + "," + text(6 + 3 * s) +
+              "],[0,1,0,7],[0,0,0,1]]}";
+    folder.put_image(std::to_string(i) + ".png", 16, 12);
+  }
+  folder.put("transforms.json", scene(lens, frames));
+  gart::dataset const data = gart::load_dataset(folder.path, all_train());
+  for (int k = 0; k < 3; ++k) {
+    CHECK(data.bounds_min[k] == doctest::Approx(5 + k - 3).epsilon(1e-4));
+    CHECK(data.bounds_max[k] == doctest::Approx(5 + k + 3).epsilon(1e-4));
+  }
+  CHECK(any_note(data, "look at"));
+}
+
+TEST_CASE("names are unique and fit for files") {
+  scratch_folder const folder;
+  std::string frames;
+  char const* const paths[] = {"x/a b.png", "x_a b.png", "../up.png", "a.png", "a.jpg", "a_truth.png"};
+  scratch_folder const& f = folder;
+  fs::create_directories(f.path / "scene");
+  for (char const* path : paths) {
+    f.put_image(fs::path("scene") / path, 16, 12);
+    if (!frames.empty()) frames += ',';
+    frames += frame(path, 1);
+  }
+  f.put("scene/transforms.json", scene(lens, frames));
+  std::set<std::string> names;
+  for (gart::dataset_view const& v : gart::load_dataset(f.path / "scene", all_train()).train) {
+    names.insert(v.name);
+    CHECK(v.name.find_first_of("/ \\") == std::string::npos);
+  }
+  CHECK(names.size() == 6);
+  CHECK(names.count("up"));
+  CHECK(names.count("x_a_b"));
+  CHECK(!(names.count("a") && names.count("a_truth")));
+}
+
+TEST_CASE("a folder with COLMAP and transforms.json uses COLMAP and says so") {
+  scratch_folder const folder;
+  folder.put_image("images/a.png", 16, 12);
+  folder.put("sparse/0/cameras.txt", "1 PINHOLE 16 12 20 20 8 6\n");
+  folder.put("sparse/0/images.txt", "1 1 0 0 0 0 0 0 1 a.png\n\n");
+  fs::path const json = folder.put("transforms.json", scene(lens, frame("images/a.png", 1)));
+  gart::dataset const data = gart::load_dataset(folder.path, all_train());
+  CHECK(data.format == "COLMAP");
+  CHECK(any_note(data, json.string()));
+  CHECK(gart::load_dataset(json, all_train()).format == "nerfstudio");
+  gart::dataset_options one;
+  CHECK(holds(error_of([&] { gart::load_dataset(folder.path, one); }), "no view is left to train on"));
+}
+
+TEST_CASE("what is missing, of a wrong type or not traced is named") {
+  scratch_folder const folder;
+  folder.put_image("a.png", 16, 12);
+  fs::path const path = folder.path / "transforms.json";
+  auto const refused = [&](std::string const& text) {
+    folder.put("transforms.json", text);
+    std::string const what = error_of([&] { gart::load_dataset(folder.path, all_train()); });
+    CHECK(holds(what, path.string()));
+    return what;
+  };
+  std::string const one = frame("a.png", 1);
+  CHECK(holds(refused("{\"fl_x\": 1}"), "'frames' is missing"));
+  CHECK(holds(refused("[1]"), "not a JSON object"));
+  CHECK(holds(refused("{\"frames\": 3}"), "'frames' is not a list"));
+  CHECK(holds(refused(scene(lens, "")), "lists no image"));
+  CHECK(holds(refused(scene(lens, "4")), "frame 0"));
+  CHECK(holds(refused(scene(lens, "{\"transform_matrix\": " + pose(1) + "}")), "'file_path' is missing"));
+  CHECK(holds(refused(scene(lens, "{\"file_path\": \"a.png\"}")), "'transform_matrix' is missing"));
+  CHECK(holds(refused(scene(lens, "{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,0],[0,1,0],[0,0,1,0]]}")),
+              "matrix"));
+  CHECK(holds(
+      refused(scene(lens, "{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,0],[0,\"1\",0,0],[0,0,1,0]]}")),
+      "matrix"));
+  CHECK(
+      holds(refused(scene(lens, "{\"file_path\": \"a.png\", \"transform_matrix\": [[-1,0,0,0],[0,1,0,0],[0,0,1,0]]}")),
+            "not a rotation"));
+  CHECK(holds(refused(scene(lens, "{\"file_path\": \"a.png\", \"transform_matrix\": [[0,0,0,0],[0,0,0,0],[0,0,0,0]]}")),
+              "not a rotation"));
+  CHECK(holds(
+      refused(scene(lens, "{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,1e300],[0,1,0,0],[0,0,1,0]]}")),
+      "not finite"));
+  CHECK(holds(refused(scene("\"w\": 16, \"h\": 12", one)), "'fl_x'"));
+  CHECK(holds(refused(scene("\"fl_x\": \"20\"", one)), "'fl_x' is not a number"));
+  CHECK(holds(refused(scene("\"fl_x\": 0, \"w\": 16, \"h\": 12", one)), "focal length"));
+  CHECK(holds(refused(scene("\"fl_x\": 20, \"w\": -16, \"h\": 12", one)), "'w' is not a size"));
+  CHECK(holds(refused(scene("\"fl_x\": 20, \"w\": 16", one)), "'h'"));
+  CHECK(holds(refused(scene("\"camera_angle_x\": 4", one)), "angle"));
+  CHECK(holds(refused(scene(lens + ", \"camera_model\": \"OPENCV_FISHEYE\"", one)), "OPENCV_FISHEYE"));
+  CHECK(holds(refused(scene(lens + ", \"k3\": 0.1", one)), "'k3' is not zero"));
+  CHECK(holds(refused(scene(lens + ", \"is_fisheye\": true", one)), "fisheye"));
+  CHECK(holds(refused(scene(lens, frame("none.png", 1))), "none of the 1 image"));
+  folder.put("transforms.json", scene(lens + ", \"ply_file_path\": \"none.ply\"", one));
+  CHECK(holds(error_of([&] { gart::load_dataset(folder.path, all_train()); }), "none.ply"));
+  folder.put("transforms.json", scene("\"fl_x\": 20, \"w\": 16, \"h\": 20", one));
+  CHECK(holds(error_of([&] { gart::load_dataset(folder.path, all_train()); }), "a.png"));
+  folder.put("transforms.json", scene("\"fl_x\": 0", one));
+  CHECK(holds(error_of([&] { gart::load_dataset(folder.path, all_train()); }), "focal length"));
+  CHECK(holds(error_of([&] { gart::load_dataset(folder.path / "none"); }), "no such file"));
+  scratch_folder const empty;
+  CHECK(holds(error_of([&] { gart::load_dataset(empty.path); }), "holds no capture"));
+}
+
+TEST_CASE("damaged JSON is refused and never crashes") {
+  scratch_folder const folder;
+  folder.put_image("a.png", 16, 12);
+  std::string const text = scene(lens, frame("a.png", 1));
+  maltreat(folder.put("transforms.json", text), text, true,
+           [&] { gart::load_dataset(folder.path / "transforms.json", all_train()); });
+}
+
+TEST_CASE("camera JSON is in OpenCV axes") {
+  scratch_folder const folder;
+  std::string const text =
+      "[{\"name\": \"orbit/00\", \"width\": 16, \"height\": 12, \"fx\": 20, \"fy\": 21, \"cx\": 8, \"cy\": 6, "
+      "\"c2w\": " +
+      pose(4) + "}]";
+  fs::path const path = folder.put("cameras.json", text);
+  auto const cameras = gart::load_cameras(path);
+  REQUIRE(cameras.size() == 1);
+  CHECK(cameras[0].name == "orbit_00");
+  CHECK(cameras[0].view.fy == 21);
+  CHECK(cameras[0].view.rotation[1].y == 1);
+  CHECK(cameras[0].view.position.z == 4);
+  CHECK(holds(error_of([&] { gart::load_cameras(folder.put("none.json", " []")); }), "holds no camera"));
+  maltreat(path, text, true, [&] { gart::load_cameras(path); });
+}
