@@ -19,7 +19,7 @@
 #define GART_KERNEL
 #endif
 
-#if defined(__CUDACC__)
+#if defined(__CUDA_ARCH__)
 #define GART_UNROLL _Pragma("unroll")
 #else
 #define GART_UNROLL
