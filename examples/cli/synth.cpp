@@ -1,0 +1,78 @@
+#include "commands.hpp"
+#include "synth_capture.hpp"
+
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+
+namespace gart_cli {
+namespace {
+
+// One updating line on a terminal, else a line every quarter.
+class progress_line {
+ public:
+  void operator()(int done, int total) {
+    double const seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    double const left = seconds * (total - done) / done;
+    if (terminal_) {
+      std::fprintf(stderr, "\rsynth: view %d of %d, %.0f s left ", done, total, left);
+      if (done == total) std::fprintf(stderr, "\r\033[K");
+    } else if (done == total || done * 4 / total != (done - 1) * 4 / total) {
+      std::fprintf(stderr, "synth: view %d of %d, %.0f s left\n", done, total, left);
+    }
+    std::fflush(stderr);
+  }
+
+ private:
+  bool terminal_ = isatty(STDERR_FILENO) != 0;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+int run_synth(synth_options const& options, bool quiet) {
+  auto const start = std::chrono::steady_clock::now();
+  progress_line line;
+  write_synth_capture(options, quiet ? std::function<void(int, int)>() : std::ref(line));
+  if (!quiet) {
+    double const seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    std::printf("%s: %d train and %d test views of %d x %d, %d points, in %.1f s\n", options.out.c_str(), options.train,
+                options.test, options.size, options.size, options.points, seconds);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_synth(CLI::App& app, command& selected) {
+  auto options = std::make_shared<synth_options>();
+  auto quiet = std::make_shared<bool>(false);
+  CLI::App* synth = app.add_subcommand(
+      "synth", "Make a small capture to train on, with no outside data: path traced views of textured, glossy and thin meshes.");
+  synth->add_option("--out", options->out, "Folder that the capture goes to: new, empty, or an earlier capture of synth")
+      ->type_name("DIR")
+      ->required();
+  synth->add_option("--train", options->train, "Views to train on, spread over the upper hemisphere")->capture_default_str();
+  synth->add_option("--test", options->test, "Views to test on, between the others")->capture_default_str();
+  synth->add_option("--size", options->size, "Width and height of a view, in pixels")->capture_default_str();
+  synth->add_option("--samples", options->samples, "Paths a pixel: noise falls with their number, time grows with it")
+      ->capture_default_str();
+  synth->add_option("--points", options->points, "Starting points, on surfaces that the train views see")
+      ->capture_default_str();
+  synth->add_option("--seed", options->seed, "Another seed places other leaves and draws other noise; the same seed gives "
+                                             "the same files, for any number of threads")
+      ->capture_default_str();
+  synth->add_option("--threads", options->threads, "Threads to render with; 0: all of the machine's")->capture_default_str();
+  synth->add_flag("--quiet", *quiet, "Print nothing but errors");
+  synth->footer(
+      "Writes DIR/transforms_train.json and DIR/transforms_test.json (Blender's layout), DIR/train/r_N.png and\n"
+      "DIR/test/r_N.png (RGBA, transparent where there is no surface) and DIR/points3d.ply. Needs Embree.\n\n"
+      "Examples:\n"
+      "  gart synth --out out/still\n"
+      "      the capture of the quick start; then: gart train out/still --out out/model\n"
+      "  gart synth --out out/large --train 120 --test 20 --size 400 --samples 256 --points 50000\n"
+      "      more, larger and cleaner views, for a GPU\n");
+  synth->callback([options, quiet, &selected] { selected = [options, quiet] { return run_synth(*options, *quiet); }; });
+}
+
+}  // namespace gart_cli

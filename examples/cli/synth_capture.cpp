@@ -1,0 +1,126 @@
+#include "synth_capture.hpp"
+
+#include "synth_random.hpp"
+#include "synth_trace.hpp"
+
+#include <gart/core/error.hpp>
+#include <gart/io/file.hpp>
+#include <gart/io/image_file.hpp>
+#include <gart/io/ply.hpp>
+
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <string>
+#include <system_error>
+
+namespace gart_cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double angle_x = 0.69;     // horizontal field of view, radians: NeRF-Synthetic's
+constexpr double distance = 3.7;     // the scene's bounding sphere just fits the view
+constexpr char mark[] = "\"generator\": \"gart synth\"";
+
+void check_range(char const* option, int value, int low, int high) {
+  if (value < low || value > high)
+    throw gart::invalid_argument(std::string(option) + " " + std::to_string(value) + ": give " + std::to_string(low) +
+                                 " to " + std::to_string(high));
+}
+
+// A folder of somebody else's is never written into: a real capture has files of the same names.
+void prepare_folder(fs::path const& out) {
+  std::error_code failed;
+  if (fs::exists(out, failed) && !fs::is_directory(out, failed))
+    throw gart::io_error(out.string(), "is not a folder", "give --out another name");
+  if (fs::is_directory(out, failed) && !fs::is_empty(out, failed)) {
+    fs::path const transforms = out / "transforms_train.json";
+    std::string text;
+    if (fs::exists(transforms, failed)) {
+      auto const bytes = gart::read_file(transforms);
+      text.assign(bytes.begin(), bytes.end());
+    }
+    if (text.find(mark) == std::string::npos && !fs::exists(out / ".gart-synth", failed))
+      throw gart::io_error(out.string(), "holds files that gart synth did not write", "give --out a new or empty folder");
+  }
+  fs::create_directories(out / "train", failed);
+  if (!failed) fs::create_directories(out / "test", failed);
+  if (failed) throw gart::io_error(out.string(), "cannot be made: " + failed.message(), "give --out a folder that can be written");
+  // Marks the folder as gart's own until the transforms do, so that an interrupted run can be repeated.
+  gart::write_file(out / ".gart-synth", std::string_view("an unfinished capture of gart synth\n"));
+  for (char const* split : {"train", "test"}) fs::remove(out / (std::string("transforms_") + split + ".json"), failed);
+}
+
+std::string transforms_json(std::vector<gart::camera> const& cameras, std::string const& split) {
+  char text[256];
+  std::snprintf(text, sizeof text, "{\n  %s,\n  \"camera_angle_x\": %.17g,\n  \"frames\": [", mark, angle_x);
+  std::string json = text;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    json += i == 0 ? "\n" : ",\n";
+    json += "    {\"file_path\": \"./" + split + "/r_" + std::to_string(i) + "\", \"transform_matrix\": [";
+    for (int row = 0; row < 3; ++row) {
+      gart::mat3 const& r = cameras[i].rotation;
+      // OpenGL's y and z are the negatives of OpenCV's.
+      std::snprintf(text, sizeof text, "[%.9g, %.9g, %.9g, %.17g], ", r[0][row], -r[1][row], -r[2][row], cameras[i].position[row]);
+      json += text;
+    }
+    json += "[0, 0, 0, 1]]}";
+  }
+  return json + "\n  ]\n}\n";
+}
+
+}  // namespace
+
+std::vector<gart::camera> synth_cameras(int count, int size, bool test) {
+  double const golden = std::numbers::pi * (3 - std::sqrt(5.0));
+  std::vector<gart::camera> cameras;
+  for (int i = 0; i < count; ++i) {
+    // Height is uniform, hence so is the density on the sphere. Half a turn sets the test views between the others.
+    double const lowest = test ? 0.16 : 0.08, highest = test ? 0.88 : 0.95;
+    double const z = lowest + (highest - lowest) * (i + 0.5) / count, azimuth = golden * i + (test ? -0.9 : 0.0);
+    double const r = std::sqrt(1 - z * z);
+    gart::vec3d const outward(r * std::cos(azimuth), r * std::sin(azimuth), z);
+    gart::vec3d const right(-std::sin(azimuth), std::cos(azimuth), 0), down = glm::cross(-outward, right);
+    gart::camera c;
+    c.width = c.height = size;
+    c.fx = c.fy = static_cast<float>(0.5 * size / std::tan(0.5 * angle_x));
+    c.cx = c.cy = 0.5f * static_cast<float>(size);
+    c.rotation = gart::mat3(vec3(right), vec3(down), vec3(-outward));
+    c.position = distance * outward;
+    cameras.push_back(c);
+  }
+  return cameras;
+}
+
+void write_synth_capture(synth_options const& options, std::function<void(int done, int total)> const& progress) {
+  check_range("--train", options.train, 1, 10000);
+  check_range("--test", options.test, 1, 10000);
+  check_range("--size", options.size, 8, 4096);
+  check_range("--samples", options.samples, 1, static_cast<int>(sample_sequence::max_samples));
+  check_range("--points", options.points, 1, 10000000);
+  check_range("--threads", options.threads, 0, 1024);
+
+  synth_renderer const renderer(make_synth_scene(options.seed), options.threads);
+  prepare_folder(options.out);
+  auto const train = synth_cameras(options.train, options.size, false);
+  auto const test = synth_cameras(options.test, options.size, true);
+  int done = 0;
+  int const total = options.train + options.test;
+  for (auto const* cameras : {&train, &test}) {
+    fs::path const folder = options.out / (cameras == &train ? "train" : "test");
+    for (std::size_t i = 0; i < cameras->size(); ++i) {
+      auto const image = renderer.render((*cameras)[i], options.samples, hash(options.seed, done));
+      gart::write_png(folder / ("r_" + std::to_string(i) + ".png"), image);
+      ++done;
+      if (progress) progress(done, total);
+    }
+  }
+  gart::write_point_ply(options.out / "points3d.ply", renderer.points(train, options.points, options.seed));
+  gart::write_file(options.out / "transforms_test.json", transforms_json(test, "test"));
+  gart::write_file(options.out / "transforms_train.json", transforms_json(train, "train"));
+  std::error_code ignored;
+  fs::remove(options.out / ".gart-synth", ignored);
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,36 @@
+#pragma once
+// What `gart synth` writes: a capture in the layout of NeRF-Synthetic (Blender).
+//   DIR/transforms_train.json, DIR/transforms_test.json   camera_angle_x; camera to world, OpenGL axes
+//   DIR/train/r_N.png, DIR/test/r_N.png                   RGBA, straight alpha
+//   DIR/points3d.ply                                      starting points on the surfaces, coloured
+// The transforms are written last, each file whole: a capture that was interrupted is not taken for one.
+
+#include "synth_scene.hpp"
+
+#include <gart/scene/camera.hpp>
+
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+namespace gart_cli {
+
+struct synth_options {
+  std::filesystem::path out;
+  int train = 48, test = 8;  // views
+  int size = 160;            // pixels a side
+  int samples = 32;          // paths a pixel
+  int points = 10000;
+  u64 seed = 1;
+  int threads = 0;           // 0: all
+};
+
+// Cameras over the upper hemisphere, all looking at the origin: a Fibonacci spiral, the test views between its turns.
+std::vector<gart::camera> synth_cameras(int count, int size, bool test);
+
+// Errors: invalid_argument for an option out of its range, unsupported without Embree, io_error for a folder that cannot be
+// written or that holds something other than an earlier capture of gart's own.
+void write_synth_capture(synth_options const& options,
+                         std::function<void(int done, int total)> const& progress = {});
+
+}  // namespace gart_cli

@@ -1,0 +1,40 @@
+#pragma once
+// The scene of `gart synth`: triangle meshes made by formula, with procedural colours, so that a capture needs no file from
+// outside and its truth is not made of Gaussians. A still life on a disc: a glazed vase with thin leaves, a torus knot, a
+// rounded box with a wire coil, a copper ball in thin brass rings. Units are those of NeRF-Synthetic: everything lies
+// within 1.3 of the origin, z up.
+
+#include <gart/core/types.hpp>
+#include <gart/math/glm.hpp>
+
+#include <vector>
+
+namespace gart_cli {
+
+using gart::u32;
+using gart::u64;
+using gart::vec2;
+using gart::vec3;
+
+// Diffuse under a GGX lobe: f0 is the reflectance at normal incidence (0: diffuse alone), `metal` has no diffuse part.
+struct synth_material {
+  vec3 (*albedo)(vec3 position, vec2 uv);
+  float f0 = 0;
+  float roughness = 0.5f;  // GGX alpha
+  bool metal = false;      // then the albedo is the reflectance
+};
+
+struct synth_mesh {
+  std::vector<vec3> position{}, normal{};  // a vertex each
+  std::vector<vec2> uv{};
+  std::vector<u32> index{};                // three a triangle
+  synth_material material;
+  float point_density = 1;                 // relative number of starting points per area
+};
+
+using synth_scene = std::vector<synth_mesh>;
+
+// The seed places the leaves. About 60,000 triangles.
+synth_scene make_synth_scene(u64 seed);
+
+}  // namespace gart_cli

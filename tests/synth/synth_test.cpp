@@ -1,0 +1,225 @@
+// The capture of gart synth: it loads as the Blender dataset it claims to be, is the same for any number of threads, has
+// pictures with something in them, and points that lie on the scene's surfaces.
+#include <doctest/doctest.h>
+
+#include <gart/core/error.hpp>
+#include <gart/io/dataset.hpp>
+#include <gart/io/file.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <string>
+
+#include "support/policies.hpp"
+#include "synth_capture.hpp"
+#include "synth_random.hpp"
+#include "synth_trace.hpp"
+
+#include <unistd.h>
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace gart_cli;
+
+struct scratch_folder {
+  fs::path path = fs::temp_directory_path() / ("gart_synth_test_" + std::to_string(getpid()));
+  scratch_folder() { fs::remove_all(path); }
+  ~scratch_folder() { fs::remove_all(path); }
+};
+
+bool has_embree() {
+  try {
+    synth_renderer const probe(make_synth_scene(1), 1);
+    return true;
+  } catch (gart::unsupported const& missing) {
+    CHECK(std::string(missing.what()).find("libembree-dev") != std::string::npos);
+    MESSAGE("skipped: " << missing.what());
+    return false;
+  }
+}
+
+synth_options small(fs::path const& out) {
+  synth_options options;
+  options.out = out, options.train = 5, options.test = 2, options.size = 24, options.samples = 4, options.points = 200;
+  return options;
+}
+
+double distance_to_triangle(gart::vec3d p, gart::vec3d a, gart::vec3d b, gart::vec3d c) {
+  auto const to_segment = [](gart::vec3d q, gart::vec3d s, gart::vec3d e) {
+    gart::vec3d const d = e - s;
+    double const length2 = glm::dot(d, d);
+    return glm::length(q - s - d * (length2 > 0 ? std::clamp(glm::dot(q - s, d) / length2, 0.0, 1.0) : 0.0));
+  };
+  double nearest = std::min({to_segment(p, a, b), to_segment(p, b, c), to_segment(p, c, a)});
+  gart::vec3d n = glm::cross(b - a, c - a);
+  double const area = glm::length(n);
+  if (area < 1e-14) return nearest;
+  n /= area;
+  gart::vec3d const foot = p - n * glm::dot(p - a, n);
+  bool const inside = glm::dot(glm::cross(b - a, foot - a), n) >= 0 && glm::dot(glm::cross(c - b, foot - b), n) >= 0 &&
+                      glm::dot(glm::cross(a - c, foot - c), n) >= 0;
+  return inside ? std::min(nearest, std::abs(glm::dot(p - a, n))) : nearest;
+}
+
+double distance_to_scene(synth_scene const& scene, gart::vec3d p) {
+  double nearest = 1e9;
+  for (synth_mesh const& mesh : scene)
+    for (std::size_t t = 0; t < mesh.index.size(); t += 3) {
+      gart::vec3d const a(mesh.position[mesh.index[t]]);
+      if (glm::length(p - a) > 0.6) continue;  // longer than the sides of all triangles near a point, but the disc's
+      nearest = std::min(nearest, distance_to_triangle(p, a, gart::vec3d(mesh.position[mesh.index[t + 1]]),
+                                                       gart::vec3d(mesh.position[mesh.index[t + 2]])));
+    }
+  return nearest;
+}
+
+}  // namespace
+
+TEST_CASE("the samples of a stream fill every pair's square evenly") {
+  std::uint64_t const seed = gart_test::seed();
+  CAPTURE(seed);
+  for (std::uint64_t stream = seed; stream < seed + 20; ++stream)
+    for (int pair = 0; pair < 4; ++pair) {
+      // 16 samples of a (0, 2) sequence: one in each cell of every elementary grid.
+      int cells[5][16] = {};
+      for (std::uint32_t i = 0; i < 16; ++i) {
+        sample_sequence random(stream, i);
+        gart::vec2 u;
+        for (int k = 0; k <= pair; ++k) u = random.next();
+        for (int g = 0; g < 5; ++g) {
+          int const nx = 1 << g, ny = 16 >> g;
+          ++cells[g][static_cast<int>(u.x * nx) + nx * static_cast<int>(u.y * ny)];
+        }
+      }
+      for (auto const& grid : cells)
+        for (int const count : grid) REQUIRE(count == 1);
+    }
+}
+
+TEST_CASE("every mesh is finite, inside the bounds, with unit normals and indices in range") {
+  std::uint64_t const seed = gart_test::seed();
+  CAPTURE(seed);
+  for (synth_mesh const& mesh : make_synth_scene(seed)) {
+    REQUIRE(mesh.normal.size() == mesh.position.size());
+    REQUIRE(mesh.uv.size() == mesh.position.size());
+    for (std::size_t i = 0; i < mesh.position.size(); ++i) {
+      REQUIRE(glm::length(mesh.position[i]) < 1.25f);  // what the cameras' field of view holds
+      REQUIRE(glm::length(mesh.normal[i]) == doctest::Approx(1).epsilon(1e-4));
+      gart::vec3 const albedo = mesh.material.albedo(mesh.position[i], mesh.uv[i]);
+      for (int c = 0; c < 3; ++c) REQUIRE((albedo[c] >= 0 && albedo[c] <= 1));
+    }
+    REQUIRE(mesh.index.size() % 3 == 0);
+    for (std::uint32_t const i : mesh.index) REQUIRE(i < mesh.position.size());
+  }
+}
+
+TEST_CASE("the cameras look at the origin and share no position") {
+  auto cameras = synth_cameras(48, 160, false);
+  for (gart::camera const& c : synth_cameras(8, 160, true)) cameras.push_back(c);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    gart::vec3 const center(cameras[i].position), forward = gart::ray_direction(cameras[i], 80, 80);
+    CHECK(glm::length(glm::cross(center, forward)) < 1e-5f);
+    CHECK(glm::dot(center, forward) < 0);
+    CHECK(center.z > 0);
+    CHECK(cameras[i].rotation[1].z < 0);  // upright: the image's down is down
+    CHECK(glm::determinant(cameras[i].rotation) == doctest::Approx(1));
+    for (std::size_t j = 0; j < i; ++j) CHECK(glm::length(cameras[i].position - cameras[j].position) > 0.1);
+  }
+}
+
+TEST_CASE("an image is the same for any number of threads, and another for another seed") {
+  if (!has_embree()) return;
+  gart::camera const view = synth_cameras(3, 40, false)[1];
+  synth_scene const scene = make_synth_scene(7);
+  auto const one = synth_renderer(scene, 1).render(view, 4, 7), three = synth_renderer(scene, 3).render(view, 4, 7);
+  CHECK(one.data == three.data);
+  CHECK(one.data != synth_renderer(scene, 1).render(view, 4, 8).data);
+  auto const points = synth_renderer(scene, 1).points({view}, 300, 7), again = synth_renderer(scene, 3).points({view}, 300, 7);
+  CHECK(points.position == again.position);
+  CHECK(points.color == again.color);
+}
+
+TEST_CASE("many samples agree with few: no bias that one would see, and little noise") {
+  if (!has_embree()) return;
+  gart::camera const view = synth_cameras(3, 48, false)[2];
+  synth_renderer const renderer(make_synth_scene(1));
+  auto const few = renderer.render(view, 16, 1), many = renderer.render(view, 256, 2);
+  double squared = 0, sum = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < few.data.size(); ++i) {
+    if (many.data[i | 3] < 255 || i % 4 == 3) continue;  // colours of an edge's pixels rest on few samples
+    double const d = (few.data[i] - many.data[i]) / 255.0;
+    squared += d * d, sum += d, ++count;
+  }
+  REQUIRE(count > 500);
+  CHECK(squared / count < 4e-3);
+  CHECK(std::abs(sum) / count < 5e-3);
+}
+
+TEST_CASE("a capture loads, with its split, its alpha, its cameras and its points") {
+  if (!has_embree()) return;
+  scratch_folder folder;
+  synth_options const options = small(folder.path);
+  int last = 0;
+  write_synth_capture(options, [&](int done, int total) {
+    CHECK(done == ++last);
+    CHECK(total == 7);
+    CHECK_FALSE(fs::exists(folder.path / "transforms_train.json"));  // no dataset before all of it is there
+  });
+  gart::dataset const data = gart::load_dataset(folder.path);
+  CHECK(data.format == "Blender");
+  REQUIRE(data.train.size() == 5);
+  REQUIRE(data.test.size() == 2);
+  CHECK(data.alpha);
+  REQUIRE(data.points.size() == 200);
+  auto const cameras = synth_cameras(5, 24, false);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    gart::camera const& read = data.train[i].view;
+    CHECK(read.fx == doctest::Approx(cameras[i].fx));
+    CHECK(glm::length(read.position - cameras[i].position) < 1e-6);
+    for (int k = 0; k < 3; ++k) CHECK(glm::length(read.rotation[k] - cameras[i].rotation[k]) < 1e-5f);
+    gart::image8 const& image = data.train[i].image;
+    REQUIRE(image.channels == 4);
+    int empty = 0, full = 0;
+    for (int y = 0; y < 24; ++y)
+      for (int x = 0; x < 24; ++x) empty += image.at(x, y, 3) == 0, full += image.at(x, y, 3) == 255;
+    CHECK(empty > 24 * 24 / 5);
+    CHECK(full > 24 * 24 / 10);
+    CHECK(image.at(12, 14, 3) > 0);  // the disc, below the middle
+    CHECK(image.at(0, 0, 3) == 0);
+  }
+  synth_scene const scene = make_synth_scene(options.seed);
+  double worst = 0;
+  for (std::size_t i = 0; i < data.points.size(); i += 2) {
+    float const* p = &data.points.position[3 * i];
+    if (std::abs(p[2] + 0.42f) < 1e-5f) continue;  // the top of the disc
+    worst = std::max(worst, distance_to_scene(scene, {p[0], p[1], p[2]}));
+  }
+  CHECK(worst < 1e-5);
+
+  // Its own folder may be written again, with the same bytes; another's may not.
+  auto const before = gart::read_file(folder.path / "train/r_3.png");
+  synth_options again = options;
+  again.threads = 1;
+  write_synth_capture(again);
+  CHECK(gart::read_file(folder.path / "train/r_3.png") == before);
+  gart::write_file(folder.path / "transforms_train.json", std::string_view("{\"frames\": []}"));
+  CHECK_THROWS_AS(write_synth_capture(options), gart::io_error);
+  CHECK(gart::read_file(folder.path / "train/r_3.png") == before);
+}
+
+TEST_CASE("an option out of its range is refused by name, before anything is written") {
+  scratch_folder folder;
+  for (auto const member : {&synth_options::train, &synth_options::test, &synth_options::size, &synth_options::samples,
+                            &synth_options::points}) {
+    synth_options options = small(folder.path);
+    options.*member = 0;
+    CHECK_THROWS_AS(write_synth_capture(options), gart::invalid_argument);
+  }
+  CHECK_FALSE(fs::exists(folder.path));
+  if (!has_embree()) return;
+  std::ofstream(folder.path) << "a file";
+  CHECK_THROWS_AS(write_synth_capture(small(folder.path)), gart::io_error);
+}
