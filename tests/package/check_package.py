@@ -1,0 +1,113 @@
+"""Installs gart, moves the prefix away from where it was installed, and builds and runs from there: a project of g++ alone
+that is allowed no package which only gart itself needs, with no nvcc on the path; every numbered example; the program; and
+one kernel compiled by nvcc where there is one. A component that is not there has to be refused by name.
+"""
+import argparse
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+
+parser = argparse.ArgumentParser()
+parser.add_argument("--cmake", required=True)
+parser.add_argument("--source", type=pathlib.Path, required=True)
+parser.add_argument("--build", type=pathlib.Path, required=True)
+parser.add_argument("--generator", required=True)
+parser.add_argument("--version", required=True)
+parser.add_argument("--cxx", required=True)
+parser.add_argument("--nvcc")
+parser.add_argument("--jobs", default="1")
+parser.add_argument("--component", action="append", default=[], help="cuda, embree: what was built beside cpu")
+parser.add_argument("--program", action="store_true")
+a = parser.parse_args()
+here = pathlib.Path(__file__).resolve().parent
+
+
+def run(*command, env=None, fails=False):
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, env=env)
+    if (done.returncode != 0) != fails:
+        sys.exit(f"{' '.join(map(str, command))}\nexit code {done.returncode}"
+                 f"{', a failure was expected' if fails else ''}\n{done.stdout}\n{done.stderr}")
+    return done.stdout + done.stderr
+
+
+def expect(text, *words):
+    for word in words:
+        if word not in text:
+            sys.exit(f"`{word}` should be in:\n{text}")
+    return text
+
+
+def path_without_nvcc(folder):
+    """PATH, with every folder that holds an nvcc replaced by one of links to all else in it."""
+    parts = []
+    for i, part in enumerate(os.environ["PATH"].split(os.pathsep)):
+        if not part or not pathlib.Path(part, "nvcc").exists():
+            parts.append(part)
+            continue
+        links = folder / f"path{i}"
+        links.mkdir()
+        for tool in pathlib.Path(part).iterdir():
+            if tool.name != "nvcc":
+                (links / tool.name).symlink_to(tool)
+        parts.append(str(links))
+    path = os.pathsep.join(parts)
+    assert shutil.which("nvcc", path=path) is None
+    return path
+
+
+with tempfile.TemporaryDirectory() as temporary:
+    folder = pathlib.Path(temporary)
+    prefix = folder / "prefix"
+    environment = {k: v for k, v in os.environ.items() if k not in ("DESTDIR", "CUDACXX", "CUDAToolkit_ROOT")}
+    bare = {**environment, "PATH": path_without_nvcc(folder)}
+
+    run(a.cmake, "--install", a.build, "--prefix", folder / "staging", env=environment)
+    (folder / "staging").rename(prefix)
+    for name in ("LICENSE", "version.hpp", "gartConfig.cmake"):
+        if not list(prefix.rglob(name)):
+            sys.exit(f"{name} was not installed")
+
+    def configure(project, *options, env=bare, fails=False):
+        binary = folder / project.name
+        return run(a.cmake, "-S", project, "-B", binary, "-G", a.generator, f"-DCMAKE_PREFIX_PATH={prefix}",
+                   f"-DCMAKE_CXX_COMPILER={a.cxx}", "-DCMAKE_BUILD_TYPE=Release", *options, env=env, fails=fails)
+
+    def build(project, *options, env=bare):
+        configure(project, *options, env=env)
+        run(a.cmake, "--build", folder / project.name, "--parallel", a.jobs, env=env)
+        return folder / project.name
+
+    # Neither what only gart's own sources include, nor what components that were not asked for link.
+    never = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in
+             ("nlohmann_json", "Eigen3", "doctest", "CLI11", "embree", "CUDAToolkit")]
+    host = build(here / "downstream", f"-DVERSION={a.version}", *never)
+    capture, model = folder / "capture", folder / "model.ply"
+    expect(run(host / "use_headers"), f"version {a.version}")
+    expect(run(host / "use_cpu", capture, model), "serial", "openmp")
+
+    for component in a.component:
+        binary = build(here / "downstream" / component)
+        expect(run(binary / f"use_{component}"), component)
+    told = configure(here / "downstream" / "missing", fails=True)
+    expect(" ".join(told.split()), "has no component optix, telepathy", "it has: headers, io, cpu")
+
+    examples = {path.name: build(path) for path in sorted((a.source / "examples").glob("[0-9]_*"))}
+    image = folder / "image.png"
+    expect(run(examples["1_render_ply"] / "render_ply", model, image), "Gaussians")
+    assert image.read_bytes().startswith(b"\x89PNG")
+    for name in ("2_train_scene/train_scene", "3_own_loss/own_loss"):
+        trained = folder / "trained.ply"
+        trained.unlink(missing_ok=True)
+        run(examples[name.split("/")[0]] / name.split("/")[1], capture, trained, 3)
+        assert trained.read_bytes().startswith(b"ply\n")
+    expect(run(examples["4_bvh_query"] / "bvh_query", 1000), "1000 boxes")
+
+    if a.program:
+        expect(run(prefix / "bin" / "gart", "--help", env=bare), "train", "render")
+    if a.nvcc:
+        binary = build(here / "downstream" / "nvcc", f"-DCMAKE_CUDA_COMPILER={a.nvcc}", env=environment)
+        run(binary / "use_nvcc")
+print("installed, moved, and used: host" + "".join(f", {c}" for c in a.component) + (", nvcc" if a.nvcc else ""))
