@@ -86,7 +86,7 @@ struct loss_tiles {
 
   // f(cell, i, inside) for every cell of the haloed tile; i is its pixel's place in [3][H][W] where it is inside.
   template <class Team, class F>
-  GART_KERNEL void each_halo_cell(Team const& team, place const& at, F const& f) const {
+  GART_HD void each_halo_cell(Team const& team, place const& at, F const& f) const {
     constexpr int blocks = halo_pitch / block;
     team.for_each(blocks * halo_height, [&](index_t item) {
       int const row = item / blocks, first = item % blocks * block, y = at.y + row - ssim_window::radius;
@@ -120,7 +120,7 @@ struct loss_tiles {
 
   // Along rows: from haloed planes to planes of `width` by halo_height.
   template <int Planes, class Team>
-  static GART_KERNEL void convolve_rows(Team const& team, float const* halo, float* rows) {
+  static GART_HD void convolve_rows(Team const& team, float const* halo, float* rows) {
     team.for_each(rows_size / block, [&](index_t item) {
       int const row = item * block / width, x = item * block % width;
       float sums[Planes][block];
@@ -149,7 +149,7 @@ struct ssim_kernel {
   float weight;
 
   template <class Team>
-  GART_KERNEL void operator()(Team const& team) const {
+  GART_HD void operator()(Team const& team) const {
     scratch& s = team.scratch();
     auto const at = grid(team.tile());
     std::size_t const pixels = grid.image.pixels(), plane = at.channel * pixels;
@@ -238,7 +238,7 @@ struct loss_gradient_kernel {
   float weight;
 
   template <class Team>
-  GART_KERNEL void operator()(Team const& team) const {
+  GART_HD void operator()(Team const& team) const {
     scratch& s = team.scratch();
     auto const at = grid(team.tile());
     std::size_t const pixels = grid.image.pixels(), plane = at.channel * pixels;

@@ -53,7 +53,7 @@ struct adam_kernel {
   u32* skipped;
 
   template <class Team>
-  GART_KERNEL void operator()(Team const& team) const {
+  GART_HD void operator()(Team const& team) const {
     index_t const group_index = team.tile() / group_tiles;
     index_t const row = (team.tile() - group_index * group_tiles) * rows_per_tile;
     index_t const count = rows - row < rows_per_tile ? rows - row : rows_per_tile;
@@ -65,7 +65,7 @@ struct adam_kernel {
     });
   }
 
-  GART_KERNEL void update(adam_group const& group, std::size_t i, float rate) const {
+  GART_HD void update(adam_group const& group, std::size_t i, float rate) const {
     float const g = group.gradient[i];
     float const m = fma(beta1, group.first[i], mul(1.0f - beta1, g));
     float const v = fma(beta2, group.second[i], mul(mul(1.0f - beta2, g), g));

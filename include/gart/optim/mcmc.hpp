@@ -83,7 +83,7 @@ struct mcmc_draw_kernel {
   u32* source;
   u32* copies;
 
-  GART_KERNEL void operator()(index_t draw) const {
+  GART_HD void operator()(index_t draw) const {
     random_words const w = random.words(draw);
     u64 const at = below(w.v[0], w.v[1], *total);
     // The last Gaussian whose sum is at most `at`: its weight is not zero.

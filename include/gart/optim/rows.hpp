@@ -30,7 +30,7 @@ struct row_kernel {
   index_t rows, width;
 
   template <class Team>
-  GART_KERNEL void operator()(Team const& team) const {
+  GART_HD void operator()(Team const& team) const {
     index_t const first = team.tile() * rows_per_tile;
     index_t const count = rows - first < rows_per_tile ? rows - first : rows_per_tile;
     team.for_each(count * width, [&](index_t e) { body(first + e / width, e % width); });
