@@ -3,5 +3,10 @@
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/train/compiled_rows.hpp>
 
-GART_REGISTER_ROWS(gart_openmp_rows,
-                   gart::register_rows<gart::openmp_exec, gart::bvh_tracer<gart::openmp_exec>, gart::pixel_strategy>(10))
+namespace {
+using tracer = gart::bvh_tracer<gart::openmp_exec>;
+}  // namespace
+
+GART_REGISTER_ROWS(gart_openmp_rows, gart::register_rows<gart::openmp_exec, tracer, gart::pixel_strategy>(10);
+                   gart::register_rows<gart::openmp_exec, tracer, gart::hybrid_strategy>(11);
+                   gart::register_rows<gart::openmp_exec, tracer, gart::primitive_strategy>(12))

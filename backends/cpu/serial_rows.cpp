@@ -3,5 +3,10 @@
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/train/compiled_rows.hpp>
 
-GART_REGISTER_ROWS(gart_serial_rows,
-                   gart::register_rows<gart::serial_exec, gart::bvh_tracer<gart::serial_exec>, gart::pixel_strategy>(0))
+namespace {
+using tracer = gart::bvh_tracer<gart::serial_exec>;
+}  // namespace
+
+GART_REGISTER_ROWS(gart_serial_rows, gart::register_rows<gart::serial_exec, tracer, gart::pixel_strategy>(0);
+                   gart::register_rows<gart::serial_exec, tracer, gart::hybrid_strategy>(1);
+                   gart::register_rows<gart::serial_exec, tracer, gart::primitive_strategy>(2))

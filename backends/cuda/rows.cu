@@ -4,9 +4,11 @@
 #include <gart/train/compiled_rows.hpp>
 
 namespace {
+using tracer = gart::bvh_tracer<gart::cuda_exec>;
 bool device_available(std::string* reason) { return !gart::cuda_devices(reason).empty(); }
 }  // namespace
 
 GART_REGISTER_ROWS(gart_cuda_rows,
-                   gart::register_rows<gart::cuda_exec, gart::bvh_tracer<gart::cuda_exec>, gart::pixel_strategy>(
-                       20, device_available))
+                   gart::register_rows<gart::cuda_exec, tracer, gart::pixel_strategy>(20, device_available);
+                   gart::register_rows<gart::cuda_exec, tracer, gart::hybrid_strategy>(21, device_available);
+                   gart::register_rows<gart::cuda_exec, tracer, gart::primitive_strategy>(22, device_available))

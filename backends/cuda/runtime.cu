@@ -197,9 +197,11 @@ void cuda_exec::copy(void* dst, void const* src, std::size_t bytes) {
   if (bytes) check_cuda(cudaMemcpyAsync(dst, src, bytes, cudaMemcpyDeviceToDevice, as_stream(stream_)), "copying");
 }
 
-void cuda_exec::zero(void* p, std::size_t bytes) {
-  if (bytes) check_cuda(cudaMemsetAsync(p, 0, bytes, as_stream(stream_)), "clearing memory");
+void cuda_exec::fill(void* p, unsigned char byte, std::size_t bytes) {
+  if (bytes) check_cuda(cudaMemsetAsync(p, byte, bytes, as_stream(stream_)), "clearing memory");
 }
+
+void cuda_exec::zero(void* p, std::size_t bytes) { fill(p, 0, bytes); }
 
 void cuda_exec::synchronize() {
   check_cuda(cudaStreamSynchronize(as_stream(stream_)), "waiting for the device");

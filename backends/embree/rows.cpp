@@ -1,9 +1,12 @@
-// The host policies with Embree.
+// The OpenMP policy with Embree.
 #include <gart/exec/parallel.hpp>
 #include <gart/trace/embree_tracer.hpp>
 #include <gart/train/compiled_rows.hpp>
 
-GART_REGISTER_ROWS(
-    gart_embree_rows,
-    gart::register_rows<gart::serial_exec, gart::embree_tracer<gart::serial_exec>, gart::pixel_strategy>(1);
-    gart::register_rows<gart::openmp_exec, gart::embree_tracer<gart::openmp_exec>, gart::pixel_strategy>(11))
+namespace {
+using tracer = gart::embree_tracer<gart::openmp_exec>;
+}  // namespace
+
+GART_REGISTER_ROWS(gart_embree_rows, gart::register_rows<gart::openmp_exec, tracer, gart::pixel_strategy>(13);
+                   gart::register_rows<gart::openmp_exec, tracer, gart::hybrid_strategy>(14);
+                   gart::register_rows<gart::openmp_exec, tracer, gart::primitive_strategy>(15))

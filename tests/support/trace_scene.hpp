@@ -103,28 +103,41 @@ traced<E> render_scene(E& exec, gart::gaussian_model const& model, gart::camera 
   });
 }
 
-template <class E>
-gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model, gart::camera const& view,
-                                     gart::render_options const& options, int active_degree, tracer_kind kind,
-                                     std::string const& strategy, std::vector<float> const& color_gradient) {
+template <class Strategy, class E>
+gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, gart::camera const& view,
+                                  gart::render_options const& options, int active_degree, tracer_kind kind,
+                                  std::vector<float> const& color_gradient) {
   return detail::with_tracer(exec, kind, [&](auto& tracer) {
     gart::gaussians<E> scene(exec, model);
     gart::gaussians<E> gradients(exec, scene.size(), model.sh_degree);
     gart::frame_records<E> records(exec);
-    gart::backward<E> pass(exec);
+    gart::backward<E, Strategy> pass(exec);
     std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
     gart::buffer<float, E> color(exec, 3 * pixels), gradient(exec, color_gradient);
     auto const constant = std::as_const(scene).view();
     records.prepare(exec, constant, view.position, options.alpha_min);
     tracer.prepare(exec, constant, records.view(), view.position, options.alpha_min, options.near);
+    pass.prepare(exec, constant, view, options.alpha_min, options.near);
     detail::with_degree(model.sh_degree, [&](auto degree) {
-      if (strategy != "pixel") throw std::runtime_error("no such strategy: " + strategy);
-      gart::forward<degree>(exec, tracer, constant, view, options, active_degree, {color.data()}, gart::record_none{});
-      pass.template run<degree>(exec, gart::pixel_strategy{}, tracer, constant, records.view(), view, options,
-                                active_degree, color, gradient, gradients);
+      gart::forward<degree>(exec, tracer, constant, view, options, active_degree, {color.data()}, pass.record());
+      pass.template run<degree>(exec, tracer, constant, records.view(), view, options, active_degree, color, gradient,
+                                gradients);
     });
     return gradients.to_host();
   });
+}
+
+template <class E>
+gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model, gart::camera const& view,
+                                     gart::render_options const& options, int active_degree, tracer_kind kind,
+                                     std::string const& strategy, std::vector<float> const& color_gradient) {
+  if (strategy == "pixel")
+    return gradients_by<gart::pixel_strategy>(exec, model, view, options, active_degree, kind, color_gradient);
+  if (strategy == "hybrid")
+    return gradients_by<gart::hybrid_strategy>(exec, model, view, options, active_degree, kind, color_gradient);
+  if (strategy == "primitive")
+    return gradients_by<gart::primitive_strategy>(exec, model, view, options, active_degree, kind, color_gradient);
+  throw std::runtime_error("no such strategy: " + strategy);
 }
 
 template <class E>

@@ -1,9 +1,14 @@
 #pragma once
-// From the gradient of the image to the gradients of the parameters, by any strategy: gather and scatter what the strategy
-// says, then turn the moments of each Gaussian into the gradients of its mean, log-scale, quaternion and opacity.
+// From the gradient of the image to the gradients of the parameters, by any strategy (strategies.hpp):
+//   prepare()  before the forward pass: footprints, the LT buffer and the tile map, where the strategy records
+//   record()   what the forward pass is given
+//   run()      gathers and scatters what the strategy says, then turns the moments of each Gaussian into the gradients of
+//              its mean, log-scale, quaternion and opacity. Overwrites `gradients`.
 //
-// backward<E>::run overwrites `gradients`, which must have the scene's size and degree.
+// Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, 36 bytes a Gaussian, 8 a
+// (primitive, tile) pair and the LT buffer: 4 or 16 bytes for each pixel of each box.
 
+#include <gart/backward/gather.hpp>
 #include <gart/backward/scatter.hpp>
 #include <gart/backward/strategies.hpp>
 #include <gart/render/forward.hpp>
@@ -33,33 +38,78 @@ struct finish {
 
 }  // namespace backward_kernels
 
-template <execution E>
+template <execution E, class Strategy, int TileSize = 8>
 class backward {
  public:
-  explicit backward(E& exec) : moments_(exec) {}
+  using record_type = typename Strategy::template record<TileSize>;
+  static constexpr bool records = Strategy::gather::any;
 
-  // `color` and `color_gradient` are [H][W][3]; `records` and the tracer stand as the forward pass used them.
-  template <int ShDegree, class Strategy, class Tracer>
-  void run(E& exec, Strategy, Tracer& tracer, gaussians_view<float const> scene, span<ray_gaussian const> records,
+  explicit backward(E& exec) : moments_(exec), prints_(exec), map_(exec), slots_(exec) {}
+
+  void prepare(E& exec, gaussians_view<float const> scene, camera const& view, float alpha_min, float near) {
+    if constexpr (records) {
+      prints_.measure(exec, scene, view, alpha_min, near);
+      slots_.resize(prints_.slots());
+      stage_scope stage(exec, "clear");
+      exec.fill(slots_.data(), 0xff, slots_.size() * sizeof(entry));  // a NaN: not written
+    }
+  }
+
+  record_type record() const {
+    if constexpr (records)
+      return {prints_.ranges().data(), slots_.data()};
+    else
+      return {};
+  }
+
+  // `color` and `color_gradient` are [H][W][3]; `gaussians_in_frame` and the tracer stand as the forward pass used them.
+  template <int ShDegree, class Tracer>
+  void run(E& exec, Tracer& tracer, gaussians_view<float const> scene, span<ray_gaussian const> gaussians_in_frame,
            camera const& view, render_options const& options, int active_degree, span<float const> color,
            span<float const> color_gradient, gaussians<E>& gradients) {
     stage_scope stage(exec, "backward");
     moments_.resize(std::size_t{moment_stride} * scene.count);
     moments_.zero();
     gradients.sh.zero();
+    if constexpr (records) {
+      tile_grid<TileSize> const grid{view.width, view.height};
+      map_.build(exec, grid, prints_);
+      gather_kernel<ShDegree, typename Strategy::gather, entry, TileSize, E> const kernel{
+          view,          grid,         map_.view(),  prints_.ranges().data(), slots_.data(),
+          gaussians_in_frame.data(),   scene.sh,     active_degree,           color.data(),
+          color_gradient.data(),       gradients.sh.data(), moments_.data()};
+      parallel_for(exec, "backward/gather", tile_range{grid.count(), 64}, kernel);
+    }
     if constexpr (Strategy::scatter::any) {
       pixel_order const order{view.width, view.height};
       scatter_program<ShDegree, typename Strategy::scatter, E> const program{
-          view,          order,        scene.sh,     active_degree,          options.transmittance_min, records.data(),
-          color.data(),  color_gradient.data(), gradients.sh.data(), moments_.data()};
+          view,         order,        scene.sh,     active_degree, options.transmittance_min, gaussians_in_frame.data(),
+          color.data(), color_gradient.data(),      gradients.sh.data(),                      moments_.data()};
       tracer.trace(exec, "backward/scatter", order.launch_size(), program);
     }
     parallel_for(exec, "backward/finish", scene.count,
-                 backward_kernels::finish{scene, records, moments_, gradients.view()});
+                 backward_kernels::finish{scene, gaussians_in_frame, moments_, gradients.view()});
   }
 
+  std::size_t lt_bytes() const { return slots_.size() * sizeof(entry); }
+  footprints<E, TileSize> const& prints() const { return prints_; }
+
  private:
+  template <class R>
+  struct entry_of {
+    using type = float;  // no slots
+  };
+  template <class R>
+    requires requires { typename R::entry; }
+  struct entry_of<R> {
+    using type = typename R::entry;
+  };
+  using entry = typename entry_of<record_type>::type;
+
   buffer<float, E> moments_;
+  footprints<E, TileSize> prints_;
+  tile_map<E, TileSize> map_;
+  buffer<entry, E> slots_;
 };
 
 }  // namespace gart

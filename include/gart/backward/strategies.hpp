@@ -1,17 +1,37 @@
 #pragma once
-// Seam 3: a backward strategy is a composition: what the forward pass records, which terms are gathered by primitive and
-// which are scattered by pixel.
+// Seam 3: a backward strategy is a composition: what the forward pass records of a hit, which terms are gathered by
+// primitive and which are scattered by pixel.
 
+#include <gart/backward/record_lt.hpp>
 #include <gart/backward/terms.hpp>
-#include <gart/render/record.hpp>
 
 namespace gart {
 
+// Nothing recorded; every ray is traced again and scatters.
 struct pixel_strategy {
   static constexpr char const* name = "pixel";
+  template <int Size>
   using record = record_none;
   using gather = terms<>;
   using scatter = terms<color, geometry>;
+};
+
+// One channel: the colour gradient of a hit needs only its weight. Geometry by pixel.
+struct hybrid_strategy {
+  static constexpr char const* name = "hybrid";
+  template <int Size>
+  using record = record_lt<float, Size>;
+  using gather = terms<color>;
+  using scatter = terms<geometry>;
+};
+
+// Four channels; no ray is traced twice.
+struct primitive_strategy {
+  static constexpr char const* name = "primitive";
+  template <int Size>
+  using record = record_lt<lt_entry, Size>;
+  using gather = terms<color, geometry>;
+  using scatter = terms<>;
 };
 
 }  // namespace gart

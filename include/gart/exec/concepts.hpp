@@ -7,6 +7,7 @@
 //   void* allocate(bytes); void deallocate(void*, bytes);      stream-ordered; throws out_of_memory
 //   void copy_in(dst, host_src, bytes); void copy_out(host_dst, src, bytes);
 //   void copy(dst, src, bytes); void zero(p, bytes);
+//   void fill(p, byte, bytes);                                 every byte set to one value
 //   void synchronize();
 //   void begin_stage(label); void end_stage();                 brackets of a timed stage, nested (see stage.hpp)
 //   template <class T> static T atomic_add(T*, T);             in kernels: returns the old value
@@ -39,6 +40,7 @@ concept execution = requires(E& e, void* p, void const* q, std::size_t n, float*
   e.copy_out(p, q, n);
   e.copy(p, q, n);
   e.zero(p, n);
+  e.fill(p, static_cast<unsigned char>(0), n);
   e.synchronize();
   e.begin_stage("");
   e.end_stage();

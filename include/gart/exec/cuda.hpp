@@ -49,6 +49,7 @@ class cuda_exec {
   void copy_out(void* dst, void const* src, std::size_t bytes);
   void copy(void* dst, void const* src, std::size_t bytes);
   void zero(void* p, std::size_t bytes);
+  void fill(void* p, unsigned char byte, std::size_t bytes);
   void synchronize();
 
   void* stream() const { return stream_; }  // a cudaStream_t

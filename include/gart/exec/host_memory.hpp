@@ -45,6 +45,9 @@ class host_memory {
   void zero(void* p, std::size_t bytes) {
     if (bytes) std::memset(p, 0, bytes);
   }
+  void fill(void* p, unsigned char byte, std::size_t bytes) {
+    if (bytes) std::memset(p, byte, bytes);
+  }
   void synchronize() {}
 
   // A block that the policy keeps and lends to the algorithm that is running, so that sorting at every step does not

@@ -95,8 +95,15 @@ GART_HD inline u16 first_pixel(double edge, int size) {
 
 }  // namespace detail
 
-// `center` and `axes` (columns c R S) in world axes relative to the camera.
-GART_HD inline footprint project(footprint_view const& v, vec3d const& center, mat3d const& axes) {
+// Bounds in slopes x / z and y / z, with the error to widen them by.
+struct slope_box {
+  detail::interval u, w;
+  double error = 0;
+  bool visible = false;
+};
+
+// `center` and `axes` (columns c R S) in world axes relative to the camera. Sets the footprint's depth only.
+GART_HD inline footprint project(footprint_view const& v, vec3d const& center, mat3d const& axes, slope_box& s) {
   footprint out;
   vec3d const m = v.to_camera * center;
   mat3d const a = v.to_camera * axes;
@@ -107,20 +114,16 @@ GART_HD inline footprint project(footprint_view const& v, vec3d const& center, m
   double const error = 4e-6 * reach;
   if (!(m.z + depth + error >= v.near)) return out;
   double const nearest = m.z - depth - error > v.near ? m.z - depth - error : v.near;
-  detail::interval const u = detail::slope_bounds(m.x, ax, m.z, az, v.near);
-  detail::interval const w = detail::slope_bounds(m.y, ay, m.z, az, v.near);
-  double const pad_x = 0.01 + v.fx * error / nearest, pad_y = 0.01 + v.fy * error / nearest;
-  out.box.x0 = detail::first_pixel(v.fx * u.lo + v.cx - pad_x, v.width);
-  out.box.x1 = detail::first_pixel(v.fx * u.hi + v.cx + pad_x, v.width);
-  out.box.y0 = detail::first_pixel(v.fy * w.lo + v.cy - pad_y, v.height);
-  out.box.y1 = detail::first_pixel(v.fy * w.hi + v.cy + pad_y, v.height);
-  if (out.box.empty()) out.box = {};
+  s.u = detail::slope_bounds(m.x, ax, m.z, az, v.near);
+  s.w = detail::slope_bounds(m.y, ay, m.z, az, v.near);
+  s.error = error / nearest;
+  s.visible = true;
   out.depth = static_cast<float>(nearest * (1 - 1e-6));
   return out;
 }
 
-GART_HD inline footprint gaussian_footprint(footprint_view const& v, gaussian_parameters const& g, vec3d const& frame,
-                                            float alpha_min) {
+GART_HD inline footprint gaussian_slopes(footprint_view const& v, gaussian_parameters const& g, vec3d const& frame,
+                                         float alpha_min, slope_box& s) {
   float const cutoff = hit_cutoff(g, alpha_min);
   if (cutoff < 0) return {};
   mat3 const rotation = to_matrix(g.rotation);
@@ -128,7 +131,16 @@ GART_HD inline footprint gaussian_footprint(footprint_view const& v, gaussian_pa
   double const c = sqrt(static_cast<double>(cutoff));
   mat3d axes;
   for (int k = 0; k < 3; ++k) axes[k] = vec3d(rotation[k]) * (c * static_cast<double>(scale[k]));
-  return project(v, vec3d(g.mean) - frame, axes);
+  return project(v, vec3d(g.mean) - frame, axes, s);
+}
+
+GART_HD inline pixel_box pixels_of(footprint_view const& v, slope_box const& s) {
+  double const pad_x = 0.01 + v.fx * s.error, pad_y = 0.01 + v.fy * s.error;
+  pixel_box const out{detail::first_pixel(v.fx * s.u.lo + v.cx - pad_x, v.width),
+                      detail::first_pixel(v.fy * s.w.lo + v.cy - pad_y, v.height),
+                      detail::first_pixel(v.fx * s.u.hi + v.cx + pad_x, v.width),
+                      detail::first_pixel(v.fy * s.w.hi + v.cy + pad_y, v.height)};
+  return out.empty() ? pixel_box{} : out;
 }
 
 }  // namespace gart

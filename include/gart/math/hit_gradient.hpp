@@ -24,6 +24,11 @@ struct moments {
   float v[moment_stride];
 };
 
+// dL/dalpha of a hit: T before it, its colour.g, and what lies behind it.g.
+GART_HD GART_INLINE float alpha_gradient(float transmittance, float color_g, float behind_g, float alpha) {
+  return transmittance * color_g - behind_g / (1.0f - alpha);
+}
+
 // The front-to-back walk of a ray's gradient: what a hit's derivative needs of the hits before and behind it.
 struct ray_gradient {
   vec3 g;              // dL/d colour of the pixel
@@ -35,7 +40,7 @@ struct ray_gradient {
     float const cg = color.x * g.x + color.y * g.y + color.z * g.z;
     weight = transmittance * alpha;
     behind -= weight * cg;
-    float const gradient = transmittance * cg - behind / (1.0f - alpha);
+    float const gradient = gart::alpha_gradient(transmittance, cg, behind, alpha);
     transmittance *= 1.0f - alpha;
     return gradient;
   }

@@ -55,9 +55,9 @@ struct composite {
     float const weight = s.transmittance * h.alpha;
     s.color += weight * c;
     s.depth += weight * h.t;
+    record(s.at, h, s.color, s.transmittance);
     s.transmittance *= 1.0f - h.alpha;
     ++s.hits;
-    record(s.at, h, s.color, s.transmittance);
     return s.transmittance >= options.transmittance_min;
   }
   GART_HD void end(index_t, state const& s) const {

@@ -1,6 +1,6 @@
 #pragma once
 // What the forward pass leaves of each hit for the backward pass to find. A record is called once a hit, after it has been
-// composited, with the ray's accumulated colour and transmittance; it is part of a strategy (backward/strategies.hpp).
+// composited, with the ray's accumulated colour and the transmittance before the hit; it is part of a strategy (backward/strategies.hpp).
 
 #include <gart/render/pixels.hpp>
 #include <gart/trace/hit.hpp>

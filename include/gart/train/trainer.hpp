@@ -69,7 +69,7 @@ class trainer {
   optimizer_state<E> state_;
   frame_records<E> records_;
   Tracer tracer_;
-  backward<E> backward_;
+  backward<E, Strategy> backward_;
   image_loss<E> loss_;
   training_images<E> images_;
   view_order order_;

@@ -54,14 +54,14 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
 
   records_.prepare(exec_, constant, view.view.position, render.alpha_min);
   tracer_.prepare(exec_, constant, records_.view(), view.view.position, render.alpha_min, render.near);
-  forward<sh_degree>(exec_, tracer_, constant, view.view, render, degree, {color_.data()},
-                     typename Strategy::record{});
+  backward_.prepare(exec_, constant, view.view, render.alpha_min, render.near);
+  forward<sh_degree>(exec_, tracer_, constant, view.view, render, degree, {color_.data()}, backward_.record());
   {
     stage_scope stage(exec_, "loss");
     loss(loss_input<E>{exec_, view, images_.get(exec_, index, render.background), view.view.width, view.view.height,
                        color_, color_gradient_, value_});
   }
-  backward_.template run<sh_degree>(exec_, Strategy{}, tracer_, constant, records_.view(), view.view, render, degree,
+  backward_.template run<sh_degree>(exec_, tracer_, constant, records_.view(), view.view, render, degree,
                                     color_, color_gradient_, gradients_);
   ++step_;
   update(view, degree);

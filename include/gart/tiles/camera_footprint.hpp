@@ -1,0 +1,90 @@
+#pragma once
+// Footprints for a camera, its lens included. A pinhole's are math/footprint.hpp's. Through a distorted lens the rectangle
+// of slopes that bounds the ellipsoid is mapped to the image edge by edge: the map is one to one where the image is, so the
+// image of the rectangle lies within the image of its border, which is sampled and widened by what a curved edge can bulge
+// between samples.
+
+#include <gart/math/footprint.hpp>
+#include <gart/scene/camera.hpp>
+
+namespace gart {
+
+class camera_footprint {
+ public:
+  // Host side: the bounds of what the image sees, in slopes, by sampling its border.
+  camera_footprint(camera const& c, float near) : lens_(c.lens), fx_(c.fx), fy_(c.fy), cx_(c.cx), cy_(c.cy) {
+    mat3d world_to_camera(1.0);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) world_to_camera[i][j] = c.rotation[j][i];
+    detail::interval u, w;
+    double least_cosine = 1;
+    constexpr int steps = 64;
+    for (int k = 0; k <= steps; ++k) {
+      double const s = static_cast<double>(k) / steps;
+      double const border[4][2] = {{s * c.width, 0}, {s * c.width, 1.0 * c.height}, {0, s * c.height}, {1.0 * c.width, s * c.height}};
+      for (auto const& b : border) {
+        vec2 p(static_cast<float>((b[0] - c.cx) / c.fx), static_cast<float>((b[1] - c.cy) / c.fy));
+        if (c.lens.any()) p = undistort(c.lens, p);
+        u.add(p.x), w.add(p.y);
+        double const cosine = 1 / std::sqrt(1.0 + double{p.x} * p.x + double{p.y} * p.y);
+        least_cosine = cosine < least_cosine ? cosine : least_cosine;
+      }
+    }
+    // The border between samples may bulge a little further.
+    double const margin = c.lens.any() ? 0.02 : 0.0;
+    double const mu = margin * (u.hi - u.lo), mw = margin * (w.hi - w.lo);
+    u_ = {u.lo - mu, u.hi + mu}, w_ = {w.lo - mw, w.hi + mw};
+    view_ = {world_to_camera, fx_, fy_, cx_, cy_, c.width, c.height, near * least_cosine * (1 - margin)};
+  }
+
+  GART_HD footprint operator()(gaussian_parameters const& g, vec3d const& frame, float alpha_min) const {
+    slope_box s;
+    footprint out = gaussian_slopes(view_, g, frame, alpha_min, s);
+    if (!s.visible) return {};
+    if (lens_.any()) s = distorted(s);
+    out.box = pixels_of(view_, s);
+    return out;
+  }
+
+ private:
+  GART_HD void distort(double x, double y, double& u, double& v) const {
+    double const r2 = x * x + y * y, radial = 1 + r2 * (lens_.k1 + r2 * lens_.k2);
+    u = x * radial + 2 * lens_.p1 * x * y + lens_.p2 * (r2 + 2 * x * x);
+    v = y * radial + 2 * lens_.p2 * x * y + lens_.p1 * (r2 + 2 * y * y);
+  }
+
+  GART_HD slope_box distorted(slope_box const& s) const {
+    auto const clamp = [](double v, detail::interval const& to) { return v < to.lo ? to.lo : v > to.hi ? to.hi : v; };
+    // What lies outside the view is seen by no pixel; keeping the rectangle to it keeps it where the lens is one to one.
+    double const x0 = clamp(s.u.lo, u_), x1 = clamp(s.u.hi, u_), y0 = clamp(s.w.lo, w_), y1 = clamp(s.w.hi, w_);
+    detail::interval u, v;
+    constexpr int steps = 8;
+    for (int k = 0; k <= steps; ++k) {
+      double const f = static_cast<double>(k) / steps, x = x0 + f * (x1 - x0), y = y0 + f * (y1 - y0);
+      double const border[4][2] = {{x, y0}, {x, y1}, {x0, y}, {x1, y}};
+      for (auto const& b : border) {
+        double a, c;
+        distort(b[0], b[1], a, c);
+        u.add(a), v.add(c);
+      }
+    }
+    // Second derivatives of the lens along an edge are at most this on the rectangle; a chord of length h bulges h^2 / 8
+    // times as much.
+    double const rx = fabs(x0) > fabs(x1) ? fabs(x0) : fabs(x1), ry = fabs(y0) > fabs(y1) ? fabs(y0) : fabs(y1);
+    double const r = sqrt(rx * rx + ry * ry);
+    double const curvature = 6 * (fabs(double{lens_.k1}) * r + fabs(double{lens_.p1}) + fabs(double{lens_.p2})) +
+                             20 * fabs(double{lens_.k2}) * r * r * r;
+    double const hx = (x1 - x0) / steps, hy = (y1 - y0) / steps;
+    double const bulge = curvature * (hx * hx + hy * hy) / 8;
+    slope_box out = s;
+    out.u = {u.lo - bulge, u.hi + bulge}, out.w = {v.lo - bulge, v.hi + bulge};
+    return out;
+  }
+
+  distortion lens_;
+  double fx_, fy_, cx_, cy_;
+  detail::interval u_, w_;  // slopes the image sees
+  footprint_view view_;
+};
+
+}  // namespace gart

@@ -1,0 +1,85 @@
+#pragma once
+// The footprints of all Gaussians in one view: boxes with their place in the LT buffer, near depths, and how many
+// (primitive, tile) pairs they make. Cost: one launch of double arithmetic over the Gaussians, two prefix sums, and one
+// read of two totals by the host, from which buffers are sized.
+
+#include <gart/algorithm/exclusive_scan.hpp>
+#include <gart/exec/stage.hpp>
+#include <gart/scene/camera.hpp>
+#include <gart/scene/parameters.hpp>
+#include <gart/tiles/camera_footprint.hpp>
+#include <gart/tiles/layout.hpp>
+
+namespace gart {
+
+namespace tile_kernels {
+
+template <int Size>
+struct measure {
+  gaussians_view<float const> scene;
+  camera_footprint view;
+  vec3d frame;
+  float alpha_min;
+  span<lt_range> ranges;
+  span<float> depths;
+  span<u32> areas, tiles;
+  GART_KERNEL void operator()(index_t i) const {
+    footprint const f = view(load_parameters(scene, i), frame, alpha_min);
+    ranges[i].box = f.box;
+    depths[i] = f.depth;
+    areas[i] = f.box.area();
+    tiles[i] = tiles_of<Size>(f.box).area();
+  }
+};
+
+struct place {
+  span<u64 const> offsets;
+  span<lt_range> ranges;
+  GART_KERNEL void operator()(index_t i) const { ranges[i].offset = offsets[i]; }
+};
+
+}  // namespace tile_kernels
+
+template <execution E, int Size>
+class footprints {
+ public:
+  explicit footprints(E& exec)
+      : ranges_(exec), depths_(exec), areas_(exec), tiles_(exec), area_offsets_(exec), pair_offsets_(exec), totals_(exec, 2) {}
+
+  void measure(E& exec, gaussians_view<float const> scene, camera const& view, float alpha_min, float near) {
+    index_t const n = scene.count;
+    ranges_.resize(n), depths_.resize(n), areas_.resize(n), tiles_.resize(n), area_offsets_.resize(n), pair_offsets_.resize(n);
+    if (n == 0) {
+      slots_ = pairs_ = 0;
+      return;
+    }
+    {
+      stage_scope stage(exec, "footprint");
+      parallel_for(exec, "footprint/measure", n,
+                   tile_kernels::measure<Size>{scene, camera_footprint(view, near), view.position, alpha_min, ranges_,
+                                               depths_, areas_, tiles_});
+    }
+    stage_scope stage(exec, "scan");
+    exclusive_scan(exec, span<u32 const>(areas_), area_offsets_.view(), totals_.view().subspan(0, 1));
+    exclusive_scan(exec, span<u32 const>(tiles_), pair_offsets_.view(), totals_.view().subspan(1, 1));
+    parallel_for(exec, "footprint/place", n, tile_kernels::place{area_offsets_, ranges_});
+    u64 totals[2];
+    exec.copy_out(totals, totals_.data(), sizeof totals);
+    slots_ = totals[0], pairs_ = totals[1];
+  }
+
+  u64 slots() const { return slots_; }   // sum of box areas
+  u64 pairs() const { return pairs_; }   // (primitive, tile) overlaps
+  span<lt_range const> ranges() const { return ranges_; }
+  span<float const> depths() const { return depths_; }
+  span<u64 const> pair_offsets() const { return pair_offsets_; }
+
+ private:
+  buffer<lt_range, E> ranges_;
+  buffer<float, E> depths_;
+  buffer<u32, E> areas_, tiles_;
+  buffer<u64, E> area_offsets_, pair_offsets_, totals_;
+  u64 slots_ = 0, pairs_ = 0;
+};
+
+}  // namespace gart

@@ -1,0 +1,39 @@
+#pragma once
+// The image cut into square tiles, row by row. The tile's side is a compile-time parameter.
+
+#include <gart/math/footprint.hpp>
+
+namespace gart {
+
+template <int Size>
+struct tile_grid {
+  static constexpr int size = Size;
+  static constexpr int pixels = Size * Size;
+  int width = 0, height = 0;
+
+  GART_HD u32 columns() const { return static_cast<u32>((width + Size - 1) / Size); }
+  GART_HD u32 rows() const { return static_cast<u32>((height + Size - 1) / Size); }
+  GART_HD u32 count() const { return columns() * rows(); }
+
+  // The pixels of a tile, cut off at the image's edge.
+  GART_HD pixel_box tile(u32 index) const {
+    u32 const x = index % columns() * Size, y = index / columns() * Size;
+    u32 const w = static_cast<u32>(width), h = static_cast<u32>(height);
+    return {static_cast<u16>(x), static_cast<u16>(y), static_cast<u16>(x + Size < w ? x + Size : w),
+            static_cast<u16>(y + Size < h ? y + Size : h)};
+  }
+};
+
+// The tiles a box of pixels overlaps, in tile coordinates.
+template <int Size>
+GART_HD constexpr pixel_box tiles_of(pixel_box const& b) {
+  if (b.empty()) return {};
+  return {static_cast<u16>(b.x0 / Size), static_cast<u16>(b.y0 / Size), static_cast<u16>((b.x1 - 1) / Size + 1),
+          static_cast<u16>((b.y1 - 1) / Size + 1)};
+}
+
+GART_HD constexpr pixel_box intersect(pixel_box const& a, pixel_box const& b) {
+  return {a.x0 > b.x0 ? a.x0 : b.x0, a.y0 > b.y0 ? a.y0 : b.y0, a.x1 < b.x1 ? a.x1 : b.x1, a.y1 < b.y1 ? a.y1 : b.y1};
+}
+
+}  // namespace gart

@@ -1,0 +1,41 @@
+#pragma once
+// Where the slot of (primitive, tile, pixel) lies in the LT buffer: primitive-major, then tile, then pixel,
+//   idx(i, t, p) = O_primitive(i) + O_tile(i, t) + O_pixel(i, t, p).
+// O_primitive is a prefix sum of box areas in 64 bits; the rest is a closed form of the box: the tiles of a box are its
+// cells cut by the grid's lines, row by row, and each holds its pixels row by row. A bijection onto [0, sum of areas).
+
+#include <gart/tiles/grid.hpp>
+
+namespace gart {
+
+// A primitive's box and where its slots begin, one 16-byte word.
+struct alignas(16) lt_range {
+  u64 offset = 0;
+  pixel_box box;
+};
+
+// Slots of the box before tile cell `cell` (the box cut by the tile): whole rows of cells above, cells to the left.
+GART_HD constexpr u32 tile_offset(pixel_box const& box, pixel_box const& cell) {
+  return (u32{cell.y0} - box.y0) * box.width() + (u32{cell.x0} - box.x0) * cell.height();
+}
+
+GART_HD constexpr u32 pixel_offset(pixel_box const& cell, u32 x, u32 y) {
+  return (y - cell.y0) * cell.width() + (x - cell.x0);
+}
+
+// The cell of the box that holds pixel (x, y), which must lie in the box.
+template <int Size>
+GART_HD constexpr pixel_box cell_of(pixel_box const& box, u32 x, u32 y) {
+  u32 const tx = x / Size * Size, ty = y / Size * Size;
+  return {static_cast<u16>(tx > box.x0 ? tx : box.x0), static_cast<u16>(ty > box.y0 ? ty : box.y0),
+          static_cast<u16>(tx + Size < box.x1 ? tx + Size : box.x1),
+          static_cast<u16>(ty + Size < box.y1 ? ty + Size : box.y1)};
+}
+
+template <int Size>
+GART_HD constexpr u64 lt_index(lt_range const& range, u32 x, u32 y) {
+  pixel_box const cell = cell_of<Size>(range.box, x, y);
+  return range.offset + tile_offset(range.box, cell) + pixel_offset(cell, x, y);
+}
+
+}  // namespace gart
