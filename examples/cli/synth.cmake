@@ -1,5 +1,5 @@
-# gart_synth: the capture that `gart synth` makes, a library of its own so that the tests can call it. Embree is optional:
-# without it the command says what to install.
+# gart_synth: the capture that `gart synth` makes, a library of its own so that the tests can call it. Embree is
+# optional: without it the command says what to install.
 if(NOT TARGET gart_synth)
   add_library(gart_synth STATIC ${CMAKE_CURRENT_LIST_DIR}/synth_capture.cpp ${CMAKE_CURRENT_LIST_DIR}/synth_scene.cpp
                                 ${CMAKE_CURRENT_LIST_DIR}/synth_trace.cpp)

@@ -1,4 +1,5 @@
 #include "commands.hpp"
+#include "help.hpp"
 #include "synth_capture.hpp"
 
 #include <unistd.h>
@@ -48,21 +49,30 @@ void add_synth(CLI::App& app, command& selected) {
   auto options = std::make_shared<synth_options>();
   auto quiet = std::make_shared<bool>(false);
   CLI::App* synth = app.add_subcommand(
-      "synth", "Make a small capture to train on, with no outside data: path traced views of textured, glossy and thin meshes.");
-  synth->add_option("--out", options->out, "Folder that the capture goes to: new, empty, or an earlier capture of synth")
+      "synth", "Make a small capture with no outside data: path traced views of textured, glossy and thin meshes.");
+  synth->add_option("--out", options->out, "Folder of the capture: new, empty, or an earlier one of synth")
       ->type_name("DIR")
       ->required();
-  synth->add_option("--train", options->train, "Views to train on, spread over the upper hemisphere")->capture_default_str();
-  synth->add_option("--test", options->test, "Views to test on, between the others")->capture_default_str();
-  synth->add_option("--size", options->size, "Width and height of a view, in pixels")->capture_default_str();
-  synth->add_option("--samples", options->samples, "Paths a pixel: noise falls with their number, time grows with it")
+  auto const count = [synth](char const* name, int& value, synth_limits limits, char const* description) {
+    synth->add_option(name, value, description)
+        ->type_name("N")
+        ->check(between(limits.low, limits.high))
+        ->capture_default_str();
+  };
+  count("--train", options->train, synth_views, "Views to train on, spread over the upper hemisphere");
+  count("--test", options->test, synth_views, "Views to test on, between the others");
+  count("--size", options->size, synth_size, "Width and height of a view, in pixels");
+  count("--samples", options->samples, synth_samples,
+        "Paths a pixel: noise falls with their number, time grows\nwith it");
+  count("--points", options->points, synth_points, "Starting points, on surfaces that the train views see");
+  count("--threads", options->threads, synth_threads, "Threads to render with; 0: all of the machine's");
+  synth
+      ->add_option(
+          "--seed", options->seed,
+          "Another seed places other leaves and draws other noise; the\nsame seed gives the same files, for any "
+          "number of threads")
+      ->type_name("N")
       ->capture_default_str();
-  synth->add_option("--points", options->points, "Starting points, on surfaces that the train views see")
-      ->capture_default_str();
-  synth->add_option("--seed", options->seed, "Another seed places other leaves and draws other noise; the same seed gives "
-                                             "the same files, for any number of threads")
-      ->capture_default_str();
-  synth->add_option("--threads", options->threads, "Threads to render with; 0: all of the machine's")->capture_default_str();
   synth->add_flag("--quiet", *quiet, "Print nothing but errors");
   synth->footer(
       "Writes DIR/transforms_train.json and DIR/transforms_test.json (Blender's layout), DIR/train/r_N.png and\n"

@@ -19,14 +19,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double angle_x = 0.69;     // horizontal field of view, radians: NeRF-Synthetic's
-constexpr double distance = 3.7;     // the scene's bounding sphere just fits the view
+constexpr double angle_x = 0.69;  // horizontal field of view, radians: NeRF-Synthetic's
+constexpr double distance = 3.7;  // the scene's bounding sphere just fits the view
 constexpr char mark[] = "\"generator\": \"gart synth\"";
 
-void check_range(char const* option, int value, int low, int high) {
-  if (value < low || value > high)
-    throw gart::invalid_argument(std::string(option) + " " + std::to_string(value) + ": give " + std::to_string(low) +
-                                 " to " + std::to_string(high));
+void check_range(char const* option, int value, synth_limits limits) {
+  if (value < limits.low || value > limits.high)
+    throw gart::invalid_argument(std::string(option) + " " + std::to_string(value) + ": give " +
+                                 std::to_string(limits.low) + " to " + std::to_string(limits.high));
 }
 
 // A folder of somebody else's is never written into: a real capture has files of the same names.
@@ -42,11 +42,14 @@ void prepare_folder(fs::path const& out) {
       text.assign(bytes.begin(), bytes.end());
     }
     if (text.find(mark) == std::string::npos && !fs::exists(out / ".gart-synth", failed))
-      throw gart::io_error(out.string(), "holds files that gart synth did not write", "give --out a new or empty folder");
+      throw gart::io_error(out.string(), "holds files that gart synth did not write",
+                           "give --out a new or empty folder");
   }
   fs::create_directories(out / "train", failed);
   if (!failed) fs::create_directories(out / "test", failed);
-  if (failed) throw gart::io_error(out.string(), "cannot be made: " + failed.message(), "give --out a folder that can be written");
+  if (failed)
+    throw gart::io_error(out.string(), "cannot be made: " + failed.message(),
+                         "give --out a folder that can be written");
   // Marks the folder as gart's own until the transforms do, so that an interrupted run can be repeated.
   gart::write_file(out / ".gart-synth", std::string_view("an unfinished capture of gart synth\n"));
   for (char const* split : {"train", "test"}) fs::remove(out / (std::string("transforms_") + split + ".json"), failed);
@@ -62,7 +65,8 @@ std::string transforms_json(std::vector<gart::camera> const& cameras, std::strin
     for (int row = 0; row < 3; ++row) {
       gart::mat3 const& r = cameras[i].rotation;
       // OpenGL's y and z are the negatives of OpenCV's.
-      std::snprintf(text, sizeof text, "[%.9g, %.9g, %.9g, %.17g], ", r[0][row], -r[1][row], -r[2][row], cameras[i].position[row]);
+      std::snprintf(text, sizeof text, "[%.9g, %.9g, %.9g, %.17g], ", r[0][row], -r[1][row], -r[2][row],
+                    cameras[i].position[row]);
       json += text;
     }
     json += "[0, 0, 0, 1]]}";
@@ -94,12 +98,13 @@ std::vector<gart::camera> synth_cameras(int count, int size, bool test) {
 }
 
 void write_synth_capture(synth_options const& options, std::function<void(int done, int total)> const& progress) {
-  check_range("--train", options.train, 1, 10000);
-  check_range("--test", options.test, 1, 10000);
-  check_range("--size", options.size, 8, 4096);
-  check_range("--samples", options.samples, 1, static_cast<int>(sample_sequence::max_samples));
-  check_range("--points", options.points, 1, 10000000);
-  check_range("--threads", options.threads, 0, 1024);
+  static_assert(synth_samples.high <= static_cast<int>(sample_sequence::max_samples));
+  check_range("--train", options.train, synth_views);
+  check_range("--test", options.test, synth_views);
+  check_range("--size", options.size, synth_size);
+  check_range("--samples", options.samples, synth_samples);
+  check_range("--points", options.points, synth_points);
+  check_range("--threads", options.threads, synth_threads);
 
   synth_renderer const renderer(make_synth_scene(options.seed), options.threads);
   prepare_folder(options.out);

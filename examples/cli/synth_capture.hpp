@@ -22,15 +22,20 @@ struct synth_options {
   int samples = 32;          // paths a pixel
   int points = 10000;
   u64 seed = 1;
-  int threads = 0;           // 0: all
+  int threads = 0;  // 0: all
 };
+
+struct synth_limits {
+  int low, high;
+};
+inline constexpr synth_limits synth_views{1, 10000}, synth_size{8, 4096}, synth_samples{1, 4096},
+    synth_points{1, 10'000'000}, synth_threads{0, 1024};
 
 // Cameras over the upper hemisphere, all looking at the origin: a Fibonacci spiral, the test views between its turns.
 std::vector<gart::camera> synth_cameras(int count, int size, bool test);
 
-// Errors: invalid_argument for an option out of its range, unsupported without Embree, io_error for a folder that cannot be
-// written or that holds something other than an earlier capture of gart's own.
-void write_synth_capture(synth_options const& options,
-                         std::function<void(int done, int total)> const& progress = {});
+// Errors: invalid_argument for an option out of its range, unsupported without Embree, io_error for a folder that
+// cannot be written or that holds something other than an earlier capture of gart's own.
+void write_synth_capture(synth_options const& options, std::function<void(int done, int total)> const& progress = {});
 
 }  // namespace gart_cli

@@ -24,8 +24,8 @@ namespace gart_cli {
 struct synth_hit {
   float t;
   u32 mesh, triangle;
-  float u, v;          // barycentric weights of the triangle's second and third vertex
-  vec3 normal;         // of the triangle, not normalised
+  float u, v;   // barycentric weights of the triangle's second and third vertex
+  vec3 normal;  // of the triangle, not normalised
 };
 
 #if defined(GART_SYNTH_EMBREE_MAJOR)
@@ -56,8 +56,8 @@ class embree_scene {
     rtcIntersect1(scene_.get(), &context, &query);
 #endif
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-    hit = {query.ray.tfar, query.hit.geomID, query.hit.primID, query.hit.u, query.hit.v,
-           vec3(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z)};
+    hit = {query.ray.tfar, query.hit.geomID, query.hit.primID,
+           query.hit.u,    query.hit.v,      vec3(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z)};
     return true;
   }
 
@@ -78,10 +78,10 @@ class embree_scene {
   void add(synth_mesh const& mesh) {
     RTCGeometry const geometry = rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
     std::size_t const triangles = mesh.index.size() / 3;
-    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), mesh.position.size()));
-    auto* indices = static_cast<u32*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                              3 * sizeof(u32), triangles));
+    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                                 3 * sizeof(float), mesh.position.size()));
+    auto* indices = static_cast<u32*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(u32), triangles));
     if (!vertices || !indices) throw gart::error("Embree has no memory for the scene's meshes");
     for (std::size_t i = 0; i < mesh.position.size(); ++i)
       for (int k = 0; k < 3; ++k) vertices[3 * i + k] = mesh.position[i][k];

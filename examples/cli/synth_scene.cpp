@@ -61,10 +61,9 @@ vec3 disc_albedo(vec3 p, vec2) {
 vec3 vase_albedo(vec3, vec2 uv) {
   vec3 const glaze(0.025f, 0.075f, 0.27f), slip(0.74f, 0.70f, 0.60f);
   float const zigzag = uv.y + 0.035f * (2 * std::abs(uv.x * 12 - std::round(uv.x * 12)) - 0.5f);
-  float const bands = std::max({1 - smooth(0.010f, 0.016f, std::abs(zigzag - 0.235f)),
-                                1 - smooth(0.010f, 0.016f, std::abs(zigzag - 0.295f)),
-                                1 - smooth(0.006f, 0.010f, std::abs(uv.y - 0.17f)),
-                                1 - smooth(0.006f, 0.010f, std::abs(uv.y - 0.36f))});
+  float const bands = std::max(
+      {1 - smooth(0.010f, 0.016f, std::abs(zigzag - 0.235f)), 1 - smooth(0.010f, 0.016f, std::abs(zigzag - 0.295f)),
+       1 - smooth(0.006f, 0.010f, std::abs(uv.y - 0.17f)), 1 - smooth(0.006f, 0.010f, std::abs(uv.y - 0.36f))});
   return mix(glaze, slip, bands);
 }
 
@@ -89,8 +88,8 @@ vec3 steel(vec3, vec2) { return {0.62f, 0.63f, 0.66f}; }
 
 using surface = std::function<vec3(float u, float v)>;
 
-// Adds the surface over [0, 1]^2 as a grid of nu x nv cells. Normals come from differences of the formula, taken a little
-// inside the border so that a pole, where one side vanishes, has one too.
+// Adds the surface over [0, 1]^2 as a grid of nu x nv cells. Normals come from differences of the formula, taken a
+// little inside the border so that a pole, where one side vanishes, has one too.
 void add_surface(synth_mesh& mesh, int nu, int nv, surface const& f) {
   u32 const first = static_cast<u32>(mesh.position.size());
   for (int j = 0; j <= nv; ++j)
@@ -126,9 +125,11 @@ surface revolution(std::vector<vec2> profile, vec3 base, bool straight = false) 
     float const s = v * static_cast<float>(profile.size() - 1);
     int const n = static_cast<int>(profile.size()), k = std::clamp(static_cast<int>(s), 0, n - 2);
     float const t = s - static_cast<float>(k);
-    vec2 const p0 = profile[std::max(k - 1, 0)], p1 = profile[k], p2 = profile[k + 1], p3 = profile[std::min(k + 2, n - 1)];
+    vec2 const p0 = profile[std::max(k - 1, 0)], p1 = profile[k], p2 = profile[k + 1],
+               p3 = profile[std::min(k + 2, n - 1)];
     vec2 p = p1 + t * (p2 - p1);
-    if (!straight) p = p1 + 0.5f * t * (p2 - p0 + t * (2.0f * p0 - 5.0f * p1 + 4.0f * p2 - p3 + t * (3.0f * (p1 - p2) + p3 - p0)));
+    if (!straight)
+      p = p1 + 0.5f * t * (p2 - p0 + t * (2.0f * p0 - 5.0f * p1 + 4.0f * p2 - p3 + t * (3.0f * (p1 - p2) + p3 - p0)));
     return base + vec3(p.x * std::cos(2 * pi * u), p.x * std::sin(2 * pi * u), p.y);
   };
 }
@@ -136,18 +137,22 @@ surface revolution(std::vector<vec2> profile, vec3 base, bool straight = false) 
 surface ball(vec3 center, float radius) {
   return [=](float u, float v) {
     float const theta = pi * v;
-    return center + radius * vec3(std::sin(theta) * std::cos(2 * pi * u), std::sin(theta) * std::sin(2 * pi * u), -std::cos(theta));
+    return center + radius * vec3(std::sin(theta) * std::cos(2 * pi * u), std::sin(theta) * std::sin(2 * pi * u),
+                                  -std::cos(theta));
   };
 }
 
 surface ring(vec3 center, float radius, float thickness, vec3 axis) {
-  vec3 const n = glm::normalize(axis), a = glm::normalize(glm::cross(n, vec3(0.31f, 0.74f, 0.59f))), b = glm::cross(n, a);
-  return tube([=](float u) { return center + radius * (std::cos(2 * pi * u) * a + std::sin(2 * pi * u) * b); }, thickness);
+  vec3 const n = glm::normalize(axis), a = glm::normalize(glm::cross(n, vec3(0.31f, 0.74f, 0.59f))),
+             b = glm::cross(n, a);
+  return tube([=](float u) { return center + radius * (std::cos(2 * pi * u) * a + std::sin(2 * pi * u) * b); },
+              thickness);
 }
 
 synth_mesh make_disc() {
   synth_mesh mesh{.material = {disc_albedo}, .point_density = 0.6f};
-  std::vector<vec2> const profile = {{0, -0.07f}, {1.06f, -0.07f}, {1.08f, -0.05f}, {1.08f, -0.018f}, {1.062f, 0}, {0.98f, 0}, {0, 0}};
+  std::vector<vec2> const profile = {{0, -0.07f}, {1.06f, -0.07f}, {1.08f, -0.05f}, {1.08f, -0.018f},
+                                     {1.062f, 0}, {0.98f, 0},      {0, 0}};
   add_surface(mesh, 128, 6, revolution(profile, {0, 0, ground}, true));
   // Straight facets: each ring of vertices would round the edge beside it, so the flat parts take the vertical normal.
   for (std::size_t i = 0; i < mesh.position.size(); ++i)
@@ -157,9 +162,10 @@ synth_mesh make_disc() {
 
 synth_mesh make_vase(vec3 base) {
   synth_mesh mesh{.material = {vase_albedo, 0.06f, 0.18f}};
-  std::vector<vec2> const profile = {{0.10f, 0.0f},   {0.155f, 0.015f}, {0.21f, 0.09f},  {0.265f, 0.20f}, {0.27f, 0.31f},
-                                     {0.215f, 0.42f}, {0.135f, 0.50f},  {0.105f, 0.57f}, {0.13f, 0.63f},  {0.155f, 0.65f},
-                                     {0.145f, 0.655f}, {0.115f, 0.625f}, {0.095f, 0.57f}, {0.12f, 0.50f},  {0.20f, 0.42f}};
+  std::vector<vec2> const profile = {{0.10f, 0.0f},   {0.155f, 0.015f}, {0.21f, 0.09f},   {0.265f, 0.20f},
+                                     {0.27f, 0.31f},  {0.215f, 0.42f},  {0.135f, 0.50f},  {0.105f, 0.57f},
+                                     {0.13f, 0.63f},  {0.155f, 0.65f},  {0.145f, 0.655f}, {0.115f, 0.625f},
+                                     {0.095f, 0.57f}, {0.12f, 0.50f},   {0.20f, 0.42f}};
   add_surface(mesh, 96, 84, revolution(profile, base));
   return mesh;
 }
@@ -174,7 +180,8 @@ synth_mesh make_leaves(vec3 base, u64 seed) {
     vec3 const out(std::cos(azimuth), std::sin(azimuth), 0), side(-out.y, out.x, 0);
     auto const spine = [=](float s) {
       float const angle = lean * 0.8f + curl * s * s;  // from the vertical, growing as the leaf bends over
-      return base + out * (0.02f + length * s * std::sin(angle) * 0.9f) + vec3(0, 0, length * s * std::cos(angle * 0.9f));
+      return base + out * (0.02f + length * s * std::sin(angle) * 0.9f) +
+             vec3(0, 0, length * s * std::cos(angle * 0.9f));
     };
     add_surface(mesh, 4, 20, [=](float u, float v) {
       float const across = 2 * u - 1, half = width * std::pow(std::max(0.0f, std::sin(pi * (0.12f + 0.88f * v))), 0.8f);
@@ -208,7 +215,8 @@ synth_mesh make_box(vec3 center, float half, float radius, float turn) {
         float const flat = half - radius;
         vec3 const inner(std::clamp(p.x, -flat, flat), std::clamp(p.y, -flat, flat), std::clamp(p.z, -flat, flat));
         p = inner + radius * glm::normalize(p - inner);
-        return center + vec3(std::cos(turn) * p.x - std::sin(turn) * p.y, std::sin(turn) * p.x + std::cos(turn) * p.y, p.z);
+        return center +
+               vec3(std::cos(turn) * p.x - std::sin(turn) * p.y, std::sin(turn) * p.x + std::cos(turn) * p.y, p.z);
       });
   return mesh;
 }
@@ -245,8 +253,9 @@ synth_scene make_synth_scene(u64 seed) {
   add_surface(rings, 144, 10, ring(globe, 0.30f, 0.010f, {-0.35f, 0.8f, 0.5f}));
   add_surface(rings, 144, 10, ring(globe, 0.33f, 0.012f, {0.25f, -0.25f, 0.95f}));
   add_surface(rings, 144, 10, ring(globe, 0.36f, 0.013f, {0.75f, -0.65f, 0.0f}));
-  add_surface(rings, 48, 12, revolution({{0.0f, 0.0f}, {0.15f, 0.0f}, {0.15f, 0.025f}, {0.05f, 0.04f}, {0.03f, 0.085f}, {0.0f, 0.09f}},
-                                        {globe.x, globe.y, ground}, true));
+  add_surface(rings, 48, 12,
+              revolution({{0.0f, 0.0f}, {0.15f, 0.0f}, {0.15f, 0.025f}, {0.05f, 0.04f}, {0.03f, 0.085f}, {0.0f, 0.09f}},
+                         {globe.x, globe.y, ground}, true));
   scene.push_back(std::move(rings));
   return scene;
 }

@@ -15,11 +15,11 @@ namespace {
 using gart::u8;
 
 constexpr float pi = std::numbers::pi_v<float>;
-constexpr float offset = 2e-4f;     // where rays leave a surface: above rounding, below the thinnest wire
-constexpr int path_vertices = 2;    // surfaces on a path
-constexpr float glow = 0.28f;       // even light that stands for the paths' further bounces
+constexpr float offset = 2e-4f;   // where rays leave a surface: above rounding, below the thinnest wire
+constexpr int path_vertices = 2;  // surfaces on a path
+constexpr float glow = 0.28f;     // even light that stands for the paths' further bounces
 constexpr float exposure = 0.88f;
-constexpr float brightest = 6.0f;   // of one sample, so that a rare highlight stays a highlight and no firefly
+constexpr float brightest = 6.0f;  // of one sample, so that a rare highlight stays a highlight and no firefly
 
 struct frame {
   vec3 x, y, z;
@@ -125,13 +125,15 @@ struct synth_renderer::implementation {
     p.material = &mesh.material;
     p.position = w * mesh.position[corner[0]] + hit.u * mesh.position[corner[1]] + hit.v * mesh.position[corner[2]];
     p.geometric = glm::normalize(hit.normal);
-    p.normal = glm::normalize(w * mesh.normal[corner[0]] + hit.u * mesh.normal[corner[1]] + hit.v * mesh.normal[corner[2]]);
+    p.normal =
+        glm::normalize(w * mesh.normal[corner[0]] + hit.u * mesh.normal[corner[1]] + hit.v * mesh.normal[corner[2]]);
     if (glm::dot(p.geometric, direction) > 0) p.geometric = -p.geometric;
     if (glm::dot(p.normal, p.geometric) < 0) p.normal = -p.normal;
     // A smooth normal that turns away from the viewer at a silhouette would shade a visible point as hidden.
     float const facing = -glm::dot(p.normal, direction);
     if (facing < 0.02f) p.normal = glm::normalize(p.normal + (0.02f - facing) * -direction);
-    p.albedo = mesh.material.albedo(p.position, w * mesh.uv[corner[0]] + hit.u * mesh.uv[corner[1]] + hit.v * mesh.uv[corner[2]]);
+    p.albedo = mesh.material.albedo(p.position,
+                                    w * mesh.uv[corner[0]] + hit.u * mesh.uv[corner[1]] + hit.v * mesh.uv[corner[2]]);
     return p;
   }
 
@@ -156,8 +158,8 @@ struct synth_renderer::implementation {
     return light.radiance * reflectance * (in.z * there * pi * light.radius * light.radius / distance2);
   }
 
-  // False where the camera's ray meets nothing. The lamp is reached by sampling the lamp alone: all lobes are wider than
-  // it, and rays that bounce pass through it.
+  // False where the camera's ray meets nothing. The lamp is reached by sampling the lamp alone: all lobes are wider
+  // than it, and rays that bounce pass through it.
   bool radiance(vec3 origin, vec3 direction, sample_sequence& random, vec3& result) const {
     vec3 weight(1.0f);
     result = vec3(0.0f);
@@ -246,7 +248,8 @@ gart::point_cloud synth_renderer::points(std::vector<gart::camera> const& camera
       vec3 const a = mesh.position[mesh.index[3 * t]];
       vec3 const n = glm::cross(mesh.position[mesh.index[3 * t + 1]] - a, mesh.position[mesh.index[3 * t + 2]] - a);
       triangles.push_back({m, t});
-      cumulative.push_back((cumulative.empty() ? 0 : cumulative.back()) + mesh.point_density * std::sqrt(glm::dot(n, n)));
+      cumulative.push_back((cumulative.empty() ? 0 : cumulative.back()) +
+                           mesh.point_density * std::sqrt(glm::dot(n, n)));
     }
   }
 
@@ -263,7 +266,8 @@ gart::point_cloud synth_renderer::points(std::vector<gart::camera> const& camera
       synth_mesh const& mesh = tracer.scene[chosen.mesh];
       u32 const* corner = &mesh.index[3 * chosen.index];
       float const root = std::sqrt(random(1)), u = root * (1 - random(2)), v = root * random(2);
-      vec3 const p = (1 - root) * mesh.position[corner[0]] + u * mesh.position[corner[1]] + v * mesh.position[corner[2]];
+      vec3 const p =
+          (1 - root) * mesh.position[corner[0]] + u * mesh.position[corner[1]] + v * mesh.position[corner[2]];
       gart::camera const& view = cameras[static_cast<std::size_t>(random(3) * static_cast<float>(cameras.size()))];
       vec3 const origin(view.position);
       float const distance = glm::length(p - origin);

@@ -1,7 +1,7 @@
 #pragma once
-// The pictures of `gart synth`: a path tracer over Embree. A camera's rays that miss leave the pixel transparent; what they
-// meet is lit by a round lamp and a soft sky, with shadows, interreflection and one glossy lobe, and averaged over the
-// pixel's samples. The result depends on scene, camera, samples and seed only, never on the number of threads.
+// The pictures of `gart synth`: a path tracer over Embree. A camera's rays that miss leave the pixel transparent; what
+// they meet is lit by a round lamp and a soft sky, with shadows, interreflection and one glossy lobe, and averaged over
+// the pixel's samples. The result depends on scene, camera, samples and seed only, never on the number of threads.
 //
 // Cost: about four rays a sample where there is something to see, one where there is not.
 

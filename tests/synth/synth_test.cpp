@@ -1,5 +1,5 @@
-// The capture of gart synth: it loads as the Blender dataset it claims to be, is the same for any number of threads, has
-// pictures with something in them, and points that lie on the scene's surfaces.
+// The capture of gart synth: it loads as the Blender dataset it claims to be, is the same for any number of threads,
+// has pictures with something in them, and points that lie on the scene's surfaces.
 #include <doctest/doctest.h>
 
 #include <gart/core/error.hpp>
@@ -35,7 +35,7 @@ bool has_embree() {
     return true;
   } catch (gart::unsupported const& missing) {
     CHECK(std::string(missing.what()).find("libembree-dev") != std::string::npos);
-    MESSAGE("skipped: " << missing.what());
+    MESSAGE("skipped: " << std::string(missing.what()));
     return false;
   }
 }
@@ -136,7 +136,8 @@ TEST_CASE("an image is the same for any number of threads, and another for anoth
   auto const one = synth_renderer(scene, 1).render(view, 4, 7), three = synth_renderer(scene, 3).render(view, 4, 7);
   CHECK(one.data == three.data);
   CHECK(one.data != synth_renderer(scene, 1).render(view, 4, 8).data);
-  auto const points = synth_renderer(scene, 1).points({view}, 300, 7), again = synth_renderer(scene, 3).points({view}, 300, 7);
+  auto const points = synth_renderer(scene, 1).points({view}, 300, 7),
+             again = synth_renderer(scene, 3).points({view}, 300, 7);
   CHECK(points.position == again.position);
   CHECK(points.color == again.color);
 }
