@@ -37,6 +37,7 @@ void add_train(CLI::App& app, command& selected);
 void add_render(CLI::App& app, command& selected);
 void add_eval(CLI::App& app, command& selected);
 void add_synth(CLI::App& app, command& selected);
+void add_bench(CLI::App& app, command& selected);
 void add_info(CLI::App& app, command& selected);
 
 }  // namespace gart_cli

@@ -91,7 +91,7 @@ class backward {
                  backward_kernels::finish{scene, gaussians_in_frame, moments_, gradients.view()});
   }
 
-  std::size_t lt_bytes() const { return slots_.size() * sizeof(entry); }
+  std::size_t lt_bytes() const { return records ? slots_.size() * sizeof(entry) : 0; }
   footprints<E, TileSize> const& prints() const { return prints_; }
 
  private:

@@ -23,6 +23,7 @@ class compiled_session final : public session {
     return exec_.profile;
   }
   std::size_t peak_bytes() const override { return exec_.memory.peak; }
+  std::size_t lt_bytes() const override { return trainer_.lt_bytes(); }
   row_info row() const override { return {E::name, Tracer::name, Strategy::name, Traits::sh_degree}; }
 
  private:

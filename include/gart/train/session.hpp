@@ -22,7 +22,7 @@ namespace gart {
 struct row_request {
   std::string backend = "auto";   // auto serial openmp cuda
   std::string tracer = "auto";    // auto bvh embree
-  std::string backward = "auto";  // auto pixel
+  std::string backward = "auto";  // auto pixel hybrid primitive
   int sh_degree = 3;
 };
 
@@ -76,6 +76,7 @@ class session {
   virtual void load(std::filesystem::path const& checkpoint) = 0;
   virtual profiler& profile() = 0;
   virtual std::size_t peak_bytes() const = 0;
+  virtual std::size_t lt_bytes() const = 0;  // of the last step; 0 where the strategy records nothing
   virtual row_info row() const = 0;
 };
 

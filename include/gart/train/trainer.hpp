@@ -55,6 +55,7 @@ class trainer {
   rendered render(camera const& view, vec3 background);
   void save(std::filesystem::path const& path) const;
   void load(std::filesystem::path const& path);
+  std::size_t lt_bytes() const { return backward_.lt_bytes(); }
   gaussians<E>& scene() { return scene_; }
   gaussians<E> const& gradients() const { return gradients_; }
 
