@@ -26,8 +26,8 @@ namespace gart {
 struct truth_view {
   u8 const* pixels = nullptr;  // [H][W][channels]
   int channels = 3;            // 3, or 4 with straight alpha: rgb * a + background * (1 - a)
-  u8 const* mask = nullptr;    // [H][W], or null; where it is 0 the image counts as equal to the truth: no loss, no
-                               // gradient, and the means still divide by all pixels
+  u8 const* mask = nullptr;    // [H][W], or null; where it is 0 the image counts as equal to the truth: no loss,
+                               // no gradient, and the means still divide by all pixels
   vec3 background{0.0f};
 };
 
@@ -59,12 +59,12 @@ struct difference_kernel {
   }
 };
 
-// Tiles of 32 x 16 pixels of one channel, with a halo of the window's radius. A lane of a device takes one pixel at a
-// time, a host's takes 16, which its compiler puts in vector registers.
+// Tiles of one channel, with a halo of the window's radius. A lane of a device takes one pixel at a time; a host's takes
+// 16, which its compiler puts in vector registers, and its tiles are wide, for long runs of memory.
 template <execution E>
 struct loss_tiles {
   static constexpr int block = E::device ? 1 : 16;
-  static constexpr int width = 32, height = 16;
+  static constexpr int width = E::device ? 32 : 96, height = 16;
   static constexpr int halo_width = width + 2 * ssim_window::radius, halo_height = height + 2 * ssim_window::radius;
   static constexpr int halo_pitch = (halo_width + block - 1) / block * block;
   static constexpr int halo_size = halo_pitch * halo_height;
@@ -90,12 +90,13 @@ struct loss_tiles {
     constexpr int blocks = halo_pitch / block;
     team.for_each(blocks * halo_height, [&](index_t item) {
       int const row = item / blocks, first = item % blocks * block, y = at.y + row - ssim_window::radius;
+      int const x = at.x + first - ssim_window::radius;
       bool const row_inside = y >= 0 && y < image.height;
-      std::ptrdiff_t const start = at.channel * image.pixels() + static_cast<std::ptrdiff_t>(y) * image.width;
-      for (int v = 0; v < block; ++v) {
-        int const x = at.x + first + v - ssim_window::radius;
-        f(row * halo_pitch + first + v, start + x, row_inside && x >= 0 && x < image.width);
-      }
+      // In pointer-sized integers, which is what lets a compiler see that neighbours are contiguous.
+      std::ptrdiff_t const begin = x < 0 ? -x : 0, end = row_inside ? image.width - x : 0;
+      std::ptrdiff_t const start = at.channel * image.pixels() + static_cast<std::ptrdiff_t>(y) * image.width + x;
+      std::ptrdiff_t const cell = row * halo_pitch + first;
+      for (std::ptrdiff_t v = 0; v < block; ++v) f(cell + v, start + v, v >= begin && v < end);
     });
   }
 
@@ -155,7 +156,7 @@ struct ssim_kernel {
     std::size_t const pixels = grid.image.pixels(), plane = at.channel * pixels;
     int const image_width = grid.image.width, image_height = grid.image.height;
 
-    grid.each_halo_cell(team, at, [&](int cell, std::ptrdiff_t i, bool inside) {
+    grid.each_halo_cell(team, at, [&](std::ptrdiff_t cell, std::ptrdiff_t i, bool inside) {
       float const truth = inside ? centred_truth[i] : -0.5f, d = inside ? difference[i] : 0.0f;
       float const value = truth + d;
       s.halo[0][cell] = truth, s.halo[1][cell] = d;
@@ -244,9 +245,13 @@ struct loss_gradient_kernel {
     std::size_t const pixels = grid.image.pixels(), plane = at.channel * pixels;
     int const image_width = grid.image.width, image_height = grid.image.height;
 
-    grid.each_halo_cell(team, at, [&](int cell, std::ptrdiff_t i, bool inside) {
-      for (int p = 0; p < 3; ++p) s.halo[p][cell] = inside ? partials[p * 3 * pixels + i] : 0.0f;
-    });
+    for (int p = 0; p < 3; ++p) {
+      float const* const from = partials + p * 3 * pixels;
+      float* const to = s.halo[p];
+      grid.each_halo_cell(team, at, [=](std::ptrdiff_t cell, std::ptrdiff_t i, bool inside) {
+        to[cell] = inside ? from[i] : 0.0f;
+      });
+    }
     team.barrier();
     tiles::template convolve_rows<3>(team, &s.halo[0][0], &s.rows[0][0]);
     team.barrier();

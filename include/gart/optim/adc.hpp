@@ -1,9 +1,9 @@
 #pragma once
-// Adaptive density control (Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023): Gaussians
-// whose image-space gradient is large on average are cloned (small ones) or split in two (large ones); transparent and
-// oversized ones are removed; opacities are reset now and then.
+// Adaptive density control (Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023):
+// Gaussians whose image-space gradient is large on average are cloned (small ones) or split in two (large ones);
+// transparent and oversized ones are removed; opacities are reset now and then.
 //
-// The statistic. 3DGS thresholds the gradient of the loss in the mean's place on the screen, in coordinates from -1 to 1.
+// The statistic. 3DGS thresholds the gradient of the loss in the mean's place on the screen, in coordinates -1 to 1.
 // Ray tracing has no such variable, but sideways motion acts through it: with the mean at (x, y, z) in the camera,
 // ndc_x = 2 (fx x / z + cx) / W - 1, so dL/dx = dL/dndc_x * 2 fx / (W z), hence
 //   dL/dndc = (dL/dx * z W / (2 fx), dL/dy * z H / (2 fy)),
@@ -11,8 +11,8 @@
 // threshold as in 3DGS. A Gaussian whose mean is behind the camera adds nothing in that step.
 //
 // Past the budget the largest statistics grow and the rest stay as they are. New Gaussians begin with zero moments.
-// Gaussians that are not finite are removed. Cost: one small launch a step; O(N) with one host read (two at the budget) a
-// densification, and a second copy of the parameters while it runs. A split moves its halves by draws from itself.
+// Gaussians that are not finite are removed. A split moves its halves by draws from itself. Cost: one small launch a
+// step; a densification is O(N) with one host read, and holds a second copy of the parameters while it runs.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>

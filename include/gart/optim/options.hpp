@@ -26,7 +26,7 @@ struct mcmc_options {
 struct adc_options {
   int from = 500, every = 100, opacity_reset_every = 3000;
   float until = 0.5f;
-  float gradient = 2e-4f;           // mean length of the gradient of a Gaussian's mean, in the image, that makes it grow
+  float gradient = 2e-4f;           // mean length of the mean's gradient in the image that makes a Gaussian grow
   float dense = 0.01f;              // times the extent: larger ones split, smaller ones are cloned
   float prune_opacity = 0.005f;
   float prune_scale = 0.1f;         // times the extent, after the first opacity reset

@@ -22,8 +22,8 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
   return rates;
 }
 
-// One degree more every `every` steps, sooner where the run is too short for that: the full degree is reached within the
-// first third of any run.
+// One degree more every `every` steps, sooner where the run is too short for that: the full degree is reached within
+// the first third of any run.
 inline int sh_degree_at(int step, int degree, int every, int steps) {
   if (degree <= 0) return 0;
   int const interval = std::max(1, std::min(every, steps / (3 * degree)));
