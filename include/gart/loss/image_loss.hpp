@@ -59,8 +59,8 @@ struct difference_kernel {
   }
 };
 
-// Tiles of one channel, with a halo of the window's radius. A lane of a device takes one pixel at a time; a host's takes
-// 16, which its compiler puts in vector registers, and its tiles are wide, for long runs of memory.
+// Tiles of one channel, with a halo of the window's radius. A lane of a device takes one pixel at a time; a host's
+// takes 16, which its compiler puts in vector registers, and its tiles are wide, for long runs of memory.
 template <execution E>
 struct loss_tiles {
   static constexpr int block = E::device ? 1 : 16;

@@ -1,7 +1,7 @@
 #pragma once
 // Densification as Markov chain Monte Carlo (Kheradmand et al., 3D Gaussian Splatting as Markov Chain Monte Carlo,
-// 2024; constants as in gsplat): dead Gaussians move onto live ones, drawn in proportion to opacity; the count grows to a
-// budget in the same way; the means take a random step every step; opacity and size carry a small penalty.
+// 2024; constants as in gsplat): dead Gaussians move onto live ones, drawn in proportion to opacity; the count grows to
+// a budget in the same way; the means take a random step every step; opacity and size carry a small penalty.
 //
 // A Gaussian of opacity o that becomes N in one place (its copies and itself; N is cut at 51) keeps what they render:
 //   o' = 1 - (1 - o)^(1/N),  scale' = scale * o / sum_{j=1..N} C(N, j) (-1)^(j-1) o'^j / sqrt(j),
