@@ -44,7 +44,7 @@ struct gather_kernel {
   float* moments_out = nullptr;
 
   template <class Team>
-  GART_KERNEL void operator()(Team const& team) const {
+  GART_HD void operator()(Team const& team) const {
     u32 const tile = team.tile();
     u32 const first = map.offsets[tile], count = map.offsets[tile + 1] - first;
     if (count == 0) return;
