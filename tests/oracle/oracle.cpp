@@ -114,8 +114,9 @@ std::vector<hit> hits_of(std::vector<prepared> const& gaussians, Vector3d const&
     hit h;
     h.t = t, h.id = static_cast<std::uint32_t>(i);
     h.alpha = std::min(alpha_max, response);
+    // t sums what alpha's p has seen cancel, with a matrix that is itself a few units off.
     h.t_slack = 1e-7 * std::abs(t) +
-                (o_error.dot(d_g.cwiseAbs()) + d_error.dot((o_g.cwiseAbs() + 2 * std::abs(t) * d_g.cwiseAbs()))) /
+                3 * (o_error.dot(d_g.cwiseAbs()) + d_error.dot(o_g.cwiseAbs() + 2 * std::abs(t) * d_g.cwiseAbs())) /
                     d_g.squaredNorm();
     h.alpha_slack = alpha_ulps + p.cwiseAbs().dot(o_error + std::abs(t) * d_error);
     h.clamps = response > alpha_max ? 8u : 0u;
@@ -195,12 +196,14 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
   list.resize(end);
   out.transmittance = transmittance;
   Vector3d behind = background;
-  double clear_behind = 1, alpha_rounding = 0;  // the latter squared: the hits' roundings are independent
+  double clear_behind = 1;
+  double alpha_rounding = 0, slope_squared = 0;  // sums of squares: the hits' roundings are independent
   for (std::size_t i = steps.size(); i-- > 0;) {
     step& s = steps[i];
     s.behind = behind, s.clear_behind = clear_behind;
     double const weight = s.transmittance * s.h.alpha;
     double const contrast = weight * (s.color - behind).cwiseAbs().maxCoeff();
+    slope_squared += contrast * contrast;
     if (s.h.marginal)
       out.rounding += contrast;
     else
@@ -214,14 +217,18 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
   out.rounding += std::sqrt(alpha_rounding);
   for (int c = 0; c < 3; ++c) out.color[c] = behind[c];
 
-  double widest = 0;
+  double widest = 0, exchanged_squared = 0;
   for (step const& s : steps) widest = std::max(widest, s.h.t_slack);
   for (std::size_t i = 0; i < steps.size(); ++i)
     for (std::size_t j = i + 1; j < steps.size() && steps[j].h.t - steps[i].h.t <= steps[i].h.t_slack + widest; ++j) {
       step const &a = steps[i], &b = steps[j];
       if (!tied(a.h, b.h)) continue;
-      out.rounding += a.transmittance * a.h.alpha * b.h.alpha * (a.color - b.color).cwiseAbs().maxCoeff();
+      double const contrast = a.transmittance * (a.color - b.color).cwiseAbs().maxCoeff();
+      double const exchanged = contrast * a.h.alpha * b.h.alpha;
+      out.rounding += exchanged;
+      exchanged_squared += 2 * exchanged * exchanged;
     }
+  out.slope_rounding = exchanged_squared > 0 ? std::sqrt(exchanged_squared / slope_squared) : 0;
   steps.erase(std::remove_if(steps.begin(), steps.end(), [](step const& s) { return !s.h.counted; }), steps.end());
   return steps;
 }

@@ -163,13 +163,13 @@ std::vector<scene> scenes(std::uint64_t seed) {
   {
     // Faint, so that the few orders which rounding decides do not show.
     builder b(rng, 1);
-    for (int i = 0; i < 2400; ++i) b.add(b.inside(1.0f), b.axes(0.3f, 1.0f), rng.uniform(-6.5f, -4.5f));
+    for (int i = 0; i < 2400; ++i) b.add(b.inside(1.0f), b.axes(0.3f, 1.0f), rng.uniform(-8.0f, -6.2f));
     scene s{"thousands on a ray", b.model, look_at(rng, {0, 0, 0}, 4.0f, 3, 3, 6.0f), options_of(rng), 1};
-    s.options.alpha_min = 5e-4f;
+    s.options.alpha_min = 1e-4f;
     s.options.transmittance_min = 0;
     all.push_back(s);
     s.name = "thousands on a ray, ended early";
-    s.options.transmittance_min = 0.02f;
+    s.options.transmittance_min = 0.3f;
     all.push_back(s);
   }
   {
