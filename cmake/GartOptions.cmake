@@ -31,7 +31,8 @@ endif()
 
 # What every compiled target of gart has and consumers do not inherit.
 add_library(gart_private_flags INTERFACE)
-target_compile_options(gart_private_flags INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra>)
+target_compile_options(gart_private_flags INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra>
+  $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-Wno-restrict>)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   if(GART_NATIVE)
     set(GART_ARCH_FLAG -march=native)

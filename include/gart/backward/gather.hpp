@@ -15,6 +15,11 @@
 
 namespace gart {
 
+// 16 bytes, moved as one.
+struct alignas(16) quad {
+  float v[4];
+};
+
 template <int ShDegree, class Terms, class Entry, int Size, execution E>
 struct gather_kernel {
   static constexpr int block_size = 64;
@@ -22,12 +27,16 @@ struct gather_kernel {
   static constexpr int sh_stride = 3 * bands;
   using grid_type = tile_grid<Size>;
 
-  // One column a pixel: lanes of a warp on neighbouring pixels read neighbouring banks.
+  // What a lane needs of a pixel: direction and (colour . gradient), gradient, SH basis. Records are an odd number of
+  // 16-byte words apart where they can be, so that lanes on neighbouring pixels read different banks.
+  struct pixel_data {
+    static constexpr int basis_quads = (bands + 3) / 4;
+    quad direction_total, gradient;
+    quad basis[basis_quads];
+    quad spread[basis_quads % 2 ? 0 : 1];
+  };
   struct scratch {
-    float direction[3][grid_type::pixels];
-    float gradient[3][grid_type::pixels];
-    float total[grid_type::pixels];  // colour of the pixel, background included, . gradient
-    float basis[bands][grid_type::pixels];
+    pixel_data pixels[grid_type::pixels];
   };
 
   camera view;
@@ -50,76 +59,102 @@ struct gather_kernel {
     if (count == 0) return;
     pixel_box const area = grid.tile(tile);
     scratch& s = team.scratch();
-    team.for_each(area.area(), [&](index_t p) { load_pixel(s, area, p); });
+    team.for_each(area.area(), [&](index_t p) { load_pixel(s.pixels[p], area, p); });
     team.barrier();
     team.for_each(count, [&](index_t k) { gather(s, area, map.primitives[first + k]); });
     team.barrier();
   }
 
  private:
-  GART_HD void load_pixel(scratch& s, pixel_box const& area, index_t p) const {
+  GART_HD void load_pixel(pixel_data& out, pixel_box const& area, index_t p) const {
     pixel const at{static_cast<int>(area.x0 + p % area.width()), static_cast<int>(area.y0 + p / area.width())};
     std::size_t const a = 3 * (static_cast<std::size_t>(at.y) * view.width + at.x);
     vec3 const d = pixel_ray(view, at).direction;
     sh_basis<ShDegree> const basis(d);
-    float total = 0;
-    for (int c = 0; c < 3; ++c) {
-      s.direction[c][p] = d[c];
-      s.gradient[c][p] = color_gradient[a + c];
-      total += color[a + c] * color_gradient[a + c];
-    }
-    s.total[p] = total;
+    vec3 const c(color[a], color[a + 1], color[a + 2]);
+    vec3 const g(color_gradient[a], color_gradient[a + 1], color_gradient[a + 2]);
+    out.direction_total = {{d.x, d.y, d.z, c.x * g.x + c.y * g.y + c.z * g.z}};
+    out.gradient = {{g.x, g.y, g.z, 0}};
     GART_UNROLL
-    for (int k = 0; k < bands; ++k) s.basis[k][p] = basis.y[k];
+    for (int k = 0; k < 4 * pixel_data::basis_quads; ++k) out.basis[k / 4].v[k % 4] = k < bands ? basis.y[k] : 0.0f;
   }
 
-  GART_KERNEL void gather(scratch const& s, pixel_box const& area, u32 id) const {
+  // The coefficients in use; those above the active degree as zero, so that the loops over bands are straight.
+  GART_HD void load_coefficients(float (&c)[sh_stride], u32 id) const {
+    float const* from = sh + static_cast<std::size_t>(sh_stride) * id;
+    int const active = 3 * sh_coefficients(active_degree);
+    if constexpr (sh_stride % 4 == 0) {
+      GART_UNROLL
+      for (int k = 0; k < sh_stride; k += 4) {
+        quad q{};
+        if (k < active) q = *reinterpret_cast<quad const*>(from + k);
+        GART_UNROLL
+        for (int i = 0; i < 4; ++i) c[k + i] = k + i < active ? q.v[i] : 0.0f;
+      }
+    } else {
+      GART_UNROLL
+      for (int k = 0; k < sh_stride; ++k) c[k] = k < active ? from[k] : 0.0f;
+    }
+  }
+
+  GART_HD void gather(scratch const& s, pixel_box const& area, u32 id) const {
     lt_range const range = ranges[id];
     pixel_box const cell = intersect(range.box, area);
     Entry const* slot = slots + range.offset + tile_offset(range.box, cell);
     ray_gaussian const g = records[id];
-    float const* coefficients = sh + static_cast<std::size_t>(sh_stride) * id;
-    int const active = sh_coefficients(active_degree);
+    float coefficients[sh_stride];
+    load_coefficients(coefficients, id);
     float sh_sum[sh_stride] = {};
     float moment_sum[moment_stride] = {};
-    for (u32 y = cell.y0; y < cell.y1; ++y)
-      for (u32 x = cell.x0; x < cell.x1; ++x, ++slot) {
-        Entry const entry = *slot;
-        float const before = transmittance_of(entry);
-        if (!written(before)) continue;
-        u32 const p = (y - area.y0) * area.width() + (x - area.x0);
-        response const r = evaluate(g, primary_ray{{s.direction[0][p], s.direction[1][p], s.direction[2][p]}});
-        float const alpha = hit_alpha(g, r), weight = before * alpha;
-        vec3 c(0.5f);
+    u32 const width = cell.width(), slots_here = cell.area();
+    u32 const skip = area.width() - width;
+    u32 p = (cell.y0 - area.y0) * area.width() + (cell.x0 - area.x0);
+    u32 column = 0;
+    for (u32 k = 0; k < slots_here; ++k) {
+      Entry const entry = slot[k];
+      pixel_data const& at = s.pixels[p];
+      ++p;
+      if (++column == width) column = 0, p += skip;
+      float const before = transmittance_of(entry);
+      if (!written(before)) continue;
+      quad const direction_total = at.direction_total, pixel_gradient = at.gradient;
+      response const r = evaluate(g, primary_ray{{direction_total.v[0], direction_total.v[1], direction_total.v[2]}});
+      float const alpha = hit_alpha(g, r), weight = before * alpha;
+      float basis[4 * pixel_data::basis_quads];
+      GART_UNROLL
+      for (int q = 0; q < pixel_data::basis_quads; ++q) {
+        quad const four = at.basis[q];
         GART_UNROLL
-        for (int k = 0; k < bands; ++k) {
-          if (k == active) break;
-          float const basis = s.basis[k][p];
-          for (int i = 0; i < 3; ++i) c[i] += basis * coefficients[3 * k + i];
-        }
-        vec3 const pixel_gradient(s.gradient[0][p], s.gradient[1][p], s.gradient[2][p]);
-        if constexpr (Terms::color) {
-          vec3 const cg = color_gradient_of(c, pixel_gradient, weight);
-          GART_UNROLL
-          for (int k = 0; k < bands; ++k) {
-            if (k == active) break;
-            float const basis = s.basis[k][p];
-            sh_sum[3 * k] += basis * cg.x;
-            sh_sum[3 * k + 1] += basis * cg.y;
-            sh_sum[3 * k + 2] += basis * cg.z;
-          }
-        }
-        if constexpr (Terms::geometry) {
-          vec3 const seen = clamped_color(c);
-          float const color_g = seen.x * pixel_gradient.x + seen.y * pixel_gradient.y + seen.z * pixel_gradient.z;
-          float const behind = s.total[p] - (entry.r * pixel_gradient.x + entry.g * pixel_gradient.y + entry.b * pixel_gradient.z);
-          moments const m = hit_moments(g, r, alpha_gradient(before, color_g, behind, alpha));
-          GART_UNROLL
-          for (int i = 0; i < moment_count; ++i) moment_sum[i] += m.v[i];
+        for (int i = 0; i < 4; ++i) basis[4 * q + i] = four.v[i];
+      }
+      vec3 c(0.5f);
+      GART_UNROLL
+      for (int b = 0; b < bands; ++b) {
+        c.x += basis[b] * coefficients[3 * b];
+        c.y += basis[b] * coefficients[3 * b + 1];
+        c.z += basis[b] * coefficients[3 * b + 2];
+      }
+      vec3 const dl(pixel_gradient.v[0], pixel_gradient.v[1], pixel_gradient.v[2]);
+      if constexpr (Terms::color) {
+        vec3 const cg = color_gradient_of(c, dl, weight);
+        GART_UNROLL
+        for (int b = 0; b < bands; ++b) {
+          sh_sum[3 * b] += basis[b] * cg.x;
+          sh_sum[3 * b + 1] += basis[b] * cg.y;
+          sh_sum[3 * b + 2] += basis[b] * cg.z;
         }
       }
+      if constexpr (Terms::geometry) {
+        vec3 const seen = clamped_color(c);
+        float const color_g = seen.x * dl.x + seen.y * dl.y + seen.z * dl.z;
+        float const behind = direction_total.v[3] - (entry.r * dl.x + entry.g * dl.y + entry.b * dl.z);
+        moments const m = hit_moments(g, r, alpha_gradient(before, color_g, behind, alpha));
+        GART_UNROLL
+        for (int i = 0; i < moment_count; ++i) moment_sum[i] += m.v[i];
+      }
+    }
     if constexpr (Terms::color)
-      E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id, sh_sum, 3 * active);
+      E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id, sh_sum, 3 * sh_coefficients(active_degree));
     if constexpr (Terms::geometry)
       E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, moment_sum, moment_count);
   }
