@@ -11,4 +11,5 @@ bool device_available(std::string* reason) { return !gart::cuda_devices(reason).
 GART_REGISTER_ROWS(gart_cuda_rows,
                    gart::register_rows<gart::cuda_exec, tracer, gart::pixel_strategy>(20, device_available);
                    gart::register_rows<gart::cuda_exec, tracer, gart::hybrid_strategy>(21, device_available);
-                   gart::register_rows<gart::cuda_exec, tracer, gart::primitive_strategy>(22, device_available))
+                   gart::register_rows<gart::cuda_exec, tracer, gart::primitive_strategy>(23, device_available);
+                   gart::register_rows<gart::cuda_exec, tracer, gart::deterministic_strategy>(22, device_available))

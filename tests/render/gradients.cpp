@@ -75,7 +75,7 @@ TEST_CASE_TEMPLATE("gradients agree with the oracle", E, GART_TEST_POLICIES) {
     for (auto kind : tracers<E>()) {
       bool const embree = kind == tracer_kind::embree;
       CAPTURE(embree);
-      for (std::string const strategy : {"pixel", "hybrid", "primitive"}) {
+      for (std::string const strategy : {"pixel", "hybrid", "primitive", "deterministic"}) {
         CAPTURE(strategy);
         auto const got =
             scene_gradients(exec, s.model, s.view, s.options, s.active_degree, kind, strategy, w.color_gradient);

@@ -137,6 +137,8 @@ gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model,
     return gradients_by<gart::hybrid_strategy>(exec, model, view, options, active_degree, kind, color_gradient);
   if (strategy == "primitive")
     return gradients_by<gart::primitive_strategy>(exec, model, view, options, active_degree, kind, color_gradient);
+  if (strategy == "deterministic")
+    return gradients_by<gart::deterministic_strategy>(exec, model, view, options, active_degree, kind, color_gradient);
   throw std::runtime_error("no such strategy: " + strategy);
 }
 

@@ -43,8 +43,9 @@ class backward {
  public:
   using record_type = typename Strategy::template record<TileSize>;
   static constexpr bool records = Strategy::gather::any;
+  static constexpr bool ordered = records && Strategy::ordered;
 
-  explicit backward(E& exec) : moments_(exec), prints_(exec), map_(exec), slots_(exec) {}
+  explicit backward(E& exec) : moments_(exec), prints_(exec), map_(exec), slots_(exec), rows_(exec) {}
 
   void prepare(E& exec, gaussians_view<float const> scene, camera const& view, float alpha_min, float near) {
     if constexpr (records) {
@@ -69,16 +70,24 @@ class backward {
            span<float const> color_gradient, gaussians<E>& gradients) {
     stage_scope stage(exec, "backward");
     moments_.resize(std::size_t{moment_stride} * scene.count);
-    moments_.zero();
-    gradients.sh.zero();
+    // The ordered sums write every Gaussian themselves.
+    if constexpr (!ordered || Strategy::scatter::any) moments_.zero();
+    if constexpr (!ordered) gradients.sh.zero();
     if constexpr (records) {
       tile_grid<TileSize> const grid{view.width, view.height};
       map_.build(exec, grid, prints_);
-      gather_kernel<ShDegree, typename Strategy::gather, entry, TileSize, E> const kernel{
+      constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
+      if constexpr (ordered) rows_.resize(prints_.pairs() * pair_row<ShDegree>::quads);
+      gather_kernel<ShDegree, typename Strategy::gather, entry, TileSize, sums, E> const kernel{
           view,          grid,         map_.view(),  prints_.ranges().data(), slots_.data(),
           gaussians_in_frame.data(),   scene.sh,     active_degree,           color.data(),
-          color_gradient.data(),       gradients.sh.data(), moments_.data()};
+          color_gradient.data(),       gradients.sh.data(), moments_.data(),
+          prints_.pair_offsets().data(),             rows_.data()};
       parallel_for(exec, "backward/gather", tile_range{grid.count(), 64}, kernel);
+      if constexpr (ordered)
+        parallel_for(exec, "backward/sum", scene.count * pair_row<ShDegree>::quads,
+                     sum_pairs<ShDegree, typename Strategy::gather>{prints_.pair_offsets(), prints_.pairs(), rows_.data(),
+                                                                    gradients.sh.data(), moments_.data()});
     }
     if constexpr (Strategy::scatter::any) {
       pixel_order const order{view.width, view.height};
@@ -110,6 +119,7 @@ class backward {
   footprints<E, TileSize> prints_;
   tile_map<E, TileSize> map_;
   buffer<entry, E> slots_;
+  buffer<quad, E> rows_;
 };
 
 }  // namespace gart

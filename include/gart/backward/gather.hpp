@@ -20,7 +20,18 @@ struct alignas(16) quad {
   float v[4];
 };
 
-template <int ShDegree, class Terms, class Entry, int Size, execution E>
+// Where a lane's sums go: added to the Gaussian atomically, or kept as one row a (primitive, tile) pair, in primitive-major
+// order, for sum_pairs to add up in that order: the same bits in every run.
+enum class gather_sums { atomic, ordered };
+
+// A row of the ordered sums: SH gradient, padded to quads, then moments.
+template <int ShDegree>
+struct pair_row {
+  static constexpr int sh_quads = (3 * sh_basis<ShDegree>::size + 3) / 4;
+  static constexpr int quads = sh_quads + moment_stride / 4;
+};
+
+template <int ShDegree, class Terms, class Entry, int Size, gather_sums Sums, execution E>
 struct gather_kernel {
   static constexpr int block_size = 64;
   static constexpr int bands = sh_basis<ShDegree>::size;
@@ -49,8 +60,10 @@ struct gather_kernel {
   int active_degree = ShDegree;
   float const* color = nullptr;           // [H][W][3]
   float const* color_gradient = nullptr;  // [H][W][3]
-  float* sh_gradient = nullptr;
-  float* moments_out = nullptr;
+  float* sh_gradient = nullptr;              // atomic: [N][K][3]
+  float* moments_out = nullptr;              // atomic: [N][moment_stride]
+  u64 const* pair_offsets = nullptr;         // ordered: first row of each primitive
+  quad* rows = nullptr;                      // ordered: [pairs][pair_row::quads]
 
   template <class Team>
   GART_HD void operator()(Team const& team) const {
@@ -153,10 +166,66 @@ struct gather_kernel {
         for (int i = 0; i < moment_count; ++i) moment_sum[i] += m.v[i];
       }
     }
-    if constexpr (Terms::color)
-      E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id, sh_sum, 3 * sh_coefficients(active_degree));
-    if constexpr (Terms::geometry)
-      E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, moment_sum, moment_count);
+    if constexpr (Sums == gather_sums::atomic) {
+      if constexpr (Terms::color)
+        E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id, sh_sum, 3 * sh_coefficients(active_degree));
+      if constexpr (Terms::geometry)
+        E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, moment_sum, moment_count);
+    } else {
+      store_row(range.box, area, id, sh_sum, moment_sum);
+    }
+  }
+
+  GART_HD void store_row(pixel_box const& box, pixel_box const& area, u32 id, float const (&sh_sum)[sh_stride],
+                         float const (&moment_sum)[moment_stride]) const {
+    using row = pair_row<ShDegree>;
+    pixel_box const tiles = tiles_of<Size>(box);
+    u64 const pair = pair_offsets[id] + (area.y0 / Size - tiles.y0) * tiles.width() + (area.x0 / Size - tiles.x0);
+    quad* const out = rows + pair * row::quads;
+    if constexpr (Terms::color) {
+      int const active = 3 * sh_coefficients(active_degree);
+      GART_UNROLL
+      for (int q = 0; q < row::sh_quads; ++q) {
+        quad four{};
+        GART_UNROLL
+        for (int i = 0; i < 4; ++i) four.v[i] = 4 * q + i < sh_stride && 4 * q + i < active ? sh_sum[4 * q + i] : 0.0f;
+        out[q] = four;
+      }
+    }
+    if constexpr (Terms::geometry) {
+      GART_UNROLL
+      for (int q = 0; q < moment_stride / 4; ++q)
+        out[row::sh_quads + q] = {{moment_sum[4 * q], moment_sum[4 * q + 1], moment_sum[4 * q + 2], moment_sum[4 * q + 3]}};
+    }
+  }
+};
+
+// The ordered sums: quad q of primitive i over its rows, in order. One index a quad, quads of a primitive together.
+template <int ShDegree, class Terms>
+struct sum_pairs {
+  using row = pair_row<ShDegree>;
+  span<u64 const> pair_offsets;
+  u64 pairs;
+  quad const* rows;
+  float* sh_gradient;
+  float* moments_out;
+  GART_KERNEL void operator()(index_t index) const {
+    index_t const i = index / row::quads, q = index % row::quads;
+    bool const is_color = q < row::sh_quads;
+    if (is_color ? !Terms::color : !Terms::geometry) return;
+    u64 const last = i + 1 < pair_offsets.size() ? pair_offsets[i + 1] : pairs;
+    quad sum{};
+    for (u64 pair = pair_offsets[i]; pair < last; ++pair) {
+      quad const four = rows[pair * row::quads + q];
+      for (int k = 0; k < 4; ++k) sum.v[k] += four.v[k];
+    }
+    constexpr int sh_stride = 3 * sh_basis<ShDegree>::size;
+    for (int k = 0; k < 4; ++k) {
+      if (!is_color)
+        moments_out[static_cast<std::size_t>(moment_stride) * i + 4 * (q - row::sh_quads) + k] = sum.v[k];
+      else if (static_cast<int>(4 * q) + k < sh_stride)
+        sh_gradient[static_cast<std::size_t>(sh_stride) * i + 4 * q + k] = sum.v[k];
+    }
   }
 };
 

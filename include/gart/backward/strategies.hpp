@@ -10,6 +10,7 @@ namespace gart {
 // Nothing recorded; every ray is traced again and scatters.
 struct pixel_strategy {
   static constexpr char const* name = "pixel";
+  static constexpr bool ordered = false;  // sums in a fixed order: the same bits in every run
   template <int Size>
   using record = record_none;
   using gather = terms<>;
@@ -19,6 +20,7 @@ struct pixel_strategy {
 // One channel: the colour gradient of a hit needs only its weight. Geometry by pixel.
 struct hybrid_strategy {
   static constexpr char const* name = "hybrid";
+  static constexpr bool ordered = false;
   template <int Size>
   using record = record_lt<float, Size>;
   using gather = terms<color>;
@@ -28,10 +30,17 @@ struct hybrid_strategy {
 // Four channels; no ray is traced twice.
 struct primitive_strategy {
   static constexpr char const* name = "primitive";
+  static constexpr bool ordered = false;
   template <int Size>
   using record = record_lt<lt_entry, Size>;
   using gather = terms<color, geometry>;
   using scatter = terms<>;
+};
+
+// The primitive strategy with its sums in a fixed order.
+struct deterministic_strategy : primitive_strategy {
+  static constexpr char const* name = "deterministic";
+  static constexpr bool ordered = true;
 };
 
 }  // namespace gart
