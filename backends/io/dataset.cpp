@@ -99,7 +99,7 @@ void make_file_names(std::vector<std::string*> const& names) {
           std::isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '-' || c == '_' || static_cast<u8>(c) >= 0x80;
       if (!fit) c = '_';
     }
-    if (flat.empty() || flat[0] == '.') flat = "view" + flat;
+    if (flat.empty() || flat[0] == '.') flat.insert(0, "view");
     // NAME_truth is the true picture beside a render.
     std::string unique = flat;
     for (int n = 2; taken.count(unique) || taken.count(unique + "_truth"); ++n) unique = flat + "_" + std::to_string(n);

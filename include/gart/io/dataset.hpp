@@ -1,10 +1,13 @@
 #pragma once
-// A capture in host memory: views with cameras and 8-bit images, a split, and starting points where the files have them.
+// A capture in host memory: views with cameras and 8-bit images, a split, starting points where the files have them.
 //
-// load_dataset recognises, in a folder or by the file named: COLMAP (sparse/0 or sparse, .bin before .txt), Blender
-// (transforms_train.json and transforms_test.json), nerfstudio / instant-ngp (transforms.json). Images are decoded in
-// parallel and kept as 8 bits. Errors: io_error naming the file, the field and the remedy; unsupported for a camera
-// model that gart does not trace, by its name.
+// load_dataset recognises, in a folder or by the file named: COLMAP (sparse/0, sparse or the folder itself, .bin before
+// .txt; photos in images/), Blender (transforms_train.json and transforms_test.json, points3d.ply where it is there),
+// nerfstudio / instant-ngp (transforms.json). A folder that holds COLMAP and transforms.json is read as COLMAP. Images
+// are decoded in parallel and kept as 8 bits: width * height * channels bytes each. Frames without a photo, points in a
+// camera's centre and points that are not finite are left out, with a note. Errors: io_error naming the file, the field
+// and the remedy; unsupported for a camera model that gart does not trace, by its name; invalid_argument for an option
+// out of its range.
 
 #include <gart/scene/camera.hpp>
 #include <gart/scene/image.hpp>
@@ -32,7 +35,7 @@ struct point_cloud {
 struct dataset {
   std::string format;               // "COLMAP", "Blender", "nerfstudio"
   std::string split;                // how train and test were told apart, in words
-  std::string resize_filter;        // "none", or "box (integer factor)"
+  std::string resize_filter;        // "none", or "box (1/4)"
   std::vector<dataset_view> train, test;
   point_cloud points;               // empty: start at random
   std::vector<std::string> notes;   // one line each: what was skipped, scaled or assumed
@@ -43,9 +46,10 @@ struct dataset {
 };
 
 struct dataset_options {
-  int downscale = 1;     // integer factor, box filter
-  int test_every = 8;    // 0: no test views; ignored where the files have their own split
-  bool load_images = true;
+  int downscale = 1;        // integer factor, box filter; a partial last block of pixels is cropped, from cameras too
+  int test_every = 8;       // 0: no test views; ignored where the files have their own split
+  bool load_images = true;  // false: cameras alone, for which photos may all be absent if the files state sizes
+  // Called from the loading threads, one at a time.
   std::function<void(std::size_t done, std::size_t total)> progress;
 };
 

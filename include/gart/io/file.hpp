@@ -1,6 +1,6 @@
 #pragma once
-// Files written whole or not at all: to a temporary name beside the target, flushed, then renamed. A full disk, a folder
-// that is not there or not writable is an io_error naming the target, and leaves nothing half-written.
+// Files written whole or not at all: to a temporary name beside the target, flushed to the disk, then renamed. A full
+// disk, a folder that is not there or not writable is an io_error naming the target, and leaves nothing half-written.
 
 #include <gart/core/types.hpp>
 

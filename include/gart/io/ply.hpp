@@ -5,8 +5,9 @@
 // for byte, read by name in any order, ascii or binary of either endianness, without normals and with extra properties.
 // gart's own traits travel as header comments ("comment gart kernel_degree 2").
 //
-// Errors: io_error naming the file, the property and the remedy, for a truncated body, a missing property, a 2D Gaussian
-// file (no scale_2), or a NaN or infinite value (with its vertex and property).
+// Errors: io_error naming the file, the property and the remedy, for a truncated body, a missing property, a count of
+// f_rest that is no degree from 0 to 3, a 2D Gaussian file (no scale_2), a NaN or infinite value (with its vertex and
+// property), or a rotation that is all zero; invalid_argument for a model whose arrays disagree in size.
 
 #include <gart/io/dataset.hpp>
 #include <gart/scene/gaussians.hpp>
