@@ -114,6 +114,10 @@ std::vector<scene> scenes(std::uint64_t seed) {
   all.push_back(cloud(rng, "cloud, degree 1 of 3 active", 3, 1, {0, 0, 0}));
   all.push_back(cloud(rng, "cloud far from the origin", 2, 2, {1000.0, -400.0, 250.0}));
 
+  // The hit that ends a ray carries much of its colour.
+  all.push_back(cloud(rng, "cloud, rays ended at half", 3, 3, {0, 0, 0}));
+  all.back().options.transmittance_min = 0.5f;
+
   {
     scene s = cloud(rng, "cloud through an OPENCV lens", 3, 3, {0, 0, 0});
     s.view.lens = {-0.12f, 0.03f, 0.004f, -0.003f};
