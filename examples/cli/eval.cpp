@@ -37,7 +37,8 @@ int run_eval(eval_arguments const& a) {
   load.test_every = a.test_every;
   gart::dataset const data = gart::load_dataset(a.dataset, load);
   if (data.test.empty()) {
-    throw gart::io_error(a.dataset.string(), "has no test views (" + data.split + ")", "--test-every 8 keeps each 8th view");
+    throw gart::io_error(a.dataset.string(), "has no test views (" + data.split + ")",
+                         "--test-every 8 keeps each 8th view");
   }
   std::string const background = resolve_background(a.background, data.alpha);
   gart::render_options options = file.render;
@@ -81,7 +82,8 @@ void add_eval(CLI::App& app, command& selected) {
   eval->add_option("MODEL.ply", a->model, "Gaussians, from gart or another program")->type_name("")->required();
   eval->add_option("DATASET", a->dataset, "The capture, as gart train reads it")->type_name("")->required();
   eval->add_option("--out", a->out, "Where the scores go")->type_name("METRICS.json")->required();
-  eval->add_option("--renders", a->renders, "Also keep NAME.png and NAME_truth.png of each view here")->type_name("DIR");
+  eval->add_option("--renders", a->renders, "Also keep NAME.png and NAME_truth.png of each view here")
+      ->type_name("DIR");
   eval->add_option("--background", a->background, "white or black; auto: white for images with alpha, else black")
       ->type_name("NAME")
       ->capture_default_str()
@@ -97,7 +99,8 @@ void add_eval(CLI::App& app, command& selected) {
   eval->add_flag("--quiet", a->quiet, "Say nothing but errors");
   add_row_options(*eval, a->row);
   eval->footer(
-      "\nWrites METRICS.json: psnr (dB) and ssim, their means over the test views and each view's, and how they were taken.\n"
+      "\nWrites METRICS.json: psnr (dB) and ssim, their means over the test views and each view's, and how they were "
+      "taken.\n"
       "\nExamples:\n"
       "  gart eval run/model.ply lego --out metrics.json\n"
       "  gart eval other.ply garden --downscale 4 --out scores.json --renders images");

@@ -57,8 +57,9 @@ scores evaluate(std::vector<gart::dataset_view> const& views, gart::vec3 backgro
 
     gart::image_float const truth = composited(view.image, background);
     if (image.data.size() != truth.data.size()) {
-      throw gart::error(view.name + ": rendered at " + std::to_string(image.width) + " x " + std::to_string(image.height) +
-                        ", but its photograph has " + std::to_string(truth.width) + " x " + std::to_string(truth.height));
+      throw gart::error(view.name + ": rendered at " + std::to_string(image.width) + " x " +
+                        std::to_string(image.height) + ", but its photograph has " + std::to_string(truth.width) +
+                        " x " + std::to_string(truth.height));
     }
     gart::image_float scored = image;
     double const share = apply_mask(view.mask, truth, scored);

@@ -51,7 +51,8 @@ inline CLI::Validator between(double low, double high) {
         double value = 0;
         if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
         auto const show = [](double v) {
-          std::string s = v == static_cast<long long>(v) ? std::to_string(static_cast<long long>(v)) : std::to_string(v);
+          std::string s =
+              v == static_cast<long long>(v) ? std::to_string(static_cast<long long>(v)) : std::to_string(v);
           return s;
         };
         return "'" + text + "' is not a number from " + show(low) + " to " + show(high);

@@ -1,6 +1,6 @@
 #pragma once
-// The course of a training run, for the curves of its report: a few hundred points whatever the number of steps, kept in
-// history.json beside the checkpoint so that a resumed run has the whole curve.
+// The course of a training run, for the curves of its report: a few hundred points whatever the number of steps, kept
+// in history.json beside the checkpoint so that a resumed run has the whole curve.
 
 #include <gart/train/session.hpp>
 
@@ -24,7 +24,7 @@ class history {
   std::vector<test_point> test;
   double seconds = 0;  // of training, evaluation and saving left out
 
-  explicit history(int iterations) : spacing_(iterations > 400 ? iterations / 400 : 1) {}
+  explicit history(int iterations) : spacing_(iterations > 200 ? iterations / 200 : 1) {}
   void add(gart::step_report const& report);
   // Ends the mean that is being formed, so that nothing is lost by stopping here.
   void close_point();

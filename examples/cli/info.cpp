@@ -61,7 +61,8 @@ int run_info() {
 void add_info(CLI::App& app, command& selected) {
   CLI::App* info = app.add_subcommand("info", "Say what this build and this machine can do.");
   info->footer(
-      "\nPrints the version, the devices found, and the rows that were compiled: which backend, tracer and backward pass\n"
+      "\nPrints the version, the devices found, and the rows that were compiled: which backend, tracer and backward "
+      "pass\n"
       "go together, for which degrees of spherical harmonics. Writes nothing.\n"
       "\nExamples:\n"
       "  gart info\n"

@@ -31,7 +31,8 @@ int main(int argc, char** argv) {
       "  gart synth --out capture                 a small capture to try things on\n"
       "  gart train capture --out run             train on it; run/report.html shows how it went\n"
       "  gart train --help                        every option of a command\n"
-      "\nExit codes: 0 done, 1 failed, 2 the command line is wrong, 130 stopped by Ctrl-C or SIGTERM (train: saved, resumable).");
+      "\nExit codes: 0 done, 1 failed, 2 the command line is wrong, 130 stopped by Ctrl-C or SIGTERM (train: saved, "
+      "resumable).");
   command selected;
   add_train(app, selected);
   add_render(app, selected);

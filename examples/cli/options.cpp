@@ -27,18 +27,20 @@ void recorded_options::continue_from(nlohmann::json const& saved, std::filesyste
     try {
       e.set(saved[e.name]);
     } catch (nlohmann::json::exception const&) {
-      throw gart::io_error(file.string(), "option \"" + e.name + "\" is not of its type", "start anew without --resume");
+      throw gart::io_error(file.string(), "option \"" + e.name + "\" is not of its type",
+                           "start anew without --resume");
     }
     if (e.option->count() > 0 && given != e.get()) {
-      throw usage_error("--" + e.name + " " + given.dump() + ": the run to be resumed has " + e.get().dump() +
-                        " in " + file.string() + " (leave the option out to continue that run, or start another from its "
+      throw usage_error("--" + e.name + " " + given.dump() + ": the run to be resumed has " + e.get().dump() + " in " +
+                        file.string() +
+                        " (leave the option out to continue that run, or start another from its "
                         "Gaussians with --start MODEL.ply and another --out)");
     }
   }
 }
 
 CLI::Validator backend_names() { return one_of({"auto", "serial", "openmp", "cuda"}); }
-CLI::Validator tracer_names() { return one_of({"auto", "bvh", "embree"}); }
+CLI::Validator tracer_names() { return one_of({"auto", "bvh", "embree", "tiles"}); }
 
 void add_threads(CLI::App& app, int& threads) {
   app.add_option("--threads", threads, "Threads of the openmp backend, 0: all cores")
@@ -48,11 +50,13 @@ void add_threads(CLI::App& app, int& threads) {
 }
 
 void add_row_options(CLI::App& app, row_options& options) {
-  app.add_option("--backend", options.request.backend, "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is")
+  app.add_option("--backend", options.request.backend,
+                 "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(backend_names());
-  app.add_option("--tracer", options.request.tracer, "What finds the hits: bvh, or embree (CPU);\nthe images are the same")
+  app.add_option("--tracer", options.request.tracer,
+                 "What finds the hits: bvh, or embree (CPU);\nthe images are the same")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(tracer_names());

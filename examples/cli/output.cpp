@@ -13,7 +13,8 @@ void prepare_folder(fs::path const& folder) {
   std::error_code failure;
   fs::create_directories(folder, failure);
   if (failure || !fs::is_directory(folder)) {
-    throw gart::io_error(folder.string(), "cannot be made a folder: " + (failure ? failure.message() : "a file is there"),
+    throw gart::io_error(folder.string(),
+                         "cannot be made a folder: " + (failure ? failure.message() : "a file is there"),
                          "choose another --out");
   }
   fs::path const probe = folder / (".gart_probe_" + std::to_string(getpid()));

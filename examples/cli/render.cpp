@@ -48,7 +48,8 @@ depth_picture picture_depth(gart::rendered const& r) {
   if (farthest == 0) return result;
   float const range = std::max(farthest - nearest, 1e-6f * farthest);
   for (std::size_t p = 0; p < mean.size(); ++p) {
-    if (mean[p] >= 0) result.image.data[p] = static_cast<gart::u8>(std::lround(255 - 215 * (mean[p] - nearest) / range));
+    if (mean[p] >= 0)
+      result.image.data[p] = static_cast<gart::u8>(std::lround(255 - 215 * (mean[p] - nearest) / range));
   }
   result.nearest = nearest, result.farthest = farthest;
   return result;
@@ -73,14 +74,18 @@ int run_render(render_arguments const& a) {
 
   progress say(a.quiet);
   auto const row = renderer->row();
-  nlohmann::json timings = {{"backend", row.backend}, {"tracer", row.tracer}, {"gaussians", file.model.size()},
-                            {"approximations", {{"alpha_min", options.alpha_min}, {"t_min", options.transmittance_min}}},
-                            {"views", nlohmann::json::array()}};
+  nlohmann::json timings = {
+      {"backend", row.backend},
+      {"tracer", row.tracer},
+      {"gaussians", file.model.size()},
+      {"approximations", {{"alpha_min", options.alpha_min}, {"t_min", options.transmittance_min}}},
+      {"views", nlohmann::json::array()}};
   renderer->profile().enable(!a.json.empty());
   double total = 0;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     auto& [name, view] = cameras[i];
-    if (a.downscale > 1) view = gart::resized(view, std::max(1, view.width / a.downscale), std::max(1, view.height / a.downscale));
+    if (a.downscale > 1)
+      view = gart::resized(view, std::max(1, view.width / a.downscale), std::max(1, view.height / a.downscale));
     auto const start = std::chrono::steady_clock::now();
     gart::rendered const image = renderer->render(view, options);
     double const ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -94,7 +99,8 @@ int run_render(render_arguments const& a) {
     }
     timings["views"].push_back(entry);
     double const share = static_cast<double>(i + 1) / static_cast<double>(cameras.size());
-    say.state("rendered " + std::to_string(i + 1) + "/" + std::to_string(cameras.size()) + "  " + fixed(ms, 1) + " ms", share);
+    say.state("rendered " + std::to_string(i + 1) + "/" + std::to_string(cameras.size()) + "  " + fixed(ms, 1) + " ms",
+              share);
   }
   if (!a.json.empty()) {
     for (auto const& [label, time] : renderer->profile().stages()) {
@@ -117,9 +123,11 @@ void add_render(CLI::App& app, command& selected) {
   auto a = std::make_shared<render_arguments>();
   CLI::App* render = app.add_subcommand("render", "Render a model from every camera of a dataset or a camera file.");
   render->add_option("MODEL.ply", a->model, "Gaussians, from gart or another program")->type_name("")->required();
-  render->add_option("CAMERAS", a->cameras,
-                     "A dataset (all its views), or a JSON list of {\"name\", \"width\",\n"
-                     "\"height\", \"fx\", \"fy\", \"cx\", \"cy\", \"c2w\"}, in pixels, camera to world\nwith x right, y down, z forward")
+  render
+      ->add_option("CAMERAS", a->cameras,
+                   "A dataset (all its views), or a JSON list of {\"name\", \"width\",\n"
+                   "\"height\", \"fx\", \"fy\", \"cx\", \"cy\", \"c2w\"}, in pixels, camera to world\nwith x right, y "
+                   "down, z forward")
       ->type_name("")
       ->required();
   render->add_option("--out", a->out, "Folder of the images; made where there is none")->type_name("DIR")->required();
@@ -131,10 +139,14 @@ void add_render(CLI::App& app, command& selected) {
       ->type_name("N")
       ->capture_default_str()
       ->check(between(1, 64));
-  render->add_option("--alpha-min", a->alpha_min, "Opacity below which a Gaussian is not hit, 0 to 1\n(default: what the model says, else 1/255)")
+  render
+      ->add_option("--alpha-min", a->alpha_min,
+                   "Opacity below which a Gaussian is not hit, 0 to 1\n(default: what the model says, else 1/255)")
       ->type_name("A")
       ->check(between(1e-6, 0.99));
-  render->add_option("--t-min", a->t_min, "Transmittance below which a ray ends, 0 to 1\n(default: what the model says, else 1e-4)")
+  render
+      ->add_option("--t-min", a->t_min,
+                   "Transmittance below which a ray ends, 0 to 1\n(default: what the model says, else 1e-4)")
       ->type_name("T")
       ->check(between(0, 0.99));
   render->add_flag("--depth", a->depth, "Also the depth of each view, nearest white, as NAME_depth.png");

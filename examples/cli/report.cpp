@@ -37,7 +37,8 @@ std::string base64(std::vector<gart::u8> const& bytes) {
 struct color_stop {
   float r, g, b;
 };
-constexpr color_stop error_colors[] = {{10, 8, 26}, {74, 20, 96}, {150, 38, 96}, {218, 76, 62}, {249, 149, 54}, {252, 240, 170}};
+constexpr color_stop error_colors[] = {{10, 8, 26},   {74, 20, 96},   {150, 38, 96},
+                                       {218, 76, 62}, {249, 149, 54}, {252, 240, 170}};
 constexpr int last_color = 5;
 
 void put_error_color(float share, gart::u8* rgb) {
@@ -70,7 +71,8 @@ std::string count_of(json const& all, char const* key) {
 }
 
 std::string headline(std::string const& value, std::string const& unit, std::string const& label) {
-  return "<div><b>" + value + (unit.empty() ? "" : "<small>" + unit + "</small>") + "</b><span>" + label + "</span></div>";
+  return "<div><b>" + value + (unit.empty() ? "" : "<small>" + unit + "</small>") + "</b><span>" + label +
+         "</span></div>";
 }
 
 std::string figures(json const& m) {
@@ -83,15 +85,16 @@ std::string figures(json const& m) {
   html += headline(count_of(m, "gaussians"), "", "Gaussians");
   html += headline(as_duration(number_of(m, "seconds")), "", "Training time");
   html += headline(fixed(number_of(m, "iterations_per_second"), 1), "/s", "Iterations");
-  html += headline(as_bytes(number_of(m, "peak_bytes")), "", "Peak memory of the " + text_of(m, "backend") + " backend");
+  html +=
+      headline(as_bytes(number_of(m, "peak_bytes")), "", "Peak memory of the " + text_of(m, "backend") + " backend");
   return html + "</section>";
 }
 
 std::string curves(history const& course, double iterations) {
-  chart loss{"Training loss", "", "iterations", {{"loss", {}, false}}, true, iterations};
-  chart psnr{"PSNR", "dB", "iterations", {{"training view", {}, false}, {"test", {}, true}}, false, iterations};
-  chart ssim{"Test SSIM", "", "iterations", {{"SSIM", {}, true}}, false, iterations};
-  chart count{"Gaussians", "", "iterations", {{"", {}, false}}, false, iterations};
+  chart loss{"Training loss", "", "iterations", {{"", {}, false}}, true, iterations, false};
+  chart psnr{"PSNR", "dB", "iterations", {{"training view", {}, false}, {"test", {}, true}}, false, iterations, false};
+  chart ssim{"Test SSIM", "", "iterations", {{"", {}, true}}, false, iterations, false};
+  chart count{"Gaussians", "", "iterations", {{"", {}, false}}, false, iterations, true};
   for (auto const& p : course.train) {
     loss.series[0].points.emplace_back(p.step, p.loss);
     psnr.series[0].points.emplace_back(p.step, p.psnr);
@@ -109,25 +112,31 @@ std::string pictures(json const& m, std::vector<report_view> const& views) {
   std::size_t const total = m.contains("views") ? m["views"].size() : 0;
   std::string html = "<h2>Test views</h2>";
   if (total == 0) {
-    return html + "<p class=\"soft\">The capture has no test views, so nothing here tells how well the model does on "
+    return html +
+           "<p class=\"soft\">The capture has no test views, so nothing here tells how well the model does on "
            "photographs that it was not trained on.</p>";
   }
   html += "<p class=\"soft\">" +
-          (views.size() < total ? std::to_string(views.size()) + " of " + std::to_string(total) + " views, evenly spread; all are in renders/."
+          (views.size() < total ? std::to_string(views.size()) + " of " + std::to_string(total) +
+                                      " views, evenly spread; all are in renders/."
                                 : "All " + std::to_string(total) + ", also in renders/.") +
           "</p><div class=\"heads\"><span>Render</span><span>Photograph</span><span>Absolute error 0"
-          "<i class=\"scale\" style=\"background:" + error_gradient() + "\"></i>" + fixed(report_error_scale, 2) + "</span></div>";
+          "<i class=\"scale\" style=\"background:" +
+          error_gradient() + "\"></i>" + fixed(report_error_scale, 2) + "</span></div>";
   for (auto const& v : views) {
     std::string const name = html_escape(v.name);
     auto const image = [&](std::vector<gart::u8> const& jpeg, char const* what) {
-      return "<img loading=\"lazy\" alt=\"" + name + ", " + what + "\" src=\"data:image/jpeg;base64," + base64(jpeg) + "\">";
+      return "<img loading=\"lazy\" alt=\"" + name + ", " + what + "\" src=\"data:image/jpeg;base64," + base64(jpeg) +
+             "\">";
     };
-    html += "<figure class=\"view\"><figcaption><b>" + name + "</b><span>" + fixed(v.psnr, 2) + " dB</span><span>SSIM " +
-            fixed(v.ssim, 4) + "</span></figcaption><div class=\"images\">" + image(v.render, "render") +
-            image(v.truth, "photograph") + image(v.error, "error") + "</div></figure>";
+    html += "<figure class=\"view\"><figcaption><b>" + name + "</b><span>" + fixed(v.psnr, 2) +
+            " dB</span><span>SSIM " + fixed(v.ssim, 4) + "</span></figcaption><div class=\"images\">" +
+            image(v.render, "render") + image(v.truth, "photograph") + image(v.error, "error") + "</div></figure>";
   }
-  html += "<details><summary>Scores of every test view</summary><div class=\"columns\">"
-          "<table><tr><th>View</th><th class=\"n\">PSNR, dB</th><th class=\"n\">SSIM</th><th class=\"n\">Render, ms</th></tr>";
+  html +=
+      "<details><summary>Scores of every test view</summary><div class=\"columns\">"
+      "<table><tr><th>View</th><th class=\"n\">PSNR, dB</th><th class=\"n\">SSIM</th><th class=\"n\">Render, "
+      "ms</th></tr>";
   for (auto const& v : m["views"]) {
     html += "<tr><td class=\"v\">" + text_of(v, "name") + "</td><td class=\"n\">" + fixed(number_of(v, "psnr"), 2) +
             "</td><td class=\"n\">" + fixed(number_of(v, "ssim"), 4) + "</td><td class=\"n\">" +
@@ -142,8 +151,8 @@ std::string bars(std::vector<std::pair<std::string, double>> rows, std::string c
   for (auto const& [name, value] : rows) {
     double const share = whole > 0 ? std::clamp(value / whole, 0.0, 1.0) : 0;
     html += "<tr><td>" + html_escape(name) + "</td><td class=\"n\">" + fixed(value, value < 10 ? 3 : 1) + " " + unit +
-            "</td><td class=\"n\">" + fixed(100 * share, 1) + " %</td><td class=\"bar\"><i style=\"width:" +
-            fixed(100 * share, 1) + "%\"></i></td></tr>";
+            "</td><td class=\"n\">" + fixed(100 * share, 1) +
+            " %</td><td class=\"bar\"><i style=\"width:" + fixed(100 * share, 1) + "%\"></i></td></tr>";
   }
   return html + "</table>";
 }
@@ -165,18 +174,21 @@ std::string costs(json const& m) {
   std::string html = "<h2>Where the time and memory went</h2>";
   if (!stage_rows.empty()) {
     html += "<p class=\"soft\">Stages of one training step, in the mean over " + count_of(m, "profiled_steps") +
-            " steps that were timed; such a step took " + fixed(step, 2) + " ms.</p><div class=\"box\">" +
+            " steps that were timed; such a step took " + fixed(step, 2) +
+            " ms. A stage that contains others is counted with them.</p><div class=\"box\">" +
             bars(stage_rows, "ms", std::isfinite(step) ? step : stages) + "</div>";
   }
   html += "<p class=\"soft\">The run as a whole.</p><div class=\"box\">" + bars(phase_rows, "s", phases) + "</div>";
   html += "<p>Buffers of the " + text_of(m, "backend") + " backend held " + as_bytes(number_of(m, "peak_bytes")) +
-          " at most; the process held " + as_bytes(number_of(m, "peak_process_bytes")) + " of host memory, images included.</p>";
+          " at most; the process held " + as_bytes(number_of(m, "peak_process_bytes")) +
+          " of host memory, images included.</p>";
   return html;
 }
 
 std::string settings(json const& m, json const& config) {
   std::string html = "<h2>Settings</h2><div class=\"settings\">";
   auto const row = [&](std::string const& name, std::string const& value) {
+    if (value.empty()) return;
     html += "<div><span>" + html_escape(name) + "</span><b>" + html_escape(value) + "</b></div>";
   };
   json const options = config.value("options", json::object());
@@ -186,14 +198,16 @@ std::string settings(json const& m, json const& config) {
     if (fraction) std::snprintf(text, sizeof text, "%.6g", value.get<double>());
     row("--" + name, fraction ? text : value.is_string() ? value.get<std::string>() : value.dump());
   }
-  html += "</div><h2>How it was measured</h2><p>Split: " + text_of(m, "split") + "; " + count_of(m, "test_views") +
-          " test views. Images resized: " + text_of(m, "resize_filter") + ". Background: " + text_of(m, "background") +
-          ". A Gaussian is hit where its alpha is at least " + fixed(number_of(m["approximations"], "alpha_min"), 6) +
-          ", and a ray ends below a transmittance of " + fixed(number_of(m["approximations"], "t_min"), 6) +
-          ". PSNR and SSIM (11 x 11 Gaussian window, sigma 1.5) are taken per view on [0, 1] and averaged over views.</p>";
+  html +=
+      "</div><h2>How it was measured</h2><p>Split: " + text_of(m, "split") + "; " + count_of(m, "test_views") +
+      " test views. Images resized: " + text_of(m, "resize_filter") + ". Background: " + text_of(m, "background") +
+      ". A Gaussian is hit where its alpha is at least " + fixed(number_of(m["approximations"], "alpha_min"), 6) +
+      ", and a ray ends below a transmittance of " + fixed(number_of(m["approximations"], "t_min"), 6) +
+      ". PSNR and SSIM (11 x 11 Gaussian window, sigma 1.5) are taken per view on [0, 1] and averaged over views.</p>";
   if (m.contains("notes") && !m["notes"].empty()) {
     html += "<p class=\"soft\">Of the capture: ";
-    for (auto const& note : m["notes"]) html += html_escape(note.get<std::string>()) + (note == m["notes"].back() ? "" : "; ");
+    for (auto const& note : m["notes"])
+      html += html_escape(note.get<std::string>()) + (note == m["notes"].back() ? "" : "; ");
     html += ".</p>";
   }
   return html;

@@ -15,14 +15,18 @@ h1 { font-size: 28px; font-weight: 650; letter-spacing: -0.01em; margin: 0; over
 h2 { font-size: 17px; font-weight: 650; margin: 44px 0 12px; }
 p { margin: 6px 0; max-width: 80ch; } .soft, figcaption, th { color: var(--soft); }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 12px; margin-top: 26px; }
-.figures div, .chart, .box { background: var(--card); border: 1px solid var(--rule); border-radius: 10px; padding: 14px 16px; }
-.figures b { display: block; font-size: 25px; font-weight: 620; letter-spacing: -0.01em; font-variant-numeric: tabular-nums; }
+.figures div, .chart, .box { background: var(--card); border: 1px solid var(--rule); border-radius: 10px; padding:
+  14px 16px; }
+.figures b { display: block; font-size: 25px; font-weight: 620; letter-spacing: -0.01em; font-variant-numeric:
+  tabular-nums; }
 .figures small { font-size: 14px; font-weight: 450; color: var(--soft); margin-left: 3px; }
 .figures span { color: var(--soft); font-size: 13px; }
 .charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 420px), 1fr)); gap: 12px; }
-figure { margin: 0; } .chart figcaption { display: flex; flex-wrap: wrap; gap: 4px 16px; font-size: 13px; margin-bottom: 6px; }
+figure { margin: 0; }
+.chart figcaption { display: flex; flex-wrap: wrap; gap: 4px 16px; font-size: 13px; margin-bottom: 6px; }
 .chart figcaption b { color: var(--ink); font-size: 14px; font-weight: 600; margin-right: auto; }
-.key i { display: inline-block; width: 14px; height: 3px; border-radius: 2px; margin-right: 6px; vertical-align: middle; }
+.key i { display: inline-block; width: 14px; height: 3px; border-radius: 2px; margin-right: 6px; vertical-align:
+  middle; }
 .swatch-1 { background: var(--one); } .swatch-2 { background: var(--two); }
 svg { display: block; width: 100%; height: auto; } .grid { stroke: var(--rule); stroke-width: 1; }
 .tick { fill: var(--soft); font: 11px system-ui, sans-serif; font-variant-numeric: tabular-nums; }
@@ -31,18 +35,26 @@ polyline.line-1 { stroke: var(--one); } polyline.line-2 { stroke: var(--two); }
 circle.line-1 { fill: var(--one); } circle.line-2 { fill: var(--two); }
 .view { margin-bottom: 22px; } .view .images { display: grid; grid-template-columns: repeat(3, 1fr); gap: 8px; }
 .view img { display: block; width: 100%; border-radius: 6px; border: 1px solid var(--rule); }
-.view figcaption { display: flex; gap: 14px; font-size: 13px; margin-bottom: 6px; } .view figcaption b { color: var(--ink); }
-.heads { display: grid; grid-template-columns: repeat(3, 1fr); gap: 8px; font-size: 13px; color: var(--soft); margin: 12px 0 8px; }
+.view figcaption { display: flex; gap: 14px; font-size: 13px; margin-bottom: 6px; }
+.view figcaption b { color: var(--ink); }
+.heads { display: grid; grid-template-columns: repeat(3, 1fr); gap: 8px; font-size: 13px; color: var(--soft); margin:
+  12px 0 8px; }
 .scale { display: inline-block; width: 84px; height: 9px; border-radius: 3px; margin: 0 6px; vertical-align: middle; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; font-size: 14px; }
-th { text-align: left; font-weight: 450; font-size: 13px; } th, td { padding: 5px 14px 5px 0; border-bottom: 1px solid var(--rule); }
+th { text-align: left; font-weight: 450; font-size: 13px; }
+th, td { padding: 5px 14px 5px 0; border-bottom: 1px solid var(--rule); }
 tr:last-child td { border-bottom: 0; } td.n, th.n { text-align: right; white-space: nowrap; width: 1%; }
-td.bar { width: 45%; padding-right: 0; } td.bar i { display: block; height: 9px; border-radius: 3px; background: var(--bar); }
-.columns { columns: 2 380px; column-gap: 40px; } .columns table { break-inside: avoid; } td.v { overflow-wrap: anywhere; }
+td.bar { width: 45%; padding-right: 0; }
+td.bar i { display: block; height: 9px; border-radius: 3px; background: var(--bar); }
+.columns { columns: 2 380px; column-gap: 40px; }
+td.v { overflow-wrap: anywhere; }
 .settings { display: grid; grid-template-columns: repeat(auto-fit, minmax(290px, 1fr)); gap: 0 36px; }
-.settings div { display: flex; justify-content: space-between; gap: 16px; padding: 5px 0; border-bottom: 1px solid var(--rule);
-  font-size: 14px; } .settings span { color: var(--soft); } .settings b { font-weight: 500; overflow-wrap: anywhere; text-align: right; }
+.settings div { display: flex; justify-content: space-between; gap: 16px; padding: 5px 0; border-bottom: 1px solid
+  var(--rule);
+  font-size: 14px; } .settings span { color: var(--soft); }
+.settings b { font-weight: 500; overflow-wrap: anywhere; text-align: right; }
 summary { cursor: pointer; color: var(--soft); font-size: 14px; margin: 8px 0; }
+.box + p { margin-top: 16px; }
 footer { margin-top: 48px; color: var(--soft); font-size: 13px; }
 @media (max-width: 560px) { main { padding: 24px 14px 40px; } }
 )css";

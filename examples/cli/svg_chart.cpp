@@ -54,11 +54,12 @@ axis log_axis(double low, double high) {
   axis a;
   a.logarithmic = true;
   a.low = low / 1.1, a.high = high * 1.1;
-  std::vector<double> const dense{1, 2, 5}, sparse{1};
-  for (double const m : a.high / a.low < 200 ? dense : sparse) {
+  std::vector<double> const densest{1, 1.5, 2, 3, 4, 6, 8}, dense{1, 2, 5}, sparse{1};
+  for (double const m : a.high / a.low < 10 ? densest : a.high / a.low < 200 ? dense : sparse) {
     for (int e = static_cast<int>(std::floor(std::log10(a.low))); e <= std::ceil(std::log10(a.high)); ++e) {
       double const v = m * std::pow(10.0, e);
-      if (v >= a.low && v <= a.high) a.ticks.emplace_back(v, tick_text(v, std::pow(10.0, std::min(0, e))));
+      if (v >= a.low && v <= a.high)
+        a.ticks.emplace_back(v, tick_text(v, std::pow(10.0, std::min(0, e)) * (m == 1.5 ? 0.1 : 1)));
     }
   }
   return a;
@@ -72,11 +73,20 @@ std::string html_escape(std::string const& text) {
   std::string result;
   for (char const c : text) {
     switch (c) {
-      case '&': result += "&amp;"; break;
-      case '<': result += "&lt;"; break;
-      case '>': result += "&gt;"; break;
-      case '"': result += "&quot;"; break;
-      default: result += c;
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      default:
+        result += c;
     }
   }
   return result;
@@ -98,6 +108,7 @@ std::string to_svg(chart const& c) {
     most = std::max(most, s.points.size());
   }
   if (most < 2) return "";
+  if (c.from_zero) low = 0;
 
   axis const x = linear_axis(std::min(x_low, 0.0), x_high, 6, false);
   axis const y = c.logarithmic ? log_axis(low, high) : linear_axis(low, high, 4, true);
@@ -108,23 +119,26 @@ std::string to_svg(chart const& c) {
   for (std::size_t i = 0; i < series.size(); ++i) {
     if (series[i].points.empty()) continue;
     double const last = series[i].points.back().second;
-    svg += "<span class=\"key\"><i class=\"swatch-" + std::to_string(i + 1) + "\"></i>" + html_escape(series[i].name) + " " +
-           (last >= 1000 ? with_commas(static_cast<std::uint64_t>(std::llround(last))) : fixed(last, last < 1 ? 4 : 2)) +
-           html_escape(c.unit.empty() ? "" : " " + c.unit) + "</span>";
+    std::string const swatch = "<i class=\"swatch-" + std::to_string(i + 1) + "\"></i>";
+    svg +=
+        "<span class=\"key\">" + (series[i].name.empty() ? "" : swatch + html_escape(series[i].name) + " ") +
+        (last >= 1000 ? with_commas(static_cast<std::uint64_t>(std::llround(last))) : fixed(last, last < 1 ? 4 : 2)) +
+        html_escape(c.unit.empty() ? "" : " " + c.unit) + "</span>";
   }
-  svg += "</figcaption><svg viewBox=\"0 0 " + fixed(width, 0) + " " + fixed(height, 0) + "\" role=\"img\" aria-label=\"" +
-         html_escape(c.title) + "\">";
+  svg += "</figcaption><svg viewBox=\"0 0 " + fixed(width, 0) + " " + fixed(height, 0) +
+         "\" role=\"img\" aria-label=\"" + html_escape(c.title) + "\">";
   for (auto const& [value, text] : y.ticks) {
     svg += "<line class=\"grid\" x1=\"" + number(left) + "\" x2=\"" + number(width - right) + "\" y1=\"" +
-           number(at_y(value)) + "\" y2=\"" + number(at_y(value)) + "\"/><text class=\"tick\" text-anchor=\"end\" x=\"" +
-           number(left - 7) + "\" y=\"" + number(at_y(value) + 3.5) + "\">" + text + "</text>";
+           number(at_y(value)) + "\" y2=\"" + number(at_y(value)) +
+           "\"/><text class=\"tick\" text-anchor=\"end\" x=\"" + number(left - 7) + "\" y=\"" +
+           number(at_y(value) + 3.5) + "\">" + text + "</text>";
   }
   for (auto const& [value, text] : x.ticks) {
     svg += "<text class=\"tick\" text-anchor=\"middle\" x=\"" + number(at_x(value)) + "\" y=\"" +
            number(height - bottom + 16) + "\">" + text + "</text>";
   }
-  svg += "<text class=\"tick\" text-anchor=\"end\" x=\"" + number(width - right) + "\" y=\"" + number(height - 3) + "\">" +
-         html_escape(c.x_label) + "</text>";
+  svg += "<text class=\"tick\" text-anchor=\"end\" x=\"" + number(width - right) + "\" y=\"" + number(height - 3) +
+         "\">" + html_escape(c.x_label) + "</text>";
   for (std::size_t i = 0; i < series.size(); ++i) {
     std::string const color = "line-" + std::to_string(i + 1);
     svg += "<polyline class=\"" + color + "\" points=\"";
@@ -132,7 +146,8 @@ std::string to_svg(chart const& c) {
     svg += "\"/>";
     if (!series[i].markers) continue;
     for (auto const& [px, py] : series[i].points) {
-      svg += "<circle class=\"" + color + "\" r=\"3\" cx=\"" + number(at_x(px)) + "\" cy=\"" + number(at_y(py)) + "\"/>";
+      svg +=
+          "<circle class=\"" + color + "\" r=\"3\" cx=\"" + number(at_x(px)) + "\" cy=\"" + number(at_y(py)) + "\"/>";
     }
   }
   return svg + "</svg></figure>";

@@ -19,6 +19,7 @@ struct chart {
   std::vector<chart_series> series;  // at most two
   bool logarithmic = false;          // y; values that are not positive are left out
   double x_max = 0;
+  bool from_zero = false;  // y
 };
 
 // A <figure> with the title, the last value of each series, and the plot. "" where no series has two points.

@@ -74,8 +74,8 @@ class training_run {
     save_seconds_ += saving.seconds();
     if (!finished) {
       say_.note("Stopped after step " + with_commas(static_cast<std::uint64_t>(session_->steps_done())) + ". Saved " +
-                a_.checkpoint_file().string() + " and " + a_.model_file().string() + ".\nContinue with: gart train --resume --out " +
-                a_.out.string());
+                a_.checkpoint_file().string() + " and " + a_.model_file().string() +
+                ".\nContinue with: gart train --resume --out " + a_.out.string());
       return exit_interrupted;
     }
     conclude();
@@ -94,17 +94,17 @@ class training_run {
     load();
     a_.background = resolve_background(a_.background, data_.alpha);
     eval_background_ = background_color(a_.background);
-    prepare_folder(a_.out);
-    prepare_folder(a_.out / "renders");
-
     if (!a_.start.empty()) {
       start_ = with_degree(gart::read_splat_ply(a_.start), a_.sh_degree);
       if (start_.size() > a_.max_gaussians) {
-        throw usage_error("--start " + a_.start + ": has " + with_commas(start_.size()) + " Gaussians, more than --max-gaussians " +
-                          std::to_string(a_.max_gaussians));
+        throw usage_error("--start " + a_.start + ": has " + with_commas(start_.size()) +
+                          " Gaussians, more than --max-gaussians " + std::to_string(a_.max_gaussians));
       }
     }
-    session_ = gart::make_session(row_request_of(a_), train_options_of(a_), data_, a_.start.empty() ? nullptr : &start_);
+    prepare_folder(a_.out);
+    prepare_folder(a_.out / "renders");
+    session_ =
+        gart::make_session(row_request_of(a_), train_options_of(a_), data_, a_.start.empty() ? nullptr : &start_);
     if (a_.resume) {
       check_same_dataset(a_, data_);
       session_->load(a_.checkpoint_file());
@@ -128,7 +128,8 @@ class training_run {
     };
     data_ = gart::load_dataset(a_.dataset, options);
     if (data_.train.empty()) {
-      throw gart::io_error(a_.dataset.string(), "has no training views", "raise --test-every, which keeps views for testing");
+      throw gart::io_error(a_.dataset.string(), "has no training views",
+                           "raise --test-every, which keeps views for testing");
     }
     say_.note(data_.format + " capture: " + std::to_string(data_.train.size()) + " training views, " +
               std::to_string(data_.test.size()) + " test views (" + data_.split + "), " + image_size() + ", " +
@@ -161,7 +162,8 @@ class training_run {
       session_->profile().enable(false);
       if (!std::isfinite(report.loss)) {
         throw gart::error("step " + std::to_string(report.step) + ", view " + report.view +
-                          ": the loss is not a number (the last checkpoint is whole: " + a_.checkpoint_file().string() + ")");
+                          ": the loss is not a number (the last checkpoint is whole: " + a_.checkpoint_file().string() +
+                          ")");
       }
       ++steps_, step_seconds_ += seconds, course_.seconds += seconds, gaussians_ = report.gaussians;
       course_.add(report);
@@ -192,11 +194,13 @@ class training_run {
 
   scores test(int step, keep_view const& keep = {}) {
     stopwatch const testing;
-    scores const result =
-        evaluate(data_.test, eval_background_, [this](gart::camera const& c) { return session_->render(c, eval_background_); }, keep);
+    scores const result = evaluate(
+        data_.test, eval_background_, [this](gart::camera const& c) { return session_->render(c, eval_background_); },
+        keep);
     if (!result.views.empty()) {
       course_.test.push_back({step, result.psnr, result.ssim});
-      say_.note("step " + with_commas(step) + ": test PSNR " + fixed(result.psnr, 2) + " dB, SSIM " + fixed(result.ssim, 4));
+      say_.note("step " + with_commas(step) + ": test PSNR " + fixed(result.psnr, 2) + " dB, SSIM " +
+                fixed(result.ssim, 4));
     }
     test_seconds_ += testing.seconds();
     return result;
@@ -248,12 +252,13 @@ class training_run {
     gart::write_file(a_.out / "report.html", report_page(metrics, read_json(a_.config_file()), course_, shown));
     if (a_.quiet) return;
     say_.clear();
-    std::printf("trained %s steps in %s, %s Gaussians\n", with_commas(a_.iterations).c_str(), as_duration(course_.seconds).c_str(),
-                with_commas(gaussians_).c_str());
+    std::printf("trained %s steps in %s, %s Gaussians\n", with_commas(a_.iterations).c_str(),
+                as_duration(course_.seconds).c_str(), with_commas(gaussians_).c_str());
     if (!result.views.empty()) {
       std::printf("test PSNR %.2f dB, SSIM %.4f over %zu views\n", result.psnr, result.ssim, result.views.size());
     }
-    std::printf("model   %s\nreport  %s\n", a_.model_file().string().c_str(), (a_.out / "report.html").string().c_str());
+    std::printf("model   %s\nreport  %s\n", a_.model_file().string().c_str(),
+                (a_.out / "report.html").string().c_str());
   }
 
   std::string image_size() const {
@@ -277,14 +282,16 @@ class training_run {
     m["approximations"] = {{"alpha_min", a_.alpha_min}, {"t_min", a_.t_min}};
     m["seconds"] = course_.seconds;
     m["iterations_per_second"] = course_.seconds > 0 ? a_.iterations / course_.seconds : 0;
-    m["wall_seconds"] = {{"loading", load_seconds_}, {"training", step_seconds_}, {"testing", test_seconds_}, {"saving", save_seconds_}};
+    m["wall_seconds"] = {
+        {"loading", load_seconds_}, {"training", step_seconds_}, {"testing", test_seconds_}, {"saving", save_seconds_}};
     m["stages_ms"] = nlohmann::json::object();
     for (auto const& [label, time] : session_->profile().stages()) {
       if (profiled_steps_ > 0) m["stages_ms"][label] = time.milliseconds / profiled_steps_;
     }
     m["profiled_steps"] = profiled_steps_;
     m["profiled_step_ms"] = profiled_steps_ > 0 ? 1000 * profiled_seconds_ / profiled_steps_ : 0;
-    m["peak_bytes"] = session_->peak_bytes(), m["peak_process_bytes"] = peak_process_bytes();
+    m["peak_bytes"] = session_->peak_bytes(),
+    m["peak_process_bytes"] = static_cast<std::uint64_t>(peak_process_bytes());
     return m;
   }
 

@@ -11,12 +11,14 @@ namespace fs = std::filesystem;
 
 void add_arguments(CLI::App& train, train_arguments& a) {
   auto& r = a.recorded;
-  train.add_option("DATASET", a.dataset,
-                   "Capture: a folder with COLMAP's sparse/ and images/, Blender's\n"
-                   "transforms_train.json, or a transforms.json; or such a file")
+  train
+      .add_option("DATASET", a.dataset,
+                  "Capture: a folder with COLMAP's sparse/ and images/, Blender's\n"
+                  "transforms_train.json, or a transforms.json; or such a file")
       ->type_name("");
   train.add_option("--out", a.out, "Folder of the results; made where there is none")->type_name("DIR")->required();
-  train.add_flag("--resume", a.resume, "Continue the run in DIR from its last checkpoint, with its\noptions; DATASET may be left out");
+  train.add_flag("--resume", a.resume,
+                 "Continue the run in DIR from its last checkpoint, with its\noptions; DATASET may be left out");
   train.add_flag("--quiet", a.quiet, "Say nothing but errors");
 
   std::string group = "Training";
@@ -24,47 +26,60 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--iterations", a.iterations, "N", "Steps, one training view each"))->check(between(1, 1e9));
   in_group(r.add(train, "--max-gaussians", a.max_gaussians, "N", "Gaussians at most; memory and time grow with them"))
       ->check(between(1, 2147483647.0));
-  in_group(r.add(train, "--densify", a.densify, "NAME",
-                 "How Gaussians are added: mcmc (grows to --max-gaussians),\nadc (clones and splits by gradient) or none"))
+  in_group(
+      r.add(train, "--densify", a.densify, "NAME",
+            "How Gaussians are added: mcmc (grows to --max-gaussians),\nadc (clones and splits by gradient) or none"))
       ->check(one_of({"mcmc", "adc", "none"}));
-  in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3", "Degree of the spherical harmonics of colour"))->check(between(0, 3));
+  in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3", "Degree of the spherical harmonics of colour"))
+      ->check(between(0, 3));
   in_group(r.add(train, "--points", a.points, "N", "Gaussians placed at random where the capture has no points"))
       ->check(between(1, 2147483647.0));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
-  in_group(r.add(train, "--seed", a.seed, "N", "Seed of everything random; on the serial backend the same\nseed gives the same bits"));
+  in_group(r.add(train, "--seed", a.seed, "N",
+                 "Seed of everything random; on the serial backend the same\nseed gives the same bits"));
 
   group = "Capture";
   in_group(r.add(train, "--downscale", a.downscale, "N", "Shrink images by this whole factor"))->check(between(1, 64));
   in_group(r.add(train, "--background", a.background, "NAME",
-                 "white, black, or random (another at each step; tests on black);\nauto: white for images with alpha, else black"))
+                 "white, black, or random (another at each step; tests on black);\nauto: white for images with alpha, "
+                 "else black"))
       ->check(one_of({"auto", "white", "black", "random"}));
-  in_group(r.add(train, "--test-every", a.test_every, "N",
-                 "Keep each Nth view for testing, 0: none; for captures that do\nnot say themselves which are for testing"))
+  in_group(
+      r.add(train, "--test-every", a.test_every, "N",
+            "Keep each Nth view for testing, 0: none; for captures that do\nnot say themselves which are for testing"))
       ->check(between(0, 1e6));
 
   group = "Machine";
-  in_group(r.add(train, "--backend", a.backend, "NAME", "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is"))
+  in_group(r.add(train, "--backend", a.backend, "NAME",
+                 "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is"))
       ->check(backend_names());
-  in_group(r.add(train, "--tracer", a.tracer, "NAME", "What finds the hits: bvh, or embree (CPU);\nthe images are the same"))
+  in_group(
+      r.add(train, "--tracer", a.tracer, "NAME", "What finds the hits: bvh, or embree (CPU);\nthe images are the same"))
       ->check(tracer_names());
-  in_group(r.add(train, "--backward", a.backward, "NAME", "How gradients are gathered: pixel; auto: the fastest there is"))
-      ->check(one_of({"auto", "pixel"}));
+  in_group(
+      r.add(train, "--backward", a.backward, "NAME", "How gradients are gathered: pixel; auto: the fastest there is"))
+      ->check(one_of({"auto", "pixel", "hybrid", "primitive", "deterministic"}));
   add_threads(train, a.threads);
   in_group(train.get_option("--threads"));
 
   group = "Accuracy";
-  in_group(r.add(train, "--alpha-min", a.alpha_min, "A", "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as others have it"))
+  in_group(r.add(train, "--alpha-min", a.alpha_min, "A",
+                 "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as others have it"))
       ->check(between(1e-6, 0.99));
-  in_group(r.add(train, "--t-min", a.t_min, "T", "Transmittance below which a ray ends, 0 to 1"))->check(between(0, 0.99));
+  in_group(r.add(train, "--t-min", a.t_min, "T", "Transmittance below which a ray ends, 0 to 1"))
+      ->check(between(0, 0.99));
 
   group = "Course";
-  in_group(r.add(train, "--eval-every", a.eval_every, "N", "Steps between tests on the test views, 0: only at the end,\n-1: five in the run"))
+  in_group(r.add(train, "--eval-every", a.eval_every, "N",
+                 "Steps between tests on the test views, 0: only at the end,\n-1: five in the run"))
       ->check(between(-1, 1e9));
-  in_group(train.add_option("--checkpoint-every", a.checkpoint_minutes, "Minutes between checkpoints, 0: only at the end"))
+  in_group(
+      train.add_option("--checkpoint-every", a.checkpoint_minutes, "Minutes between checkpoints, 0: only at the end"))
       ->type_name("M")
       ->capture_default_str()
       ->check(between(0, 1e6));
-  in_group(train.add_option("--stop-at", a.stop_at, "Stop after this step as Ctrl-C would, 0: do not; the run can\nthen be resumed"))
+  in_group(train.add_option("--stop-at", a.stop_at,
+                            "Stop after this step as Ctrl-C would, 0: do not; the run can\nthen be resumed"))
       ->type_name("N")
       ->capture_default_str()
       ->check(between(0, 1e9));
@@ -97,7 +112,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.iterations = a.iterations;
   o.max_gaussians = a.max_gaussians;
   o.random_points = std::min(a.points, a.max_gaussians);
-  o.densify = a.densify == "mcmc" ? gart::densify_kind::mcmc
+  o.densify = a.densify == "mcmc"  ? gart::densify_kind::mcmc
               : a.densify == "adc" ? gart::densify_kind::adc
                                    : gart::densify_kind::none;
   o.sh_degree = a.sh_degree;

@@ -1,0 +1,170 @@
+// Whole runs on a capture so small that they take a second.
+
+#include "program.hpp"
+
+#include <support/policies.hpp>
+
+using namespace cli_test;
+
+namespace {
+
+std::string const small = " --backend serial --max-gaussians 60 --sh-degree 1 --quiet ";
+
+}  // namespace
+
+TEST_CASE("train leaves every file it promises, and they agree") {
+  folder const here;
+  write_capture(here / "capture");
+  auto const run =
+      here.gart("train capture --out run --iterations 30 --eval-every 10 --backend serial --max-gaussians 60");
+  REQUIRE_MESSAGE(run.code == 0, run.err);
+  CHECK(has(run.out, "test PSNR "));
+  CHECK(has(run.out, "run/report.html"));
+  CHECK(has(run.err, "30/30"));
+  CHECK_FALSE(has(run.err, "\r"));  // plain lines where there is no terminal
+
+  auto const metrics = here.json("run/metrics.json");
+  for (char const* key : {"psnr", "ssim", "views", "split", "background", "resize_filter", "test_views", "iterations",
+                          "gaussians", "seconds", "backend", "tracer", "backward", "stages_ms", "peak_bytes",
+                          "iterations_per_second", "approximations"}) {
+    CAPTURE(key);
+    CHECK(metrics.contains(key));
+  }
+  CHECK(metrics["backend"] == "serial");
+  CHECK(metrics["background"] == "black");
+  CHECK(metrics["iterations"] == 30);
+  CHECK(metrics["approximations"]["alpha_min"].get<double>() == doctest::Approx(1.0 / 255));
+  REQUIRE(metrics["views"].size() == 2);
+  CHECK(metrics["psnr"].get<double>() ==
+        doctest::Approx((metrics["views"][0]["psnr"].get<double>() + metrics["views"][1]["psnr"].get<double>()) / 2));
+  CHECK(metrics["stages_ms"].size() > 3);
+
+  for (auto const& view : metrics["views"]) {
+    auto const name = view["name"].get<std::string>();
+    auto const truth = gart::read_image(here / ("run/renders/" + name + "_truth.png"));
+    auto const render = gart::read_image(here / ("run/renders/" + name + ".png"));
+    CHECK(truth.width == 16);
+    CHECK(render.data.size() == truth.data.size());
+    // From the files alone, 8 bits each: within what rounding does to the score.
+    double sum = 0;
+    for (std::size_t i = 0; i < truth.data.size(); ++i) sum += std::pow((render.data[i] - truth.data[i]) / 255.0, 2);
+    CHECK(-10 * std::log10(sum / static_cast<double>(truth.data.size())) ==
+          doctest::Approx(view["psnr"].get<double>()).epsilon(0.005));
+  }
+  CHECK(gart::read_splat_ply(here / "run/model.ply").size() == metrics["gaussians"].get<std::size_t>());
+  auto const course = here.json("run/history.json");
+  CHECK(course["train"].back()[0] == 30);
+  CHECK(course["test"].size() == 3);
+
+  auto const page = text_of(here / "run/report.html");
+  char psnr[16];
+  std::snprintf(psnr, sizeof psnr, "%.2f", metrics["psnr"].get<double>());
+  CHECK(has(page, psnr));
+  CHECK(has(page, "<polyline"));
+  CHECK(has(page, "data:image/jpeg;base64,/9j/"));
+  CHECK_FALSE(has(page, "http"));  // one page, without a network
+  CHECK_FALSE(has(page, "src=\"renders"));
+}
+
+TEST_CASE("a run that was stopped and resumed ends with the same bytes") {
+  folder const here;
+  write_capture(here / "capture");
+  REQUIRE(here.gart("train capture --out whole --iterations 20" + small).code == 0);
+  auto const stopped = here.gart("train capture --out parts --iterations 20 --stop-at 10" + small);
+  CHECK(stopped.code == 130);
+  CHECK(fs::exists(here / "parts/model.ply"));
+  CHECK_FALSE(fs::exists(here / "parts/metrics.json"));
+  CHECK(text_of(here / "parts/model.ply") != text_of(here / "whole/model.ply"));
+  auto const resumed = here.gart("train --resume --out parts");
+  REQUIRE_MESSAGE(resumed.code == 0, resumed.err);
+  CHECK(text_of(here / "parts/model.ply") == text_of(here / "whole/model.ply"));
+  CHECK(here.json("parts/metrics.json")["psnr"] == here.json("whole/metrics.json")["psnr"]);
+  CHECK(here.json("parts/history.json")["train"].size() == here.json("whole/history.json")["train"].size());
+}
+
+TEST_CASE("SIGINT ends the run after a step, saved, and says how to go on") {
+  folder const here;
+  write_capture(here / "capture");
+  auto const run =
+      here.gart("train capture --out run --iterations 100000000 --backend serial --max-gaussians 60 --densify none",
+                "timeout --preserve-status -s INT 4");
+  CHECK(run.code == 130);
+  CHECK(has(run.err, "gart train --resume --out run"));
+  CHECK(gart::read_splat_ply(here / "run/model.ply").size() == 40);
+  int const step = here.json("run/history.json")["train"].back()[0];
+  CHECK(has(run.err, "Stopped after step"));
+  CHECK(step > 0);
+}
+
+TEST_CASE("resuming refuses what contradicts the run, and a run that is not there") {
+  folder const here;
+  write_capture(here / "capture");
+  write_capture(here / "other", 5);
+  REQUIRE(here.gart("train capture --out run --iterations 20 --stop-at 5" + small).code == 130);
+  auto const before = text_of(here / "run/checkpoint.gart");
+  auto const longer = here.gart("train --resume --out run --iterations 40");
+  CHECK(longer.code == 2);
+  CHECK_MESSAGE(has(longer.err, "--iterations 40: the run to be resumed has 20"), longer.err);
+  auto const same = here.gart("train other --resume --out run");
+  CHECK(same.code == 2);
+  CHECK_MESSAGE(has(same.err, "has 5 train_views"), same.err);
+  CHECK(text_of(here / "run/checkpoint.gart") == before);
+  auto const absent = here.gart("train capture --resume --out nowhere");
+  CHECK(absent.code == 1);
+  CHECK(has(absent.err, "nowhere/config.json"));
+  CHECK_FALSE(fs::exists(here / "nowhere"));
+  CHECK(here.gart("train --resume --out run --iterations 20 --quiet").code == 0);
+}
+
+TEST_CASE("eval scores a trained model as train did, and render draws the same image") {
+  folder const here;
+  write_capture(here / "capture");
+  REQUIRE(here.gart("train capture --out run --iterations 20 --alpha-min 0.01 --tracer bvh" + small).code == 0);
+  CHECK(has(text_of(here / "run/model.ply"), "comment gart alpha_min 0.00999999978\n"));
+  auto const eval =
+      here.gart("eval run/model.ply capture --out scores.json --renders views --backend serial --tracer bvh");
+  REQUIRE_MESSAGE(eval.code == 0, eval.err);
+  CHECK(here.json("scores.json")["psnr"].get<double>() ==
+        doctest::Approx(here.json("run/metrics.json")["psnr"].get<double>()).epsilon(1e-6));
+  CHECK(here.json("scores.json")["approximations"] == here.json("run/metrics.json")["approximations"]);
+
+  auto const render =
+      here.gart("render run/model.ply capture --out images --depth --json timings.json --backend serial --tracer bvh");
+  REQUIRE_MESSAGE(render.code == 0, render.err);
+  CHECK(here.json("timings.json")["views"].size() == 6);
+  for (auto const& view : here.json("scores.json")["views"]) {
+    auto const name = view["name"].get<std::string>() + ".png";
+    CHECK(text_of(here / ("images/" + name)) == text_of(here / ("run/renders/" + name)));
+    CHECK(text_of(here / ("views/" + name)) == text_of(here / ("run/renders/" + name)));
+  }
+  auto const half = here.gart("render run/model.ply capture --out half --downscale 2 --quiet");
+  REQUIRE(half.code == 0);
+  CHECK(half.out.empty());
+  CHECK(half.err.empty());
+  for (auto const& file : fs::directory_iterator(here / "half")) CHECK(gart::read_image(file.path()).width == 8);
+}
+
+TEST_CASE("an ordinary model's header has no comments, and --start takes it at another degree") {
+  folder const here;
+  write_capture(here / "capture");
+  gart::write_splat_ply(here / "start.ply", one_gaussian());
+  REQUIRE(here.gart("train capture --out run --start start.ply --iterations 3 --densify none" + small).code == 0);
+  CHECK_FALSE(has(text_of(here / "run/model.ply"), "comment"));
+  auto const model = gart::read_splat_ply(here / "run/model.ply");
+  CHECK(model.size() == 1);
+  CHECK(model.sh_degree == 1);
+  CHECK(here.gart("train capture --out none --start start.ply --max-gaussians 0").code == 2);
+}
+
+TEST_CASE("a run without test views says so instead of scoring nothing") {
+  folder const here;
+  write_capture(here / "capture", 3, 0);
+  auto const run = here.gart("train capture --out run --iterations 3" + small);
+  REQUIRE_MESSAGE(run.code == 0, run.err);
+  CHECK(here.json("run/metrics.json")["psnr"].is_null());
+  CHECK(has(text_of(here / "run/report.html"), "no test views"));
+  auto const eval = here.gart("eval run/model.ply capture --out scores.json");
+  CHECK(eval.code == 1);
+  CHECK(has(eval.err, "no test views"));
+  CHECK_FALSE(fs::exists(here / "scores.json"));
+}

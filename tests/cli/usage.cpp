@@ -1,0 +1,100 @@
+// What the program says of itself, and of command lines that are wrong.
+
+#include "program.hpp"
+
+#include <support/policies.hpp>
+
+using namespace cli_test;
+
+TEST_CASE("every command's help teaches: a sentence, what it writes, two examples, defaults") {
+  folder const here;
+  for (std::string const command : {"train", "render", "eval", "synth", "info"}) {
+    CAPTURE(command);
+    auto const help = here.gart(command + " --help");
+    CHECK(help.code == 0);
+    CHECK(help.err.empty());
+    CHECK(has(help.out, "Usage: gart " + command));
+    CHECK(has(help.out, "rites"));
+    auto const examples = help.out.find("Examples:\n");
+    REQUIRE(examples != std::string::npos);
+    auto const first = help.out.find("  gart " + command, examples);
+    REQUIRE(first != std::string::npos);
+    CHECK(help.out.find("  gart " + command, first + 1) != std::string::npos);
+    if (command != "info") CHECK(has(help.out, "(default: "));
+  }
+}
+
+TEST_CASE("train has every option that is promised, with its default") {
+  folder const here;
+  auto const help = here.gart("train --help").out;
+  for (char const* option : {"--out DIR (required)",
+                             "--backend",
+                             "--tracer",
+                             "--backward",
+                             "--iterations",
+                             "--max-gaussians",
+                             "--densify",
+                             "--sh-degree",
+                             "--downscale",
+                             "--background",
+                             "--alpha-min",
+                             "--t-min",
+                             "--seed",
+                             "--test-every",
+                             "--eval-every",
+                             "--resume",
+                             "--quiet",
+                             "--points",
+                             "--start",
+                             "--threads",
+                             "(default: 30000)",
+                             "(default: 0.0001)"}) {
+    CAPTURE(option);
+    CHECK(has(help, option));
+  }
+}
+
+TEST_CASE("wrong command lines exit with 2, say what is wrong, and make nothing") {
+  folder const here;
+  struct line {
+    char const *arguments, *says;
+  };
+  for (auto const& [arguments, says] : {
+           line{"train x", "--out is required"},
+           line{"train --out made", "DATASET is missing"},
+           line{"train x --out made --iterations 0", "--iterations: '0' is not a number from 1"},
+           line{"train x --out made --iterations ten", "--iterations"},
+           line{"train x --out made --backend gpu", "'gpu' is none of auto, serial, openmp, cuda"},
+           line{"train x --out made --densify all", "mcmc, adc, none"},
+           line{"train x --out made --sh-degree 4", "--sh-degree"},
+           line{"train x --out made --t-min -1", "--t-min"},
+           line{"train x --out made --alpha-min nan", "--alpha-min"},
+           line{"train x --out made --speed 9", "--speed"},
+           line{"render model.ply --out made", "CAMERAS"},
+           line{"render model.ply x --out made --background red", "black, white"},
+           line{"eval model.ply x", "--out"},
+           line{"paint", "paint"},
+       }) {
+    CAPTURE(arguments);
+    auto const result = here.gart(arguments);
+    CHECK(result.code == 2);
+    CHECK(result.out.empty());
+    CHECK(has(result.err, "gart: error: "));
+    CHECK(has(result.err, "--help"));
+    CHECK_MESSAGE(has(result.err, says), result.err);
+    CHECK_FALSE(fs::exists(here / "made"));
+  }
+  auto const bare = here.gart("");
+  CHECK(bare.code == 2);
+  CHECK(has(bare.err, "train"));
+}
+
+TEST_CASE("info names the version and the rows") {
+  folder const here;
+  auto const info = here.gart("info");
+  CHECK(info.code == 0);
+  CHECK(has(info.out, "gart       "));
+  CHECK(has(info.out, "serial     bvh        pixel"));
+  CHECK(has(info.out, "openmp     bvh        pixel"));
+  CHECK(has(info.out, "auto means "));
+}
