@@ -56,7 +56,7 @@ void add_row_options(CLI::App& app, row_options& options) {
       ->capture_default_str()
       ->check(backend_names());
   app.add_option("--tracer", options.request.tracer,
-                 "What finds the hits: bvh, or embree (CPU);\nthe images are the same")
+                 "What finds the hits: tiles, bvh, or embree (CPU);\nthe images are the same")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(tracer_names());

@@ -54,7 +54,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is"))
       ->check(backend_names());
   in_group(
-      r.add(train, "--tracer", a.tracer, "NAME", "What finds the hits: bvh, or embree (CPU);\nthe images are the same"))
+      r.add(train, "--tracer", a.tracer, "NAME", "What finds the hits: tiles, bvh, or embree (CPU);\nthe images are the same"))
       ->check(tracer_names());
   in_group(
       r.add(train, "--backward", a.backward, "NAME", "How gradients are gathered: pixel; auto: the fastest there is"))

@@ -38,9 +38,9 @@ inline bool within_rounding(oracle::pixel const& p) { return p.rounding > image_
 template <class E>
 inline std::vector<tracer_kind> tracers() {
 #if defined(GART_WITH_EMBREE)
-  if constexpr (!E::device) return {tracer_kind::bvh, tracer_kind::embree};
+  if constexpr (!E::device) return {tracer_kind::bvh, tracer_kind::tiles, tracer_kind::embree};
 #endif
-  return {tracer_kind::bvh};
+  return {tracer_kind::bvh, tracer_kind::tiles};
 }
 
 }  // namespace gart_test

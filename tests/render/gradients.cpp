@@ -73,9 +73,9 @@ TEST_CASE_TEMPLATE("gradients agree with the oracle", E, GART_TEST_POLICIES) {
     CAPTURE(s.name);
     CHECK(w.aside <= 2 + e.picture.pixels.size() / 20);
     for (auto kind : tracers<E>()) {
-      bool const embree = kind == tracer_kind::embree;
-      CAPTURE(embree);
-      for (std::string const strategy : {"pixel", "hybrid", "primitive", "deterministic"}) {
+      int const tracer = static_cast<int>(kind);
+      CAPTURE(tracer);
+      for (std::string const& strategy : strategies_for(kind, s.model.sh_degree)) {
         CAPTURE(strategy);
         auto const got =
             scene_gradients(exec, s.model, s.view, s.options, s.active_degree, kind, strategy, w.color_gradient);

@@ -3,6 +3,7 @@
 
 #include <gart/backward/backward.hpp>
 #include <gart/trace/bvh_tracer.hpp>
+#include <gart/trace/tile_tracer.hpp>
 #if defined(GART_WITH_EMBREE)
 #include <gart/trace/embree_tracer.hpp>
 #endif
@@ -13,7 +14,7 @@
 
 namespace gart_test {
 
-enum class tracer_kind { bvh, embree };
+enum class tracer_kind { bvh, embree, tiles };
 
 template <class E>
 struct traced {
@@ -38,6 +39,7 @@ struct list_program {
   gart::hit* list;
 
   GART_HD bool active(gart::index_t i) const { return order.inside(order.at(i)); }
+  GART_HD gart::pixel at(gart::index_t i) const { return order.at(i); }
   GART_HD state begin(gart::index_t i) const {
     state s;
     s.direction = gart::pixel_ray(view, order.at(i)).direction;
@@ -60,6 +62,10 @@ template <class E, class F>
 auto with_tracer(E& exec, tracer_kind kind, F&& body) {
   if (kind == tracer_kind::bvh) {
     gart::bvh_tracer<E> tracer(exec);
+    return body(tracer);
+  }
+  if (kind == tracer_kind::tiles) {
+    gart::tile_tracer<E> tracer(exec);
     return body(tracer);
   }
 #if defined(GART_WITH_EMBREE)
@@ -94,7 +100,7 @@ traced<E> render_scene(E& exec, gart::gaussian_model const& model, gart::camera 
     gart::buffer<gart::u32, E> hits(exec, pixels);
     auto const constant = std::as_const(scene).view();
     records.prepare(exec, constant, view.position, options.alpha_min);
-    tracer.prepare(exec, constant, records.view(), view.position, options.alpha_min, options.near);
+    tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
     detail::with_degree(model.sh_degree, [&](auto degree) {
       gart::forward<degree>(exec, tracer, constant, view, options, active_degree,
                             {color.data(), transmittance.data(), depth.data(), hits.data()}, gart::record_none{});
@@ -103,43 +109,67 @@ traced<E> render_scene(E& exec, gart::gaussian_model const& model, gart::camera 
   });
 }
 
-template <class Strategy, class E>
+template <int Degree, class Strategy, class Tracer, class E>
 gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, gart::camera const& view,
-                                  gart::render_options const& options, int active_degree, tracer_kind kind,
+                                  gart::render_options const& options, int active_degree,
                                   std::vector<float> const& color_gradient) {
-  return detail::with_tracer(exec, kind, [&](auto& tracer) {
-    gart::gaussians<E> scene(exec, model);
-    gart::gaussians<E> gradients(exec, scene.size(), model.sh_degree);
-    gart::frame_records<E> records(exec);
-    gart::backward<E, Strategy> pass(exec);
-    std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
-    gart::buffer<float, E> color(exec, 3 * pixels), gradient(exec, color_gradient);
-    auto const constant = std::as_const(scene).view();
-    records.prepare(exec, constant, view.position, options.alpha_min);
-    tracer.prepare(exec, constant, records.view(), view.position, options.alpha_min, options.near);
-    pass.prepare(exec, constant, view, options.alpha_min, options.near);
-    detail::with_degree(model.sh_degree, [&](auto degree) {
-      gart::forward<degree>(exec, tracer, constant, view, options, active_degree, {color.data()}, pass.record());
-      pass.template run<degree>(exec, tracer, constant, records.view(), view, options, active_degree, color, gradient,
-                                gradients);
-    });
-    return gradients.to_host();
-  });
+  Tracer tracer(exec);
+  gart::gaussians<E> scene(exec, model);
+  gart::gaussians<E> gradients(exec, scene.size(), model.sh_degree);
+  gart::frame_records<E> records(exec);
+  gart::backward<E, Strategy> pass(exec);
+  std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
+  gart::buffer<float, E> color(exec, 3 * pixels), gradient(exec, color_gradient);
+  auto const constant = std::as_const(scene).view();
+  records.prepare(exec, constant, view.position, options.alpha_min);
+  tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
+  pass.prepare(exec, tracer, constant, view, options.alpha_min, options.near);
+  gart::forward<Degree>(exec, tracer, constant, view, options, active_degree, {color.data()}, pass.record());
+  pass.template run<Degree>(exec, tracer, constant, records.view(), view, options, active_degree, color, gradient,
+                            gradients);
+  return gradients.to_host();
+}
+
+// Which strategies are compiled here for a tracer and a degree: each strategy and each tracer at every degree, the other
+// combinations at degree 3 only, for the sake of the compiler's time.
+inline std::vector<std::string> strategies_for(tracer_kind kind, int degree) {
+  if (kind == tracer_kind::embree) return {"pixel"};
+  if (kind == tracer_kind::tiles) return degree == 3 ? std::vector<std::string>{"pixel", "hybrid", "primitive", "deterministic"}
+                                                     : std::vector<std::string>{"primitive"};
+  return degree == 3 ? std::vector<std::string>{"pixel", "hybrid", "primitive"} : std::vector<std::string>{"pixel"};
 }
 
 template <class E>
 gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                                      gart::render_options const& options, int active_degree, tracer_kind kind,
                                      std::string const& strategy, std::vector<float> const& color_gradient) {
-  if (strategy == "pixel")
-    return gradients_by<gart::pixel_strategy>(exec, model, view, options, active_degree, kind, color_gradient);
-  if (strategy == "hybrid")
-    return gradients_by<gart::hybrid_strategy>(exec, model, view, options, active_degree, kind, color_gradient);
-  if (strategy == "primitive")
-    return gradients_by<gart::primitive_strategy>(exec, model, view, options, active_degree, kind, color_gradient);
-  if (strategy == "deterministic")
-    return gradients_by<gart::deterministic_strategy>(exec, model, view, options, active_degree, kind, color_gradient);
-  throw std::runtime_error("no such strategy: " + strategy);
+  using bvh = gart::bvh_tracer<E>;
+  using tiles = gart::tile_tracer<E>;
+  return detail::with_degree(model.sh_degree, [&](auto degree) -> gart::gaussian_model {
+    auto const by = [&]<class Strategy, class Tracer>(Strategy, std::type_identity<Tracer>) {
+      return gradients_by<degree, Strategy, Tracer>(exec, model, view, options, active_degree, color_gradient);
+    };
+    if (kind == tracer_kind::bvh && strategy == "pixel") return by(gart::pixel_strategy{}, std::type_identity<bvh>{});
+    if (kind == tracer_kind::tiles && strategy == "primitive")
+      return by(gart::primitive_strategy{}, std::type_identity<tiles>{});
+    if constexpr (degree == 3) {
+      if (kind == tracer_kind::bvh && strategy == "hybrid") return by(gart::hybrid_strategy{}, std::type_identity<bvh>{});
+      if (kind == tracer_kind::bvh && strategy == "primitive")
+        return by(gart::primitive_strategy{}, std::type_identity<bvh>{});
+      if (kind == tracer_kind::tiles && strategy == "pixel")
+        return by(gart::pixel_strategy{}, std::type_identity<tiles>{});
+      if (kind == tracer_kind::tiles && strategy == "hybrid")
+        return by(gart::hybrid_strategy{}, std::type_identity<tiles>{});
+      if (kind == tracer_kind::tiles && strategy == "deterministic")
+        return by(gart::deterministic_strategy{}, std::type_identity<tiles>{});
+    }
+#if defined(GART_WITH_EMBREE)
+    if constexpr (!E::device)
+      if (kind == tracer_kind::embree && strategy == "pixel")
+        return by(gart::pixel_strategy{}, std::type_identity<gart::embree_tracer<E>>{});
+#endif
+    throw std::runtime_error("not compiled here: " + strategy);
+  });
 }
 
 template <class E>
@@ -153,7 +183,7 @@ std::vector<std::vector<gart::hit>> hit_lists(E& exec, gart::gaussian_model cons
     gart::buffer<gart::hit, E> list(exec);
     auto const constant = std::as_const(scene).view();
     records.prepare(exec, constant, view.position, options.alpha_min);
-    tracer.prepare(exec, constant, records.view(), view.position, options.alpha_min, options.near);
+    tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
     gart::pixel_order const order{view.width, view.height};
     list_program program{view, order, options.transmittance_min, counts.data(), nullptr, nullptr};
     tracer.trace(exec, "count", order.launch_size(), program);

@@ -1,6 +1,6 @@
 #pragma once
 // From the gradient of the image to the gradients of the parameters, by any strategy (strategies.hpp):
-//   prepare()  before the forward pass: footprints, the LT buffer and the tile map, where the strategy records
+//   prepare()  before the forward pass: footprints, tile map and LT buffer, where the strategy records
 //   record()   what the forward pass is given
 //   run()      gathers and scatters what the strategy says, then turns the moments of each Gaussian into the gradients of
 //              its mean, log-scale, quaternion and opacity. Overwrites `gradients`.
@@ -12,6 +12,7 @@
 #include <gart/backward/scatter.hpp>
 #include <gart/backward/strategies.hpp>
 #include <gart/render/forward.hpp>
+#include <gart/tiles/screen_tiles.hpp>
 
 namespace gart {
 
@@ -45,12 +46,21 @@ class backward {
   static constexpr bool records = Strategy::gather::any;
   static constexpr bool ordered = records && Strategy::ordered;
 
-  explicit backward(E& exec) : moments_(exec), prints_(exec), map_(exec), slots_(exec), rows_(exec) {}
+  explicit backward(E& exec) : moments_(exec), own_tiles_(exec), slots_(exec), rows_(exec) {}
 
-  void prepare(E& exec, gaussians_view<float const> scene, camera const& view, float alpha_min, float near) {
+  // After the tracer's own preparation: a tracer that has the view's tiles lends them.
+  template <class Tracer>
+  void prepare(E& exec, Tracer const& tracer, gaussians_view<float const> scene, camera const& view, float alpha_min,
+               float near) {
     if constexpr (records) {
-      prints_.measure(exec, scene, view, alpha_min, near);
-      slots_.resize(prints_.slots());
+      if constexpr (requires { tracer.tiles(); }) {
+        tiles_ = &tracer.tiles();
+      } else {
+        own_tiles_.measure(exec, scene, view, alpha_min, near);
+        own_tiles_.map(exec, tile_order::cover);
+        tiles_ = &own_tiles_;
+      }
+      slots_.resize(tiles_->prints().slots());
       stage_scope stage(exec, "clear");
       exec.fill(slots_.data(), 0xff, slots_.size() * sizeof(entry));  // a NaN: not written
     }
@@ -58,7 +68,7 @@ class backward {
 
   record_type record() const {
     if constexpr (records)
-      return {prints_.ranges().data(), slots_.data()};
+      return {tiles_->prints().ranges().data(), slots_.data()};
     else
       return {};
   }
@@ -74,19 +84,19 @@ class backward {
     if constexpr (!ordered || Strategy::scatter::any) moments_.zero();
     if constexpr (!ordered) gradients.sh.zero();
     if constexpr (records) {
-      tile_grid<TileSize> const grid{view.width, view.height};
-      map_.build(exec, grid, prints_);
+      tile_grid<TileSize> const& grid = tiles_->grid();
+      footprints<E, TileSize> const& prints = tiles_->prints();
       constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
-      if constexpr (ordered) rows_.resize(prints_.pairs() * pair_row<ShDegree>::quads);
+      if constexpr (ordered) rows_.resize(prints.pairs() * pair_row<ShDegree>::quads);
       gather_kernel<ShDegree, typename Strategy::gather, entry, TileSize, sums, E> const kernel{
-          view,          grid,         map_.view(),  prints_.ranges().data(), slots_.data(),
+          view,          grid,         tiles_->lists().view(),  prints.ranges().data(), slots_.data(),
           gaussians_in_frame.data(),   scene.sh,     active_degree,           color.data(),
           color_gradient.data(),       gradients.sh.data(), moments_.data(),
-          prints_.pair_offsets().data(),             rows_.data()};
+          prints.pair_offsets().data(),             rows_.data()};
       parallel_for(exec, "backward/gather", tile_range{grid.count(), 64}, kernel);
       if constexpr (ordered)
         parallel_for(exec, "backward/sum", scene.count * pair_row<ShDegree>::quads,
-                     sum_pairs<ShDegree, typename Strategy::gather>{prints_.pair_offsets(), prints_.pairs(), rows_.data(),
+                     sum_pairs<ShDegree, typename Strategy::gather>{prints.pair_offsets(), prints.pairs(), rows_.data(),
                                                                     gradients.sh.data(), moments_.data()});
     }
     if constexpr (Strategy::scatter::any) {
@@ -101,7 +111,6 @@ class backward {
   }
 
   std::size_t lt_bytes() const { return records ? slots_.size() * sizeof(entry) : 0; }
-  footprints<E, TileSize> const& prints() const { return prints_; }
 
  private:
   template <class R>
@@ -116,8 +125,8 @@ class backward {
   using entry = typename entry_of<record_type>::type;
 
   buffer<float, E> moments_;
-  footprints<E, TileSize> prints_;
-  tile_map<E, TileSize> map_;
+  screen_tiles<E, TileSize> own_tiles_;
+  screen_tiles<E, TileSize> const* tiles_ = nullptr;
   buffer<entry, E> slots_;
   buffer<quad, E> rows_;
 };

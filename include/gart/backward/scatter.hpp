@@ -35,6 +35,7 @@ struct scatter_program {
   float* moments_out = nullptr;           // [N][moment_stride]
 
   GART_HD bool active(index_t i) const { return order.inside(order.at(i)); }
+  GART_HD pixel at(index_t i) const { return order.at(i); }
   GART_HD state begin(index_t i) const {
     state s;
     pixel const at = order.at(i);

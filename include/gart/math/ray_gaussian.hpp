@@ -117,9 +117,14 @@ GART_HD GART_INLINE response evaluate(ray_gaussian const& g, Ray const& r) {
   }
   float const od = fma(o.x, d.x, fma(o.y, d.y, mul(o.z, d.z)));
   float const dd = fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)));
+  float const inverse = divide(1.0f, dd);
   response out;
-  out.t = divide(-od, dd);
+  out.t = mul(-od, inverse);
   out.p = {fma(out.t, d.x, o.x), fma(out.t, d.y, o.y), fma(out.t, d.z, o.z)};
+  // p is orthogonal to d; the rounding of t leaves a part along it, which the thin axis of a pancake magnifies in the
+  // gradients of its mean and rotation. One step takes it out.
+  float const along = mul(-fma(out.p.x, d.x, fma(out.p.y, d.y, mul(out.p.z, d.z))), inverse);
+  out.p = {fma(along, d.x, out.p.x), fma(along, d.y, out.p.y), fma(along, d.z, out.p.z)};
   out.d2 = fma(out.p.x, out.p.x, fma(out.p.y, out.p.y, mul(out.p.z, out.p.z)));
   return out;
 }

@@ -41,6 +41,7 @@ struct composite {
   Record record;
 
   GART_HD bool active(index_t i) const { return order.inside(order.at(i)); }
+  GART_HD pixel at(index_t i) const { return order.at(i); }
   GART_HD state begin(index_t i) const {
     state s;
     s.at = order.at(i);

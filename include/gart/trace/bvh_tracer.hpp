@@ -4,6 +4,7 @@
 // `rebuild_every` says so.
 
 #include <gart/bvh/walk.hpp>
+#include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/scene/parameters.hpp>
 #include <gart/trace/window_visitor.hpp>
@@ -45,11 +46,11 @@ class bvh_tracer {
   // Steps between rebuilds; 1 builds at every prepare.
   int rebuild_every = 1;
 
-  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, vec3d frame,
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
                float alpha_min, float near) {
     boxes_.resize(scene.count);
     parallel_for(exec, "bvh/boxes", scene.count,
-                 trace_kernels::bound_ellipsoids{scene, frame, alpha_min, boxes_});
+                 trace_kernels::bound_ellipsoids{scene, view.position, alpha_min, boxes_});
     bool const rebuild = tree_.view().count != scene.count || ++age_ >= rebuild_every;
     if (rebuild) {
       tree_.build(exec, boxes_);

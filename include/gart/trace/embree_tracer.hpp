@@ -67,10 +67,10 @@ class embree_tracer {
 
   explicit embree_tracer(E& exec) : boxes_(exec) {}
 
-  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, vec3d frame,
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
                float alpha_min, float near) {
     boxes_.resize(scene.count);
-    parallel_for(exec, "embree/boxes", scene.count, trace_kernels::bound_ellipsoids{scene, frame, alpha_min, boxes_});
+    parallel_for(exec, "embree/boxes", scene.count, trace_kernels::bound_ellipsoids{scene, view.position, alpha_min, boxes_});
     stage_scope stage(exec, "embree/build");
     tree_.build(boxes_);
     scene_ = {records.data(), scene.count, near};

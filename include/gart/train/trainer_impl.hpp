@@ -53,8 +53,8 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   color_.resize(floats), color_gradient_.resize(floats);
 
   records_.prepare(exec_, constant, view.view.position, render.alpha_min);
-  tracer_.prepare(exec_, constant, records_.view(), view.view.position, render.alpha_min, render.near);
-  backward_.prepare(exec_, constant, view.view, render.alpha_min, render.near);
+  tracer_.prepare(exec_, constant, records_.view(), view.view, render.alpha_min, render.near);
+  backward_.prepare(exec_, tracer_, constant, view.view, render.alpha_min, render.near);
   forward<sh_degree>(exec_, tracer_, constant, view.view, render, degree, {color_.data()}, backward_.record());
   {
     stage_scope stage(exec_, "loss");

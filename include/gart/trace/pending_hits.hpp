@@ -1,0 +1,64 @@
+#pragma once
+// The hits of a ray that have been found and not yet passed on, sorted, in a ring of fixed capacity: the front is taken off
+// as it becomes certain, new ones usually go near the back.
+
+#include <gart/core/macros.hpp>
+#include <gart/core/types.hpp>
+
+namespace gart {
+
+struct pending_hit {
+  float t;
+  u32 place;  // in the tile's list
+  float alpha;
+};
+
+// Capacity: a power of two.
+template <int Capacity>
+class pending_hits {
+  static_assert((Capacity & (Capacity - 1)) == 0);
+
+ public:
+  GART_HD bool empty() const { return count_ == 0; }
+  GART_HD pending_hit const& front() const { return at(0); }
+  GART_HD GART_INLINE pending_hit pop() {
+    pending_hit const h = at(0);
+    ++head_, --count_;
+    return h;
+  }
+
+  // `less(a, b)` is the order of hits. True where there was no room: `h` is then the farthest of all and was left out.
+  template <class Less>
+  GART_HD GART_INLINE bool insert(pending_hit& h, Less const& less) {
+    bool const full = count_ == Capacity;
+    if (full) {
+      pending_hit const farthest = at(Capacity - 1);
+      if (!less(h, farthest)) return true;
+      --count_;
+      place(h, less);
+      h = farthest;
+      return true;
+    }
+    place(h, less);
+    return false;
+  }
+
+ private:
+  template <class Less>
+  GART_HD GART_INLINE void place(pending_hit const& h, Less const& less) {
+    u32 k = count_++;
+    for (; k > 0; --k) {
+      pending_hit const previous = at(k - 1);
+      if (!less(h, previous)) break;
+      at(k) = previous;
+    }
+    at(k) = h;
+  }
+  GART_HD GART_INLINE pending_hit& at(u32 k) { return ring_[(head_ + k) & (Capacity - 1)]; }
+  GART_HD GART_INLINE pending_hit const& at(u32 k) const { return ring_[(head_ + k) & (Capacity - 1)]; }
+
+  pending_hit ring_[Capacity];
+  u32 head_ = 0, count_ = 0;
+};
+
+}  // namespace gart

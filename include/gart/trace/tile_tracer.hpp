@@ -1,0 +1,123 @@
+#pragma once
+// The traverser on tile lists, for the primary rays of a camera: no tree. A tile's list holds every Gaussian that any of its
+// pixels can hit, sorted by conservative near depth, so a pixel walks the list and keeps the hits found in a small window
+// sorted by (t, id); the first of them is next as soon as it lies nearer than all that is left of the list can. When the
+// window overflows its nearest are kept, and the ray resumes strictly after its last hit from the first candidate whose hit
+// was dropped: exact for any number of hits. The hits are those of the other tracers, bit for bit.
+//
+// Ray programs must also say where a ray's pixel is: at(i), with x and y. Cost: the footprints, one sort of the (primitive,
+// tile) pairs, and a walk of each tile's list up to where its rays end.
+
+#include <gart/scene/camera.hpp>
+#include <gart/scene/gaussians.hpp>
+#include <gart/tiles/screen_tiles.hpp>
+#include <gart/trace/pending_hits.hpp>
+#include <gart/trace/ray_program.hpp>
+
+namespace gart {
+
+namespace trace_kernels {
+
+template <int Capacity, int Size, ray_program P>
+struct walk_tiles {
+  static constexpr int block_size = 64;
+  tile_grid<Size> grid;
+  tile_map_view map;
+  float const* depths;
+  traced_scene scene;
+  vec3 forward;  // the camera's axis
+  P program;
+
+  GART_KERNEL void operator()(index_t i) const {
+    if (!program.active(i)) return;
+    auto state = program.begin(i);
+    auto const at = program.at(i);
+    walk(state, program.ray_of(i, state),
+         static_cast<u32>(at.y) / Size * grid.columns() + static_cast<u32>(at.x) / Size);
+    program.end(i, state);
+  }
+
+ private:
+  template <class State>
+  GART_HD GART_INLINE void walk(State& state, primary_ray const& ray, u32 tile) const {
+    vec3 const& d = ray.direction;
+    // z = t * cosine; rounded up, so that what is said to lie nearer than a depth does.
+    float const cosine = (d.x * forward.x + d.y * forward.y + d.z * forward.z) * 1.000002f;
+    u32 const end = map.offsets[tile + 1];
+    u32 const* const list = map.primitives.data();
+    auto const nearer = [list](pending_hit const& a, pending_hit const& b) {
+      return a.t < b.t || (a.t == b.t && list[a.place] < list[b.place]);
+    };
+    float last_t = scene.near;
+    u32 last_id = 0xffffffffu;
+    pending_hits<Capacity> pending;
+    auto const pass_on = [&]() {
+      pending_hit const h = pending.pop();
+      last_t = h.t, last_id = list[h.place];
+      return program.on_hit(state, hit{h.t, last_id, h.alpha});
+    };
+    for (u32 first = map.offsets[tile]; first < end;) {
+      // Hits at or behind the limit did not fit; the earliest candidate of them is where the next round begins.
+      pending_hit limit{3.402823466e38f, end, 0};
+      u32 resume = end;
+      for (u32 k = first; k < end; ++k) {
+        u32 const id = list[k];
+        float const bound = near_depth(depths[id], map.depth_shift);  // of all that is left of the list
+        while (!pending.empty() && pending.front().t * cosine < bound)
+          if (!pass_on()) return;
+        if (resume < end && pending.empty() && limit.t * cosine < bound) break;
+        ray_gaussian const g = scene.gaussians[id];
+        response const r = evaluate(g, ray);
+        if (!is_hit(g, r, scene.near) || !before(last_t, last_id, r.t, id)) continue;
+        pending_hit h{r.t, k, 0};
+        if (resume < end && !nearer(h, limit)) {
+          resume = k < resume ? k : resume;
+          continue;
+        }
+        h.alpha = hit_alpha(g, r);
+        if (pending.insert(h, nearer)) {
+          limit = h;
+          resume = h.place < resume ? h.place : resume;
+        }
+      }
+      while (!pending.empty())
+        if (!pass_on()) return;
+      first = resume;
+    }
+  }
+};
+
+}  // namespace trace_kernels
+
+template <execution E, int Size = 8>
+class tile_tracer {
+ public:
+  static constexpr char const* name = "tiles";
+  static constexpr int window = 16;
+
+  explicit tile_tracer(E& exec) : tiles_(exec) {}
+
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
+               float alpha_min, float near) {
+    tiles_.measure(exec, scene, view, alpha_min, near);
+    tiles_.map(exec, tile_order::depth);
+    scene_ = {records.data(), scene.count, near};
+    forward_ = view.rotation[2];
+  }
+
+  template <ray_program P>
+  void trace(E& exec, char const* label, index_t rays, P const& program) {
+    parallel_for(exec, label, rays,
+                 trace_kernels::walk_tiles<window, Size, P>{tiles_.grid(), tiles_.lists().view(),
+                                                            tiles_.prints().depths().data(), scene_, forward_, program});
+  }
+
+  screen_tiles<E, Size> const& tiles() const { return tiles_; }
+
+ private:
+  screen_tiles<E, Size> tiles_;
+  traced_scene scene_;
+  vec3 forward_{0, 0, 1};
+};
+
+}  // namespace gart
