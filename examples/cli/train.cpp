@@ -112,6 +112,7 @@ class training_run {
     } else {
       begin_anew();
     }
+    if (a_.resume) say_.note("resuming after step " + with_commas(session_->steps_done()));
     say_.note(row_.backend + " backend, " + row_.tracer + " tracer, " + row_.backward + " backward pass");
     load_seconds_ = loading.seconds();
   }

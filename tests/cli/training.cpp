@@ -77,6 +77,9 @@ TEST_CASE("a run that was stopped and resumed ends with the same bytes") {
   CHECK(text_of(here / "parts/model.ply") != text_of(here / "whole/model.ply"));
   auto const resumed = here.gart("train --resume --out parts");
   REQUIRE_MESSAGE(resumed.code == 0, resumed.err);
+  // Starting over would end with the same bytes too.
+  CHECK_MESSAGE(has(resumed.err, "resuming after step 10\n"), resumed.err);
+  CHECK(has(resumed.err, "\n11/20 "));
   CHECK(text_of(here / "parts/model.ply") == text_of(here / "whole/model.ply"));
   CHECK(here.json("parts/metrics.json")["psnr"] == here.json("whole/metrics.json")["psnr"]);
   CHECK(here.json("parts/history.json")["train"].size() == here.json("whole/history.json")["train"].size());
