@@ -12,7 +12,7 @@
 #include <gart/backward/scatter.hpp>
 #include <gart/backward/strategies.hpp>
 #include <gart/render/forward.hpp>
-#include <gart/tiles/screen_tiles.hpp>
+#include <gart/tiles/tile_map.hpp>
 
 namespace gart {
 
@@ -42,25 +42,30 @@ struct finish {
 template <execution E, class Strategy, int TileSize = 8>
 class backward {
  public:
+  template <class Term>
+  using only = std::conditional_t<(std::is_same_v<Term, gart::color> ? Strategy::gather::color : Strategy::gather::geometry),
+                                  terms<Term>, terms<>>;
   using record_type = typename Strategy::template record<TileSize>;
   static constexpr bool records = Strategy::gather::any;
   static constexpr bool ordered = records && Strategy::ordered;
 
-  explicit backward(E& exec) : moments_(exec), own_tiles_(exec), slots_(exec), rows_(exec) {}
+  explicit backward(E& exec) : moments_(exec), own_prints_(exec), map_(exec), slots_(exec), rows_(exec) {}
 
-  // After the tracer's own preparation: a tracer that has the view's tiles lends them.
+  // After the tracer's own preparation: a tracer that has the view's footprints lends them.
   template <class Tracer>
   void prepare(E& exec, Tracer const& tracer, gaussians_view<float const> scene, camera const& view, float alpha_min,
                float near) {
     if constexpr (records) {
-      if constexpr (requires { tracer.tiles(); }) {
-        tiles_ = &tracer.tiles();
+      grid_ = {view.width, view.height};
+      if constexpr (requires { tracer.prints(); }) {
+        prints_ = &tracer.prints();
       } else {
-        own_tiles_.measure(exec, scene, view, alpha_min, near);
-        own_tiles_.map(exec, tile_order::cover);
-        tiles_ = &own_tiles_;
+        own_prints_.measure(exec, scene, view, alpha_min, near);
+        prints_ = &own_prints_;
       }
-      slots_.resize(tiles_->prints().slots());
+      // Sorted by cover also where the tracer has lists sorted by depth: lanes in step are worth the sort.
+      map_.build(exec, grid_, *prints_, tile_order::cover);
+      slots_.resize(prints_->slots());
       stage_scope stage(exec, "clear");
       exec.fill(slots_.data(), 0xff, slots_.size() * sizeof(entry));  // a NaN: not written
     }
@@ -68,7 +73,7 @@ class backward {
 
   record_type record() const {
     if constexpr (records)
-      return {tiles_->prints().ranges().data(), slots_.data()};
+      return {prints_->ranges().data(), slots_.data()};
     else
       return {};
   }
@@ -84,19 +89,14 @@ class backward {
     if constexpr (!ordered || Strategy::scatter::any) moments_.zero();
     if constexpr (!ordered) gradients.sh.zero();
     if constexpr (records) {
-      tile_grid<TileSize> const& grid = tiles_->grid();
-      footprints<E, TileSize> const& prints = tiles_->prints();
-      constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
-      if constexpr (ordered) rows_.resize(prints.pairs() * pair_row<ShDegree>::quads);
-      gather_kernel<ShDegree, typename Strategy::gather, entry, TileSize, sums, E> const kernel{
-          view,          grid,         tiles_->lists().view(),  prints.ranges().data(), slots_.data(),
-          gaussians_in_frame.data(),   scene.sh,     active_degree,           color.data(),
-          color_gradient.data(),       gradients.sh.data(), moments_.data(),
-          prints.pair_offsets().data(),             rows_.data()};
-      parallel_for(exec, "backward/gather", tile_range{grid.count(), 64}, kernel);
+      if constexpr (ordered) rows_.resize(prints_->pairs() * pair_row<ShDegree>::quads);
+      // Colour and geometry in a launch each: together their sums and coefficients leave too few registers for enough
+      // warps to hide memory behind.
+      gather_terms<ShDegree, only<gart::color>>(exec, scene, gaussians_in_frame, view, active_degree, color, color_gradient, gradients);
+      gather_terms<ShDegree, only<geometry>>(exec, scene, gaussians_in_frame, view, active_degree, color, color_gradient, gradients);
       if constexpr (ordered)
         parallel_for(exec, "backward/sum", scene.count * pair_row<ShDegree>::quads,
-                     sum_pairs<ShDegree, typename Strategy::gather>{prints.pair_offsets(), prints.pairs(), rows_.data(),
+                     sum_pairs<ShDegree, typename Strategy::gather>{prints_->pair_offsets(), prints_->pairs(), rows_.data(),
                                                                     gradients.sh.data(), moments_.data()});
     }
     if constexpr (Strategy::scatter::any) {
@@ -124,9 +124,36 @@ class backward {
   };
   using entry = typename entry_of<record_type>::type;
 
+  template <int ShDegree, class Terms>
+  void gather_terms(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians_in_frame,
+                    camera const& view, int active_degree, span<float const> image, span<float const> image_gradient,
+                    gaussians<E>& gradients) {
+    if constexpr (Terms::any) {
+      constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
+      gather_kernel<ShDegree, Terms, entry, TileSize, sums, E> const kernel{view,
+                                                                            grid_,
+                                                                            map_.view(),
+                                                                            prints_->ranges().data(),
+                                                                            slots_.data(),
+                                                                            gaussians_in_frame.data(),
+                                                                            scene.sh,
+                                                                            active_degree,
+                                                                            image.data(),
+                                                                            image_gradient.data(),
+                                                                            gradients.sh.data(),
+                                                                            moments_.data(),
+                                                                            prints_->pair_offsets().data(),
+                                                                            rows_.data()};
+      parallel_for(exec, Terms::color ? "backward/gather colour" : "backward/gather geometry",
+                   tile_range{grid_.count(), 64}, kernel);
+    }
+  }
+
   buffer<float, E> moments_;
-  screen_tiles<E, TileSize> own_tiles_;
-  screen_tiles<E, TileSize> const* tiles_ = nullptr;
+  footprints<E, TileSize> own_prints_;
+  footprints<E, TileSize> const* prints_ = nullptr;
+  tile_grid<TileSize> grid_;
+  tile_map<E, TileSize> map_;
   buffer<entry, E> slots_;
   buffer<quad, E> rows_;
 };

@@ -15,11 +15,6 @@
 
 namespace gart {
 
-// 16 bytes, moved as one.
-struct alignas(16) quad {
-  float v[4];
-};
-
 // Where a lane's sums go: added to the Gaussian atomically, or kept as one row a (primitive, tile) pair, in primitive-major
 // order, for sum_pairs to add up in that order: the same bits in every run.
 enum class gather_sums { atomic, ordered };
@@ -92,79 +87,26 @@ struct gather_kernel {
     for (int k = 0; k < 4 * pixel_data::basis_quads; ++k) out.basis[k / 4].v[k % 4] = k < bands ? basis.y[k] : 0.0f;
   }
 
-  // The coefficients in use; those above the active degree as zero, so that the loops over bands are straight.
-  GART_HD void load_coefficients(float (&c)[sh_stride], u32 id) const {
-    float const* from = sh + static_cast<std::size_t>(sh_stride) * id;
-    int const active = 3 * sh_coefficients(active_degree);
-    if constexpr (sh_stride % 4 == 0) {
-      GART_UNROLL
-      for (int k = 0; k < sh_stride; k += 4) {
-        quad q{};
-        if (k < active) q = *reinterpret_cast<quad const*>(from + k);
-        GART_UNROLL
-        for (int i = 0; i < 4; ++i) c[k + i] = k + i < active ? q.v[i] : 0.0f;
-      }
-    } else {
-      GART_UNROLL
-      for (int k = 0; k < sh_stride; ++k) c[k] = k < active ? from[k] : 0.0f;
-    }
-  }
-
   GART_HD void gather(scratch const& s, pixel_box const& area, u32 id) const {
     lt_range const range = ranges[id];
     pixel_box const cell = intersect(range.box, area);
     Entry const* slot = slots + range.offset + tile_offset(range.box, cell);
-    ray_gaussian const g = records[id];
-    float coefficients[sh_stride];
-    load_coefficients(coefficients, id);
     float sh_sum[sh_stride] = {};
     float moment_sum[moment_stride] = {};
-    u32 const width = cell.width(), slots_here = cell.area();
+    lane_data const data(*this, id);
+    u32 const width = cell.width(), last = cell.area() - 1;
     u32 const skip = area.width() - width;
     u32 p = (cell.y0 - area.y0) * area.width() + (cell.x0 - area.x0);
     u32 column = 0;
-    for (u32 k = 0; k < slots_here; ++k) {
-      Entry const entry = slot[k];
+    Entry next = slot[0];  // read one ahead: what follows hides the way from memory
+    for (u32 k = 0; k <= last; ++k) {
+      Entry const entry = next;
+      next = slot[k < last ? k + 1 : last];
       pixel_data const& at = s.pixels[p];
       ++p;
       if (++column == width) column = 0, p += skip;
-      float const before = transmittance_of(entry);
-      if (!written(before)) continue;
-      quad const direction_total = at.direction_total, pixel_gradient = at.gradient;
-      response const r = evaluate(g, primary_ray{{direction_total.v[0], direction_total.v[1], direction_total.v[2]}});
-      float const alpha = hit_alpha(g, r), weight = before * alpha;
-      float basis[4 * pixel_data::basis_quads];
-      GART_UNROLL
-      for (int q = 0; q < pixel_data::basis_quads; ++q) {
-        quad const four = at.basis[q];
-        GART_UNROLL
-        for (int i = 0; i < 4; ++i) basis[4 * q + i] = four.v[i];
-      }
-      vec3 c(0.5f);
-      GART_UNROLL
-      for (int b = 0; b < bands; ++b) {
-        c.x += basis[b] * coefficients[3 * b];
-        c.y += basis[b] * coefficients[3 * b + 1];
-        c.z += basis[b] * coefficients[3 * b + 2];
-      }
-      vec3 const dl(pixel_gradient.v[0], pixel_gradient.v[1], pixel_gradient.v[2]);
-      if constexpr (Terms::color) {
-        vec3 const cg = color_gradient_of(c, dl, weight);
-        GART_UNROLL
-        for (int b = 0; b < bands; ++b) {
-          sh_sum[3 * b] += basis[b] * cg.x;
-          sh_sum[3 * b + 1] += basis[b] * cg.y;
-          sh_sum[3 * b + 2] += basis[b] * cg.z;
-        }
-      }
-      if constexpr (Terms::geometry) {
-        vec3 const seen = clamped_color(c);
-        float const color_g = seen.x * dl.x + seen.y * dl.y + seen.z * dl.z;
-        float const behind = direction_total.v[3] - (entry.r * dl.x + entry.g * dl.y + entry.b * dl.z);
-        moments const m = hit_moments(g, r, alpha_gradient(before, color_g, behind, alpha));
-        GART_UNROLL
-        for (int i = 0; i < moment_count; ++i) moment_sum[i] += m.v[i];
-      }
+      if (!entry.written()) continue;
+      add(at, entry, data, sh_sum, moment_sum);
     }
     if constexpr (Sums == gather_sums::atomic) {
       if constexpr (Terms::color)
@@ -173,6 +115,55 @@ struct gather_kernel {
         E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, moment_sum, moment_count);
     } else {
       store_row(range.box, area, id, sh_sum, moment_sum);
+    }
+  }
+
+  // What only the geometry's gradient reads of a Gaussian.
+  struct geometry_data {
+    ray_gaussian gaussian;
+    sh_row<ShDegree> coefficients;
+    GART_HD geometry_data(gather_kernel const& k, u32 id)
+        : gaussian(k.records[id]), coefficients(k.sh + static_cast<std::size_t>(sh_stride) * id, k.active_degree) {}
+  };
+  struct no_data {
+    GART_HD no_data(gather_kernel const&, u32) {}
+  };
+  using lane_data = std::conditional_t<Terms::geometry, geometry_data, no_data>;
+
+  // One hit: its pixel, its record.
+  GART_HD GART_INLINE void add(pixel_data const& at, Entry const& entry, lane_data const& data,
+                               float (&sh_sum)[sh_stride], float (&moment_sum)[moment_stride]) const {
+    quad const g = at.gradient;
+    vec3 const dl(g.v[0], g.v[1], g.v[2]);
+    sh_basis<ShDegree> basis;
+    GART_UNROLL
+    for (int q = 0; q < pixel_data::basis_quads; ++q) {
+      quad const four = at.basis[q];
+      GART_UNROLL
+      for (int i = 0; i < 4; ++i)
+        if (4 * q + i < bands) basis.y[4 * q + i] = four.v[i];
+    }
+    if constexpr (Terms::color) {
+      float const w = entry.weight();
+      vec3 const cg(entry.clamped(0) ? 0.0f : w * dl.x, entry.clamped(1) ? 0.0f : w * dl.y,
+                    entry.clamped(2) ? 0.0f : w * dl.z);
+      GART_UNROLL
+      for (int b = 0; b < bands; ++b) {
+        sh_sum[3 * b] += basis.y[b] * cg.x;
+        sh_sum[3 * b + 1] += basis.y[b] * cg.y;
+        sh_sum[3 * b + 2] += basis.y[b] * cg.z;
+      }
+    }
+    if constexpr (Terms::geometry) {
+      quad const d = at.direction_total;
+      response const r = evaluate(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
+      float const alpha = hit_alpha(data.gaussian, r), before = entry.weight() / alpha;
+      vec3 const c = clamped_color(basis.unclamped(data.coefficients.v)), l = entry.color();
+      float const color_g = c.x * dl.x + c.y * dl.y + c.z * dl.z;
+      float const behind = d.v[3] - (l.x * dl.x + l.y * dl.y + l.z * dl.z);
+      moments const m = hit_moments(data.gaussian, r, alpha_gradient(before, color_g, behind, alpha));
+      GART_UNROLL
+      for (int i = 0; i < moment_count; ++i) moment_sum[i] += m.v[i];
     }
   }
 

@@ -50,7 +50,8 @@ struct scatter_program {
   GART_HD primary_ray ray_of(index_t, state const& s) const { return {s.direction}; }
 
   GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h) const {
-    vec3 const unclamped = s.basis.unclamped(sh + static_cast<std::size_t>(sh_stride) * h.id, active_degree);
+    vec3 const unclamped = 
+        s.basis.unclamped(sh_row<ShDegree>(sh + static_cast<std::size_t>(sh_stride) * h.id, active_degree).v);
     float weight;
     float const alpha_gradient = s.gradient.pass(h.alpha, clamped_color(unclamped), weight);
     if constexpr (Terms::color) {

@@ -22,7 +22,7 @@ struct hybrid_strategy {
   static constexpr char const* name = "hybrid";
   static constexpr bool ordered = false;
   template <int Size>
-  using record = record_lt<float, Size>;
+  using record = record_lt<weight_entry, Size>;
   using gather = terms<color>;
   using scatter = terms<geometry>;
 };

@@ -13,4 +13,9 @@ using u32 = std::uint32_t;
 using u64 = std::uint64_t;
 using index_t = std::uint32_t;
 
+// 16 bytes, moved as one: what wide loads and stores are made of.
+struct alignas(16) quad {
+  float v[4];
+};
+
 }  // namespace gart

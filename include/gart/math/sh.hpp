@@ -3,6 +3,7 @@
 // max(0, 0.5 + sum_k c_k Y_k(d)), d the unit direction of the ray.
 
 #include <gart/core/macros.hpp>
+#include <gart/core/types.hpp>
 #include <gart/math/glm.hpp>
 
 namespace gart {
@@ -39,18 +40,40 @@ struct sh_basis {
     }
   }
 
-  // Before the clamp at zero; `coefficients` is [size][3]. Bands above
-  // `active` are left out: a schedule raises the degree while the storage stays.
-  GART_HD GART_INLINE vec3 unclamped(float const* coefficients, int active) const {
+  // Before the clamp at zero.
+  GART_HD GART_INLINE vec3 unclamped(float const (&coefficients)[3 * size]) const {
     vec3 c(0.5f);
     GART_UNROLL
     for (int k = 0; k < size; ++k) {
-      if (k == (active + 1) * (active + 1)) break;
       c.x += y[k] * coefficients[3 * k];
       c.y += y[k] * coefficients[3 * k + 1];
       c.z += y[k] * coefficients[3 * k + 2];
     }
     return c;
+  }
+};
+
+// The coefficients of one Gaussian, [size][3] from `from`; those above the active degree as zero: a schedule raises the
+// degree while the storage stays, and loops over bands stay straight. Rows of a multiple of 16 bytes are read as such.
+template <int Degree>
+struct sh_row {
+  static constexpr int floats = 3 * sh_basis<Degree>::size;
+  float v[floats];
+
+  GART_HD GART_INLINE sh_row(float const* from, int active_degree) {
+    int const active = 3 * (active_degree + 1) * (active_degree + 1);
+    if constexpr (floats % 4 == 0) {
+      GART_UNROLL
+      for (int k = 0; k < floats; k += 4) {
+        quad q{};
+        if (k < active) q = *reinterpret_cast<quad const*>(from + k);
+        GART_UNROLL
+        for (int i = 0; i < 4; ++i) v[k + i] = k + i < active ? q.v[i] : 0.0f;
+      }
+    } else {
+      GART_UNROLL
+      for (int k = 0; k < floats; ++k) v[k] = k < active ? from[k] : 0.0f;
+    }
   }
 };
 

@@ -52,11 +52,12 @@ struct composite {
   GART_HD primary_ray ray_of(index_t, state const& s) const { return {s.direction}; }
   GART_HD GART_INLINE bool on_hit(state& s, hit const& h) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
-    vec3 const c = clamped_color(s.basis.unclamped(sh + stride * h.id, active_degree));
+    vec3 const unclamped = s.basis.unclamped(sh_row<ShDegree>(sh + stride * h.id, active_degree).v);
+    vec3 const c = clamped_color(unclamped);
     float const weight = s.transmittance * h.alpha;
     s.color += weight * c;
     s.depth += weight * h.t;
-    record(s.at, h, s.color, s.transmittance);
+    record(s.at, h, s.color, weight, unclamped);
     s.transmittance *= 1.0f - h.alpha;
     ++s.hits;
     return s.transmittance >= options.transmittance_min;

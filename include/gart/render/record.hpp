@@ -1,6 +1,6 @@
 #pragma once
 // What the forward pass leaves of each hit for the backward pass to find. A record is called once a hit, after it has been
-// composited, with the ray's accumulated colour and the transmittance before the hit; it is part of a strategy (backward/strategies.hpp).
+// composited, with the ray's accumulated colour, the hit's weight T alpha and its own colour before the clamp; it is part of a strategy (backward/strategies.hpp).
 
 #include <gart/render/pixels.hpp>
 #include <gart/trace/hit.hpp>
@@ -9,7 +9,8 @@ namespace gart {
 
 // Nothing: the backward pass traces again.
 struct record_none {
-  GART_HD GART_INLINE void operator()(pixel, hit const&, vec3 const& /*color*/, float /*transmittance*/) const {}
+  GART_HD GART_INLINE void operator()(pixel, hit const&, vec3 const& /*color*/, float /*weight*/,
+                                      vec3 const& /*unclamped*/) const {}
 };
 
 }  // namespace gart

@@ -10,7 +10,7 @@
 
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
-#include <gart/tiles/screen_tiles.hpp>
+#include <gart/tiles/tile_map.hpp>
 #include <gart/trace/pending_hits.hpp>
 #include <gart/trace/ray_program.hpp>
 
@@ -95,12 +95,13 @@ class tile_tracer {
   static constexpr char const* name = "tiles";
   static constexpr int window = 16;
 
-  explicit tile_tracer(E& exec) : tiles_(exec) {}
+  explicit tile_tracer(E& exec) : prints_(exec), map_(exec) {}
 
   void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
                float alpha_min, float near) {
-    tiles_.measure(exec, scene, view, alpha_min, near);
-    tiles_.map(exec, tile_order::depth);
+    grid_ = {view.width, view.height};
+    prints_.measure(exec, scene, view, alpha_min, near);
+    map_.build(exec, grid_, prints_, tile_order::depth);
     scene_ = {records.data(), scene.count, near};
     forward_ = view.rotation[2];
   }
@@ -108,14 +109,16 @@ class tile_tracer {
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
     parallel_for(exec, label, rays,
-                 trace_kernels::walk_tiles<window, Size, P>{tiles_.grid(), tiles_.lists().view(),
-                                                            tiles_.prints().depths().data(), scene_, forward_, program});
+                 trace_kernels::walk_tiles<window, Size, P>{grid_, map_.view(), prints_.depths().data(), scene_, forward_,
+                                                            program});
   }
 
-  screen_tiles<E, Size> const& tiles() const { return tiles_; }
+  footprints<E, Size> const& prints() const { return prints_; }
 
  private:
-  screen_tiles<E, Size> tiles_;
+  tile_grid<Size> grid_;
+  footprints<E, Size> prints_;
+  tile_map<E, Size> map_;
   traced_scene scene_;
   vec3 forward_{0, 0, 1};
 };
