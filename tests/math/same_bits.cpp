@@ -1,0 +1,66 @@
+// What decides a hit gives the same bits on every policy: kernels against the same functions called here.
+#include <gart/exec/buffer.hpp>
+#include <gart/math/ray_gaussian.hpp>
+#include <support/policies.hpp>
+
+#include <random>
+#include <vector>
+
+// A host built without FMA rounds twice where others round once.
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+
+namespace {
+
+struct sample {
+  gart::gaussian_parameters gaussian;
+  gart::vec3 direction;
+};
+
+struct outcome {
+  float exponential, logarithm, sigma, cutoff, t, d2, alpha;
+};
+
+GART_HD outcome outcome_of(sample const& s) {
+  gart::ray_gaussian const g = gart::prepare(s.gaussian, gart::vec3d(0.0), 1.0f / 255);
+  gart::response const r = gart::evaluate(g, gart::primary_ray{s.direction});
+  float const x = s.gaussian.log_scale.x;
+  return {gart::exponential(x), gart::logarithm(gart::exponential(x)), g.sigma, g.cutoff, r.t, r.d2, gart::hit_alpha(g, r)};
+}
+
+struct evaluate_samples {
+  gart::span<sample const> samples;
+  gart::span<outcome> out;
+  GART_KERNEL void operator()(gart::index_t i) const { out[i] = outcome_of(samples[i]); }
+};
+
+bool same(float a, float b) { return gart::float_to_bits(a) == gart::float_to_bits(b) || (a != a && b != b); }
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("the same bits on every policy", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  std::normal_distribution<float> n;
+  std::vector<sample> samples(50000);
+  for (sample& s : samples) {
+    s.gaussian = {{n(random), n(random), 4 + n(random)}, {3 * n(random) - 2, 3 * n(random) - 2, 3 * n(random) - 2},
+                  {n(random), n(random), n(random), n(random)}, 3 * n(random)};
+    gart::vec3 const d(0.3f * n(random), 0.3f * n(random), 1.0f);
+    s.direction = d / std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
+  }
+  E exec;
+  gart::buffer<sample, E> in(exec, samples);
+  gart::buffer<outcome, E> out(exec, samples.size());
+  gart::parallel_for(exec, "evaluate", static_cast<gart::index_t>(samples.size()), evaluate_samples{in, out});
+  auto const got = out.to_host();
+  long other[7] = {};
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    outcome const e = outcome_of(samples[i]), g = got[i];
+    other[0] += !same(e.exponential, g.exponential), other[1] += !same(e.logarithm, g.logarithm);
+    other[2] += !same(e.sigma, g.sigma), other[3] += !same(e.cutoff, g.cutoff), other[4] += !same(e.t, g.t);
+    other[5] += !same(e.d2, g.d2), other[6] += !same(e.alpha, g.alpha);
+  }
+  for (long count : other) CHECK(count == 0);
+}
+
+#endif

@@ -1,0 +1,110 @@
+// The addresses of the LT buffer: one to one onto [0, sum of box areas), primitive by primitive, tile by tile.
+#include <gart/tiles/layout.hpp>
+#include <support/policies.hpp>
+
+#include <random>
+#include <vector>
+
+namespace {
+
+using gart::u32;
+using gart::u64;
+
+template <int Size>
+void check_addresses(std::mt19937_64& random, int trials) {
+  auto const below = [&](int n) { return static_cast<int>(random() % static_cast<u64>(n)); };
+  for (int trial = 0; trial < trials; ++trial) {
+    gart::tile_grid<Size> const grid{1 + below(70), 1 + below(70)};
+    CAPTURE(Size);
+    CAPTURE(grid.width);
+    CAPTURE(grid.height);
+    std::vector<gart::lt_range> ranges(1 + below(20));
+    u64 slots = 0;
+    for (auto& r : ranges) {
+      int const x0 = below(grid.width + 1), y0 = below(grid.height + 1);
+      r.box = {static_cast<gart::u16>(x0), static_cast<gart::u16>(y0),
+               static_cast<gart::u16>(x0 + below(grid.width - x0 + 1)),
+               static_cast<gart::u16>(y0 + below(grid.height - y0 + 1))};
+      if (below(8) == 0) r.box = {0, 0, static_cast<gart::u16>(grid.width), static_cast<gart::u16>(grid.height)};
+      r.offset = slots;
+      slots += r.box.area();
+    }
+    // In the order the buffer is meant to have, addresses count up by one: that is the bijection.
+    u64 next = 0;
+    long wrong = 0, wrong_walk = 0;
+    for (auto const& r : ranges)
+      for (u32 t = 0; t < grid.count(); ++t) {
+        gart::pixel_box const cell = gart::intersect(r.box, grid.tile(t));
+        u64 const cell_begin = next;
+        for (u32 y = cell.y0; y < cell.y1; ++y)
+          for (u32 x = cell.x0; x < cell.x1; ++x) wrong += gart::lt_index<Size>(r, x, y) != next++;
+        // What a gather over (primitive, tile) walks.
+        if (!cell.empty()) wrong_walk += r.offset + gart::tile_offset(r.box, cell) != cell_begin;
+        wrong_walk += next - cell_begin != cell.area();
+      }
+    CHECK(wrong == 0);
+    CHECK(wrong_walk == 0);
+    CHECK(next == slots);
+  }
+}
+
+template <int Size>
+void check_grid(int width, int height) {
+  gart::tile_grid<Size> const grid{width, height};
+  CAPTURE(Size);
+  CAPTURE(width);
+  CAPTURE(height);
+  std::vector<int> covered(static_cast<std::size_t>(width) * height, 0);
+  for (u32 t = 0; t < grid.count(); ++t) {
+    gart::pixel_box const b = grid.tile(t);
+    CHECK(!b.empty());
+    CHECK(gart::tiles_of<Size>(b).area() == 1);
+    for (int y = b.y0; y < b.y1; ++y)
+      for (int x = b.x0; x < b.x1; ++x) ++covered[static_cast<std::size_t>(y) * width + x];
+  }
+  for (int c : covered)
+    if (c != 1) FAIL_CHECK("a pixel lies in " << c << " tiles");
+}
+
+}  // namespace
+
+TEST_CASE("addresses of (primitive, tile, pixel) are one to one and in order") {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  check_addresses<4>(random, 100);
+  check_addresses<8>(random, 100);
+  check_addresses<16>(random, 100);
+}
+
+TEST_CASE("addresses keep 64 bits") {
+  gart::lt_range const range{u64{5} << 32, {0, 0, 65535, 65535}};
+  CHECK(gart::lt_index<8>(range, 65534, 65534) == (u64{5} << 32) + u64{65535} * 65535 - 1);
+}
+
+TEST_CASE("tiles cover every pixel once, whatever the image's size") {
+  for (int const* size : {(int const[]){1, 1}, (int const[]){7, 5}, (int const[]){8, 8}, (int const[]){64, 48}, (int const[]){33, 17}}) {
+    check_grid<4>(size[0], size[1]);
+    check_grid<8>(size[0], size[1]);
+    check_grid<16>(size[0], size[1]);
+  }
+  CHECK(gart::tile_grid<16>{65535, 65535}.tile(4096 * 4096 - 1).area() == 15 * 15);
+}
+
+TEST_CASE("the tiles of a box are those that share a pixel with it") {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed() + 1);
+  gart::tile_grid<8> const grid{61, 45};
+  for (int trial = 0; trial < 300; ++trial) {
+    auto const below = [&](int n) { return static_cast<gart::u16>(random() % static_cast<u64>(n)); };
+    gart::pixel_box b{below(61), below(45), 0, 0};
+    b.x1 = static_cast<gart::u16>(b.x0 + below(62 - b.x0)), b.y1 = static_cast<gart::u16>(b.y0 + below(46 - b.y0));
+    gart::pixel_box const tiles = gart::tiles_of<8>(b);
+    long wrong = 0;
+    for (u32 t = 0; t < grid.count(); ++t) {
+      u32 const x = t % grid.columns(), y = t / grid.columns();
+      bool const listed = x >= tiles.x0 && x < tiles.x1 && y >= tiles.y0 && y < tiles.y1;
+      wrong += listed == (b.empty() || gart::intersect(b, grid.tile(t)).empty());
+    }
+    CHECK(wrong == 0);
+  }
+}

@@ -1,0 +1,188 @@
+// Footprints, their places in the LT buffer and the tile-primitive map of whole scenes, on every policy, against one
+// Gaussian at a time on the host.
+#include <tiles/ellipsoids.hpp>
+
+#include <gart/tiles/tile_map.hpp>
+#include <support/policies.hpp>
+
+#include <algorithm>
+
+using gart_test::placement;
+
+namespace {
+
+using gart::u32;
+using gart::u64;
+
+constexpr float alpha_min = 1.0f / 255;
+
+template <class T, class E>
+std::vector<T> host_copy(E& exec, gart::span<T const> from) {
+  std::vector<T> out(from.size());
+  if (!out.empty()) exec.copy_out(out.data(), from.data(), out.size() * sizeof(T));
+  return out;
+}
+
+bool same(gart::pixel_box const& a, gart::pixel_box const& b) {
+  return a.x0 == b.x0 && a.y0 == b.y0 && a.x1 == b.x1 && a.y1 == b.y1;
+}
+
+template <class E, int Size>
+struct pass {
+  gart::footprints<E, Size> prints;
+  gart::tile_map<E, Size> map;
+  explicit pass(E& exec) : prints(exec), map(exec) {}
+
+  void check(E& exec, gart::gaussian_model const& model, gart::camera const& view, float near) {
+    gart::gaussians<E> const scene(exec, model);
+    prints.measure(exec, scene.view(), view, alpha_min, near);
+    auto const ranges = host_copy(exec, prints.ranges());
+    auto const depths = host_copy(exec, prints.depths());
+    REQUIRE(ranges.size() == model.size());
+    REQUIRE(depths.size() == model.size());
+    check_boxes(model, view, near, ranges, depths);
+    check_places(exec, ranges);
+    check_map(exec, {view.width, view.height}, ranges, depths, gart::tile_order::cover);
+    check_map(exec, {view.width, view.height}, ranges, depths, gart::tile_order::depth);
+  }
+
+ private:
+  // A device may contract the double arithmetic and so move a bound that lies on a pixel's edge.
+  static void check_boxes(gart::gaussian_model const& model, gart::camera const& view, float near,
+                          std::vector<gart::lt_range> const& ranges, std::vector<float> const& depths) {
+    gart::camera_footprint const project(view, near);
+    gart::gaussians_view<float const> const all{model.mean.data(),    model.log_scale.data(), model.quaternion.data(),
+                                                model.opacity.data(), model.sh.data(),        static_cast<u32>(model.size()),
+                                                model.sh_degree};
+    std::size_t other = 0;
+    for (std::size_t i = 0; i < model.size(); ++i) {
+      gart::footprint const f = project(gart::load_parameters(all, static_cast<u32>(i)), view.position, alpha_min);
+      other += !same(f.box, ranges[i].box) || std::fabs(f.depth - depths[i]) > 1e-5f * std::fabs(f.depth);
+    }
+    CHECK(other <= (E::device ? model.size() / 200 : 0));
+  }
+
+  void check_places(E& exec, std::vector<gart::lt_range> const& ranges) const {
+    auto const pair_offsets = host_copy(exec, prints.pair_offsets());
+    u64 slots = 0, pairs = 0;
+    long wrong = 0;
+    for (std::size_t i = 0; i < ranges.size(); ++i) {
+      wrong += ranges[i].offset != slots || pair_offsets[i] != pairs;
+      slots += ranges[i].box.area();
+      pairs += gart::tiles_of<Size>(ranges[i].box).area();
+    }
+    CHECK(wrong == 0);
+    CHECK(prints.slots() == slots);
+    CHECK(prints.pairs() == pairs);
+  }
+
+  void check_map(E& exec, gart::tile_grid<Size> const& grid, std::vector<gart::lt_range> const& ranges,
+                 std::vector<float> const& depths, gart::tile_order order) {
+    map.build(exec, grid, prints, order);
+    int const shift = map.view().depth_shift;
+    auto const offsets = host_copy(exec, map.view().offsets);
+    auto const primitives = host_copy(exec, map.view().primitives);
+    std::vector<u32> expected, starts{0};
+    for (u32 t = 0; t < grid.count(); ++t) {
+      gart::pixel_box const area = grid.tile(t);
+      for (u32 i = 0; i < ranges.size(); ++i)
+        if (!ranges[i].box.empty() && !gart::intersect(ranges[i].box, area).empty()) expected.push_back(i);
+      auto const key = [&](u32 i) -> u64 {
+        if (order == gart::tile_order::depth) return gart::depth_key(depths[i], shift);
+        return E::device ? (gart::intersect(ranges[i].box, area).area() - 1) * 8 / (Size * Size) : 0;
+      };
+      std::stable_sort(expected.begin() + starts.back(), expected.end(), [&](u32 a, u32 b) { return key(a) < key(b); });
+      starts.push_back(static_cast<u32>(expected.size()));
+    }
+    CAPTURE(static_cast<int>(order));
+    CHECK(offsets == starts);
+    CHECK(primitives == expected);
+    if (order == gart::tile_order::cover) return;
+    CHECK(shift < 24);  // an exponent and some of the mantissa are left to order by
+    for (float depth : depths)
+      if (gart::near_depth(depth, shift) > depth) FAIL_CHECK("a depth is rounded up: " << depth);
+  }
+};
+
+template <class E, int Size>
+void check_scenes(E& exec) {
+  gart_test::ellipsoid_source source(gart_test::seed() + Size);
+  pass<E, Size> reused(exec);  // from view to view, as a training run does
+  for (int trial = 0; trial < 12; ++trial) {
+    placement const where = static_cast<placement>(trial % static_cast<int>(placement::count));
+    gart::camera const view = source.camera(trial == 11 ? placement::lens : where);
+    CAPTURE(gart_test::name_of(where));
+    CAPTURE(Size);
+    gart::gaussian_model model;
+    int const n = trial % 3 == 0 ? 1000 : 100 + 37 * trial;
+    for (int i = 0; i < n; ++i) gart_test::append(model, source.gaussian(where, view));
+    reused.check(exec, model, view, 0.01f);
+  }
+}
+
+gart::gaussian_parameters at(double x, double y, double z, double scale) {
+  float const s = static_cast<float>(std::log(scale));
+  return {gart::vec3(x, y, z), gart::vec3(s), {1, 0, 0, 0}, 2.0f};
+}
+
+gart::camera straight(int width, int height) {
+  gart::camera c;
+  c.width = width, c.height = height;
+  c.fx = c.fy = 20;
+  c.cx = width * 0.5f, c.cy = height * 0.5f;
+  return c;
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("footprints, addresses and tile lists of random scenes", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  E exec;
+  check_scenes<E, 4>(exec);
+  check_scenes<E, 8>(exec);
+  check_scenes<E, 16>(exec);
+}
+
+TEST_CASE_TEMPLATE("footprints and tile lists of scenes at the edges", E, GART_TEST_POLICIES) {
+  E exec;
+  pass<E, 8> p(exec);
+  gart::gaussian_model model;
+  SUBCASE("no Gaussians") {}
+  SUBCASE("one") { gart_test::append(model, at(0, 0, 2, 0.1)); }
+  SUBCASE("one that nothing sees") { gart_test::append(model, at(0, 0, -20, 0.1)); }
+  SUBCASE("too weak, or not finite") {
+    auto g = at(0, 0, 2, 0.1);
+    g.opacity = -7;
+    gart_test::append(model, g);
+    g.opacity = NAN;
+    gart_test::append(model, g);
+    g = at(INFINITY, 0, 2, 0.1);
+    gart_test::append(model, g);
+    g = at(0, 0, 2, 0.1);
+    g.rotation = {0, 0, 0, 0};
+    gart_test::append(model, g);
+  }
+  SUBCASE("hidden ones between seen ones") {
+    for (int i = 0; i < 300; ++i) gart_test::append(model, at(0.01 * i - 1.5, 0, i % 3 ? 2 : -20, 0.1));
+  }
+  SUBCASE("all over the screen") {
+    for (int i = 0; i < 300; ++i) gart_test::append(model, at(0, 0, 2, 50));
+  }
+  p.check(exec, model, straight(61, 45), 0.01f);
+  p.check(exec, model, straight(1, 1), 0.01f);
+  p.check(exec, model, straight(8, 8), 0.01f);
+  p.check(exec, model, straight(3, 200), 0.01f);
+}
+
+TEST_CASE_TEMPLATE("what can never be hit has an empty box", E, GART_TEST_POLICIES) {
+  E exec;
+  gart::gaussian_model model;
+  auto weak = at(0, 0, 2, 0.1), lost = at(0, 0, 2, 0.1);
+  weak.opacity = -7, lost.mean.x = NAN;
+  for (auto const& g : {weak, lost, at(0, 0, -20, 0.1), at(50, 0, 2, 0.1)}) gart_test::append(model, g);
+  gart::gaussians<E> const scene(exec, model);
+  gart::footprints<E, 8> prints(exec);
+  prints.measure(exec, scene.view(), straight(64, 48), alpha_min, 0.01f);
+  CHECK(prints.slots() == 0);
+  CHECK(prints.pairs() == 0);
+}
