@@ -47,6 +47,15 @@ GART_HD GART_INLINE float divide(float a, float b) {
 #endif
 }
 
+// 1 / a, correctly rounded.
+GART_HD GART_INLINE float reciprocal(float a) {
+#if defined(__CUDA_ARCH__)
+  return __frcp_rn(a);
+#else
+  return 1.0f / a;
+#endif
+}
+
 GART_HD GART_INLINE float square_root(float a) {
 #if defined(__CUDA_ARCH__)
   return __fsqrt_rn(a);

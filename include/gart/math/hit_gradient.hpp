@@ -49,8 +49,8 @@ struct ray_gradient {
 GART_HD GART_INLINE moments hit_moments(ray_gaussian const& gaussian, response const& r, float alpha_gradient) {
   float const raw = unclamped_alpha(gaussian, r);
   float const a = raw < alpha_max ? raw * alpha_gradient : 0.0f;
-  vec3 const ap = a * r.p;
-  return {{a, ap.x, ap.y, ap.z, ap.x * r.p.x, ap.y * r.p.y, ap.z * r.p.z, ap.y * r.p.z, ap.x * r.p.z, ap.x * r.p.y, 0, 0}};
+  vec3 const p = orthogonal_offset(r), ap = a * p;
+  return {{a, ap.x, ap.y, ap.z, ap.x * p.x, ap.y * p.y, ap.z * p.z, ap.y * p.z, ap.x * p.z, ap.x * p.y, 0, 0}};
 }
 
 struct geometry_gradient {

@@ -97,9 +97,11 @@ GART_HD GART_INLINE ray_gaussian prepare(gaussian_parameters const& g, vec3d con
 }
 
 struct response {
-  float t;   // distance of the largest response along the ray
-  float d2;  // |p|^2 there
-  vec3 p;    // offset from the centre, in standard deviations along the Gaussian's axes
+  float t;        // distance of the largest response along the ray
+  float d2;       // |p|^2 there
+  vec3 p;         // offset from the centre, in standard deviations along the Gaussian's axes
+  vec3 d;         // d_g
+  float inverse;  // 1 / |d_g|^2
 };
 
 GART_HD GART_INLINE float gaussian_origin(ray_gaussian::row const& m, primary_ray const&) { return m.o; }
@@ -117,16 +119,20 @@ GART_HD GART_INLINE response evaluate(ray_gaussian const& g, Ray const& r) {
   }
   float const od = fma(o.x, d.x, fma(o.y, d.y, mul(o.z, d.z)));
   float const dd = fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)));
-  float const inverse = divide(1.0f, dd);
   response out;
-  out.t = mul(-od, inverse);
+  out.d = d;
+  out.inverse = reciprocal(dd);
+  out.t = mul(-od, out.inverse);
   out.p = {fma(out.t, d.x, o.x), fma(out.t, d.y, o.y), fma(out.t, d.z, o.z)};
-  // p is orthogonal to d; the rounding of t leaves a part along it, which the thin axis of a pancake magnifies in the
-  // gradients of its mean and rotation. One step takes it out.
-  float const along = mul(-fma(out.p.x, d.x, fma(out.p.y, d.y, mul(out.p.z, d.z))), inverse);
-  out.p = {fma(along, d.x, out.p.x), fma(along, d.y, out.p.y), fma(along, d.z, out.p.z)};
   out.d2 = fma(out.p.x, out.p.x, fma(out.p.y, out.p.y, mul(out.p.z, out.p.z)));
   return out;
+}
+
+// p is orthogonal to d_g, but the rounding of t leaves a part along it. It does not show in d2, where it enters squared; in
+// the gradients of mean and rotation the thin axis of a pancake magnifies it. One step takes it out.
+GART_HD GART_INLINE vec3 orthogonal_offset(response const& r) {
+  float const along = -(r.p.x * r.d.x + r.p.y * r.d.y + r.p.z * r.d.z) * r.inverse;
+  return r.p + along * r.d;
 }
 
 // NaN compares false: what cannot be evaluated is no hit.

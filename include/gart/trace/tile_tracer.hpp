@@ -21,6 +21,8 @@ namespace trace_kernels {
 template <int Capacity, int Size, ray_program P>
 struct walk_tiles {
   static constexpr int block_size = 64;
+  // Candidates between two looks at what has become certain: rays of a warp then pass on several hits at a time together.
+  static constexpr u32 stride = 8;
   tile_grid<Size> grid;
   tile_map_view map;
   float const* depths;
@@ -62,10 +64,12 @@ struct walk_tiles {
       u32 resume = end;
       for (u32 k = first; k < end; ++k) {
         u32 const id = list[k];
-        float const bound = near_depth(depths[id], map.depth_shift);  // of all that is left of the list
-        while (!pending.empty() && pending.front().t * cosine < bound)
-          if (!pass_on()) return;
-        if (resume < end && pending.empty() && limit.t * cosine < bound) break;
+        if ((k - first) % stride == 0) {
+          float const bound = near_depth(depths[id], map.depth_shift);  // of all that is left of the list
+          while (!pending.empty() && pending.front().t * cosine < bound)
+            if (!pass_on()) return;
+          if (resume < end && pending.empty() && limit.t * cosine < bound) break;
+        }
         ray_gaussian const g = scene.gaussians[id];
         response const r = evaluate(g, ray);
         if (!is_hit(g, r, scene.near) || !before(last_t, last_id, r.t, id)) continue;
@@ -93,7 +97,7 @@ template <execution E, int Size = 8>
 class tile_tracer {
  public:
   static constexpr char const* name = "tiles";
-  static constexpr int window = 16;
+  static constexpr int window = 32;
 
   explicit tile_tracer(E& exec) : prints_(exec), map_(exec) {}
 
