@@ -50,7 +50,10 @@ class random_boxes {
   gart::ray towards(vec3 const& target) {
     vec3 const origin = point(15);
     vec3 d = target - origin;
-    if (uniform(0, 1) < 0.2f) d = vec3(0.0f), d[static_cast<int>(uniform(0, 2.99f))] = uniform(-1, 1) < 0 ? -1.0f : 1.0f;
+    if (uniform(0, 1) < 0.2f) {
+      d = vec3(0.0f);
+      d[static_cast<int>(uniform(0, 2.99f))] = uniform(-1, 1) < 0 ? -1.0f : 1.0f;
+    }
     return {origin, d / std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z)};
   }
 
@@ -58,7 +61,8 @@ class random_boxes {
   std::mt19937_64 random_;
 };
 
-// By slabs in double: +1 the ray crosses the box within [from, to] with room to spare, -1 it misses, 0 too close to say.
+// By slabs in double: +1 the ray crosses the box within [from, to] with room to spare, -1 it misses, 0 too close to
+// say.
 int crosses(box const& b, gart::ray const& r, double from, double to) {
   if (is_empty(b)) return -1;
   double entry = from, exit = to;
@@ -154,8 +158,12 @@ void check_boxes(E& exec, random_boxes& source, std::vector<box> const& boxes) {
   if (n > 0) check_tree(nodes_of(exec, tree), boxes);
   std::vector<gart::ray> rays;
   for (int i = 0; i < 100; ++i) {
-    box const* target = n > 0 ? &boxes[static_cast<std::size_t>(source.uniform(0, 0.999f) * n)] : nullptr;
-    rays.push_back(source.towards(target && !is_empty(*target) ? 0.5f * target->lo + 0.5f * target->hi : source.point(10)));
+    vec3 target = source.point(10);
+    if (n > 0) {
+      box const& b = boxes[static_cast<std::size_t>(source.uniform(0, 0.999f) * n)];
+      if (!is_empty(b)) target = 0.5f * b.lo + 0.5f * b.hi;
+    }
+    rays.push_back(source.towards(target));
   }
   check_walk(exec, tree, boxes, rays, 0, 1e9f);
   check_walk(exec, tree, boxes, rays, 5, 12);

@@ -1,4 +1,4 @@
-// Functions of one argument, rotations, spherical harmonics and the lens, each against double precision or its definition.
+// Functions of one argument, rotations, spherical harmonics and the lens, each against double or its definition.
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/math/sh.hpp>
 #include <gart/scene/camera.hpp>
@@ -162,7 +162,8 @@ TEST_CASE("spherical harmonics: the real ones with the Condon-Shortley phase, in
     gart::vec3 const d(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
     gart::sh_basis<3> const basis(d);
     for (int l = 0, k = 0; l <= 3; ++l)
-      for (int m = -l; m <= l; ++m, ++k) CHECK(basis.y[k] == doctest::Approx(real_harmonic(l, m, theta, phi)).epsilon(2e-6));
+      for (int m = -l; m <= l; ++m, ++k)
+        CHECK(basis.y[k] == doctest::Approx(real_harmonic(l, m, theta, phi)).epsilon(2e-6));
     gart::sh_basis<1> const low(d);
     for (int k = 0; k < 4; ++k) CHECK(low.y[k] == basis.y[k]);
   }
@@ -220,7 +221,8 @@ TEST_CASE("undistort inverts the lens") {
   for (int trial = 0; trial < 200; ++trial) {
     gart::distortion lens;
     lens.k1 = static_cast<float>(source.uniform(-0.15, 0.3)), lens.k2 = static_cast<float>(source.uniform(0, 0.1));
-    lens.p1 = static_cast<float>(source.uniform(-0.01, 0.01)), lens.p2 = static_cast<float>(source.uniform(-0.01, 0.01));
+    lens.p1 = static_cast<float>(source.uniform(-0.01, 0.01));
+    lens.p2 = static_cast<float>(source.uniform(-0.01, 0.01));
     for (int i = 0; i < 100; ++i) {
       double const x = source.uniform(-0.8, 0.8), y = source.uniform(-0.8, 0.8), r2 = x * x + y * y;
       double const radial = 1 + lens.k1 * r2 + lens.k2 * r2 * r2;

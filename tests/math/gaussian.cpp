@@ -169,8 +169,9 @@ TEST_CASE("moments become the gradients of a weighted sum of alphas") {
         for (int i = 0; i < gart::moment_count; ++i) total.v[i] += one.v[i];
       }
       gart::geometry_gradient const got = gart::from_moments(total.v, s, g);
-      double const all[11] = {got.mean.x,     got.mean.y,     got.mean.z,     got.log_scale.x, got.log_scale.y, got.log_scale.z,
-                              got.rotation.w, got.rotation.x, got.rotation.y, got.rotation.z,  got.opacity};
+      double const all[11] = {got.mean.x,      got.mean.y,      got.mean.z,     got.log_scale.x,
+                              got.log_scale.y, got.log_scale.z, got.rotation.w, got.rotation.x,
+                              got.rotation.y,  got.rotation.z,  got.opacity};
       for (int k = part.first; k < part.first + part.count; ++k) {
         double const h = 1e-5;
         parameters up = p, down = p;

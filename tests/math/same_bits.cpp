@@ -24,7 +24,8 @@ GART_HD outcome outcome_of(sample const& s) {
   gart::ray_gaussian const g = gart::prepare(s.gaussian, gart::vec3d(0.0), 1.0f / 255);
   gart::response const r = gart::evaluate(g, gart::primary_ray{s.direction});
   float const x = s.gaussian.log_scale.x;
-  return {gart::exponential(x), gart::logarithm(gart::exponential(x)), g.sigma, g.cutoff, r.t, r.d2, gart::hit_alpha(g, r)};
+  float const e = gart::exponential(x);
+  return {e, gart::logarithm(e), g.sigma, g.cutoff, r.t, r.d2, gart::hit_alpha(g, r)};
 }
 
 struct evaluate_samples {

@@ -1,5 +1,5 @@
-// Footprints against every pixel's ray, evaluated with the functions that decide a hit when rendering: no hit lies outside
-// its box or nearer than its depth, and boxes are not much larger than their hits demand.
+// Footprints against every pixel's ray, evaluated with the functions that decide a hit when rendering: no hit lies
+// outside its box or nearer than its depth, and boxes are not much larger than their hits demand.
 #include <tiles/ellipsoids.hpp>
 
 #include <gart/render/pixels.hpp>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr float alpha_min = 1.0f / 255;
 constexpr int cameras_per_placement = 100;
-constexpr int ellipsoids_per_camera = 77;  // 100,100 in all
+constexpr int ellipsoids_per_camera = 72;  // 100,800 in all
 
 struct rays {
   std::vector<gart::primary_ray> primary;
@@ -34,7 +34,8 @@ struct rays {
 struct tally {
   long gaussians = 0, hit = 0, outside = 0, too_near = 0;
   double box_area = 0, bounds_area = 0, missed_area = 0;  // of boxes with hits, of their hits' bounds, of boxes without
-  long inner = 0, loose = 0;  // boxes not cut by the image or the near plane; those a side of which is over 2 pixels out
+  // Boxes not cut by the image or the near plane, and those of them a side of which is over 2 pixels out.
+  long inner = 0, loose = 0;
   std::string first;
 
   void measure(gart::camera const& c, float near, rays const& r, gart::gaussian_parameters const& g,
@@ -101,8 +102,8 @@ tally measure(placement p) {
 TEST_CASE("no hit outside its box or nearer than its depth, and boxes are tight") {
   CAPTURE(gart_test::seed());
   // How much larger in the mean: the area of boxes with hits against that of their hits' bounds, and the area of boxes
-  // without hits, in pixels a Gaussian (images have about 2,800). Hits lie where the response is largest, not everywhere
-  // on the ellipsoid, so an ellipsoid about the camera has a larger box than its hits.
+  // without hits, in pixels a Gaussian (images have about 2,800). Hits lie where the response is largest, not
+  // everywhere on the ellipsoid, so an ellipsoid about the camera has a larger box than its hits.
   struct {
     placement where;
     double ratio, missed;

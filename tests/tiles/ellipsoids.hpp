@@ -1,6 +1,6 @@
 #pragma once
-// Random cameras, and random Gaussians placed in a camera's own axes: ordinary ones and every extreme at which bounds of
-// a projected ellipsoid are known to go wrong.
+// Random cameras, and random Gaussians placed in a camera's own axes: ordinary ones and every extreme at which bounds
+// of a projected ellipsoid are known to go wrong.
 
 #include <gart/scene/camera.hpp>
 #include <gart/scene/parameters.hpp>
@@ -18,6 +18,7 @@ enum class placement {
   behind,
   needle,
   pancake,
+  near_tip,
   sub_pixel,
   whole_screen,
   far_away,
@@ -30,9 +31,9 @@ enum class placement {
 
 inline char const* name_of(placement p) {
   constexpr char const* names[] = {"ordinary",     "across the near plane", "around the camera", "behind",
-                                   "needle",       "pancake",               "sub-pixel",         "whole screen",
-                                   "far away",     "any scale",             "far from the origin", "tiny near",
-                                   "distorted lens"};
+                                   "needle",       "pancake",               "near tip",          "sub-pixel",
+                                   "whole screen", "far away",              "any scale",         "far from the origin",
+                                   "tiny near",    "distorted lens"};
   return names[static_cast<int>(p)];
 }
 
@@ -106,6 +107,17 @@ class ellipsoid_source {
         scale = z * log_uniform(0.01, 2);
         aspect = {uniform(0.3, 1), 1, log_uniform(1e-6, 1e-2)};
         break;
+      case placement::near_tip: {
+        // A long needle with its end before the camera and its centre far away: the roundings of the centre's distance
+        // are large beside the end's.
+        gart::vec3d const tip = gart::vec3d(uniform(-0.4, 0.4), uniform(-0.4, 0.4), 1) * log_uniform(0.05, 0.5);
+        double const cutoff = gart::hit_cutoff({{}, {}, {}, g.opacity}, 1.0f / 255);
+        scale = log_uniform(1, 1e5);
+        gart::vec3d const along(gart::to_matrix(rotation())[2]);
+        at = tip + along * (scale * std::sqrt(cutoff > 0 ? cutoff : 1.0));
+        align(g, c, along, true);
+        return placed(g, c, at, {tip.z * log_uniform(1e-3, 0.1), tip.z * log_uniform(1e-3, 0.1), scale});
+      }
       case placement::sub_pixel: scale = z * log_uniform(1e-7, 3e-3); break;
       case placement::whole_screen: scale = z * log_uniform(1, 100); break;
       case placement::far_away:

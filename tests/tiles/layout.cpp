@@ -82,10 +82,11 @@ TEST_CASE("addresses keep 64 bits") {
 }
 
 TEST_CASE("tiles cover every pixel once, whatever the image's size") {
-  for (int const* size : {(int const[]){1, 1}, (int const[]){7, 5}, (int const[]){8, 8}, (int const[]){64, 48}, (int const[]){33, 17}}) {
-    check_grid<4>(size[0], size[1]);
-    check_grid<8>(size[0], size[1]);
-    check_grid<16>(size[0], size[1]);
+  int const sizes[][2] = {{1, 1}, {7, 5}, {8, 8}, {64, 48}, {33, 17}};
+  for (auto const& [width, height] : sizes) {
+    check_grid<4>(width, height);
+    check_grid<8>(width, height);
+    check_grid<16>(width, height);
   }
   CHECK(gart::tile_grid<16>{65535, 65535}.tile(4096 * 4096 - 1).area() == 15 * 15);
 }

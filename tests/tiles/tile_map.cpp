@@ -51,12 +51,13 @@ struct pass {
   static void check_boxes(gart::gaussian_model const& model, gart::camera const& view, float near,
                           std::vector<gart::lt_range> const& ranges, std::vector<float> const& depths) {
     gart::camera_footprint const project(view, near);
+    u32 const n = static_cast<u32>(model.size());
     gart::gaussians_view<float const> const all{model.mean.data(),    model.log_scale.data(), model.quaternion.data(),
-                                                model.opacity.data(), model.sh.data(),        static_cast<u32>(model.size()),
+                                                model.opacity.data(), model.sh.data(),        n,
                                                 model.sh_degree};
     std::size_t other = 0;
-    for (std::size_t i = 0; i < model.size(); ++i) {
-      gart::footprint const f = project(gart::load_parameters(all, static_cast<u32>(i)), view.position, alpha_min);
+    for (u32 i = 0; i < n; ++i) {
+      gart::footprint const f = project(gart::load_parameters(all, i), view.position, alpha_min);
       other += !same(f.box, ranges[i].box) || std::fabs(f.depth - depths[i]) > 1e-5f * std::fabs(f.depth);
     }
     CHECK(other <= (E::device ? model.size() / 200 : 0));
