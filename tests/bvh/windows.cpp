@@ -231,7 +231,7 @@ TEST_CASE_TEMPLATE("random scenes, hits behind the origin and at the near distan
     vec3 const d(normal(random), normal(random), normal(random));
     rays.push_back({vec3(at(random), at(random), at(random)), d / std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z)});
   }
-  check_rays(exec, model, rays, 0.3f, 1);
+  check_rays(exec, model, rays, 0.3f, 0);
   // A hit at exactly the near distance is none.
   gart::gaussian_model two;
   add(two, {0, 0, 0.5f}, 0.125f);

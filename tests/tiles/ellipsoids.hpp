@@ -76,7 +76,8 @@ class ellipsoid_source {
   }
 
   gart::gaussian_parameters gaussian(placement p, gart::camera const& c) {
-    gart::gaussian_parameters g;
+    gart::gaussian_parameters g{};
+    g.mean = g.log_scale = gart::vec3(0.0f);
     g.rotation = rotation();
     g.opacity = static_cast<float>(chance(0.1) ? uniform(-6, -4) : uniform(-3, 8));
     double z = log_uniform(0.5, 30), scale = 0.1;
@@ -111,7 +112,7 @@ class ellipsoid_source {
         // A long needle with its end before the camera and its centre far away: the roundings of the centre's distance
         // are large beside the end's.
         gart::vec3d const tip = gart::vec3d(uniform(-0.4, 0.4), uniform(-0.4, 0.4), 1) * log_uniform(0.05, 0.5);
-        double const cutoff = gart::hit_cutoff({{}, {}, {}, g.opacity}, 1.0f / 255);
+        double const cutoff = gart::hit_cutoff(g, 1.0f / 255);
         scale = log_uniform(1, 1e5);
         gart::vec3d const along(gart::to_matrix(rotation())[2]);
         at = tip + along * (scale * std::sqrt(cutoff > 0 ? cutoff : 1.0));
