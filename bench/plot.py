@@ -1,0 +1,320 @@
+#!/usr/bin/env python3
+"""Draws bench/results/*.json: charts into docs/figures/*.svg, tables into docs/backward.md. Python 3 alone is needed.
+
+    python3 bench/plot.py [--results bench/results] [--docs docs]
+
+A table stands in the page between <!-- table NAME --> and <!-- end -->, and is replaced there. A result that is not
+there leaves its chart and its table as they are; a result that names a failed measurement shows it as such.
+"""
+import argparse
+import json
+import os
+import re
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+COLORS = ["#4269d0", "#efb118", "#ff725c", "#6cc5b0", "#3ca951", "#a463f2", "#97bbf5", "#9c6b4e", "#9498a0"]
+STRATEGIES = ("pixel", "hybrid", "primitive")
+INK, SOFT, GRID = "#1f2328", "#57606a", "#d8dee4"
+
+# The parts of a step and the stages that make them up: stages nest, so each part names the outermost ones.
+COMPONENTS = (
+    ("preprocess", r"preprocess"),
+    ("footprint, scan", r"footprint|scan"),
+    ("tile maps", r"map"),
+    ("BVH", r"bvh/boxes|bvh build"),
+    ("clear LT", r"clear"),
+    ("forward", r"forward"),
+    ("loss", r"loss_.*"),
+    ("backward", r"backward"),
+    ("Adam", r"adam"),
+)
+
+
+def components(run):
+    stages = run.get("stages_ms", {})
+    return [(name, sum(ms for label, ms in stages.items() if re.fullmatch(pattern, label)))
+            for name, pattern in COMPONENTS]
+
+
+def backward_ms(run):
+    return run.get("stages_ms", {}).get("backward")
+
+
+def text_of(value):
+    return str(value).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def ticks(top, wanted=5):
+    """Round numbers from 0 to at least `top`."""
+    if top <= 0:
+        return [0, 1]
+    step = 10.0 ** len(str(int(top)))
+    while top / step < wanted:
+        for divisor in (2, 2.5, 2):
+            if top / step >= wanted:
+                break
+            step /= divisor
+    out = [0.0]
+    while out[-1] < top:
+        out.append(out[-1] + step)
+    return out
+
+
+class Svg:
+    """A drawing on a light ground of its own, so that it reads on light and on dark pages."""
+
+    def __init__(self, width, height, title):
+        self.width, self.height, self.parts = width, height, []
+        self.text(20, 30, title, size=16, weight="600")
+
+    def add(self, markup):
+        self.parts.append(markup)
+
+    def text(self, x, y, value, size=12, anchor="start", color=INK, weight="400"):
+        self.add(f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" text-anchor="{anchor}" fill="{color}" '
+                 f'font-weight="{weight}">{text_of(value)}</text>')
+
+    def line(self, x0, y0, x1, y1, color=GRID, width=1):
+        self.add(f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{y1:.1f}" stroke="{color}" '
+                 f'stroke-width="{width}"/>')
+
+    def bar(self, x, y, width, height, color, hint):
+        self.add(f'<rect x="{x:.1f}" y="{y:.1f}" width="{max(width, 0):.1f}" height="{height:.1f}" fill="{color}">'
+                 f"<title>{text_of(hint)}</title></rect>")
+
+    def legend(self, x, y, entries):
+        for name, color in entries:
+            self.bar(x, y - 9, 11, 11, color, name)
+            self.text(x + 16, y, name, color=SOFT)
+            x += 34 + 7 * len(name)
+
+    def write(self, path):
+        os.makedirs(os.path.dirname(path), exist_ok=True)
+        with open(path + ".part", "w") as f:
+            f.write(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width} {self.height}" '
+                    f'width="{self.width}" height="{self.height}" font-family="system-ui, sans-serif">\n'
+                    f'<rect width="{self.width}" height="{self.height}" rx="8" fill="#ffffff" stroke="{GRID}"/>\n'
+                    + "\n".join(self.parts) + "\n</svg>\n")
+        os.replace(path + ".part", path)
+        print("wrote", path)
+
+
+def axis(svg, left, right, top, bottom, values, unit):
+    """A vertical scale; returns the height of a value."""
+    y_of = lambda v: bottom - (bottom - top) * v / values[-1]
+    for v in values:
+        svg.line(left, y_of(v), right, y_of(v))
+        svg.text(left - 8, y_of(v) + 4, f"{v:g}", anchor="end", color=SOFT)
+    svg.text(left, top - 12, unit, color=SOFT)
+    return y_of
+
+
+def bars(path, title, unit, groups, note):
+    """groups: [(label, [(series, value)])]; a bar each, side by side."""
+    series = list(dict.fromkeys(name for _, row in groups for name, _ in row))
+    color = {name: COLORS[i % len(COLORS)] for i, name in enumerate(series)}
+    svg = Svg(760, 400, title)
+    svg.legend(20, 56, color.items())
+    y_of = axis(svg, 70, 740, 104, 330, ticks(max(v for _, row in groups for _, v in row)), unit)
+    share = 670 / len(groups)
+    for g, (label, row) in enumerate(groups):
+        width = min(70, 0.75 * share / len(row))
+        x = 70 + share * (g + 0.5) - width * len(row) / 2
+        for name, value in row:
+            svg.bar(x + 2, y_of(value), width - 4, y_of(0) - y_of(value), color[name],
+                    f"{label}, {name}: {value:.3g} {unit}")
+            svg.text(x + width / 2, y_of(value) - 5, f"{value:.3g}", size=11, anchor="middle")
+            x += width
+        svg.text(70 + share * (g + 0.5), 352, label, anchor="middle")
+    svg.text(20, 384, note, size=11, color=SOFT)
+    svg.write(path)
+
+
+def stacked(path, title, unit, rows, note):
+    """rows: [(label, [(part, value)])]; one horizontal bar a row."""
+    names = list(dict.fromkeys(name for _, parts in rows for name, value in parts if value > 0))
+    color = {name: COLORS[i % len(COLORS)] for i, name in enumerate(names)}
+    height = 120 + 40 * len(rows) + 50
+    svg = Svg(860, height, title)
+    svg.legend(20, 56, color.items())
+    values = ticks(max(sum(v for _, v in parts) for _, parts in rows))
+    left, right, top, bottom = 210, 780, 80, 80 + 40 * len(rows)
+    x_of = lambda v: left + (right - left) * v / values[-1]
+    for v in values:
+        svg.line(x_of(v), top, x_of(v), bottom)
+        svg.text(x_of(v), bottom + 18, f"{v:g}", anchor="middle", color=SOFT)
+    svg.text(right + 12, bottom + 18, unit, color=SOFT)
+    for r, (label, parts) in enumerate(rows):
+        y, at = top + 40 * r + 8, 0.0
+        svg.text(left - 10, y + 17, label, anchor="end")
+        for name, value in parts:
+            if value > 0:
+                svg.bar(x_of(at), y, x_of(at + value) - x_of(at), 24, color[name],
+                        f"{label}, {name}: {value:.3g} {unit}")
+                at += value
+        svg.text(x_of(at) + 6, y + 17, f"{at:.3g}", size=11)
+    svg.text(20, height - 16, note, size=11, color=SOFT)
+    svg.write(path)
+
+
+def lines(path, title, unit, x_title, series, note):
+    """series: [(name, [(x, y)])]."""
+    svg = Svg(760, 420, title)
+    color = {name: COLORS[i % len(COLORS)] for i, (name, _) in enumerate(series)}
+    svg.legend(20, 56, color.items())
+    points = [p for _, row in series for p in row]
+    y_of = axis(svg, 70, 720, 104, 330, ticks(max(y for _, y in points)), unit)
+    low, high = min(x for x, _ in points), max(x for x, _ in points)
+    x_of = lambda x: 90 + 610 * (x - low) / max(high - low, 1e-9)
+    for x in sorted({x for x, _ in points}):
+        svg.text(x_of(x), 350, f"{x:g}", anchor="middle", color=SOFT)
+    svg.text(395, 372, x_title, anchor="middle", color=SOFT)
+    for name, row in series:
+        path_of = " ".join(f"{x_of(x):.1f},{y_of(y):.1f}" for x, y in sorted(row))
+        svg.add(f'<polyline points="{path_of}" fill="none" stroke="{color[name]}" stroke-width="2"/>')
+        for x, y in row:
+            svg.add(f'<circle cx="{x_of(x):.1f}" cy="{y_of(y):.1f}" r="3.5" fill="{color[name]}">'
+                    f"<title>{text_of(name)}: {x:g} M, {y:.3g} {unit}</title></circle>")
+    svg.text(20, 404, note, size=11, color=SOFT)
+    svg.write(path)
+
+
+def table(header, rows):
+    out = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    return out + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
+
+
+def source(result):
+    machine = result["machine"]
+    return f"{machine.get('gpu', machine['cpu'])}, commit {result['commit']}, {result['date']}"
+
+
+class Pages:
+    def __init__(self, results, docs):
+        self.results, self.docs, self.tables = results, docs, {}
+
+    def load(self, what):
+        path = os.path.join(self.results, what + ".json")
+        if not os.path.exists(path):
+            print(f"{path}: not measured; left as it is")
+            return None
+        with open(path) as f:
+            return json.load(f)
+
+    def figure(self, name):
+        return os.path.join(self.docs, "figures", name + ".svg")
+
+    def strategies(self):
+        result = self.load("strategies")
+        if not result:
+            return
+        rows, good = [], [r for r in result["runs"] if "error" not in r]
+        slowest = {(r["scene"], r["tracer"]): backward_ms(r) for r in good if r["backward"] == "pixel"}
+        for run in result["runs"]:
+            if "error" in run:
+                rows.append([run["scene"], run["tracer"], run["backward"], "failed", "", "", "", "", ""])
+                continue
+            ms, pixel = backward_ms(run), slowest.get((run["scene"], run["tracer"]))
+            rows.append([run["scene"], run["tracer"], run["backward"], f"{run['stages_ms'].get('forward', 0):.2f}",
+                         f"{ms:.2f}", f"{pixel / ms:.1f}x" if pixel else "", f"{run['step_ms']:.2f}",
+                         f"{run['lt_bytes'] / 1e9:.2f}", f"{run['peak_bytes'] / 1e9:.2f}"])
+        first = good[0] if good else None
+        size = f"{first['width']} x {first['height']}, mean of {first['views']} views" if first else ""
+        self.tables["strategies"] = table(
+            ["scene", "tracer", "strategy", "forward, ms", "backward, ms", "against pixel", "step, ms", "LT, GB",
+             "peak, GB"], rows) + ["", f"{size}, medians of {first['repeats'] if first else 0}; {source(result)}."]
+        if not good:
+            return
+        tracers = list(dict.fromkeys(r["tracer"] for r in good))
+        scenes = list(dict.fromkeys(r["scene"] for r in good))
+        pick = lambda scene, tracer: [r for s in STRATEGIES for r in good
+                                      if (r["scene"], r["tracer"], r["backward"]) == (scene, tracer, s)]
+        bars(self.figure("backward"), "Backward pass by strategy", "ms",
+             [(f"{scene}, {tracer}", [(r["backward"], backward_ms(r)) for r in pick(scene, tracer)])
+              for tracer in tracers for scene in scenes if pick(scene, tracer)], source(result))
+        for tracer in tracers:
+            stacked(self.figure(f"step_{tracer}"), f"A training step by its parts, {tracer} tracer", "ms",
+                    [(f"{scene}, {r['backward']}", components(r)) for scene in scenes for r in pick(scene, tracer)],
+                    source(result))
+
+    def memory(self):
+        result = self.load("memory")
+        if not result:
+            return
+        good = [r for r in result["runs"] if "error" not in r]
+        self.tables["memory"] = table(
+            ["scene", "image", "strategy", "LT, GB", "peak, GB"],
+            [[r["scene"], f"{r['width']} x {r['height']}", r["backward"], f"{r['lt_bytes'] / 1e9:.2f}",
+              f"{r['peak_bytes'] / 1e9:.2f}"] if "error" not in r else
+             [r["scene"], f"scale {r['scale']}", r["backward"], "failed", ""] for r in result["runs"]]
+        ) + ["", f"First camera; {source(result)}."]
+        if not good:
+            return
+        for field, name, title in (("lt_bytes", "lt_memory", "LT buffer against the number of Gaussians"),
+                                   ("peak_bytes", "peak_memory", "Peak memory of a training step")):
+            series = {}
+            for r in good:
+                kind = f"{r['backward']}, {r['width']} x {r['height']}"
+                series.setdefault(kind, []).append((r["thousands"] / 1000, r[field] / 1e9))
+            lines(self.figure(name), title, "GB", "million Gaussians", list(series.items()), source(result))
+
+    def stages(self):
+        result = self.load("stages")
+        if not result:
+            return
+        times = {r["name"].rsplit("/", 1)[0]: r["milliseconds"] for r in result["runs"] if not r.get("error_occurred")}
+        self.tables["stages"] = table(["stage", "ms"], [[f"`{name}`", f"{ms:.3f}"] for name, ms in times.items()]) + [
+            "", f"{result['scene']}, {result['image']}; {source(result)}."]
+        parts = (("tile map", "tile_map/{}/depth"), ("traversal", "trace/tiles/{}"),
+                 ("backward", "backward/tiles/primitive/{}"))
+        groups = [(f"{size} x {size}", [(name, times[pattern.format(size)]) for name, pattern in parts
+                                        if pattern.format(size) in times]) for size in (4, 8, 16)]
+        groups = [g for g in groups if g[1]]
+        if groups:
+            bars(self.figure("tile_size"), f"Tile size, primitive strategy, {result['scene']}", "ms", groups,
+                 source(result))
+
+    def cpu(self):
+        result = self.load("cpu")
+        if not result:
+            return
+        rows = {}
+        for r in result["runs"]:
+            name, policy = r["name"].rsplit("/", 1)
+            rows.setdefault(name, {})[policy] = r["milliseconds"]
+        shown = lambda row, policy: f"{row[policy]:.2f}" if row.get(policy) is not None else ""
+        self.tables["cpu"] = table(
+            ["stage", "serial, ms", "openmp, ms"],
+            [[f"`{name}`", shown(row, "serial"), shown(row, "openmp")] for name, row in rows.items()]
+        ) + ["", f"{result['scene']}, {result['image']}, {result['machine']['cores']} cores; {source(result)}."]
+
+    def write_tables(self):
+        path = os.path.join(self.docs, "backward.md")
+        with open(path) as f:
+            page = f.read()
+        for name, rows in self.tables.items():
+            page, found = re.subn(rf"(<!-- table {name} -->\n).*?(<!-- end -->)",
+                                  lambda m: m.group(1) + "\n".join(rows) + "\n" + m.group(2), page, flags=re.DOTALL)
+            if not found:
+                print(f"{path}: has no place for the table {name}")
+        with open(path + ".part", "w") as f:
+            f.write(page)
+        os.replace(path + ".part", path)
+        print("wrote", path)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--results", default=os.path.join(HERE, "results"))
+    parser.add_argument("--docs", default=os.path.join(os.path.dirname(HERE), "docs"))
+    a = parser.parse_args()
+    pages = Pages(a.results, a.docs)
+    pages.strategies()
+    pages.memory()
+    pages.stages()
+    pages.cpu()
+    pages.write_tables()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,319 @@
+#!/usr/bin/env python3
+"""Checks and times a build of gart, and writes what it measured as JSON. Python 3 alone is needed.
+
+    python3 bench/run.py --build DIR --scenes DIR --what tests,stages,paper
+
+What (comma-separated; default all but sanitize and cpu):
+  tests       every CUDA test of the build
+  sanitize    compute-sanitizer memcheck and racecheck over a training step of each strategy
+  stages      gart_bench_cuda on the first scene: each stage on its own, and tile sizes 4, 8 and 16
+  cpu         gart_bench: the same stages on the host policies, on a small scene
+  strategies  `gart bench`: a training step by strategy and tracer, on the first two scenes
+  memory      `gart bench`: LT and peak memory against the number of Gaussians, at two resolutions
+  paper       strategies, memory and stages
+
+Scenes are DIR/NAME.ply with DIR/NAME.json, a list of cameras {"name","width","height","fx","fy","cx","cy","c2w"}.
+synth_1000k is the scene of a million Gaussians, and so on. A missing one is made by --generator, a command in which
+{dir}, {name} and {count} are replaced; without it, by gart_bench itself (discs on spheres, called discs_1000k). The
+name of the scene stands beside every number.
+
+Each result is a file OUT/WHAT.json: machine, commit, date, command, and `runs`. bench/plot.py makes the figures.
+Exit code: 0, or 1 when a test or a measurement failed; what failed is in the file and on the standard error.
+"""
+import argparse
+import datetime
+import glob
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory")
+SKIPPED = 77
+
+
+class Failure(Exception):
+    pass
+
+
+def run(command, **options):
+    """The finished process; never raises for an exit code."""
+    return subprocess.run([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          errors="replace", **options)
+
+
+def last_line(text):
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return lines[-1] if lines else "no output"
+
+
+def first_match(pattern, text):
+    found = re.search(pattern, text, re.MULTILINE)
+    return found.group(1).strip() if found else "unknown"
+
+
+def machine():
+    cpuinfo = open("/proc/cpuinfo").read() if os.path.exists("/proc/cpuinfo") else ""
+    out = {"cpu": first_match(r"^model name\s*:\s*(.*)$", cpuinfo), "cores": os.cpu_count()}
+    if shutil.which("nvidia-smi"):
+        query = run(["nvidia-smi", "--query-gpu=name,driver_version,memory.total", "--format=csv,noheader"]).stdout
+        fields = [f.strip() for f in query.splitlines()[0].split(",")] if query.strip() else []
+        if len(fields) == 3:
+            out["gpu"], out["driver"], out["gpu_memory"] = fields
+    return out
+
+
+def commit_of(argument):
+    if argument:
+        return argument
+    folder = os.path.dirname(os.path.abspath(__file__))
+    head = run(["git", "-C", folder, "rev-parse", "--short=12", "HEAD"])
+    if head.returncode != 0:
+        return "unknown"
+    changed = run(["git", "-C", folder, "status", "--porcelain", "--untracked-files=no"]).stdout.strip()
+    return head.stdout.strip() + (" with changes" if changed else "")
+
+
+class Bench:
+    def __init__(self, a):
+        self.a = a
+        self.commit = commit_of(a.commit)
+        self.machine = machine()
+        self.failures = []
+        self.temporary = tempfile.mkdtemp(prefix="gart-bench-")
+
+    def program(self, name):
+        for found in glob.glob(os.path.join(self.a.build, "**", name), recursive=True):
+            if os.path.isfile(found) and os.access(found, os.X_OK):
+                return found
+        hint = "-DGART_BUILD_BENCH=ON" if name.startswith("gart_bench") else "-DGART_CUDA=ON"
+        raise Failure(f"{self.a.build}: no program {name}; configure with {hint} and build")
+
+    def say(self, text):
+        print(text, file=sys.stderr, flush=True)
+
+    def fail(self, text):
+        self.failures.append(text)
+        self.say("FAILED  " + text)
+
+    def write(self, what, runs, **more):
+        os.makedirs(self.a.out, exist_ok=True)
+        path = os.path.join(self.a.out, what + ".json")
+        result = {"what": what, "machine": self.machine, "commit": self.commit,
+                  "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
+                  "command": " ".join(shlex.quote(x) for x in ["python3"] + sys.argv), **more, "runs": runs}
+        with open(path + ".part", "w") as f:
+            json.dump(result, f, indent=1)
+            f.write("\n")
+        os.replace(path + ".part", path)
+        self.say(f"wrote {path}")
+
+    def scene(self, thousands):
+        """(name, ply, json) of the scene of so many thousand Gaussians; made where it is missing."""
+        names = (f"synth_{thousands}k", f"discs_{thousands}k")
+        folder = self.a.scenes
+        stem = lambda name: os.path.join(folder, name)
+        complete = lambda name: os.path.exists(stem(name) + ".ply") and os.path.exists(stem(name) + ".json")
+        for name in names:
+            if complete(name) and not (self.a.generator and name != names[0]):
+                return name, stem(name) + ".ply", stem(name) + ".json"
+        os.makedirs(folder, exist_ok=True)
+        if self.a.generator:
+            name = names[0]
+            text = self.a.generator.format(dir=shlex.quote(folder), name=name, count=1000 * thousands)
+            made = run(["sh", "-c", text])
+        else:
+            name = names[1]
+            made = run([self.program("gart_bench"), "--gaussians", 1000 * thousands, "--size", "1237x822", "--write",
+                        stem(name)])
+        if made.returncode != 0 or not complete(name):
+            raise Failure(f"{folder}/{name}: could not be made: {last_line(made.stderr)}")
+        return name, stem(name) + ".ply", stem(name) + ".json"
+
+    def enlarged(self, cameras, factor):
+        """The same cameras with images `factor` times as wide and high."""
+        if factor == 1:
+            return cameras
+        with open(cameras) as f:
+            entries = json.load(f)
+        for camera in entries:
+            for field in ("width", "height", "fx", "fy", "cx", "cy"):
+                camera[field] *= factor
+        path = os.path.join(self.temporary, f"x{factor}_" + os.path.basename(cameras))
+        with open(path, "w") as f:
+            json.dump(entries, f)
+        return path
+
+    def gart_bench(self, ply, cameras, tracer, backward, views, warmups, repeats):
+        """The JSON of `gart bench`, or {"error": ...} for a row that fails."""
+        path = os.path.join(self.temporary, "bench.json")
+        if os.path.exists(path):
+            os.remove(path)
+        command = [self.program("gart"), "bench", ply, cameras, "--backend", "cuda", "--tracer", tracer, "--backward",
+                   backward, "--views", views, "--warmups", warmups, "--repeats", repeats, "--json", path, "--quiet"]
+        done = run(command)
+        if done.returncode != 0:
+            self.fail(f"{backward}, {tracer}, {os.path.basename(ply)}: {last_line(done.stderr)}")
+            return {"tracer": tracer, "backward": backward, "error": last_line(done.stderr)}
+        with open(path) as f:
+            return json.load(f)
+
+    # The parts.
+
+    def tests(self):
+        programs = sorted(p for p in glob.glob(os.path.join(self.a.build, "tests", "**", "test_*_cuda"), recursive=True)
+                          if os.access(p, os.X_OK) and os.path.isfile(p))
+        if not programs:
+            raise Failure(f"{self.a.build}/tests: no CUDA tests; configure with -DGART_CUDA=ON -DGART_BUILD_TESTS=ON")
+        runs = []
+        for program in programs:
+            name, start = os.path.basename(program), time.time()
+            done = run([program])
+            result = {0: "passed", SKIPPED: "skipped"}.get(done.returncode, "failed")
+            row = {"test": name, "result": result, "seconds": round(time.time() - start, 1)}
+            totals = re.search(r"assertions:\s*(\d+)", done.stdout)
+            if totals:
+                row["assertions"] = int(totals.group(1))
+            if result == "failed":
+                row["output"] = done.stdout[-3000:] + done.stderr[-1000:]
+                self.fail(name)
+            self.say(f"{name}: {result}, {row['seconds']} s")
+            runs.append(row)
+        self.write("tests", runs)
+
+    def sanitize(self):
+        sanitizer = shutil.which("compute-sanitizer") or "/usr/local/cuda/bin/compute-sanitizer"
+        if not os.path.exists(sanitizer):
+            raise Failure("compute-sanitizer: not found; it comes with the CUDA toolkit")
+        stem = os.path.join(self.temporary, "small")
+        made = run([self.program("gart_bench"), "--gaussians", 3000, "--size", "96x64", "--write", stem])
+        if made.returncode != 0:
+            raise Failure(f"{stem}: could not be made: {last_line(made.stderr)}")
+        runs = []
+        for tool in ("memcheck", "racecheck"):
+            for tracer in self.a.tracers:
+                for backward in self.a.backwards:
+                    command = [sanitizer, "--tool", tool, "--error-exitcode", "99", self.program("gart"), "bench",
+                               stem + ".ply", stem + ".json", "--backend", "cuda", "--tracer", tracer, "--backward",
+                               backward, "--views", "1", "--warmups", "0", "--repeats", "1", "--quiet"]
+                    done = run(command)
+                    summary = first_match(r"(?:ERROR|RACECHECK) SUMMARY: (.*)$", done.stdout + done.stderr)
+                    row = {"tool": tool, "tracer": tracer, "backward": backward, "summary": summary,
+                           "clean": done.returncode == 0}
+                    if not row["clean"]:
+                        row["output"] = (done.stdout + done.stderr)[:3000]
+                        self.fail(f"{tool}, {tracer}, {backward}: {summary}")
+                    self.say(f"{tool}, {tracer}, {backward}: {summary}")
+                    runs.append(row)
+        self.write("sanitize", runs)
+
+    def google_benchmark(self, what, program, arguments, **more):
+        path = os.path.join(self.temporary, "stages.json")
+        done = run([self.program(program), *arguments, f"--benchmark_filter={self.a.filter}",
+                    f"--benchmark_out={path}", "--benchmark_out_format=json",
+                    f"--benchmark_min_time={self.a.min_time}"])
+        if done.returncode != 0:
+            raise Failure(f"{program}: {last_line(done.stderr)}")
+        with open(path) as f:
+            raw = json.load(f)
+        dropped = ("family_index", "per_family_instance_index", "repetition_index", "run_type", "threads", "run_name",
+                   "repetitions", "time_unit", "cpu_time")
+        runs = []
+        for row in raw["benchmarks"]:
+            entry = {k: v for k, v in row.items() if k not in dropped}
+            entry["name"] = entry["name"].replace("/manual_time", "")
+            entry["milliseconds"] = entry.pop("real_time", None)
+            if row.get("error_occurred"):
+                self.fail(f"{row['name']}: {row.get('error_message')}")
+            runs.append(entry)
+        self.write(what, runs, gaussians=raw["context"]["gaussians"], image=raw["context"]["image"], **more)
+
+    def stages(self):
+        name, ply, cameras = self.scene(self.a.counts[0])
+        self.google_benchmark("stages", "gart_bench_cuda", ["--model", ply, "--cameras", cameras], scene=name)
+
+    def cpu(self):
+        self.google_benchmark("cpu", "gart_bench", ["--gaussians", 20000, "--size", "320x240"], scene="discs_20k")
+
+    def strategies(self):
+        runs = []
+        for thousands in self.a.counts[:2]:
+            name, ply, cameras = self.scene(thousands)
+            for tracer in self.a.tracers:
+                for backward in self.a.backwards:
+                    result = self.gart_bench(ply, cameras, tracer, backward, self.a.views, 5, self.a.repeats)
+                    runs.append({"scene": name, **result})
+                    if "error" not in result:
+                        self.say(f"{name}, {tracer}, {backward}: step {result['step_ms']:.2f} ms, backward "
+                                 f"{result['stages_ms']['backward']:.2f} ms")
+        self.write("strategies", runs)
+
+    def memory(self):
+        runs = []
+        for thousands in self.a.counts:
+            name, ply, cameras = self.scene(thousands)
+            for factor in (1, 2):
+                for backward in ("primitive", "hybrid"):
+                    result = self.gart_bench(ply, self.enlarged(cameras, factor), self.a.tracers[0], backward, 1, 1, 3)
+                    runs.append({"scene": name, "thousands": thousands, "scale": factor, **result})
+                    if "error" not in result:
+                        self.say(f"{name}, x{factor}, {backward}: LT {result['lt_bytes'] / 1e9:.2f} GB, peak "
+                                 f"{result['peak_bytes'] / 1e9:.2f} GB")
+        self.write("memory", runs)
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    listed = lambda text: [x for x in text.split(",") if x]
+    here = os.path.dirname(os.path.abspath(__file__))
+    parser.add_argument("--build", required=True, help="build folder, with -DGART_BUILD_BENCH=ON")
+    parser.add_argument("--scenes", default="scenes", help="folder of the scenes")
+    parser.add_argument("--out", default=os.path.join(here, "results"), help="folder of the results")
+    parser.add_argument("--what", type=listed, default=["tests", "paper"], help="parts, comma-separated")
+    parser.add_argument("--sanitize", action="store_true", help="the part sanitize besides")
+    parser.add_argument("--generator", help="command that makes a missing scene: {dir} {name} {count}")
+    parser.add_argument("--counts", type=lambda t: [int(x) for x in listed(t)], default=[1000, 2000, 3000, 4000, 5000],
+                        help="thousands of Gaussians; strategies take the first two, stages the first")
+    parser.add_argument("--tracers", type=listed, default=["tiles", "bvh"], help="memory takes the first")
+    parser.add_argument("--backwards", type=listed, default=["pixel", "hybrid", "primitive"])
+    parser.add_argument("--views", type=int, default=4, help="cameras of the strategies")
+    parser.add_argument("--repeats", type=int, default=20, help="measured steps a camera; the median counts")
+    parser.add_argument("--filter", default=".", help="stages and cpu: benchmarks by regular expression")
+    parser.add_argument("--min-time", type=float, default=0.2, help="stages and cpu: seconds a benchmark")
+    parser.add_argument("--commit", help="what was built, where the folder is no git checkout")
+    a = parser.parse_args()
+    wanted = a.what + (["sanitize"] if a.sanitize else [])
+    if "paper" in wanted:
+        wanted += ["stages", "strategies", "memory"]
+    unknown = [w for w in wanted if w not in PARTS + ("paper",)]
+    if unknown:
+        parser.error(f"--what {unknown[0]}: not one of {', '.join(PARTS)}, paper")
+    a.parts = [p for p in PARTS if p in wanted]
+    if not os.path.isdir(a.build):
+        parser.error(f"--build {a.build}: no such folder")
+    return a
+
+
+def main():
+    bench = Bench(arguments())
+    try:
+        for part in bench.a.parts:
+            bench.say(f"== {part}")
+            try:
+                getattr(bench, part)()
+            except Failure as failure:
+                bench.fail(f"{part}: {failure}")
+    finally:
+        shutil.rmtree(bench.temporary, ignore_errors=True)
+    for text in bench.failures:
+        print("failed: " + text, file=sys.stderr)
+    return 1 if bench.failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,36 @@
+// A whole training step on one view, by tracer and strategy. Rates of zero keep the scene as it is.
+#include "support/frame.hpp"
+
+#include <gart/train/trainer.hpp>
+
+namespace {
+
+template <class By, class Strategy, gart::execution E>
+void step(benchmark::State& state, E& exec) {
+  auto const& scene = gart_bench::the_scene();
+  gart::dataset data;
+  gart::dataset_view view;
+  view.name = "noise", view.view = scene.view();
+  view.image = gart::image8(view.view.width, view.view.height, 3);
+  view.image.data = gart_bench::noise_bytes(view.image.data.size());
+  data.train.push_back(std::move(view));
+  gart::train_options options;
+  options.iterations = 1, options.sh_every = 1;  // every coefficient from the first step
+  options.densify = gart::densify_kind::none;
+  options.rates = {0, 0, 0, 0, 0, 0, 0};
+  using tracer = typename By::template tracer<E>;
+  using traits = gart::scene_traits<gart_bench::sh_degree>;
+  gart::trainer<E, traits, tracer, Strategy> trainer(exec, options, data, scene.model);
+  gart_bench::measure(state, exec, [&] { trainer.step(); });
+  state.counters["lt_bytes"] = static_cast<double>(trainer.lt_bytes());
+  state.counters["peak_bytes"] = static_cast<double>(exec.memory.peak);
+}
+
+}  // namespace
+
+GART_BENCH("step/bvh/pixel", step<gart_bench::by_bvh, gart::pixel_strategy>)
+GART_BENCH("step/bvh/hybrid", step<gart_bench::by_bvh, gart::hybrid_strategy>)
+GART_BENCH("step/bvh/primitive", step<gart_bench::by_bvh, gart::primitive_strategy>)
+GART_BENCH("step/tiles/pixel", step<gart_bench::by_tiles<8>, gart::pixel_strategy>)
+GART_BENCH("step/tiles/hybrid", step<gart_bench::by_tiles<8>, gart::hybrid_strategy>)
+GART_BENCH("step/tiles/primitive", step<gart_bench::by_tiles<8>, gart::primitive_strategy>)

@@ -1,0 +1,34 @@
+#pragma once
+// The Gaussians and the camera that every benchmark runs on: a splat PLY with a camera JSON, or Gaussians of our own
+// making: thin discs on three nested spheres, a few tens of hits a ray whatever their number.
+
+#include <gart/io/dataset.hpp>
+#include <gart/scene/gaussians.hpp>
+
+#include <filesystem>
+#include <string>
+
+namespace gart_bench {
+
+inline constexpr int sh_degree = 3;
+
+struct scene {
+  gart::gaussian_model model;  // of sh_degree
+  std::vector<gart::named_camera> cameras;
+  gart::camera const& view() const { return cameras.front().view; }
+};
+
+struct scene_options {
+  std::filesystem::path model, cameras;  // empty: discs
+  std::size_t gaussians = 20000;
+  int width = 320, height = 240;
+};
+
+scene make_scene(scene_options const& options);
+// STEM.ply and STEM.json.
+void write_scene(std::filesystem::path const& stem, scene const& s);
+
+// The scene of the run, made by main.
+scene const& the_scene();
+
+}  // namespace gart_bench
