@@ -64,8 +64,9 @@ GART_HD inline interval slope_bounds(double mx, vec3d const& ax, double mz, vec3
   double const qb = b0 * mz - dot(bx, az);
   double const qc = (b0 - sqrt(dot(bx, bx))) * (b0 + sqrt(dot(bx, bx)));
   double const discriminant = qb * qb - qa * qc;
-  if (discriminant >= 0 && qa != 0) {
-    double const root = sqrt(discriminant);
+  // In front of the camera there are tangents: a negative discriminant is rounding. A crossing ellipsoid may have none.
+  if (discriminant >= 0 || !crosses) {
+    double const root = sqrt(discriminant > 0 ? discriminant : 0.0);
     double const q = qb >= 0 ? qb + root : qb - root;
     double const slopes[2] = {q / qa, q != 0 ? qc / q : 0.0};
     for (double const u : slopes) {

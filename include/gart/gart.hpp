@@ -1,0 +1,19 @@
+#pragma once
+// Everything that is safe in any host translation unit: captures and models in and out, training and rendering over rows
+// chosen at run time, and the templates on the host policies. Kernels on CUDA need nvcc and exec/cuda_launch.cuh first.
+
+#include <gart/backward/backward.hpp>
+#include <gart/bvh/walk.hpp>
+#include <gart/core/version.hpp>
+#include <gart/exec/cuda.hpp>
+#include <gart/exec/parallel.hpp>
+#include <gart/io/dataset.hpp>
+#include <gart/io/image_file.hpp>
+#include <gart/io/ply.hpp>
+#include <gart/loss/metrics.hpp>
+#include <gart/render/forward.hpp>
+#include <gart/trace/bvh_tracer.hpp>
+#include <gart/trace/tile_tracer.hpp>
+#include <gart/train/initial.hpp>
+#include <gart/train/session.hpp>
+#include <gart/train/trainer.hpp>
