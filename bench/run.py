@@ -7,7 +7,7 @@ What (comma-separated; default all but sanitize and cpu):
   tests       every CUDA test of the build
   sanitize    compute-sanitizer memcheck and racecheck over a training step of each strategy
   stages      gart_bench_cuda on the first scene: each stage on its own, and tile sizes 4, 8 and 16
-  cpu         gart_bench: the same stages on the host policies, on a small scene
+  cpu         gart_bench: the same stages on the host policies, on a small scene; a minute or two
   strategies  `gart bench`: a training step by strategy and tracer, on the first two scenes
   memory      `gart bench`: LT and peak memory against the number of Gaussians, at two resolutions
   paper       strategies, memory and stages
@@ -238,7 +238,7 @@ class Bench:
         self.google_benchmark("stages", "gart_bench_cuda", ["--model", ply, "--cameras", cameras], scene=name)
 
     def cpu(self):
-        self.google_benchmark("cpu", "gart_bench", ["--gaussians", 20000, "--size", "320x240"], scene="discs_20k")
+        self.google_benchmark("cpu", "gart_bench", ["--gaussians", "5000", "--size", "160x120"], scene="discs_5k")
 
     def strategies(self):
         runs = []
