@@ -161,6 +161,11 @@ class training_run {
       double const seconds = step.seconds();
       if (session_->profile().enabled()) ++profiled_steps_, profiled_seconds_ += seconds;
       session_->profile().enable(false);
+      if (report.backward != row_.backward && !fell_back_) {
+        fell_back_ = true;
+        say_.note("step " + with_commas(report.step) + ": the LT buffer would pass --lt-budget, this step and others like it are " +
+                  report.backward);
+      }
       if (!std::isfinite(report.loss)) {
         throw gart::error("step " + std::to_string(report.step) + ", view " + report.view +
                           ": the loss is not a number (the last checkpoint is whole: " + a_.checkpoint_file().string() +
@@ -300,6 +305,7 @@ class training_run {
   progress say_;
   history course_;
   gart::row_info row_;
+  bool fell_back_ = false;
   gart::dataset data_;
   gart::gaussian_model start_;
   gart::vec3 eval_background_{0.0f};

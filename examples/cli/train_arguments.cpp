@@ -34,6 +34,12 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(between(0, 3));
   in_group(r.add(train, "--points", a.points, "N", "Gaussians placed at random where the capture has no points"))
       ->check(between(1, 2147483647.0));
+  in_group(r.add(train, "--init-opacity", a.initial_opacity, "A",
+                 "Opacity of the first Gaussians, below 1; 0: 0.5 with mcmc,\nelse 0.1"))
+      ->check(between(0, 0.99));
+  in_group(r.add(train, "--init-scale", a.initial_scale, "X",
+                 "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 with mcmc, else 1"))
+      ->check(between(0, 100));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
   in_group(r.add(train, "--seed", a.seed, "N",
                  "Seed of everything random; on the serial backend the same\nseed gives the same bits"));
@@ -57,8 +63,11 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       r.add(train, "--tracer", a.tracer, "NAME", "What finds the hits: tiles, bvh, or embree (CPU);\nthe images are the same"))
       ->check(tracer_names());
   in_group(
-      r.add(train, "--backward", a.backward, "NAME", "How gradients are gathered: pixel; auto: the fastest there is"))
+      r.add(train, "--backward", a.backward, "NAME", "How gradients are summed: primitive (one sum a Gaussian and\ntile), hybrid (a quarter of the memory), pixel, or\ndeterministic (the same bits in every run); auto: the fastest"))
       ->check(one_of({"auto", "pixel", "hybrid", "primitive", "deterministic"}));
+  in_group(r.add(train, "--lt-budget", a.lt_budget_gb, "GB",
+                 "Memory for what the forward pass records for primitive;\na step that needs more falls back to hybrid, which needs a\nquarter. 0: no limit"))
+      ->check(between(0, 1e6));
   add_threads(train, a.threads);
   in_group(train.get_option("--threads"));
 
@@ -115,6 +124,10 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.densify = a.densify == "mcmc"  ? gart::densify_kind::mcmc
               : a.densify == "adc" ? gart::densify_kind::adc
                                    : gart::densify_kind::none;
+  if (o.densify != gart::densify_kind::mcmc) o.initial_opacity = 0.1f, o.initial_scale = 1.0f;
+  if (a.initial_opacity > 0) o.initial_opacity = a.initial_opacity;
+  if (a.initial_scale > 0) o.initial_scale = a.initial_scale;
+  o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
   o.sh_degree = a.sh_degree;
   o.background = a.background == "white"    ? gart::background_kind::white
                  : a.background == "random" ? gart::background_kind::random

@@ -51,10 +51,11 @@ class backward {
 
   explicit backward(E& exec) : moments_(exec), own_prints_(exec), map_(exec), slots_(exec), rows_(exec) {}
 
-  // After the tracer's own preparation: a tracer that has the view's footprints lends them.
+  // After the tracer's own preparation: a tracer that has the view's footprints lends them. False, and
+  // nothing allocated, where the LT buffer would take more than byte_budget (0: no limit).
   template <class Tracer>
-  void prepare(E& exec, Tracer const& tracer, gaussians_view<float const> scene, camera const& view, float alpha_min,
-               float near) {
+  bool prepare(E& exec, Tracer const& tracer, gaussians_view<float const> scene, camera const& view, float alpha_min,
+               float near, u64 byte_budget = 0) {
     if constexpr (records) {
       grid_ = {view.width, view.height};
       if constexpr (requires { tracer.prints(); }) {
@@ -63,12 +64,14 @@ class backward {
         own_prints_.measure(exec, scene, view, alpha_min, near);
         prints_ = &own_prints_;
       }
+      if (byte_budget && prints_->slots() * sizeof(entry) > byte_budget) return false;
       // Sorted by cover also where the tracer has lists sorted by depth: lanes in step are worth the sort.
       map_.build(exec, grid_, *prints_, tile_order::cover);
       slots_.resize(prints_->slots());
       stage_scope stage(exec, "clear");
       exec.fill(slots_.data(), 0xff, slots_.size() * sizeof(entry));  // a NaN: not written
     }
+    return true;
   }
 
   record_type record() const {

@@ -98,10 +98,11 @@ struct gather_kernel {
     u32 const skip = area.width() - width;
     u32 p = (cell.y0 - area.y0) * area.width() + (cell.x0 - area.x0);
     u32 column = 0;
-    Entry next = slot[0];  // read one ahead: what follows hides the way from memory
+    Entry next = slot[0], after = slot[last > 0 ? 1 : 0];  // read two ahead: the work between hides the way from memory
     for (u32 k = 0; k <= last; ++k) {
       Entry const entry = next;
-      next = slot[k < last ? k + 1 : last];
+      next = after;
+      after = slot[k + 2 < last ? k + 2 : last];
       pixel_data const& at = s.pixels[p];
       ++p;
       if (++column == width) column = 0, p += skip;

@@ -35,6 +35,7 @@ struct primitive_strategy {
   using record = record_lt<lt_entry, Size>;
   using gather = terms<color, geometry>;
   using scatter = terms<>;
+  using fallback = hybrid_strategy;  // where the LT buffer would pass its budget: a quarter of it
 };
 
 // The primitive strategy with its sums in a fixed order.

@@ -291,7 +291,6 @@ class image_loss {
   void evaluate(span<float const> image, truth_view truth, int width, int height, float ssim_weight,
                 span<float> gradient, span<float> loss) {
     E& exec = *exec_;
-    stage_scope stage(exec, "loss");
     detail::loss_tiles<E> const grid{{width, height}};
     std::size_t const values = 3 * grid.image.pixels();
     planes_.resize(2 * values), partials_.resize(3 * values), sums_.resize(std::size_t{2} * grid.count());

@@ -62,15 +62,19 @@ struct walk_tiles {
       // Hits at or behind the limit did not fit; the earliest candidate of them is where the next round begins.
       pending_hit limit{3.402823466e38f, end, 0};
       u32 resume = end;
+      u32 next_id = list[first];
+      ray_gaussian next = scene.gaussians[next_id];  // read one ahead: the work between hides the way from memory
       for (u32 k = first; k < end; ++k) {
-        u32 const id = list[k];
+        u32 const id = next_id;
+        ray_gaussian const g = next;
+        next_id = list[k + 1 < end ? k + 1 : k];
+        next = scene.gaussians[next_id];
         if ((k - first) % stride == 0) {
           float const bound = near_depth(depths[id], map.depth_shift);  // of all that is left of the list
           while (!pending.empty() && pending.front().t * cosine < bound)
             if (!pass_on()) return;
           if (resume < end && pending.empty() && limit.t * cosine < bound) break;
         }
-        ray_gaussian const g = scene.gaussians[id];
         response const r = evaluate(g, ray);
         if (!is_hit(g, r, scene.near) || !before(last_t, last_id, r.t, id)) continue;
         pending_hit h{r.t, k, 0};

@@ -60,6 +60,7 @@ struct step_report {
   float psnr = 0;        // of this step's training view
   index_t gaussians = 0;
   std::string view;
+  std::string backward;  // the strategy of this step: not the one asked for where its LT buffer would pass the budget
 };
 
 class session {

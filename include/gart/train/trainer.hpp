@@ -55,11 +55,24 @@ class trainer {
   rendered render(camera const& view, vec3 background);
   void save(std::filesystem::path const& path) const;
   void load(std::filesystem::path const& path);
-  std::size_t lt_bytes() const { return backward_.lt_bytes(); }
+  std::size_t lt_bytes() const { return fell_back_ ? fallback_.lt_bytes() : backward_.lt_bytes(); }
   gaussians<E>& scene() { return scene_; }
   gaussians<E> const& gradients() const { return gradients_; }
 
  private:
+  template <class S>
+  struct fallback_of {
+    using type = S;
+  };
+  template <class S>
+    requires requires { typename S::fallback; }
+  struct fallback_of<S> {
+    using type = typename S::fallback;
+  };
+  using fallback_strategy = typename fallback_of<Strategy>::type;
+
+  template <class Pass, class Loss>
+  void differentiate(Pass& pass, Loss&& loss, std::size_t view, render_options const& render, int degree);
   void update(dataset_view const& view, int degree);
   vec3 background_of(int step) const;
 
@@ -71,6 +84,7 @@ class trainer {
   frame_records<E> records_;
   Tracer tracer_;
   backward<E, Strategy> backward_;
+  backward<E, fallback_strategy> fallback_;
   image_loss<E> loss_;
   training_images<E> images_;
   view_order order_;
@@ -79,6 +93,7 @@ class trainer {
   buffer<float, E> color_, color_gradient_, value_;
   buffer<u32, E> skipped_;
   int step_ = 0;
+  bool fell_back_ = false;
 };
 
 }  // namespace gart

@@ -19,6 +19,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       records_(exec),
       tracer_(exec),
       backward_(exec),
+      fallback_(exec),
       loss_(exec),
       images_(data),
       order_(data.train.size(), options.seed),
@@ -54,15 +55,18 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
 
   records_.prepare(exec_, constant, view.view.position, render.alpha_min);
   tracer_.prepare(exec_, constant, records_.view(), view.view, render.alpha_min, render.near);
-  backward_.prepare(exec_, tracer_, constant, view.view, render.alpha_min, render.near);
-  forward<sh_degree>(exec_, tracer_, constant, view.view, render, degree, {color_.data()}, backward_.record());
-  {
-    stage_scope stage(exec_, "loss");
-    loss(loss_input<E>{exec_, view, images_.get(exec_, index, render.background), view.view.width, view.view.height,
-                       color_, color_gradient_, value_});
+  auto const prepare = [&](auto& pass, u64 budget) {
+    return pass.prepare(exec_, tracer_, constant, view.view, render.alpha_min, render.near, budget);
+  };
+  fell_back_ = !prepare(backward_, options_.lt_budget);
+  if (fell_back_) {
+    if constexpr (std::is_same_v<fallback_strategy, Strategy>)
+      throw out_of_memory("LT budget", 0, options_.lt_budget, "this strategy has no smaller one: raise --lt-budget");
+    prepare(fallback_, 0);
+    differentiate(fallback_, loss, index, render, degree);
+  } else {
+    differentiate(backward_, loss, index, render, degree);
   }
-  backward_.template run<sh_degree>(exec_, tracer_, constant, records_.view(), view.view, render, degree,
-                                    color_, color_gradient_, gradients_);
   ++step_;
   update(view, degree);
 
@@ -70,10 +74,27 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   report.step = step_;
   report.gaussians = scene_.size();
   report.view = view.name;
+  report.backward = fell_back_ ? fallback_strategy::name : Strategy::name;
   std::vector<float> const value = value_.to_host();
   report.loss = value[0];
   report.psnr = value[1] > 0 ? -10.0f * std::log10(value[1]) : 99.0f;
   return report;
+}
+
+template <execution E, class Traits, class Tracer, class Strategy>
+template <class Pass, class Loss>
+void trainer<E, Traits, Tracer, Strategy>::differentiate(Pass& pass, Loss&& loss, std::size_t index,
+                                                         render_options const& render, int degree) {
+  dataset_view const& view = data_.train[index];
+  auto const constant = std::as_const(scene_).view();
+  forward<sh_degree>(exec_, tracer_, constant, view.view, render, degree, {color_.data()}, pass.record());
+  {
+    stage_scope stage(exec_, "loss");
+    loss(loss_input<E>{exec_, view, images_.get(exec_, index, render.background), view.view.width, view.view.height,
+                       color_, color_gradient_, value_});
+  }
+  pass.template run<sh_degree>(exec_, tracer_, constant, records_.view(), view.view, render, degree, color_,
+                               color_gradient_, gradients_);
 }
 
 // The optimizer's step and what grows, moves and prunes the Gaussians.
