@@ -91,15 +91,17 @@ std::vector<float> neighbor_distance2(std::vector<float> const& position) {
 
 gaussian_model model_from_points(point_cloud const& points, train_options const& options) {
   constexpr float sh_constant = 0.28209479177387814f;
-  float const o = options.initial_opacity;
+  float const o = options.initial_opacity == 0 ? 0.1f : options.initial_opacity;
+  float const scale = options.initial_scale == 0 ? 1.0f : options.initial_scale;
   if (!(o > 0 && o < 1)) throw invalid_argument("the initial opacity must lie between 0 and 1");
+  if (!(scale > 0)) throw invalid_argument("the initial scale must be positive");
   gaussian_model m;
   m.resize(points.size(), options.sh_degree);
   std::vector<float> const d2 = neighbor_distance2(points.position);
   m.mean = points.position;
   std::size_t const stride = m.size() ? m.sh.size() / m.size() : 0;
   for (std::size_t i = 0; i < m.size(); ++i) {
-    float const s = std::log(std::sqrt(std::max(d2[i], 1e-7f)) * options.initial_scale);
+    float const s = std::log(std::sqrt(std::max(d2[i], 1e-7f)) * scale);
     for (int a = 0; a < 3; ++a) m.log_scale[3 * i + a] = s;
     m.quaternion[4 * i] = 1;
     m.opacity[i] = std::log(o / (1 - o));
@@ -122,12 +124,18 @@ point_cloud random_points(vec3d lo, vec3d hi, index_t count, u64 seed) {
   return out;
 }
 
-gaussian_model initial_model(dataset const& data, train_options const& options) {
+gaussian_model initial_model(dataset const& data, train_options const& given) {
+  train_options options = given;
   if (options.max_gaussians == 0) throw invalid_argument("--max-gaussians must be at least 1");
   point_cloud points = data.points;
-  if (points.size() == 0)
+  if (points.size() == 0) {
     points = random_points(data.bounds_min, data.bounds_max, std::min(options.random_points, options.max_gaussians),
                            options.seed);
+    if (options.densify == densify_kind::mcmc) {
+      if (options.initial_opacity == 0) options.initial_opacity = 0.5f;
+      if (options.initial_scale == 0) options.initial_scale = 0.1f;
+    }
+  }
   if (points.size() > options.max_gaussians) {
     // A random subset: the first n of a shuffle.
     random_source const source{options.seed, 1, random_use::user};

@@ -35,10 +35,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--points", a.points, "N", "Gaussians placed at random where the capture has no points"))
       ->check(between(1, 2147483647.0));
   in_group(r.add(train, "--init-opacity", a.initial_opacity, "A",
-                 "Opacity of the first Gaussians, below 1; 0: 0.5 with mcmc,\nelse 0.1"))
+                 "Opacity of the first Gaussians, below 1; 0: 0.5 for random\npoints with mcmc, else 0.1"))
       ->check(between(0, 0.99));
   in_group(r.add(train, "--init-scale", a.initial_scale, "X",
-                 "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 with mcmc, else 1"))
+                 "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 for random points with mcmc, else 1"))
       ->check(between(0, 100));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
   in_group(r.add(train, "--seed", a.seed, "N",
@@ -124,9 +124,8 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.densify = a.densify == "mcmc"  ? gart::densify_kind::mcmc
               : a.densify == "adc" ? gart::densify_kind::adc
                                    : gart::densify_kind::none;
-  if (o.densify != gart::densify_kind::mcmc) o.initial_opacity = 0.1f, o.initial_scale = 1.0f;
-  if (a.initial_opacity > 0) o.initial_opacity = a.initial_opacity;
-  if (a.initial_scale > 0) o.initial_scale = a.initial_scale;
+  o.initial_opacity = a.initial_opacity;
+  o.initial_scale = a.initial_scale;
   o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
   o.sh_degree = a.sh_degree;
   o.background = a.background == "white"    ? gart::background_kind::white

@@ -25,7 +25,7 @@ struct train_arguments {
   int iterations = defaults.iterations;
   gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
   int sh_degree = defaults.sh_degree, downscale = 1, test_every = 8, eval_every = -1;
-  float initial_opacity = 0, initial_scale = 0;  // 0: what suits `densify`
+  float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
   float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;
   double lt_budget_gb = 0;
   gart::u64 seed = defaults.seed;

@@ -28,7 +28,7 @@ struct pair_row {
 
 template <int ShDegree, class Terms, class Entry, int Size, gather_sums Sums, execution E>
 struct gather_kernel {
-  static constexpr int block_size = 64;
+  static constexpr int block_size = 64, min_blocks = Terms::geometry ? 8 : 10;
   static constexpr int bands = sh_basis<ShDegree>::size;
   static constexpr int sh_stride = 3 * bands;
   using grid_type = tile_grid<Size>;

@@ -16,8 +16,9 @@ struct tile_grid {
   GART_HD u32 count() const { return columns() * rows(); }
 
   // The pixels of a tile, cut off at the image's edge.
-  GART_HD pixel_box tile(u32 index) const {
-    u32 const x = index % columns() * Size, y = index / columns() * Size;
+  GART_HD pixel_box tile(u32 index) const { return tile(index % columns(), index / columns()); }
+  GART_HD pixel_box tile(u32 column, u32 row) const {
+    u32 const x = column * Size, y = row * Size;
     u32 const w = static_cast<u32>(width), h = static_cast<u32>(height);
     return {static_cast<u16>(x), static_cast<u16>(y), static_cast<u16>(x + Size < w ? x + Size : w),
             static_cast<u16>(y + Size < h ? y + Size : h)};

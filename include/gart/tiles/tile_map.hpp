@@ -52,7 +52,7 @@ struct emit_pairs {
         u32 const tile = y * grid.columns() + x;
         u32 within = depth;
         if (order == tile_order::cover)
-          within = ((intersect(box, grid.tile(tile)).area() - 1) << order_bits) / tile_grid<Size>::pixels;
+          within = ((intersect(box, grid.tile(x, y)).area() - 1) << order_bits) / tile_grid<Size>::pixels;
         keys[at] = tile << order_bits | within;
         primitives[at] = i;
         E::atomic_add(&counts[tile], 1u);

@@ -20,7 +20,7 @@ namespace trace_kernels {
 
 template <int Capacity, int Size, ray_program P>
 struct walk_tiles {
-  static constexpr int block_size = 64;
+  static constexpr int block_size = 64, min_blocks = 8;
   // Candidates between two looks at what has become certain: rays of a warp then pass on several hits at a time together.
   static constexpr u32 stride = 8;
   tile_grid<Size> grid;

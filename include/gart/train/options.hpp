@@ -20,9 +20,11 @@ struct train_options {
   int sh_degree = 3;
   int sh_every = 1000;              // a degree more after so many steps (or iterations / (3 * degrees) in shorter runs)
   background_kind background = background_kind::black;
-  // MCMC starts from small, dense Gaussians, which few rays meet; without it 0.1 and 1.0 are usual, which fill the space.
-  float initial_opacity = 0.5f;
-  float initial_scale = 0.1f;       // times the distance to the neighbours
+  // Of the first Gaussians; the scale is times the distance to the neighbours. 0: what suits the start. A capture's points
+  // lie on surfaces, and 0.1 and 1.0 fill the gaps between them. Random points are mostly in empty space: with MCMC,
+  // which moves them, 0.5 and 0.1 let rays through from the first step.
+  float initial_opacity = 0;
+  float initial_scale = 0;
   float ssim_weight = 0.2f;
   u64 lt_budget = 0;                // bytes of the LT buffer above which a step falls back to hybrid; 0: no limit
   u64 seed = 1;
