@@ -21,7 +21,7 @@ struct backward_frame {
     frame.prepare(exec);
     prepare(exec);
     gart::forward<gart_bench::sh_degree>(exec, frame.tracer, frame.scene(), frame.view, frame.options,
-                                         gart_bench::sh_degree, {color.data()}, pass.record());
+                                         gart_bench::sh_degree, pass.targets(color.data()), pass.record());
   }
   void prepare(E& exec) {
     pass.prepare(exec, frame.tracer, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);

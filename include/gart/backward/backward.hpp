@@ -1,7 +1,7 @@
 #pragma once
 // From the gradient of the image to the gradients of the parameters, by any strategy (strategies.hpp):
 //   prepare()  before the forward pass: footprints, tile map and LT buffer, where the strategy records
-//   record()   what the forward pass is given
+//   record(), targets()  what the forward pass is given
 //   run()      gathers and scatters what the strategy says, then turns the moments of each Gaussian into the gradients of
 //              its mean, log-scale, quaternion and opacity. Overwrites `gradients`.
 //
@@ -48,8 +48,14 @@ class backward {
   using record_type = typename Strategy::template record<TileSize>;
   static constexpr bool records = Strategy::gather::any;
   static constexpr bool ordered = records && Strategy::ordered;
+  static constexpr slot_validity validity = [] {
+    if constexpr (records)
+      return Strategy::validity;
+    else
+      return slot_validity::cleared;
+  }();
 
-  explicit backward(E& exec) : moments_(exec), own_prints_(exec), map_(exec), slots_(exec), rows_(exec) {}
+  explicit backward(E& exec) : moments_(exec), own_prints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec) {}
 
   // After the tracer's own preparation: a tracer that has the view's footprints lends them. False, and
   // nothing allocated, where the LT buffer would take more than byte_budget (0: no limit).
@@ -68,8 +74,13 @@ class backward {
       // Sorted by cover also where the tracer has lists sorted by depth: lanes in step are worth the sort.
       map_.build(exec, grid_, *prints_, tile_order::cover);
       slots_.resize(prints_->slots());
-      stage_scope stage(exec, "clear");
-      exec.fill(slots_.data(), 0xff, slots_.size() * sizeof(entry));  // a NaN: not written
+      near_ = near;
+      if constexpr (validity == slot_validity::recomputed) {
+        last_.resize(static_cast<std::size_t>(view.width) * view.height);
+      } else {
+        stage_scope stage(exec, "clear");
+        exec.fill(slots_.data(), 0xff, slots_.size() * sizeof(entry));  // a NaN: not written
+      }
     }
     return true;
   }
@@ -79,6 +90,14 @@ class backward {
       return {prints_->ranges().data(), slots_.data()};
     else
       return {};
+  }
+
+  // What the forward pass writes for this pass: its colour, and where rays end if the slots' validity needs it.
+  image_targets targets(float* color) {
+    image_targets out;
+    out.color = color;
+    if constexpr (records && validity == slot_validity::recomputed) out.last = last_.data();
+    return out;
   }
 
   // `color` and `color_gradient` are [H][W][3]; `gaussians_in_frame` and the tracer stand as the forward pass used them.
@@ -133,7 +152,7 @@ class backward {
                     gaussians<E>& gradients) {
     if constexpr (Terms::any) {
       constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
-      gather_kernel<ShDegree, Terms, entry, TileSize, sums, E> const kernel{view,
+      gather_kernel<ShDegree, Terms, entry, TileSize, sums, validity, E> const kernel{view,
                                                                             grid_,
                                                                             map_.view(),
                                                                             prints_->ranges().data(),
@@ -146,7 +165,9 @@ class backward {
                                                                             gradients.sh.data(),
                                                                             moments_.data(),
                                                                             prints_->pair_offsets().data(),
-                                                                            rows_.data()};
+                                                                            rows_.data(),
+                                                                            last_.data(),
+                                                                            near_};
       parallel_for(exec, Terms::color ? "backward/gather colour" : "backward/gather geometry",
                    tile_range{grid_.count(), 64}, kernel);
     }
@@ -159,6 +180,8 @@ class backward {
   tile_map<E, TileSize> map_;
   buffer<entry, E> slots_;
   buffer<quad, E> rows_;
+  buffer<last_hit, E> last_;
+  float near_ = 0;
 };
 
 }  // namespace gart

@@ -7,9 +7,11 @@
 // by the function the forward pass used, so they are the same bits.
 
 #include <gart/backward/record_lt.hpp>
+#include <gart/backward/strategies.hpp>
 #include <gart/backward/terms.hpp>
 #include <gart/math/hit_gradient.hpp>
 #include <gart/math/sh.hpp>
+#include <gart/render/composite.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/tiles/tile_map.hpp>
 
@@ -26,8 +28,9 @@ struct pair_row {
   static constexpr int quads = sh_quads + moment_stride / 4;
 };
 
-template <int ShDegree, class Terms, class Entry, int Size, gather_sums Sums, execution E>
+template <int ShDegree, class Terms, class Entry, int Size, gather_sums Sums, slot_validity Validity, execution E>
 struct gather_kernel {
+  static constexpr bool recomputed = Validity == slot_validity::recomputed;
   static constexpr int block_size = 64, min_blocks = Terms::geometry ? 8 : 10;
   static constexpr int bands = sh_basis<ShDegree>::size;
   static constexpr int sh_stride = 3 * bands;
@@ -39,7 +42,8 @@ struct gather_kernel {
     static constexpr int basis_quads = (bands + 3) / 4;
     quad direction_total, gradient;
     quad basis[basis_quads];
-    quad spread[basis_quads % 2 ? 0 : 1];
+    quad last;  // t and id of the ray's last hit, where validity is recomputed; and what makes the words odd in number
+    quad spread[basis_quads % 2 ? 1 : 0];
   };
   struct scratch {
     pixel_data pixels[grid_type::pixels];
@@ -59,6 +63,8 @@ struct gather_kernel {
   float* moments_out = nullptr;              // atomic: [N][moment_stride]
   u64 const* pair_offsets = nullptr;         // ordered: first row of each primitive
   quad* rows = nullptr;                      // ordered: [pairs][pair_row::quads]
+  last_hit const* last = nullptr;            // recomputed: [H][W]
+  float near = 0;
 
   template <class Team>
   GART_HD void operator()(Team const& team) const {
@@ -83,6 +89,10 @@ struct gather_kernel {
     vec3 const g(color_gradient[a], color_gradient[a + 1], color_gradient[a + 2]);
     out.direction_total = {{d.x, d.y, d.z, c.x * g.x + c.y * g.y + c.z * g.z}};
     out.gradient = {{g.x, g.y, g.z, 0}};
+    if constexpr (recomputed) {
+      last_hit const end = last[a / 3];
+      out.last = {{end.t, bits_to_float(end.id), 0, 0}};
+    }
     GART_UNROLL
     for (int k = 0; k < 4 * pixel_data::basis_quads; ++k) out.basis[k / 4].v[k % 4] = k < bands ? basis.y[k] : 0.0f;
   }
@@ -106,7 +116,14 @@ struct gather_kernel {
       pixel_data const& at = s.pixels[p];
       ++p;
       if (++column == width) column = 0, p += skip;
-      if (!entry.written()) continue;
+      if constexpr (recomputed) {
+        quad const d = at.direction_total;
+        response const r = evaluate(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
+        bool const reached = !before(at.last.v[0], float_to_bits(at.last.v[1]), r.t, id);
+        if (!is_hit(data.gaussian, r, near) || !reached) continue;
+      } else if (!entry.written()) {
+        continue;
+      }
       add(at, entry, data, sh_sum, moment_sum);
     }
     if constexpr (Sums == gather_sums::atomic) {
@@ -119,17 +136,21 @@ struct gather_kernel {
     }
   }
 
-  // What only the geometry's gradient reads of a Gaussian.
-  struct geometry_data {
-    ray_gaussian gaussian;
-    sh_row<ShDegree> coefficients;
-    GART_HD geometry_data(gather_kernel const& k, u32 id)
-        : gaussian(k.records[id]), coefficients(k.sh + static_cast<std::size_t>(sh_stride) * id, k.active_degree) {}
-  };
+  // What a lane keeps of its Gaussian: colour alone needs nothing but the slots.
   struct no_data {
     GART_HD no_data(gather_kernel const&, u32) {}
   };
-  using lane_data = std::conditional_t<Terms::geometry, geometry_data, no_data>;
+  struct record_data {
+    ray_gaussian gaussian;
+    GART_HD record_data(gather_kernel const& k, u32 id) : gaussian(k.records[id]) {}
+  };
+  struct geometry_data : record_data {
+    sh_row<ShDegree> coefficients;
+    GART_HD geometry_data(gather_kernel const& k, u32 id)
+        : record_data(k, id), coefficients(k.sh + static_cast<std::size_t>(sh_stride) * id, k.active_degree) {}
+  };
+  using lane_data =
+      std::conditional_t<Terms::geometry, geometry_data, std::conditional_t<recomputed, record_data, no_data>>;
 
   // One hit: its pixel, its record.
   GART_HD GART_INLINE void add(pixel_data const& at, Entry const& entry, lane_data const& data,

@@ -17,10 +17,16 @@ struct pixel_strategy {
   using scatter = terms<color, geometry>;
 };
 
+// How a slot of the LT buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN before every
+// forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held against the last hit of
+// its ray: the same decision, bit for bit, with nothing to clear (docs/backward.md has what each costs).
+enum class slot_validity { cleared, recomputed };
+
 // One channel: the colour gradient of a hit needs only its weight. Geometry by pixel.
 struct hybrid_strategy {
   static constexpr char const* name = "hybrid";
   static constexpr bool ordered = false;
+  static constexpr slot_validity validity = slot_validity::cleared;
   template <int Size>
   using record = record_lt<weight_entry, Size>;
   using gather = terms<color>;
@@ -31,6 +37,7 @@ struct hybrid_strategy {
 struct primitive_strategy {
   static constexpr char const* name = "primitive";
   static constexpr bool ordered = false;
+  static constexpr slot_validity validity = slot_validity::cleared;
   template <int Size>
   using record = record_lt<lt_entry, Size>;
   using gather = terms<color, geometry>;
@@ -42,6 +49,12 @@ struct primitive_strategy {
 struct deterministic_strategy : primitive_strategy {
   static constexpr char const* name = "deterministic";
   static constexpr bool ordered = true;
+};
+
+// The primitive strategy without a clear.
+struct recomputed_strategy : primitive_strategy {
+  static constexpr char const* name = "recomputed";
+  static constexpr slot_validity validity = slot_validity::recomputed;
 };
 
 }  // namespace gart

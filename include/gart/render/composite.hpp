@@ -11,12 +11,19 @@
 
 namespace gart {
 
+// Where a ray's list ends; before every hit where it has none.
+struct last_hit {
+  float t = -1;
+  u32 id = 0;
+};
+
 // Row-major, one entry a pixel; null where not wanted.
 struct image_targets {
   float* color = nullptr;          // [3], background composited
   float* transmittance = nullptr;  // after the last hit
   float* depth = nullptr;          // sum of weight * t
   u32* hits = nullptr;             // composited
+  last_hit* last = nullptr;        // the hit that the ray ended with
 };
 
 template <int ShDegree, class Record>
@@ -30,6 +37,7 @@ struct composite {
     float transmittance = 1;
     float depth = 0;
     u32 hits = 0;
+    last_hit last;
   };
 
   camera view;
@@ -60,6 +68,7 @@ struct composite {
     record(s.at, h, s.color, weight, unclamped);
     s.transmittance *= 1.0f - h.alpha;
     ++s.hits;
+    s.last = {h.t, h.id};
     return s.transmittance >= options.transmittance_min;
   }
   GART_HD void end(index_t, state const& s) const {
@@ -71,6 +80,7 @@ struct composite {
     if (out.transmittance) out.transmittance[a] = s.transmittance;
     if (out.depth) out.depth[a] = s.depth;
     if (out.hits) out.hits[a] = s.hits;
+    if (out.last) out.last[a] = s.last;
   }
 };
 

@@ -87,7 +87,7 @@ void trainer<E, Traits, Tracer, Strategy>::differentiate(Pass& pass, Loss&& loss
                                                          render_options const& render, int degree) {
   dataset_view const& view = data_.train[index];
   auto const constant = std::as_const(scene_).view();
-  forward<sh_degree>(exec_, tracer_, constant, view.view, render, degree, {color_.data()}, pass.record());
+  forward<sh_degree>(exec_, tracer_, constant, view.view, render, degree, pass.targets(color_.data()), pass.record());
   {
     stage_scope stage(exec_, "loss");
     loss(loss_input<E>{exec_, view, images_.get(exec_, index, render.background), view.view.width, view.view.height,
