@@ -38,7 +38,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "Opacity of the first Gaussians, below 1; 0: 0.5 for random\npoints with mcmc, else 0.1"))
       ->check(between(0, 0.99));
   in_group(r.add(train, "--init-scale", a.initial_scale, "X",
-                 "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 for random points with mcmc, else 1"))
+                 "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 for random points with\nmcmc, else 1"))
       ->check(between(0, 100));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
   in_group(r.add(train, "--seed", a.seed, "N",

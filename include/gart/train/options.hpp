@@ -20,9 +20,9 @@ struct train_options {
   int sh_degree = 3;
   int sh_every = 1000;              // a degree more after so many steps (or iterations / (3 * degrees) in shorter runs)
   background_kind background = background_kind::black;
-  // Of the first Gaussians; the scale is times the distance to the neighbours. 0: what suits the start. A capture's points
-  // lie on surfaces, and 0.1 and 1.0 fill the gaps between them. Random points are mostly in empty space: with MCMC,
-  // which moves them, 0.5 and 0.1 let rays through from the first step.
+  // Of the first Gaussians; the scale is times the distance to the neighbours. 0: what suits the start. A capture's
+  // points lie on surfaces, and 0.1 and 1.0 fill the gaps between them. Random points are mostly in empty space: with
+  // MCMC, which moves them, 0.5 and 0.1 let rays through from the first step.
   float initial_opacity = 0;
   float initial_scale = 0;
   float ssim_weight = 0.2f;
