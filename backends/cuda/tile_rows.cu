@@ -10,7 +10,7 @@ bool device_available(std::string* reason) { return !gart::cuda_devices(reason).
 
 GART_REGISTER_ROWS(gart_cuda_tile_rows,
                    gart::register_rows<gart::cuda_exec, tracer, gart::pixel_strategy>(30, device_available);
-                   gart::register_rows<gart::cuda_exec, tracer, gart::recomputed_strategy>(29, device_available);
+                   gart::register_rows<gart::cuda_exec, tracer, gart::cleared_strategy>(29, device_available);
                    gart::register_rows<gart::cuda_exec, tracer, gart::hybrid_strategy>(31, device_available);
                    gart::register_rows<gart::cuda_exec, tracer, gart::deterministic_strategy>(32, device_available);
                    gart::register_rows<gart::cuda_exec, tracer, gart::primitive_strategy>(33, device_available))

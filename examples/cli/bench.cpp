@@ -124,10 +124,10 @@ void add_bench(CLI::App& app, command& selected) {
   CLI::App* bench = app.add_subcommand("bench", "Time every stage of a training step on a model, camera by camera.");
   bench->add_option("MODEL.ply", a->model, "Gaussians, from gart or another program")->type_name("")->required();
   bench->add_option("CAMERAS", a->cameras, "A dataset, or a camera JSON as for gart render")->type_name("")->required();
-  bench->add_option("--backward", a->backward, "Backward strategy: auto, pixel, hybrid, primitive,\ndeterministic (sums in a fixed order) or recomputed (no clear)")
+  bench->add_option("--backward", a->backward, "Backward strategy: auto, pixel, hybrid, primitive,\ndeterministic (sums in a fixed order) or cleared (primitive\nwith its LT buffer cleared)")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(one_of({"auto", "pixel", "hybrid", "primitive", "deterministic", "recomputed"}));
+      ->check(one_of({"auto", "pixel", "hybrid", "primitive", "deterministic", "cleared"}));
   bench->add_option("--views", a->views, "The first so many cameras")->type_name("N")->capture_default_str()->check(between(1, 10000));
   bench->add_option("--warmups", a->warmups, "Steps before the measured ones, each view")->type_name("N")->capture_default_str()->check(between(0, 1000));
   bench->add_option("--repeats", a->repeats, "Measured steps, each view; the median counts")->type_name("N")->capture_default_str()->check(between(1, 1000));

@@ -49,10 +49,12 @@ class backward {
   static constexpr bool records = Strategy::gather::any;
   static constexpr bool ordered = records && Strategy::ordered;
   static constexpr slot_validity validity = [] {
-    if constexpr (records)
-      return Strategy::validity;
-    else
+    if constexpr (!records)
       return slot_validity::cleared;
+    else if constexpr (Strategy::validity == slot_validity::automatic)
+      return E::device ? slot_validity::recomputed : slot_validity::cleared;
+    else
+      return Strategy::validity;
   }();
 
   explicit backward(E& exec) : moments_(exec), own_prints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec) {}

@@ -19,8 +19,9 @@ struct pixel_strategy {
 
 // How a slot of the LT buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN before every
 // forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held against the last hit of
-// its ray: the same decision, bit for bit, with nothing to clear (docs/backward.md has what each costs).
-enum class slot_validity { cleared, recomputed };
+// its ray: the same decision, bit for bit, with nothing to clear. `automatic` is what measured better (docs/backward.md):
+// on a device, where the clear costs more than it saves, the primitive strategy recomputes; on a host it does not.
+enum class slot_validity { automatic, cleared, recomputed };
 
 // One channel: the colour gradient of a hit needs only its weight. Geometry by pixel.
 struct hybrid_strategy {
@@ -37,7 +38,7 @@ struct hybrid_strategy {
 struct primitive_strategy {
   static constexpr char const* name = "primitive";
   static constexpr bool ordered = false;
-  static constexpr slot_validity validity = slot_validity::cleared;
+  static constexpr slot_validity validity = slot_validity::automatic;
   template <int Size>
   using record = record_lt<lt_entry, Size>;
   using gather = terms<color, geometry>;
@@ -51,7 +52,11 @@ struct deterministic_strategy : primitive_strategy {
   static constexpr bool ordered = true;
 };
 
-// The primitive strategy without a clear.
+// The primitive strategy with either rule: what the other is tested and measured against.
+struct cleared_strategy : primitive_strategy {
+  static constexpr char const* name = "cleared";
+  static constexpr slot_validity validity = slot_validity::cleared;
+};
 struct recomputed_strategy : primitive_strategy {
   static constexpr char const* name = "recomputed";
   static constexpr slot_validity validity = slot_validity::recomputed;

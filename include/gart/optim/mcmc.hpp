@@ -172,6 +172,16 @@ struct mcmc_penalty_kernel {
 
 }  // namespace detail
 
+// The growth of a run that starts from `count` Gaussians: options.growth, or what reaches the budget within the first two
+// fifths of the densification steps where that is more, but no more than 1.2.
+inline float growth_for(mcmc_options const& options, index_t count, index_t max_gaussians, int iterations) {
+  double const rounds = 0.4 * (options.until * iterations - options.from) / (options.every > 0 ? options.every : 1);
+  if (count == 0 || count >= max_gaussians || rounds < 1) return options.growth;
+  double const needed = std::pow(static_cast<double>(max_gaussians) / count, 1 / rounds);
+  double const most = options.growth > 1.2 ? options.growth : 1.2;
+  return static_cast<float>(needed < options.growth ? options.growth : needed > most ? most : needed);
+}
+
 // It has no state: what it draws depends on the seed and the step only. Steps count from 1.
 template <execution E>
 class mcmc {
@@ -179,6 +189,8 @@ class mcmc {
   mcmc(E& exec, mcmc_options const& options, index_t max_gaussians, int iterations, u64 seed)
       : exec_(&exec), options_(options), max_gaussians_(max_gaussians), iterations_(iterations), seed_(seed),
         weight_(exec), dead_(exec), target_(exec), source_(exec), before_(exec), dead_before_(exec), totals_(exec, 2) {}
+
+  void set_growth(float growth) { options_.growth = growth; }
 
   // Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale); before the optimizer's step.
   void add_penalties(gaussians<E> const& model, gaussians<E>& gradient) {

@@ -17,7 +17,7 @@ struct learning_rates {
 struct mcmc_options {
   int from = 500, every = 100;
   float until = 5.0f / 6;           // share of the run
-  float growth = 1.05f;             // a step of growth, up to max_gaussians
+  float growth = 1.05f;             // a step of growth, up to max_gaussians; more in runs too short for it (growth_for)
   float dead_opacity = 0.005f;
   float noise = 5e5f;               // times the learning rate of the means
   float opacity_penalty = 0.01f, scale_penalty = 0.01f;

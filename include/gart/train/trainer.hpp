@@ -93,6 +93,7 @@ class trainer {
   buffer<float, E> color_, color_gradient_, value_;
   buffer<u32, E> skipped_;
   int step_ = 0;
+  float growth_ = 1;
   bool fell_back_ = false;
 };
 

@@ -32,6 +32,8 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
   if (data.train.empty()) throw invalid_argument("trainer: the dataset has no training views");
   skipped_.zero();
+  growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
+  mcmc_.set_growth(growth_);
 }
 
 template <execution E, class Traits, class Tracer, class Strategy>
@@ -141,6 +143,7 @@ void trainer<E, Traits, Tracer, Strategy>::save(std::filesystem::path const& pat
   add("", scene_), add("first/", state_.first), add("second/", state_.second);
   out.add("step", std::vector<int>{step_});
   out.add("sh_degree", std::vector<int>{sh_degree});
+  out.add("growth", std::vector<float>{growth_});
   out.add("seed", std::vector<u64>{options_.seed});
   out.add("adc/gradient_sum", adc_.gradient_sum.to_host()), out.add("adc/touched", adc_.touched.to_host());
   out.write(path);
@@ -151,7 +154,8 @@ void trainer<E, Traits, Tracer, Strategy>::load(std::filesystem::path const& pat
   checkpoint_reader in(path);
   std::vector<int> const degree = in.get<int>("sh_degree"), step = in.get<int>("step");
   std::vector<u64> const seed = in.get<u64>("seed");
-  if (degree.size() != 1 || step.size() != 1 || seed.size() != 1) in.fail("a counter is not one number");
+  std::vector<float> const growth = in.get<float>("growth");
+  if (degree.size() != 1 || step.size() != 1 || seed.size() != 1 || growth.size() != 1) in.fail("a counter is not one number");
   if (degree[0] != sh_degree)
     in.fail("is of SH degree " + std::to_string(degree[0]) + ", this run of " + std::to_string(sh_degree) +
             ": give --sh-degree " + std::to_string(degree[0]));
@@ -176,6 +180,8 @@ void trainer<E, Traits, Tracer, Strategy>::load(std::filesystem::path const& pat
   options_.seed = seed[0];
   order_ = view_order(data_.train.size(), options_.seed);
   step_ = step[0];
+  growth_ = growth[0];
+  mcmc_.set_growth(growth_);
 }
 
 }  // namespace gart
