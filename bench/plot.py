@@ -237,6 +237,26 @@ class Pages:
                     [(f"{scene}, {r['backward']}", components(r)) for scene in scenes for r in pick(scene, tracer)],
                     source(result))
 
+    # Runs of `strategies` with others than the three: bench/run.py --backwards deterministic,recomputed.
+    def variants(self):
+        result = self.load("variants")
+        if not result:
+            return
+        rows = [[r["scene"], r["backward"], f"{backward_ms(r):.2f}", f"{r['stages_ms'].get('clear', 0):.2f}",
+                 f"{r['step_ms']:.2f}"] for r in result["runs"] if "error" not in r]
+        self.tables["variants"] = table(["scene", "strategy", "backward, ms", "clear, ms", "step, ms"],
+                                        rows) + ["", f"{source(result)}; in that commit `primitive` is `cleared`."]
+
+    def counters(self):
+        result = self.load("counters")
+        if not result:
+            return
+        rows = [[r["kernel"], f"{r['ms']:.2f}", f"{r['sm_percent']:.0f}%", f"{r['dram_percent']:.0f}%",
+                 f"{r['l1_hit_percent']:.0f}%", f"{r['occupancy_percent']:.0f}%",
+                 f"{r['stall_cycles']:.1f} of {r['cycles_per_instruction']:.1f}"] for r in result["runs"]]
+        self.tables["counters"] = table(["kernel", "time, ms", "SM", "DRAM", "L1 hits", "occupancy",
+                                         "cycles an instruction waiting for loads"], rows) + ["", f"{source(result)}."]
+
     def memory(self):
         result = self.load("memory")
         if not result:
@@ -310,6 +330,8 @@ def main():
     a = parser.parse_args()
     pages = Pages(a.results, a.docs)
     pages.strategies()
+    pages.variants()
+    pages.counters()
     pages.memory()
     pages.stages()
     pages.cpu()
