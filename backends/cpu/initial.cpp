@@ -48,7 +48,8 @@ class nearest_three {
     float width = -1;
     for (int a = 0; a < 3; ++a) {
       float lo = unbounded, hi = -unbounded;
-      for (std::size_t i = first; i < last; ++i) lo = std::min(lo, at(order_[i], a)), hi = std::max(hi, at(order_[i], a));
+      for (std::size_t i = first; i < last; ++i)
+        lo = std::min(lo, at(order_[i], a)), hi = std::max(hi, at(order_[i], a));
       if (hi - lo > width) width = hi - lo, widest = a;
     }
     std::size_t const middle = first + (last - first) / 2;

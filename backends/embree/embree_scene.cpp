@@ -49,8 +49,8 @@ struct embree_scene::handles {
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
 
   handles() {
-    // Robust: a box is entered wherever the exact ray would, so no candidate is lost to rounding. Dynamic, low quality: it
-    // is built every step.
+    // Robust: a box is entered wherever the exact ray would, so no candidate is lost to rounding. Dynamic, low quality:
+    // it is built every step.
     rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC));
     rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_LOW);
     rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_LOW);

@@ -8,7 +8,8 @@
 #include <cstdio>
 #include <exception>
 
-// The p-th of the coordinates along one axis, 0 <= p <= 1: models have stray Gaussians far out, so no mean and no maximum.
+// The p-th of the coordinates along one axis, 0 <= p <= 1: models have stray Gaussians far out, so no mean and no
+// maximum.
 double quantile(gart::gaussian_model const& model, int axis, double p) {
   std::vector<float> values;
   for (std::size_t i = 0; i < model.size(); ++i) values.push_back(model.mean[3 * i + axis]);

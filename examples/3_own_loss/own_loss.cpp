@@ -1,6 +1,6 @@
 // Training with a loss of one's own: own_loss DATASET MODEL.ply [ITERATIONS]
-// Charbonnier's, the mean of sqrt(d^2 + e^2) - e over pixels and channels: quadratic for small differences, L1 for large
-// ones. The trainer is a template here, compiled for OpenMP, SH degree 1, the BVH and the pixel backward pass.
+// Charbonnier's, the mean of sqrt(d^2 + e^2) - e over pixels and channels: quadratic for small differences, L1 for
+// large ones. The trainer is a template here, compiled for OpenMP, SH degree 1, the BVH and the pixel backward pass.
 #include <gart/backward/strategies.hpp>
 #include <gart/exec/parallel.hpp>
 #include <gart/io/ply.hpp>

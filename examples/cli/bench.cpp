@@ -100,20 +100,29 @@ int run_bench(bench_arguments const& a) {
               static_cast<double>(v + 1) / static_cast<double>(cameras.size()));
   }
   say.clear();
-  nlohmann::json result = {{"backend", row.backend}, {"tracer", row.tracer}, {"backward", row.backward},
-                           {"sh_degree", row.sh_degree}, {"gaussians", file.model.size()},
-                           {"width", cameras[0].view.width}, {"height", cameras[0].view.height},
-                           {"views", cameras.size()}, {"warmups", a.warmups}, {"repeats", a.repeats},
-                           {"step_ms", wall}, {"stages_ms", stages}, {"hits_per_ray", hits},
-                           {"lt_bytes", lt_bytes}, {"peak_bytes", peak}};
+  nlohmann::json result = {{"backend", row.backend},
+                           {"tracer", row.tracer},
+                           {"backward", row.backward},
+                           {"sh_degree", row.sh_degree},
+                           {"gaussians", file.model.size()},
+                           {"width", cameras[0].view.width},
+                           {"height", cameras[0].view.height},
+                           {"views", cameras.size()},
+                           {"warmups", a.warmups},
+                           {"repeats", a.repeats},
+                           {"step_ms", wall},
+                           {"stages_ms", stages},
+                           {"hits_per_ray", hits},
+                           {"lt_bytes", lt_bytes},
+                           {"peak_bytes", peak}};
   if (!a.json.empty()) write_json(a.json, result);
   std::printf("%s, %s, %s: %zu Gaussians, %d x %d, medians of %d, mean over %zu views\n", row.backend.c_str(),
               row.tracer.c_str(), row.backward.c_str(), file.model.size(), cameras[0].view.width,
               cameras[0].view.height, a.repeats, cameras.size());
   std::printf("  %-24s %10.3f ms\n", "whole step", wall);
   for (auto const& [label, ms] : stages) std::printf("  %-24s %10.3f ms\n", label.c_str(), ms);
-  std::printf("  %-24s %10.1f\n  %-24s %10s\n  %-24s %10s\n", "hits a ray", hits, "LT buffer", as_bytes(lt_bytes).c_str(),
-              "peak memory", as_bytes(static_cast<double>(peak)).c_str());
+  std::printf("  %-24s %10.1f\n  %-24s %10s\n  %-24s %10s\n", "hits a ray", hits, "LT buffer",
+              as_bytes(lt_bytes).c_str(), "peak memory", as_bytes(static_cast<double>(peak)).c_str());
   return 0;
 }
 
@@ -124,18 +133,31 @@ void add_bench(CLI::App& app, command& selected) {
   CLI::App* bench = app.add_subcommand("bench", "Time every stage of a training step on a model, camera by camera.");
   bench->add_option("MODEL.ply", a->model, "Gaussians, from gart or another program")->type_name("")->required();
   bench->add_option("CAMERAS", a->cameras, "A dataset, or a camera JSON as for gart render")->type_name("")->required();
-  bench->add_option("--backward", a->backward, "Backward strategy: auto, pixel, hybrid, primitive,\ndeterministic (sums in a fixed order) or cleared (primitive\nwith its LT buffer cleared)")
+  bench
+      ->add_option("--backward", a->backward,
+                   "Backward strategy: auto, pixel, hybrid, primitive,\ndeterministic (sums in a fixed order) or "
+                   "cleared (primitive\nwith its LT buffer cleared)")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(one_of({"auto", "pixel", "hybrid", "primitive", "deterministic", "cleared"}));
-  bench->add_option("--views", a->views, "The first so many cameras")->type_name("N")->capture_default_str()->check(between(1, 10000));
-  bench->add_option("--warmups", a->warmups, "Steps before the measured ones, each view")->type_name("N")->capture_default_str()->check(between(0, 1000));
-  bench->add_option("--repeats", a->repeats, "Measured steps, each view; the median counts")->type_name("N")->capture_default_str()->check(between(1, 1000));
+  bench->add_option("--views", a->views, "The first so many cameras")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 10000));
+  bench->add_option("--warmups", a->warmups, "Steps before the measured ones, each view")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(0, 1000));
+  bench->add_option("--repeats", a->repeats, "Measured steps, each view; the median counts")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 1000));
   bench->add_option("--json", a->json, "Write the figures to this file")->type_name("FILE");
   bench->add_flag("--quiet", a->quiet, "No progress line");
   add_row_options(*bench, a->row);
   bench->footer(
-      "\nStages nest: \"backward\" is everything between the image's gradient and the parameters', \"backward/...\" its\n"
+      "\nStages nest: \"backward\" is everything between the image's gradient and the parameters', \"backward/...\" "
+      "its\n"
       "parts. On a GPU stages are device time, by events; \"whole step\" is wall time, with one wait a step.\n"
       "\nExamples:\n"
       "  gart bench run/model.ply lego --backend cuda --backward primitive --json bench.json\n"

@@ -38,7 +38,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "Opacity of the first Gaussians, below 1; 0: 0.5 for random\npoints with mcmc, else 0.1"))
       ->check(between(0, 0.99));
   in_group(r.add(train, "--init-scale", a.initial_scale, "X",
-                 "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 for random points with\nmcmc, else 1"))
+                 "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 for random points "
+                 "with\nmcmc, else 1"))
       ->check(between(0, 100));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
   in_group(r.add(train, "--seed", a.seed, "N",
@@ -59,14 +60,16 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--backend", a.backend, "NAME",
                  "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is"))
       ->check(backend_names());
-  in_group(
-      r.add(train, "--tracer", a.tracer, "NAME", "What finds the hits: tiles, bvh, or embree (CPU);\nthe images are the same"))
+  in_group(r.add(train, "--tracer", a.tracer, "NAME",
+                 "What finds the hits: tiles, bvh, or embree (CPU);\nthe images are the same"))
       ->check(tracer_names());
-  in_group(
-      r.add(train, "--backward", a.backward, "NAME", "How gradients are summed: primitive (one sum a Gaussian and\ntile), hybrid (a quarter of the memory), pixel, or\ndeterministic (the same bits in every run); auto: the fastest"))
+  in_group(r.add(train, "--backward", a.backward, "NAME",
+                 "How gradients are summed: primitive (one sum a Gaussian and\ntile), hybrid (a quarter of the "
+                 "memory), pixel, or\ndeterministic (the same bits in every run); auto: the fastest"))
       ->check(one_of({"auto", "pixel", "hybrid", "primitive", "deterministic"}));
   in_group(r.add(train, "--lt-budget", a.lt_budget_gb, "GB",
-                 "Memory for what the forward pass records for primitive;\na step that needs more falls back to hybrid, which needs a\nquarter. 0: no limit"))
+                 "Memory for what the forward pass records for primitive;\na step that needs more falls back to "
+                 "hybrid, which needs a\nquarter. 0: no limit"))
       ->check(between(0, 1e6));
   add_threads(train, a.threads);
   in_group(train.get_option("--threads"));

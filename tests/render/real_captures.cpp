@@ -1,5 +1,5 @@
-// All tracers give the same hit lists on real captures: the starting models of a COLMAP capture and of one with a distorted
-// lens, seen by their own cameras.
+// All tracers give the same hit lists on real captures: the starting models of a COLMAP capture and of one with a
+// distorted lens, seen by their own cameras.
 #include <support/policies.hpp>
 #include <support/trace_scene.hpp>
 

@@ -1,6 +1,6 @@
 #pragma once
-// The policies a test body runs over: TEST_CASE_TEMPLATE("...", E, GART_TEST_POLICIES). Compiled by a host compiler they
-// are the two host policies; by nvcc, with GART_TEST_CUDA, cuda_exec.
+// The policies a test body runs over: TEST_CASE_TEMPLATE("...", E, GART_TEST_POLICIES). Compiled by a host compiler
+// they are the two host policies; by nvcc, with GART_TEST_CUDA, cuda_exec.
 
 #include <doctest/doctest.h>
 
@@ -21,7 +21,8 @@ namespace gart_test {
 // The seed of property tests: GART_TEST_SEED, or another at every run; CAPTURE it so that a failure can be repeated.
 inline std::uint64_t seed() {
   static std::uint64_t const value = [] {
-    if (char const* text = std::getenv("GART_TEST_SEED")) return static_cast<std::uint64_t>(std::strtoull(text, nullptr, 10));
+    if (char const* text = std::getenv("GART_TEST_SEED"))
+      return static_cast<std::uint64_t>(std::strtoull(text, nullptr, 10));
     return static_cast<std::uint64_t>(std::random_device{}());
   }();
   return value;

@@ -80,10 +80,14 @@ auto with_tracer(E& exec, tracer_kind kind, F&& body) {
 template <class F>
 auto with_degree(int degree, F&& body) {
   switch (degree) {
-    case 0: return body(std::integral_constant<int, 0>{});
-    case 1: return body(std::integral_constant<int, 1>{});
-    case 2: return body(std::integral_constant<int, 2>{});
-    default: return body(std::integral_constant<int, 3>{});
+    case 0:
+      return body(std::integral_constant<int, 0>{});
+    case 1:
+      return body(std::integral_constant<int, 1>{});
+    case 2:
+      return body(std::integral_constant<int, 2>{});
+    default:
+      return body(std::integral_constant<int, 3>{});
   }
 }
 
@@ -124,18 +128,21 @@ gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, ga
   records.prepare(exec, constant, view.position, options.alpha_min);
   tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
   pass.prepare(exec, tracer, constant, view, options.alpha_min, options.near);
-  gart::forward<Degree>(exec, tracer, constant, view, options, active_degree, pass.targets(color.data()), pass.record());
+  gart::forward<Degree>(exec, tracer, constant, view, options, active_degree, pass.targets(color.data()),
+                        pass.record());
   pass.template run<Degree>(exec, tracer, constant, records.view(), view, options, active_degree, color, gradient,
                             gradients);
   return gradients.to_host();
 }
 
-// Which strategies are compiled here for a tracer and a degree: each strategy and each tracer at every degree, the other
-// combinations at degree 3 only, for the sake of the compiler's time.
+// Which strategies are compiled here for a tracer and a degree: each strategy and each tracer at every degree, the
+// other combinations at degree 3 only, for the sake of the compiler's time.
 inline std::vector<std::string> strategies_for(tracer_kind kind, int degree) {
   if (kind == tracer_kind::embree) return {"pixel"};
-  if (kind == tracer_kind::tiles) return degree == 3 ? std::vector<std::string>{"pixel", "hybrid", "primitive", "deterministic", "recomputed", "cleared"}
-                                                     : std::vector<std::string>{"primitive"};
+  if (kind == tracer_kind::tiles)
+    return degree == 3
+               ? std::vector<std::string>{"pixel", "hybrid", "primitive", "deterministic", "recomputed", "cleared"}
+               : std::vector<std::string>{"primitive"};
   return degree == 3 ? std::vector<std::string>{"pixel", "hybrid", "primitive"} : std::vector<std::string>{"pixel"};
 }
 
@@ -153,7 +160,8 @@ gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model,
     if (kind == tracer_kind::tiles && strategy == "primitive")
       return by(gart::primitive_strategy{}, std::type_identity<tiles>{});
     if constexpr (degree == 3) {
-      if (kind == tracer_kind::bvh && strategy == "hybrid") return by(gart::hybrid_strategy{}, std::type_identity<bvh>{});
+      if (kind == tracer_kind::bvh && strategy == "hybrid")
+        return by(gart::hybrid_strategy{}, std::type_identity<bvh>{});
       if (kind == tracer_kind::bvh && strategy == "primitive")
         return by(gart::primitive_strategy{}, std::type_identity<bvh>{});
       if (kind == tracer_kind::tiles && strategy == "pixel")

@@ -2,11 +2,12 @@
 // From the gradient of the image to the gradients of the parameters, by any strategy (strategies.hpp):
 //   prepare()  before the forward pass: footprints, tile map and LT buffer, where the strategy records
 //   record(), targets()  what the forward pass is given
-//   run()      gathers and scatters what the strategy says, then turns the moments of each Gaussian into the gradients of
+//   run()      gathers and scatters what the strategy says, then turns the moments of each Gaussian into the gradients
+//   of
 //              its mean, log-scale, quaternion and opacity. Overwrites `gradients`.
 //
-// Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, 36 bytes a Gaussian, 8 a
-// (primitive, tile) pair and the LT buffer: 4 or 16 bytes for each pixel of each box.
+// Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, 36 bytes a Gaussian, 8
+// a (primitive, tile) pair and the LT buffer: 4 or 16 bytes for each pixel of each box.
 
 #include <gart/backward/gather.hpp>
 #include <gart/backward/scatter.hpp>
@@ -26,7 +27,8 @@ struct finish {
   GART_KERNEL void operator()(index_t i) const {
     ray_gaussian const g = records[i];
     geometry_gradient out{vec3(0.0f), vec3(0.0f), {0, 0, 0, 0}, 0};
-    if (g.cutoff >= 0) out = from_moments(moments.data() + std::size_t{moment_stride} * i, load_parameters(scene, i), g);
+    if (g.cutoff >= 0)
+      out = from_moments(moments.data() + std::size_t{moment_stride} * i, load_parameters(scene, i), g);
     for (int k = 0; k < 3; ++k) {
       gradients.mean[std::size_t{3} * i + k] = out.mean[k];
       gradients.log_scale[std::size_t{3} * i + k] = out.log_scale[k];
@@ -43,8 +45,9 @@ template <execution E, class Strategy, int TileSize = 8>
 class backward {
  public:
   template <class Term>
-  using only = std::conditional_t<(std::is_same_v<Term, gart::color> ? Strategy::gather::color : Strategy::gather::geometry),
-                                  terms<Term>, terms<>>;
+  using only =
+      std::conditional_t<(std::is_same_v<Term, gart::color> ? Strategy::gather::color : Strategy::gather::geometry),
+                         terms<Term>, terms<>>;
   using record_type = typename Strategy::template record<TileSize>;
   static constexpr bool records = Strategy::gather::any;
   static constexpr bool ordered = records && Strategy::ordered;
@@ -102,7 +105,8 @@ class backward {
     return out;
   }
 
-  // `color` and `color_gradient` are [H][W][3]; `gaussians_in_frame` and the tracer stand as the forward pass used them.
+  // `color` and `color_gradient` are [H][W][3]; `gaussians_in_frame` and the tracer stand as the forward pass used
+  // them.
   template <int ShDegree, class Tracer>
   void run(E& exec, Tracer& tracer, gaussians_view<float const> scene, span<ray_gaussian const> gaussians_in_frame,
            camera const& view, render_options const& options, int active_degree, span<float const> color,
@@ -116,18 +120,28 @@ class backward {
       if constexpr (ordered) rows_.resize(prints_->pairs() * pair_row<ShDegree>::quads);
       // Colour and geometry in a launch each: together their sums and coefficients leave too few registers for enough
       // warps to hide memory behind.
-      gather_terms<ShDegree, only<gart::color>>(exec, scene, gaussians_in_frame, view, active_degree, color, color_gradient, gradients);
-      gather_terms<ShDegree, only<geometry>>(exec, scene, gaussians_in_frame, view, active_degree, color, color_gradient, gradients);
+      gather_terms<ShDegree, only<gart::color>>(exec, scene, gaussians_in_frame, view, active_degree, color,
+                                                color_gradient, gradients);
+      gather_terms<ShDegree, only<geometry>>(exec, scene, gaussians_in_frame, view, active_degree, color,
+                                             color_gradient, gradients);
       if constexpr (ordered)
-        parallel_for(exec, "backward/sum", scene.count * pair_row<ShDegree>::quads,
-                     sum_pairs<ShDegree, typename Strategy::gather>{prints_->pair_offsets(), prints_->pairs(), rows_.data(),
-                                                                    gradients.sh.data(), moments_.data()});
+        parallel_for(
+            exec, "backward/sum", scene.count * pair_row<ShDegree>::quads,
+            sum_pairs<ShDegree, typename Strategy::gather>{prints_->pair_offsets(), prints_->pairs(), rows_.data(),
+                                                           gradients.sh.data(), moments_.data()});
     }
     if constexpr (Strategy::scatter::any) {
       pixel_order const order{view.width, view.height};
-      scatter_program<ShDegree, typename Strategy::scatter, E> const program{
-          view,         order,        scene.sh,     active_degree, options.transmittance_min, gaussians_in_frame.data(),
-          color.data(), color_gradient.data(),      gradients.sh.data(),                      moments_.data()};
+      scatter_program<ShDegree, typename Strategy::scatter, E> const program{view,
+                                                                             order,
+                                                                             scene.sh,
+                                                                             active_degree,
+                                                                             options.transmittance_min,
+                                                                             gaussians_in_frame.data(),
+                                                                             color.data(),
+                                                                             color_gradient.data(),
+                                                                             gradients.sh.data(),
+                                                                             moments_.data()};
       tracer.trace(exec, "backward/scatter", order.launch_size(), program);
     }
     parallel_for(exec, "backward/finish", scene.count,
@@ -142,7 +156,7 @@ class backward {
     using type = float;  // no slots
   };
   template <class R>
-    requires requires { typename R::entry; }
+  requires requires { typename R::entry; }
   struct entry_of<R> {
     using type = typename R::entry;
   };
@@ -155,21 +169,21 @@ class backward {
     if constexpr (Terms::any) {
       constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
       gather_kernel<ShDegree, Terms, entry, TileSize, sums, validity, E> const kernel{view,
-                                                                            grid_,
-                                                                            map_.view(),
-                                                                            prints_->ranges().data(),
-                                                                            slots_.data(),
-                                                                            gaussians_in_frame.data(),
-                                                                            scene.sh,
-                                                                            active_degree,
-                                                                            image.data(),
-                                                                            image_gradient.data(),
-                                                                            gradients.sh.data(),
-                                                                            moments_.data(),
-                                                                            prints_->pair_offsets().data(),
-                                                                            rows_.data(),
-                                                                            last_.data(),
-                                                                            near_};
+                                                                                      grid_,
+                                                                                      map_.view(),
+                                                                                      prints_->ranges().data(),
+                                                                                      slots_.data(),
+                                                                                      gaussians_in_frame.data(),
+                                                                                      scene.sh,
+                                                                                      active_degree,
+                                                                                      image.data(),
+                                                                                      image_gradient.data(),
+                                                                                      gradients.sh.data(),
+                                                                                      moments_.data(),
+                                                                                      prints_->pair_offsets().data(),
+                                                                                      rows_.data(),
+                                                                                      last_.data(),
+                                                                                      near_};
       parallel_for(exec, Terms::color ? "backward/gather colour" : "backward/gather geometry",
                    tile_range{grid_.count(), 64}, kernel);
     }

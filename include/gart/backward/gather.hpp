@@ -1,10 +1,11 @@
 #pragma once
 // The backward pass by primitive: a team takes a tile, its lanes take the primitives of the tile's list in turn. A lane
 // walks the pixels that the primitive's box and the tile share, reads what the forward pass recorded there, sums the
-// gradient in registers and adds it to the Gaussian once. Rays and their SH bases are computed once a tile, into scratch.
+// gradient in registers and adds it to the Gaussian once. Rays and their SH bases are computed once a tile, into
+// scratch.
 //
-// Whether a slot is a hit is told by the slot itself (backward/record_lt.hpp); its t, offset and alpha are evaluated again
-// by the function the forward pass used, so they are the same bits.
+// Whether a slot is a hit is told by the slot itself (backward/record_lt.hpp); its t, offset and alpha are evaluated
+// again by the function the forward pass used, so they are the same bits.
 
 #include <gart/backward/record_lt.hpp>
 #include <gart/backward/strategies.hpp>
@@ -17,8 +18,8 @@
 
 namespace gart {
 
-// Where a lane's sums go: added to the Gaussian atomically, or kept as one row a (primitive, tile) pair, in primitive-major
-// order, for sum_pairs to add up in that order: the same bits in every run.
+// Where a lane's sums go: added to the Gaussian atomically, or kept as one row a (primitive, tile) pair, in
+// primitive-major order, for sum_pairs to add up in that order: the same bits in every run.
 enum class gather_sums { atomic, ordered };
 
 // A row of the ordered sums: SH gradient, padded to quads, then moments.
@@ -59,11 +60,11 @@ struct gather_kernel {
   int active_degree = ShDegree;
   float const* color = nullptr;           // [H][W][3]
   float const* color_gradient = nullptr;  // [H][W][3]
-  float* sh_gradient = nullptr;              // atomic: [N][K][3]
-  float* moments_out = nullptr;              // atomic: [N][moment_stride]
-  u64 const* pair_offsets = nullptr;         // ordered: first row of each primitive
-  quad* rows = nullptr;                      // ordered: [pairs][pair_row::quads]
-  last_hit const* last = nullptr;            // recomputed: [H][W]
+  float* sh_gradient = nullptr;           // atomic: [N][K][3]
+  float* moments_out = nullptr;           // atomic: [N][moment_stride]
+  u64 const* pair_offsets = nullptr;      // ordered: first row of each primitive
+  quad* rows = nullptr;                   // ordered: [pairs][pair_row::quads]
+  last_hit const* last = nullptr;         // recomputed: [H][W]
   float near = 0;
 
   template <class Team>
@@ -128,7 +129,8 @@ struct gather_kernel {
     }
     if constexpr (Sums == gather_sums::atomic) {
       if constexpr (Terms::color)
-        E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id, sh_sum, 3 * sh_coefficients(active_degree));
+        E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id, sh_sum,
+                          3 * sh_coefficients(active_degree));
       if constexpr (Terms::geometry)
         E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, moment_sum, moment_count);
     } else {
@@ -208,7 +210,8 @@ struct gather_kernel {
     if constexpr (Terms::geometry) {
       GART_UNROLL
       for (int q = 0; q < moment_stride / 4; ++q)
-        out[row::sh_quads + q] = {{moment_sum[4 * q], moment_sum[4 * q + 1], moment_sum[4 * q + 2], moment_sum[4 * q + 3]}};
+        out[row::sh_quads + q] = {
+            {moment_sum[4 * q], moment_sum[4 * q + 1], moment_sum[4 * q + 2], moment_sum[4 * q + 3]}};
     }
   }
 };

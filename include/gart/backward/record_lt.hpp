@@ -1,9 +1,9 @@
 #pragma once
-// What the primitive and hybrid strategies record of a hit, at its place in the LT buffer (tiles/layout.hpp). The weight
-// w = T alpha stands for the transmittance T before the hit, which is w / alpha; with it goes, for each channel of the hit's
-// colour, whether it was clamped at zero:
-//   primitive  4 channels: the ray's colour with the hit (L), whose sign bits, free as L is not negative, hold the clamps; w
-//   hybrid     1 channel: w, whose three lowest bits hold the clamps (a relative error of 2^-20)
+// What the primitive and hybrid strategies record of a hit, at its place in the LT buffer (tiles/layout.hpp). The
+// weight w = T alpha stands for the transmittance T before the hit, which is w / alpha; with it goes, for each channel
+// of the hit's colour, whether it was clamped at zero:
+//   primitive  4 channels: the ray's colour with the hit (L), whose sign bits, free as L is not negative, hold the
+//   clamps; w hybrid     1 channel: w, whose three lowest bits hold the clamps (a relative error of 2^-20)
 // Slots that no hit wrote hold what the clear left there, a NaN, which `written` tells.
 
 #include <gart/math/arith.hpp>

@@ -50,7 +50,7 @@ struct scatter_program {
   GART_HD primary_ray ray_of(index_t, state const& s) const { return {s.direction}; }
 
   GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h) const {
-    vec3 const unclamped = 
+    vec3 const unclamped =
         s.basis.unclamped(sh_row<ShDegree>(sh + static_cast<std::size_t>(sh_stride) * h.id, active_degree).v);
     float weight;
     float const alpha_gradient = s.gradient.pass(h.alpha, clamped_color(unclamped), weight);
@@ -64,7 +64,8 @@ struct scatter_program {
         row[3 * k + 1] = s.basis.y[k] * g.y;
         row[3 * k + 2] = s.basis.y[k] * g.z;
       }
-      E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * h.id, row, 3 * sh_coefficients(active_degree));
+      E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * h.id, row,
+                        3 * sh_coefficients(active_degree));
     }
     if constexpr (Terms::geometry) {
       ray_gaussian const g = records[h.id];

@@ -1,5 +1,5 @@
 #pragma once
-// Seam 3: a backward strategy is a composition: what the forward pass records of a hit, which terms are gathered by
+// A backward strategy is a composition: what the forward pass records of a hit, which terms are gathered by
 // primitive and which are scattered by pixel.
 
 #include <gart/backward/record_lt.hpp>
@@ -17,10 +17,11 @@ struct pixel_strategy {
   using scatter = terms<color, geometry>;
 };
 
-// How a slot of the LT buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN before every
-// forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held against the last hit of
-// its ray: the same decision, bit for bit, with nothing to clear. `automatic` is what measured better (docs/backward.md):
-// on a device, where the clear costs more than it saves, the primitive strategy recomputes; on a host it does not.
+// How a slot of the LT buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN before
+// every forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held against the
+// last hit of its ray: the same decision, bit for bit, with nothing to clear. `automatic` is what measured better
+// (docs/backward.md): on a device, where the clear costs more than it saves, the primitive strategy recomputes; on a
+// host it does not.
 enum class slot_validity { automatic, cleared, recomputed };
 
 // One channel: the colour gradient of a hit needs only its weight. Geometry by pixel.

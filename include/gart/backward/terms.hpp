@@ -1,5 +1,6 @@
 #pragma once
-// The two parts of a hit's gradient, and which of them a pass computes: colour (3 K floats of SH) and geometry (10 moments).
+// The two parts of a hit's gradient, and which of them a pass computes: colour (3 K floats of SH) and geometry (10
+// moments).
 
 #include <type_traits>
 

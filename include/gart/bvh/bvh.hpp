@@ -1,7 +1,7 @@
 #pragma once
 // A binary bounding volume hierarchy over boxes, built on the policy's own sort (Karras, "Maximizing parallelism in the
-// construction of BVHs, octrees, and k-d trees", HPG 2012): Morton codes of the box centres, a radix sort, one thread an
-// inner node, boxes fitted from the leaves up. refit keeps the tree and fits its boxes to new ones.
+// construction of BVHs, octrees, and k-d trees", HPG 2012): Morton codes of the box centres, a radix sort, one thread
+// an inner node, boxes fitted from the leaves up. refit keeps the tree and fits its boxes to new ones.
 //
 // Shapes: n boxes make max(n - 1, 1) nodes of 64 bytes; node 0 is the root. Cost: O(n) work beside the sort.
 // Boxes that are empty (empty_box) are never met.

@@ -154,7 +154,8 @@ void bvh<E>::build(E& exec, span<box const> boxes) {
   codes_.resize(count_), order_.resize(count_), leaf_parent_.resize(count_);
   nodes_.resize(count_ > 1 ? count_ - 1 : 1);
   span<box> const all = bounds_.view();
-  span<box> const stage1 = all.subspan(0, wide), stage2 = all.subspan(wide, narrow), root = all.subspan(wide + narrow, 1);
+  span<box> const stage1 = all.subspan(0, wide), stage2 = all.subspan(wide, narrow),
+                  root = all.subspan(wide + narrow, 1);
   parallel_for(exec, "bvh/bounds", wide, bvh_kernels::bound_centers{boxes, stage1, true});
   parallel_for(exec, "bvh/bounds", narrow, bvh_kernels::bound_centers{stage1, stage2, false});
   parallel_for(exec, "bvh/bounds", 1, bvh_kernels::bound_centers{stage2, root, false});

@@ -61,8 +61,10 @@ GART_HD GART_INLINE void walk(bvh_view const& tree, Ray const& r, Visitor& visit
       u32 const which = c == 0 ? child[0] : child[1];
       if (wanted && (which & bvh_node::leaf)) {
         visitor.leaf(which & ~bvh_node::leaf);
-        if (c == 0) enter[0] = false;
-        else enter[1] = false;
+        if (c == 0)
+          enter[0] = false;
+        else
+          enter[1] = false;
       }
     }
     if (enter[0] && enter[1]) {

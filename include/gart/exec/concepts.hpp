@@ -1,5 +1,5 @@
 #pragma once
-// Seam 1, the execution policy: a queue on which kernels run, and the memory they run in.
+// The execution policy: a queue on which kernels run, and the memory they run in.
 //
 // A policy is the first argument of everything that computes. It offers
 //   static constexpr char const* name;   "serial", "openmp", "cuda"

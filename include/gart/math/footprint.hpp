@@ -1,12 +1,13 @@
 #pragma once
-// Where on the image a Gaussian can be hit: the perspective-correct bounds of its ellipsoid |p|^2 <= cutoff, for a pinhole.
+// Where on the image a Gaussian can be hit: the perspective-correct bounds of its ellipsoid |p|^2 <= cutoff, for a
+// pinhole.
 //
 // In camera space the ellipsoid is m + A s, |s| <= 1, A = c W R S with c^2 the cutoff and rows A_x, A_y, A_z. Planes
-// x = u z through the camera touch it where (m_x - u m_z)^2 = |A_x - u A_z|^2, a quadratic in u: the roots are the bounds of
-// x / z when the ellipsoid lies in front of the camera (the paper's centre p and half-extent h in another form). When it
-// crosses the near plane z = n only the part in front counts: a root is a bound if it touches at z >= n, and the section
-// with the near plane, an ellipse, gives the others. So a Gaussian beside the camera, or around it, gets the box of what can
-// be seen of it, never more than the section demands.
+// x = u z through the camera touch it where (m_x - u m_z)^2 = |A_x - u A_z|^2, a quadratic in u: the roots are the
+// bounds of x / z when the ellipsoid lies in front of the camera (the paper's centre p and half-extent h in another
+// form). When it crosses the near plane z = n only the part in front counts: a root is a bound if it touches at z >= n,
+// and the section with the near plane, an ellipse, gives the others. So a Gaussian beside the camera, or around it,
+// gets the box of what can be seen of it, never more than the section demands.
 //
 // All in double: the quadratic of a small far ellipsoid cancels to a few digits in float. Then widened by what float
 // arithmetic can move a hit (32 roundings of the distance) and a hundredth of a pixel: no pixel that hits lies outside.
@@ -36,7 +37,7 @@ struct footprint_view {
   mat3d to_camera;  // world to camera rotation
   double fx, fy, cx, cy;
   int width, height;
-  double near;      // smallest z of a hit: the ray's near distance times the least cosine of a pixel
+  double near;  // smallest z of a hit: the ray's near distance times the least cosine of a pixel
 };
 
 namespace detail {

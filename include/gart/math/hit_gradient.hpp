@@ -8,8 +8,8 @@
 //   m0 = sum a,  m1 = sum a p,  m2 = sum a p p^T
 //   dL/d logit = (1 - sigma) m0          dL/d mean = M^T m1           dL/d log s_k = m2_kk
 //   dL/d rotation (body frame)_i = m2_jk (s_j / s_k - s_k / s_j), (i, j, k) cyclic
-// for x = mean + R S p is the point of largest response and dL/dM = -(sum a p p^T)(R S)^T. Where a clamp is active (alpha
-// at alpha_max, a colour at 0) the derivative through it is zero.
+// for x = mean + R S p is the point of largest response and dL/dM = -(sum a p p^T)(R S)^T. Where a clamp is active
+// (alpha at alpha_max, a colour at 0) the derivative through it is zero.
 
 #include <gart/math/quaternion.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -31,8 +31,8 @@ GART_HD GART_INLINE float alpha_gradient(float transmittance, float color_g, flo
 
 // The front-to-back walk of a ray's gradient: what a hit's derivative needs of the hits before and behind it.
 struct ray_gradient {
-  vec3 g;              // dL/d colour of the pixel
-  float behind;        // (colour of all hits not yet passed, and the background).g
+  vec3 g;        // dL/d colour of the pixel
+  float behind;  // (colour of all hits not yet passed, and the background).g
   float transmittance = 1;
 
   // dL/dalpha of the hit; moves past it. `weight` returns w.
@@ -60,13 +60,20 @@ struct geometry_gradient {
 };
 
 // From the sums over all hits to the stored parameters.
-GART_HD GART_INLINE geometry_gradient from_moments(float const* m, gaussian_parameters const& p, ray_gaussian const& g) {
+GART_HD GART_INLINE geometry_gradient from_moments(float const* m, gaussian_parameters const& p,
+                                                   ray_gaussian const& g) {
   geometry_gradient out;
   out.opacity = m[0] * (1.0f - g.sigma);
   for (int j = 0; j < 3; ++j) {
-    float const column[3] = {j == 0 ? g.m[0].x : j == 1 ? g.m[0].y : g.m[0].z,
-                             j == 0 ? g.m[1].x : j == 1 ? g.m[1].y : g.m[1].z,
-                             j == 0 ? g.m[2].x : j == 1 ? g.m[2].y : g.m[2].z};
+    float const column[3] = {j == 0   ? g.m[0].x
+                             : j == 1 ? g.m[0].y
+                                      : g.m[0].z,
+                             j == 0   ? g.m[1].x
+                             : j == 1 ? g.m[1].y
+                                      : g.m[1].z,
+                             j == 0   ? g.m[2].x
+                             : j == 1 ? g.m[2].y
+                                      : g.m[2].z};
     out.mean[j] = column[0] * m[1] + column[1] * m[2] + column[2] * m[3];
   }
   out.log_scale = {m[4], m[5], m[6]};

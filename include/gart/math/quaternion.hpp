@@ -10,7 +10,9 @@ struct quaternion {
   float w = 1, x = 0, y = 0, z = 0;
 };
 
-GART_HD GART_INLINE float norm2(quaternion const& q) { return fma(q.w, q.w, fma(q.x, q.x, fma(q.y, q.y, mul(q.z, q.z)))); }
+GART_HD GART_INLINE float norm2(quaternion const& q) {
+  return fma(q.w, q.w, fma(q.x, q.x, fma(q.y, q.y, mul(q.z, q.z))));
+}
 
 // Below this square of the norm a quaternion has no direction in float: its Gaussian is culled.
 inline constexpr float quaternion_norm2_min = 1e-8f;

@@ -6,8 +6,8 @@
 // cutoff = 2 ln(sigma / alpha_min), and t > near.
 //
 // Everything is relative to a frame, a point of the world held in double (the camera's centre for primary rays): mu is
-// subtracted from it in double, so that scenes far from the origin lose nothing. This file is the only place that decides
-// what is a hit, at which t and with which alpha; its arithmetic is fixed (arith.hpp).
+// subtracted from it in double, so that scenes far from the origin lose nothing. This file is the only place that
+// decides what is a hit, at which t and with which alpha; its arithmetic is fixed (arith.hpp).
 
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
@@ -67,8 +67,8 @@ GART_HD GART_INLINE float hit_cutoff(gaussian_parameters const& g, float alpha_m
   float const sigma = sigmoid(g.opacity);
   bool const valid = is_finite(g.mean.x) && is_finite(g.mean.y) && is_finite(g.mean.z) && is_finite(g.opacity) &&
                      is_finite(norm2(g.rotation)) && norm2(g.rotation) > quaternion_norm2_min &&
-                     g.log_scale.x > -40.0f && g.log_scale.x < 40.0f && g.log_scale.y > -40.0f && g.log_scale.y < 40.0f &&
-                     g.log_scale.z > -40.0f && g.log_scale.z < 40.0f;
+                     g.log_scale.x > -40.0f && g.log_scale.x < 40.0f && g.log_scale.y > -40.0f &&
+                     g.log_scale.y < 40.0f && g.log_scale.z > -40.0f && g.log_scale.z < 40.0f;
   if (!valid || !(sigma >= alpha_min)) return -1.0f;
   return mul(2.0f, logarithm(divide(sigma, alpha_min)));
 }
@@ -128,8 +128,8 @@ GART_HD GART_INLINE response evaluate(ray_gaussian const& g, Ray const& r) {
   return out;
 }
 
-// p is orthogonal to d_g, but the rounding of t leaves a part along it. It does not show in d2, where it enters squared; in
-// the gradients of mean and rotation the thin axis of a pancake magnifies it. One step takes it out.
+// p is orthogonal to d_g, but the rounding of t leaves a part along it. It does not show in d2, where it enters
+// squared; in the gradients of mean and rotation the thin axis of a pancake magnifies it. One step takes it out.
 GART_HD GART_INLINE vec3 orthogonal_offset(response const& r) {
   float const along = -(r.p.x * r.d.x + r.p.y * r.d.y + r.p.z * r.d.z) * r.inverse;
   return r.p + along * r.d;

@@ -78,6 +78,8 @@ struct sh_row {
 };
 
 // The colour a hit shows.
-GART_HD GART_INLINE vec3 clamped_color(vec3 c) { return {c.x > 0 ? c.x : 0.0f, c.y > 0 ? c.y : 0.0f, c.z > 0 ? c.z : 0.0f}; }
+GART_HD GART_INLINE vec3 clamped_color(vec3 c) {
+  return {c.x > 0 ? c.x : 0.0f, c.y > 0 ? c.y : 0.0f, c.z > 0 ? c.z : 0.0f};
+}
 
 }  // namespace gart

@@ -145,12 +145,12 @@ struct mcmc_noise_kernel {
     random_normals const n = normals(random.words(i));
     float local[3], moved[3];
     for (int c = 0; c < 3; ++c)
-      local[c] = (r[0][c] * n.v[0] + r[1][c] * n.v[1] + r[2][c] * n.v[2]) *
-                 expf(2 * model.log_scale[std::size_t{3} * i + c]);
+      local[c] =
+          (r[0][c] * n.v[0] + r[1][c] * n.v[1] + r[2][c] * n.v[2]) * expf(2 * model.log_scale[std::size_t{3} * i + c]);
     bool finite = true;
     for (int c = 0; c < 3; ++c) {
-      moved[c] = model.mean[std::size_t{3} * i + c] +
-                 gate * (r[c][0] * local[0] + r[c][1] * local[1] + r[c][2] * local[2]);
+      moved[c] =
+          model.mean[std::size_t{3} * i + c] + gate * (r[c][0] * local[0] + r[c][1] * local[1] + r[c][2] * local[2]);
       finite = finite && is_finite(moved[c]);
     }
     for (int c = 0; c < 3 && finite; ++c) model.mean[std::size_t{3} * i + c] = moved[c];
@@ -172,8 +172,8 @@ struct mcmc_penalty_kernel {
 
 }  // namespace detail
 
-// The growth of a run that starts from `count` Gaussians: options.growth, or what reaches the budget within the first two
-// fifths of the densification steps where that is more, but no more than 1.2.
+// The growth of a run that starts from `count` Gaussians: options.growth, or what reaches the budget within the first
+// two fifths of the densification steps where that is more, but no more than 1.2.
 inline float growth_for(mcmc_options const& options, index_t count, index_t max_gaussians, int iterations) {
   double const rounds = 0.4 * (options.until * iterations - options.from) / (options.every > 0 ? options.every : 1);
   if (count == 0 || count >= max_gaussians || rounds < 1) return options.growth;
@@ -187,8 +187,18 @@ template <execution E>
 class mcmc {
  public:
   mcmc(E& exec, mcmc_options const& options, index_t max_gaussians, int iterations, u64 seed)
-      : exec_(&exec), options_(options), max_gaussians_(max_gaussians), iterations_(iterations), seed_(seed),
-        weight_(exec), dead_(exec), target_(exec), source_(exec), before_(exec), dead_before_(exec), totals_(exec, 2) {}
+      : exec_(&exec),
+        options_(options),
+        max_gaussians_(max_gaussians),
+        iterations_(iterations),
+        seed_(seed),
+        weight_(exec),
+        dead_(exec),
+        target_(exec),
+        source_(exec),
+        before_(exec),
+        dead_before_(exec),
+        totals_(exec, 2) {}
 
   void set_growth(float growth) { options_.growth = growth; }
 
@@ -250,8 +260,8 @@ class mcmc {
   void add_noise(gaussians<E>& model, int step, float mean_rate) {
     if (options_.noise == 0) return;
     parallel_for(*exec_, "mcmc_noise", model.size(),
-                 detail::mcmc_noise_kernel{model.view(), {seed_, static_cast<u32>(step), random_use::noise},
-                                           options_.noise * mean_rate});
+                 detail::mcmc_noise_kernel{
+                     model.view(), {seed_, static_cast<u32>(step), random_use::noise}, options_.noise * mean_rate});
   }
 
  private:
@@ -273,9 +283,9 @@ class mcmc {
                  detail::mcmc_draw_kernel<E>{before_.data(), totals_.data(), n, random, source_.data(), copies.data()});
     parallel_for(*exec_, "mcmc_share", n,
                  detail::mcmc_share_kernel{model.view(), copies.data(), options_.dead_opacity});
-    for_each_element(*exec_, "mcmc_copy", draws, model.sh_degree(),
-                     detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(),
-                                            target_.data()});
+    for_each_element(
+        *exec_, "mcmc_copy", draws, model.sh_degree(),
+        detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(), target_.data()});
   }
 
   E* exec_;

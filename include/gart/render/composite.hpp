@@ -1,8 +1,8 @@
 #pragma once
 // The forward ray program: front-to-back compositing of the hits of a pixel,
 //   C += T alpha c,  T *= 1 - alpha,
-// colour from spherical harmonics on the ray's direction, until T < transmittance_min (the hit that crosses counts). The
-// background is added with what transmittance is left.
+// colour from spherical harmonics on the ray's direction, until T < transmittance_min (the hit that crosses counts).
+// The background is added with what transmittance is left.
 
 #include <gart/math/sh.hpp>
 #include <gart/render/options.hpp>

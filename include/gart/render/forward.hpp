@@ -42,8 +42,8 @@ class frame_records {
 
 // ShDegree is the degree the coefficients are stored with; bands above active_degree are not evaluated.
 template <int ShDegree, execution E, class Tracer, class Record>
-void forward(E& exec, Tracer& tracer, gaussians_view<float const> scene, camera const& view, render_options const& options,
-             int active_degree, image_targets const& targets, Record const& record) {
+void forward(E& exec, Tracer& tracer, gaussians_view<float const> scene, camera const& view,
+             render_options const& options, int active_degree, image_targets const& targets, Record const& record) {
   pixel_order const order{view.width, view.height};
   composite<ShDegree, Record> const program{view, order, scene.sh, active_degree, options, targets, record};
   tracer.trace(exec, "forward", order.launch_size(), program);

@@ -6,9 +6,9 @@
 namespace gart {
 
 struct render_options {
-  float alpha_min = 1.0f / 255.0f;     // a Gaussian is hit where sigma * rho >= alpha_min
-  float transmittance_min = 1e-4f;     // a ray ends after the hit that brings T below this
-  float near = 0.01f;                  // hits lie at t > near, world units along the ray
+  float alpha_min = 1.0f / 255.0f;  // a Gaussian is hit where sigma * rho >= alpha_min
+  float transmittance_min = 1e-4f;  // a ray ends after the hit that brings T below this
+  float near = 0.01f;               // hits lie at t > near, world units along the ray
   vec3 background{0.0f};
 };
 

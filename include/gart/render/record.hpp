@@ -1,6 +1,7 @@
 #pragma once
-// What the forward pass leaves of each hit for the backward pass to find. A record is called once a hit, after it has been
-// composited, with the ray's accumulated colour, the hit's weight T alpha and its own colour before the clamp; it is part of a strategy (backward/strategies.hpp).
+// What the forward pass leaves of each hit for the backward pass to find. A record is called once a hit, after it has
+// been composited, with the ray's accumulated colour, the hit's weight T alpha and its own colour before the clamp; it
+// is part of a strategy (backward/strategies.hpp).
 
 #include <gart/render/pixels.hpp>
 #include <gart/trace/hit.hpp>

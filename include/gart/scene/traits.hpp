@@ -1,5 +1,5 @@
 #pragma once
-// Seam 4: what a scene requires, at compile time. Kernels choose code by it, so that what a scene does not need has no
+// What a scene requires, at compile time. Kernels choose code by it, so that what a scene does not need has no
 // registers, no fields and no bytes. The rows that gart's libraries compile are SH degrees 0 to 3 (train/rows.hpp).
 
 namespace gart {

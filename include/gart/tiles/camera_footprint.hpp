@@ -1,8 +1,8 @@
 #pragma once
-// Footprints for a camera, its lens included. A pinhole's are math/footprint.hpp's. Through a distorted lens the rectangle
-// of slopes that bounds the ellipsoid is mapped to the image edge by edge: the map is one to one where the image is, so the
-// image of the rectangle lies within the image of its border, which is sampled and widened by what a curved edge can bulge
-// between samples.
+// Footprints for a camera, its lens included. A pinhole's are math/footprint.hpp's. Through a distorted lens the
+// rectangle of slopes that bounds the ellipsoid is mapped to the image edge by edge: the map is one to one where the
+// image is, so the image of the rectangle lies within the image of its border, which is sampled and widened by what a
+// curved edge can bulge between samples.
 
 #include <gart/math/footprint.hpp>
 #include <gart/scene/camera.hpp>
@@ -21,7 +21,8 @@ class camera_footprint {
     constexpr int steps = 64;
     for (int k = 0; k <= steps; ++k) {
       double const s = static_cast<double>(k) / steps;
-      double const border[4][2] = {{s * c.width, 0}, {s * c.width, 1.0 * c.height}, {0, s * c.height}, {1.0 * c.width, s * c.height}};
+      double const border[4][2] = {
+          {s * c.width, 0}, {s * c.width, 1.0 * c.height}, {0, s * c.height}, {1.0 * c.width, s * c.height}};
       for (auto const& b : border) {
         vec2 p(static_cast<float>((b[0] - c.cx) / c.fx), static_cast<float>((b[1] - c.cy) / c.fy));
         if (c.lens.any()) p = undistort(c.lens, p);
@@ -55,7 +56,8 @@ class camera_footprint {
 
   GART_HD slope_box distorted(slope_box const& s) const {
     auto const clamp = [](double v, detail::interval const& to) { return v < to.lo ? to.lo : v > to.hi ? to.hi : v; };
-    // What lies outside the view is seen by no pixel; keeping the rectangle to it keeps it where the lens is one to one.
+    // What lies outside the view is seen by no pixel; keeping the rectangle to it keeps it where the lens is one to
+    // one.
     double const x0 = clamp(s.u.lo, u_), x1 = clamp(s.u.hi, u_), y0 = clamp(s.w.lo, w_), y1 = clamp(s.w.hi, w_);
     detail::interval u, v;
     constexpr int steps = 8;
@@ -68,8 +70,8 @@ class camera_footprint {
         u.add(a), v.add(c);
       }
     }
-    // Second derivatives of the lens along an edge are at most this on the rectangle; a chord of length h bulges h^2 / 8
-    // times as much.
+    // Second derivatives of the lens along an edge are at most this on the rectangle; a chord of length h bulges h^2 /
+    // 8 times as much.
     double const rx = fabs(x0) > fabs(x1) ? fabs(x0) : fabs(x1), ry = fabs(y0) > fabs(y1) ? fabs(y0) : fabs(y1);
     double const r = sqrt(rx * rx + ry * ry);
     double const curvature = 6 * (fabs(double{lens_.k1}) * r + fabs(double{lens_.p1}) + fabs(double{lens_.p2})) +

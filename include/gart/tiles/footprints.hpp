@@ -44,11 +44,18 @@ template <execution E, int Size>
 class footprints {
  public:
   explicit footprints(E& exec)
-      : ranges_(exec), depths_(exec), areas_(exec), tiles_(exec), area_offsets_(exec), pair_offsets_(exec), totals_(exec, 2) {}
+      : ranges_(exec),
+        depths_(exec),
+        areas_(exec),
+        tiles_(exec),
+        area_offsets_(exec),
+        pair_offsets_(exec),
+        totals_(exec, 2) {}
 
   void measure(E& exec, gaussians_view<float const> scene, camera const& view, float alpha_min, float near) {
     index_t const n = scene.count;
-    ranges_.resize(n), depths_.resize(n), areas_.resize(n), tiles_.resize(n), area_offsets_.resize(n), pair_offsets_.resize(n);
+    ranges_.resize(n), depths_.resize(n), areas_.resize(n), tiles_.resize(n), area_offsets_.resize(n),
+        pair_offsets_.resize(n);
     if (n == 0) {
       slots_ = pairs_ = 0;
       return;
@@ -68,8 +75,8 @@ class footprints {
     slots_ = totals[0], pairs_ = totals[1];
   }
 
-  u64 slots() const { return slots_; }   // sum of box areas
-  u64 pairs() const { return pairs_; }   // (primitive, tile) overlaps
+  u64 slots() const { return slots_; }  // sum of box areas
+  u64 pairs() const { return pairs_; }  // (primitive, tile) overlaps
   span<lt_range const> ranges() const { return ranges_; }
   span<float const> depths() const { return depths_; }
   span<u64 const> pair_offsets() const { return pair_offsets_; }

@@ -1,11 +1,13 @@
 #pragma once
-// The tile-primitive map: for every tile, the primitives whose boxes overlap it. One pair for each overlap is emitted in
-// primitive order, radix sorted by tile, and a prefix sum over the counts of the tiles says where each tile's list begins.
+// The tile-primitive map: for every tile, the primitives whose boxes overlap it. One pair for each overlap is emitted
+// in primitive order, radix sorted by tile, and a prefix sum over the counts of the tiles says where each tile's list
+// begins.
 //
 // One 32-bit key sorts both by tile and within it, in the bits that the tile's number leaves free:
 //   depth   by conservative near depth, cut to those bits (rounded down, so it stays conservative): what the tile-list
 //           tracer reads; near_depth() gives the bound a list is sorted by
-//   cover   on a device by how much of the tile a box covers, in eight classes, so that lanes that walk the boxes in step
+//   cover   on a device by how much of the tile a box covers, in eight classes, so that lanes that walk the boxes in
+//   step
 //           have walks of like length; on a host not at all
 // Ties stay in primitive order (the sort is stable).
 
@@ -71,8 +73,9 @@ class tile_map {
     stage_scope stage(exec, "map");
     u64 const pairs = prints.pairs();
     if (pairs >= (u64{1} << 31))
-      throw out_of_memory("tile map", pairs * 16, 0,
-                          std::to_string(pairs) + " (primitive, tile) pairs: raise --downscale or lower --max-gaussians");
+      throw out_of_memory(
+          "tile map", pairs * 16, 0,
+          std::to_string(pairs) + " (primitive, tile) pairs: raise --downscale or lower --max-gaussians");
     int const tile_bits = bits_for(grid.count());
     int const order_bits = order == tile_order::depth ? 32 - tile_bits : E::device ? 3 : 0;
     depth_shift_ = 31 - order_bits > 0 ? 31 - order_bits : 0;  // 31: a depth's sign bit is never set

@@ -1,7 +1,7 @@
 #pragma once
-// The traverser on gart's own BVH, on every policy: one ray a thread, a window of the nearest hits, resumed until the ray
-// ends. prepare() fits the tree to the Gaussians of a frame: built anew, or refitted when their number has not changed and
-// `rebuild_every` says so.
+// The traverser on gart's own BVH, on every policy: one ray a thread, a window of the nearest hits, resumed until the
+// ray ends. prepare() fits the tree to the Gaussians of a frame: built anew, or refitted when their number has not
+// changed and `rebuild_every` says so.
 
 #include <gart/bvh/walk.hpp>
 #include <gart/scene/camera.hpp>
@@ -18,7 +18,9 @@ struct bound_ellipsoids {
   vec3d frame;
   float alpha_min;
   span<box> boxes;
-  GART_KERNEL void operator()(index_t i) const { boxes[i] = ellipsoid_box(load_parameters(scene, i), frame, alpha_min); }
+  GART_KERNEL void operator()(index_t i) const {
+    boxes[i] = ellipsoid_box(load_parameters(scene, i), frame, alpha_min);
+  }
 };
 
 template <int Capacity, ray_program P>

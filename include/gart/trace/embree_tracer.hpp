@@ -1,7 +1,7 @@
 #pragma once
-// The traverser on Embree, for the host policies: user geometry over the ellipsoids' boxes, a window of the nearest hits a
-// ray, resumed until the ray ends. Embree proposes, math/ray_gaussian.hpp decides: the hits are those of the BVH tracer, bit
-// for bit. Link gart::embree; this header itself needs no Embree.
+// The traverser on Embree, for the host policies: user geometry over the ellipsoids' boxes, a window of the nearest
+// hits a ray, resumed until the ray ends. Embree proposes, math/ray_gaussian.hpp decides: the hits are those of the BVH
+// tracer, bit for bit. Link gart::embree; this header itself needs no Embree.
 
 #include <gart/bvh/box.hpp>
 #include <gart/scene/parameters.hpp>
@@ -70,7 +70,8 @@ class embree_tracer {
   void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
                float alpha_min, float near) {
     boxes_.resize(scene.count);
-    parallel_for(exec, "embree/boxes", scene.count, trace_kernels::bound_ellipsoids{scene, view.position, alpha_min, boxes_});
+    parallel_for(exec, "embree/boxes", scene.count,
+                 trace_kernels::bound_ellipsoids{scene, view.position, alpha_min, boxes_});
     stage_scope stage(exec, "embree/build");
     tree_.build(boxes_);
     scene_ = {records.data(), scene.count, near};

@@ -12,7 +12,10 @@ struct hit {
   float alpha = 0;  // min(0.99, sigma * rho)
 };
 
-// The order of hits on a ray: by distance, ties by id. Total, so that a traversal resumed "strictly after" loses nothing.
-GART_HD constexpr bool before(float t_a, u32 id_a, float t_b, u32 id_b) { return t_a < t_b || (t_a == t_b && id_a < id_b); }
+// The order of hits on a ray: by distance, ties by id. Total, so that a traversal resumed "strictly after" loses
+// nothing.
+GART_HD constexpr bool before(float t_a, u32 id_a, float t_b, u32 id_b) {
+  return t_a < t_b || (t_a == t_b && id_a < id_b);
+}
 
 }  // namespace gart

@@ -1,12 +1,12 @@
 #pragma once
-// The traverser on tile lists, for the primary rays of a camera: no tree. A tile's list holds every Gaussian that any of its
-// pixels can hit, sorted by conservative near depth, so a pixel walks the list and keeps the hits found in a small window
-// sorted by (t, id); the first of them is next as soon as it lies nearer than all that is left of the list can. When the
-// window overflows its nearest are kept, and the ray resumes strictly after its last hit from the first candidate whose hit
-// was dropped: exact for any number of hits. The hits are those of the other tracers, bit for bit.
+// The traverser on tile lists, for the primary rays of a camera: no tree. A tile's list holds every Gaussian that any
+// of its pixels can hit, sorted by conservative near depth, so a pixel walks the list and keeps the hits found in a
+// small window sorted by (t, id); the first of them is next as soon as it lies nearer than all that is left of the list
+// can. When the window overflows its nearest are kept, and the ray resumes strictly after its last hit from the first
+// candidate whose hit was dropped: exact for any number of hits. The hits are those of the other tracers, bit for bit.
 //
-// Ray programs must also say where a ray's pixel is: at(i), with x and y. Cost: the footprints, one sort of the (primitive,
-// tile) pairs, and a walk of each tile's list up to where its rays end.
+// Ray programs must also say where a ray's pixel is: at(i), with x and y. Cost: the footprints, one sort of the
+// (primitive, tile) pairs, and a walk of each tile's list up to where its rays end.
 
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -21,7 +21,8 @@ namespace trace_kernels {
 template <int Capacity, int Size, ray_program P>
 struct walk_tiles {
   static constexpr int block_size = 64, min_blocks = 8;
-  // Candidates between two looks at what has become certain: rays of a warp then pass on several hits at a time together.
+  // Candidates between two looks at what has become certain: rays of a warp then pass on several hits at a time
+  // together.
   static constexpr u32 stride = 8;
   tile_grid<Size> grid;
   tile_map_view map;
@@ -117,8 +118,8 @@ class tile_tracer {
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
     parallel_for(exec, label, rays,
-                 trace_kernels::walk_tiles<window, Size, P>{grid_, map_.view(), prints_.depths().data(), scene_, forward_,
-                                                            program});
+                 trace_kernels::walk_tiles<window, Size, P>{grid_, map_.view(), prints_.depths().data(), scene_,
+                                                            forward_, program});
   }
 
   footprints<E, Size> const& prints() const { return prints_; }

@@ -1,6 +1,6 @@
 #pragma once
-// Turns templates into rows: sessions and renderers of a policy, a tracer and a strategy, for every SH degree. Include where
-// the kernels of the policy can be compiled, and call register_rows from GART_REGISTER_ROWS.
+// Turns templates into rows: sessions and renderers of a policy, a tracer and a strategy, for every SH degree. Include
+// where the kernels of the policy can be compiled, and call register_rows from GART_REGISTER_ROWS.
 
 #include <gart/train/rows.hpp>
 #include <gart/train/trainer.hpp>
@@ -58,13 +58,14 @@ class compiled_renderer final : public renderer {
 
 template <execution E, class Traits, class Tracer, class Strategy>
 void register_row_of(int rank, bool (*available)(std::string*)) {
-  register_row({{E::name, Tracer::name, Strategy::name, Traits::sh_degree},
-                rank,
-                available,
-                []() -> std::unique_ptr<renderer> { return std::make_unique<compiled_renderer<E, Traits, Tracer, Strategy>>(); },
-                [](train_options const& options, dataset const& data, gaussian_model const& start) -> std::unique_ptr<session> {
-                  return std::make_unique<compiled_session<E, Traits, Tracer, Strategy>>(options, data, start);
-                }});
+  register_row(
+      {{E::name, Tracer::name, Strategy::name, Traits::sh_degree},
+       rank,
+       available,
+       []() -> std::unique_ptr<renderer> { return std::make_unique<compiled_renderer<E, Traits, Tracer, Strategy>>(); },
+       [](train_options const& options, dataset const& data, gaussian_model const& start) -> std::unique_ptr<session> {
+         return std::make_unique<compiled_session<E, Traits, Tracer, Strategy>>(options, data, start);
+       }});
 }
 
 template <execution E, class Tracer, class Strategy>

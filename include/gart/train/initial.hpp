@@ -1,6 +1,6 @@
 #pragma once
-// Where training starts: a model from points (log-scale = ln sqrt(max(mean squared distance to the 3 nearest neighbours,
-// 1e-7)), identity rotation, colour in the constant band), or from points at random in a box.
+// Where training starts: a model from points (log-scale = ln sqrt(max(mean squared distance to the 3 nearest
+// neighbours, 1e-7)), identity rotation, colour in the constant band), or from points at random in a box.
 
 #include <gart/io/dataset.hpp>
 #include <gart/scene/gaussians.hpp>

@@ -18,7 +18,7 @@ struct train_options {
   index_t random_points = 100'000;  // where the capture has no points
   densify_kind densify = densify_kind::mcmc;
   int sh_degree = 3;
-  int sh_every = 1000;              // a degree more after so many steps (or iterations / (3 * degrees) in shorter runs)
+  int sh_every = 1000;  // a degree more after so many steps (or iterations / (3 * degrees) in shorter runs)
   background_kind background = background_kind::black;
   // Of the first Gaussians; the scale is times the distance to the neighbours. 0: what suits the start. A capture's
   // points lie on surfaces, and 0.1 and 1.0 fill the gaps between them. Random points are mostly in empty space: with
@@ -26,9 +26,9 @@ struct train_options {
   float initial_opacity = 0;
   float initial_scale = 0;
   float ssim_weight = 0.2f;
-  u64 lt_budget = 0;                // bytes of the LT buffer above which a step falls back to hybrid; 0: no limit
+  u64 lt_budget = 0;  // bytes of the LT buffer above which a step falls back to hybrid; 0: no limit
   u64 seed = 1;
-  render_options render;            // its background is set from `background`
+  render_options render;  // its background is set from `background`
   learning_rates rates;
   mcmc_options mcmc;
   adc_options adc;

@@ -1,6 +1,6 @@
 #pragma once
-// The table of compiled rows behind make_session and make_renderer. A library that compiles rows registers them when it is
-// loaded (GART_REGISTER_ROWS); a program that instantiates its own may do the same.
+// The table of compiled rows behind make_session and make_renderer. A library that compiles rows registers them when it
+// is loaded (GART_REGISTER_ROWS); a program that instantiates its own may do the same.
 
 #include <gart/train/session.hpp>
 
@@ -11,8 +11,8 @@ namespace gart {
 
 struct compiled_row {
   row_info row;
-  int rank = 0;                           // "auto" takes the highest that is available
-  bool (*available)(std::string* reason); // false: no device, with the reason
+  int rank = 0;                            // "auto" takes the highest that is available
+  bool (*available)(std::string* reason);  // false: no device, with the reason
   std::unique_ptr<renderer> (*make_renderer)();
   std::unique_ptr<session> (*make_session)(train_options const&, dataset const&, gaussian_model const& start);
 };
@@ -23,9 +23,9 @@ inline bool always_available(std::string*) { return true; }
 }  // namespace gart
 
 // `name` becomes a symbol that the linker is told to keep, so that the object with the rows is not dropped.
-#define GART_REGISTER_ROWS(name, ...)           \
-  extern "C" bool name;                         \
-  bool name = [] {                              \
-    __VA_ARGS__;                                \
-    return true;                                \
+#define GART_REGISTER_ROWS(name, ...) \
+  extern "C" bool name;               \
+  bool name = [] {                    \
+    __VA_ARGS__;                      \
+    return true;                      \
   }();

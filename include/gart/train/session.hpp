@@ -1,6 +1,6 @@
 #pragma once
-// Training and rendering behind one host-safe interface: the row (policy, SH degree, tracer, backward strategy) is chosen
-// at run time from the rows that were compiled. What g++ code, the `gart` program for one, uses.
+// Training and rendering behind one host-safe interface: the row (policy, SH degree, tracer, backward strategy) is
+// chosen at run time from the rows that were compiled. What g++ code, the `gart` program for one, uses.
 //
 // Errors: unsupported, naming the rows there are, for a row that is not; out_of_memory; whatever the policy throws.
 
@@ -36,10 +36,10 @@ row_info resolve(row_request const& request);
 std::vector<row_info> compiled_rows();
 
 struct rendered {
-  image_float color;           // background composited
-  image_float transmittance;   // 1 channel
-  image_float depth;           // 1 channel: sum of weight * t
-  basic_image<u32> hits;       // 1 channel: hits composited
+  image_float color;          // background composited
+  image_float transmittance;  // 1 channel
+  image_float depth;          // 1 channel: sum of weight * t
+  basic_image<u32> hits;      // 1 channel: hits composited
 };
 
 class renderer {
@@ -55,9 +55,9 @@ class renderer {
 std::unique_ptr<renderer> make_renderer(row_request const& request);
 
 struct step_report {
-  int step = 0;          // steps done, this one included
+  int step = 0;  // steps done, this one included
   float loss = 0;
-  float psnr = 0;        // of this step's training view
+  float psnr = 0;  // of this step's training view
   index_t gaussians = 0;
   std::string view;
   std::string backward;  // the strategy of this step: not the one asked for where its LT buffer would pass the budget
@@ -81,7 +81,8 @@ class session {
   virtual row_info row() const = 0;
 };
 
-// The dataset must outlive the session. `start` seeds the Gaussians where given, else the dataset's points or random ones.
+// The dataset must outlive the session. `start` seeds the Gaussians where given, else the dataset's points or random
+// ones.
 std::unique_ptr<session> make_session(row_request const& request, train_options const& options, dataset const& data,
                                       gaussian_model const* start = nullptr);
 

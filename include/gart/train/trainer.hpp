@@ -1,14 +1,14 @@
 #pragma once
-// Training, one step at a time: a view, the forward pass, the loss, the backward pass by the strategy, Adam, densification.
-// Composed from the parts; each can be replaced. A loss of one's own is a callable given to step().
+// Training, one step at a time: a view, the forward pass, the loss, the backward pass by the strategy, Adam,
+// densification. Composed from the parts; each can be replaced. A loss of one's own is a callable given to step().
 //
 //   openmp_exec exec;
 //   trainer<openmp_exec, scene_traits<3>, bvh_tracer<openmp_exec>, pixel_strategy> run(exec, options, data, start);
 //   while (run.steps_done() < options.iterations) run.step();
 //   write_splat_ply("model.ply", run.model());
 //
-// The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step), so a
-// checkpoint holds parameters, moments and counters only.
+// The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step),
+// so a checkpoint holds parameters, moments and counters only.
 
 #include <gart/backward/backward.hpp>
 #include <gart/loss/image_loss.hpp>
@@ -26,17 +26,17 @@
 
 namespace gart {
 
-// What a loss sees: the rendered image and its view, in the policy's memory. It writes dL/d image and, into value[0..1],
-// the loss and the mean squared error.
+// What a loss sees: the rendered image and its view, in the policy's memory. It writes dL/d image and, into
+// value[0..1], the loss and the mean squared error.
 template <execution E>
 struct loss_input {
   E& exec;
   dataset_view const& view;
   truth_view truth;
   int width, height;
-  span<float const> image;   // [H][W][3]
-  span<float> gradient;      // [H][W][3]
-  span<float> value;         // [2]
+  span<float const> image;  // [H][W][3]
+  span<float> gradient;     // [H][W][3]
+  span<float> value;        // [2]
 };
 
 template <execution E, class Traits, class Tracer, class Strategy>
@@ -65,7 +65,7 @@ class trainer {
     using type = S;
   };
   template <class S>
-    requires requires { typename S::fallback; }
+  requires requires { typename S::fallback; }
   struct fallback_of<S> {
     using type = typename S::fallback;
   };

@@ -116,8 +116,10 @@ void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, int 
 template <execution E, class Traits, class Tracer, class Strategy>
 vec3 trainer<E, Traits, Tracer, Strategy>::background_of(int step) const {
   switch (options_.background) {
-    case background_kind::black: return vec3(0.0f);
-    case background_kind::white: return vec3(1.0f);
+    case background_kind::black:
+      return vec3(0.0f);
+    case background_kind::white:
+      return vec3(1.0f);
     default: {
       auto const w = random_source{options_.seed ^ 0x6261636bu, static_cast<u32>(step), random_use::user}.words(0);
       return {uniform(w.v[0]), uniform(w.v[1]), uniform(w.v[2])};
@@ -155,7 +157,8 @@ void trainer<E, Traits, Tracer, Strategy>::load(std::filesystem::path const& pat
   std::vector<int> const degree = in.get<int>("sh_degree"), step = in.get<int>("step");
   std::vector<u64> const seed = in.get<u64>("seed");
   std::vector<float> const growth = in.get<float>("growth");
-  if (degree.size() != 1 || step.size() != 1 || seed.size() != 1 || growth.size() != 1) in.fail("a counter is not one number");
+  if (degree.size() != 1 || step.size() != 1 || seed.size() != 1 || growth.size() != 1)
+    in.fail("a counter is not one number");
   if (degree[0] != sh_degree)
     in.fail("is of SH degree " + std::to_string(degree[0]) + ", this run of " + std::to_string(sh_degree) +
             ": give --sh-degree " + std::to_string(degree[0]));
@@ -173,7 +176,8 @@ void trainer<E, Traits, Tracer, Strategy>::load(std::filesystem::path const& pat
     return m;
   };
   gaussian_model const scene = get(""), first = get("first/"), second = get("second/");
-  if (first.size() != scene.size() || second.size() != scene.size()) in.fail("its moments differ in number from its Gaussians");
+  if (first.size() != scene.size() || second.size() != scene.size())
+    in.fail("its moments differ in number from its Gaussians");
   scene_.assign(scene), state_.first.assign(first), state_.second.assign(second);
   gradients_ = gaussians<E>(exec_, scene_.size(), sh_degree);
   adc_.gradient_sum.assign(in.get<float>("adc/gradient_sum")), adc_.touched.assign(in.get<u32>("adc/touched"));

@@ -1,6 +1,6 @@
 #pragma once
-// The true images where kernels can read them: the dataset's own memory on host policies; on a device each is copied at its
-// first use and stays.
+// The true images where kernels can read them: the dataset's own memory on host policies; on a device each is copied at
+// its first use and stays.
 
 #include <gart/exec/buffer.hpp>
 #include <gart/io/dataset.hpp>
