@@ -19,9 +19,8 @@ struct pixel_strategy {
 
 // How a slot of the LT buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN before
 // every forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held against the
-// last hit of its ray: the same decision, bit for bit, with nothing to clear. `automatic` is what measured better
-// (docs/backward.md): on a device, where the clear costs more than it saves, the primitive strategy recomputes; on a
-// host it does not.
+// last hit of its ray: the same decision, bit for bit, with nothing to clear. `automatic`:
+// recomputed on a device, where that measured better (docs/backward.md), and cleared on a host.
 enum class slot_validity { automatic, cleared, recomputed };
 
 // One channel: the colour gradient of a hit needs only its weight. Geometry by pixel.
