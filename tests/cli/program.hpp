@@ -7,10 +7,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <thread>
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -49,11 +52,34 @@ class folder {
     std::string const command =
         "cd '" + path_.string() + "' && " + before + " '" GART_PROGRAM "' " + arguments + " >stdout.txt 2>stderr.txt";
     int const status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of(path_ / "stdout.txt"), text_of(path_ / "stderr.txt")};
+    return outcome_of(status);
+  }
+  // Interrupts the program as Ctrl-C does, once `sign` stands in what it has said; waits at most two minutes for that.
+  outcome gart_interrupted_at(std::string const& sign, std::string const& arguments) const {
+    std::string const command =
+        "cd '" + path_.string() + "' && exec '" GART_PROGRAM "' " + arguments + " >stdout.txt 2>stderr.txt";
+    pid_t const child = fork();
+    if (child == 0) {
+      execl("/bin/sh", "sh", "-c", command.c_str(), static_cast<char*>(nullptr));
+      _exit(127);
+    }
+    int status = 0;
+    for (int waited_ms = 0; waited_ms < 120'000; waited_ms += 20) {
+      if (fs::exists(path_ / "stderr.txt") && text_of(path_ / "stderr.txt").find(sign) != std::string::npos) break;
+      if (waitpid(child, &status, WNOHANG) == child) return outcome_of(status);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    kill(child, SIGINT);
+    waitpid(child, &status, 0);
+    return outcome_of(status);
   }
   nlohmann::json json(std::string const& name) const { return nlohmann::json::parse(text_of(path_ / name)); }
 
  private:
+  outcome outcome_of(int status) const {
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of(path_ / "stdout.txt"), text_of(path_ / "stderr.txt")};
+  }
+
   fs::path path_;
 };
 

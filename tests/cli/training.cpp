@@ -88,9 +88,8 @@ TEST_CASE("a run that was stopped and resumed ends with the same bytes") {
 TEST_CASE("SIGINT ends the run after a step, saved, and says how to go on") {
   folder const here;
   write_capture(here / "capture");
-  auto const run =
-      here.gart("train capture --out run --iterations 100000000 --backend serial --max-gaussians 60 --densify none",
-                "timeout --preserve-status -s INT 4");
+  auto const run = here.gart_interrupted_at(
+      " it/s", "train capture --out run --iterations 100000000 --backend serial --max-gaussians 60 --densify none");
   CHECK(run.code == 130);
   CHECK(has(run.err, "gart train --resume --out run"));
   CHECK(gart::read_splat_ply(here / "run/model.ply").size() == 40);
