@@ -1,6 +1,7 @@
 // What decides a hit gives the same bits on every policy: kernels against the same functions called here.
 #include <gart/exec/buffer.hpp>
 #include <gart/math/ray_gaussian.hpp>
+#include <gart/scene/camera.hpp>
 #include <support/policies.hpp>
 
 #include <random>
@@ -34,6 +35,18 @@ struct evaluate_samples {
   GART_KERNEL void operator()(gart::index_t i) const { out[i] = outcome_of(samples[i]); }
 };
 
+GART_HD gart::vec3 ray_of(gart::camera const& view, gart::index_t i) {
+  auto const k = static_cast<int>(i);
+  return gart::ray_direction(view, static_cast<float>(k % view.width) + 0.5f,
+                             static_cast<float>(k / view.width) + 0.5f);
+}
+
+struct cast_rays {
+  gart::camera view;
+  gart::span<gart::vec3> out;
+  GART_KERNEL void operator()(gart::index_t i) const { out[i] = ray_of(view, i); }
+};
+
 bool same(float a, float b) { return gart::float_to_bits(a) == gart::float_to_bits(b) || (a != a && b != b); }
 
 }  // namespace
@@ -62,6 +75,31 @@ TEST_CASE_TEMPLATE("the same bits on every policy", E, GART_TEST_POLICIES) {
     other[5] += !same(e.d2, g.d2), other[6] += !same(e.alpha, g.alpha);
   }
   for (long count : other) CHECK(count == 0);
+}
+
+TEST_CASE_TEMPLATE("the same rays on every policy, whatever the lens", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  std::normal_distribution<float> n;
+  for (int k = 0; k < 8; ++k) {
+    gart::camera view;
+    view.width = 160, view.height = 120;
+    view.fx = 110 + 10 * n(random), view.fy = 110 + 10 * n(random);
+    view.cx = 80 + n(random), view.cy = 60 + n(random);
+    if (k % 2) view.lens = {0.05f * n(random), 0.02f * n(random), 0.01f * n(random), 0.01f * n(random)};
+    view.rotation = gart::to_matrix({n(random), n(random), n(random), n(random)});
+    E exec;
+    auto const count = static_cast<gart::index_t>(view.width) * view.height;
+    gart::buffer<gart::vec3, E> out(exec, static_cast<std::size_t>(count));
+    gart::parallel_for(exec, "cast", count, cast_rays{view, out});
+    auto const got = out.to_host();
+    long other = 0;
+    for (gart::index_t i = 0; i < count; ++i) {
+      gart::vec3 const expected = ray_of(view, i);
+      for (int c = 0; c < 3; ++c) other += !same(expected[c], got[static_cast<std::size_t>(i)][c]);
+    }
+    CHECK(other == 0);
+  }
 }
 
 #endif

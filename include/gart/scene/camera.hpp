@@ -8,6 +8,7 @@
 // a ray inverts it by Newton's method (undistort below).
 
 #include <gart/core/macros.hpp>
+#include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
 
 #include <string>
@@ -33,30 +34,32 @@ struct camera {
 GART_HD inline vec2 undistort(distortion const& lens, vec2 distorted) {
   vec2 p = distorted;
   for (int i = 0; i < 10; ++i) {
-    float const x = p.x, y = p.y, r2 = x * x + y * y;
-    float const radial = 1 + r2 * (lens.k1 + r2 * lens.k2);
-    float const slope = 2 * lens.k1 + 4 * lens.k2 * r2;  // d radial / d x = slope * x
-    float const ex = x * radial + 2 * lens.p1 * x * y + lens.p2 * (r2 + 2 * x * x) - distorted.x;
-    float const ey = y * radial + 2 * lens.p2 * x * y + lens.p1 * (r2 + 2 * y * y) - distorted.y;
-    float const xx = radial + slope * x * x + 2 * lens.p1 * y + 6 * lens.p2 * x;
-    float const xy = slope * x * y + 2 * lens.p1 * x + 2 * lens.p2 * y;
-    float const yy = radial + slope * y * y + 2 * lens.p2 * x + 6 * lens.p1 * y;
-    float const det = xx * yy - xy * xy;
+    float const x = p.x, y = p.y, xx = mul(x, x), yy = mul(y, y), xy = mul(x, y), r2 = add(xx, yy);
+    float const radial = fma(r2, fma(r2, lens.k2, lens.k1), 1.0f);
+    float const slope = fma(mul(4.0f, lens.k2), r2, mul(2.0f, lens.k1));  // d radial / d x = slope * x
+    float const p1 = mul(2.0f, lens.p1), p2 = mul(2.0f, lens.p2);
+    float const ex = add(fma(x, radial, fma(p1, xy, mul(lens.p2, fma(2.0f, xx, r2)))), -distorted.x);
+    float const ey = add(fma(y, radial, fma(p2, xy, mul(lens.p1, fma(2.0f, yy, r2)))), -distorted.y);
+    float const by_xx = fma(slope, xx, fma(p1, y, fma(mul(3.0f, p2), x, radial)));
+    float const by_xy = fma(slope, xy, fma(p1, x, mul(p2, y)));
+    float const by_yy = fma(slope, yy, fma(p2, x, fma(mul(3.0f, p1), y, radial)));
+    float const det = fma(by_xx, by_yy, -mul(by_xy, by_xy));
     if (!(det != 0)) break;
-    vec2 const step((ex * yy - ey * xy) / det, (ey * xx - ex * xy) / det);
-    p -= step;
-    if (step.x * step.x + step.y * step.y < 1e-16f) break;
+    vec2 const step(divide(fma(ex, by_yy, -mul(ey, by_xy)), det), divide(fma(ey, by_xx, -mul(ex, by_xy)), det));
+    p = vec2(add(p.x, -step.x), add(p.y, -step.y));
+    if (fma(step.x, step.x, mul(step.y, step.y)) < 1e-16f) break;
   }
   return p;
 }
 
-// Unit direction, in the world, of the ray through the image point (u, v).
+// Unit direction, in the world, of the ray through the image point (u, v). It decides hits, so its arithmetic is fixed.
 GART_HD inline vec3 ray_direction(camera const& c, float u, float v) {
-  vec2 p((u - c.cx) / c.fx, (v - c.cy) / c.fy);
+  vec2 p(divide(add(u, -c.cx), c.fx), divide(add(v, -c.cy), c.fy));
   if (c.lens.any()) p = undistort(c.lens, p);
-  vec3 const d = c.rotation * vec3(p.x, p.y, 1.0f);
-  float const inverse = 1.0f / sqrtf(d.x * d.x + d.y * d.y + d.z * d.z);
-  return d * inverse;
+  vec3 d;
+  for (int k = 0; k < 3; ++k) d[k] = fma(c.rotation[0][k], p.x, fma(c.rotation[1][k], p.y, c.rotation[2][k]));
+  float const inverse = divide(1.0f, square_root(fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)))));
+  return {mul(d.x, inverse), mul(d.y, inverse), mul(d.z, inverse)};
 }
 
 // The same camera for an image of another size: intrinsics scale per axis.
