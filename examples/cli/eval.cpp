@@ -21,6 +21,7 @@ struct eval_arguments {
   row_options row;
   std::string background = "auto";
   int downscale = 1, test_every = 8;
+  int max_hits = -1;
   bool quiet = false;
 };
 
@@ -43,6 +44,7 @@ int run_eval(eval_arguments const& a) {
   std::string const background = resolve_background(a.background, data.alpha);
   gart::render_options options = file.render;
   options.background = background_color(background);
+  if (a.max_hits >= 0) options.max_hits = static_cast<gart::u32>(a.max_hits);
   renderer->set_model(file.model);
 
   progress say(a.quiet);
@@ -63,7 +65,7 @@ int run_eval(eval_arguments const& a) {
   metrics["background"] = background, metrics["notes"] = data.notes;
   metrics["gaussians"] = file.model.size(), metrics["sh_degree"] = file.model.sh_degree;
   metrics["backend"] = row.backend, metrics["tracer"] = row.tracer;
-  metrics["approximations"] = {{"alpha_min", options.alpha_min}, {"t_min", options.transmittance_min}};
+  metrics["approximations"] = approximations_of(options);
   metrics["peak_bytes"] = renderer->peak_bytes();
   write_json(a.out, metrics);
   say.clear();
@@ -96,6 +98,7 @@ void add_eval(CLI::App& app, command& selected) {
       ->type_name("N")
       ->capture_default_str()
       ->check(between(1, 1e6));
+  add_max_hits(*eval, a->max_hits);
   eval->add_flag("--quiet", a->quiet, "Say nothing but errors");
   add_row_options(*eval, a->row);
   eval->footer(

@@ -63,6 +63,13 @@ void add_row_options(CLI::App& app, row_options& options) {
   add_threads(app, options.threads);
 }
 
+void add_max_hits(CLI::App& app, int& max_hits) {
+  app.add_option("--max-hits", max_hits,
+                 "Hits after which a ray ends, 0: no cap\n(default: what the model says, else 0)")
+      ->type_name("N")
+      ->check(between(0, max_hits_most));
+}
+
 void use_threads([[maybe_unused]] int threads) {
 #if defined(_OPENMP)
   if (threads > 0) omp_set_num_threads(threads);
@@ -96,7 +103,20 @@ model_file load_model(std::filesystem::path const& path) {
   };
   number("alpha_min", file.render.alpha_min);
   number("t_min", file.render.transmittance_min);
+  if (auto const found = traits.find("max_hits"); found != traits.end()) {
+    char* end = nullptr;
+    unsigned long const parsed = std::strtoul(found->second.c_str(), &end, 10);
+    if (end == found->second.c_str() || *end != '\0' || found->second[0] == '-' || parsed > max_hits_most) {
+      throw gart::io_error(path.string(), "comment gart max_hits is '" + found->second + "'",
+                           "a whole number belongs there, 0 for no cap; remove the comment for none");
+    }
+    file.render.max_hits = static_cast<gart::u32>(parsed);
+  }
   return file;
+}
+
+nlohmann::json approximations_of(gart::render_options const& render) {
+  return {{"alpha_min", render.alpha_min}, {"t_min", render.transmittance_min}, {"max_hits", render.max_hits}};
 }
 
 gart::gaussian_model with_degree(gart::gaussian_model const& model, int degree) {

@@ -47,6 +47,8 @@ struct row_options {
 void add_threads(CLI::App& app, int& threads);
 void add_row_options(CLI::App& app, row_options& options);
 void use_threads(int threads);
+// --max-hits of a model to be rendered: negative where the model says.
+void add_max_hits(CLI::App& app, int& max_hits);
 
 CLI::Validator backend_names();
 CLI::Validator tracer_names();
@@ -62,6 +64,9 @@ struct model_file {
 };
 // io_error for what is no splat file; unsupported for a kernel that is not traced here.
 model_file load_model(std::filesystem::path const& path);
+inline constexpr gart::u32 max_hits_most = 1'000'000'000;
+// What a run left out, as every report tells it.
+nlohmann::json approximations_of(gart::render_options const& render);
 // Coefficients past `degree` are dropped, missing ones are zero.
 gart::gaussian_model with_degree(gart::gaussian_model const& model, int degree);
 

@@ -25,6 +25,7 @@ struct render_arguments {
   std::string background = "black";
   int downscale = 1;
   float alpha_min = -1, t_min = -1;
+  int max_hits = -1;
   bool depth = false, quiet = false;
 };
 
@@ -71,6 +72,7 @@ int run_render(render_arguments const& a) {
   options.background = background_color(a.background);
   if (a.alpha_min >= 0) options.alpha_min = a.alpha_min;
   if (a.t_min >= 0) options.transmittance_min = a.t_min;
+  if (a.max_hits >= 0) options.max_hits = static_cast<gart::u32>(a.max_hits);
 
   progress say(a.quiet);
   auto const row = renderer->row();
@@ -78,7 +80,7 @@ int run_render(render_arguments const& a) {
       {"backend", row.backend},
       {"tracer", row.tracer},
       {"gaussians", file.model.size()},
-      {"approximations", {{"alpha_min", options.alpha_min}, {"t_min", options.transmittance_min}}},
+      {"approximations", approximations_of(options)},
       {"views", nlohmann::json::array()}};
   renderer->profile().enable(!a.json.empty());
   double total = 0;
@@ -149,6 +151,7 @@ void add_render(CLI::App& app, command& selected) {
                    "Transmittance below which a ray ends, 0 to 1\n(default: what the model says, else 1e-4)")
       ->type_name("T")
       ->check(between(0, 0.99));
+  add_max_hits(*render, a->max_hits);
   render->add_flag("--depth", a->depth, "Also the depth of each view, nearest white, as NAME_depth.png");
   render->add_option("--json", a->json, "Write timings of each view and stage in milliseconds")->type_name("FILE");
   render->add_flag("--quiet", a->quiet, "Say nothing but errors");

@@ -198,11 +198,13 @@ std::string settings(json const& m, json const& config) {
     if (fraction) std::snprintf(text, sizeof text, "%.6g", value.get<double>());
     row("--" + name, fraction ? text : value.is_string() ? value.get<std::string>() : value.dump());
   }
+  double const max_hits = number_of(m["approximations"], "max_hits");
+  std::string const cap = max_hits > 0 ? " or after " + fixed(max_hits, 0) + " hits" : "";
   html +=
       "</div><h2>How it was measured</h2><p>Split: " + text_of(m, "split") + "; " + count_of(m, "test_views") +
       " test views. Images resized: " + text_of(m, "resize_filter") + ". Background: " + text_of(m, "background") +
       ". A Gaussian is hit where its alpha is at least " + fixed(number_of(m["approximations"], "alpha_min"), 6) +
-      ", and a ray ends below a transmittance of " + fixed(number_of(m["approximations"], "t_min"), 6) +
+      ", and a ray ends below a transmittance of " + fixed(number_of(m["approximations"], "t_min"), 6) + cap +
       ". PSNR and SSIM (11 x 11 Gaussian window, sigma 1.5) are taken per view on [0, 1] and averaged over views.</p>";
   if (m.contains("notes") && !m["notes"].empty()) {
     html += "<p class=\"soft\">Of the capture: ";

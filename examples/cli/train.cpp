@@ -236,6 +236,7 @@ class training_run {
     };
     put("alpha_min", a_.alpha_min, a_.defaults.render.alpha_min);
     put("t_min", a_.t_min, a_.defaults.render.transmittance_min);
+    if (a_.max_hits != 0) result["max_hits"] = std::to_string(a_.max_hits);
     return result;
   }
 
@@ -285,7 +286,7 @@ class training_run {
     m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
     m["iterations"] = a_.iterations, m["gaussians"] = gaussians_, m["sh_degree"] = row_.sh_degree;
     m["backend"] = row_.backend, m["tracer"] = row_.tracer, m["backward"] = row_.backward;
-    m["approximations"] = {{"alpha_min", a_.alpha_min}, {"t_min", a_.t_min}};
+    m["approximations"] = approximations_of(train_options_of(a_).render);
     m["seconds"] = course_.seconds;
     m["iterations_per_second"] = course_.seconds > 0 ? a_.iterations / course_.seconds : 0;
     m["wall_seconds"] = {

@@ -80,6 +80,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(between(1e-6, 0.99));
   in_group(r.add(train, "--t-min", a.t_min, "T", "Transmittance below which a ray ends, 0 to 1"))
       ->check(between(0, 0.99));
+  in_group(r.add(train, "--max-hits", a.max_hits, "N", "Hits after which a ray ends, 0: no cap"))
+      ->check(between(0, max_hits_most));
 
   group = "Course";
   in_group(r.add(train, "--eval-every", a.eval_every, "N",
@@ -137,6 +139,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.seed = a.seed;
   o.render.alpha_min = a.alpha_min;
   o.render.transmittance_min = a.t_min;
+  o.render.max_hits = a.max_hits;
   return o;
 }
 

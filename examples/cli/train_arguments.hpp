@@ -27,6 +27,7 @@ struct train_arguments {
   int sh_degree = defaults.sh_degree, downscale = 1, test_every = 8, eval_every = -1;
   float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
   float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;
+  gart::u32 max_hits = defaults.render.max_hits;
   double lt_budget_gb = 0;
   gart::u64 seed = defaults.seed;
   recorded_options recorded;

@@ -74,6 +74,8 @@ TEST_CASE("a model that was trained with another kernel is not drawn with this o
   write_capture(here / "capture");
   gart::write_splat_ply(here / "k4.ply", one_gaussian(), {{"kernel_degree", "4"}});
   fails(here.gart("render k4.ply capture --out images"), {"k4.ply", "kernel_degree 4"});
+  gart::write_splat_ply(here / "cap.ply", one_gaussian(), {{"max_hits", "few"}});
+  fails(here.gart("render cap.ply capture --out images"), {"cap.ply", "max_hits is 'few'"});
   gart::write_splat_ply(here / "a.ply", one_gaussian(), {{"alpha_min", "much"}});
   fails(here.gart("render a.ply capture --out images"), {"alpha_min", "much"});
 }

@@ -63,6 +63,11 @@ TEST_CASE("the clamps, the thresholds and the hit that ends a ray") {
   CHECK(p.list[1].id == 0);
   CHECK(p.transmittance == doctest::Approx(1e-4).epsilon(1e-9));
   CHECK(p.color[0] == doctest::Approx(0.01 * 0.99 + 1e-4 * 0.25).epsilon(1e-9));
+  auto capped = o;
+  capped.max_hits = 1;
+  auto const first = oracle::render(m, one_pixel(), capped, 0).pixels[0];
+  CHECK(first.list.size() == 1);
+  CHECK(first.color[0] == doctest::Approx(0.01 * 0.25).epsilon(1e-9));
 
   auto const g = oracle::gradients(m, one_pixel(), o, 0, {1, 1, 1});
   CHECK(g.opacity[0] == 0);

@@ -164,6 +164,7 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
   std::vector<step> steps;
   double const t_min = options.transmittance_min;
   Vector3d const background(options.background[0], options.background[1], options.background[2]);
+  std::uint32_t composited = 0;
   double transmittance = 1, relative_error = 0, brightest = std::max(1.0, background.maxCoeff());
   std::size_t end = 0;
   for (; end < list.size(); ++end) {
@@ -181,7 +182,8 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
       out.edge = true;
       out.rounding += transmittance * brightest;
     }
-    if (transmittance < t_min) {
+    ++composited;
+    if (transmittance < t_min || composited == options.max_hits) {
       ++end;
       break;
     }
@@ -189,10 +191,13 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
   // Equal in every bit is the same geometry twice, ordered by id in any arithmetic: no tie.
   auto const tied = [](hit const& a, hit const& b) { return a.t != b.t && b.t - a.t <= a.t_slack + b.t_slack; };
   // Where the last hit may trade places with a neighbour, the ray may end one hit sooner or later.
-  if (transmittance < t_min) {
+  bool const capped = options.max_hits != 0 && composited == options.max_hits;
+  if (transmittance < t_min || capped) {
     if (end > 1) out.edge |= tied(list[end - 2], list[end - 1]);
     if (end < list.size()) out.edge |= tied(list[end - 1], list[end]);
   }
+  // Which hit is the last one of a cap is then not decided, however opaque it is.
+  if (capped && out.edge) out.rounding += steps.back().transmittance * brightest;
   list.resize(end);
   out.transmittance = transmittance;
   Vector3d behind = background;

@@ -7,7 +7,7 @@
 //   o_g = M (o - mean), d_g = M d, t = -o_g.d_g / d_g.d_g, p = o_g + t d_g,
 //   alpha = min(0.99, sigmoid(opacity) exp(-|p|^2 / 2)), a hit when alpha >= alpha_min and t > near,
 //   colour = sum_i T_i alpha_i c_i + T background, T_(i+1) = T_i (1 - alpha_i), in the order (t, id), until T <
-//   transmittance_min.
+//   transmittance_min, or until max_hits hits where that is not 0.
 //
 // Every decision is also asked how far it is from going the other way in float: see pixel.
 

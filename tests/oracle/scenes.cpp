@@ -118,6 +118,10 @@ std::vector<scene> scenes(std::uint64_t seed) {
   all.push_back(cloud(rng, "cloud, rays ended at half", 3, 3, {0, 0, 0}));
   all.back().options.transmittance_min = 0.5f;
 
+  // The cap ends rays in front of what most of them would still meet.
+  all.push_back(cloud(rng, "cloud, rays ended after three hits", 3, 3, {0, 0, 0}));
+  all.back().options.max_hits = 3;
+
   {
     scene s = cloud(rng, "cloud through an OPENCV lens", 3, 3, {0, 0, 0});
     s.view.lens = {-0.12f, 0.03f, 0.004f, -0.003f};

@@ -34,6 +34,7 @@ struct list_program {
   gart::camera view;
   gart::pixel_order order;
   float transmittance_min;
+  gart::u32 max_hits;
   gart::u32* counts;
   gart::u32 const* offsets;
   gart::hit* list;
@@ -51,7 +52,7 @@ struct list_program {
     if (list) list[s.at + s.count] = h;
     ++s.count;
     s.transmittance *= 1.0f - h.alpha;
-    return s.transmittance >= transmittance_min;
+    return s.transmittance >= transmittance_min && s.count != max_hits;
   }
   GART_HD void end(gart::index_t i, state const& s) const { counts[order.address(order.at(i))] = s.count; }
 };
@@ -197,7 +198,8 @@ std::vector<std::vector<gart::hit>> hit_lists(E& exec, gart::gaussian_model cons
     records.prepare(exec, constant, view.position, options.alpha_min);
     tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
     gart::pixel_order const order{view.width, view.height};
-    list_program program{view, order, options.transmittance_min, counts.data(), nullptr, nullptr};
+    list_program program{view, order, options.transmittance_min, options.max_hits, counts.data(), nullptr,
+                         nullptr};
     tracer.trace(exec, "count", order.launch_size(), program);
     std::vector<gart::u32> const count = counts.to_host();
     std::vector<gart::u32> offset(pixels + 1, 0);

@@ -137,6 +137,7 @@ class backward {
                                                                              scene.sh,
                                                                              active_degree,
                                                                              options.transmittance_min,
+                                                                             options.max_hits,
                                                                              gaussians_in_frame.data(),
                                                                              color.data(),
                                                                              color_gradient.data(),

@@ -21,6 +21,7 @@ struct scatter_program {
     vec3 direction;
     sh_basis<ShDegree> basis;
     ray_gradient gradient;
+    u32 left;  // hits until the cap; from 0, no cap, it counts down past it
   };
 
   camera view;
@@ -28,6 +29,7 @@ struct scatter_program {
   float const* sh = nullptr;
   int active_degree = ShDegree;
   float transmittance_min = 0;
+  u32 max_hits = 0;
   ray_gaussian const* records = nullptr;
   float const* color = nullptr;           // [H][W][3], as the forward pass left it, background in it
   float const* color_gradient = nullptr;  // [H][W][3]
@@ -44,6 +46,7 @@ struct scatter_program {
     float const* c = color + 3 * order.address(at);
     float const* g = color_gradient + 3 * order.address(at);
     s.gradient.g = {g[0], g[1], g[2]};
+    s.left = max_hits;
     s.gradient.behind = c[0] * g[0] + c[1] * g[1] + c[2] * g[2];
     return s;
   }
@@ -72,7 +75,7 @@ struct scatter_program {
       moments const m = hit_moments(g, evaluate(g, primary_ray{s.direction}), alpha_gradient);
       E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * h.id, m.v, moment_count);
     }
-    return s.gradient.transmittance >= transmittance_min;
+    return s.gradient.transmittance >= transmittance_min && --s.left != 0;
   }
   GART_HD void end(index_t, state const&) const {}
 };

@@ -1,7 +1,8 @@
 #pragma once
 // The forward ray program: front-to-back compositing of the hits of a pixel,
 //   C += T alpha c,  T *= 1 - alpha,
-// colour from spherical harmonics on the ray's direction, until T < transmittance_min (the hit that crosses counts).
+// colour from spherical harmonics on the ray's direction, until T < transmittance_min (the hit that crosses counts), or
+// until max_hits of them where there is such a cap.
 // The background is added with what transmittance is left.
 
 #include <gart/math/sh.hpp>
@@ -69,7 +70,7 @@ struct composite {
     s.transmittance *= 1.0f - h.alpha;
     ++s.hits;
     s.last = {h.t, h.id};
-    return s.transmittance >= options.transmittance_min;
+    return s.transmittance >= options.transmittance_min && s.hits != options.max_hits;
   }
   GART_HD void end(index_t, state const& s) const {
     std::size_t const a = order.address(s.at);
