@@ -11,7 +11,7 @@ gart::buffer<gart::box, E> boxes_of_scene(E& exec) {
   gart::buffer<gart::box, E> boxes(exec, frame.gaussians.size());
   gart::parallel_for(
       exec, "boxes", frame.gaussians.size(),
-      gart::trace_kernels::bound_ellipsoids{frame.scene(), frame.view.position, frame.options.alpha_min, boxes});
+      gart::trace_kernels::bound_ellipsoids<>{frame.scene(), frame.view.position, frame.options.alpha_min, boxes});
   exec.synchronize();
   return boxes;
 }

@@ -110,6 +110,38 @@ TEST_CASE("sigmoid, and what is finite") {
   CHECK_FALSE(gart::is_finite(NAN));
 }
 
+TEST_CASE_TEMPLATE("responses, their cut-offs and slopes against double", Response, gart::generalized_gaussian<1>,
+                   gart::generalized_gaussian<2>, gart::generalized_gaussian<3>, gart::generalized_gaussian<4>,
+                   gart::generalized_gaussian<5>, gart::generalized_gaussian<8>) {
+  constexpr int n = Response::degree;
+  CAPTURE(n);
+  double worst_response = 0, worst_slope = 0, worst_cutoff = 0;
+  for (double r = 1e-3; r < 3.6; r *= 1.003) {
+    auto const d2 = static_cast<float>(r * r);
+    double const radius = std::sqrt(static_cast<double>(d2)), exponent = -4.5 * std::pow(radius / 3, n);
+    // What is off is the exponent, by two roundings or so.
+    worst_response =
+        std::max(worst_response, std::fabs(Response::response(d2) / std::exp(exponent) - 1) / (1 - exponent));
+    worst_slope = std::max(worst_slope, std::fabs(Response::slope(d2) * radius * radius / (-n * exponent) - 1));
+  }
+  for (double ratio = 1; ratio < 1e12; ratio *= 1.01) {
+    auto const given = static_cast<float>(ratio);
+    double const exact = 9 * std::pow(std::log(static_cast<double>(given)) / 4.5, 2.0 / n);
+    float const got = Response::cutoff(given);
+    worst_cutoff = std::max(worst_cutoff, std::fabs(got - exact) / std::max(exact, 1e-12));
+  }
+  CAPTURE(worst_response);
+  CAPTURE(worst_slope);
+  CAPTURE(worst_cutoff);
+  CHECK(worst_response < 3e-7);
+  CHECK(worst_slope < 1e-6);
+  CHECK(worst_cutoff < 1e-6);
+  CHECK(Response::response(0.0f) == 1.0f);
+  CHECK(Response::response(9.0f) == doctest::Approx(std::exp(-4.5)).epsilon(1e-6));
+  CHECK(Response::response(1e30f) == 0.0f);
+  CHECK(Response::cutoff(1.0f) == 0.0f);
+}
+
 TEST_CASE("quaternions of any norm against Eigen") {
   CAPTURE(gart_test::seed());
   numbers_source source(gart_test::seed() + 2);

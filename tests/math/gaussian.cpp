@@ -17,13 +17,14 @@ struct exact_response {
   double t, d2, alpha;
 };
 
-exact_response exactly(parameters const& p, Eigen::Vector3d const& origin, Eigen::Vector3d const& direction) {
+exact_response exactly(parameters const& p, Eigen::Vector3d const& origin, Eigen::Vector3d const& direction,
+                       int degree = 2) {
   Eigen::Matrix3d const r = Eigen::Quaterniond(p[6], p[7], p[8], p[9]).normalized().toRotationMatrix();
   Eigen::Vector3d const inverse(std::exp(-p[3]), std::exp(-p[4]), std::exp(-p[5]));
   Eigen::Matrix3d const m = inverse.asDiagonal() * r.transpose();
   Eigen::Vector3d const o = m * (origin - Eigen::Vector3d(p[0], p[1], p[2])), d = m * direction;
   double const t = -o.dot(d) / d.dot(d), d2 = (o + t * d).squaredNorm();
-  return {t, d2, std::exp(-0.5 * d2) / (1 + std::exp(-p[10]))};
+  return {t, d2, std::exp(-4.5 * std::pow(std::sqrt(d2) / 3, degree)) / (1 + std::exp(-p[10]))};
 }
 
 gart::gaussian_parameters stored(parameters const& p) {
@@ -137,8 +138,11 @@ TEST_CASE("scenes far from the origin lose nothing to the frame") {
   CHECK(m.z == doctest::Approx(1.9).epsilon(1e-6));
 }
 
-TEST_CASE("moments become the gradients of a weighted sum of alphas") {
+TEST_CASE_TEMPLATE("moments become the gradients of a weighted sum of alphas", Response, gart::generalized_gaussian<1>,
+                   gart::generalized_gaussian<2>, gart::generalized_gaussian<3>, gart::generalized_gaussian<4>,
+                   gart::generalized_gaussian<5>, gart::generalized_gaussian<8>) {
   CAPTURE(gart_test::seed());
+  CAPTURE(Response::degree);
   source from(gart_test::seed() + 1);
   constexpr int rays = 12;
   struct group {
@@ -152,20 +156,23 @@ TEST_CASE("moments become the gradients of a weighted sum of alphas") {
       std::vector<Eigen::Vector3d> directions;
       std::vector<double> weights;
       for (int k = 0; k < rays; ++k) {
-        directions.push_back(from.towards(p, Eigen::Vector3d::Zero()));
+        // A difference across the cusp of degree 1 is no derivative.
+        do directions.resize(k), directions.push_back(from.towards(p, Eigen::Vector3d::Zero()));
+        while (Response::degree == 1 && exactly(p, Eigen::Vector3d::Zero(), directions[k]).d2 < 0.01);
         weights.push_back(static_cast<float>(from.uniform(-1, 1)));
       }
       auto const loss = [&](parameters const& at) {
         double sum = 0;
-        for (int k = 0; k < rays; ++k) sum += weights[k] * exactly(at, Eigen::Vector3d::Zero(), directions[k]).alpha;
+        for (int k = 0; k < rays; ++k)
+          sum += weights[k] * exactly(at, Eigen::Vector3d::Zero(), directions[k], Response::degree).alpha;
         return sum;
       };
       gart::gaussian_parameters const s = stored(p);
-      gart::ray_gaussian const g = gart::prepare(s, gart::vec3d(0.0), 1e-6f);
+      gart::ray_gaussian const g = gart::prepare<Response>(s, gart::vec3d(0.0), 1e-6f);
       gart::moments total{};
       for (int k = 0; k < rays; ++k) {
-        gart::response const r = gart::evaluate(g, gart::primary_ray{to_vec3(directions[k])});
-        gart::moments const one = gart::hit_moments(g, r, static_cast<float>(weights[k]));
+        gart::response const r = gart::evaluate<Response>(g, gart::primary_ray{to_vec3(directions[k])});
+        gart::moments const one = gart::hit_moments<Response>(g, r, static_cast<float>(weights[k]));
         for (int i = 0; i < gart::moment_count; ++i) total.v[i] += one.v[i];
       }
       gart::geometry_gradient const got = gart::from_moments(total.v, s, g);
@@ -183,6 +190,29 @@ TEST_CASE("moments become the gradients of a weighted sum of alphas") {
     INFO(std::string(part.name));
     CHECK(std::sqrt(difference / size) < 1e-4);
   }
+}
+
+TEST_CASE("the cusp of degree 1: a gradient of one size from every side, and none at the centre") {
+  using cusp = gart::generalized_gaussian<1>;
+  gart::gaussian_parameters const g{{0, 0, 2}, {0, 0, 0}, {1, 0, 0, 0}, 0};
+  gart::ray_gaussian const record = gart::prepare<cusp>(g, gart::vec3d(0.0), 1.0f / 255);
+  auto const gradient_from = [&](float x, float y) {
+    gart::ray const r{{x, y, 0}, {0, 0, 1}};
+    gart::moments const m = gart::hit_moments<cusp>(record, gart::evaluate<cusp>(record, r), 1.0f);
+    return gart::from_moments(m.v, g, record);
+  };
+  gart::geometry_gradient const centre = gradient_from(0, 0);
+  CHECK(centre.mean == gart::vec3(0.0f));
+  CHECK(centre.log_scale == gart::vec3(0.0f));
+  CHECK(centre.opacity == doctest::Approx(0.25));
+  for (float const r : {1e-6f, 1e-12f, 1e-19f}) {
+    CAPTURE(r);
+    CHECK(gradient_from(r, 0).mean.x == doctest::Approx(0.5 * 1.5).epsilon(1e-4));
+    CHECK(gradient_from(-r, 0).mean.x == doctest::Approx(-0.5 * 1.5).epsilon(1e-4));
+    CHECK(gradient_from(0, r).mean.y == doctest::Approx(0.5 * 1.5).epsilon(1e-4));
+  }
+  // Where the square of the offset is no longer a number, it is the centre.
+  CHECK(gradient_from(1e-30f, 0).mean == gart::vec3(0.0f));
 }
 
 TEST_CASE("no gradient passes a clamp") {

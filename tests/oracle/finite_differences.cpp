@@ -33,8 +33,9 @@ struct difference {
   doubles color, transmittance;  // per pixel, by one parameter
 };
 
-void check(oracle::scene const& s) {
+void check(oracle::scene const& s, int kernel_degree = 2, double tolerance = 1e-6) {
   oracle::parameters m(s.model);
+  m.kernel_degree = kernel_degree;
   auto const render = [&] { return oracle::render(m, s.view, s.options, s.active_degree); };
   auto const base = render();
   std::size_t const pixels = base.pixels.size();
@@ -86,7 +87,7 @@ void check(oracle::scene const& s) {
       error += (got - expected) * (got - expected), norm += expected * expected;
     }
     REQUIRE(norm > 0);
-    CHECK(std::sqrt(error / norm) < 1e-6);
+    CHECK(std::sqrt(error / norm) < tolerance);
   }
 }
 
@@ -98,6 +99,16 @@ TEST_CASE("gradients agree with central differences") {
   for (int degree = 0; degree <= 3; ++degree) {
     CAPTURE(degree);
     check(oracle::smooth_scene(seed + degree, degree, 2.0f));
+  }
+}
+
+TEST_CASE("gradients agree with central differences for every kernel degree") {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  // A difference across the cusp of degree 1 is off where a ray passes the centre closely.
+  for (int degree : {1, 3, 4, 5, 8}) {
+    CAPTURE(degree);
+    check(oracle::smooth_scene(seed + degree, 0, 2.0f), degree, degree == 1 ? 1e-4 : 1e-6);
   }
 }
 

@@ -97,16 +97,18 @@ double const ulps = 3 * std::ldexp(1.0, -24);
 double const alpha_ulps = 1e-6;      // exp, sigmoid and their product, relative
 double const decision_slack = 1e-5;  // and what a decision on alpha or T is given beyond that, relative
 
-std::vector<hit> hits_of(std::vector<prepared> const& gaussians, Vector3d const& d,
+std::vector<hit> hits_of(std::vector<prepared> const& gaussians, int kernel_degree, Vector3d const& d,
                          gart::render_options const& options) {
   std::vector<hit> list;
   double const alpha_min = options.alpha_min, near = options.near;
+  double const n = kernel_degree;
   for (std::size_t i = 0; i < gaussians.size(); ++i) {
     prepared const& g = gaussians[i];
     Vector3d const o_g = g.to_unit * g.from_mean, d_g = g.to_unit * d;
     double const t = -o_g.dot(d_g) / d_g.squaredNorm();
     Vector3d const p = o_g + t * d_g;
-    double const response = g.sigma * std::exp(-0.5 * p.squaredNorm());
+    double const radius = p.norm();
+    double const response = g.sigma * std::exp(-4.5 * std::pow(radius / 3, n));
     if (response < 0.5 * alpha_min) continue;
 
     Matrix3d const magnitude = g.to_unit.cwiseAbs();
@@ -118,7 +120,12 @@ std::vector<hit> hits_of(std::vector<prepared> const& gaussians, Vector3d const&
     h.t_slack = 1e-7 * std::abs(t) +
                 3 * (o_error.dot(d_g.cwiseAbs()) + d_error.dot(o_g.cwiseAbs() + 2 * std::abs(t) * d_g.cwiseAbs())) /
                     d_g.squaredNorm();
-    h.alpha_slack = alpha_ulps + p.cwiseAbs().dot(o_error + std::abs(t) * d_error);
+    // The relative slope of the response, 1.5 n (r / 3)^(n - 1), times what p may be off by along itself.
+    Vector3d const p_error = o_error + std::abs(t) * d_error;
+    double const along = radius > 0 ? p.cwiseAbs().dot(p_error) / radius : p_error.norm();
+    h.alpha_slack = alpha_ulps + 1.5 * n * std::pow(radius / 3, n - 1) * along;
+    // Towards the cusp of degree 1 the direction of the gradient is lost, and with it its sign.
+    h.at_cusp = kernel_degree == 1 && radius < 1e3 * p_error.norm();
     h.clamps = response > alpha_max ? 8u : 0u;
     h.marginal = std::abs(response - alpha_min) <= (decision_slack + h.alpha_slack) * alpha_min ||
                  std::abs(t - near) <= h.t_slack;
@@ -174,7 +181,7 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
     steps.push_back({h, s.color, transmittance, Vector3d::Zero(), 0});
     brightest = std::max(brightest, s.color.maxCoeff());
     out.edge |= h.marginal;
-    out.kink |= s.kink || std::abs(h.alpha / alpha_max - 1) * (h.clamps & 8 ? 0 : 1) < h.alpha_slack;
+    out.kink |= s.kink || h.at_cusp || std::abs(h.alpha / alpha_max - 1) * (h.clamps & 8 ? 0 : 1) < h.alpha_slack;
     if (!h.counted) continue;
     transmittance *= 1 - h.alpha;
     relative_error += h.alpha / (1 - h.alpha) * h.alpha_slack;
@@ -268,7 +275,9 @@ dual response_of(parameters const& m, std::size_t i, Vector3d const& origin, Vec
     pp += dual(p * p);
   }
   dual const sigma = 1.0 / (1.0 + exp(dual(-dual(m.opacity[i], 11, 10))));
-  return sigma * exp(dual(-0.5 * pp));
+  // |p|^n as a power of |p|^2; at its centre the response has no slope, or for degree 1 none that has a direction.
+  if (pp.value() == 0) return sigma;
+  return sigma * exp(dual(-4.5 * pow(dual(pp / 9.0), 0.5 * m.kernel_degree)));
 }
 
 void check_degree(parameters const& m, int active_degree) {
@@ -303,7 +312,7 @@ picture render(parameters const& m, gart::camera const& c, gart::render_options 
       Vector3d const d = world_direction(c, i, j);
       double y[16];
       harmonics(d, y);
-      p.list = hits_of(gaussians, d, options);
+      p.list = hits_of(gaussians, m.kernel_degree, d, options);
       composite(m, p.list, y, active_degree, options, p);
     }
   return out;
@@ -332,7 +341,7 @@ parameters gradients(parameters const& m, gart::camera const& c, gart::render_op
     double y[16];
     harmonics(d, y);
     pixel ignored;
-    auto list = hits_of(gaussians, d, options);
+    auto list = hits_of(gaussians, m.kernel_degree, d, options);
     for (step const& s : composite(m, list, y, active_degree, options, ignored)) {
       std::size_t const i = s.h.id;
       double const weight = s.transmittance * s.h.alpha;

@@ -5,9 +5,9 @@
 //
 // For a ray o + t d, |d| = 1, and a Gaussian with M = S^-1 R^T:
 //   o_g = M (o - mean), d_g = M d, t = -o_g.d_g / d_g.d_g, p = o_g + t d_g,
-//   alpha = min(0.99, sigmoid(opacity) exp(-|p|^2 / 2)), a hit when alpha >= alpha_min and t > near,
-//   colour = sum_i T_i alpha_i c_i + T background, T_(i+1) = T_i (1 - alpha_i), in the order (t, id), until T <
-//   transmittance_min, or until max_hits hits where that is not 0.
+//   alpha = min(0.99, sigmoid(opacity) exp(-4.5 (|p| / 3)^n)), n the kernel degree, 2 for a Gaussian, a hit when alpha
+//   >= alpha_min and t > near, colour = sum_i T_i alpha_i c_i + T background, T_(i+1) = T_i (1 - alpha_i), in the order
+//   (t, id), until T < transmittance_min, or until max_hits hits where that is not 0.
 //
 // Every decision is also asked how far it is from going the other way in float: see pixel.
 
@@ -23,6 +23,7 @@ namespace oracle {
 // The parameters of gart::gaussian_model, same shapes, in double; also the shape of a gradient.
 struct parameters {
   int sh_degree = 0;
+  int kernel_degree = 2;
   std::vector<double> mean, log_scale, quaternion, opacity, sh;
 
   parameters() = default;
@@ -37,6 +38,7 @@ struct hit {
   double alpha = 0, alpha_slack = 0;
   bool counted = true;    // false: just misses a threshold, and is listed because float may see a hit
   bool marginal = false;  // within rounding of alpha_min or near, on either side
+  bool at_cusp = false;   // within rounding of the cusp of degree 1: alpha's gradient has no sure direction
   unsigned clamps = 0;    // bits 0-2: colour channel held at 0; bit 3: alpha held at 0.99
 };
 

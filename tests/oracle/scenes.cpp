@@ -189,6 +189,14 @@ std::vector<scene> scenes(std::uint64_t seed) {
   return all;
 }
 
+scene kernel_scene(std::uint64_t seed, int kernel_degree) {
+  random rng(seed + static_cast<std::uint64_t>(kernel_degree));
+  builder b(rng, 0);
+  for (int i = 0; i < 80; ++i) b.add(b.inside(1.0f), b.axes(0.05f, 0.6f), rng.uniform(-3.0f, 3.0f));
+  for (int i = 0; i < 8; ++i) b.add(b.inside(3.0f), b.axes(0.5f, 4.0f), rng.uniform(-4.0f, -1.0f));
+  return {"kernels", b.model, look_at(rng, {0, 0, 0}, 3.0f, 37, 23, 0.9f), options_of(rng), 0};
+}
+
 scene smooth_scene(std::uint64_t seed, int sh_degree, float aspect) {
   random rng(seed);
   builder b(rng, sh_degree);

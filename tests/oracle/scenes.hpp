@@ -23,6 +23,9 @@ struct scene {
 // The same seed gives the same scenes with every compiler.
 std::vector<scene> scenes(std::uint64_t seed);
 
+// A cloud of SH degree 0 with some ellipsoids that reach around the camera, another for each kernel degree.
+scene kernel_scene(std::uint64_t seed, int kernel_degree);
+
 // A few Gaussians and pixels whose image has no steps: alpha_min 1e-12, near and transmittance_min out of reach.
 // `sh_degree` in 0..3; `aspect` is the ratio of the longest to the shortest axis.
 scene smooth_scene(std::uint64_t seed, int sh_degree, float aspect);

@@ -1,11 +1,8 @@
 #pragma once
-// The scenes of a test run with the oracle's pictures of them, rendered once for all policies, and how closely the
-// library must agree with a pixel.
+// The scenes of a test run with the oracle's pictures of them, rendered once for all policies.
 
-#include <oracle/oracle.hpp>
 #include <oracle/scenes.hpp>
-#include <support/policies.hpp>
-#include <support/trace_scene.hpp>
+#include <render/agreement.hpp>
 
 #include <vector>
 
@@ -29,11 +26,6 @@ inline std::vector<expectation> const& expectations() {
   }();
   return all;
 }
-
-inline double const image_tolerance = 1e-5;
-
-// Rounding alone may move this pixel by the tolerance: an undecided hit or order, or an ill-conditioned one.
-inline bool within_rounding(oracle::pixel const& p) { return p.rounding > image_tolerance; }
 
 template <class E>
 inline std::vector<tracer_kind> tracers() {

@@ -2,49 +2,9 @@
 #include <render/expected.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
-#include <map>
 
 using namespace gart_test;
-
-namespace {
-
-// Every hit that rounding cannot undo is there, nothing that rounding cannot make, t and alpha within rounding, and in
-// an order that rounding can give. Returns what is wrong, or nothing; `differs` says that the list is not the oracle's.
-std::string complaint(std::vector<gart::hit> const& got, oracle::pixel const& p, bool& differs) {
-  std::map<gart::u32, oracle::hit const*> listed;
-  std::size_t sure = 0;
-  std::vector<gart::u32> ids;
-  for (auto const& h : p.list) {
-    listed[h.id] = &h, sure += h.counted && !h.marginal;
-    if (h.counted) ids.push_back(h.id);
-  }
-  differs = !std::equal(got.begin(), got.end(), ids.begin(), ids.end(),
-                        [](auto const& h, gart::u32 id) { return h.id == id; });
-
-  oracle::hit const* farthest = nullptr;  // by t - t_slack
-  for (std::size_t i = 0; i < got.size(); ++i) {
-    auto const& h = got[i];
-    auto const found = listed.find(h.id);
-    std::string const who = "hit " + std::to_string(i) + ", Gaussian " + std::to_string(h.id) + ": ";
-    if (found == listed.end()) return who + "is no hit, or was reported twice";
-    oracle::hit const& o = *found->second;
-    listed.erase(found);
-    sure -= o.counted && !o.marginal;
-    if (!(std::abs(h.t - o.t) <= o.t_slack + 1e-6 * std::abs(o.t)))
-      return who + "t is " + std::to_string(h.t) + ", not " + std::to_string(o.t);
-    if (!(std::abs(h.alpha - o.alpha) <= (1e-5 + 2 * o.alpha_slack) * o.alpha))
-      return who + "alpha is " + std::to_string(h.alpha) + ", not " + std::to_string(o.alpha);
-    if (i && !gart::before(got[i - 1].t, got[i - 1].id, h.t, h.id)) return who + "out of order by its own (t, id)";
-    if (farthest && farthest->t - farthest->t_slack > o.t + o.t_slack + 1e-6 * std::abs(o.t)) return who + "too late";
-    if (farthest && farthest->t == o.t && farthest->id > o.id) return who + "a tie not ordered by id";
-    if (!farthest || o.t - o.t_slack >= farthest->t - farthest->t_slack) farthest = &o;
-  }
-  return sure ? std::to_string(sure) + " hits are missing" : "";
-}
-
-}  // namespace
 
 TEST_CASE_TEMPLATE("hit lists agree with the oracle", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();

@@ -59,19 +59,19 @@ struct list_program {
 
 namespace detail {
 
-template <class E, class F>
+template <class Response = gart::generalized_gaussian<>, class E, class F>
 auto with_tracer(E& exec, tracer_kind kind, F&& body) {
   if (kind == tracer_kind::bvh) {
-    gart::bvh_tracer<E> tracer(exec);
+    gart::bvh_tracer<E, Response> tracer(exec);
     return body(tracer);
   }
   if (kind == tracer_kind::tiles) {
-    gart::tile_tracer<E> tracer(exec);
+    gart::tile_tracer<E, 8, Response> tracer(exec);
     return body(tracer);
   }
 #if defined(GART_WITH_EMBREE)
   if constexpr (!E::device) {
-    gart::embree_tracer<E> tracer(exec);
+    gart::embree_tracer<E, Response> tracer(exec);
     return body(tracer);
   }
 #endif
@@ -94,23 +94,29 @@ auto with_degree(int degree, F&& body) {
 
 }  // namespace detail
 
+template <int Degree, class Tracer, class E>
+traced<E> render_by(E& exec, Tracer& tracer, gart::gaussian_model const& model, gart::camera const& view,
+                    gart::render_options const& options, int active_degree) {
+  gart::gaussians<E> scene(exec, model);
+  gart::frame_records<E> records(exec);
+  std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
+  gart::buffer<float, E> color(exec, 3 * pixels), transmittance(exec, pixels), depth(exec, pixels);
+  gart::buffer<gart::u32, E> hits(exec, pixels);
+  auto const constant = std::as_const(scene).view();
+  records.template prepare<typename Tracer::response_type>(exec, constant, view.position, options.alpha_min);
+  tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
+  gart::forward<Degree>(exec, tracer, constant, view, options, active_degree,
+                        {color.data(), transmittance.data(), depth.data(), hits.data()}, gart::record_none{});
+  return {color.to_host(), transmittance.to_host(), depth.to_host(), hits.to_host()};
+}
+
 template <class E>
 traced<E> render_scene(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                        gart::render_options const& options, int active_degree, tracer_kind kind) {
   return detail::with_tracer(exec, kind, [&](auto& tracer) {
-    gart::gaussians<E> scene(exec, model);
-    gart::frame_records<E> records(exec);
-    std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
-    gart::buffer<float, E> color(exec, 3 * pixels), transmittance(exec, pixels), depth(exec, pixels);
-    gart::buffer<gart::u32, E> hits(exec, pixels);
-    auto const constant = std::as_const(scene).view();
-    records.prepare(exec, constant, view.position, options.alpha_min);
-    tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
-    detail::with_degree(model.sh_degree, [&](auto degree) {
-      gart::forward<degree>(exec, tracer, constant, view, options, active_degree,
-                            {color.data(), transmittance.data(), depth.data(), hits.data()}, gart::record_none{});
+    return detail::with_degree(model.sh_degree, [&](auto degree) {
+      return render_by<degree>(exec, tracer, model, view, options, active_degree);
     });
-    return traced<E>{color.to_host(), transmittance.to_host(), depth.to_host(), hits.to_host()};
   });
 }
 
@@ -122,11 +128,11 @@ gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, ga
   gart::gaussians<E> scene(exec, model);
   gart::gaussians<E> gradients(exec, scene.size(), model.sh_degree);
   gart::frame_records<E> records(exec);
-  gart::backward<E, Strategy> pass(exec);
+  gart::backward<E, Strategy, gart::tile_size_of<Tracer>> pass(exec);
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
   gart::buffer<float, E> color(exec, 3 * pixels), gradient(exec, color_gradient);
   auto const constant = std::as_const(scene).view();
-  records.prepare(exec, constant, view.position, options.alpha_min);
+  records.template prepare<typename Tracer::response_type>(exec, constant, view.position, options.alpha_min);
   tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
   pass.prepare(exec, tracer, constant, view, options.alpha_min, options.near);
   gart::forward<Degree>(exec, tracer, constant, view, options, active_degree, pass.targets(color.data()),
@@ -185,21 +191,20 @@ gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model,
   });
 }
 
-template <class E>
+template <class Response = gart::generalized_gaussian<>, class E>
 std::vector<std::vector<gart::hit>> hit_lists(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                                               gart::render_options const& options, tracer_kind kind) {
-  return detail::with_tracer(exec, kind, [&](auto& tracer) {
+  return detail::with_tracer<Response>(exec, kind, [&](auto& tracer) {
     gart::gaussians<E> scene(exec, model);
     gart::frame_records<E> records(exec);
     std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
     gart::buffer<gart::u32, E> counts(exec, pixels), starts(exec);
     gart::buffer<gart::hit, E> list(exec);
     auto const constant = std::as_const(scene).view();
-    records.prepare(exec, constant, view.position, options.alpha_min);
+    records.template prepare<Response>(exec, constant, view.position, options.alpha_min);
     tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
     gart::pixel_order const order{view.width, view.height};
-    list_program program{view, order, options.transmittance_min, options.max_hits, counts.data(), nullptr,
-                         nullptr};
+    list_program program{view, order, options.transmittance_min, options.max_hits, counts.data(), nullptr, nullptr};
     tracer.trace(exec, "count", order.launch_size(), program);
     std::vector<gart::u32> const count = counts.to_host();
     std::vector<gart::u32> offset(pixels + 1, 0);

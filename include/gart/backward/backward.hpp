@@ -41,6 +41,13 @@ struct finish {
 
 }  // namespace backward_kernels
 
+// The tiles that a tracer's footprints are cut into; 8 where it has none to lend.
+template <class Tracer>
+inline constexpr int tile_size_of = 8;
+template <class Tracer>
+requires requires { Tracer::tile_size; }
+inline constexpr int tile_size_of<Tracer> = Tracer::tile_size;
+
 template <execution E, class Strategy, int TileSize = 8>
 class backward {
  public:
@@ -72,7 +79,7 @@ class backward {
       if constexpr (requires { tracer.prints(); }) {
         prints_ = &tracer.prints();
       } else {
-        own_prints_.measure(exec, scene, view, alpha_min, near);
+        own_prints_.template measure<typename Tracer::response_type>(exec, scene, view, alpha_min, near);
         prints_ = &own_prints_;
       }
       if (byte_budget && prints_->slots() * sizeof(entry) > byte_budget) return false;
@@ -111,6 +118,7 @@ class backward {
   void run(E& exec, Tracer& tracer, gaussians_view<float const> scene, span<ray_gaussian const> gaussians_in_frame,
            camera const& view, render_options const& options, int active_degree, span<float const> color,
            span<float const> color_gradient, gaussians<E>& gradients) {
+    using response = typename Tracer::response_type;
     stage_scope stage(exec, "backward");
     moments_.resize(std::size_t{moment_stride} * scene.count);
     // The ordered sums write every Gaussian themselves.
@@ -120,9 +128,9 @@ class backward {
       if constexpr (ordered) rows_.resize(prints_->pairs() * pair_row<ShDegree>::quads);
       // Colour and geometry in a launch each: together their sums and coefficients leave too few registers for enough
       // warps to hide memory behind.
-      gather_terms<ShDegree, only<gart::color>>(exec, scene, gaussians_in_frame, view, active_degree, color,
+      gather_terms<ShDegree, response, only<gart::color>>(exec, scene, gaussians_in_frame, view, active_degree, color,
                                                 color_gradient, gradients);
-      gather_terms<ShDegree, only<geometry>>(exec, scene, gaussians_in_frame, view, active_degree, color,
+      gather_terms<ShDegree, response, only<geometry>>(exec, scene, gaussians_in_frame, view, active_degree, color,
                                              color_gradient, gradients);
       if constexpr (ordered)
         parallel_for(
@@ -132,7 +140,7 @@ class backward {
     }
     if constexpr (Strategy::scatter::any) {
       pixel_order const order{view.width, view.height};
-      scatter_program<ShDegree, typename Strategy::scatter, E> const program{view,
+      scatter_program<ShDegree, response, typename Strategy::scatter, E> const program{view,
                                                                              order,
                                                                              scene.sh,
                                                                              active_degree,
@@ -163,13 +171,13 @@ class backward {
   };
   using entry = typename entry_of<record_type>::type;
 
-  template <int ShDegree, class Terms>
+  template <int ShDegree, class Response, class Terms>
   void gather_terms(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians_in_frame,
                     camera const& view, int active_degree, span<float const> image, span<float const> image_gradient,
                     gaussians<E>& gradients) {
     if constexpr (Terms::any) {
       constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
-      gather_kernel<ShDegree, Terms, entry, TileSize, sums, validity, E> const kernel{view,
+      gather_kernel<ShDegree, Response, Terms, entry, TileSize, sums, validity, E> const kernel{view,
                                                                                       grid_,
                                                                                       map_.view(),
                                                                                       prints_->ranges().data(),

@@ -29,7 +29,8 @@ struct pair_row {
   static constexpr int quads = sh_quads + moment_stride / 4;
 };
 
-template <int ShDegree, class Terms, class Entry, int Size, gather_sums Sums, slot_validity Validity, execution E>
+template <int ShDegree, class Response, class Terms, class Entry, int Size, gather_sums Sums, slot_validity Validity,
+          execution E>
 struct gather_kernel {
   static constexpr bool recomputed = Validity == slot_validity::recomputed;
   static constexpr int block_size = 64, min_blocks = Terms::geometry ? 8 : 10;
@@ -119,7 +120,7 @@ struct gather_kernel {
       if (++column == width) column = 0, p += skip;
       if constexpr (recomputed) {
         quad const d = at.direction_total;
-        response const r = evaluate(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
+        response const r = evaluate<Response>(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
         bool const reached = !before(at.last.v[0], float_to_bits(at.last.v[1]), r.t, id);
         if (!is_hit(data.gaussian, r, near) || !reached) continue;
       } else if (!entry.written()) {
@@ -180,12 +181,13 @@ struct gather_kernel {
     }
     if constexpr (Terms::geometry) {
       quad const d = at.direction_total;
-      response const r = evaluate(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
-      float const alpha = hit_alpha(data.gaussian, r), before = entry.weight() / alpha;
+      response const r = evaluate<Response>(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
+      float const alpha = hit_alpha<Response>(data.gaussian, r), before = entry.weight() / alpha;
       vec3 const c = clamped_color(basis.unclamped(data.coefficients.v)), l = entry.color();
       float const color_g = c.x * dl.x + c.y * dl.y + c.z * dl.z;
       float const behind = d.v[3] - (l.x * dl.x + l.y * dl.y + l.z * dl.z);
-      moments const m = hit_moments(data.gaussian, r, alpha_gradient(before, color_g, behind, alpha));
+      moments const m =
+          hit_moments<Response>(data.gaussian, r, alpha_gradient(before, color_g, behind, alpha));
       GART_UNROLL
       for (int i = 0; i < moment_count; ++i) moment_sum[i] += m.v[i];
     }

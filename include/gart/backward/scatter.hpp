@@ -13,7 +13,7 @@
 
 namespace gart {
 
-template <int ShDegree, class Terms, execution E>
+template <int ShDegree, class Response, class Terms, execution E>
 struct scatter_program {
   using ray_type = primary_ray;
   static constexpr int sh_stride = 3 * sh_basis<ShDegree>::size;
@@ -72,7 +72,7 @@ struct scatter_program {
     }
     if constexpr (Terms::geometry) {
       ray_gaussian const g = records[h.id];
-      moments const m = hit_moments(g, evaluate(g, primary_ray{s.direction}), alpha_gradient);
+      moments const m = hit_moments<Response>(g, evaluate<Response>(g, primary_ray{s.direction}), alpha_gradient);
       E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * h.id, m.v, moment_count);
     }
     return s.gradient.transmittance >= transmittance_min && --s.left != 0;

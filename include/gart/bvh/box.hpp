@@ -27,8 +27,9 @@ GART_HD GART_INLINE box join(box const& a, box const& b) {
 // h_k = c sqrt(sum_j (R_kj s_j)^2), c^2 the cutoff. Evaluating a hit in float moves it by a few roundings of the
 // distance to the frame, so the box is widened by 32 of them: a candidate is never missed for being just outside its
 // own box.
+template <class Response = generalized_gaussian<>>
 GART_HD GART_INLINE box ellipsoid_box(gaussian_parameters const& g, vec3d const& frame, float alpha_min) {
-  float const cutoff = hit_cutoff(g, alpha_min);
+  float const cutoff = hit_cutoff<Response>(g, alpha_min);
   if (cutoff < 0) return empty_box();
   vec3 const center = relative_mean(g.mean, frame);
   mat3 const rotation = to_matrix(g.rotation);

@@ -124,9 +124,10 @@ GART_HD inline footprint project(footprint_view const& v, vec3d const& center, m
   return out;
 }
 
+template <class Response = generalized_gaussian<>>
 GART_HD inline footprint gaussian_slopes(footprint_view const& v, gaussian_parameters const& g, vec3d const& frame,
                                          float alpha_min, slope_box& s) {
-  float const cutoff = hit_cutoff(g, alpha_min);
+  float const cutoff = hit_cutoff<Response>(g, alpha_min);
   if (cutoff < 0) return {};
   mat3 const rotation = to_matrix(g.rotation);
   vec3 const scale = scale_of(g);

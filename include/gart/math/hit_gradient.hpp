@@ -3,12 +3,12 @@
 //
 // With w = T alpha, a hit of colour c adds w c to its ray and leaves T (1 - alpha); for the image gradient g,
 //   dL/dalpha = T (c.g) - (what lies behind the hit).g / (1 - alpha),   dL/dc = w g.
-// alpha = sigma exp(-|p|^2 / 2), so with a = alpha dL/dalpha the geometry of a Gaussian needs only ten sums over its
-// hits, the moments, all in the Gaussian's own space:
-//   m0 = sum a,  m1 = sum a p,  m2 = sum a p p^T
+// alpha = sigma rho(|p|^2), so with a = alpha dL/dalpha and b = a times the slope of ln rho (math/response.hpp; b = a for
+// a Gaussian) the geometry needs only ten sums over the hits, the moments, all in the Gaussian's own space:
+//   m0 = sum a,  m1 = sum b p,  m2 = sum b p p^T
 //   dL/d logit = (1 - sigma) m0          dL/d mean = M^T m1           dL/d log s_k = m2_kk
 //   dL/d rotation (body frame)_i = m2_jk (s_j / s_k - s_k / s_j), (i, j, k) cyclic
-// for x = mean + R S p is the point of largest response and dL/dM = -(sum a p p^T)(R S)^T. Where a clamp is active
+// for x = mean + R S p is the point of largest response and dL/dM = -(sum b p p^T)(R S)^T. Where a clamp is active
 // (alpha at alpha_max, a colour at 0) the derivative through it is zero.
 
 #include <gart/math/quaternion.hpp>
@@ -46,11 +46,13 @@ struct ray_gradient {
   }
 };
 
+template <class Response = generalized_gaussian<>>
 GART_HD GART_INLINE moments hit_moments(ray_gaussian const& gaussian, response const& r, float alpha_gradient) {
-  float const raw = unclamped_alpha(gaussian, r);
+  float const raw = unclamped_alpha<Response>(gaussian, r);
   float const a = raw < alpha_max ? raw * alpha_gradient : 0.0f;
-  vec3 const p = orthogonal_offset(r), ap = a * p;
-  return {{a, ap.x, ap.y, ap.z, ap.x * p.x, ap.y * p.y, ap.z * p.z, ap.y * p.z, ap.x * p.z, ap.x * p.y, 0, 0}};
+  float const b = a * Response::slope(r.d2);
+  vec3 const p = orthogonal_offset(r), bp = b * p;
+  return {{a, bp.x, bp.y, bp.z, bp.x * p.x, bp.y * p.y, bp.z * p.z, bp.y * p.z, bp.x * p.z, bp.x * p.y, 0, 0}};
 }
 
 struct geometry_gradient {

@@ -1,9 +1,10 @@
 #pragma once
 // A Gaussian as a ray meets it. In the Gaussian's own space (unit sphere, axes of the ellipsoid) a ray o + t d is
 //   o_g = M (o - mu),  d_g = M d,  M = S^-1 R^T;
-// the response is largest at t = -o_g.d_g / d_g.d_g, where p = o_g + t d_g is the offset from the centre and the
-// response rho = exp(-|p|^2 / 2). The ray hits where sigma * rho >= alpha_min, that is where |p|^2 is at most
-// cutoff = 2 ln(sigma / alpha_min), and t > near.
+// the response is largest at t = -o_g.d_g / d_g.d_g, where p = o_g + t d_g is the offset from the centre; there it is
+// rho(|p|^2), for a Gaussian exp(-|p|^2 / 2), of the Response that the scene is made of (math/response.hpp). The ray hits
+// where sigma * rho >= alpha_min, that is where |p|^2 is at most the cutoff, 2 ln(sigma / alpha_min) for a Gaussian, and
+// t > near.
 //
 // Everything is relative to a frame, a point of the world held in double (the camera's centre for primary rays): mu is
 // subtracted from it in double, so that scenes far from the origin lose nothing. This file is the only place that
@@ -12,6 +13,7 @@
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
 #include <gart/math/quaternion.hpp>
+#include <gart/math/response.hpp>
 
 namespace gart {
 
@@ -63,6 +65,7 @@ GART_HD GART_INLINE vec3 relative_mean(vec3 const& mean, vec3d const& frame) {
 }
 
 // Largest |p|^2 of a hit; negative where the Gaussian is never hit (too weak, or its parameters are not finite).
+template <class Response = generalized_gaussian<>>
 GART_HD GART_INLINE float hit_cutoff(gaussian_parameters const& g, float alpha_min) {
   float const sigma = sigmoid(g.opacity);
   bool const valid = is_finite(g.mean.x) && is_finite(g.mean.y) && is_finite(g.mean.z) && is_finite(g.opacity) &&
@@ -70,16 +73,17 @@ GART_HD GART_INLINE float hit_cutoff(gaussian_parameters const& g, float alpha_m
                      g.log_scale.x > -40.0f && g.log_scale.x < 40.0f && g.log_scale.y > -40.0f &&
                      g.log_scale.y < 40.0f && g.log_scale.z > -40.0f && g.log_scale.z < 40.0f;
   if (!valid || !(sigma >= alpha_min)) return -1.0f;
-  return mul(2.0f, logarithm(divide(sigma, alpha_min)));
+  return Response::cutoff(divide(sigma, alpha_min));
 }
 
 GART_HD GART_INLINE vec3 scale_of(gaussian_parameters const& g) {
   return {exponential(g.log_scale.x), exponential(g.log_scale.y), exponential(g.log_scale.z)};
 }
 
+template <class Response = generalized_gaussian<>>
 GART_HD GART_INLINE ray_gaussian prepare(gaussian_parameters const& g, vec3d const& frame, float alpha_min) {
   ray_gaussian out;
-  out.cutoff = hit_cutoff(g, alpha_min);
+  out.cutoff = hit_cutoff<Response>(g, alpha_min);
   out.sigma = sigmoid(g.opacity);
   if (out.cutoff < 0) {
     for (auto& row : out.m) row = {0, 0, 0, 0};
@@ -109,7 +113,7 @@ GART_HD GART_INLINE float gaussian_origin(ray_gaussian::row const& m, ray const&
   return fma(m.x, r.origin.x, fma(m.y, r.origin.y, fma(m.z, r.origin.z, m.o)));
 }
 
-template <class Ray>
+template <class Response = generalized_gaussian<>, class Ray>
 GART_HD GART_INLINE response evaluate(ray_gaussian const& g, Ray const& r) {
   vec3 o, d;
   GART_UNROLL
@@ -121,7 +125,7 @@ GART_HD GART_INLINE response evaluate(ray_gaussian const& g, Ray const& r) {
   float const dd = fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)));
   response out;
   out.d = d;
-  out.inverse = reciprocal(dd);
+  out.inverse = Response::reciprocal(dd);
   out.t = mul(-od, out.inverse);
   out.p = {fma(out.t, d.x, o.x), fma(out.t, d.y, o.y), fma(out.t, d.z, o.z)};
   out.d2 = fma(out.p.x, out.p.x, fma(out.p.y, out.p.y, mul(out.p.z, out.p.z)));
@@ -140,12 +144,14 @@ GART_HD GART_INLINE bool is_hit(ray_gaussian const& g, response const& r, float 
   return r.d2 <= g.cutoff && r.t > near;
 }
 
+template <class Response = generalized_gaussian<>>
 GART_HD GART_INLINE float unclamped_alpha(ray_gaussian const& g, response const& r) {
-  return mul(g.sigma, exponential(mul(-0.5f, r.d2)));
+  return mul(g.sigma, Response::response(r.d2));
 }
 
+template <class Response = generalized_gaussian<>>
 GART_HD GART_INLINE float hit_alpha(ray_gaussian const& g, response const& r) {
-  float const a = unclamped_alpha(g, r);
+  float const a = unclamped_alpha<Response>(g, r);
   return a < alpha_max ? a : alpha_max;
 }
 

@@ -6,7 +6,8 @@
 // A Gaussian of opacity o that becomes N in one place (its copies and itself; N is cut at 51) keeps what they render:
 //   o' = 1 - (1 - o)^(1/N),  scale' = scale * o / sum_{j=1..N} C(N, j) (-1)^(j-1) o'^j / sqrt(j),
 // which keeps the integral of the composited opacity across a line through the centre. (The paper's double sum, with
-// sum_i C(i-1, j-1) = C(N, j).) Moments of copies and sources are cleared.
+// sum_i C(i-1, j-1) = C(N, j).) For a generalised Gaussian of degree n (math/response.hpp) it is the n-th root of j.
+// Moments of copies and sources are cleared.
 //
 // Weights are 32-bit fixed point and their sums 64-bit integers, so the draws are exact for any count and have the same
 // bits on every policy. A Gaussian whose opacity or geometry is not finite counts as dead. Where none is alive nothing
@@ -28,13 +29,13 @@ struct relocated_shape {
 };
 
 // Of each of `copies` Gaussians that replace one of opacity `o`. In double: the sum alternates.
-GART_HD inline relocated_shape relocation(double o, u32 copies) {
+GART_HD inline relocated_shape relocation(double o, u32 copies, int kernel_degree = 2) {
   double const n = copies < 51 ? copies : 51;
   double const p = -expm1(log1p(-o) / n);
   double term = 1, sum = 0;
   for (int j = 1; j <= static_cast<int>(n); ++j) {
     term *= (n - j + 1) / j * p * (j > 1 ? -1 : 1);
-    sum += term / sqrt(static_cast<double>(j));
+    sum += term / (kernel_degree == 2 ? sqrt(static_cast<double>(j)) : pow(static_cast<double>(j), 1.0 / kernel_degree));
   }
   return {p, o / sum};
 }
@@ -101,11 +102,12 @@ struct mcmc_share_kernel {
   gaussians_view<float> model;
   u32 const* copies;
   float least_opacity;
+  int kernel_degree;
 
   GART_HD void operator()(index_t i) const {
     if (copies[i] == 0) return;
     double const o = fmin(1 / (1 + exp(-static_cast<double>(model.opacity[i]))), 1 - 1e-7);
-    relocated_shape const shape = relocation(o, copies[i] + 1);
+    relocated_shape const shape = relocation(o, copies[i] + 1, kernel_degree);
     double const opacity = fmin(fmax(shape.opacity, static_cast<double>(least_opacity)), 1 - 1e-7);
     model.opacity[i] = static_cast<float>(log(opacity / (1 - opacity)));
     float const shift = static_cast<float>(log(shape.scale_factor));
@@ -282,7 +284,8 @@ class mcmc {
     parallel_for(*exec_, "mcmc_draw", draws,
                  detail::mcmc_draw_kernel<E>{before_.data(), totals_.data(), n, random, source_.data(), copies.data()});
     parallel_for(*exec_, "mcmc_share", n,
-                 detail::mcmc_share_kernel{model.view(), copies.data(), options_.dead_opacity});
+                 detail::mcmc_share_kernel{model.view(), copies.data(), options_.dead_opacity,
+                                            options_.kernel_degree});
     for_each_element(
         *exec_, "mcmc_copy", draws, model.sh_degree(),
         detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(), target_.data()});

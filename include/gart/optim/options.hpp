@@ -21,6 +21,7 @@ struct mcmc_options {
   float dead_opacity = 0.005f;
   float noise = 5e5f;               // times the learning rate of the means
   float opacity_penalty = 0.01f, scale_penalty = 0.01f;
+  int kernel_degree = 2;            // of the Gaussians that are relocated; a trainer sets its own
 };
 
 struct adc_options {

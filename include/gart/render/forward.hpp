@@ -16,12 +16,15 @@ namespace gart {
 
 namespace render_kernels {
 
+template <class Response>
 struct prepare_records {
   gaussians_view<float const> scene;
   vec3d frame;
   float alpha_min;
   span<ray_gaussian> records;
-  GART_KERNEL void operator()(index_t i) const { records[i] = prepare(load_parameters(scene, i), frame, alpha_min); }
+  GART_KERNEL void operator()(index_t i) const { 
+    records[i] = prepare<Response>(load_parameters(scene, i), frame, alpha_min);
+  }
 };
 
 }  // namespace render_kernels
@@ -30,9 +33,12 @@ template <execution E>
 class frame_records {
  public:
   explicit frame_records(E& exec) : records_(exec) {}
+  // Response: the tracer's response_type.
+  template <class Response = generalized_gaussian<>>
   void prepare(E& exec, gaussians_view<float const> scene, vec3d frame, float alpha_min) {
     records_.resize(scene.count);
-    parallel_for(exec, "preprocess", scene.count, render_kernels::prepare_records{scene, frame, alpha_min, records_});
+    parallel_for(exec, "preprocess", scene.count,
+                 render_kernels::prepare_records<Response>{scene, frame, alpha_min, records_});
   }
   span<ray_gaussian const> view() const { return records_; }
 

@@ -1,13 +1,18 @@
 #pragma once
 // What a scene requires, at compile time. Kernels choose code by it, so that what a scene does not need has no
-// registers, no fields and no bytes. The rows that gart's libraries compile are SH degrees 0 to 3 (train/rows.hpp).
+// registers, no fields and no bytes. The rows that gart's libraries compile are listed by `gart info`; train/rows.hpp is
+// how a program compiles its own (examples/5_own_row).
+
+#include <gart/math/response.hpp>
 
 namespace gart {
 
-template <int ShDegree = 3>
+// Response: how a Gaussian falls from its centre, and in which arithmetic (math/response.hpp).
+template <int ShDegree = 3, class Response = generalized_gaussian<>>
 struct scene_traits {
   static_assert(ShDegree >= 0 && ShDegree <= 3, "spherical harmonics go to degree 3");
   static constexpr int sh_degree = ShDegree;
+  using response = Response;
 };
 
 }  // namespace gart

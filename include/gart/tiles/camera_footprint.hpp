@@ -38,9 +38,10 @@ class camera_footprint {
     view_ = {world_to_camera, fx_, fy_, cx_, cy_, c.width, c.height, near * least_cosine * (1 - margin)};
   }
 
+  template <class Response = generalized_gaussian<>>
   GART_HD footprint operator()(gaussian_parameters const& g, vec3d const& frame, float alpha_min) const {
     slope_box s;
-    footprint out = gaussian_slopes(view_, g, frame, alpha_min, s);
+    footprint out = gaussian_slopes<Response>(view_, g, frame, alpha_min, s);
     if (!s.visible) return {};
     if (lens_.any()) s = distorted(s);
     out.box = pixels_of(view_, s);

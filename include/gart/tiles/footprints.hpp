@@ -14,7 +14,7 @@ namespace gart {
 
 namespace tile_kernels {
 
-template <int Size>
+template <class Response, int Size>
 struct measure {
   gaussians_view<float const> scene;
   camera_footprint view;
@@ -24,7 +24,7 @@ struct measure {
   span<float> depths;
   span<u32> areas, tiles;
   GART_KERNEL void operator()(index_t i) const {
-    footprint const f = view(load_parameters(scene, i), frame, alpha_min);
+    footprint const f = view.template operator()<Response>(load_parameters(scene, i), frame, alpha_min);
     ranges[i].box = f.box;
     depths[i] = f.depth;
     areas[i] = f.box.area();
@@ -52,6 +52,7 @@ class footprints {
         pair_offsets_(exec),
         totals_(exec, 2) {}
 
+  template <class Response = generalized_gaussian<>>
   void measure(E& exec, gaussians_view<float const> scene, camera const& view, float alpha_min, float near) {
     index_t const n = scene.count;
     ranges_.resize(n), depths_.resize(n), areas_.resize(n), tiles_.resize(n), area_offsets_.resize(n),
@@ -63,8 +64,8 @@ class footprints {
     {
       stage_scope stage(exec, "footprint");
       parallel_for(exec, "footprint/measure", n,
-                   tile_kernels::measure<Size>{scene, camera_footprint(view, near), view.position, alpha_min, ranges_,
-                                               depths_, areas_, tiles_});
+                   tile_kernels::measure<Response, Size>{scene, camera_footprint(view, near), view.position, alpha_min,
+                                                         ranges_, depths_, areas_, tiles_});
     }
     stage_scope stage(exec, "scan");
     exclusive_scan(exec, span<u32 const>(areas_), area_offsets_.view(), totals_.view().subspan(0, 1));

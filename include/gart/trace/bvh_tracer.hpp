@@ -13,17 +13,18 @@ namespace gart {
 
 namespace trace_kernels {
 
+template <class Response = generalized_gaussian<>>
 struct bound_ellipsoids {
   gaussians_view<float const> scene;
   vec3d frame;
   float alpha_min;
   span<box> boxes;
   GART_KERNEL void operator()(index_t i) const {
-    boxes[i] = ellipsoid_box(load_parameters(scene, i), frame, alpha_min);
+    boxes[i] = ellipsoid_box<Response>(load_parameters(scene, i), frame, alpha_min);
   }
 };
 
-template <int Capacity, ray_program P>
+template <class Response, int Capacity, ray_program P>
 struct walk_rays {
   static constexpr int block_size = 128;
   bvh_view tree;
@@ -31,15 +32,18 @@ struct walk_rays {
   P program;
   GART_KERNEL void operator()(index_t i) const {
     if (!program.active(i)) return;
-    trace_windows<Capacity>(scene, program, i, [this](auto const& r, auto& visitor) { walk(tree, r, visitor); });
+    trace_windows<Capacity, Response>(scene, program, i,
+                                      [this](auto const& r, auto& visitor) { walk(tree, r, visitor); });
   }
 };
 
 }  // namespace trace_kernels
 
-template <execution E>
+// Response: what the scene's Gaussians are (math/response.hpp).
+template <execution E, class Response = generalized_gaussian<>>
 class bvh_tracer {
  public:
+  using response_type = Response;
   static constexpr char const* name = "bvh";
   static constexpr int window = 16;
 
@@ -52,7 +56,7 @@ class bvh_tracer {
                float alpha_min, float near) {
     boxes_.resize(scene.count);
     parallel_for(exec, "bvh/boxes", scene.count,
-                 trace_kernels::bound_ellipsoids{scene, view.position, alpha_min, boxes_});
+                 trace_kernels::bound_ellipsoids<Response>{scene, view.position, alpha_min, boxes_});
     bool const rebuild = tree_.view().count != scene.count || ++age_ >= rebuild_every;
     if (rebuild) {
       tree_.build(exec, boxes_);
@@ -65,7 +69,7 @@ class bvh_tracer {
 
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
-    parallel_for(exec, label, rays, trace_kernels::walk_rays<window, P>{tree_.view(), scene_, program});
+    parallel_for(exec, label, rays, trace_kernels::walk_rays<Response, window, P>{tree_.view(), scene_, program});
   }
 
   bvh<E> const& tree() const { return tree_; }

@@ -36,14 +36,14 @@ class embree_scene {
 
 namespace trace_kernels {
 
-template <int Capacity, ray_program P>
+template <class Response, int Capacity, ray_program P>
 struct embree_rays {
   embree_scene const* tree;
   traced_scene scene;
   P program;
   void operator()(index_t i) const {
     if (!program.active(i)) return;
-    trace_windows<Capacity>(scene, program, i, [this](auto const& r, auto& visitor) {
+    trace_windows<Capacity, Response>(scene, program, i, [this](auto const& r, auto& visitor) {
       using visitor_type = std::remove_reference_t<decltype(visitor)>;
       tree->intersect(
           origin_of(r), r.direction, visitor.near(), visitor.far(),
@@ -59,9 +59,10 @@ struct embree_rays {
 
 }  // namespace trace_kernels
 
-template <host_execution E>
+template <host_execution E, class Response = generalized_gaussian<>>
 class embree_tracer {
  public:
+  using response_type = Response;
   static constexpr char const* name = "embree";
   static constexpr int window = 16;
 
@@ -71,7 +72,7 @@ class embree_tracer {
                float alpha_min, float near) {
     boxes_.resize(scene.count);
     parallel_for(exec, "embree/boxes", scene.count,
-                 trace_kernels::bound_ellipsoids{scene, view.position, alpha_min, boxes_});
+                 trace_kernels::bound_ellipsoids<Response>{scene, view.position, alpha_min, boxes_});
     stage_scope stage(exec, "embree/build");
     tree_.build(boxes_);
     scene_ = {records.data(), scene.count, near};
@@ -79,7 +80,7 @@ class embree_tracer {
 
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
-    parallel_for(exec, label, rays, trace_kernels::embree_rays<window, P>{&tree_, scene_, program});
+    parallel_for(exec, label, rays, trace_kernels::embree_rays<Response, window, P>{&tree_, scene_, program});
   }
 
  private:

@@ -18,7 +18,7 @@ namespace gart {
 
 namespace trace_kernels {
 
-template <int Capacity, int Size, ray_program P>
+template <class Response, int Capacity, int Size, ray_program P>
 struct walk_tiles {
   static constexpr int block_size = 64, min_blocks = 8;
   // Candidates between two looks at what has become certain: rays of a warp then pass on several hits at a time
@@ -76,14 +76,14 @@ struct walk_tiles {
             if (!pass_on()) return;
           if (resume < end && pending.empty() && limit.t * cosine < bound) break;
         }
-        response const r = evaluate(g, ray);
+        response const r = evaluate<Response>(g, ray);
         if (!is_hit(g, r, scene.near) || !before(last_t, last_id, r.t, id)) continue;
         pending_hit h{r.t, k, 0};
         if (resume < end && !nearer(h, limit)) {
           resume = k < resume ? k : resume;
           continue;
         }
-        h.alpha = hit_alpha(g, r);
+        h.alpha = hit_alpha<Response>(g, r);
         if (pending.insert(h, nearer)) {
           limit = h;
           resume = h.place < resume ? h.place : resume;
@@ -98,18 +98,21 @@ struct walk_tiles {
 
 }  // namespace trace_kernels
 
-template <execution E, int Size = 8>
+// Size: side of a tile. Window: hits a ray keeps at most, a power of two; a smaller one is walked again more often.
+template <execution E, int Size = 8, class Response = generalized_gaussian<>, int Window = 32>
 class tile_tracer {
  public:
+  using response_type = Response;
   static constexpr char const* name = "tiles";
-  static constexpr int window = 32;
+  static constexpr int tile_size = Size;
+  static constexpr int window = Window;
 
   explicit tile_tracer(E& exec) : prints_(exec), map_(exec) {}
 
   void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
                float alpha_min, float near) {
     grid_ = {view.width, view.height};
-    prints_.measure(exec, scene, view, alpha_min, near);
+    prints_.template measure<Response>(exec, scene, view, alpha_min, near);
     map_.build(exec, grid_, prints_, tile_order::depth);
     scene_ = {records.data(), scene.count, near};
     forward_ = view.rotation[2];
@@ -118,8 +121,8 @@ class tile_tracer {
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
     parallel_for(exec, label, rays,
-                 trace_kernels::walk_tiles<window, Size, P>{grid_, map_.view(), prints_.depths().data(), scene_,
-                                                            forward_, program});
+                 trace_kernels::walk_tiles<Response, Window, Size, P>{grid_, map_.view(), prints_.depths().data(),
+                                                                      scene_, forward_, program});
   }
 
   footprints<E, Size> const& prints() const { return prints_; }

@@ -7,7 +7,7 @@
 
 namespace gart {
 
-template <int Capacity, class Ray>
+template <int Capacity, class Ray, class Response = generalized_gaussian<>>
 struct window_visitor {
   traced_scene scene;
   Ray ray;
@@ -22,19 +22,19 @@ struct window_visitor {
   GART_HD GART_INLINE float far() const { return window.far(); }
   GART_HD GART_INLINE void leaf(u32 id) {
     ray_gaussian const g = scene.gaussians[id];
-    response const r = evaluate(g, ray);
+    response const r = evaluate<Response>(g, ray);
     if (is_hit(g, r, scene.near) && before(last_t, last_id, r.t, id) && window.wants(r.t, id))
-      window.insert({r.t, id, hit_alpha(g, r)});
+      window.insert({r.t, id, hit_alpha<Response>(g, r)});
   }
 };
 
 // Feeds `program` the hits of ray i; `gather` proposes candidates to the visitor (at least all whose hits lie in
 // [near(), far()]) and is called again until a window is not full.
-template <int Capacity, ray_program P, class Gather>
+template <int Capacity, class Response = generalized_gaussian<>, ray_program P, class Gather>
 GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& program, index_t i, Gather const& gather) {
   auto state = program.begin(i);
   auto const r = program.ray_of(i, state);
-  window_visitor<Capacity, std::remove_const_t<decltype(r)>> visitor(scene, r);
+  window_visitor<Capacity, std::remove_const_t<decltype(r)>, Response> visitor(scene, r);
   bool more = true;
   while (more) {
     visitor.window.clear();

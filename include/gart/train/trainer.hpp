@@ -43,6 +43,8 @@ template <execution E, class Traits, class Tracer, class Strategy>
 class trainer {
  public:
   static constexpr int sh_degree = Traits::sh_degree;
+  static_assert(std::is_same_v<typename Tracer::response_type, typename Traits::response>,
+                "the tracer finds the hits of another response than the traits name");
 
   trainer(E& exec, train_options const& options, dataset const& data, gaussian_model const& start);
 
@@ -75,6 +77,11 @@ class trainer {
   void differentiate(Pass& pass, Loss&& loss, std::size_t view, render_options const& render, int degree);
   void update(dataset_view const& view, int degree);
   vec3 background_of(int step) const;
+  static mcmc_options mcmc_options_of(train_options const& options) {
+    mcmc_options m = options.mcmc;
+    m.kernel_degree = Traits::response::degree;
+    return m;
+  }
 
   E& exec_;
   train_options options_;
@@ -83,8 +90,8 @@ class trainer {
   optimizer_state<E> state_;
   frame_records<E> records_;
   Tracer tracer_;
-  backward<E, Strategy> backward_;
-  backward<E, fallback_strategy> fallback_;
+  backward<E, Strategy, tile_size_of<Tracer>> backward_;
+  backward<E, fallback_strategy, tile_size_of<Tracer>> fallback_;
   image_loss<E> loss_;
   training_images<E> images_;
   view_order order_;

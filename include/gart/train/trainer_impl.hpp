@@ -23,7 +23,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       loss_(exec),
       images_(data),
       order_(data.train.size(), options.seed),
-      mcmc_(exec, options.mcmc, options.max_gaussians, options.iterations, options.seed),
+      mcmc_(exec, mcmc_options_of(options), options.max_gaussians, options.iterations, options.seed),
       adc_(exec, options.adc, options.max_gaussians, options.iterations, data.extent, options.seed),
       color_(exec),
       color_gradient_(exec),
@@ -55,7 +55,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
   color_.resize(floats), color_gradient_.resize(floats);
 
-  records_.prepare(exec_, constant, view.view.position, render.alpha_min);
+  records_.template prepare<typename Traits::response>(exec_, constant, view.view.position, render.alpha_min);
   tracer_.prepare(exec_, constant, records_.view(), view.view, render.alpha_min, render.near);
   auto const prepare = [&](auto& pass, u64 budget) {
     return pass.prepare(exec_, tracer_, constant, view.view, render.alpha_min, render.near, budget);

@@ -1,0 +1,89 @@
+#pragma once
+// How the response of a Gaussian falls from its centre: the generalised Gaussians of 3DGRT (Moenne-Loccoz et al. 2024),
+//   rho = exp(s |p|^n),  s = -4.5 / 3^n,  n in {1, 2, 3, 4, 5, 8},
+// equal at the centre and at three standard deviations. n = 2 is the Gaussian, a larger n flatter inside and steeper
+// at the rim, so that fewer Gaussians cover a surface and rays meet fewer of them; n = 1 has a cusp at its centre.
+// Everything else that asks for a Response takes one of these types. A response offers, all of the squared distance
+// |p|^2:
+//   response(d2)   rho
+//   cutoff(ratio)  the largest |p|^2 with sigma rho >= alpha_min, ratio = sigma / alpha_min >= 1
+//   slope(d2)      -2 d ln rho / d |p|^2 = n (4.5 / 3^n) |p|^(n-2), what a hit's moments are weighted with
+//                  (math/hit_gradient.hpp); 1 for n = 2
+//   reciprocal(a)  1 / a, for the point of largest response
+// They decide hits: fixed arithmetic (math/arith.hpp), powers by multiplication and square roots. cutoff is within
+// 1e-6 of exact, relatively.
+//
+// The cusp of n = 1: towards the centre the gradient's norm goes to a limit, its direction does not. At |p| = 0, where
+// no direction is given, slope is 0 and with it the gradient of mean, scale and rotation: the mean over all directions.
+
+#include <gart/math/arith.hpp>
+
+namespace gart {
+
+template <int Degree = 2>
+struct generalized_gaussian {
+  static_assert(Degree == 1 || Degree == 2 || Degree == 3 || Degree == 4 || Degree == 5 || Degree == 8,
+                "generalised Gaussians have degree 1, 2, 3, 4, 5 or 8");
+  static constexpr int degree = Degree;
+
+  GART_HD GART_INLINE static float response(float d2) { return exponential(mul(-scale, power(d2))); }
+
+  GART_HD GART_INLINE static float cutoff(float ratio) {
+    float const level = mul(inverse_scale, logarithm(ratio));  // |p|^n
+    if constexpr (Degree == 1)
+      return mul(level, level);
+    else if constexpr (Degree == 2)
+      return level;
+    else if constexpr (Degree == 4)
+      return square_root(level);
+    else if constexpr (Degree == 8)
+      return square_root(square_root(level));
+    else
+      return level < 1e-30f ? 0.0f : exponential(mul(2.0f / Degree, logarithm(level)));
+  }
+
+  GART_HD GART_INLINE static float slope(float d2) {
+    constexpr float factor = Degree * scale;
+    if constexpr (Degree == 1)
+      return d2 > 0 ? factor / square_root(d2) : 0.0f;
+    else if constexpr (Degree == 2)
+      return 1.0f;
+    else if constexpr (Degree == 3)
+      return factor * square_root(d2);
+    else if constexpr (Degree == 4)
+      return factor * d2;
+    else if constexpr (Degree == 5)
+      return factor * d2 * square_root(d2);
+    else
+      return factor * d2 * d2 * d2;
+  }
+
+  GART_HD GART_INLINE static float reciprocal(float a) { return gart::reciprocal(a); }
+
+ private:
+  static constexpr double exact_scale = [] {
+    double s = 4.5;
+    for (int k = 0; k < Degree; ++k) s /= 3;
+    return s;
+  }();
+  static constexpr float scale = static_cast<float>(exact_scale);  // -s
+  static constexpr float inverse_scale = static_cast<float>(1 / exact_scale);
+
+  // |p|^n
+  GART_HD GART_INLINE static float power(float d2) {
+    if constexpr (Degree == 1)
+      return square_root(d2);
+    else if constexpr (Degree == 2)
+      return d2;
+    else if constexpr (Degree == 3)
+      return mul(d2, square_root(d2));
+    else if constexpr (Degree == 4)
+      return mul(d2, d2);
+    else if constexpr (Degree == 5)
+      return mul(mul(d2, d2), square_root(d2));
+    else
+      return mul(mul(d2, d2), mul(d2, d2));
+  }
+};
+
+}  // namespace gart
