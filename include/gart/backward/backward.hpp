@@ -9,7 +9,7 @@
 // Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, 36 bytes a Gaussian, 8
 // a (primitive, tile) pair and the LT buffer: 4 or 16 bytes for each pixel of each box.
 
-#include <gart/backward/gather.hpp>
+#include <gart/backward/packet_gather.hpp>
 #include <gart/backward/scatter.hpp>
 #include <gart/backward/strategies.hpp>
 #include <gart/render/forward.hpp>
@@ -83,8 +83,13 @@ class backward {
         prints_ = &own_prints_;
       }
       if (byte_budget && prints_->slots() * sizeof(entry) > byte_budget) return false;
-      // Sorted by cover also where the tracer has lists sorted by depth: lanes in step are worth the sort.
-      map_.build(exec, grid_, *prints_, tile_order::cover);
+      // On a device sorted by cover also where the tracer has lists sorted by depth: lanes in step are worth the sort.
+      if constexpr (!E::device && requires { tracer.map(); }) {
+        lists_ = tracer.map();
+      } else {
+        map_.build(exec, grid_, *prints_, tile_order::cover);
+        lists_ = map_.view();
+      }
       slots_.resize(prints_->slots());
       near_ = near;
       if constexpr (validity == slot_validity::recomputed) {
@@ -126,12 +131,17 @@ class backward {
     if constexpr (!ordered) gradients.sh.zero();
     if constexpr (records) {
       if constexpr (ordered) rows_.resize(prints_->pairs() * pair_row<ShDegree>::quads);
-      // Colour and geometry in a launch each: together their sums and coefficients leave too few registers for enough
-      // warps to hide memory behind.
-      gather_terms<ShDegree, response, only<gart::color>>(exec, scene, gaussians_in_frame, view, active_degree, color,
-                                                color_gradient, gradients);
-      gather_terms<ShDegree, response, only<geometry>>(exec, scene, gaussians_in_frame, view, active_degree, color,
-                                             color_gradient, gradients);
+      if constexpr (E::device) {
+        // Colour and geometry in a launch each: together their sums and coefficients leave too few registers for enough
+        // warps to hide memory behind.
+        gather_terms<ShDegree, response, only<gart::color>>(exec, scene, gaussians_in_frame, view, active_degree, color,
+                                                            color_gradient, gradients);
+        gather_terms<ShDegree, response, only<geometry>>(exec, scene, gaussians_in_frame, view, active_degree, color,
+                                                         color_gradient, gradients);
+      } else {
+        gather_terms<ShDegree, response, typename Strategy::gather>(exec, scene, gaussians_in_frame, view, active_degree,
+                                                                    color, color_gradient, gradients);
+      }
       if constexpr (ordered)
         parallel_for(
             exec, "backward/sum", scene.count * pair_row<ShDegree>::quads,
@@ -177,24 +187,33 @@ class backward {
                     gaussians<E>& gradients) {
     if constexpr (Terms::any) {
       constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
-      gather_kernel<ShDegree, Response, Terms, entry, TileSize, sums, validity, E> const kernel{view,
-                                                                                      grid_,
-                                                                                      map_.view(),
-                                                                                      prints_->ranges().data(),
-                                                                                      slots_.data(),
-                                                                                      gaussians_in_frame.data(),
-                                                                                      scene.sh,
-                                                                                      active_degree,
-                                                                                      image.data(),
-                                                                                      image_gradient.data(),
-                                                                                      gradients.sh.data(),
-                                                                                      moments_.data(),
-                                                                                      prints_->pair_offsets().data(),
-                                                                                      rows_.data(),
-                                                                                      last_.data(),
-                                                                                      near_};
-      parallel_for(exec, Terms::color ? "backward/gather colour" : "backward/gather geometry",
-                   tile_range{grid_.count(), 64}, kernel);
+      using kernel_type = gather_kernel<ShDegree, Response, Terms, entry, TileSize, sums, validity, E>;
+      kernel_type const kernel{view,
+                               grid_,
+                               lists_,
+                               prints_->ranges().data(),
+                               slots_.data(),
+                               gaussians_in_frame.data(),
+                               scene.sh,
+                               active_degree,
+                               image.data(),
+                               image_gradient.data(),
+                               gradients.sh.data(),
+                               moments_.data(),
+                               prints_->pair_offsets().data(),
+                               rows_.data(),
+                               last_.data(),
+                               near_};
+      char const* const label = !Terms::geometry ? "backward/gather colour"
+                                : !Terms::color  ? "backward/gather geometry"
+                                                 : "backward/gather";
+#if !defined(__CUDACC__)
+      if constexpr (!E::device) {
+        parallel_for(exec, label, tile_range{grid_.count(), 1}, packet_gather<kernel_type>{kernel});
+        return;
+      }
+#endif
+      parallel_for(exec, label, tile_range{grid_.count(), 64}, kernel);
     }
   }
 
@@ -203,6 +222,7 @@ class backward {
   footprints<E, TileSize> const* prints_ = nullptr;
   tile_grid<TileSize> grid_;
   tile_map<E, TileSize> map_;
+  tile_map_view lists_;
   buffer<entry, E> slots_;
   buffer<quad, E> rows_;
   buffer<last_hit, E> last_;

@@ -81,6 +81,20 @@ struct gather_kernel {
     team.barrier();
   }
 
+  // What a primitive's walk of a tile has summed goes to the Gaussian, or to its row.
+  GART_HD GART_INLINE void finish(pixel_box const& box, pixel_box const& area, u32 id, float const (&sh_sum)[sh_stride],
+                                  float const (&moment_sum)[moment_stride]) const {
+    if constexpr (Sums == gather_sums::atomic) {
+      if constexpr (Terms::color)
+        E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id, sh_sum,
+                          3 * sh_coefficients(active_degree));
+      if constexpr (Terms::geometry)
+        E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, moment_sum, moment_count);
+    } else {
+      store_row(box, area, id, sh_sum, moment_sum);
+    }
+  }
+
  private:
   GART_HD void load_pixel(pixel_data& out, pixel_box const& area, index_t p) const {
     pixel const at{static_cast<int>(area.x0 + p % area.width()), static_cast<int>(area.y0 + p / area.width())};
@@ -128,15 +142,7 @@ struct gather_kernel {
       }
       add(at, entry, data, sh_sum, moment_sum);
     }
-    if constexpr (Sums == gather_sums::atomic) {
-      if constexpr (Terms::color)
-        E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id, sh_sum,
-                          3 * sh_coefficients(active_degree));
-      if constexpr (Terms::geometry)
-        E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, moment_sum, moment_count);
-    } else {
-      store_row(range.box, area, id, sh_sum, moment_sum);
-    }
+    finish(range.box, area, id, sh_sum, moment_sum);
   }
 
   // What a lane keeps of its Gaussian: colour alone needs nothing but the slots.

@@ -87,24 +87,34 @@ GART_HD GART_INLINE u32 float_to_bits(float f) {
 // By the exponent bits, so that no fast-math switch can remove it.
 GART_HD GART_INLINE bool is_finite(float f) { return (float_to_bits(f) & 0x7f800000u) != 0x7f800000u; }
 
-// exp(x) for x in [-87, 88]: Cody-Waite reduction and a polynomial of degree 6, the same operations on every policy.
-// Below -87 it is 0. Relative error under 2 ulp (tests/math.cpp).
-GART_HD GART_INLINE float exponential(float x) {
-  float const shift = 12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer in the low mantissa bits
-  float const biased = fma(x, 1.44269504f, shift);
-  float const n = add(biased, -shift);
-  float r = fma(n, -0.693359375f, x);
-  r = fma(n, 2.12194440e-4f, r);
-  float p = 1.9875691500e-4f;
-  p = fma(p, r, 1.3981999507e-3f);
-  p = fma(p, r, 8.3334519073e-3f);
-  p = fma(p, r, 4.1665795894e-2f);
-  p = fma(p, r, 1.6666665459e-1f);
-  p = fma(p, r, 5.0000001201e-1f);
-  p = add(fma(mul(r, r), p, r), 1.0f);
-  float const scale = bits_to_float((float_to_bits(biased) + 127u) << 23);
-  return x < -87.0f ? 0.0f : mul(p, scale);
+// For formulas over floats and over lanes of them (math/lanes.hpp).
+GART_HD GART_INLINE bool both(bool a, bool b) { return a && b; }
+GART_HD GART_INLINE float select(bool which, float a, float b) { return which ? a : b; }
+
+// x 2^n, where `biased` is n + 1.5 * 2^23.
+GART_HD GART_INLINE float scale_by_power(float x, float biased) {
+  return mul(x, bits_to_float((float_to_bits(biased) + 127u) << 23));
 }
+
+// exp(x) for x in [-87, 88]: Cody-Waite reduction and a polynomial of degree 6, the same operations on every policy.
+// Below -87 it is 0. Relative error under 2 ulp (tests/math).
+template <class F>
+GART_HD GART_INLINE F exponential_of(F x) {
+  F const shift = 12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer in the low mantissa bits
+  F const biased = fma(x, F(1.44269504f), shift);
+  F const n = add(biased, -shift);
+  F r = fma(n, F(-0.693359375f), x);
+  r = fma(n, F(2.12194440e-4f), r);
+  F p = 1.9875691500e-4f;
+  p = fma(p, r, F(1.3981999507e-3f));
+  p = fma(p, r, F(8.3334519073e-3f));
+  p = fma(p, r, F(4.1665795894e-2f));
+  p = fma(p, r, F(1.6666665459e-1f));
+  p = fma(p, r, F(5.0000001201e-1f));
+  p = add(fma(mul(r, r), p, r), F(1.0f));
+  return select(x < F(-87.0f), F(0.0f), scale_by_power(p, biased));
+}
+GART_HD GART_INLINE float exponential(float x) { return exponential_of(x); }
 
 // ln(x) for positive normal x: mantissa in [sqrt(1/2), sqrt(2)) and a polynomial, the same operations on every policy.
 // Relative error under 2 ulp away from 1 (tests/math).

@@ -17,6 +17,8 @@ namespace gart {
 using vec2 = glm::vec2;
 using vec3 = glm::vec3;
 using vec4 = glm::vec4;
+template <class F>
+using vec3_of = glm::vec<3, F, glm::defaultp>;
 using vec3d = glm::dvec3;
 using mat3 = glm::mat3;  // m[column][row]
 using mat3d = glm::dmat3;

@@ -20,13 +20,16 @@ namespace gart {
 inline constexpr int moment_count = 10;
 inline constexpr int moment_stride = 12;
 
-struct moments {
-  float v[moment_stride];
+template <class F>
+struct moments_of {
+  F v[moment_stride];
 };
+using moments = moments_of<float>;
 
 // dL/dalpha of a hit: T before it, its colour.g, and what lies behind it.g.
-GART_HD GART_INLINE float alpha_gradient(float transmittance, float color_g, float behind_g, float alpha) {
-  return transmittance * color_g - behind_g / (1.0f - alpha);
+template <class F>
+GART_HD GART_INLINE F alpha_gradient(F transmittance, F color_g, F behind_g, F alpha) {
+  return transmittance * color_g - behind_g / (F(1.0f) - alpha);
 }
 
 // The front-to-back walk of a ray's gradient: what a hit's derivative needs of the hits before and behind it.
@@ -46,13 +49,13 @@ struct ray_gradient {
   }
 };
 
-template <class Response = generalized_gaussian<>>
-GART_HD GART_INLINE moments hit_moments(ray_gaussian const& gaussian, response const& r, float alpha_gradient) {
-  float const raw = unclamped_alpha<Response>(gaussian, r);
-  float const a = raw < alpha_max ? raw * alpha_gradient : 0.0f;
-  float const b = a * Response::slope(r.d2);
-  vec3 const p = orthogonal_offset(r), bp = b * p;
-  return {{a, bp.x, bp.y, bp.z, bp.x * p.x, bp.y * p.y, bp.z * p.z, bp.y * p.z, bp.x * p.z, bp.x * p.y, 0, 0}};
+template <class Response = generalized_gaussian<>, class F>
+GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, response_of<F> const& r, F alpha_gradient) {
+  F const raw = unclamped_alpha<Response>(gaussian, r);
+  F const a = select(raw < F(alpha_max), raw * alpha_gradient, F(0.0f));
+  F const b = a * Response::slope(r.d2);
+  vec3_of<F> const p = orthogonal_offset(r), bp = {b * p.x, b * p.y, b * p.z};
+  return {{a, bp.x, bp.y, bp.z, bp.x * p.x, bp.y * p.y, bp.z * p.z, bp.y * p.z, bp.x * p.z, bp.x * p.y, 0.0f, 0.0f}};
 }
 
 struct geometry_gradient {

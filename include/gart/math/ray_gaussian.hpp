@@ -15,14 +15,18 @@
 #include <gart/math/quaternion.hpp>
 #include <gart/math/response.hpp>
 
+#include <type_traits>
+
 namespace gart {
 
 inline constexpr float alpha_max = 0.99f;
 
 // From the frame's origin: what a camera casts.
-struct primary_ray {
-  vec3 direction;  // unit
+template <class F>
+struct primary_ray_of {
+  vec3_of<F> direction;  // unit
 };
+using primary_ray = primary_ray_of<float>;
 
 // From anywhere; `origin` relative to the frame.
 struct ray {
@@ -100,30 +104,37 @@ GART_HD GART_INLINE ray_gaussian prepare(gaussian_parameters const& g, vec3d con
   return out;
 }
 
-struct response {
-  float t;        // distance of the largest response along the ray
-  float d2;       // |p|^2 there
-  vec3 p;         // offset from the centre, in standard deviations along the Gaussian's axes
-  vec3 d;         // d_g
-  float inverse;  // 1 / |d_g|^2
+// Of one ray, or of one a lane.
+template <class F>
+struct response_of {
+  F t;           // distance of the largest response along the ray
+  F d2;          // |p|^2 there
+  vec3_of<F> p;  // offset from the centre, in standard deviations along the Gaussian's axes
+  vec3_of<F> d;  // d_g
+  F inverse;     // 1 / |d_g|^2
 };
+using response = response_of<float>;
 
-GART_HD GART_INLINE float gaussian_origin(ray_gaussian::row const& m, primary_ray const&) { return m.o; }
+template <class F>
+GART_HD GART_INLINE F gaussian_origin(ray_gaussian::row const& m, primary_ray_of<F> const&) {
+  return m.o;
+}
 GART_HD GART_INLINE float gaussian_origin(ray_gaussian::row const& m, ray const& r) {
   return fma(m.x, r.origin.x, fma(m.y, r.origin.y, fma(m.z, r.origin.z, m.o)));
 }
 
 template <class Response = generalized_gaussian<>, class Ray>
-GART_HD GART_INLINE response evaluate(ray_gaussian const& g, Ray const& r) {
-  vec3 o, d;
+GART_HD GART_INLINE auto evaluate(ray_gaussian const& g, Ray const& r) {
+  using F = std::remove_cvref_t<decltype(r.direction.x)>;
+  vec3_of<F> o, d;
   GART_UNROLL
   for (int k = 0; k < 3; ++k) {
     o[k] = gaussian_origin(g.m[k], r);
-    d[k] = fma(g.m[k].x, r.direction.x, fma(g.m[k].y, r.direction.y, mul(g.m[k].z, r.direction.z)));
+    d[k] = fma(F(g.m[k].x), r.direction.x, fma(F(g.m[k].y), r.direction.y, mul(F(g.m[k].z), r.direction.z)));
   }
-  float const od = fma(o.x, d.x, fma(o.y, d.y, mul(o.z, d.z)));
-  float const dd = fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)));
-  response out;
+  F const od = fma(o.x, d.x, fma(o.y, d.y, mul(o.z, d.z)));
+  F const dd = fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)));
+  response_of<F> out;
   out.d = d;
   out.inverse = Response::reciprocal(dd);
   out.t = mul(-od, out.inverse);
@@ -134,25 +145,27 @@ GART_HD GART_INLINE response evaluate(ray_gaussian const& g, Ray const& r) {
 
 // p is orthogonal to d_g, but the rounding of t leaves a part along it. It does not show in d2, where it enters
 // squared; in the gradients of mean and rotation the thin axis of a pancake magnifies it. One step takes it out.
-GART_HD GART_INLINE vec3 orthogonal_offset(response const& r) {
-  float const along = -(r.p.x * r.d.x + r.p.y * r.d.y + r.p.z * r.d.z) * r.inverse;
-  return r.p + along * r.d;
+template <class F>
+GART_HD GART_INLINE vec3_of<F> orthogonal_offset(response_of<F> const& r) {
+  F const along = -(r.p.x * r.d.x + r.p.y * r.d.y + r.p.z * r.d.z) * r.inverse;
+  return {r.p.x + along * r.d.x, r.p.y + along * r.d.y, r.p.z + along * r.d.z};
 }
 
 // NaN compares false: what cannot be evaluated is no hit.
-GART_HD GART_INLINE bool is_hit(ray_gaussian const& g, response const& r, float near) {
-  return r.d2 <= g.cutoff && r.t > near;
+template <class F>
+GART_HD GART_INLINE auto is_hit(ray_gaussian const& g, response_of<F> const& r, float near) {
+  return both(r.d2 <= F(g.cutoff), r.t > F(near));
 }
 
-template <class Response = generalized_gaussian<>>
-GART_HD GART_INLINE float unclamped_alpha(ray_gaussian const& g, response const& r) {
-  return mul(g.sigma, Response::response(r.d2));
+template <class Response = generalized_gaussian<>, class F>
+GART_HD GART_INLINE F unclamped_alpha(ray_gaussian const& g, response_of<F> const& r) {
+  return mul(F(g.sigma), Response::response(r.d2));
 }
 
-template <class Response = generalized_gaussian<>>
-GART_HD GART_INLINE float hit_alpha(ray_gaussian const& g, response const& r) {
-  float const a = unclamped_alpha<Response>(g, r);
-  return a < alpha_max ? a : alpha_max;
+template <class Response = generalized_gaussian<>, class F>
+GART_HD GART_INLINE F hit_alpha(ray_gaussian const& g, response_of<F> const& r) {
+  F const a = unclamped_alpha<Response>(g, r);
+  return select(a < F(alpha_max), a, F(alpha_max));
 }
 
 }  // namespace gart

@@ -10,13 +10,14 @@
 //   slope(d2)      -2 d ln rho / d |p|^2 = n (4.5 / 3^n) |p|^(n-2), what a hit's moments are weighted with
 //                  (math/hit_gradient.hpp); 1 for n = 2
 //   reciprocal(a)  1 / a, for the point of largest response
-// They decide hits: fixed arithmetic (math/arith.hpp), powers by multiplication and square roots. cutoff is within
+// All but cutoff take a float or lanes of them. They decide hits: fixed arithmetic (math/arith.hpp), powers by multiplication and square roots. cutoff is within
 // 1e-6 of exact, relatively.
 //
 // The cusp of n = 1: towards the centre the gradient's norm goes to a limit, its direction does not. At |p| = 0, where
 // no direction is given, slope is 0 and with it the gradient of mean, scale and rotation: the mean over all directions.
 
 #include <gart/math/arith.hpp>
+#include <gart/math/lanes.hpp>
 
 namespace gart {
 
@@ -26,7 +27,10 @@ struct generalized_gaussian {
                 "generalised Gaussians have degree 1, 2, 3, 4, 5 or 8");
   static constexpr int degree = Degree;
 
-  GART_HD GART_INLINE static float response(float d2) { return exponential(mul(-scale, power(d2))); }
+  template <class F>
+  GART_HD GART_INLINE static F response(F d2) {
+    return exponential(mul(F(-scale), power(d2)));
+  }
 
   GART_HD GART_INLINE static float cutoff(float ratio) {
     float const level = mul(inverse_scale, logarithm(ratio));  // |p|^n
@@ -42,12 +46,13 @@ struct generalized_gaussian {
       return level < 1e-30f ? 0.0f : exponential(mul(2.0f / Degree, logarithm(level)));
   }
 
-  GART_HD GART_INLINE static float slope(float d2) {
-    constexpr float factor = Degree * scale;
+  template <class F>
+  GART_HD GART_INLINE static F slope(F d2) {
+    F const factor = Degree * scale;
     if constexpr (Degree == 1)
-      return d2 > 0 ? factor / square_root(d2) : 0.0f;
+      return select(d2 > F(0.0f), factor / square_root(d2), F(0.0f));
     else if constexpr (Degree == 2)
-      return 1.0f;
+      return F(1.0f);
     else if constexpr (Degree == 3)
       return factor * square_root(d2);
     else if constexpr (Degree == 4)
@@ -58,7 +63,10 @@ struct generalized_gaussian {
       return factor * d2 * d2 * d2;
   }
 
-  GART_HD GART_INLINE static float reciprocal(float a) { return gart::reciprocal(a); }
+  template <class F>
+  GART_HD GART_INLINE static F reciprocal(F a) {
+    return gart::reciprocal(a);
+  }
 
  private:
   static constexpr double exact_scale = [] {
@@ -70,7 +78,8 @@ struct generalized_gaussian {
   static constexpr float inverse_scale = static_cast<float>(1 / exact_scale);
 
   // |p|^n
-  GART_HD GART_INLINE static float power(float d2) {
+  template <class F>
+  GART_HD GART_INLINE static F power(F d2) {
     if constexpr (Degree == 1)
       return square_root(d2);
     else if constexpr (Degree == 2)

@@ -4,24 +4,26 @@
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
+#include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
 
 namespace gart {
 
-template <int Degree>
+// Of one direction, or of one a lane.
+template <int Degree, class F = float>
 struct sh_basis {
   static constexpr int size = (Degree + 1) * (Degree + 1);
-  float y[size];
+  F y[size];
 
   sh_basis() = default;
-  GART_HD GART_INLINE explicit sh_basis(vec3 d) {
+  GART_HD GART_INLINE explicit sh_basis(vec3_of<F> const& d) {
     y[0] = 0.28209479177387814f;
     if constexpr (Degree >= 1) {
       y[1] = -0.4886025119029199f * d.y;
       y[2] = 0.4886025119029199f * d.z;
       y[3] = -0.4886025119029199f * d.x;
     }
-    float const xx = d.x * d.x, yy = d.y * d.y, zz = d.z * d.z;
+    F const xx = d.x * d.x, yy = d.y * d.y, zz = d.z * d.z;
     if constexpr (Degree >= 2) {
       y[4] = 1.0925484305920792f * d.x * d.y;
       y[5] = -1.0925484305920792f * d.y * d.z;
@@ -41,15 +43,15 @@ struct sh_basis {
   }
 
   // Before the clamp at zero.
-  GART_HD GART_INLINE vec3 unclamped(float const (&coefficients)[3 * size]) const {
-    vec3 c(0.5f);
+  GART_HD GART_INLINE vec3_of<F> unclamped(float const (&coefficients)[3 * size]) const {
+    F r = 0.5f, g = 0.5f, b = 0.5f;
     GART_UNROLL
     for (int k = 0; k < size; ++k) {
-      c.x += y[k] * coefficients[3 * k];
-      c.y += y[k] * coefficients[3 * k + 1];
-      c.z += y[k] * coefficients[3 * k + 2];
+      r += y[k] * F(coefficients[3 * k]);
+      g += y[k] * F(coefficients[3 * k + 1]);
+      b += y[k] * F(coefficients[3 * k + 2]);
     }
-    return c;
+    return {r, g, b};
   }
 };
 
@@ -78,8 +80,10 @@ struct sh_row {
 };
 
 // The colour a hit shows.
-GART_HD GART_INLINE vec3 clamped_color(vec3 c) {
-  return {c.x > 0 ? c.x : 0.0f, c.y > 0 ? c.y : 0.0f, c.z > 0 ? c.z : 0.0f};
+template <class F>
+GART_HD GART_INLINE vec3_of<F> clamped_color(vec3_of<F> const& c) {
+  F const zero = 0.0f;
+  return {select(c.x > zero, c.x, zero), select(c.y > zero, c.y, zero), select(c.z > zero, c.z, zero)};
 }
 
 }  // namespace gart

@@ -27,6 +27,16 @@ struct image_targets {
   last_hit* last = nullptr;        // the hit that the ray ended with
 };
 
+// Adds a hit of colour c to a ray, or to one a lane; returns its weight T alpha.
+template <class F>
+GART_HD GART_INLINE F blend(F alpha, F t, vec3_of<F> const& c, vec3_of<F>& color, F& depth, F& transmittance) {
+  F const weight = transmittance * alpha;
+  color.x += weight * c.x, color.y += weight * c.y, color.z += weight * c.z;
+  depth += weight * t;
+  transmittance *= F(1.0f) - alpha;
+  return weight;
+}
+
 template <int ShDegree, class Record>
 struct composite {
   using ray_type = primary_ray;
@@ -62,12 +72,8 @@ struct composite {
   GART_HD GART_INLINE bool on_hit(state& s, hit const& h) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
     vec3 const unclamped = s.basis.unclamped(sh_row<ShDegree>(sh + stride * h.id, active_degree).v);
-    vec3 const c = clamped_color(unclamped);
-    float const weight = s.transmittance * h.alpha;
-    s.color += weight * c;
-    s.depth += weight * h.t;
+    float const weight = blend(h.alpha, h.t, clamped_color(unclamped), s.color, s.depth, s.transmittance);
     record(s.at, h, s.color, weight, unclamped);
-    s.transmittance *= 1.0f - h.alpha;
     ++s.hits;
     s.last = {h.t, h.id};
     return s.transmittance >= options.transmittance_min && s.hits != options.max_hits;

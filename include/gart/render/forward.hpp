@@ -8,7 +8,7 @@
 //   forward<3>(exec, tracer, scene, view, options, 3, targets, record_none{});
 
 #include <gart/exec/stage.hpp>
-#include <gart/render/composite.hpp>
+#include <gart/render/packet_composite.hpp>
 #include <gart/scene/parameters.hpp>
 #include <gart/trace/ray_program.hpp>
 

@@ -26,6 +26,11 @@ struct pixel_order {
     return {static_cast<int>(block % columns * block_width + lane % block_width),
             static_cast<int>(block / columns * block_height + lane / block_width)};
   }
+  GART_HD index_t index(pixel p) const {
+    index_t const x = static_cast<index_t>(p.x), y = static_cast<index_t>(p.y);
+    index_t const block = y / block_height * static_cast<index_t>(blocks_x()) + x / block_width;
+    return block * (block_width * block_height) + y % block_height * block_width + x % block_width;
+  }
   GART_HD bool inside(pixel p) const { return p.x < width && p.y < height; }
   GART_HD std::size_t address(pixel p) const { return static_cast<std::size_t>(p.y) * width + p.x; }
 };

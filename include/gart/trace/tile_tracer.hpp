@@ -11,6 +11,7 @@
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/tiles/tile_map.hpp>
+#include <gart/trace/packet_walk.hpp>
 #include <gart/trace/pending_hits.hpp>
 #include <gart/trace/ray_program.hpp>
 
@@ -96,6 +97,39 @@ struct walk_tiles {
   }
 };
 
+#if !defined(__CUDACC__)
+// On a host, programs with packets: a tile's packets one after another; rays of a packet that runs over one by one.
+template <class Response, int Window, int Size, ray_program P>
+struct walk_tile_packets {
+  using packets = decltype(packets_of(std::declval<P const&>()));
+  using scratch = packet_walk<Response, Size, packets>;
+  walk_tiles<Response, Window, Size, P> rays;
+  lt_range const* ranges;
+
+  template <class Team>
+  void operator()(Team const& team) const {
+    pixel_box const tile = rays.grid.tile(team.tile());
+    packets const program = packets_of(rays.program);
+    for (int y = tile.y0; y < tile.y1; y += packet_block::height)
+      for (int x = tile.x0; x < tile.x1; x += packet_block::width)
+        if (!team.scratch()(program, rays.scene, rays.map, ranges, rays.depths, rays.forward, tile, team.tile(), {x, y}))
+          one_by_one({x, y});
+  }
+
+ private:
+  void one_by_one(packet_block const& block) const {
+    auto const& order = rays.program.order;
+    for (int l = 0; l < lane_count; ++l) {
+      auto const at = packets::pixel_of(block, l);
+      if (order.inside(at)) rays(order.index(at));
+    }
+  }
+};
+
+template <class P>
+concept has_packets = requires(P const& p) { packets_of(p); };
+#endif
+
 }  // namespace trace_kernels
 
 // Size: side of a tile. Window: hits a ray keeps at most, a power of two; a smaller one is walked again more often.
@@ -120,12 +154,20 @@ class tile_tracer {
 
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
-    parallel_for(exec, label, rays,
-                 trace_kernels::walk_tiles<Response, Window, Size, P>{grid_, map_.view(), prints_.depths().data(),
-                                                                      scene_, forward_, program});
+    trace_kernels::walk_tiles<Response, Window, Size, P> const walk{
+        grid_, map_.view(), prints_.depths().data(), scene_, forward_, program};
+#if !defined(__CUDACC__)
+    if constexpr (!E::device && trace_kernels::has_packets<P>) {
+      parallel_for(exec, label, tile_range{grid_.count(), 1},
+                   trace_kernels::walk_tile_packets<Response, Window, Size, P>{walk, prints_.ranges().data()});
+      return;
+    }
+#endif
+    parallel_for(exec, label, rays, walk);
   }
 
   footprints<E, Size> const& prints() const { return prints_; }
+  tile_map_view map() const { return map_.view(); }
 
  private:
   tile_grid<Size> grid_;
