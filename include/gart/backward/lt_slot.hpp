@@ -6,7 +6,7 @@
 //   float4   16 bytes  L, whose free sign bits hold the clamps; w
 //   half      8 bytes  the same in four halves: L within 2^-11 relatively (2^-25 absolutely), at most 65504; 2^15 w, so
 //                      that a weight keeps its 2^-11 down to 2e-9
-//   shared    8 bytes  L with 9 bits a channel and one exponent: within 2^-9 of its largest channel, at most 65408; w, whose
+//   shared    8 bytes  L with 9 bits a channel and one exponent: within 0.002 of its largest channel, at most 65408; w, whose
 //                      three lowest bits hold the clamps (a relative error of 2^-20)
 //   weight    4 bytes  w as in shared; no L: enough for the gradient of colour (hybrid)
 //
