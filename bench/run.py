@@ -3,13 +3,15 @@
 
     python3 bench/run.py --build DIR --scenes DIR --what tests,stages,paper
 
-What (comma-separated; default all but sanitize and cpu):
+What (comma-separated; default all but sanitize, cpu and traits):
   tests       every CUDA test of the build
   sanitize    compute-sanitizer memcheck and racecheck over a training step of each strategy
   stages      gart_bench_cuda on the first scene: each stage on its own, and tile sizes 4, 8 and 16
   cpu         gart_bench: the same stages on the host policies, on a small scene; a minute or two
   strategies  `gart bench`: a training step by strategy and tracer, on the first two scenes
   memory      `gart bench`: LT and peak memory against the number of Gaussians, at two resolutions
+  traits      `gart bench`: a training step by row (docs/traits.md): SH and kernel degree, arithmetic, LT format, tile,
+              window, determinism; on --backend, and bytes a Gaussian. Needs -DGART_VARIANTS=ON
   paper       strategies, memory and stages
 
 Scenes are DIR/NAME.ply with DIR/NAME.json, a list of cameras {"name","width","height","fx","fy","cx","cy","c2w"}.
@@ -21,6 +23,7 @@ Each result is a file OUT/WHAT.json: machine, commit, date, command, and `runs`.
 Exit code: 0, or 1 when a test or a measurement failed; what failed is in the file and on the standard error.
 """
 import argparse
+import array
 import datetime
 import glob
 import json
@@ -33,8 +36,17 @@ import sys
 import tempfile
 import time
 
-PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory")
+PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits")
 SKIPPED = 77
+
+# Rows of docs/traits.md: name, SH degree, kernel degree, options of gart bench.
+TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
+              [(f"kernel degree {n}", 3, n, {}) for n in (1, 3, 4, 5, 8)] +
+              [("fast arithmetic", 3, 2, {"arithmetic": "fast"}),
+               ("LT half", 3, 2, {"lt-format": "half"}), ("LT shared", 3, 2, {"lt-format": "shared"}),
+               ("hybrid", 3, 2, {"backward": "hybrid"}), ("deterministic", 3, 2, {"backward": "deterministic"}),
+               ("tiles of 4", 3, 2, {"tile-size": 4}), ("tiles of 16", 3, 2, {"tile-size": 16}),
+               ("window 16", 3, 2, {"window": 16}), ("window 64", 3, 2, {"window": 64})])
 
 
 class Failure(Exception):
@@ -149,13 +161,14 @@ class Bench:
             json.dump(entries, f)
         return path
 
-    def gart_bench(self, ply, cameras, tracer, backward, views, warmups, repeats):
+    def gart_bench(self, ply, cameras, tracer, backward, views, warmups, repeats, backend="cuda", **more):
         """The JSON of `gart bench`, or {"error": ...} for a row that fails."""
         path = os.path.join(self.temporary, "bench.json")
         if os.path.exists(path):
             os.remove(path)
-        command = [self.program("gart"), "bench", ply, cameras, "--backend", "cuda", "--tracer", tracer, "--backward",
+        command = [self.program("gart"), "bench", ply, cameras, "--backend", backend, "--tracer", tracer, "--backward",
                    backward, "--views", views, "--warmups", warmups, "--repeats", repeats, "--json", path, "--quiet"]
+        command += [text for name, value in more.items() for text in (f"--{name}", value)]
         done = run(command)
         if done.returncode != 0:
             self.fail(f"{backward}, {tracer}, {os.path.basename(ply)}: {last_line(done.stderr)}")
@@ -266,6 +279,52 @@ class Bench:
                                  f"{result['peak_bytes'] / 1e9:.2f} GB")
         self.write("memory", runs)
 
+    def with_degrees(self, ply, sh_degree, kernel_degree):
+        """The model with the bands above a degree left out, as one of a kernel degree."""
+        with open(ply, "rb") as f:
+            head = b""
+            while not head.endswith(b"end_header\n"):
+                head += f.readline()
+            lines = head.decode().splitlines()
+            names = [line.split()[2] for line in lines if line.startswith("property float")]
+            values = array.array("f", f.read())
+        rest = sum(name.startswith("f_rest_") for name in names) // 3
+        keep = (sh_degree + 1) ** 2 - 1
+        if keep > rest:
+            raise Failure(f"{ply}: of a smaller SH degree than {sh_degree}")
+        dropped = {f"f_rest_{channel * rest + k}" for channel in range(3) for k in range(keep, rest)}
+        at = [i for i, name in enumerate(names) if name not in dropped]
+        width = len(names)
+        out = array.array("f", bytes(4 * len(at) * (len(values) // width)))
+        for to, i in enumerate(at):
+            out[to::len(at)] = values[i::width]
+        f_rest = iter(range(3 * keep))
+        header = ["ply", "format binary_little_endian 1.0", f"comment gart kernel_degree {kernel_degree}",
+                  f"element vertex {len(values) // width}"]
+        header += ["property float " + (f"f_rest_{next(f_rest)}" if names[i].startswith("f_rest_") else names[i])
+                   for i in at] + ["end_header"]
+        path = os.path.join(self.temporary, "degrees.ply")
+        with open(path, "wb") as f:
+            f.write(("\n".join(header) + "\n").encode())
+            f.write(out.tobytes())
+        return path
+
+    def traits(self):
+        name, ply, cameras = self.scene(self.a.counts[0])
+        backend, runs = self.a.backend, []
+        for row, sh_degree, kernel_degree, options in TRAIT_ROWS:
+            more = {"backward": "primitive", **options}
+            result = self.gart_bench(self.with_degrees(ply, sh_degree, kernel_degree), cameras, "tiles",
+                                     more.pop("backward"), self.a.views, 5, self.a.repeats, backend, **more)
+            floats = 11 + 3 * (sh_degree + 1) ** 2
+            # Adam's two moments; a checkpoint holds parameters and moments; a splat file three normals of zero besides.
+            held = {"parameters": 4 * floats, "gradients": 4 * floats, "moments": 8 * floats, "checkpoint": 12 * floats,
+                    "ply": 4 * (floats + 3)}
+            runs.append({"scene": name, "row": row, "bytes_a_gaussian": held, **result})
+            if "error" not in result:
+                self.say(f"{row}: step {result['step_ms']:.2f} ms")
+        self.write("traits" if backend == "cuda" else "traits_" + backend, runs)
+
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -283,6 +342,7 @@ def arguments():
     parser.add_argument("--backwards", type=listed, default=["pixel", "hybrid", "primitive"])
     parser.add_argument("--views", type=int, default=4, help="cameras of the strategies")
     parser.add_argument("--repeats", type=int, default=20, help="measured steps a camera; the median counts")
+    parser.add_argument("--backend", default="cuda", help="of the traits")
     parser.add_argument("--filter", default=".", help="stages and cpu: benchmarks by regular expression")
     parser.add_argument("--min-time", type=float, default=0.2, help="stages and cpu: seconds a benchmark")
     parser.add_argument("--commit", help="what was built, where the folder is no git checkout")

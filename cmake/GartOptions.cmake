@@ -6,6 +6,8 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 
 option(GART_NATIVE "Compile the CPU code for this machine's processor; off: x86-64-v3 (AVX2, FMA)" ON)
 option(GART_BUILD_PROGRAM "Build the gart program" ${PROJECT_IS_TOP_LEVEL})
+option(GART_VARIANTS "Rows for the program to measure trades with: kernel degrees, fast arithmetic, tiles, windows"
+       ${GART_BUILD_PROGRAM})
 option(GART_BUILD_EXAMPLES "Build the examples" ${PROJECT_IS_TOP_LEVEL})
 option(GART_BUILD_TESTS "Build the tests (doctest, Eigen)" ${PROJECT_IS_TOP_LEVEL})
 option(GART_BUILD_BENCH "Build the benchmarks (Google Benchmark)" OFF)

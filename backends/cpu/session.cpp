@@ -4,6 +4,8 @@
 #include <gart/train/rows.hpp>
 
 #include <algorithm>
+#include <set>
+#include <utility>
 
 namespace gart {
 
@@ -16,14 +18,60 @@ std::vector<compiled_row>& rows() {
 
 bool matches(std::string const& wanted, std::string const& name) { return wanted == "auto" || wanted == name; }
 
+// The window of the row that "auto" takes.
+int usual_window(row_info const& row) {
+  compiled_row const* best = nullptr;
+  for (auto const& r : rows())
+    if (r.row.backend == row.backend && r.row.tracer == row.tracer && (!best || r.rank > best->rank)) best = &r;
+  return best->row.window;
+}
+
+// What a row has that the ordinary one has not.
+std::string peculiarities(row_info const& r) {
+  std::string out;
+  auto const add = [&out](std::string const& text) { out += ", " + text; };
+  if (r.kernel_degree != 2) add("kernel degree " + std::to_string(r.kernel_degree));
+  if (r.arithmetic != "exact") add(r.arithmetic + " arithmetic");
+  if (r.lt_format != "none" && r.lt_format != "weight" && r.lt_format != "float4") add("LT format " + r.lt_format);
+  if (r.tile_size != 8) add("tiles of " + std::to_string(r.tile_size));
+  if (r.window != usual_window(r)) add("window " + std::to_string(r.window));
+  return out;
+}
+
+// "openmp / tiles / primitive (SH 0 1 2 3)", rows of one kind together.
 std::string list_rows() {
-  std::vector<std::string> names;
+  std::vector<std::pair<std::string, std::set<int>>> kinds;
   for (auto const& r : rows()) {
-    std::string const name = r.row.backend + " / " + r.row.tracer + " / " + r.row.backward;
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    std::string const kind =
+        r.row.backend + " / " + r.row.tracer + " / " + r.row.backward + peculiarities(r.row);
+    auto const same = std::find_if(kinds.begin(), kinds.end(), [&](auto const& k) { return k.first == kind; });
+    (same == kinds.end() ? kinds.emplace_back(kind, std::set<int>{}) : *same).second.insert(r.row.sh_degree);
   }
   std::string out;
-  for (auto const& name : names) out += (out.empty() ? "" : ", ") + name;
+  for (auto const& [kind, degrees] : kinds) {
+    out += (out.empty() ? "" : "; ") + kind + " (SH";
+    for (int const d : degrees) out += " " + std::to_string(d);
+    out += ")";
+  }
+  return out;
+}
+
+bool matches(row_request const& wanted, row_info const& row) {
+  return matches(wanted.backend, row.backend) && matches(wanted.tracer, row.tracer) &&
+         matches(wanted.backward, row.backward) && wanted.sh_degree == row.sh_degree &&
+         wanted.kernel_degree == row.kernel_degree && wanted.arithmetic == row.arithmetic &&
+         matches(wanted.lt_format, row.lt_format) && (wanted.tile_size == 0 || wanted.tile_size == row.tile_size) &&
+         (wanted.window == 0 || wanted.window == row.window);
+}
+
+std::string as_text(row_request const& r) {
+  std::string out = "backend " + r.backend + ", tracer " + r.tracer + ", backward " + r.backward + ", SH degree " +
+                    std::to_string(r.sh_degree);
+  if (r.kernel_degree != 2) out += ", kernel degree " + std::to_string(r.kernel_degree);
+  if (r.arithmetic != "exact") out += ", " + r.arithmetic + " arithmetic";
+  if (r.lt_format != "auto") out += ", LT format " + r.lt_format;
+  if (r.tile_size != 0) out += ", tiles of " + std::to_string(r.tile_size);
+  if (r.window != 0) out += ", window " + std::to_string(r.window);
   return out;
 }
 
@@ -31,9 +79,7 @@ compiled_row const& find(row_request const& request) {
   compiled_row const* best = nullptr;
   std::string reason, unavailable;
   for (auto const& r : rows()) {
-    if (!matches(request.backend, r.row.backend) || !matches(request.tracer, r.row.tracer) ||
-        !matches(request.backward, r.row.backward) || request.sh_degree != r.row.sh_degree)
-      continue;
+    if (!matches(request, r.row)) continue;
     if (!r.available(&reason)) {
       unavailable = r.row.backend;
       continue;
@@ -43,9 +89,10 @@ compiled_row const& find(row_request const& request) {
   if (best) return *best;
   if (!unavailable.empty())
     throw unsupported("backend " + unavailable + ": " + reason + "; use --backend openmp, which needs no device");
-  throw unsupported("no compiled row for backend " + request.backend + ", tracer " + request.tracer + ", backward " +
-                    request.backward + ", SH degree " + std::to_string(request.sh_degree) +
-                    "; there are, with SH degrees 0 to 3 (backend / tracer / backward): " + list_rows());
+  throw unsupported("no compiled row for " + as_text(request) + "; there are (backend / tracer / backward): " +
+                    list_rows() +
+                    ". A program compiles rows of its own with GART_REGISTER_ROWS: gart/train/compiled_rows.hpp, shown "
+                    "by examples/5_own_row");
 }
 
 }  // namespace

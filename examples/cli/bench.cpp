@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 struct bench_arguments {
   fs::path model, cameras, json;
   row_options row;
-  std::string backward = "auto";
+  std::string backward = "auto", lt_format = "auto";
   int views = 4, warmups = 5, repeats = 20;
   bool quiet = false;
 };
@@ -54,9 +54,9 @@ int run_bench(bench_arguments const& a) {
   if (static_cast<int>(cameras.size()) > a.views) cameras.resize(static_cast<std::size_t>(a.views));
   if (!a.json.empty()) prepare_file(a.json);
 
-  auto request = a.row.request;
-  request.sh_degree = file.model.sh_degree;
-  request.backward = a.backward;
+  auto wanted = a.row.request;
+  wanted.backward = a.backward, wanted.lt_format = a.lt_format;
+  auto const request = row_request_for(file, a.model, wanted);
   gart::train_options options;
   options.densify = gart::densify_kind::none;
   options.iterations = 1;  // the full SH degree from the first step
@@ -104,6 +104,11 @@ int run_bench(bench_arguments const& a) {
                            {"tracer", row.tracer},
                            {"backward", row.backward},
                            {"sh_degree", row.sh_degree},
+                           {"kernel_degree", row.kernel_degree},
+                           {"arithmetic", row.arithmetic},
+                           {"lt_format", row.lt_format},
+                           {"tile_size", row.tile_size},
+                           {"window", row.window},
                            {"gaussians", file.model.size()},
                            {"width", cameras[0].view.width},
                            {"height", cameras[0].view.height},
@@ -155,6 +160,11 @@ void add_bench(CLI::App& app, command& selected) {
   bench->add_option("--json", a->json, "Write the figures to this file")->type_name("FILE");
   bench->add_flag("--quiet", a->quiet, "No progress line");
   add_row_options(*bench, a->row);
+  bench->add_option("--lt-format", a->lt_format, "What the forward pass leaves of a hit: float4, half or shared")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(lt_format_names())
+      ->group(bench->get_option("--arithmetic")->get_group());
   bench->footer(
       "\nStages nest: \"backward\" is everything between the image's gradient and the parameters', \"backward/...\" "
       "its\n"

@@ -28,9 +28,7 @@ struct eval_arguments {
 int run_eval(eval_arguments const& a) {
   use_threads(a.row.threads);
   model_file file = load_model(a.model);
-  auto request = a.row.request;
-  request.sh_degree = file.model.sh_degree;
-  auto const renderer = gart::make_renderer(request);
+  auto const renderer = gart::make_renderer(row_request_for(file, a.model, a.row.request));
   prepare_file(a.out);
   if (!a.renders.empty()) prepare_folder(a.renders);
   gart::dataset_options load;
@@ -64,8 +62,9 @@ int run_eval(eval_arguments const& a) {
   metrics["format"] = data.format, metrics["split"] = data.split, metrics["resize_filter"] = data.resize_filter;
   metrics["background"] = background, metrics["notes"] = data.notes;
   metrics["gaussians"] = file.model.size(), metrics["sh_degree"] = file.model.sh_degree;
+  metrics["kernel_degree"] = file.kernel_degree;
   metrics["backend"] = row.backend, metrics["tracer"] = row.tracer;
-  metrics["approximations"] = approximations_of(options);
+  metrics["approximations"] = approximations_of(options, row);
   metrics["peak_bytes"] = renderer->peak_bytes();
   write_json(a.out, metrics);
   say.clear();

@@ -42,12 +42,17 @@ int run_info() {
   std::printf("gart       %s\n", gart::version);
   print_devices();
   // Rows that differ only in the degree of the spherical harmonics share a line.
-  std::map<std::tuple<std::string, std::string, std::string>, std::set<int>> rows;
-  for (auto const& r : gart::compiled_rows()) rows[{r.backend, r.tracer, r.backward}].insert(r.sh_degree);
-  std::puts("\nbackend    tracer     backward   SH degrees");
+  std::map<std::tuple<std::string, std::string, std::string, int, std::string, std::string, int, int>, std::set<int>>
+      rows;
+  for (auto const& r : gart::compiled_rows()) {
+    rows[{r.backend, r.tracer, r.backward, r.kernel_degree, r.arithmetic, r.lt_format, r.tile_size, r.window}].insert(
+        r.sh_degree);
+  }
+  std::puts("\nbackend  tracer  backward       kernel  arithmetic  LT format  tile  window  SH degrees");
   for (auto const& [names, degrees] : rows) {
-    auto const& [backend, tracer, backward] = names;
-    std::printf("%-10s %-10s %-10s", backend.c_str(), tracer.c_str(), backward.c_str());
+    auto const& [backend, tracer, backward, kernel_degree, arithmetic, lt_format, tile_size, window] = names;
+    std::printf("%-8s %-7s %-14s %-7d %-11s %-10s %-5d %-7d", backend.c_str(), tracer.c_str(), backward.c_str(),
+                kernel_degree, arithmetic.c_str(), lt_format.c_str(), tile_size, window);
     for (int const degree : degrees) std::printf(" %d", degree);
     std::puts("");
   }

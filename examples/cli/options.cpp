@@ -41,6 +41,9 @@ void recorded_options::continue_from(nlohmann::json const& saved, std::filesyste
 
 CLI::Validator backend_names() { return one_of({"auto", "serial", "openmp", "cuda"}); }
 CLI::Validator tracer_names() { return one_of({"auto", "bvh", "embree", "tiles"}); }
+CLI::Validator arithmetic_names() { return one_of({"exact", "fast"}); }
+CLI::Validator lt_format_names() { return one_of({"auto", "float4", "half", "shared"}); }
+CLI::Validator kernel_degree_names() { return one_of({"1", "2", "3", "4", "5", "8"}); }
 
 void add_threads(CLI::App& app, int& threads) {
   app.add_option("--threads", threads, "Threads of the openmp backend, 0: all cores")
@@ -61,6 +64,22 @@ void add_row_options(CLI::App& app, row_options& options) {
       ->capture_default_str()
       ->check(tracer_names());
   add_threads(app, options.threads);
+  std::string const group = "Traits that trade (gart info lists the rows that have them)";
+  app.add_option("--arithmetic", options.request.arithmetic, "exact, or fast: shorter exponentials and reciprocals")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(arithmetic_names())
+      ->group(group);
+  app.add_option("--tile-size", options.request.tile_size, "Pixels a side of a tile, 0: what suits")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(0, 64))
+      ->group(group);
+  app.add_option("--window", options.request.window, "Hits a ray keeps in order at a time, 0: what suits")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(0, 1024))
+      ->group(group);
 }
 
 void add_max_hits(CLI::App& app, int& max_hits) {
@@ -86,9 +105,12 @@ model_file load_model(std::filesystem::path const& path) {
   gart::ply_traits traits;
   model_file file;
   file.model = gart::read_splat_ply(path, &traits);
-  if (auto const kernel = traits.find("kernel_degree"); kernel != traits.end() && kernel->second != "2") {
-    throw gart::unsupported(path.string() + ": kernel_degree " + kernel->second +
-                            " is not traced by this program, which has Gaussians (kernel_degree 2)");
+  if (auto const kernel = traits.find("kernel_degree"); kernel != traits.end()) {
+    if (kernel_degree_names().operator()(kernel->second) != "") {
+      throw gart::io_error(path.string(), "comment gart kernel_degree is '" + kernel->second + "'",
+                           "1, 2, 3, 4, 5 or 8 belongs there; remove the comment for Gaussians (2)");
+    }
+    file.kernel_degree = std::atoi(kernel->second.c_str());
   }
   auto const number = [&](char const* key, float& value) {
     auto const found = traits.find(key);
@@ -115,8 +137,23 @@ model_file load_model(std::filesystem::path const& path) {
   return file;
 }
 
-nlohmann::json approximations_of(gart::render_options const& render) {
-  return {{"alpha_min", render.alpha_min}, {"t_min", render.transmittance_min}, {"max_hits", render.max_hits}};
+gart::row_request row_request_for(model_file const& file, std::filesystem::path const& path, gart::row_request wanted) {
+  wanted.sh_degree = file.model.sh_degree;
+  wanted.kernel_degree = file.kernel_degree;
+  try {
+    gart::resolve(wanted);
+  } catch (gart::unsupported const& e) {
+    throw gart::unsupported(path.string() + ": " + e.what());
+  }
+  return wanted;
+}
+
+nlohmann::json approximations_of(gart::render_options const& render, gart::row_info const& row) {
+  return {{"alpha_min", render.alpha_min},
+          {"t_min", render.transmittance_min},
+          {"max_hits", render.max_hits},
+          {"arithmetic", row.arithmetic},
+          {"lt_format", row.lt_format}};
 }
 
 gart::gaussian_model with_degree(gart::gaussian_model const& model, int degree) {

@@ -39,7 +39,8 @@ class recorded_options {
   std::vector<entry> entries_;
 };
 
-// --backend --tracer --threads, as every command that traces rays has them.
+// --backend --tracer --threads, as every command that traces rays has them, and the traits that trade one thing for
+// another: --arithmetic --tile-size --window.
 struct row_options {
   gart::row_request request;
   int threads = 0;
@@ -52,6 +53,9 @@ void add_max_hits(CLI::App& app, int& max_hits);
 
 CLI::Validator backend_names();
 CLI::Validator tracer_names();
+CLI::Validator arithmetic_names();
+CLI::Validator kernel_degree_names();
+CLI::Validator lt_format_names();
 
 // "black", "white", or for "auto" what suits the capture: white for images with alpha, as published results have it.
 std::string resolve_background(std::string const& name, bool alpha);
@@ -61,12 +65,15 @@ gart::vec3 background_color(std::string const& name);
 struct model_file {
   gart::gaussian_model model;
   gart::render_options render;
+  int kernel_degree = 2;
 };
-// io_error for what is no splat file; unsupported for a kernel that is not traced here.
+// io_error for what is no splat file, or one whose traits say what cannot be.
 model_file load_model(std::filesystem::path const& path);
+// The row for a model; unsupported, naming its file, where there is none of its degrees.
+gart::row_request row_request_for(model_file const& file, std::filesystem::path const& path, gart::row_request wanted);
 inline constexpr gart::u32 max_hits_most = 1'000'000'000;
-// What a run left out, as every report tells it.
-nlohmann::json approximations_of(gart::render_options const& render);
+// What a run left out or computed shorter, as every report tells it.
+nlohmann::json approximations_of(gart::render_options const& render, gart::row_info const& row);
 // Coefficients past `degree` are dropped, missing ones are zero.
 gart::gaussian_model with_degree(gart::gaussian_model const& model, int degree);
 

@@ -64,9 +64,7 @@ int run_render(render_arguments const& a) {
   prepare_folder(a.out);
   if (!a.json.empty()) prepare_file(a.json);
 
-  auto request = a.row.request;
-  request.sh_degree = file.model.sh_degree;
-  auto const renderer = gart::make_renderer(request);
+  auto const renderer = gart::make_renderer(row_request_for(file, a.model, a.row.request));
   renderer->set_model(file.model);
   gart::render_options options = file.render;
   options.background = background_color(a.background);
@@ -76,12 +74,11 @@ int run_render(render_arguments const& a) {
 
   progress say(a.quiet);
   auto const row = renderer->row();
-  nlohmann::json timings = {
-      {"backend", row.backend},
-      {"tracer", row.tracer},
-      {"gaussians", file.model.size()},
-      {"approximations", approximations_of(options)},
-      {"views", nlohmann::json::array()}};
+  nlohmann::json timings = {{"backend", row.backend},
+                            {"tracer", row.tracer},
+                            {"gaussians", file.model.size()},
+                            {"approximations", approximations_of(options, row)},
+                            {"views", nlohmann::json::array()}};
   renderer->profile().enable(!a.json.empty());
   double total = 0;
   for (std::size_t i = 0; i < cameras.size(); ++i) {

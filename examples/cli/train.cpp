@@ -90,12 +90,19 @@ class training_run {
     if (a_.dataset.empty()) throw usage_error("DATASET is missing (see gart train --help)");
     row_ = gart::resolve(row_request_of(a_));
     a_.backend = row_.backend, a_.tracer = row_.tracer, a_.backward = row_.backward;
+    a_.lt_format = row_.lt_format, a_.tile_size = row_.tile_size, a_.window = row_.window;
     course_ = history(a_.iterations);
     load();
     a_.background = resolve_background(a_.background, data_.alpha);
     eval_background_ = background_color(a_.background);
     if (!a_.start.empty()) {
-      start_ = with_degree(gart::read_splat_ply(a_.start), a_.sh_degree);
+      model_file const file = load_model(a_.start);
+      if (file.kernel_degree != a_.kernel_degree) {
+        throw usage_error("--start " + a_.start + ": is of kernel degree " + std::to_string(file.kernel_degree) +
+                          ", the run of " + std::to_string(a_.kernel_degree) + " (give --kernel-degree " +
+                          std::to_string(file.kernel_degree) + ")");
+      }
+      start_ = with_degree(file.model, a_.sh_degree);
       if (start_.size() > a_.max_gaussians) {
         throw usage_error("--start " + a_.start + ": has " + with_commas(start_.size()) +
                           " Gaussians, more than --max-gaussians " + std::to_string(a_.max_gaussians));
@@ -236,6 +243,7 @@ class training_run {
     };
     put("alpha_min", a_.alpha_min, a_.defaults.render.alpha_min);
     put("t_min", a_.t_min, a_.defaults.render.transmittance_min);
+    if (row_.kernel_degree != 2) result["kernel_degree"] = std::to_string(row_.kernel_degree);
     if (a_.max_hits != 0) result["max_hits"] = std::to_string(a_.max_hits);
     return result;
   }
@@ -286,7 +294,8 @@ class training_run {
     m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
     m["iterations"] = a_.iterations, m["gaussians"] = gaussians_, m["sh_degree"] = row_.sh_degree;
     m["backend"] = row_.backend, m["tracer"] = row_.tracer, m["backward"] = row_.backward;
-    m["approximations"] = approximations_of(train_options_of(a_).render);
+    m["kernel_degree"] = row_.kernel_degree;
+    m["approximations"] = approximations_of(train_options_of(a_).render, row_);
     m["seconds"] = course_.seconds;
     m["iterations_per_second"] = course_.seconds > 0 ? a_.iterations / course_.seconds : 0;
     m["wall_seconds"] = {

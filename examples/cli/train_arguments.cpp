@@ -45,6 +45,11 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--seed", a.seed, "N",
                  "Seed of everything random; on the serial backend the same\nseed gives the same bits"));
 
+  in_group(r.add(train, "--kernel-degree", a.kernel_degree, "N",
+                 "How Gaussians fall from their centres, exp(-4.5 (r / 3)^N):\n2, or the generalised 1, 3, 4, 5, 8 of "
+                 "3DGRT"))
+      ->check(kernel_degree_names());
+
   group = "Capture";
   in_group(r.add(train, "--downscale", a.downscale, "N", "Shrink images by this whole factor"))->check(between(1, 64));
   in_group(r.add(train, "--background", a.background, "NAME",
@@ -83,6 +88,17 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--max-hits", a.max_hits, "N", "Hits after which a ray ends, 0: no cap"))
       ->check(between(0, max_hits_most));
 
+  in_group(r.add(train, "--arithmetic", a.arithmetic, "NAME", "exact, or fast: shorter exponentials and reciprocals"))
+      ->check(arithmetic_names());
+  in_group(r.add(train, "--lt-format", a.lt_format, "NAME",
+                 "What the forward pass leaves of a hit for primitive: float4,\nhalf or shared (half the memory, less "
+                 "exact gradients)"))
+      ->check(lt_format_names());
+  in_group(r.add(train, "--tile-size", a.tile_size, "N", "Pixels a side of a tile, 0: what suits"))
+      ->check(between(0, 64));
+  in_group(r.add(train, "--window", a.window, "N", "Hits a ray keeps in order at a time, 0: what suits"))
+      ->check(between(0, 1024));
+
   group = "Course";
   in_group(r.add(train, "--eval-every", a.eval_every, "N",
                  "Steps between tests on the test views, 0: only at the end,\n-1: five in the run"))
@@ -119,7 +135,10 @@ void continue_run(train_arguments& a) {
   }
 }
 
-gart::row_request row_request_of(train_arguments const& a) { return {a.backend, a.tracer, a.backward, a.sh_degree}; }
+gart::row_request row_request_of(train_arguments const& a) {
+  return {a.backend,    a.tracer,    a.backward,  a.sh_degree, a.kernel_degree,
+          a.arithmetic, a.lt_format, a.tile_size, a.window};
+}
 
 gart::train_options train_options_of(train_arguments const& a) {
   gart::train_options o = a.defaults;

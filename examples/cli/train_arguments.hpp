@@ -21,9 +21,11 @@ struct train_arguments {
 
   // What follows decides the result and is recorded.
   std::string backend = "auto", tracer = "auto", backward = "auto", densify = "mcmc", background = "auto", start;
+  std::string arithmetic = "exact", lt_format = "auto";
   gart::train_options defaults;
   int iterations = defaults.iterations;
   gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
+  int kernel_degree = 2, tile_size = 0, window = 0;
   int sh_degree = defaults.sh_degree, downscale = 1, test_every = 8, eval_every = -1;
   float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
   float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;

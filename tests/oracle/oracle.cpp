@@ -199,12 +199,12 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
   auto const tied = [](hit const& a, hit const& b) { return a.t != b.t && b.t - a.t <= a.t_slack + b.t_slack; };
   // Where the last hit may trade places with a neighbour, the ray may end one hit sooner or later.
   bool const capped = options.max_hits != 0 && composited == options.max_hits;
-  if (transmittance < t_min || capped) {
-    if (end > 1) out.edge |= tied(list[end - 2], list[end - 1]);
-    if (end < list.size()) out.edge |= tied(list[end - 1], list[end]);
-  }
-  // Which hit is the last one of a cap is then not decided, however opaque it is.
-  if (capped && out.edge) out.rounding += steps.back().transmittance * brightest;
+  bool const ended = transmittance < t_min || capped;
+  bool const trades = ended && ((end > 1 && tied(list[end - 2], list[end - 1])) ||
+                                (end < list.size() && tied(list[end - 1], list[end])));
+  out.edge |= trades;
+  // Which hit is the last one is then not decided, however opaque it is; nor at a cap where some hit is not.
+  if (trades || (capped && out.edge)) out.rounding += steps.back().transmittance * brightest;
   list.resize(end);
   out.transmittance = transmittance;
   Vector3d behind = background;

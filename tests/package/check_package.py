@@ -104,6 +104,9 @@ with tempfile.TemporaryDirectory() as temporary:
         run(examples[name.split("/")[0]] / name.split("/")[1], capture, trained, 3)
         assert trained.read_bytes().startswith(b"ply\n")
     expect(run(examples["4_bvh_query"] / "bvh_query", 1000), "1000 boxes")
+    own = folder / "own.ply"
+    expect(run(examples["5_own_row"] / "own_row", capture, own, 3), "openmp, tiles, primitive: kernel degree 4")
+    expect(own.read_bytes()[:400].decode("latin-1"), "comment gart kernel_degree 4\n")
 
     if a.program:
         expect(run(prefix / "bin" / "gart", "--help", env=bare), "train", "render")

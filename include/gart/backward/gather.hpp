@@ -4,7 +4,7 @@
 // gradient in registers and adds it to the Gaussian once. Rays and their SH bases are computed once a tile, into
 // scratch.
 //
-// Whether a slot is a hit is told by the slot itself (backward/record_lt.hpp); its t, offset and alpha are evaluated
+// Whether a slot is a hit is told by the slot itself (backward/lt_slot.hpp); its t, offset and alpha are evaluated
 // again by the function the forward pass used, so they are the same bits.
 
 #include <gart/backward/record_lt.hpp>
@@ -41,7 +41,7 @@ struct gather_kernel {
   // What a lane needs of a pixel: direction and (colour . gradient), gradient, SH basis. Records are an odd number of
   // 16-byte words apart where they can be, so that lanes on neighbouring pixels read different banks.
   struct pixel_data {
-    static constexpr int basis_quads = (bands + 3) / 4;
+    static constexpr int basis_quads = ShDegree == 0 ? 0 : (bands + 3) / 4;  // of degree 0 it is a constant
     quad direction_total, gradient;
     quad basis[basis_quads];
     quad last;  // t and id of the ray's last hit, where validity is recomputed; and what makes the words odd in number
@@ -167,6 +167,7 @@ struct gather_kernel {
     quad const g = at.gradient;
     vec3 const dl(g.v[0], g.v[1], g.v[2]);
     sh_basis<ShDegree> basis;
+    if constexpr (ShDegree == 0) basis = sh_basis<ShDegree>(vec3(0.0f));
     GART_UNROLL
     for (int q = 0; q < pixel_data::basis_quads; ++q) {
       quad const four = at.basis[q];

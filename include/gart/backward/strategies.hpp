@@ -46,6 +46,13 @@ struct primitive_strategy {
   using fallback = hybrid_strategy;  // where the LT buffer would pass its budget: a quarter of it
 };
 
+// The primitive strategy with slots of another format (backward/lt_slot.hpp): less memory for less exact gradients.
+template <class Entry>
+struct primitive_strategy_in : primitive_strategy {
+  template <int Size>
+  using record = record_lt<Entry, Size>;
+};
+
 // The primitive strategy with its sums in a fixed order.
 struct deterministic_strategy : primitive_strategy {
   static constexpr char const* name = "deterministic";

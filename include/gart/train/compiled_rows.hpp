@@ -1,11 +1,29 @@
 #pragma once
-// Turns templates into rows: sessions and renderers of a policy, a tracer and a strategy, for every SH degree. Include
-// where the kernels of the policy can be compiled, and call register_rows from GART_REGISTER_ROWS.
+// Turns templates into rows: sessions and renderers of a policy, traits, a tracer and a strategy. Include where the
+// kernels of the policy can be compiled, and call from GART_REGISTER_ROWS register_rows, for every SH degree, or
+// register_row_of for one row:
+//   using response = gart::generalized_gaussian<4>;
+//   GART_REGISTER_ROWS(my_rows,
+//                      gart::register_row_of<gart::openmp_exec, gart::scene_traits<3, response>,
+//                                            gart::tile_tracer<gart::openmp_exec, 8, response>,
+//                                            gart::primitive_strategy>(-1))
 
 #include <gart/train/rows.hpp>
 #include <gart/train/trainer.hpp>
 
 namespace gart {
+
+template <execution E, class Traits, class Tracer, class Strategy>
+row_info row_of() {
+  using response = typename Traits::response;
+  row_info row{E::name, Tracer::name, Strategy::name, Traits::sh_degree, response::degree};
+  row.arithmetic = response::fast ? "fast" : "exact";
+  using record = typename Strategy::template record<tile_size_of<Tracer>>;
+  if constexpr (requires { record::entry::name; }) row.lt_format = record::entry::name;
+  row.tile_size = tile_size_of<Tracer>;
+  row.window = Tracer::window;
+  return row;
+}
 
 template <execution E, class Traits, class Tracer, class Strategy>
 class compiled_session final : public session {
@@ -24,7 +42,7 @@ class compiled_session final : public session {
   }
   std::size_t peak_bytes() const override { return exec_.memory.peak; }
   std::size_t lt_bytes() const override { return trainer_.lt_bytes(); }
-  row_info row() const override { return {E::name, Tracer::name, Strategy::name, Traits::sh_degree}; }
+  row_info row() const override { return row_of<E, Traits, Tracer, Strategy>(); }
 
  private:
   E exec_;
@@ -47,7 +65,7 @@ class compiled_renderer final : public renderer {
     return exec_.profile;
   }
   std::size_t peak_bytes() const override { return exec_.memory.peak; }
-  row_info row() const override { return {E::name, Tracer::name, Strategy::name, Traits::sh_degree}; }
+  row_info row() const override { return row_of<E, Traits, Tracer, Strategy>(); }
 
  private:
   E exec_;
@@ -57,9 +75,9 @@ class compiled_renderer final : public renderer {
 };
 
 template <execution E, class Traits, class Tracer, class Strategy>
-void register_row_of(int rank, bool (*available)(std::string*)) {
+void register_row_of(int rank, bool (*available)(std::string*) = always_available) {
   register_row(
-      {{E::name, Tracer::name, Strategy::name, Traits::sh_degree},
+      {row_of<E, Traits, Tracer, Strategy>(),
        rank,
        available,
        []() -> std::unique_ptr<renderer> { return std::make_unique<compiled_renderer<E, Traits, Tracer, Strategy>>(); },

@@ -1,6 +1,6 @@
 #pragma once
 // The table of compiled rows behind make_session and make_renderer. A library that compiles rows registers them when it
-// is loaded (GART_REGISTER_ROWS); a program that instantiates its own may do the same.
+// is loaded (GART_REGISTER_ROWS); a program that instantiates its own may do the same (examples/5_own_row).
 
 #include <gart/train/session.hpp>
 
@@ -11,7 +11,7 @@ namespace gart {
 
 struct compiled_row {
   row_info row;
-  int rank = 0;                            // "auto" takes the highest that is available
+  int rank = 0;  // "auto" takes the highest that is available; rows that trade something lie below 0
   bool (*available)(std::string* reason);  // false: no device, with the reason
   std::unique_ptr<renderer> (*make_renderer)();
   std::unique_ptr<session> (*make_session)(train_options const&, dataset const&, gaussian_model const& start);

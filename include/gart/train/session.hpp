@@ -2,7 +2,8 @@
 // Training and rendering behind one host-safe interface: the row (policy, SH degree, tracer, backward strategy) is
 // chosen at run time from the rows that were compiled. What g++ code, the `gart` program for one, uses.
 //
-// Errors: unsupported, naming the rows there are, for a row that is not; out_of_memory; whatever the policy throws.
+// Errors: unsupported, naming the rows there are and how to compile one, for a row that is not; out_of_memory; whatever
+// the policy throws.
 
 #include <gart/exec/profile.hpp>
 #include <gart/io/dataset.hpp>
@@ -18,17 +19,26 @@
 
 namespace gart {
 
-// Names as on the command line. "auto": the best there is on this machine.
+// Names as on the command line. "auto" and 0: the best there is on this machine.
 struct row_request {
   std::string backend = "auto";   // auto serial openmp cuda
-  std::string tracer = "auto";    // auto bvh embree
-  std::string backward = "auto";  // auto pixel hybrid primitive
+  std::string tracer = "auto";    // auto bvh embree tiles
+  std::string backward = "auto";  // auto pixel hybrid primitive deterministic
   int sh_degree = 3;
+  int kernel_degree = 2;             // of the generalised Gaussians (math/response.hpp)
+  std::string arithmetic = "exact";  // exact fast
+  std::string lt_format = "auto";    // what the backward pass finds of a hit (backward/lt_slot.hpp)
+  int tile_size = 0;                 // pixels a side
+  int window = 0;                    // hits that a ray keeps in order before it goes over the scene again
 };
 
 struct row_info {
   std::string backend, tracer, backward;
   int sh_degree = 3;
+  int kernel_degree = 2;
+  std::string arithmetic = "exact";
+  std::string lt_format = "none";
+  int tile_size = 8, window = 0;
 };
 
 // A request with every "auto" decided; unsupported, naming the rows, where there is none.

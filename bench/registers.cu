@@ -1,0 +1,45 @@
+// The main kernels of a training step by row, instantiated for bench/registers.py to read what the compiler gave them.
+#include <gart/backward/backward.hpp>
+#include <gart/exec/cuda_launch.cuh>
+#include <gart/trace/tile_tracer.hpp>
+
+using namespace gart;
+
+namespace {
+
+template <int ShDegree, class Response, class Entry>
+using forward_kernel = trace_kernels::walk_tiles<Response, 32, 8, composite<ShDegree, record_lt<Entry, 8>>>;
+
+template <int ShDegree, class Response, class Term, class Entry, gather_sums Sums = gather_sums::atomic>
+using backward_kernel =
+    gather_kernel<ShDegree, Response, terms<Term>, Entry, 8, Sums, slot_validity::recomputed, cuda_exec>;
+
+}  // namespace
+
+#define FORWARD(...)                                                                   \
+  template __global__ void detail::run_index_kernel<forward_kernel<__VA_ARGS__>>(index_t, \
+                                                                                 forward_kernel<__VA_ARGS__> const);
+#define BACKWARD(...) \
+  template __global__ void detail::run_tile_kernel<backward_kernel<__VA_ARGS__>>(backward_kernel<__VA_ARGS__> const);
+#define ROW(degree, response, entry)        \
+  FORWARD(degree, response, entry)          \
+  BACKWARD(degree, response, color, entry)  \
+  BACKWARD(degree, response, geometry, entry)
+
+using plain = generalized_gaussian<>;
+using fast = generalized_gaussian<2, arithmetic::fast>;
+
+ROW(0, plain, lt_entry)
+ROW(1, plain, lt_entry)
+ROW(2, plain, lt_entry)
+ROW(3, plain, lt_entry)
+ROW(3, generalized_gaussian<1>, lt_entry)
+ROW(3, generalized_gaussian<3>, lt_entry)
+ROW(3, generalized_gaussian<4>, lt_entry)
+ROW(3, generalized_gaussian<5>, lt_entry)
+ROW(3, generalized_gaussian<8>, lt_entry)
+ROW(3, fast, lt_entry)
+ROW(3, plain, lt_half_entry)
+ROW(3, plain, lt_shared_entry)
+BACKWARD(3, plain, color, lt_entry, gather_sums::ordered)
+BACKWARD(3, plain, geometry, lt_entry, gather_sums::ordered)

@@ -1,0 +1,83 @@
+// Rows chosen by what a model is and what is traded: by the program's own options and files.
+
+#include "program.hpp"
+
+#include <support/policies.hpp>
+
+#include <array>
+#include <cmath>
+
+using namespace cli_test;
+
+TEST_CASE("SH degree 0 stores and optimises 14 floats a Gaussian") {
+  folder const here;
+  write_capture(here / "capture");
+  REQUIRE(here.gart("train capture --out run --iterations 3 --sh-degree 0 --densify none --backend serial --quiet")
+              .code == 0);
+  std::string const ply = text_of(here / "run/model.ply");
+  CHECK_FALSE(has(ply, "f_rest"));
+  // Beside the 14: the format's normal, three zeros.
+  std::string const end = "end_header\n";
+  CHECK(ply.size() == ply.find(end) + end.size() + 40 * 4 * (14 + 3));
+  // Parameters and two moments; names, lengths and counters beside.
+  CHECK(fs::file_size(here / "run/checkpoint.gart") < 40 * 3 * 4 * 14 + 1000);
+}
+
+TEST_CASE("a row that is not compiled is refused with those that are") {
+  folder const here;
+  write_capture(here / "capture");
+  auto const run = here.gart("train capture --out run --sh-degree 1 --kernel-degree 8 --backend serial");
+  CHECK(run.code == 1);
+  CHECK_MESSAGE(has(run.err, "SH degree 1, kernel degree 8"), run.err);
+  CHECK(has(run.err, "serial / bvh / primitive (SH 0 1 2 3)"));
+  CHECK(has(run.err, "GART_REGISTER_ROWS"));
+  CHECK(has(run.err, "examples/5_own_row"));
+  CHECK_FALSE(fs::exists(here / "run"));
+}
+
+#if defined(GART_VARIANTS)
+namespace {
+std::string const openmp = " --iterations 10 --backend openmp --max-gaussians 60 --quiet ";
+}  // namespace
+
+TEST_CASE("a model of another kernel degree says so in its file and is rendered as one") {
+  folder const here;
+  write_capture(here / "capture");
+  auto const run = here.gart("train capture --out run --kernel-degree 4" + openmp);
+  REQUIRE_MESSAGE(run.code == 0, run.err);
+  CHECK(here.json("run/metrics.json")["kernel_degree"] == 4);
+  std::string ply = text_of(here / "run/model.ply");
+  std::string const comment = "comment gart kernel_degree 4\n";
+  REQUIRE(has(ply, comment));
+  REQUIRE(here.gart("eval run/model.ply capture --out scores.json --backend openmp --quiet").code == 0);
+  double const psnr = here.json("scores.json")["psnr"];
+  CHECK(psnr == doctest::Approx(here.json("run/metrics.json")["psnr"].get<double>()).epsilon(1e-6));
+  ply.erase(ply.find(comment), comment.size());
+  gart::write_file(here / "plain.ply", ply);
+  REQUIRE(here.gart("eval plain.ply capture --out plain.json --backend openmp --quiet").code == 0);
+  CHECK(std::abs(here.json("plain.json")["psnr"].get<double>() - psnr) > 0.01);
+  CHECK(here.gart("train capture --out next --start run/model.ply" + openmp).code == 2);
+}
+
+TEST_CASE("what is traded is chosen by name and reported, and tiles and windows change no image") {
+  folder const here;
+  write_capture(here / "capture");
+  REQUIRE(here.gart("train capture --out run" + openmp).code == 0);
+  REQUIRE(here.gart("render run/model.ply capture --out usual --backend openmp --tracer tiles --quiet").code == 0);
+  for (std::string const trait : {"--tile-size 4", "--tile-size 16", "--window 16", "--window 64"}) {
+    CAPTURE(trait);
+    auto const done = here.gart("render run/model.ply capture --out other --backend openmp --quiet " + trait);
+    REQUIRE_MESSAGE(done.code == 0, done.err);
+    for (auto const& file : fs::directory_iterator(here / "usual"))
+      CHECK(text_of(file.path()) == text_of(here / ("other/" + file.path().filename().string())));
+  }
+  for (auto const& [option, name, value] : {std::array{"--lt-format half", "lt_format", "half"},
+                                            std::array{"--lt-format shared", "lt_format", "shared"},
+                                            std::array{"--arithmetic fast", "arithmetic", "fast"}}) {
+    CAPTURE(option);
+    auto const done = here.gart(std::string("train capture --out traded ") + option + openmp);
+    REQUIRE_MESSAGE(done.code == 0, done.err);
+    CHECK(here.json("traded/metrics.json")["approximations"][name] == value);
+  }
+}
+#endif
