@@ -12,7 +12,7 @@
 //
 // The gradient of alpha is a difference of the pixel's colour and L, over 1 - alpha: an error of L counts by how little of
 // the ray lies behind the hit. Relative errors of a whole gradient, group by group, against double (tests/traits): float4
-// 1e-4, half 5e-3 and shared 2.5e-2 on clouds; on stacks of hits at the clamp 1e-4, 5e-2 and 0.25.
+// 1e-4, half 5e-3 and shared 2.5e-2 on clouds; on stacks of hits at the clamp 5e-4, 5e-2 and 0.25.
 // Slots that no hit wrote hold what the clear left there, all bits set, which `written` tells.
 
 #include <gart/math/arith.hpp>
