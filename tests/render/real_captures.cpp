@@ -94,7 +94,7 @@ TEST_CASE_TEMPLATE("every policy meets the hits that the serial one meets on rea
     gart::render_options const render;
     comparison const found = compare(hit_lists(serial, c.model, c.view, render, tracer_kind::tiles),
                                      hit_lists(exec, c.model, c.view, render, tracer_kind::tiles));
-    MESSAGE(c.name << ", " << E::name << " against serial: " << found.different << " of " << found.hits
+    MESSAGE(c.name << ", " << std::string(E::name) << " against serial: " << found.different << " of " << found.hits
                    << " hits differ");
     CHECK(found.different * 1'000'000 <= found.hits);
   }

@@ -111,7 +111,7 @@ void check_degree(E& exec) {
 struct cleared_ordered : gart::cleared_strategy {
   static constexpr bool ordered = true;
 };
-struct recomputed_ordered : gart::recomputed_strategy {
+struct recomputed_ordered : gart::primitive_strategy {
   static constexpr bool ordered = true;
 };
 

@@ -61,8 +61,6 @@ class backward {
   static constexpr slot_validity validity = [] {
     if constexpr (!records)
       return slot_validity::cleared;
-    else if constexpr (Strategy::validity == slot_validity::automatic)
-      return E::device ? slot_validity::recomputed : slot_validity::cleared;
     else
       return Strategy::validity;
   }();

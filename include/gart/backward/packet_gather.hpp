@@ -78,7 +78,8 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     pixel_box const cell = intersect(range.box, area);
     Entry const* const slots = gather.slots + range.offset + tile_offset(range.box, cell);
     ray_gaussian const& g = gather.records[id];
-    sh_row<ShDegree> const coefficients(gather.sh + static_cast<std::size_t>(sh_stride) * id, gather.active_degree);
+    float const* const coefficients = gather.sh + static_cast<std::size_t>(sh_stride) * id;
+    int const active_bands = sh_coefficients(gather.active_degree);
     lanes sh_sum[3][band_groups];
     lanes moment_sum[moment_count];
     for (auto& channel : sh_sum)
@@ -120,7 +121,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
           }
       }
       if constexpr (Terms::geometry) {
-        vec3_of<lanes> const c = clamped_color(at.basis.unclamped(coefficients.v));
+        vec3_of<lanes> const c = clamped_color(at.basis.unclamped(coefficients, active_bands));
         lanes const alpha = hit_alpha<Response>(g, r);
         lanes const color_g = dot(c, at.gradient), behind = at.total - dot(l_color, at.gradient);
         moments_of<lanes> const m = hit_moments<Response>(g, r, alpha_gradient(weight / alpha, color_g, behind, alpha));

@@ -19,9 +19,9 @@ struct pixel_strategy {
 
 // How a slot of the LT buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN before
 // every forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held against the
-// last hit of its ray: the same decision, bit for bit, with nothing to clear. `automatic`:
-// recomputed on a device, where that measured better (docs/backward.md), and cleared on a host.
-enum class slot_validity { automatic, cleared, recomputed };
+// last hit of its ray: the same decision, bit for bit, with nothing to clear. It measured better on a device and on a
+// host (docs/backward.md).
+enum class slot_validity { cleared, recomputed };
 
 // One channel: the colour gradient of a hit needs only its weight. Geometry by pixel.
 struct hybrid_strategy {
@@ -38,7 +38,7 @@ struct hybrid_strategy {
 struct primitive_strategy {
   static constexpr char const* name = "primitive";
   static constexpr bool ordered = false;
-  static constexpr slot_validity validity = slot_validity::automatic;
+  static constexpr slot_validity validity = slot_validity::recomputed;
   template <int Size>
   using record = record_lt<lt_entry, Size>;
   using gather = terms<color, geometry>;
@@ -59,14 +59,10 @@ struct deterministic_strategy : primitive_strategy {
   static constexpr bool ordered = true;
 };
 
-// The primitive strategy with either rule: what the other is tested and measured against.
+// The primitive strategy with the other rule: what recomputing is tested and measured against.
 struct cleared_strategy : primitive_strategy {
   static constexpr char const* name = "cleared";
   static constexpr slot_validity validity = slot_validity::cleared;
-};
-struct recomputed_strategy : primitive_strategy {
-  static constexpr char const* name = "recomputed";
-  static constexpr slot_validity validity = slot_validity::recomputed;
 };
 
 }  // namespace gart

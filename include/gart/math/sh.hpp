@@ -44,9 +44,14 @@ struct sh_basis {
 
   // Before the clamp at zero.
   GART_HD GART_INLINE vec3_of<F> unclamped(float const (&coefficients)[3 * size]) const {
+    return unclamped(coefficients, size);
+  }
+  // The first bands alone.
+  GART_HD GART_INLINE vec3_of<F> unclamped(float const* coefficients, int bands) const {
     F r = 0.5f, g = 0.5f, b = 0.5f;
     GART_UNROLL
     for (int k = 0; k < size; ++k) {
+      if (k >= bands) break;
       r += y[k] * F(coefficients[3 * k]);
       g += y[k] * F(coefficients[3 * k + 1]);
       b += y[k] * F(coefficients[3 * k + 2]);
@@ -80,7 +85,7 @@ struct sh_row {
 };
 
 // The colour a hit shows.
-template <class F>
+template <class F = float>
 GART_HD GART_INLINE vec3_of<F> clamped_color(vec3_of<F> const& c) {
   F const zero = 0.0f;
   return {select(c.x > zero, c.x, zero), select(c.y > zero, c.y, zero), select(c.z > zero, c.z, zero)};

@@ -44,8 +44,7 @@ struct packet_composite {
 
   void shade(state const& s, u32 id, pixel_box const& tile, lanes (&out)[channels], note& place) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
-    vec3_of<lanes> const c =
-        s.basis.unclamped(sh_row<ShDegree>(program.sh + stride * id, program.active_degree).v);
+    vec3_of<lanes> const c = s.basis.unclamped(program.sh + stride * id, sh_coefficients(program.active_degree));
     out[0] = c.x, out[1] = c.y, out[2] = c.z;
     place = program.record.place_of(id, tile);
   }
