@@ -103,19 +103,29 @@ struct body {
   vec3d to_unit(vec3d const& v) const { return rotate_back(v) * inverse_scale; }
 };
 
-body body_of(gaussian_model const& m, std::size_t i, vec3d const& camera, double alpha_min) {
+// rho = exp(-4.5 (|p| / 3)^n).
+struct kernel {
+  int degree;
+  double response(double p2) const { return std::exp(-4.5 * std::pow(p2 / 9, 0.5 * degree)); }
+  // -2 d ln rho / d |p|^2; at the cusp of degree 1, which has no direction there, none.
+  double slope(double p2) const { return p2 > 0 || degree > 1 ? 0.5 * degree * std::pow(p2 / 9, 0.5 * degree - 1) : 0; }
+  // The largest |p| with ratio * rho >= 1.
+  double reach(double ratio) const { return 3 * std::pow(std::log(ratio) / 4.5, 1.0 / degree); }
+};
+
+body body_of(gaussian_model const& m, std::size_t i, vec3d const& camera, double alpha_min, kernel const& k) {
   body g;
   float const* const values[] = {&m.mean[3 * i], &m.log_scale[3 * i], &m.quaternion[4 * i], &m.opacity[i]};
   int const counts[] = {3, 3, 4, 1};
   for (int group = 0; group < 4; ++group)
-    for (int k = 0; k < counts[group]; ++k)
-      if (!std::isfinite(values[group][k])) return g;
+    for (int c = 0; c < counts[group]; ++c)
+      if (!std::isfinite(values[group][c])) return g;
   double largest = 0;
-  for (int k = 0; k < 3; ++k) {
-    double const s = m.log_scale[3 * i + k];
+  for (int c = 0; c < 3; ++c) {
+    double const s = m.log_scale[3 * i + c];
     if (!(s > -40 && s < 40)) return g;
-    g.mean[k] = m.mean[3 * i + k] - camera[k];
-    g.inverse_scale[k] = std::exp(-s);
+    g.mean[c] = m.mean[3 * i + c] - camera[c];
+    g.inverse_scale[c] = std::exp(-s);
     largest = std::max(largest, std::exp(s));
   }
   double const q[4] = {m.quaternion[4 * i], m.quaternion[4 * i + 1], m.quaternion[4 * i + 2], m.quaternion[4 * i + 3]};
@@ -125,8 +135,8 @@ body body_of(gaussian_model const& m, std::size_t i, vec3d const& camera, double
   g.norm = std::sqrt(norm2);
   g.w = q[0] / g.norm, g.axis = vec3d(q[1], q[2], q[3]) / g.norm;
   g.origin = g.to_unit(-g.mean);
-  // alpha >= alpha_min holds where |p|^2 <= 2 ln(sigma / alpha_min), and |x - mean| <= |p| times the largest scale.
-  double const radius = 1.000001 * largest * std::sqrt(2 * std::log(g.sigma / alpha_min)), distance = length(g.mean);
+  // |x - mean| <= |p| times the largest scale.
+  double const radius = 1.000001 * largest * k.reach(g.sigma / alpha_min), distance = length(g.mean);
   g.around_camera = !(radius < distance);
   g.valid = true;
   if (g.around_camera) return g;
@@ -166,10 +176,11 @@ struct reference_hit {
 
 class pixel_tracer {
  public:
-  pixel_tracer(gaussian_model const& model, render_options const& options, int active_degree,
+  pixel_tracer(gaussian_model const& model, render_options const& options, int active_degree, kernel const& k,
                std::vector<body> const& bodies)
       : model_(model),
         options_(options),
+        kernel_(k),
         bodies_(bodies),
         stored_(static_cast<std::size_t>(sh_coefficients(model.sh_degree))),
         active_(static_cast<std::size_t>(sh_coefficients(active_degree))) {}
@@ -185,7 +196,7 @@ class pixel_tracer {
       h.id = id;
       h.t = -dot(g.origin, d_g) / dot(d_g, d_g);
       h.p = g.origin + h.t * d_g;
-      h.raw = g.sigma * std::exp(-0.5 * dot(h.p, h.p));
+      h.raw = g.sigma * kernel_.response(dot(h.p, h.p));
       h.alpha = std::min(opaque, h.raw);
       if (h.alpha >= alpha_min && h.t > near) list.push_back(h);
     }
@@ -248,16 +259,17 @@ class pixel_tracer {
     }
   }
 
-  // alpha = sigma exp(-|p|^2 / 2) with p = S^-1 R^T (t d - mean); t is where |p| is least, so moving it changes
-  // nothing. `a` is alpha dL/dalpha. to: mean, log-scale, quaternion, opacity.
-  static void add_geometry(body const& g, reference_hit const& h, vec3d const& d, double a, double* to) {
-    vec3d const by_body = -a * h.p * g.inverse_scale;  // dL by R^T (t d - mean)
+  // alpha = sigma rho(|p|) with p = S^-1 R^T (t d - mean); t is where |p| is least, so moving it changes nothing. `a`
+  // is alpha dL/dalpha. to: mean, log-scale, quaternion, opacity.
+  void add_geometry(body const& g, reference_hit const& h, vec3d const& d, double a, double* to) const {
+    double const b = a * kernel_.slope(dot(h.p, h.p));
+    vec3d const by_body = -b * h.p * g.inverse_scale;  // dL by R^T (t d - mean)
     vec3d const by_point = g.rotate(by_body), x = h.t * d - g.mean;
-    for (int k = 0; k < 3; ++k) to[k] -= by_point[k], to[3 + k] += a * h.p[k] * h.p[k];
-    // x . R b with R b = b + 2 w u x b + 2 u x (u x b), by (w, u); then through the division by the norm.
-    vec3d const &u = g.axis, &b = by_body;
-    double by_w = 2 * dot(x, cross(u, b));
-    vec3d by_u = 2 * g.w * cross(b, x) + 2.0 * (x * dot(u, b) + b * dot(u, x) - 2.0 * u * dot(x, b));
+    for (int k = 0; k < 3; ++k) to[k] -= by_point[k], to[3 + k] += b * h.p[k] * h.p[k];
+    // x . R v with R v = v + 2 w u x v + 2 u x (u x v), by (w, u); then through the division by the norm.
+    vec3d const &u = g.axis, &v = by_body;
+    double by_w = 2 * dot(x, cross(u, v));
+    vec3d by_u = 2 * g.w * cross(v, x) + 2.0 * (x * dot(u, v) + v * dot(u, x) - 2.0 * u * dot(x, v));
     double const along = by_w * g.w + dot(by_u, u);
     by_w -= along * g.w, by_u -= along * u;
     to[6] += by_w / g.norm;
@@ -267,6 +279,7 @@ class pixel_tracer {
 
   gaussian_model const& model_;
   render_options const& options_;
+  kernel kernel_;
   std::vector<body> const& bodies_;
   std::size_t stored_, active_;
 };
@@ -305,9 +318,10 @@ std::vector<std::vector<u32>> blocks_of(camera const& view, std::vector<u32> con
 }
 
 void check(gaussian_model const& model, camera const& view, render_options const& options, int active_degree,
-           std::vector<u32> const& pixels, std::vector<double> const& color_gradient) {
+           std::vector<u32> const& pixels, std::vector<double> const& color_gradient, int kernel_degree) {
   if (active_degree < 0 || active_degree > model.sh_degree || model.sh_degree > 3)
     throw invalid_argument("reference: the active SH degree must lie between 0 and the model's, and that be at most 3");
+  if (kernel_degree < 1) throw invalid_argument("reference: the kernel's degree must be at least 1");
   if (!(options.alpha_min > 0)) throw invalid_argument("reference: alpha_min must be positive");
   if (!color_gradient.empty() && color_gradient.size() != 3 * pixels.size())
     throw invalid_argument("reference: the colour's gradient must have three values a pixel");
@@ -329,8 +343,9 @@ std::vector<u32> all_pixels(camera const& view) {
 
 reference_image trace_reference(gaussian_model const& model, camera const& view, render_options const& options,
                                 int active_degree, std::vector<u32> const& pixels,
-                                std::vector<double> const& color_gradient) {
-  check(model, view, options, active_degree, pixels, color_gradient);
+                                std::vector<double> const& color_gradient, int kernel_degree) {
+  check(model, view, options, active_degree, pixels, color_gradient, kernel_degree);
+  kernel const falloff{kernel_degree};
   std::size_t const n = model.size();
   bool const backwards = !color_gradient.empty();
   reference_image out;
@@ -348,9 +363,9 @@ reference_image trace_reference(gaussian_model const& model, camera const& view,
   for (std::size_t k = 0; k < pixels.size(); ++k) rays[k] = ray_through(view, pixels[k]);
   std::vector<body> bodies(n);
 #pragma omp parallel for
-  for (std::size_t i = 0; i < n; ++i) bodies[i] = body_of(model, i, view.position, options.alpha_min);
+  for (std::size_t i = 0; i < n; ++i) bodies[i] = body_of(model, i, view.position, options.alpha_min, falloff);
 
-  pixel_tracer const tracer(model, options, active_degree, bodies);
+  pixel_tracer const tracer(model, options, active_degree, falloff, bodies);
   auto const blocks = blocks_of(view, pixels);
 #pragma omp parallel for ordered schedule(dynamic, 1)
   for (std::size_t b = 0; b < blocks.size(); ++b) {

@@ -4,7 +4,8 @@
 //
 // For a ray o + t d, |d| = 1, and a Gaussian with M = S^-1 R^T:
 //   o_g = M (o - mean), d_g = M d, t = -o_g.d_g / d_g.d_g, p = o_g + t d_g,
-//   alpha = min(0.99, sigmoid(opacity) exp(-|p|^2 / 2)), a hit where alpha >= alpha_min and t > near,
+//   alpha = min(0.99, sigmoid(opacity) exp(-4.5 (|p| / 3)^n)), n the kernel's degree (2: a Gaussian),
+//   a hit where alpha >= alpha_min and t > near,
 //   colour = sum_i T_i alpha_i c_i + T background, T_(i+1) = T_i (1 - alpha_i), hits in the order (t, id), until
 //   T < transmittance_min; the hit that crosses counts.
 // Backwards, with g = dL/dcolour and B_i what is seen behind hit i with T = 1,
@@ -49,6 +50,6 @@ std::vector<u32> all_pixels(camera const& view);
 // not have, and a pixel at which the lens cannot be inverted.
 reference_image trace_reference(gaussian_model const& model, camera const& view, render_options const& options,
                                 int active_degree, std::vector<u32> const& pixels,
-                                std::vector<double> const& color_gradient = {});
+                                std::vector<double> const& color_gradient = {}, int kernel_degree = 2);
 
 }  // namespace gart
