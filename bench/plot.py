@@ -395,9 +395,9 @@ class Pages:
             sections += ["", f"{result['pixels']:,} pixels of {len(result['views'])} views, medians of "
                          f"{result['repeats']}; the whole run took {result['seconds']:.0f} s. "
                          + (f"Not compiled there: {absent}. " if absent else "") + source(result) + ".", ""]
-            uncut += [[name, f"`{r['name']}`", f"{r['alpha_min']:.4g}", f"{r['image']['max']:.1e}",
+            uncut += [[name, f"`{r['name']}`", f"{r['approximations']['alpha_min']:.4g}", f"{r['image']['max']:.1e}",
                        f"{r['image']['psnr']:.1f}", f"{r['gradient_worst']:.1e}"]
-                      for r in sorted(result["uncut"]["settings"], key=lambda r: r["alpha_min"])]
+                      for r in sorted(result["uncut"]["settings"], key=lambda r: r["approximations"]["alpha_min"])]
         if sections:
             self.tables["tradeoff"] = sections
             self.tables["uncut"] = table(["scene", "setting", "alpha_min", "image, max", "PSNR, dB",

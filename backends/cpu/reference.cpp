@@ -209,7 +209,7 @@ class pixel_tracer {
       shade(h, basis);
       h.transmittance = transmittance;
       transmittance *= 1 - h.alpha;
-      if (transmittance < options_.transmittance_min) break;
+      if (transmittance < options_.transmittance_min || count == options_.max_hits) break;
     }
     list.resize(count);
     return list;

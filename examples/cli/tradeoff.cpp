@@ -111,7 +111,7 @@ class tradeoff_run {
     prepare_folder(a_.out);
 
     reference_ = settings_.front().use.render;
-    reference_.transmittance_min = 0;
+    reference_.transmittance_min = 0, reference_.max_hits = 0;
     if (a_.reference_alpha_min > 0) reference_.alpha_min = a_.reference_alpha_min;
     auto const renderer = gart::make_renderer(settings_.front().use.row);
     renderer->set_model(file_.model);
@@ -147,7 +147,7 @@ class tradeoff_run {
             {"repeats", a_.repeats},
             {"background", background_},
             {"gradient_of", first.truth.empty() ? "a random weight of every colour" : "the training loss"},
-            {"reference", {{"alpha_min", reference_.alpha_min}, {"t_min", reference_.transmittance_min}}}};
+            {"reference", approximations_of(reference_)}};
   }
 
   json measure(setting const& s) {
@@ -222,8 +222,7 @@ class tradeoff_run {
             {"tracer", row.tracer},
             {"backward", row.backward},
             {"sh_degree", row.sh_degree},
-            {"alpha_min", s.use.render.alpha_min},
-            {"t_min", s.use.render.transmittance_min},
+            {"approximations", approximations_of(s.use.render)},
             {"rebuild_every", s.use.render.rebuild_every},
             {"shrink", s.use.shrink},
             {"image", {{"max", errors.image_max()}, {"rms", errors.image_rms()}, {"psnr", errors.psnr()}}},

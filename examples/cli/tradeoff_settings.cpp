@@ -62,6 +62,8 @@ std::vector<setting> settings_of(configuration const& exact) {
   t.sweep<>(
       "t_min", [](c& x) -> float& { return x.render.transmittance_min; },
       std::vector<float>{0.0f, 1e-5f, 1e-4f, 1e-3f, 1e-2f, 0.05f});
+  t.sweep<>(
+      "max_hits", [](c& x) -> gart::u32& { return x.render.max_hits; }, std::vector<gart::u32>{64, 32, 16, 8});
   std::vector<int> degrees;
   for (int d = exact.row.sh_degree - 1; d >= 0; --d) degrees.push_back(d);
   t.sweep<>(

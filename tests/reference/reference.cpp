@@ -13,14 +13,26 @@ namespace {
 
 using doubles = std::vector<double>;
 
-std::vector<oracle::scene> all_scenes() {
-  auto all = oracle::scenes(gart_test::seed());
-  all.push_back(oracle::smooth_scene(gart_test::seed(), 3, 1000.0f));  // hits behind the camera count
-  // Many blocks, most of which most of the Gaussians cannot be met from.
-  all.push_back(all.front());
-  all.back().name = "cloud, from afar through a long lens";
-  all.back().view.width = 150, all.back().view.height = 110;
-  all.back().view.fx *= 6, all.back().view.fy *= 6, all.back().view.cx = 75, all.back().view.cy = 55;
+struct kernel_scene {
+  oracle::scene scene;
+  int kernel_degree = 2;
+};
+
+// Many blocks, most of which most of the Gaussians cannot be met from.
+oracle::scene from_afar() {
+  oracle::scene s = oracle::scenes(gart_test::seed()).front();
+  s.name = "cloud, from afar through a long lens";
+  s.view.width = 150, s.view.height = 110;
+  s.view.fx *= 6, s.view.fy *= 6, s.view.cx = 75, s.view.cy = 55;
+  return s;
+}
+
+std::vector<kernel_scene> all_scenes() {
+  std::vector<kernel_scene> all;
+  for (auto const& s : oracle::scenes(gart_test::seed())) all.push_back({s});
+  all.push_back({oracle::smooth_scene(gart_test::seed(), 3, 1000.0f)});  // hits behind the camera count
+  all.push_back({from_afar()});
+  for (int degree : {1, 3, 4, 5, 8}) all.push_back({oracle::kernel_scene(gart_test::seed(), degree), degree});
   return all;
 }
 
@@ -62,9 +74,11 @@ void check_gradients(gart::reference_gradients const& got, oracle::parameters co
 TEST_CASE("images and gradients are the oracle's") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
-  for (auto const& s : all_scenes()) {
+  for (auto const& [s, kernel_degree] : all_scenes()) {
     CAPTURE(s.name);
-    oracle::parameters const m(s.model);
+    CAPTURE(kernel_degree);
+    oracle::parameters m(s.model);
+    m.kernel_degree = kernel_degree;
     auto const expected = oracle::render(m, s.view, s.options, s.active_degree);
     auto gradient = random_gradient(expected.pixels.size());
     for (std::size_t p = 0; p < expected.pixels.size(); ++p)
@@ -93,7 +107,7 @@ TEST_CASE("images and gradients are the oracle's") {
 TEST_CASE("a few pixels in any order are those of the image, and their gradient is theirs alone") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
-  auto const s = all_scenes().back();
+  auto const s = from_afar();
   auto order = gart::all_pixels(s.view);
   std::mt19937_64 engine(seed);
   std::shuffle(order.begin(), order.end(), engine);
@@ -121,7 +135,7 @@ TEST_CASE("a few pixels in any order are those of the image, and their gradient 
 TEST_CASE("no Gaussian that is hit is left out of a block") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
-  auto s = all_scenes().front();
+  auto s = oracle::scenes(seed).front();
   s.view.width = s.view.height = 96;
   s.view.fx = s.view.fy = 75, s.view.cx = s.view.cy = 48;
   // Balls, whose hits reach the sphere they are bounded by, about as large as a block.
