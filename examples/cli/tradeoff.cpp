@@ -97,10 +97,11 @@ class tradeoff_run {
     use_threads(a_.row.threads);
     file_ = load_model(a_.model);
     configuration exact;
-    exact.row = a_.row.request;
-    exact.row.sh_degree = file_.model.sh_degree, exact.row.backward = a_.backward;
+    gart::row_request wanted = a_.row.request;
+    wanted.backward = a_.backward;
+    exact.row = row_request_for(file_, a_.model, wanted);
     gart::row_info const row = gart::resolve(exact.row);
-    exact.row = {row.backend, row.tracer, row.backward, row.sh_degree};
+    exact.row.backend = row.backend, exact.row.tracer = row.tracer, exact.row.backward = row.backward;
     exact.render = file_.render;
     settings_ = selected_settings(settings_of(exact), a_.settings);
 
@@ -124,7 +125,7 @@ class tradeoff_run {
       set_color_gradient(v, renderer->render(v.view, settings_.front().use.render).color, reference_.background,
                          ssim_weight);
       auto const start = std::chrono::steady_clock::now();
-      trace_reference(v, file_.model, reference_);
+      trace_reference(v, file_, reference_);
       reference_seconds_ += seconds_since(start);
     }
   }
@@ -139,6 +140,7 @@ class tradeoff_run {
             {"cameras", fs::absolute(a_.cameras).lexically_normal().filename().string()},
             {"gaussians", file_.model.size()},
             {"sh_degree", file_.model.sh_degree},
+            {"kernel_degree", file_.kernel_degree},
             {"backend", exact.row.backend},
             {"width", first.view.width},
             {"height", first.view.height},
@@ -147,7 +149,7 @@ class tradeoff_run {
             {"repeats", a_.repeats},
             {"background", background_},
             {"gradient_of", first.truth.empty() ? "a random weight of every colour" : "the training loss"},
-            {"reference", approximations_of(reference_)}};
+            {"reference", {{"alpha_min", reference_.alpha_min}, {"t_min", reference_.transmittance_min}}}};
   }
 
   json measure(setting const& s) {
@@ -222,7 +224,10 @@ class tradeoff_run {
             {"tracer", row.tracer},
             {"backward", row.backward},
             {"sh_degree", row.sh_degree},
-            {"approximations", approximations_of(s.use.render)},
+            {"kernel_degree", row.kernel_degree},
+            {"tile_size", row.tile_size},
+            {"window", row.window},
+            {"approximations", approximations_of(s.use.render, row)},
             {"rebuild_every", s.use.render.rebuild_every},
             {"shrink", s.use.shrink},
             {"image", {{"max", errors.image_max()}, {"rms", errors.image_rms()}, {"psnr", errors.psnr()}}},

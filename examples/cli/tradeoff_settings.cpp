@@ -56,22 +56,32 @@ std::vector<setting> settings_of(configuration const& exact) {
       x.render.alpha_min = p.render.alpha_min, x.render.transmittance_min = p.render.transmittance_min;
     });
   }
-  t.sweep<>(
+  t.sweep(
       "alpha_min", [](c& x) -> float& { return x.render.alpha_min; },
       std::vector<float>{0.5f / 255, 1.0f / 255, 2.0f / 255, 4.0f / 255, 0.02f, 0.05f});
-  t.sweep<>(
+  t.sweep(
       "t_min", [](c& x) -> float& { return x.render.transmittance_min; },
       std::vector<float>{0.0f, 1e-5f, 1e-4f, 1e-3f, 1e-2f, 0.05f});
-  t.sweep<>(
+  t.sweep(
       "max_hits", [](c& x) -> gart::u32& { return x.render.max_hits; }, std::vector<gart::u32>{64, 32, 16, 8});
   std::vector<int> degrees;
   for (int d = exact.row.sh_degree - 1; d >= 0; --d) degrees.push_back(d);
-  t.sweep<>(
+  t.sweep(
       "sh_degree", [](c& x) -> int& { return x.row.sh_degree; }, degrees);
-  t.sweep<>(
+  t.sweep(
+      "kernel_degree", [](c& x) -> int& { return x.row.kernel_degree; }, std::vector<int>{1, 2, 3, 4, 5, 8});
+  t.sweep(
+      "arithmetic", [](c& x) -> std::string& { return x.row.arithmetic; }, std::vector<std::string>{"fast"});
+  t.sweep(
+      "lt_format", [](c& x) -> std::string& { return x.row.lt_format; }, std::vector<std::string>{"half", "shared"});
+  t.sweep(
+      "tile_size", [](c& x) -> int& { return x.row.tile_size; }, std::vector<int>{4, 16});
+  t.sweep(
+      "window", [](c& x) -> int& { return x.row.window; }, std::vector<int>{16, 64});
+  t.sweep(
       "backward", [](c& x) -> std::string& { return x.row.backward; },
       std::vector<std::string>{"pixel", "hybrid", "primitive", "cleared", "deterministic"});
-  t.sweep<>(
+  t.sweep(
       "tracer", [](c& x) -> std::string& { return x.row.tracer; }, std::vector<std::string>{"tiles", "bvh", "embree"});
   for (int const every : {4, 16}) {
     t.add("rebuild_every", std::to_string(every), [&](c& x) { x.row.tracer = "bvh", x.render.rebuild_every = every; });

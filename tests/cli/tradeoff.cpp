@@ -94,6 +94,7 @@ TEST_CASE("tradeoff measures every knob, names those it has not, and finds the f
   CHECK(error("exact") < 1e-4);
   CHECK(error("t_min=0.01") < error("t_min=0.05"));
   CHECK(error("exact") < error("t_min=0.01"));
+  CHECK(error("exact") < error("max_hits=8"));
   CHECK(error("alpha_min=0.02") < error("alpha_min=0.05"));
   CHECK(error("exact") < error("resolution=1/2"));
   CHECK(error("resolution=1/2") < error("resolution=1/4"));
@@ -108,7 +109,9 @@ TEST_CASE("tradeoff measures every knob, names those it has not, and finds the f
   std::string absent;
   for (auto const& a : result["absent"]) absent += a["name"].get<std::string>() + " ";
   CHECK(has(absent, "tracer=tiles"));  // for openmp and cuda
-  CHECK(has(absent, "backward=deterministic"));
+  for (char const* row :
+       {"backward=deterministic", "kernel_degree=4", "arithmetic=fast", "lt_format=half", "tile_size=4"})
+    CHECK_MESSAGE(has(absent, row), row);
   auto const table = text_of(here / "trade/table.txt");
   CHECK(has(table, "absent  tracer=tiles"));
   CHECK(has(run.out, table));
