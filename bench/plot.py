@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws bench/results/*.json: charts into docs/figures/*.svg, tables into docs/backward.md. Python 3 alone is needed.
+"""Draws bench/results/*.json: charts into docs/figures/*.svg, tables into docs/*.md. Python 3 alone is needed.
 
     python3 bench/plot.py [--results bench/results] [--docs docs]
 
@@ -7,7 +7,9 @@ A table stands in the page between <!-- table NAME --> and <!-- end -->, and is 
 there leaves its chart and its table as they are; a result that names a failed measurement shows it as such.
 """
 import argparse
+import glob
 import json
+import math
 import os
 import re
 
@@ -179,6 +181,62 @@ def lines(path, title, unit, x_title, series, note):
     svg.write(path)
 
 
+def scatter(svg, top, points, x_title, y_title):
+    """points: [(label, x, y, on the front)] over two logarithmic scales, in a panel 400 high that begins at `top`."""
+    left, right, bottom = 80, 1010, top + 360
+    xs, ys = [p[1] for p in points], [p[2] for p in points]
+    spread = lambda values, room: (math.log10(min(values)) - room, math.log10(max(values)) + room)
+    (x_low, x_high), (y_low, y_high) = spread(xs, 0.06), spread(ys, 0.2)
+    x_of = lambda v: left + (right - left) * (math.log10(v) - x_low) / (x_high - x_low)
+    y_of = lambda v: bottom - (bottom - top) * (math.log10(v) - y_low) / (y_high - y_low)
+
+    def decade_ticks(low, high):
+        steps = (1, 2, 3, 5, 7) if high - low < 1 else (1, 2, 5) if high - low < 2.3 else (1,)
+        values = (m * 10.0 ** e for e in range(math.floor(low), math.ceil(high) + 1) for m in steps)
+        return [v for v in values if low <= math.log10(v) <= high]
+
+    for v in decade_ticks(x_low, x_high):
+        svg.line(x_of(v), top, x_of(v), bottom)
+        svg.text(x_of(v), bottom + 18, f"{v:g}", anchor="middle", color=SOFT)
+    for v in decade_ticks(y_low, y_high):
+        svg.line(left, y_of(v), right, y_of(v))
+        svg.text(left - 8, y_of(v) + 4, f"{v:g}", anchor="end", color=SOFT)
+    svg.text(right, bottom + 36, x_title, anchor="end", color=SOFT)
+    svg.text(left, top - 10, y_title, color=SOFT)
+
+    front = sorted((p for p in points if p[3]), key=lambda p: p[1])
+    corners = [(x_of(front[0][1]), y_of(front[0][2]))]
+    for _, x, y, _ in front[1:]:
+        corners += [(x_of(x), corners[-1][1]), (x_of(x), y_of(y))]
+    svg.add(f'<polyline points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in corners)}" fill="none" '
+            f'stroke="{COLORS[0]}" stroke-width="1.6"/>')
+    taken = []
+    for label, x, y, on_front in sorted(points, key=lambda p: p[3]):
+        taken.append((x_of(x) - 4, y_of(y) - 4, x_of(x) + 4, y_of(y) + 4))
+        svg.add(f'<circle cx="{x_of(x):.1f}" cy="{y_of(y):.1f}" r="4" fill="{COLORS[0] if on_front else "#b9c0c6"}">'
+                f"<title>{text_of(label)}: {x:.3g} ms, error {y:.2g}</title></circle>")
+    # The front chooses the places of its labels first; further off, a thin line leads to the point.
+    for label, x, y, on_front in sorted(points, key=lambda p: (not p[3], p[1])):
+        at, width = (x_of(x), y_of(y)), 6.3 * len(label)
+        for reach in (8, 20, 36, 56, 80, 110) if on_front else (8, 20, 36):
+            for across, down in ((1, 0), (-1, 0), (1, -1), (1, 1), (-1, -1), (-1, 1), (0, -1), (0, 1)):
+                end = (at[0] + across * reach, at[1] + down * reach)
+                x0 = end[0] if across > 0 else end[0] - width if across < 0 else end[0] - width / 2
+                box = (x0, end[1] - 7, x0 + width, end[1] + 7)
+                if box[0] < left or box[2] > right + 40 or box[1] < top or box[3] > bottom:
+                    continue
+                if any(box[0] < o[2] and o[0] < box[2] and box[1] < o[3] and o[1] < box[3] for o in taken):
+                    continue
+                break
+            else:
+                continue
+            taken.append(box)
+            if reach > 10:
+                svg.line(*at, *end)
+            svg.text(x0, end[1] + 4, label, size=11, color=INK if on_front else "#8b949e")
+            break
+
+
 def table(header, rows):
     out = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
     return out + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
@@ -308,19 +366,79 @@ class Pages:
             [[f"`{name}`", shown(row, "serial"), shown(row, "openmp")] for name, row in rows.items()]
         ) + ["", f"{result['scene']}, {result['image']}, {result['machine']['cores']} cores; {source(result)}."]
 
+    def tradeoff(self):
+        sections, uncut = [], []
+        for path in sorted(glob.glob(os.path.join(self.results, "tradeoff_*.json"))):
+            result = self.load(os.path.basename(path)[:-5])
+            name, runs = result["scene"], result["runs"]
+            exact = runs[0]
+            size = f"{result['width']} x {result['height']}"
+            subject = f"{name}: {result['gaussians']:,} Gaussians, {size}, {result['backend']}"
+            svg = Svg(1060, 960, subject)
+            for top, which, title, error in (
+                    (90, "image", "root mean square error of the colour", lambda r: r["image"]["rms"]),
+                    (510, "gradients", "relative error of the gradient, worst group", lambda r: r["gradient_worst"])):
+                points = [(r["name"], r["total_ms"], error(r), r["front"][which]) for r in runs if error(r)]
+                scatter(svg, top, points, "forward and backward, ms a view", title)
+            svg.text(20, 940, source(result), size=11, color=SOFT)
+            svg.write(self.figure("tradeoff_" + name))
+            worst = lambda r: max(r["gradients"], key=lambda group: r["gradients"][group] or 0)
+            marks = lambda r: "".join(mark for mark, which in (("i", "image"), ("g", "gradients")) if r["front"][which])
+            rows = [[f"`{r['name']}`", marks(r), f"{r['image']['max']:.1e}", f"{r['image']['psnr']:.1f}",
+                     f"{r['gradient_worst']:.1e} ({worst(r)})", f"{r['prepare_ms']:.1f}", f"{r['forward_ms']:.1f}",
+                     f"{r['backward_ms']:.1f}", f"{r['total_ms']:.1f}", f"{exact['total_ms'] / r['total_ms']:.2f}x",
+                     f"{r['lt_bytes'] / 1e6:.1f}", f"{r['peak_bytes'] / 1e6:.0f}"] for r in runs]
+            sections += [f"### {subject}", "", f"![Error against time, {name}](figures/tradeoff_{name}.svg)", ""]
+            sections += table(["setting", "front", "image, max", "PSNR, dB", "gradient, worst group", "prepare, ms",
+                               "forward, ms", "backward, ms", "total, ms", "against exact", "LT, MB", "peak, MB"], rows)
+            absent = ", ".join(f"`{a['name']}`" for a in result["absent"])
+            sections += ["", f"{result['pixels']:,} pixels of {len(result['views'])} views, medians of "
+                         f"{result['repeats']}; the whole run took {result['seconds']:.0f} s. "
+                         + (f"Not compiled there: {absent}. " if absent else "") + source(result) + ".", ""]
+            uncut += [[name, f"`{r['name']}`", f"{r['approximations']['alpha_min']:.4g}", f"{r['image']['max']:.1e}",
+                       f"{r['image']['psnr']:.1f}", f"{r['gradient_worst']:.1e}"]
+                      for r in sorted(result["uncut"]["settings"], key=lambda r: r["approximations"]["alpha_min"])]
+        if sections:
+            self.tables["tradeoff"] = sections
+            self.tables["uncut"] = table(["scene", "setting", "alpha_min", "image, max", "PSNR, dB",
+                                          "gradient, worst group"], uncut)
+
+    def presets(self):
+        rows = []
+        for path in sorted(glob.glob(os.path.join(self.results, "presets_*.json"))):
+            result = self.load(os.path.basename(path)[:-5])
+            trade = self.load("tradeoff_" + result["scene"])
+            of = {r["name"].replace("preset=", ""): r for r in trade["runs"]} if trade else {}
+            for r in result["runs"]:
+                a, t = r["approximations"], of.get(r["preset"])
+                rows.append([result["scene"], r["preset"], f"{a['alpha_min']:.3g}", f"{a['t_min']:.3g}"] +
+                            ([f"{t['image']['psnr']:.1f}", f"{t['gradient_worst']:.1e}", f"{t['total_ms']:.1f}"] if t
+                             else ["", "", ""]) +
+                            [f"{r['psnr']:.2f}", f"{r['ssim']:.4f}", f"{r['seconds']:.0f}", f"{r['gaussians']:,}"])
+            rows.append([f"{result['scene']}: {source(result)}"] + [""] * 10)
+        if rows:
+            self.tables["presets"] = table(["scene", "preset", "alpha_min", "t_min", "image PSNR, dB",
+                                            "gradient, worst group", "a view, ms", "trained PSNR, dB", "SSIM",
+                                            "training, s", "Gaussians"], rows)
+
     def write_tables(self):
-        path = os.path.join(self.docs, "backward.md")
-        with open(path) as f:
-            page = f.read()
-        for name, rows in self.tables.items():
-            page, found = re.subn(rf"(<!-- table {name} -->\n).*?(<!-- end -->)",
-                                  lambda m: m.group(1) + "\n".join(rows) + "\n" + m.group(2), page, flags=re.DOTALL)
-            if not found:
-                print(f"{path}: has no place for the table {name}")
-        with open(path + ".part", "w") as f:
-            f.write(page)
-        os.replace(path + ".part", path)
-        print("wrote", path)
+        for path in sorted(glob.glob(os.path.join(self.docs, "*.md"))):
+            with open(path) as f:
+                page = before = f.read()
+            for name, rows in list(self.tables.items()):
+                page, found = re.subn(rf"(<!-- table {name} -->\n).*?(<!-- end -->)",
+                                      lambda m: m.group(1) + "\n".join(rows) + "\n" + m.group(2), page,
+                                      flags=re.DOTALL)
+                if found:
+                    del self.tables[name]
+            if page == before:
+                continue
+            with open(path + ".part", "w") as f:
+                f.write(page)
+            os.replace(path + ".part", path)
+            print("wrote", path)
+        for name in self.tables:
+            print(f"{self.docs}: no page has a place for the table {name}")
 
 
 def main():
@@ -335,6 +453,8 @@ def main():
     pages.memory()
     pages.stages()
     pages.cpu()
+    pages.tradeoff()
+    pages.presets()
     pages.write_tables()
 
 

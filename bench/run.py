@@ -3,7 +3,7 @@
 
     python3 bench/run.py --build DIR --scenes DIR --what tests,stages,paper
 
-What (comma-separated; default all but sanitize, cpu and traits):
+What (comma-separated; default all but sanitize, cpu, traits, tradeoff and presets):
   tests       every CUDA test of the build
   sanitize    compute-sanitizer memcheck and racecheck over a training step of each strategy
   stages      gart_bench_cuda on the first scene: each stage on its own, and tile sizes 4, 8 and 16
@@ -13,6 +13,8 @@ What (comma-separated; default all but sanitize, cpu and traits):
   traits      `gart bench`: a training step by row (docs/traits.md): SH and kernel degree, arithmetic, LT format, tile,
               window, determinism; on --backend, and bytes a Gaussian. Needs -DGART_VARIANTS=ON
   paper       strategies, memory and stages
+  tradeoff    `gart tradeoff` on the first scene and on every --model: what each approximation costs and buys
+  presets     `gart train` with each --preset on every --capture: what they cost in quality
 
 Scenes are DIR/NAME.ply with DIR/NAME.json, a list of cameras {"name","width","height","fx","fy","cx","cy","c2w"}.
 synth_1000k is the scene of a million Gaussians, and so on. A missing one is made by --generator, a command in which
@@ -36,7 +38,8 @@ import sys
 import tempfile
 import time
 
-PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits")
+PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff", "presets")
+PRESETS = ("exact", "balanced", "fast")
 SKIPPED = 77
 
 # Rows of docs/traits.md: name, SH degree, kernel degree, options of gart bench.
@@ -324,6 +327,45 @@ class Bench:
             if "error" not in result:
                 self.say(f"{row}: step {result['step_ms']:.2f} ms")
         self.write("traits" if backend == "cuda" else "traits_" + backend, runs)
+    def gart_tradeoff(self, ply, cameras, arguments):
+        folder = os.path.join(self.temporary, "tradeoff")
+        shutil.rmtree(folder, ignore_errors=True)
+        done = run([self.program("gart"), "tradeoff", ply, cameras, "--out", folder, "--backend", self.a.backend,
+                    "--quiet", *arguments])
+        if done.returncode != 0:
+            raise Failure(f"gart tradeoff {ply}: {last_line(done.stderr)}")
+        with open(os.path.join(folder, "tradeoff.json")) as f:
+            return json.load(f)
+
+    def tradeoff(self):
+        models = [self.scene(thousands) for thousands in self.a.counts[:1]] + self.a.model
+        for name, ply, cameras in models:
+            result = self.gart_tradeoff(ply, cameras, ["--repeats", self.a.repeats, "--views", self.a.views])
+            # The cut-off that the model was trained with, against hardly any: what it leaves out itself.
+            uncut = self.gart_tradeoff(ply, cameras, ["--repeats", 1, "--views", self.a.views, "--settings", "alpha_min",
+                                                      "--reference-alpha-min", "1e-5"])
+            result["uncut"] = {"reference": uncut["reference"], "settings": uncut["settings"]}
+            self.write("tradeoff_" + name, result.pop("settings"), scene=name, **result)
+            self.say(f"{name}: {len(result['absent'])} settings not compiled, {result['seconds']:.0f} s")
+
+    def presets(self):
+        for name, capture in self.a.capture:
+            runs = []
+            for preset in PRESETS:
+                folder = os.path.join(self.temporary, "preset")
+                shutil.rmtree(folder, ignore_errors=True)
+                done = run([self.program("gart"), "train", capture, "--out", folder, "--preset", preset, "--backend",
+                            self.a.backend, "--quiet", *shlex.split(self.a.train)])
+                if done.returncode != 0:
+                    self.fail(f"{name}, {preset}: {last_line(done.stderr)}")
+                    continue
+                with open(os.path.join(folder, "metrics.json")) as f:
+                    metrics = json.load(f)
+                kept = ("psnr", "ssim", "seconds", "gaussians", "iterations", "approximations", "backend", "image_size",
+                        "test_views", "peak_bytes")
+                runs.append({"preset": preset, **{key: metrics[key] for key in kept}})
+                self.say(f"{name}, {preset}: {metrics['psnr']:.2f} dB, {metrics['seconds']:.0f} s")
+            self.write("presets_" + name, runs, scene=name, train=self.a.train)
 
 
 def arguments():
@@ -337,14 +379,20 @@ def arguments():
     parser.add_argument("--sanitize", action="store_true", help="the part sanitize besides")
     parser.add_argument("--generator", help="command that makes a missing scene: {dir} {name} {count}")
     parser.add_argument("--counts", type=lambda t: [int(x) for x in listed(t)], default=[1000, 2000, 3000, 4000, 5000],
-                        help="thousands of Gaussians; strategies take the first two, stages the first")
+                        help="thousands of Gaussians; strategies take the first two, stages and tradeoff the first; '' "
+                             "for no scene in tradeoff")
     parser.add_argument("--tracers", type=listed, default=["tiles", "bvh"], help="memory takes the first")
     parser.add_argument("--backwards", type=listed, default=["pixel", "hybrid", "primitive"])
     parser.add_argument("--views", type=int, default=4, help="cameras of the strategies")
     parser.add_argument("--repeats", type=int, default=20, help="measured steps a camera; the median counts")
-    parser.add_argument("--backend", default="cuda", help="of the traits")
+    parser.add_argument("--backend", default="cuda", help="of traits, tradeoff and presets")
     parser.add_argument("--filter", default=".", help="stages and cpu: benchmarks by regular expression")
     parser.add_argument("--min-time", type=float, default=0.2, help="stages and cpu: seconds a benchmark")
+    parser.add_argument("--model", nargs=3, action="append", default=[], metavar=("NAME", "PLY", "CAMERAS"),
+                        help="tradeoff: a trained model and its capture or camera JSON; may be repeated")
+    parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("NAME", "DATASET"),
+                        help="presets: a capture to train on; may be repeated")
+    parser.add_argument("--train", default="", help="presets: further options of gart train, in one string")
     parser.add_argument("--commit", help="what was built, where the folder is no git checkout")
     a = parser.parse_args()
     wanted = a.what + (["sanitize"] if a.sanitize else [])

@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
   add_render(app, selected);
   add_eval(app, selected);
   add_bench(app, selected);
+  add_tradeoff(app, selected);
   add_synth(app, selected);
   add_info(app, selected);
 

@@ -203,7 +203,8 @@ std::string settings(json const& m, json const& config) {
   html +=
       "</div><h2>How it was measured</h2><p>Split: " + text_of(m, "split") + "; " + count_of(m, "test_views") +
       " test views. Images resized: " + text_of(m, "resize_filter") + ". Background: " + text_of(m, "background") +
-      ". A Gaussian is hit where its alpha is at least " + fixed(number_of(m["approximations"], "alpha_min"), 6) +
+      ". Approximations: preset " + text_of(m["approximations"], "preset") +
+      "; a Gaussian is hit where its alpha is at least " + fixed(number_of(m["approximations"], "alpha_min"), 6) +
       ", and a ray ends below a transmittance of " + fixed(number_of(m["approximations"], "t_min"), 6) + cap +
       ". PSNR and SSIM (11 x 11 Gaussian window, sigma 1.5) are taken per view on [0, 1] and averaged over views.</p>";
   if (m.contains("notes") && !m["notes"].empty()) {

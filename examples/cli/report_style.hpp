@@ -5,9 +5,10 @@ namespace gart_cli {
 
 inline constexpr char report_style[] = R"css(
 :root { color-scheme: light dark; --page: #fbfbfa; --card: #ffffff; --ink: #1c1e21; --soft: #667079; --rule: #e4e6e8;
-  --one: #2563c9; --two: #d9730d; --bar: #c9d8f0; }
+  --one: #2563c9; --two: #d9730d; --bar: #c9d8f0;
+  --dim: #b9c0c6; }
 @media (prefers-color-scheme: dark) { :root { --page: #131517; --card: #1b1e21; --ink: #e6e8ea; --soft: #98a1aa;
-  --rule: #2d3236; --one: #74a7f5; --two: #f0a04b; --bar: #2c4468; } }
+  --rule: #2d3236; --one: #74a7f5; --two: #f0a04b; --bar: #2c4468; --dim: #566069; } }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--page); color: var(--ink); font: 15px/1.5 system-ui, sans-serif; }
 main { max-width: 1180px; margin: 0 auto; padding: 40px 24px 64px; }
@@ -32,6 +33,9 @@ svg { display: block; width: 100%; height: auto; } .grid { stroke: var(--rule); 
 .tick { fill: var(--soft); font: 11px system-ui, sans-serif; font-variant-numeric: tabular-nums; }
 polyline { fill: none; stroke-width: 1.6; stroke-linejoin: round; stroke-linecap: round; }
 polyline.line-1 { stroke: var(--one); } polyline.line-2 { stroke: var(--two); }
+circle.dim { fill: var(--dim); } text.dim, tr.dim { fill: var(--soft); color: var(--soft); }
+.label { fill: var(--ink); font: 11px system-ui, sans-serif; } .leader { stroke: var(--rule); stroke-width: 1; }
+.wide { overflow-x: auto; }
 circle.line-1 { fill: var(--one); } circle.line-2 { fill: var(--two); }
 .view { margin-bottom: 22px; } .view .images { display: grid; grid-template-columns: repeat(3, 1fr); gap: 8px; }
 .view img { display: block; width: 100%; border-radius: 6px; border: 1px solid var(--rule); }

@@ -1,10 +1,10 @@
 #include "svg_chart.hpp"
 
 #include "progress.hpp"
+#include "svg_axis.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 namespace gart_cli {
@@ -12,58 +12,6 @@ namespace gart_cli {
 namespace {
 
 constexpr double width = 560, height = 230, left = 46, right = 14, top = 10, bottom = 34;
-
-// "12k" for 12000, and no more decimals than tell ticks `step` apart.
-std::string tick_text(double value, double step) {
-  if (std::abs(value) >= 1e6) return fixed(value / 1e6, step < 1e6 ? 1 : 0) + "M";
-  if (std::abs(value) >= 1e4 || (std::abs(value) >= 1e3 && step >= 100)) {
-    return fixed(value / 1e3, step < 1e3 ? 1 : 0) + "k";
-  }
-  return fixed(value, step >= 1 ? 0 : static_cast<int>(std::ceil(-std::log10(step) - 1e-9)));
-}
-
-double nice_step(double range, int ticks) {
-  double const rough = range / ticks, power = std::pow(10.0, std::floor(std::log10(rough)));
-  double const mantissa = rough / power;
-  return power * (mantissa <= 1 ? 1 : mantissa <= 2 ? 2 : mantissa <= 5 ? 5 : 10);
-}
-
-struct axis {
-  double low = 0, high = 1;
-  bool logarithmic = false;
-  std::vector<std::pair<double, std::string>> ticks;
-
-  double place(double v) const {
-    return logarithmic ? (std::log(v) - std::log(low)) / (std::log(high) - std::log(low)) : (v - low) / (high - low);
-  }
-};
-
-axis linear_axis(double low, double high, int ticks, bool round_ends) {
-  if (!(high > low)) low -= 0.5 * std::max(1e-3, std::abs(low)), high = low + std::max(1e-3, std::abs(low) * 1.5);
-  double const step = nice_step(high - low, ticks);
-  axis a;
-  a.low = round_ends ? std::floor(low / step + 1e-9) * step : low;
-  a.high = round_ends ? std::ceil(high / step - 1e-9) * step : high;
-  for (double v = std::ceil(a.low / step - 1e-9) * step; v <= a.high + 1e-9 * step; v += step) {
-    a.ticks.emplace_back(v, tick_text(std::abs(v) < 1e-9 * step ? 0 : v, step));
-  }
-  return a;
-}
-
-axis log_axis(double low, double high) {
-  axis a;
-  a.logarithmic = true;
-  a.low = low / 1.1, a.high = high * 1.1;
-  std::vector<double> const densest{1, 1.5, 2, 3, 4, 6, 8}, dense{1, 2, 5}, sparse{1};
-  for (double const m : a.high / a.low < 10 ? densest : a.high / a.low < 200 ? dense : sparse) {
-    for (int e = static_cast<int>(std::floor(std::log10(a.low))); e <= std::ceil(std::log10(a.high)); ++e) {
-      double const v = m * std::pow(10.0, e);
-      if (v >= a.low && v <= a.high)
-        a.ticks.emplace_back(v, tick_text(v, std::pow(10.0, std::min(0, e)) * (m == 1.5 ? 0.1 : 1)));
-    }
-  }
-  return a;
-}
 
 std::string number(double v) { return fixed(v, 1); }
 
@@ -110,8 +58,8 @@ std::string to_svg(chart const& c) {
   if (most < 2) return "";
   if (c.from_zero) low = 0;
 
-  axis const x = linear_axis(std::min(x_low, 0.0), x_high, 6, false);
-  axis const y = c.logarithmic ? log_axis(low, high) : linear_axis(low, high, 4, true);
+  chart_axis const x = linear_axis(std::min(x_low, 0.0), x_high, 6, false);
+  chart_axis const y = c.logarithmic ? log_axis(low, high) : linear_axis(low, high, 4, true);
   auto const at_x = [&](double v) { return left + x.place(v) * (width - left - right); };
   auto const at_y = [&](double v) { return height - bottom - y.place(v) * (height - top - bottom); };
 

@@ -296,6 +296,7 @@ class training_run {
     m["backend"] = row_.backend, m["tracer"] = row_.tracer, m["backward"] = row_.backward;
     m["kernel_degree"] = row_.kernel_degree;
     m["approximations"] = approximations_of(train_options_of(a_).render, row_);
+    m["approximations"]["preset"] = a_.preset;
     m["seconds"] = course_.seconds;
     m["iterations_per_second"] = course_.seconds > 0 ? a_.iterations / course_.seconds : 0;
     m["wall_seconds"] = {
@@ -343,7 +344,10 @@ void add_train(CLI::App& app, command& selected) {
       "\nExamples:\n"
       "  gart train lego --out run --downscale 4 --iterations 2000 --max-gaussians 20000\n"
       "  gart train --resume --out run");
-  train->callback([a, &selected] { selected = [a] { return training_run(*a).run(); }; });
+  train->callback([a, train, &selected] {
+    apply_preset(*train, *a);
+    selected = [a] { return training_run(*a).run(); };
+  });
 }
 
 }  // namespace gart_cli

@@ -2,6 +2,7 @@
 
 #include "commands.hpp"
 #include "output.hpp"
+#include "presets.hpp"
 
 #include <gart/core/version.hpp>
 
@@ -76,10 +77,15 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "Memory for what the forward pass records for primitive;\na step that needs more falls back to "
                  "hybrid, which needs a\nquarter. 0: no limit"))
       ->check(between(0, 1e6));
+  in_group(r.add(train, "--rebuild-every", a.rebuild_every, "N",
+                 "Steps between builds of the bvh tracer's tree, which is\nrefitted in between; the images are the "
+                 "same"))
+      ->check(between(1, 1e6));
   add_threads(train, a.threads);
   in_group(train.get_option("--threads"));
 
   group = "Accuracy";
+  in_group(r.add(train, "--preset", a.preset, "NAME", presets_help()))->check(one_of(preset_names()));
   in_group(r.add(train, "--alpha-min", a.alpha_min, "A",
                  "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as others have it"))
       ->check(between(1e-6, 0.99));
@@ -113,6 +119,15 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->type_name("N")
       ->capture_default_str()
       ->check(between(0, 1e9));
+}
+
+void apply_preset(CLI::App const& train, train_arguments& a) {
+  preset const& chosen = preset_named(a.preset);
+  auto const set = [&](char const* option, auto& value, auto const& by_preset) {
+    if (train.get_option(option)->count() == 0) value = by_preset;
+  };
+  set("--alpha-min", a.alpha_min, chosen.render.alpha_min);
+  set("--t-min", a.t_min, chosen.render.transmittance_min);
 }
 
 void continue_run(train_arguments& a) {
@@ -159,6 +174,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.render.alpha_min = a.alpha_min;
   o.render.transmittance_min = a.t_min;
   o.render.max_hits = a.max_hits;
+  o.render.rebuild_every = a.rebuild_every;
   return o;
 }
 

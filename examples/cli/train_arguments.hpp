@@ -22,6 +22,7 @@ struct train_arguments {
   // What follows decides the result and is recorded.
   std::string backend = "auto", tracer = "auto", backward = "auto", densify = "mcmc", background = "auto", start;
   std::string arithmetic = "exact", lt_format = "auto";
+  std::string preset = "exact";
   gart::train_options defaults;
   int iterations = defaults.iterations;
   gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
@@ -30,6 +31,7 @@ struct train_arguments {
   float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
   float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;
   gart::u32 max_hits = defaults.render.max_hits;
+  int rebuild_every = defaults.render.rebuild_every;
   double lt_budget_gb = 0;
   gart::u64 seed = defaults.seed;
   recorded_options recorded;
@@ -42,6 +44,8 @@ struct train_arguments {
 };
 
 void add_arguments(CLI::App& train, train_arguments& a);
+// Sets what the preset says and the command line does not.
+void apply_preset(CLI::App const& train, train_arguments& a);
 // Takes the options of the run in `out`, and its dataset where none was named. io_error where there is no such run.
 void continue_run(train_arguments& a);
 gart::row_request row_request_of(train_arguments const& a);

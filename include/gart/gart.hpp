@@ -12,6 +12,7 @@
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
 #include <gart/loss/metrics.hpp>
+#include <gart/reference/reference.hpp>
 #include <gart/render/forward.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>

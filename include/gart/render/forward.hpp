@@ -46,6 +46,12 @@ class frame_records {
   buffer<ray_gaussian, E> records_;
 };
 
+// Gives a tracer those of the options that it has.
+template <class Tracer>
+void configure(Tracer& tracer, render_options const& options) {
+  if constexpr (requires { tracer.rebuild_every; }) tracer.rebuild_every = options.rebuild_every;
+}
+
 // ShDegree is the degree the coefficients are stored with; bands above active_degree are not evaluated.
 template <int ShDegree, execution E, class Tracer, class Record>
 void forward(E& exec, Tracer& tracer, gaussians_view<float const> scene, camera const& view,

@@ -52,7 +52,16 @@ class compiled_session final : public session {
 template <execution E, class Traits, class Tracer, class Strategy>
 class compiled_renderer final : public renderer {
  public:
-  compiled_renderer() : records_(exec_), tracer_(exec_), scene_(exec_, 0, Traits::sh_degree) {}
+  static constexpr int sh_degree = Traits::sh_degree;
+
+  compiled_renderer()
+      : records_(exec_),
+        tracer_(exec_),
+        pass_(exec_),
+        scene_(exec_, 0, sh_degree),
+        gradients_(exec_, 0, sh_degree),
+        color_(exec_),
+        color_gradient_(exec_) {}
   void set_model(gaussian_model const& model) override {
     if (model.sh_degree != Traits::sh_degree) throw invalid_argument("renderer: the model has another SH degree");
     scene_.assign(model);
@@ -60,18 +69,38 @@ class compiled_renderer final : public renderer {
   rendered render(camera const& view, render_options const& options) override {
     return render_image<Traits::sh_degree>(exec_, tracer_, records_, std::as_const(scene_).view(), view, options);
   }
+  void differentiate(camera const& view, render_options const& options, image_float const& color_gradient) override {
+    std::size_t const floats = std::size_t{3} * view.width * view.height;
+    if (color_gradient.data.size() != floats)
+      throw invalid_argument("renderer: the colour's gradient must have three values for each pixel of the view");
+    color_.resize(floats), color_gradient_.assign(color_gradient.data);
+    gradients_.resize_keep(scene_.size());
+    auto const scene = std::as_const(scene_).view();
+    stage_scope stage(exec_, "gradients");
+    records_.template prepare<typename Traits::response>(exec_, scene, view.position, options.alpha_min);
+    configure(tracer_, options);
+    tracer_.prepare(exec_, scene, records_.view(), view, options.alpha_min, options.near);
+    pass_.prepare(exec_, tracer_, scene, view, options.alpha_min, options.near);
+    forward<sh_degree>(exec_, tracer_, scene, view, options, sh_degree, pass_.targets(color_.data()), pass_.record());
+    pass_.template run<sh_degree>(exec_, tracer_, scene, records_.view(), view, options, sh_degree, color_,
+                                  color_gradient_, gradients_);
+  }
+  gaussian_model gradients() const override { return gradients_.to_host(); }
   profiler& profile() override {
     exec_.synchronize();
     return exec_.profile;
   }
   std::size_t peak_bytes() const override { return exec_.memory.peak; }
+  std::size_t lt_bytes() const override { return pass_.lt_bytes(); }
   row_info row() const override { return row_of<E, Traits, Tracer, Strategy>(); }
 
  private:
   E exec_;
   frame_records<E> records_;
   Tracer tracer_;
-  gaussians<E> scene_;
+  backward<E, Strategy, tile_size_of<Tracer>> pass_;
+  gaussians<E> scene_, gradients_;
+  buffer<float, E> color_, color_gradient_;
 };
 
 template <execution E, class Traits, class Tracer, class Strategy>

@@ -13,6 +13,7 @@ rendered render_image(E& exec, Tracer& tracer, frame_records<E>& records, gaussi
   buffer<float, E> color(exec, 3 * pixels), transmittance(exec, pixels), depth(exec, pixels);
   buffer<u32, E> hits(exec, pixels);
   records.template prepare<typename Tracer::response_type>(exec, scene, view.position, options.alpha_min);
+  configure(tracer, options);
   tracer.prepare(exec, scene, records.view(), view, options.alpha_min, options.near);
   forward<ShDegree>(exec, tracer, scene, view, options, ShDegree,
                     {color.data(), transmittance.data(), depth.data(), hits.data()}, record_none{});

@@ -56,6 +56,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   color_.resize(floats), color_gradient_.resize(floats);
 
   records_.template prepare<typename Traits::response>(exec_, constant, view.view.position, render.alpha_min);
+  configure(tracer_, render);
   tracer_.prepare(exec_, constant, records_.view(), view.view, render.alpha_min, render.near);
   auto const prepare = [&](auto& pass, u64 budget) {
     return pass.prepare(exec_, tracer_, constant, view.view, render.alpha_min, render.near, budget);

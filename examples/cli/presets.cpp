@@ -1,0 +1,40 @@
+#include "presets.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+namespace gart_cli {
+
+std::vector<preset> const& presets() {
+  static std::vector<preset> const all = [] {
+    preset exact{"exact", {}, "leaves out what no image shows"};
+    preset balanced{"balanced", {}, ""}, fast{"fast", {}, ""};
+    balanced.render.transmittance_min = 1e-3f;
+    fast.render.alpha_min = 0.02f, fast.render.transmittance_min = 0.01f;
+    return std::vector<preset>{exact, balanced, fast};
+  }();
+  return all;
+}
+
+std::vector<std::string> preset_names() {
+  std::vector<std::string> names;
+  for (preset const& p : presets()) names.push_back(p.name);
+  return names;
+}
+
+preset const& preset_named(std::string const& name) {
+  return *std::find_if(presets().begin(), presets().end(), [&](preset const& p) { return p.name == name; });
+}
+
+std::string presets_help() {
+  std::string text = "What is left out for speed; options given besides win.";
+  for (preset const& p : presets()) {
+    char line[160];
+    std::snprintf(line, sizeof line, "\n%s: --alpha-min %.4g --t-min %.4g;\n  %s", p.name.c_str(), p.render.alpha_min,
+                  p.render.transmittance_min, p.cost.c_str());
+    text += line;
+  }
+  return text;
+}
+
+}  // namespace gart_cli

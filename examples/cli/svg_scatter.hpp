@@ -1,0 +1,25 @@
+#pragma once
+// Points over two logarithmic axes as inline SVG, with the front of those that no other beats drawn as a line. Colours
+// come from the page's style sheet (classes line-1, dim, grid, tick, label).
+
+#include <string>
+#include <vector>
+
+namespace gart_cli {
+
+struct scatter_point {
+  double x, y;
+  std::string label;
+  bool front = false;
+};
+
+struct scatter {
+  std::string title, x_label, y_label;
+  std::vector<scatter_point> points;  // those that are not positive and finite are left out
+};
+
+// A <figure> the width of the page. Labels keep clear of each other and of the points; a point off the front that has
+// no room for one says its name when it is pointed at. "" where there are not two points.
+std::string to_svg(scatter const& plot);
+
+}  // namespace gart_cli

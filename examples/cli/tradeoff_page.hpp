@@ -1,0 +1,16 @@
+#pragma once
+// What `gart tradeoff` shows of tradeoff.json: a table in text, and a page with the fronts.
+
+#include <nlohmann/json.hpp>
+
+#include <string>
+
+namespace gart_cli {
+
+// Sets front.image and front.gradients of each setting: no other is at least as fast and as close, and better in one.
+void mark_fronts(nlohmann::json& settings);
+
+std::string tradeoff_table(nlohmann::json const& result);
+std::string tradeoff_page(nlohmann::json const& result);
+
+}  // namespace gart_cli
