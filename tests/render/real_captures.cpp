@@ -1,5 +1,7 @@
 // Hit lists on real captures, one tracer and one policy against another: the starting models of a COLMAP capture and of
 // one with a distorted lens, seen by their own cameras.
+#include <gart/exec/parallel.hpp>  // the serial policy beside the one under test
+
 #include <render/expected.hpp>
 
 #include <gart/io/dataset.hpp>
