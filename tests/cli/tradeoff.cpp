@@ -85,7 +85,7 @@ TEST_CASE("tradeoff measures every knob, names those it has not, and finds the f
   auto const run = here.gart("tradeoff cloud.ply capture --out trade --backend serial --repeats 2 --pixels 100");
   REQUIRE_MESSAGE(run.code == 0, run.err);
   CHECK(has(run.out, "PSNR"));
-  CHECK(has(run.err, "measuring 1/"));
+  CHECK(has(run.err, "measuring "));
   auto const result = here.json("trade/tradeoff.json");
   CHECK(result["pixels"] == 200);
   CHECK(result["gradient_of"] == "the training loss");
@@ -157,7 +157,7 @@ TEST_CASE("tradeoff takes cameras without photographs, and refuses what it canno
   gart::write_file(here / "empty.json", "[]");
   auto const no_cameras = here.gart("tradeoff cloud.ply empty.json --out none");
   CHECK(no_cameras.code == 1);
-  CHECK(has(no_cameras.err, "has no cameras"));
+  CHECK(has(no_cameras.err, "empty.json: holds no camera"));
   CHECK_FALSE(fs::exists(here / "none"));
 }
 
