@@ -12,6 +12,7 @@ option(GART_BUILD_EXAMPLES "Build the examples" ${PROJECT_IS_TOP_LEVEL})
 option(GART_BUILD_TESTS "Build the tests (doctest, Eigen)" ${PROJECT_IS_TOP_LEVEL})
 option(GART_BUILD_BENCH "Build the benchmarks (Google Benchmark)" OFF)
 option(GART_SANITIZE "Address and undefined-behaviour sanitizers on all host code" OFF)
+option(GART_BUILD_FUZZ "Build the fuzzers of the readers (Clang; tests/fuzz/README.md)" OFF)
 
 include(CheckLanguage)
 set(GART_CUDA AUTO CACHE STRING "CUDA policy: ON, OFF, or AUTO (where nvcc is found)")
@@ -47,6 +48,15 @@ endif()
 if(GART_SANITIZE)
   target_compile_options(gart_private_flags INTERFACE
     $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer>)
+  target_link_options(gart_private_flags INTERFACE -fsanitize=address,undefined)
+endif()
+if(GART_BUILD_FUZZ)
+  if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+    message(FATAL_ERROR "GART_BUILD_FUZZ needs Clang, for libFuzzer: configure with -DCMAKE_CXX_COMPILER=clang++")
+  endif()
+  target_compile_options(gart_private_flags INTERFACE
+    $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined
+                              -fno-omit-frame-pointer>)
   target_link_options(gart_private_flags INTERFACE -fsanitize=address,undefined)
 endif()
 

@@ -10,6 +10,7 @@
 #include <cctype>
 #include <cmath>
 #include <exception>
+#include <map>
 #include <mutex>
 #include <set>
 #include <system_error>
@@ -52,10 +53,14 @@ void set_pose(camera& view, mat3d const& axes, vec3d const& center, std::string 
   };
   double const length[3] = {std::sqrt(dot(axes[0], axes[0])), std::sqrt(dot(axes[1], axes[1])),
                             std::sqrt(dot(axes[2], axes[2]))};
+  // Past this the squares of distances leave the range of a float.
+  constexpr double farthest = 1e18;
   bool finite = true;
-  for (int i = 0; i < 3; ++i)
-    finite = finite && std::isfinite(length[i]) && std::isfinite(static_cast<float>(center[i]));
-  if (!finite) throw io_error(where, "the pose is not finite", "remove the image, or correct its pose");
+  for (int i = 0; i < 3; ++i) finite = finite && std::isfinite(length[i]) && std::abs(center[i]) <= farthest;
+  if (!finite) {
+    throw io_error(where, "the pose is not finite, or farther than 1e18 from the origin",
+                   "remove the image, or correct its pose");
+  }
   bool rotation = length[0] > 1e-12;
   for (int i = 1; i < 3; ++i) rotation = rotation && std::abs(length[i] - length[0]) <= 1e-2 * length[0];
   if (rotation) {
@@ -77,6 +82,7 @@ void set_pose(camera& view, mat3d const& axes, vec3d const& center, std::string 
 
 void make_file_names(std::vector<std::string*> const& names) {
   std::set<std::string> taken;
+  std::map<std::string, int> copies;  // of a name, so that a thousand of them are not each tried again
   for (std::string* name : names) {
     std::string path = *name, flat;
     std::replace(path.begin(), path.end(), '\\', '/');
@@ -102,7 +108,8 @@ void make_file_names(std::vector<std::string*> const& names) {
     if (flat.empty() || flat[0] == '.') flat.insert(0, "view");
     // NAME_truth is the true picture beside a render.
     std::string unique = flat;
-    for (int n = 2; taken.count(unique) || taken.count(unique + "_truth"); ++n) unique = flat + "_" + std::to_string(n);
+    while (taken.count(unique) || taken.count(unique + "_truth"))
+      unique = flat + "_" + std::to_string(++copies[flat] + 1);
     taken.insert(unique), taken.insert(unique + "_truth");
     *name = unique;
   }
@@ -192,6 +199,7 @@ bool fit_to_photo(frame& f, image_size size) {
                    "use the photos that were calibrated, or copies scaled alike in both directions");
   }
   f.view = resized(c, size.width, size.height);
+  check_camera(f.view, f.photo.string());
   return true;
 }
 
@@ -260,6 +268,8 @@ void drop_frames_without_photo(capture& c, bool load_images) {
     c.frames.erase(
         std::remove_if(c.frames.begin(), c.frames.end(), [](frame const& f) { return f.role == part::left_out; }),
         c.frames.end());
+    if (c.frames.empty())
+      throw io_error(c.source.string(), "the lists of the file's split hold none of its frames", "correct the lists");
   }
 }
 

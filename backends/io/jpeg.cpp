@@ -58,15 +58,15 @@ image8 decode_jpeg(std::vector<u8> const& bytes, std::string const& where) {
   if (colorspace == TJCS_CMYK || colorspace == TJCS_YCCK) {
     throw io_error(where, "is a CMYK JPEG", "convert it to RGB");
   }
-  // No coder spends less than a bit on a block of 64 pixels but for runs of empty ones: a larger size is a lie, and
-  // must not be allocated.
-  if (static_cast<u64>(size.width) * static_cast<u64>(size.height) > static_cast<u64>(bytes.size()) * 8192) {
+  // A block of 64 pixels costs a Huffman coder at least a bit, 512 pixels a byte: a size beyond twice that is a lie,
+  // and must not be allocated.
+  if (static_cast<u64>(size.width) * static_cast<u64>(size.height) > static_cast<u64>(bytes.size()) * 1024) {
     refuse(where, "the size in its header is larger than its data can hold");
   }
   bool const gray = colorspace == TJCS_GRAY;
   image8 image(size.width, size.height, gray ? 1 : 3);
   if (tjDecompress2(decoder.get(), bytes.data(), bytes.size(), image.data.data(), size.width, 0, size.height,
-                    gray ? TJPF_GRAY : TJPF_RGB, TJFLAG_ACCURATEDCT) != 0) {
+                    gray ? TJPF_GRAY : TJPF_RGB, TJFLAG_ACCURATEDCT | TJFLAG_LIMITSCANS) != 0) {
     // Stray bytes between segments lose nothing; every other warning means pixels that are made up.
     std::string const what = tjGetErrorStr2(decoder.get());
     bool const harmless =

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <ostream>
 #include <string_view>
 #include <utility>
@@ -154,8 +155,9 @@ class body_reader {
 
   void skip_list(element const& e, u64 record, property const& p) {
     double const n = next(p.count_type, e, record, p);
-    if (n < 0)
-      file_.refuse(place(e, record, p) + " is a list of negative length", "the file is damaged: export it again");
+    if (!(n >= 0 && n <= std::numeric_limits<u32>::max() && n == std::floor(n)))
+      file_.refuse(place(e, record, p) + " is a list whose length is not a count",
+                   "the file is damaged: export it again");
     u64 const count = static_cast<u64>(n);
     if (file_.head.format == encoding::ascii) {
       for (u64 i = 0; i < count; ++i) next_ascii(e, record, p);

@@ -31,6 +31,18 @@ void on_error(png_structp png, png_const_charp text) {
 
 void on_warning(png_structp, png_const_charp) {}
 
+// libpng's two structs, which go even where the pixels find no memory.
+struct png_reader {
+  png_structp png;
+  png_infop info;
+  explicit png_reader(png_state& state)
+      : png(png_create_read_struct(PNG_LIBPNG_VER_STRING, &state, on_error, on_warning)),
+        info(png ? png_create_info_struct(png) : nullptr) {}
+  ~png_reader() { png_destroy_read_struct(&png, &info, nullptr); }
+  png_reader(png_reader const&) = delete;
+  png_reader& operator=(png_reader const&) = delete;
+};
+
 void pull(png_structp png, png_bytep out, std::size_t count) {
   auto* state = static_cast<png_state*>(png_get_io_ptr(png));
   if (count > state->source->size() - state->position) png_error(png, "the file is truncated");
@@ -54,6 +66,8 @@ void flush(png_structp) {}
 bool decode(png_structp png, png_infop info, png_state& state, image8& image) {
   if (setjmp(png_jmpbuf(png))) return false;
   png_set_read_fn(png, &state, pull);
+  // Nothing but the pixels: libpng would allocate whatever length a text or profile promises, for a warning.
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
   png_read_info(png, info);
   // Deflate expands at most 1032 times: a size beyond that is a lie, and must not be allocated.
   if (png_get_rowbytes(png, info) > (state.source->size() * 1040 + 4096) / png_get_image_height(png, info)) {
@@ -101,11 +115,9 @@ image8 decode_png(std::vector<u8> const& bytes, std::string const& where) {
   png_state state;
   state.source = &bytes;
   image8 image;
-  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &state, on_error, on_warning);
-  png_infop info = png ? png_create_info_struct(png) : nullptr;
-  bool const done = info && decode(png, info, state, image);
-  png_destroy_read_struct(&png, &info, nullptr);
-  if (!done) throw io_error(where, std::string("is not a readable PNG: ") + state.message, "replace the file");
+  png_reader const reader(state);
+  if (!reader.info || !decode(reader.png, reader.info, state, image))
+    throw io_error(where, std::string("is not a readable PNG: ") + state.message, "replace the file");
   return image;
 }
 

@@ -1,5 +1,9 @@
 #include "history.hpp"
 
+#include "output.hpp"
+
+#include <gart/core/error.hpp>
+
 #include <algorithm>
 
 namespace gart_cli {
@@ -28,17 +32,26 @@ nlohmann::json history::to_json() const {
   return all;
 }
 
-void history::restore(nlohmann::json const& saved, int step) {
+void history::restore(std::filesystem::path const& file, int step) {
+  nlohmann::json const saved = read_json(file);
+  auto const rows = [&](char const* key) -> nlohmann::json const& {
+    if (!saved.is_object() || !saved.contains(key) || !saved[key].is_array()) {
+      throw gart::io_error(file.string(), std::string("has no list \"") + key + "\"",
+                           "remove it, and the report shows the resumed part of the run alone");
+    }
+    return saved[key];
+  };
   // A loss that was not finite is null in the file, and no point of a curve.
   auto const usable = [step](nlohmann::json const& row, std::size_t columns) {
-    return row.is_array() && row.size() == columns && row[0].is_number() && row[0].get<int>() <= step &&
-           std::all_of(row.begin(), row.end(), [](auto const& v) { return v.is_number(); });
+    return row.is_array() && row.size() == columns &&
+           std::all_of(row.begin(), row.end(), [](auto const& v) { return v.is_number(); }) &&
+           row[0].get<double>() >= 0 && row[0].get<double>() <= step;
   };
   train.clear(), test.clear();
-  for (auto const& row : saved.value("train", nlohmann::json::array())) {
+  for (auto const& row : rows("train")) {
     if (usable(row, 5)) train.push_back({row[0], row[1], row[2], row[3], row[4]});
   }
-  for (auto const& row : saved.value("test", nlohmann::json::array())) {
+  for (auto const& row : rows("test")) {
     if (usable(row, 3)) test.push_back({row[0], row[1], row[2]});
   }
   seconds = train.empty() ? 0 : train.back().seconds;

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <filesystem>
 #include <vector>
 
 namespace gart_cli {
@@ -29,8 +30,9 @@ class history {
   // Ends the mean that is being formed, so that nothing is lost by stopping here.
   void close_point();
   nlohmann::json to_json() const;
-  // Forgets what came after `step`: a checkpoint may be older than the history beside it.
-  void restore(nlohmann::json const& saved, int step);
+  // What the file holds of the steps up to `step`: a checkpoint may be older than the history beside it. io_error for a
+  // file that is no history.
+  void restore(std::filesystem::path const& file, int step);
 
  private:
   int spacing_, pending_ = 0;

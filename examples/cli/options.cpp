@@ -23,14 +23,18 @@ void recorded_options::continue_from(nlohmann::json const& saved, std::filesyste
     if (!saved.contains(e.name)) {
       throw gart::io_error(file.string(), "has no option \"" + e.name + "\"", "start anew without --resume");
     }
-    nlohmann::json const given = e.get();
+    nlohmann::json const given = e.get(), &value = saved[e.name];
+    bool const named = e.option->count() > 0;
     try {
-      e.set(saved[e.name]);
-    } catch (nlohmann::json::exception const&) {
-      throw gart::io_error(file.string(), "option \"" + e.name + "\" is not of its type",
-                           "start anew without --resume");
+      if (value.is_structured() || value.is_null()) throw CLI::ConversionError("it is not one value");
+      e.option->clear();
+      e.option->add_result(value.is_string() ? value.get<std::string>() : value.dump());
+      e.option->run_callback();
+    } catch (CLI::Error const& wrong) {
+      throw gart::io_error(file.string(), "option \"" + e.name + "\" is not valid: " + wrong.what(),
+                           "correct it, or start anew without --resume");
     }
-    if (e.option->count() > 0 && given != e.get()) {
+    if (named && given != e.get()) {
       throw usage_error("--" + e.name + " " + given.dump() + ": the run to be resumed has " + e.get().dump() + " in " +
                         file.string() +
                         " (leave the option out to continue that run, or start another from its "

@@ -20,13 +20,13 @@ class recorded_options {
   template <class T>
   CLI::Option* add(CLI::App& app, std::string const& flag, T& value, std::string const& type, std::string const& help) {
     CLI::Option* option = app.add_option(flag, value, help)->capture_default_str()->type_name(type);
-    entries_.push_back({flag.substr(2), option, [&value] { return nlohmann::json(value); },
-                        [&value](nlohmann::json const& saved) { saved.get_to(value); }});
+    entries_.push_back({flag.substr(2), option, [&value] { return nlohmann::json(value); }});
     return option;
   }
   nlohmann::json values() const;
-  // Takes the values of an earlier run. usage_error for an option that was given and says otherwise; io_error, naming
-  // `file` and the option, for one that is missing or of another type.
+  // Takes the values of an earlier run as if they stood on the command line, by the same checks. usage_error for an
+  // option that was given and says otherwise; io_error, naming `file` and the option, for one that is missing or that
+  // the command line would refuse.
   void continue_from(nlohmann::json const& saved, std::filesystem::path const& file);
 
  private:
@@ -34,7 +34,6 @@ class recorded_options {
     std::string name;
     CLI::Option* option;
     std::function<nlohmann::json()> get;
-    std::function<void(nlohmann::json const&)> set;
   };
   std::vector<entry> entries_;
 };

@@ -115,7 +115,7 @@ class training_run {
     if (a_.resume) {
       check_same_dataset(a_, data_);
       session_->load(a_.checkpoint_file());
-      if (fs::exists(a_.history_file())) course_.restore(read_json(a_.history_file()), session_->steps_done());
+      if (fs::exists(a_.history_file())) course_.restore(a_.history_file(), session_->steps_done());
     } else {
       begin_anew();
     }

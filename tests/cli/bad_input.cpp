@@ -102,6 +102,15 @@ TEST_CASE("a checkpoint that is damaged is refused and kept") {
   gart::write_file(here / "run/checkpoint.gart", std::string_view(whole).substr(0, whole.size() / 2));
   fails(here.gart("train --resume --out run"), {"checkpoint.gart"});
   CHECK(text_of(here / "run/checkpoint.gart").size() == whole.size() / 2);
+  gart::write_file(here / "run/checkpoint.gart", whole);
+  auto const history = text_of(here / "run/history.json");
+  gart::write_file(here / "run/history.json", "[]");
+  fails(here.gart("train --resume --out run"), {"history.json", "\"train\""});
+  gart::write_file(here / "run/history.json", history);
+  std::string config = text_of(here / "run/config.json");
+  config.replace(config.find("\"iterations\": 20"), 16, "\"iterations\": -3");
+  gart::write_file(here / "run/config.json", config);
+  fails(here.gart("train --resume --out run"), {"config.json", "iterations", "'-3' is not a number from 1"});
   gart::write_file(here / "run/config.json", "{\"options\": {");
   fails(here.gart("train --resume --out run"), {"config.json", "JSON"});
 }

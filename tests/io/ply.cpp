@@ -199,6 +199,12 @@ TEST_CASE("what is not a 3D Gaussian model is refused, naming the property") {
   CHECK(holds(refused("vertex 5", "vertex -1"), "without a count"));
   CHECK(holds(refused("1.0", "2.0"), "1.0"));
   CHECK(holds(refused("element vertex", "element node"), "element vertex"));
+  for (char const* length : {"nan", "1e300", "-1", "0.5"}) {
+    folder.put("list.ply", std::string("ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int i\n") +
+                               "element vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n" +
+                               length + " 1 2 3\n");
+    CHECK(holds(error_of([&] { gart::read_point_ply(folder.path / "list.ply"); }), "whose length is not a count"));
+  }
   // An element without properties holds no bytes, however many there are.
   CHECK(refused("element vertex", "element nothing 18446744073709551615\nelement vertex") == "");
   CHECK(holds(refused("element vertex 5\n", "element vertex 18446744073709551615\nelement nothing 5\n"), "missing"));

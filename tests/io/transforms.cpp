@@ -2,6 +2,7 @@
 
 #include <gart/io/ply.hpp>
 
+#include <chrono>
 #include <cmath>
 #include <set>
 
@@ -146,6 +147,9 @@ TEST_CASE("transforms.json with a split of its own") {
   CHECK(data.test[0].name == "b");
   CHECK(holds(data.split, "own"));
   CHECK(any_note(data, "1 frame left out"));
+  folder.put("transforms.json", scene(lens + ", \"train_filenames\": [\"x\"], \"test_filenames\": [\"y\"]",
+                                      frame("a.png", 1) + "," + frame("b.png", 2)));
+  CHECK(holds(error_of([&] { gart::load_cameras(folder.path); }), "hold none of its frames"));
 }
 
 TEST_CASE("without points the box lies where the cameras look") {
@@ -191,6 +195,23 @@ TEST_CASE("names are unique and fit for files") {
   CHECK(names.count("up"));
   CHECK(names.count("x_a_b"));
   CHECK(!(names.count("a") && names.count("a_truth")));
+}
+
+TEST_CASE("20,000 cameras of one name are told apart in little time") {
+  scratch_folder const folder;
+  std::string text = "[";
+  for (int i = 0; i < 20000; ++i) {
+    text += std::string(i ? "," : "") +
+            R"({"name":"a","width":1,"height":1,"fx":1,"fy":1,"cx":0,"cy":0,"c2w":[[1,0,0,0],[0,1,0,0],[0,0,1,0]]})";
+  }
+  fs::path const path = folder.put("cameras.json", text + "]");
+  auto const begin = std::chrono::steady_clock::now();
+  auto const cameras = gart::load_cameras(path);
+  CHECK(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() < 20);
+  std::set<std::string> names;
+  for (gart::named_camera const& c : cameras) names.insert(c.name);
+  CHECK(names.size() == 20000);
+  CHECK(names.count("a_20000"));
 }
 
 TEST_CASE("a folder with COLMAP and transforms.json uses COLMAP and says so") {
@@ -242,6 +263,10 @@ TEST_CASE("what is missing, of a wrong type or not traced is named") {
   CHECK(holds(refused(scene("\"fl_x\": \"20\"", one)), "'fl_x' is not a number"));
   CHECK(holds(refused(scene("\"fl_x\": 0, \"w\": 16, \"h\": 12", one)), "focal length"));
   CHECK(holds(refused(scene("\"fl_x\": 20, \"w\": -16, \"h\": 12", one)), "'w' is not a size"));
+  CHECK(holds(refused(scene(lens,
+                            "{\"file_path\": \"a.png\", \"transform_matrix\": "
+                            "[[1,0,0,3e38],[0,1,0,0],[0,0,1,0]]}")),
+              "farther than 1e18"));
   CHECK(holds(refused(scene("\"fl_x\": 20, \"w\": 16", one)), "'h'"));
   CHECK(holds(refused(scene("\"camera_angle_x\": 4", one)), "angle"));
   CHECK(holds(refused(scene(lens + ", \"camera_model\": \"OPENCV_FISHEYE\"", one)), "OPENCV_FISHEYE"));
@@ -252,6 +277,8 @@ TEST_CASE("what is missing, of a wrong type or not traced is named") {
   CHECK(holds(error_of([&] { gart::load_dataset(folder.path, all_train()); }), "none.ply"));
   folder.put("transforms.json", scene("\"fl_x\": 20, \"w\": 16, \"h\": 20", one));
   CHECK(holds(error_of([&] { gart::load_dataset(folder.path, all_train()); }), "a.png"));
+  folder.put("transforms.json", scene("\"fl_x\": 3e38, \"w\": 4, \"h\": 3", one));
+  CHECK(holds(error_of([&] { gart::load_dataset(folder.path, all_train()); }), "focal length"));
   folder.put("transforms.json", scene("\"fl_x\": 0", one));
   CHECK(holds(error_of([&] { gart::load_dataset(folder.path, all_train()); }), "focal length"));
   CHECK(holds(error_of([&] { gart::load_dataset(folder.path / "none"); }), "no such file"));

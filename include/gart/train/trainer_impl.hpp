@@ -4,6 +4,7 @@
 #include <gart/train/trainer.hpp>
 
 #include <cmath>
+#include <limits>
 
 namespace gart {
 
@@ -160,6 +161,9 @@ void trainer<E, Traits, Tracer, Strategy>::load(std::filesystem::path const& pat
   std::vector<float> const growth = in.get<float>("growth");
   if (degree.size() != 1 || step.size() != 1 || seed.size() != 1 || growth.size() != 1)
     in.fail("a counter is not one number");
+  if (step[0] < 0 || step[0] == std::numeric_limits<int>::max())
+    in.fail("is damaged: it was saved after step " + std::to_string(step[0]));
+  if (!(growth[0] > 0 && std::isfinite(growth[0]))) in.fail("is damaged: its growth is no factor");
   if (degree[0] != sh_degree)
     in.fail("is of SH degree " + std::to_string(degree[0]) + ", this run of " + std::to_string(sh_degree) +
             ": give --sh-degree " + std::to_string(degree[0]));
@@ -179,9 +183,13 @@ void trainer<E, Traits, Tracer, Strategy>::load(std::filesystem::path const& pat
   gaussian_model const scene = get(""), first = get("first/"), second = get("second/");
   if (first.size() != scene.size() || second.size() != scene.size())
     in.fail("its moments differ in number from its Gaussians");
+  std::vector<float> const gradient_sum = in.get<float>("adc/gradient_sum");
+  std::vector<u32> const touched = in.get<u32>("adc/touched");
+  if (touched.size() != gradient_sum.size()) in.fail("its arrays adc/* differ in length");
+  // Nothing is taken over before all of it is known to be whole.
   scene_.assign(scene), state_.first.assign(first), state_.second.assign(second);
   gradients_ = gaussians<E>(exec_, scene_.size(), sh_degree);
-  adc_.gradient_sum.assign(in.get<float>("adc/gradient_sum")), adc_.touched.assign(in.get<u32>("adc/touched"));
+  adc_.gradient_sum.assign(gradient_sum), adc_.touched.assign(touched);
   options_.seed = seed[0];
   order_ = view_order(data_.train.size(), options_.seed);
   step_ = step[0];

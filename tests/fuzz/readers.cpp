@@ -1,0 +1,196 @@
+// Models, captures, cameras and images.
+
+#include "fuzz/support.hpp"
+
+#include <gart/io/dataset.hpp>
+#include <gart/io/image_file.hpp>
+#include <gart/io/ply.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+namespace gart_fuzz {
+namespace {
+
+bool finite(std::vector<float> const& values) {
+  return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
+}
+
+bool finite(gart::vec3d const& v) {
+  bool all = true;
+  for (int i = 0; i < 3; ++i) all = all && std::isfinite(static_cast<float>(v[i]));
+  return all;
+}
+
+void check_points(gart::point_cloud const& points) {
+  promise(points.position.size() % 3 == 0 && points.color.size() == points.position.size(), "points without colours");
+  promise(finite(points.position), "a point that is not finite");
+}
+
+void check_camera(gart::camera const& c) {
+  promise(c.width >= 1 && c.height >= 1, "a camera without pixels");
+  promise(c.fx > 0 && c.fy > 0 && finite({c.fx, c.fy, c.cx, c.cy}), "intrinsics that are not finite");
+  promise(finite({c.lens.k1, c.lens.k2, c.lens.p1, c.lens.p2}), "a lens that is not finite");
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      float dot = 0;
+      for (int k = 0; k < 3; ++k) dot += c.rotation[i][k] * c.rotation[j][k];
+      promise(std::abs(dot - (i == j ? 1.0f : 0.0f)) < 1e-3f, "a pose that is no rotation");
+    }
+  }
+  promise(finite(c.position), "a position that is not finite");
+}
+
+void check_cameras(std::vector<gart::named_camera> const& cameras) {
+  promise(!cameras.empty(), "no camera");
+  std::set<std::string> names;
+  for (gart::named_camera const& c : cameras) {
+    check_camera(c.view);
+    promise(names.insert(c.name).second, "two cameras of one name");
+    promise(c.name.find('/') == std::string::npos && !c.name.empty(), "a name that is unfit for a file");
+  }
+}
+
+void check_image(gart::image8 const& image, std::set<int> const& channels) {
+  promise(image.width >= 1 && image.height >= 1 && channels.count(image.channels), "an image of no pixels");
+  promise(image.data.size() == static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height) *
+                                   static_cast<std::size_t>(image.channels),
+          "an image whose data do not fit its size");
+}
+
+void check_dataset(gart::dataset const& data) {
+  promise(!data.train.empty(), "nothing to train on");
+  for (auto const* views : {&data.train, &data.test}) {
+    for (gart::dataset_view const& v : *views) {
+      check_camera(v.view);
+      check_image(v.image, {3, 4});
+      promise(v.image.width == v.view.width && v.image.height == v.view.height, "an image and a camera that differ");
+      if (v.mask.empty()) continue;
+      check_image(v.mask, {1});
+      promise(v.mask.width == v.view.width && v.mask.height == v.view.height, "a mask and a camera that differ");
+    }
+  }
+  check_points(data.points);
+  promise(data.extent > 0 && std::isfinite(data.extent), "an extent that is no length");
+  promise(finite(data.bounds_min) && finite(data.bounds_max), "bounds that are not finite");
+}
+
+// The first n parts of `input`, between which stands a line "====". A part that is not there is no file.
+template <std::size_t n>
+void put_parts(scratch_folder const& folder, std::array<char const*, n> const& names, std::string_view input) {
+  std::string_view const separator = "\n====\n";
+  bool there = true;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!there) {
+      fs::remove(folder.path() / names[i]);
+      continue;
+    }
+    std::size_t const end = i + 1 < n ? input.find(separator) : std::string_view::npos;
+    folder.put(names[i], input.substr(0, end));
+    there = end != std::string_view::npos;
+    if (there) input.remove_prefix(end + separator.size());
+  }
+}
+
+void put_photos(scratch_folder const& folder, std::string const& where) {
+  fs::create_directories(folder.path() / where);
+  gart::write_png(folder.path() / where / "a.png", gart::image8(4, 3, 3, 90));
+  gart::write_png(folder.path() / where / "b.png", gart::image8(8, 6, 4, 200));
+  gart::write_png(folder.path() / where / "mask.png", gart::image8(4, 3, 1, 255));
+}
+
+// A capture's views with their photos, then its cameras without: two ways through the same files.
+bool read_capture(scratch_folder const& folder, fs::path const& path) {
+  gart::dataset_options options;
+  options.downscale = 2, options.test_every = 3;
+  bool const trainable = accepted(folder, [&] { check_dataset(gart::load_dataset(path, options)); });
+  bool const usable = accepted(folder, [&] { check_cameras(gart::load_cameras(path)); });
+  return trainable || usable;
+}
+
+bool read_image(scratch_folder const& folder, char const* name, std::string_view input, std::set<int> const& channels) {
+  fs::path const file = folder.put(name, input);
+  return accepted(folder, [&] {
+    gart::image8 const image = gart::read_image(file);
+    check_image(image, channels);
+  });
+}
+
+}  // namespace
+
+bool splat_ply(std::string_view input) {
+  static scratch_folder const folder("splat_ply");
+  fs::path const file = folder.put("model.ply", input), again = folder.path() / "again.ply";
+  return accepted(folder, [&] {
+    gart::ply_traits traits;
+    gart::gaussian_model const m = gart::read_splat_ply(file, &traits);
+    gart::gaussian_model shape;
+    shape.resize(m.size(), m.sh_degree);
+    promise(m.sh_degree >= 0 && m.sh_degree <= 3 && m.mean.size() == shape.mean.size() &&
+                m.log_scale.size() == shape.log_scale.size() && m.quaternion.size() == shape.quaternion.size() &&
+                m.sh.size() == shape.sh.size(),
+            "arrays that differ in length");
+    promise(finite(m.mean) && finite(m.log_scale) && finite(m.quaternion) && finite(m.opacity) && finite(m.sh),
+            "a Gaussian that is not finite");
+    gart::write_splat_ply(again, m);
+    gart::gaussian_model const back = gart::read_splat_ply(again);
+    promise(back.sh_degree == m.sh_degree && back.mean == m.mean && back.log_scale == m.log_scale &&
+                back.quaternion == m.quaternion && back.opacity == m.opacity && back.sh == m.sh,
+            "a model that is another when written and read again");
+  });
+}
+
+bool point_ply(std::string_view input) {
+  static scratch_folder const folder("point_ply");
+  fs::path const file = folder.put("points.ply", input);
+  return accepted(folder, [&] { check_points(gart::read_point_ply(file)); });
+}
+
+bool colmap_bin(std::string_view input) {
+  static scratch_folder const folder("colmap_bin");
+  static bool const photos = (put_photos(folder, "images"), true);
+  put_parts<3>(folder, {"sparse/0/cameras.bin", "sparse/0/images.bin", "sparse/0/points3D.bin"}, input);
+  return photos && read_capture(folder, folder.path());
+}
+
+bool colmap_txt(std::string_view input) {
+  static scratch_folder const folder("colmap_txt");
+  static bool const photos = (put_photos(folder, "images"), true);
+  put_parts<3>(folder, {"sparse/0/cameras.txt", "sparse/0/images.txt", "sparse/0/points3D.txt"}, input);
+  return photos && read_capture(folder, folder.path());
+}
+
+bool transforms(std::string_view input) {
+  static scratch_folder const folder("transforms");
+  static bool const photos = (put_photos(folder, "images"), true);
+  static bool const points =
+      (gart::write_point_ply(folder.path() / "points.ply", {{1, 2, 3, 0, 0, 0}, {1, 2, 3, 4, 5, 6}}), true);
+  return photos && points && read_capture(folder, folder.put("transforms.json", input));
+}
+
+bool blender(std::string_view input) {
+  static scratch_folder const folder("blender");
+  static bool const photos = (put_photos(folder, "images"), true);
+  put_parts<2>(folder, {"transforms_train.json", "transforms_test.json"}, input);
+  return photos && read_capture(folder, folder.path());
+}
+
+bool camera_json(std::string_view input) {
+  static scratch_folder const folder("camera_json");
+  fs::path const file = folder.put("cameras.json", input);
+  return accepted(folder, [&] { check_cameras(gart::load_cameras(file)); });
+}
+
+bool png(std::string_view input) {
+  static scratch_folder const folder("png");
+  return read_image(folder, "image.png", input, {1, 3, 4});
+}
+
+bool jpeg(std::string_view input) {
+  static scratch_folder const folder("jpeg");
+  return read_image(folder, "image.jpg", input, {1, 3});
+}
+
+}  // namespace gart_fuzz
