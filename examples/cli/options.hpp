@@ -24,6 +24,13 @@ class recorded_options {
                         [&value](nlohmann::json const& saved) { saved.get_to(value); }});
     return option;
   }
+  // A flag with its opposite: "--auto,!--no-auto".
+  CLI::Option* add_flag(CLI::App& app, std::string const& flags, bool& value, std::string const& help) {
+    CLI::Option* option = app.add_flag(flags, value, help);
+    entries_.push_back({flags.substr(2, flags.find(',') - 2), option, [&value] { return nlohmann::json(value); },
+                        [&value](nlohmann::json const& saved) { saved.get_to(value); }});
+    return option;
+  }
   nlohmann::json values() const;
   // Takes the values of an earlier run. usage_error for an option that was given and says otherwise; io_error, naming
   // `file` and the option, for one that is missing or of another type.
@@ -53,8 +60,6 @@ void add_max_hits(CLI::App& app, int& max_hits);
 CLI::Validator backend_names();
 CLI::Validator tracer_names();
 
-// "black", "white", or for "auto" what suits the capture: white for images with alpha, as published results have it.
-std::string resolve_background(std::string const& name, bool alpha);
 gart::vec3 background_color(std::string const& name);
 
 // Of a model's file, where the command line does not say otherwise: what it was trained with.
@@ -67,7 +72,5 @@ model_file load_model(std::filesystem::path const& path);
 inline constexpr gart::u32 max_hits_most = 1'000'000'000;
 // What a run left out, as every report tells it.
 nlohmann::json approximations_of(gart::render_options const& render);
-// Coefficients past `degree` are dropped, missing ones are zero.
-gart::gaussian_model with_degree(gart::gaussian_model const& model, int degree);
 
 }  // namespace gart_cli
