@@ -28,6 +28,7 @@ import glob
 import json
 import os
 import re
+import resource
 import shlex
 import shutil
 import subprocess
@@ -302,7 +303,9 @@ class Bench:
                     out = os.path.join(self.temporary, "run")
                     command = [self.program("gart"), "train", folder, "--out", out, mode, "--backend", self.a.backend,
                                "--seed", seed, "--eval-every", 0, "--quiet", *shlex.split(options)]
+                    before = resource.getrusage(resource.RUSAGE_CHILDREN)
                     done = run(command)
+                    after = resource.getrusage(resource.RUSAGE_CHILDREN)
                     row = {"mode": mode, "seed": seed, "options": options}
                     if done.returncode != 0:
                         row["error"] = last_line(done.stderr)
@@ -311,6 +314,8 @@ class Bench:
                         with open(os.path.join(out, "metrics.json")) as f:
                             metrics = json.load(f)
                         row.update({k: metrics[k] for k in kept})
+                        # Of the whole process, loading and testing included; other work on the machine is not in it.
+                        row["cpu_seconds"] = after.ru_utime - before.ru_utime
                         self.say(f"{name}, seed {seed}, {mode}: {row['psnr']:.3f} dB, {row['seconds']:.1f} s, SH degree "
                                  f"{row['sh_degree']}, {row['floats_per_gaussian']} floats a Gaussian")
                     runs.append(row)
