@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws bench/results/*.json: charts into docs/figures/*.svg, tables into docs/backward.md. Python 3 alone is needed.
+"""Draws bench/results/*.json: charts into docs/figures/*.svg, tables into docs/*.md. Python 3 alone is needed.
 
     python3 bench/plot.py [--results bench/results] [--docs docs]
 
@@ -7,6 +7,7 @@ A table stands in the page between <!-- table NAME --> and <!-- end -->, and is 
 there leaves its chart and its table as they are; a result that names a failed measurement shows it as such.
 """
 import argparse
+import glob
 import json
 import os
 import re
@@ -308,19 +309,46 @@ class Pages:
             [[f"`{name}`", shown(row, "serial"), shown(row, "openmp")] for name, row in rows.items()]
         ) + ["", f"{result['scene']}, {result['image']}, {result['machine']['cores']} cores; {source(result)}."]
 
+    def auto(self):
+        rows = []
+        for path in sorted(glob.glob(os.path.join(self.results, "auto_*.json"))):
+            result = self.load(os.path.basename(path)[:-5])
+            runs = [r for r in result["runs"] if "error" not in r]
+            full = {r["seed"]: r for r in runs if r["mode"] == "--no-auto"}
+            for r in runs:
+                base = full.get(r["seed"], {})
+                change = f"{r['psnr'] - base['psnr']:+.3f}" if r["mode"] == "--auto" and base else ""
+                gains = ", ".join(f"{t['band']}: {t['gain']:+.3f} ({t['forecast']:+.3f})" for t in r["sh_trials"])
+                rows.append([result["capture"], "full" if r["mode"] == "--no-auto" else "auto", r["sh_degree"],
+                             r["floats_per_gaussian"], f"{r['psnr']:.3f}", change, f"{r['seconds']:.0f}",
+                             f"{r['cpu_seconds']:.0f}", f"{r['model_bytes'] / 1e3:,.0f}",
+                             f"{r['checkpoint_bytes'] / 1e3:,.0f}", f"{r['peak_bytes'] / 1e6:.1f}", gains])
+            first = runs[0] if runs else {}
+            rows.append([f"{result['capture']}: {first.get('image_size', '')}, {first.get('options', '')}; "
+                         f"{first.get('backend', '')}, {source(result)}"] + [""] * 11)
+        if rows:
+            self.tables["auto"] = table(["capture", "model", "SH", "floats", "PSNR, dB", "against full", "training, s",
+                                         "CPU, s", "PLY, kB", "checkpoint, kB", "peak, MB",
+                                         "bands tried: gain (forecast), dB"], rows)
+
     def write_tables(self):
-        path = os.path.join(self.docs, "backward.md")
-        with open(path) as f:
-            page = f.read()
-        for name, rows in self.tables.items():
-            page, found = re.subn(rf"(<!-- table {name} -->\n).*?(<!-- end -->)",
-                                  lambda m: m.group(1) + "\n".join(rows) + "\n" + m.group(2), page, flags=re.DOTALL)
-            if not found:
-                print(f"{path}: has no place for the table {name}")
-        with open(path + ".part", "w") as f:
-            f.write(page)
-        os.replace(path + ".part", path)
-        print("wrote", path)
+        for path in sorted(glob.glob(os.path.join(self.docs, "*.md"))):
+            with open(path) as f:
+                page = before = f.read()
+            for name, rows in list(self.tables.items()):
+                page, found = re.subn(rf"(<!-- table {name} -->\n).*?(<!-- end -->)",
+                                      lambda m: m.group(1) + "\n".join(rows) + "\n" + m.group(2), page,
+                                      flags=re.DOTALL)
+                if found:
+                    del self.tables[name]
+            if page == before:
+                continue
+            with open(path + ".part", "w") as f:
+                f.write(page)
+            os.replace(path + ".part", path)
+            print("wrote", path)
+        for name in self.tables:
+            print(f"{self.docs}: no page has a place for the table {name}")
 
 
 def main():
@@ -335,6 +363,7 @@ def main():
     pages.memory()
     pages.stages()
     pages.cpu()
+    pages.auto()
     pages.write_tables()
 
 

@@ -11,8 +11,8 @@ What (comma-separated; default all but sanitize, cpu and auto):
   strategies  `gart bench`: a training step by strategy and tracer, on the first two scenes
   memory      `gart bench`: LT and peak memory against the number of Gaussians, at two resolutions
   paper       strategies, memory and stages
-  auto        `gart train --auto` against --no-auto on each capture: scores, seconds, bytes, what was chosen and measured;
-              a file auto_CAPTURE.json each. The captures lie in --data; `quickstart` is made by `gart synth`
+  auto        `gart train --auto` against --no-auto on every --capture: scores, seconds, bytes, what was chosen and
+              measured; a file auto_NAME.json each
 
 Scenes are DIR/NAME.ply with DIR/NAME.json, a list of cameras {"name","width","height","fx","fy","cx","cy","c2w"}.
 synth_1000k is the scene of a million Gaussians, and so on. A missing one is made by --generator, a command in which
@@ -38,12 +38,11 @@ import time
 
 PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "auto")
 SKIPPED = 77
-# Steps and Gaussians of a full training, as published results have them; --train says otherwise.
-CAPTURES = {"lego": "--iterations 30000 --max-gaussians 300000",
-            "tandt_train": "--iterations 30000 --max-gaussians 1000000",
-            "fox": "--iterations 30000 --max-gaussians 500000",
-            "many_cameras": "--iterations 30000 --max-gaussians 500000",
-            "quickstart": "--iterations 3000 --max-gaussians 50000"}
+# Steps and Gaussians of a full training where --train does not say.
+FULL_TRAINING = {"lego": "--iterations 30000 --max-gaussians 300000",
+                 "tandt_train": "--iterations 30000 --max-gaussians 1000000",
+                 "fox": "--iterations 30000 --max-gaussians 500000",
+                 "many_cameras": "--iterations 30000 --max-gaussians 500000"}
 
 
 class Failure(Exception):
@@ -275,29 +274,13 @@ class Bench:
                                  f"{result['peak_bytes'] / 1e9:.2f} GB")
         self.write("memory", runs)
 
-    def capture(self, name):
-        folder = os.path.join(self.a.data, name)
-        if name == "quickstart" and not os.path.isdir(folder):
-            folder = os.path.join(self.temporary, name)
-            made = run([self.program("gart"), "synth", "--out", folder])
-            if made.returncode != 0:
-                raise Failure(f"{folder}: could not be made: {last_line(made.stderr)}")
-        if not os.path.isdir(folder):
-            raise Failure(f"{folder}: no such capture; name the folder of captures with --data")
-        return folder
-
     def auto(self):
         kept = ("psnr", "ssim", "test_views", "seconds", "gaussians", "sh_degree", "floats_per_gaussian", "model_bytes",
                 "checkpoint_bytes", "peak_bytes", "profiled_step_ms", "background", "backend", "tracer", "backward",
                 "image_size", "train_views", "iterations", "sh_trials", "chosen")
-        for name in self.a.captures:
-            try:
-                folder = self.capture(name)
-            except Failure as failure:
-                self.fail(str(failure))
-                continue
+        for name, folder in self.a.capture:
             runs = []
-            options = self.a.train if self.a.train is not None else CAPTURES.get(name, "")
+            options = self.a.train or FULL_TRAINING.get(name, "")
             for seed in range(1, self.a.seeds + 1):
                 for mode in ("--no-auto", "--auto"):
                     out = os.path.join(self.temporary, "run")
@@ -340,12 +323,11 @@ def arguments():
     parser.add_argument("--repeats", type=int, default=20, help="measured steps a camera; the median counts")
     parser.add_argument("--filter", default=".", help="stages and cpu: benchmarks by regular expression")
     parser.add_argument("--min-time", type=float, default=0.2, help="stages and cpu: seconds a benchmark")
-    parser.add_argument("--data", default=os.environ.get("GART_DATA", os.path.join(here, "..", "..", "shared", "data")),
-                        help="auto: folder of the captures")
-    parser.add_argument("--captures", type=listed, default=list(CAPTURES), help="auto: which")
-    parser.add_argument("--train", help="auto: options of gart train, for all captures")
+    parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("NAME", "DATASET"),
+                        help="auto: a capture to train on; may be repeated")
+    parser.add_argument("--train", default="", help="auto: further options of gart train, in one string")
+    parser.add_argument("--backend", default="auto", help="auto: backend")
     parser.add_argument("--seeds", type=int, default=1, help="auto: runs of each kind")
-    parser.add_argument("--backend", default="cuda", help="auto: what computes")
     parser.add_argument("--commit", help="what was built, where the folder is no git checkout")
     a = parser.parse_args()
     wanted = a.what + (["sanitize"] if a.sanitize else [])
