@@ -29,6 +29,15 @@ int degree_in_use(gaussian_model const& m) {
   return degree;
 }
 
+bool lower_rows(row_request request) {
+  try {
+    while (request.sh_degree-- > 0) resolve(request);
+    return true;
+  } catch (unsupported const&) {
+    return false;
+  }
+}
+
 class degree_selection final : public session {
  public:
   degree_selection(row_request const& request, train_options const& options, dataset const& data,
@@ -180,9 +189,9 @@ class degree_selection final : public session {
 
 }  // namespace
 
-trial_plan plan_trials(train_options const& options, std::size_t train_views) {
+trial_plan plan_trials(row_request const& request, train_options const& options, std::size_t train_views) {
   trial_plan plan;
-  plan.degree = options.sh_degree;
+  plan.degree = request.sh_degree;
   plan.begin = options.iterations / 2;
   plan.steps = std::max(fewest_steps, options.iterations / 50);
   std::size_t const views = std::min(train_views / 10, most_held_out);
@@ -194,6 +203,8 @@ trial_plan plan_trials(train_options const& options, std::size_t train_views) {
     plan.why = std::to_string(train_views) + " training views are too few to hold some out and measure";
   } else if (options.iterations < 4 * plan.steps * plan.degree) {
     plan.why = "a run under " + std::to_string(4 * plan.steps * plan.degree) + " steps is too short to measure";
+  } else if (!lower_rows(request)) {
+    plan.why = "lower degrees are not compiled for this row";
   } else {
     for (std::size_t i = 0; i < views; ++i) plan.held_out.push_back((2 * i + 1) * train_views / (2 * views));
     char gain[32];

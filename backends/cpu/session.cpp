@@ -66,11 +66,9 @@ std::unique_ptr<renderer> make_renderer(row_request const& request) { return fin
 std::unique_ptr<session> make_session(row_request const& request, train_options const& options, dataset const& data,
                                       gaussian_model const* start) {
   compiled_row const& row = find(request);
-  train_options measured = options;
-  measured.sh_degree = request.sh_degree;
-  trial_plan const plan = plan_trials(measured, data.train.size());
+  trial_plan const plan = plan_trials(request, options, data.train.size());
   gaussian_model const from = start ? *start : initial_model(data, options);
-  if (!plan.held_out.empty()) return make_degree_selection(request, measured, data, from, plan);
+  if (!plan.held_out.empty()) return make_degree_selection(request, options, data, from, plan);
   return row.make_session(options, data, from);
 }
 

@@ -129,25 +129,26 @@ TEST_CASE("training starts from the capture's points, or from random ones as MCM
 }
 
 TEST_CASE("bands are measured where views and steps allow, on views evenly spread, within a quarter of the run") {
+  gart::row_request request{"serial"};
   gart::train_options options;
   options.sh_gain = 0.02f;
-  auto const plan = gart::plan_trials(options, 100);
+  auto const plan = gart::plan_trials(request, options, 100);
   CHECK(plan.held_out == std::vector<std::size_t>{6, 18, 31, 43, 56, 68, 81, 93});
   CHECK(plan.begin == 15000);
   CHECK(plan.steps == 600);
-  CHECK(gart::plan_trials(options, 20).held_out.size() == 2);
-  CHECK(gart::plan_trials(options, 19).held_out.empty());
+  CHECK(gart::plan_trials(request, options, 20).held_out.size() == 2);
+  CHECK(gart::plan_trials(request, options, 19).held_out.empty());
   for (int const iterations : {1, 599, 600, 5000, 30000}) {
     options.iterations = iterations;
-    auto const p = gart::plan_trials(options, 40);
+    auto const p = gart::plan_trials(request, options, 40);
     CAPTURE(iterations);
     CHECK(p.held_out.empty() == (iterations < 600));
     if (!p.held_out.empty()) CHECK(4 * p.degree * p.steps <= iterations);
     CHECK_FALSE(p.why.empty());
   }
-  options.sh_degree = 0;
-  CHECK(gart::plan_trials(options, 40).held_out.empty());
-  options.sh_degree = 3, options.sh_gain = 0;
-  CHECK(gart::plan_trials(options, 40).held_out.empty());
+  request.sh_degree = 0;
+  CHECK(gart::plan_trials(request, options, 40).held_out.empty());
+  request.sh_degree = 3, options.sh_gain = 0;
+  CHECK(gart::plan_trials(request, options, 40).held_out.empty());
   CHECK(gart::forecast_gain(0.01, 100, 300, 500) == doctest::Approx(0.02));
 }

@@ -92,7 +92,7 @@ TEST_CASE("a band has no floats before it is used, and its coming changes no bit
   CAPTURE(seed);
   fixture f = make(seed, 0.5f);
   auto const growing = session_of(f);
-  f.options.held_out = gart::plan_trials(f.options, views).held_out;
+  f.options.held_out = gart::plan_trials(serial, f.options, views).held_out;
   f.options.sh_gain = 0;
   auto const full = session_of(f);
   std::set<std::size_t> floats;
@@ -143,7 +143,7 @@ TEST_CASE("the threshold decides, the scores are those of the views held out, an
   CAPTURE(seed);
   fixture f = make(seed, 0.8f);
   f.options.sh_gain = 100;
-  auto const held_out = gart::plan_trials(f.options, views).held_out;
+  auto const held_out = gart::plan_trials(serial, f.options, views).held_out;
   REQUIRE(held_out.size() == 2);
   auto const is_held = [&](std::string const& name) {
     return std::find(held_out.begin(), held_out.end(), std::stoul(name)) != held_out.end();
@@ -185,7 +185,6 @@ TEST_CASE("the threshold decides, the scores are those of the views held out, an
   CHECK(after.size() == views);
 
   f.options.sh_gain = 1e-6f;
-  f.options.sh_degree = 1;
   auto const kept = gart::make_session({"serial", "auto", "auto", 1}, f.options, f.data, &f.start);
   while (kept->steps_done() < iterations) kept->step();
   REQUIRE(kept->trials().size() == 1);

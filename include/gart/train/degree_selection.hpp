@@ -43,9 +43,9 @@ struct trial_plan {
   std::string why;                    // in words
 };
 
-// From the options' iterations, sh_degree and sh_gain. Nothing is measured where the trials would take more than a
-// quarter of the run, or fewer than 20 training views are there to hold some out of.
-trial_plan plan_trials(train_options const& options, std::size_t train_views);
+// Nothing is measured where the trials would take more than a quarter of the run, where fewer than 20 training views
+// are there to hold some out of, or where the row is not compiled for every lower degree.
+trial_plan plan_trials(row_request const& request, train_options const& options, std::size_t train_views);
 
 double forecast_gain(double gain, int first_step, int now, int iterations);
 
