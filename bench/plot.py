@@ -420,6 +420,27 @@ class Pages:
             self.tables["presets"] = table(["scene", "preset", "alpha_min", "t_min", "image PSNR, dB",
                                             "gradient, worst group", "a view, ms", "trained PSNR, dB", "SSIM",
                                             "training, s", "Gaussians"], rows)
+    def auto(self):
+        rows = []
+        for path in sorted(glob.glob(os.path.join(self.results, "auto_*.json"))):
+            result = self.load(os.path.basename(path)[:-5])
+            runs = [r for r in result["runs"] if "error" not in r]
+            full = {r["seed"]: r for r in runs if r["mode"] == "--no-auto"}
+            for r in runs:
+                base = full.get(r["seed"], {})
+                change = f"{r['psnr'] - base['psnr']:+.3f}" if r["mode"] == "--auto" and base else ""
+                gains = ", ".join(f"{t['band']}: {t['gain']:+.3f} ({t['forecast']:+.3f})" for t in r["sh_trials"])
+                rows.append([result["capture"], "full" if r["mode"] == "--no-auto" else "auto", r["sh_degree"],
+                             r["floats_per_gaussian"], f"{r['psnr']:.3f}", change, f"{r['seconds']:.0f}",
+                             f"{r['cpu_seconds']:.0f}", f"{r['model_bytes'] / 1e3:,.0f}",
+                             f"{r['checkpoint_bytes'] / 1e3:,.0f}", f"{r['peak_bytes'] / 1e6:.1f}", gains])
+            first = runs[0] if runs else {}
+            rows.append([f"{result['capture']}: {first.get('image_size', '')}, {first.get('options', '')}; "
+                         f"{first.get('backend', '')}, {source(result)}"] + [""] * 11)
+        if rows:
+            self.tables["auto"] = table(["capture", "model", "SH", "floats", "PSNR, dB", "against full", "training, s",
+                                         "CPU, s", "PLY, kB", "checkpoint, kB", "peak, MB",
+                                         "bands tried: gain (forecast), dB"], rows)
 
     def write_tables(self):
         for path in sorted(glob.glob(os.path.join(self.docs, "*.md"))):
@@ -455,6 +476,7 @@ def main():
     pages.cpu()
     pages.tradeoff()
     pages.presets()
+    pages.auto()
     pages.write_tables()
 
 

@@ -3,7 +3,7 @@
 
     python3 bench/run.py --build DIR --scenes DIR --what tests,stages,paper
 
-What (comma-separated; default all but sanitize, cpu, traits, tradeoff and presets):
+What (comma-separated; default all but sanitize, cpu, traits, tradeoff, presets and auto):
   tests       every CUDA test of the build
   sanitize    compute-sanitizer memcheck and racecheck over a training step of each strategy
   stages      gart_bench_cuda on the first scene: each stage on its own, and tile sizes 4, 8 and 16
@@ -15,6 +15,8 @@ What (comma-separated; default all but sanitize, cpu, traits, tradeoff and prese
   paper       strategies, memory and stages
   tradeoff    `gart tradeoff` on the first scene and on every --model: what each approximation costs and buys
   presets     `gart train` with each --preset on every --capture: what they cost in quality
+  auto        `gart train --auto` against --no-auto on every --capture: scores, seconds, bytes, what was chosen and
+              measured; a file auto_NAME.json each
 
 Scenes are DIR/NAME.ply with DIR/NAME.json, a list of cameras {"name","width","height","fx","fy","cx","cy","c2w"}.
 synth_1000k is the scene of a million Gaussians, and so on. A missing one is made by --generator, a command in which
@@ -31,6 +33,7 @@ import glob
 import json
 import os
 import re
+import resource
 import shlex
 import shutil
 import subprocess
@@ -38,9 +41,14 @@ import sys
 import tempfile
 import time
 
-PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff", "presets")
+PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff", "presets", "auto")
 PRESETS = ("exact", "balanced", "fast")
 SKIPPED = 77
+# Steps and Gaussians of a full training where --train does not say.
+FULL_TRAINING = {"lego": "--iterations 30000 --max-gaussians 300000",
+                 "tandt_train": "--iterations 30000 --max-gaussians 1000000",
+                 "fox": "--iterations 30000 --max-gaussians 500000",
+                 "many_cameras": "--iterations 30000 --max-gaussians 500000"}
 
 # Rows of docs/traits.md: name, SH degree, kernel degree, options of gart bench.
 TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
@@ -327,6 +335,7 @@ class Bench:
             if "error" not in result:
                 self.say(f"{row}: step {result['step_ms']:.2f} ms")
         self.write("traits" if backend == "cuda" else "traits_" + backend, runs)
+
     def gart_tradeoff(self, ply, cameras, arguments):
         folder = os.path.join(self.temporary, "tradeoff")
         shutil.rmtree(folder, ignore_errors=True)
@@ -367,6 +376,36 @@ class Bench:
                 self.say(f"{name}, {preset}: {metrics['psnr']:.2f} dB, {metrics['seconds']:.0f} s")
             self.write("presets_" + name, runs, scene=name, train=self.a.train)
 
+    def auto(self):
+        kept = ("psnr", "ssim", "test_views", "seconds", "gaussians", "sh_degree", "floats_per_gaussian", "model_bytes",
+                "checkpoint_bytes", "peak_bytes", "profiled_step_ms", "background", "backend", "tracer", "backward",
+                "image_size", "train_views", "iterations", "sh_trials", "chosen")
+        for name, folder in self.a.capture:
+            runs = []
+            options = self.a.train or FULL_TRAINING.get(name, "")
+            for seed in range(1, self.a.seeds + 1):
+                for mode in ("--no-auto", "--auto"):
+                    out = os.path.join(self.temporary, "run")
+                    command = [self.program("gart"), "train", folder, "--out", out, mode, "--backend", self.a.backend,
+                               "--seed", seed, "--eval-every", 0, "--quiet", *shlex.split(options)]
+                    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+                    done = run(command)
+                    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+                    row = {"mode": mode, "seed": seed, "options": options}
+                    if done.returncode != 0:
+                        row["error"] = last_line(done.stderr)
+                        self.fail(f"{name}, {mode}: {row['error']}")
+                    else:
+                        with open(os.path.join(out, "metrics.json")) as f:
+                            metrics = json.load(f)
+                        row.update({k: metrics[k] for k in kept})
+                        # Of the whole process, loading and testing included; other work on the machine is not in it.
+                        row["cpu_seconds"] = after.ru_utime - before.ru_utime
+                        self.say(f"{name}, seed {seed}, {mode}: {row['psnr']:.3f} dB, {row['seconds']:.1f} s, SH degree "
+                                 f"{row['sh_degree']}, {row['floats_per_gaussian']} floats a Gaussian")
+                    runs.append(row)
+            self.write("auto_" + name, runs, capture=name)
+
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -385,14 +424,15 @@ def arguments():
     parser.add_argument("--backwards", type=listed, default=["pixel", "hybrid", "primitive"])
     parser.add_argument("--views", type=int, default=4, help="cameras of the strategies")
     parser.add_argument("--repeats", type=int, default=20, help="measured steps a camera; the median counts")
-    parser.add_argument("--backend", default="cuda", help="of traits, tradeoff and presets")
+    parser.add_argument("--backend", default="cuda", help="of traits, tradeoff, presets and auto")
     parser.add_argument("--filter", default=".", help="stages and cpu: benchmarks by regular expression")
     parser.add_argument("--min-time", type=float, default=0.2, help="stages and cpu: seconds a benchmark")
     parser.add_argument("--model", nargs=3, action="append", default=[], metavar=("NAME", "PLY", "CAMERAS"),
                         help="tradeoff: a trained model and its capture or camera JSON; may be repeated")
     parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("NAME", "DATASET"),
-                        help="presets: a capture to train on; may be repeated")
-    parser.add_argument("--train", default="", help="presets: further options of gart train, in one string")
+                        help="presets and auto: a capture to train on; may be repeated")
+    parser.add_argument("--train", default="", help="presets and auto: further options of gart train, in one string")
+    parser.add_argument("--seeds", type=int, default=1, help="auto: runs of each kind")
     parser.add_argument("--commit", help="what was built, where the folder is no git checkout")
     a = parser.parse_args()
     wanted = a.what + (["sanitize"] if a.sanitize else [])

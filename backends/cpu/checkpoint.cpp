@@ -1,8 +1,11 @@
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
 #include <gart/train/checkpoint.hpp>
+#include <gart/train/state.hpp>
 
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <ostream>
 
 namespace gart {
@@ -65,6 +68,77 @@ std::vector<char> const& checkpoint_reader::find(std::string const& name, std::s
   if (it == arrays_.end()) fail("has no array " + name);
   if (it->second.size() % element != 0) fail("array " + name + " is not a whole number of elements");
   return it->second;
+}
+
+training_state with_sh_degree(training_state state, int degree) {
+  for (gaussian_model* model : {&state.scene, &state.first, &state.second})
+    *model = with_sh_degree(std::move(*model), degree);
+  return state;
+}
+
+void write_checkpoint(std::filesystem::path const& path, training_state const& state) {
+  checkpoint_writer out;
+  auto const add = [&](std::string const& prefix, gaussian_model const& m) {
+    out.add(prefix + "mean", m.mean), out.add(prefix + "log_scale", m.log_scale);
+    out.add(prefix + "quaternion", m.quaternion), out.add(prefix + "opacity", m.opacity), out.add(prefix + "sh", m.sh);
+  };
+  add("", state.scene), add("first/", state.first), add("second/", state.second);
+  out.add("step", std::vector<int>{state.step});
+  out.add("sh_degree", std::vector<int>{state.scene.sh_degree});
+  out.add("growth", std::vector<float>{state.growth});
+  out.add("seed", std::vector<u64>{state.seed});
+  out.add("adc/gradient_sum", state.gradient_sum), out.add("adc/touched", state.touched);
+  out.add("band_trials", state.trials);
+  out.write(path);
+}
+
+namespace {
+
+training_state state_of(checkpoint_reader const& in) {
+  training_state s;
+  std::vector<int> const degree = in.get<int>("sh_degree"), step = in.get<int>("step");
+  std::vector<u64> const seed = in.get<u64>("seed");
+  std::vector<float> const growth = in.get<float>("growth");
+  if (degree.size() != 1 || step.size() != 1 || seed.size() != 1 || growth.size() != 1)
+    in.fail("a counter is not one number");
+  if (degree[0] < 0 || degree[0] > 3) in.fail("is damaged: it is of SH degree " + std::to_string(degree[0]));
+  if (step[0] < 0 || step[0] == std::numeric_limits<int>::max())
+    in.fail("is damaged: it was saved after step " + std::to_string(step[0]));
+  if (!(growth[0] > 0 && std::isfinite(growth[0]))) in.fail("is damaged: its growth is no factor");
+  auto const get = [&](std::string const& prefix) {
+    gaussian_model m;
+    m.sh_degree = degree[0];
+    m.mean = in.get<float>(prefix + "mean"), m.log_scale = in.get<float>(prefix + "log_scale");
+    m.quaternion = in.get<float>(prefix + "quaternion"), m.opacity = in.get<float>(prefix + "opacity");
+    m.sh = in.get<float>(prefix + "sh");
+    std::size_t const n = m.size();
+    if (m.mean.size() != 3 * n || m.log_scale.size() != 3 * n || m.quaternion.size() != 4 * n ||
+        m.sh.size() != 3 * n * static_cast<std::size_t>(sh_coefficients(m.sh_degree)))
+      in.fail("its arrays " + prefix + "* differ in length");
+    return m;
+  };
+  s.scene = get(""), s.first = get("first/"), s.second = get("second/");
+  if (s.first.size() != s.scene.size() || s.second.size() != s.scene.size())
+    in.fail("its moments differ in number from its Gaussians");
+  s.step = step[0], s.growth = growth[0], s.seed = seed[0];
+  s.gradient_sum = in.get<float>("adc/gradient_sum"), s.touched = in.get<u32>("adc/touched");
+  if (s.gradient_sum.size() != s.touched.size()) in.fail("its arrays adc/* differ in length");
+  s.trials = in.get<band_trial>("band_trials");
+  return s;
+}
+
+}  // namespace
+
+training_state read_checkpoint(std::filesystem::path const& path) { return state_of(checkpoint_reader(path)); }
+
+training_state read_checkpoint(std::filesystem::path const& path, int sh_degree) {
+  checkpoint_reader const in(path);
+  training_state s = state_of(in);
+  if (s.scene.sh_degree != sh_degree) {
+    in.fail("is of SH degree " + std::to_string(s.scene.sh_degree) + ", this run of " + std::to_string(sh_degree) +
+            ": give --sh-degree " + std::to_string(s.scene.sh_degree));
+  }
+  return s;
 }
 
 }  // namespace gart

@@ -1,5 +1,6 @@
 #include <gart/core/error.hpp>
 #include <gart/optim/random.hpp>
+#include <gart/train/choose.hpp>
 #include <gart/train/initial.hpp>
 
 #include <algorithm>
@@ -90,14 +91,12 @@ std::vector<float> neighbor_distance2(std::vector<float> const& position) {
   return out;
 }
 
-gaussian_model model_from_points(point_cloud const& points, train_options const& options) {
+gaussian_model model_from_points(point_cloud const& points, int sh_degree, float o, float scale) {
   constexpr float sh_constant = 0.28209479177387814f;
-  float const o = options.initial_opacity == 0 ? 0.1f : options.initial_opacity;
-  float const scale = options.initial_scale == 0 ? 1.0f : options.initial_scale;
   if (!(o > 0 && o < 1)) throw invalid_argument("the initial opacity must lie between 0 and 1");
   if (!(scale > 0)) throw invalid_argument("the initial scale must be positive");
   gaussian_model m;
-  m.resize(points.size(), options.sh_degree);
+  m.resize(points.size(), sh_degree);
   std::vector<float> const d2 = neighbor_distance2(points.position);
   m.mean = points.position;
   std::size_t const stride = m.size() ? m.sh.size() / m.size() : 0;
@@ -125,18 +124,11 @@ point_cloud random_points(vec3d lo, vec3d hi, index_t count, u64 seed) {
   return out;
 }
 
-gaussian_model initial_model(dataset const& data, train_options const& given) {
-  train_options options = given;
+gaussian_model initial_model(dataset const& data, train_options const& options) {
   if (options.max_gaussians == 0) throw invalid_argument("--max-gaussians must be at least 1");
-  point_cloud points = data.points;
-  if (points.size() == 0) {
-    points = random_points(data.bounds_min, data.bounds_max, std::min(options.random_points, options.max_gaussians),
-                           options.seed);
-    if (options.densify == densify_kind::mcmc) {
-      if (options.initial_opacity == 0) options.initial_opacity = 0.5f;
-      if (options.initial_scale == 0) options.initial_scale = 0.1f;
-    }
-  }
+  starting_points const start = choose_start(data, options).value;
+  point_cloud points =
+      start.random ? random_points(data.bounds_min, data.bounds_max, start.count, options.seed) : data.points;
   if (points.size() > options.max_gaussians) {
     // A random subset: the first n of a shuffle.
     random_source const source{options.seed, 1, random_use::user};
@@ -151,7 +143,7 @@ gaussian_model initial_model(dataset const& data, train_options const& given) {
     points.position.resize(std::size_t{3} * options.max_gaussians);
     points.color.resize(std::size_t{3} * options.max_gaussians);
   }
-  return model_from_points(points, options);
+  return model_from_points(points, options.sh_degree, start.opacity, start.scale);
 }
 
 }  // namespace gart

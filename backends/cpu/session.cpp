@@ -1,5 +1,6 @@
 // Which rows there are, and which one a request means.
 #include <gart/core/error.hpp>
+#include <gart/train/degree_selection.hpp>
 #include <gart/train/initial.hpp>
 #include <gart/train/rows.hpp>
 
@@ -112,7 +113,10 @@ std::unique_ptr<renderer> make_renderer(row_request const& request) { return fin
 std::unique_ptr<session> make_session(row_request const& request, train_options const& options, dataset const& data,
                                       gaussian_model const* start) {
   compiled_row const& row = find(request);
-  return row.make_session(options, data, start ? *start : initial_model(data, options));
+  trial_plan const plan = plan_trials(request, options, data.train.size());
+  gaussian_model const from = start ? *start : initial_model(data, options);
+  if (!plan.held_out.empty()) return make_degree_selection(request, options, data, from, plan);
+  return row.make_session(options, data, from);
 }
 
 }  // namespace gart

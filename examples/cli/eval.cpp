@@ -1,3 +1,4 @@
+#include "choices.hpp"
 #include "commands.hpp"
 #include "evaluate.hpp"
 #include "options.hpp"
@@ -39,7 +40,7 @@ int run_eval(eval_arguments const& a) {
     throw gart::io_error(a.dataset.string(), "has no test views (" + data.split + ")",
                          "--test-every 8 keeps each 8th view");
   }
-  std::string const background = resolve_background(a.background, data.alpha);
+  std::string const background = a.background != "auto" ? a.background : background_for(gart::inspect(data)).value;
   gart::render_options options = file.render;
   options.background = background_color(background);
   if (a.max_hits >= 0) options.max_hits = static_cast<gart::u32>(a.max_hits);
@@ -85,7 +86,7 @@ void add_eval(CLI::App& app, command& selected) {
   eval->add_option("--out", a->out, "Where the scores go")->type_name("METRICS.json")->required();
   eval->add_option("--renders", a->renders, "Also keep NAME.png and NAME_truth.png of each view here")
       ->type_name("DIR");
-  eval->add_option("--background", a->background, "white or black; auto: white for images with alpha, else black")
+  eval->add_option("--background", a->background, "white or black; auto: as gart train chooses")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(one_of({"auto", "white", "black"}));

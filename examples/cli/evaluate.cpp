@@ -9,39 +9,6 @@
 
 namespace gart_cli {
 
-namespace {
-
-// Makes excluded pixels equal to the truth; the share of pixels that count.
-double apply_mask(gart::image8 const& mask, gart::image_float const& truth, gart::image_float& render) {
-  if (mask.empty()) return 1;
-  std::size_t const pixels = static_cast<std::size_t>(truth.width) * truth.height;
-  std::size_t kept = 0;
-  for (std::size_t p = 0; p < pixels; ++p) {
-    if (mask.data[p * mask.channels] != 0) {
-      ++kept;
-      continue;
-    }
-    for (int c = 0; c < 3; ++c) render.data[3 * p + c] = truth.data[3 * p + c];
-  }
-  return static_cast<double>(kept) / static_cast<double>(pixels);
-}
-
-}  // namespace
-
-gart::image_float composited(gart::image8 const& image, gart::vec3 background) {
-  gart::image_float result(image.width, image.height, 3);
-  std::size_t const pixels = static_cast<std::size_t>(image.width) * image.height;
-  for (std::size_t p = 0; p < pixels; ++p) {
-    gart::u8 const* const from = image.data.data() + p * image.channels;
-    float const alpha = image.channels == 4 ? from[3] / 255.0f : 1.0f;
-    for (int c = 0; c < 3; ++c) {
-      float const value = from[image.channels >= 3 ? c : 0] / 255.0f;
-      result.data[3 * p + c] = value * alpha + background[c] * (1 - alpha);
-    }
-  }
-  return result;
-}
-
 scores evaluate(std::vector<gart::dataset_view> const& views, gart::vec3 background, render_view const& render,
                 keep_view const& keep) {
   scores result;
@@ -55,16 +22,15 @@ scores evaluate(std::vector<gart::dataset_view> const& views, gart::vec3 backgro
     score.milliseconds = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     for (float& v : image.data) v = std::clamp(v, 0.0f, 1.0f);
 
-    gart::image_float const truth = composited(view.image, background);
+    gart::image_float const truth = gart::composited(view.image, background);
     if (image.data.size() != truth.data.size()) {
       throw gart::error(view.name + ": rendered at " + std::to_string(image.width) + " x " +
                         std::to_string(image.height) + ", but its photograph has " + std::to_string(truth.width) +
                         " x " + std::to_string(truth.height));
     }
     gart::image_float scored = image;
-    double const share = apply_mask(view.mask, truth, scored);
-    // The mean of the squares over all pixels, the excluded ones zero, is `share` times the mean over those that count.
-    score.psnr = gart::psnr(scored, truth) + 10 * std::log10(share);
+    double const share = gart::apply_mask(view.mask, truth, scored);
+    score.psnr = gart::masked_psnr(scored, truth, share);
     score.ssim = gart::ssim(scored, truth);
     psnr_sum += score.psnr, ssim_sum += score.ssim;
     if (keep) keep(i, score, image, truth);

@@ -1,7 +1,5 @@
 #pragma once
-// Scores of rendered views against photographs: PSNR and SSIM on [0, 1], the render clamped to it, the mean over views.
-// Straight alpha of the truth is composited on the background. Pixels that a mask excludes count in neither sum of
-// PSNR; for SSIM, whose windows need them, they hold the truth in both images.
+// Scores of rendered views against photographs: PSNR and SSIM (gart/loss/metrics.hpp), the mean over views.
 
 #include <gart/io/dataset.hpp>
 #include <gart/train/session.hpp>
@@ -34,8 +32,6 @@ using keep_view = std::function<void(std::size_t index, view_score const&, gart:
 
 scores evaluate(std::vector<gart::dataset_view> const& views, gart::vec3 background, render_view const& render,
                 keep_view const& keep = {});
-
-gart::image_float composited(gart::image8 const& image, gart::vec3 background);
 
 // "psnr", "ssim", "test_views" and "views"; null where there is no number.
 nlohmann::json to_json(scores const& result);

@@ -99,10 +99,6 @@ void use_threads([[maybe_unused]] int threads) {
 #endif
 }
 
-std::string resolve_background(std::string const& name, bool alpha) {
-  return name != "auto" ? name : alpha ? "white" : "black";
-}
-
 gart::vec3 background_color(std::string const& name) { return gart::vec3(name == "white" ? 1.0f : 0.0f); }
 
 model_file load_model(std::filesystem::path const& path) {
@@ -158,18 +154,6 @@ nlohmann::json approximations_of(gart::render_options const& render, gart::row_i
           {"max_hits", render.max_hits},
           {"arithmetic", row.arithmetic},
           {"lt_format", row.lt_format}};
-}
-
-gart::gaussian_model with_degree(gart::gaussian_model const& model, int degree) {
-  gart::gaussian_model result = model;
-  if (degree == model.sh_degree) return result;
-  result.resize(model.size(), degree);
-  std::size_t const from = 3u * gart::sh_coefficients(model.sh_degree), to = 3u * gart::sh_coefficients(degree);
-  std::fill(result.sh.begin(), result.sh.end(), 0.0f);
-  for (std::size_t i = 0; i < model.size(); ++i) {
-    std::copy_n(model.sh.begin() + i * from, std::min(from, to), result.sh.begin() + i * to);
-  }
-  return result;
 }
 
 }  // namespace gart_cli

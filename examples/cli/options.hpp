@@ -23,6 +23,12 @@ class recorded_options {
     entries_.push_back({flag.substr(2), option, [&value] { return nlohmann::json(value); }});
     return option;
   }
+  // A flag with its opposite: "--auto,!--no-auto".
+  CLI::Option* add_flag(CLI::App& app, std::string const& flags, bool& value, std::string const& help) {
+    CLI::Option* option = app.add_flag(flags, value, help);
+    entries_.push_back({flags.substr(2, flags.find(',') - 2), option, [&value] { return nlohmann::json(value); }});
+    return option;
+  }
   nlohmann::json values() const;
   // Takes the values of an earlier run as if they stood on the command line, by the same checks. usage_error for an
   // option that was given and says otherwise; io_error, naming `file` and the option, for one that is missing or that
@@ -56,8 +62,6 @@ CLI::Validator arithmetic_names();
 CLI::Validator kernel_degree_names();
 CLI::Validator lt_format_names();
 
-// "black", "white", or for "auto" what suits the capture: white for images with alpha, as published results have it.
-std::string resolve_background(std::string const& name, bool alpha);
 gart::vec3 background_color(std::string const& name);
 
 // Of a model's file, where the command line does not say otherwise: what it was trained with.
@@ -73,7 +77,5 @@ gart::row_request row_request_for(model_file const& file, std::filesystem::path 
 inline constexpr gart::u32 max_hits_most = 1'000'000'000;
 // What a run left out or computed shorter, as every report tells it.
 nlohmann::json approximations_of(gart::render_options const& render, gart::row_info const& row);
-// Coefficients past `degree` are dropped, missing ones are zero.
-gart::gaussian_model with_degree(gart::gaussian_model const& model, int degree);
 
 }  // namespace gart_cli

@@ -185,6 +185,29 @@ std::string costs(json const& m) {
   return html;
 }
 
+std::string choices(json const& m) {
+  if (!m.contains("chosen") || m["chosen"].empty()) return "";
+  std::string html = "<h2>Chosen for this capture</h2><div class=\"box\"><table>";
+  for (auto const& c : m["chosen"]) {
+    html += "<tr><td>" + text_of(c, "option") + "</td><td><b>" + text_of(c, "value") + "</b></td><td>" +
+            text_of(c, "why") + "</td></tr>";
+  }
+  html += "</table></div>";
+  if (!m.contains("sh_trials") || m["sh_trials"].empty()) return html;
+  html +=
+      "<p class=\"soft\">Bands of spherical harmonics on trial: PSNR of training views held out, where two branches of "
+      "the run end, with the band and without.</p><div class=\"box\"><table><tr><th>Band</th><th class=\"n\">with, "
+      "dB</th><th class=\"n\">without, dB</th><th class=\"n\">gain by the end, at most, dB</th><th></th></tr>";
+  for (auto const& t : m["sh_trials"]) {
+    html += "<tr><td>" + count_of(t, "band") + "</td><td class=\"n\">" + fixed(number_of(t, "psnr_with"), 3) +
+            "</td><td class=\"n\">" + fixed(number_of(t, "psnr_without"), 3) + "</td><td class=\"n\">" +
+            fixed(number_of(t, "forecast"), 3) + "</td><td>" + (t.value("kept", true) ? "stays" : "goes") +
+            "</td></tr>";
+  }
+  return html + "</table></div><p>The model has SH degree " + count_of(m, "sh_degree") + ": " +
+         count_of(m, "floats_per_gaussian") + " floats a Gaussian.</p>";
+}
+
 std::string settings(json const& m, json const& config) {
   std::string html = "<h2>Settings</h2><div class=\"settings\">";
   auto const row = [&](std::string const& name, std::string const& value) {
@@ -255,6 +278,7 @@ std::string report_page(json const& metrics, json const& config, history const& 
   page += curves(course, number_of(metrics, "iterations"));
   page += pictures(metrics, views);
   page += costs(metrics);
+  page += choices(metrics);
   page += settings(metrics, config);
   page += "<footer>gart " + std::string(gart::version) + "</footer></main></body></html>\n";
   return page;

@@ -107,7 +107,7 @@ class tradeoff_run {
 
     say_.state("reading views", 0);
     set_ = load_views(a_.cameras, a_.views);
-    background_ = resolve_background(a_.background, set_.alpha);
+    background_ = a_.background != "auto" ? a_.background : set_.background;
     for (setting& s : settings_) s.use.render.background = background_color(background_);
     prepare_folder(a_.out);
 
@@ -153,7 +153,7 @@ class tradeoff_run {
   }
 
   json measure(setting const& s) {
-    gart::gaussian_model const model = with_degree(file_.model, s.use.row.sh_degree);
+    gart::gaussian_model const model = gart::with_sh_degree(file_.model, s.use.row.sh_degree);
     auto const renderer = gart::make_renderer(s.use.row);
     renderer->set_model(model);
     error_sums errors;

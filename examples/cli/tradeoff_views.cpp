@@ -1,3 +1,4 @@
+#include "choices.hpp"
 #include "tradeoff_views.hpp"
 
 #include "output.hpp"
@@ -96,7 +97,7 @@ view_set load_views(fs::path const& cameras, view_choice const& choice) {
     gart::dataset_options options;
     options.downscale = choice.downscale;
     gart::dataset data = gart::load_dataset(cameras, options);
-    out.alpha = data.alpha, out.extent = data.extent;
+    out.background = background_for(gart::inspect(data)).value, out.extent = data.extent;
     for (std::size_t const i : evenly_spread(data.train.size(), choice.count)) {
       auto& v = data.train[i];
       out.views.push_back({v.name, v.view, std::move(v.image), std::move(v.mask), {}, {}, {}});

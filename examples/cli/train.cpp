@@ -1,3 +1,4 @@
+#include "choices.hpp"
 #include "commands.hpp"
 #include "evaluate.hpp"
 #include "history.hpp"
@@ -88,12 +89,17 @@ class training_run {
     stopwatch const loading;
     if (a_.resume) continue_run(a_);
     if (a_.dataset.empty()) throw usage_error("DATASET is missing (see gart train --help)");
+    row_ = gart::resolve(row_request_of(a_));  // what is not there is known before images are read
+    course_ = history(a_.iterations);
+    load();
+    chosen_ = choose(a_, data_);
     row_ = gart::resolve(row_request_of(a_));
     a_.backend = row_.backend, a_.tracer = row_.tracer, a_.backward = row_.backward;
     a_.lt_format = row_.lt_format, a_.tile_size = row_.tile_size, a_.window = row_.window;
-    course_ = history(a_.iterations);
-    load();
-    a_.background = resolve_background(a_.background, data_.alpha);
+    for (auto& choice : chosen_) {
+      if (choice["option"] == "--tracer") choice["value"] = a_.tracer;
+      if (choice["option"] == "--backward") choice["value"] = a_.backward;
+    }
     eval_background_ = background_color(a_.background);
     if (!a_.start.empty()) {
       model_file const file = load_model(a_.start);
@@ -102,7 +108,7 @@ class training_run {
                           ", the run of " + std::to_string(a_.kernel_degree) + " (give --kernel-degree " +
                           std::to_string(file.kernel_degree) + ")");
       }
-      start_ = with_degree(file.model, a_.sh_degree);
+      start_ = gart::with_sh_degree(file.model, row_.sh_degree);
       if (start_.size() > a_.max_gaussians) {
         throw usage_error("--start " + a_.start + ": has " + with_commas(start_.size()) +
                           " Gaussians, more than --max-gaussians " + std::to_string(a_.max_gaussians));
@@ -114,14 +120,25 @@ class training_run {
         gart::make_session(row_request_of(a_), train_options_of(a_), data_, a_.start.empty() ? nullptr : &start_);
     if (a_.resume) {
       check_same_dataset(a_, data_);
+      chosen_ = read_json(a_.config_file()).value("chosen", chosen_);
       session_->load(a_.checkpoint_file());
       if (fs::exists(a_.history_file())) course_.restore(a_.history_file(), session_->steps_done());
     } else {
       begin_anew();
     }
     if (a_.resume) say_.note("resuming after step " + with_commas(session_->steps_done()));
+    trials_ = session_->trials().size();
+    say_choices();
     say_.note(row_.backend + " backend, " + row_.tracer + " tracer, " + row_.backward + " backward pass");
     load_seconds_ = loading.seconds();
+  }
+
+  void say_choices() {
+    say_.note("chosen for this capture, each by its option where one is given:");
+    for (auto const& choice : chosen_) {
+      auto const text = [&](char const* key) { return choice.value(key, std::string()); };
+      say_.note("  " + text("option") + " " + text("value") + ": " + text("why"));
+    }
   }
 
   void load() {
@@ -149,7 +166,9 @@ class training_run {
   // An earlier run's results go, lest they be taken for this one's.
   void begin_anew() {
     for (char const* old : {"checkpoint.gart", "history.json", "metrics.json", "report.html"}) fs::remove(a_.out / old);
-    write_json(a_.config_file(), config_of(a_, data_));
+    nlohmann::json config = config_of(a_, data_);
+    config["chosen"] = chosen_;
+    write_json(a_.config_file(), config);
     session_->save(a_.checkpoint_file());
   }
 
@@ -179,11 +198,12 @@ class training_run {
                           ")");
       }
       ++steps_, step_seconds_ += seconds, course_.seconds += seconds, gaussians_ = report.gaussians;
-      course_.add(report);
+      if (!report.trial) course_.add(report);
+      say_new_trials();
       recent.add(report, seconds);
       show(report, recent);
       int const between = a_.steps_between_tests();
-      if (between > 0 && report.step % between == 0 && report.step < a_.iterations) test(report.step);
+      if (!report.trial && between > 0 && report.step % between == 0 && report.step < a_.iterations) test(report.step);
       if (a_.checkpoint_minutes > 0 && since_start.seconds() - last_checkpoint > 60 * a_.checkpoint_minutes) {
         stopwatch const saving;
         save_checkpoint();
@@ -194,6 +214,12 @@ class training_run {
     return true;
   }
 
+  void say_new_trials() {
+    auto const trials = session_->trials();
+    for (; trials_ < trials.size(); ++trials_)
+      say_.note("step " + with_commas(session_->steps_done()) + ": " + in_words(trials[trials_]));
+  }
+
   void show(gart::step_report const& report, recent_steps const& recent) {
     double const share = static_cast<double>(report.step) / a_.iterations;
     if (!say_.due(share)) return;
@@ -201,7 +227,8 @@ class training_run {
     say_.state(with_commas(report.step) + "/" + with_commas(a_.iterations) + "  " + fixed(rate, rate < 10 ? 2 : 0) +
                    " it/s  loss " + fixed(recent.loss, 4) + "  PSNR " + fixed(recent.psnr, 2) + " dB  " +
                    with_commas(report.gaussians) + " Gaussians  " +
-                   as_duration((a_.iterations - report.step) * recent.seconds) + " left",
+                   as_duration((a_.iterations - report.step) * recent.seconds) + " left" +
+                   (report.trial ? ", a band on trial" : ""),
                share);
   }
 
@@ -292,7 +319,10 @@ class training_run {
     m["format"] = data_.format, m["split"] = data_.split, m["resize_filter"] = data_.resize_filter;
     m["train_views"] = data_.train.size(), m["image_size"] = image_size(), m["notes"] = data_.notes;
     m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
-    m["iterations"] = a_.iterations, m["gaussians"] = gaussians_, m["sh_degree"] = row_.sh_degree;
+    m["iterations"] = a_.iterations, m["gaussians"] = gaussians_, m["sh_degree"] = session_->row().sh_degree;
+    m["floats_per_gaussian"] = 11 + 3 * gart::sh_coefficients(session_->row().sh_degree);
+    m["chosen"] = chosen_, m["sh_trials"] = trials_of(session_->trials());
+    m["model_bytes"] = fs::file_size(a_.model_file()), m["checkpoint_bytes"] = fs::file_size(a_.checkpoint_file());
     m["backend"] = row_.backend, m["tracer"] = row_.tracer, m["backward"] = row_.backward;
     m["kernel_degree"] = row_.kernel_degree;
     m["approximations"] = approximations_of(train_options_of(a_).render, row_);
@@ -318,6 +348,8 @@ class training_run {
   gart::row_info row_;
   bool fell_back_ = false;
   gart::dataset data_;
+  nlohmann::json chosen_;
+  std::size_t trials_ = 0;  // that have been told of
   gart::gaussian_model start_;
   gart::vec3 eval_background_{0.0f};
   std::unique_ptr<gart::session> session_;

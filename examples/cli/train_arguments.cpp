@@ -31,8 +31,14 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       r.add(train, "--densify", a.densify, "NAME",
             "How Gaussians are added: mcmc (grows to --max-gaussians),\nadc (clones and splits by gradient) or none"))
       ->check(one_of({"mcmc", "adc", "none"}));
-  in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3", "Degree of the spherical harmonics of colour"))
-      ->check(between(0, 3));
+  in_group(r.add_flag(train, "--auto,!--no-auto", a.automatic,
+                      "Model only what the scene requires: measure on held-out\ntraining views which bands of "
+                      "spherical harmonics pay, and\nstore no others. The default; --no-auto stores all"));
+  in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3",
+                 "Degree of the spherical harmonics of colour; auto: measured,\nor 3 with --no-auto"))
+      ->check(one_of({"auto", "0", "1", "2", "3"}));
+  in_group(r.add(train, "--sh-gain", a.sh_gain, "DB", "PSNR on the held-out views that a band must buy by the end"))
+      ->check(between(1e-6, 100));
   in_group(r.add(train, "--points", a.points, "N", "Gaussians placed at random where the capture has no points"))
       ->check(between(1, 2147483647.0));
   in_group(r.add(train, "--init-opacity", a.initial_opacity, "A",
@@ -54,8 +60,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   group = "Capture";
   in_group(r.add(train, "--downscale", a.downscale, "N", "Shrink images by this whole factor"))->check(between(1, 64));
   in_group(r.add(train, "--background", a.background, "NAME",
-                 "white, black, or random (another at each step; tests on black);\nauto: white for images with alpha, "
-                 "else black"))
+                 "white, black, or random (another at each step; tests on black);\nauto: white for transparent "
+                 "images and plain white borders,\nelse black"))
       ->check(one_of({"auto", "white", "black", "random"}));
   in_group(
       r.add(train, "--test-every", a.test_every, "N",
@@ -150,8 +156,14 @@ void continue_run(train_arguments& a) {
   }
 }
 
+namespace {
+int most_sh_degree(train_arguments const& a) {
+  return a.sh_degree == "auto" ? a.defaults.sh_degree : std::stoi(a.sh_degree);
+}
+}  // namespace
+
 gart::row_request row_request_of(train_arguments const& a) {
-  return {a.backend,    a.tracer,    a.backward,  a.sh_degree, a.kernel_degree,
+  return {a.backend,    a.tracer,    a.backward,  most_sh_degree(a), a.kernel_degree,
           a.arithmetic, a.lt_format, a.tile_size, a.window};
 }
 
@@ -166,7 +178,8 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.initial_opacity = a.initial_opacity;
   o.initial_scale = a.initial_scale;
   o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
-  o.sh_degree = a.sh_degree;
+  o.sh_degree = most_sh_degree(a);
+  o.sh_gain = a.automatic && a.sh_degree == "auto" ? a.sh_gain : 0;
   o.background = a.background == "white"    ? gart::background_kind::white
                  : a.background == "random" ? gart::background_kind::random
                                             : gart::background_kind::black;

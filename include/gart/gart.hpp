@@ -16,6 +16,8 @@
 #include <gart/render/forward.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
+#include <gart/train/choose.hpp>
+#include <gart/train/degree_selection.hpp>
 #include <gart/train/initial.hpp>
 #include <gart/train/session.hpp>
 #include <gart/train/trainer.hpp>

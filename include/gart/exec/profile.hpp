@@ -24,6 +24,14 @@ class profiler {
   }
   std::map<std::string, stage_time> const& stages() const { return stages_; }
   void clear() { stages_.clear(); }
+  // Adds what the other has measured, and leaves it empty.
+  void take(profiler& other) {
+    for (auto const& [label, time] : other.stages_) {
+      stages_[label].milliseconds += time.milliseconds;
+      stages_[label].launches += time.launches;
+    }
+    other.clear();
+  }
 
  private:
   bool enabled_ = false;

@@ -1,9 +1,12 @@
 #pragma once
 // How good a render is, against the truth, in double on the host's cores: PSNR and SSIM as papers report them. Renders
-// are clamped to [0, 1] first. Errors: invalid_argument where the sizes differ or an image is empty.
+// are clamped to [0, 1] first. Straight alpha of a photograph is composited on the background. Pixels that a mask
+// excludes count in neither sum of PSNR; for SSIM, whose windows need them, they are made to hold the truth.
+// Errors: invalid_argument where the sizes differ or an image is empty.
 
 #include <gart/core/error.hpp>
 #include <gart/loss/ssim_window.hpp>
+#include <gart/math/glm.hpp>
 #include <gart/scene/image.hpp>
 
 #include <cmath>
@@ -30,6 +33,37 @@ inline double clamped(float v) { return v > 0 ? (v < 1 ? v : 1.0) : 0.0; }
 
 }  // namespace detail
 
+// The truth that a view is held against.
+inline image_float composited(image8 const& image, vec3 background) {
+  image_float result(image.width, image.height, 3);
+  std::size_t const pixels = static_cast<std::size_t>(image.width) * image.height;
+  for (std::size_t p = 0; p < pixels; ++p) {
+    u8 const* const from = image.data.data() + p * image.channels;
+    float const alpha = image.channels == 4 ? from[3] / 255.0f : 1.0f;
+    for (int c = 0; c < 3; ++c) {
+      float const value = from[image.channels >= 3 ? c : 0] / 255.0f;
+      result.data[3 * p + c] = value * alpha + background[c] * (1 - alpha);
+    }
+  }
+  return result;
+}
+
+// Makes excluded pixels equal to the truth; the share of pixels that count. An empty mask excludes none.
+inline double apply_mask(image8 const& mask, image_float const& truth, image_float& render) {
+  if (mask.empty()) return 1;
+  detail::check_pair(render, truth, "mask");
+  std::size_t const pixels = static_cast<std::size_t>(truth.width) * truth.height;
+  std::size_t kept = 0;
+  for (std::size_t p = 0; p < pixels; ++p) {
+    if (mask.data[p * mask.channels] != 0) {
+      ++kept;
+      continue;
+    }
+    for (int c = 0; c < 3; ++c) render.data[3 * p + c] = truth.data[3 * p + c];
+  }
+  return static_cast<double>(kept) / static_cast<double>(pixels);
+}
+
 // -10 log10 of the mean squared error; infinite where the images are equal.
 inline double psnr(image_float const& render, image_float const& truth) {
   detail::check_pair(render, truth, "psnr");
@@ -48,6 +82,12 @@ inline double psnr(image_float const& render, image_float const& truth) {
   for (double const row : rows) sum += row;
   return sum > 0 ? -10 * std::log10(sum / static_cast<double>(truth.data.size()))
                  : std::numeric_limits<double>::infinity();
+}
+
+// Of a render whose excluded pixels equal the truth, `share` of the pixels being left: the mean of the squares over all
+// pixels is `share` times the mean over those that count.
+inline double masked_psnr(image_float const& render, image_float const& truth, double share) {
+  return psnr(render, truth) + 10 * std::log10(share);
 }
 
 // Mean over pixels and channels; 1 where the images are equal.

@@ -24,10 +24,9 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
 
 // One degree more every `every` steps, sooner where the run is too short for that: the full degree is reached within
 // the first third of any run.
+inline int sh_interval(int degree, int every, int steps) { return std::max(1, std::min(every, steps / (3 * degree))); }
 inline int sh_degree_at(int step, int degree, int every, int steps) {
-  if (degree <= 0) return 0;
-  int const interval = std::max(1, std::min(every, steps / (3 * degree)));
-  return std::min(degree, step / interval);
+  return degree <= 0 ? 0 : std::min(degree, step / sh_interval(degree, every, steps));
 }
 
 }  // namespace gart

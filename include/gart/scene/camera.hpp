@@ -30,6 +30,13 @@ struct camera {
   vec3d position{0.0};    // the centre in the world, in double: everything else is relative to it
 };
 
+// The image point, in units of the focal length about the principal point, of the slopes x = X/Z and y = Y/Z.
+GART_HD inline void distort(distortion const& lens, double x, double y, double& u, double& v) {
+  double const r2 = x * x + y * y, radial = 1 + r2 * (lens.k1 + r2 * lens.k2);
+  u = x * radial + 2 * lens.p1 * x * y + lens.p2 * (r2 + 2 * x * x);
+  v = y * radial + 2 * lens.p2 * x * y + lens.p1 * (r2 + 2 * y * y);
+}
+
 // Newton's method on the distortion; exact to float after a few steps for lenses that are invertible at the point.
 GART_HD inline vec2 undistort(distortion const& lens, vec2 distorted) {
   vec2 p = distorted;

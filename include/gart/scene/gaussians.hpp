@@ -11,6 +11,7 @@
 #include <gart/core/span.hpp>
 #include <gart/exec/buffer.hpp>
 
+#include <algorithm>
 #include <vector>
 
 namespace gart {
@@ -28,6 +29,17 @@ struct gaussian_model {
     sh.resize(n * 3 * sh_coefficients(degree));
   }
 };
+
+// The same Gaussians with other storage: coefficients past `degree` are dropped, missing ones are zero.
+inline gaussian_model with_sh_degree(gaussian_model model, int degree) {
+  if (degree == model.sh_degree) return model;
+  std::size_t const from = std::size_t{3} * sh_coefficients(model.sh_degree), to = std::size_t{3} * sh_coefficients(degree);
+  std::vector<float> const old = std::move(model.sh);
+  model.sh.assign(model.size() * to, 0.0f), model.sh_degree = degree;
+  for (std::size_t i = 0; i < model.size(); ++i)
+    std::copy_n(old.data() + i * from, std::min(from, to), model.sh.data() + i * to);
+  return model;
+}
 
 // T is float or float const.
 template <class T>

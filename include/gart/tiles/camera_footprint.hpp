@@ -49,12 +49,6 @@ class camera_footprint {
   }
 
  private:
-  GART_HD void distort(double x, double y, double& u, double& v) const {
-    double const r2 = x * x + y * y, radial = 1 + r2 * (lens_.k1 + r2 * lens_.k2);
-    u = x * radial + 2 * lens_.p1 * x * y + lens_.p2 * (r2 + 2 * x * x);
-    v = y * radial + 2 * lens_.p2 * x * y + lens_.p1 * (r2 + 2 * y * y);
-  }
-
   GART_HD slope_box distorted(slope_box const& s) const {
     auto const clamp = [](double v, detail::interval const& to) { return v < to.lo ? to.lo : v > to.hi ? to.hi : v; };
     // What lies outside the view is seen by no pixel; keeping the rectangle to it keeps it where the lens is one to
@@ -67,7 +61,7 @@ class camera_footprint {
       double const border[4][2] = {{x, y0}, {x, y1}, {x0, y}, {x1, y}};
       for (auto const& b : border) {
         double a, c;
-        distort(b[0], b[1], a, c);
+        distort(lens_, b[0], b[1], a, c);
         u.add(a), v.add(c);
       }
     }

@@ -1,5 +1,5 @@
 #pragma once
-// Checkpoints: "gart checkpoint 1\n", then named arrays (name length, name, bytes, data; little endian), the last one
+// The file format of checkpoints: "gart checkpoint 1\n", then named arrays (name length, name, bytes, data; little endian), the last one
 // named "end". Written whole or not at all. Errors: io_error naming the file and the array that is missing, truncated
 // or of another size.
 

@@ -36,6 +36,8 @@ class compiled_session final : public session {
   rendered render(camera const& view, vec3 background) override { return trainer_.render(view, background); }
   void save(std::filesystem::path const& path) const override { trainer_.save(path); }
   void load(std::filesystem::path const& path) override { trainer_.load(path); }
+  training_state state() const override { return trainer_.state(); }
+  void set_state(training_state const& state) override { trainer_.set_state(state); }
   profiler& profile() override {
     exec_.synchronize();
     return exec_.profile;

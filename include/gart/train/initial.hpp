@@ -8,7 +8,8 @@
 
 namespace gart {
 
-gaussian_model model_from_points(point_cloud const& points, train_options const& options);
+// `scale` is times the distance to the neighbours.
+gaussian_model model_from_points(point_cloud const& points, int sh_degree, float opacity, float scale);
 point_cloud random_points(vec3d lo, vec3d hi, index_t count, u64 seed);
 
 // The dataset's points, or random ones in its bounds; at most options.max_gaussians (a random subset beyond).

@@ -9,6 +9,7 @@
 #include <gart/io/dataset.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/train/options.hpp>
+#include <gart/train/state.hpp>
 
 #include <filesystem>
 #include <functional>
@@ -77,6 +78,7 @@ struct step_report {
   index_t gaussians = 0;
   std::string view;
   std::string backward;  // the strategy of this step: not the one asked for where its LT buffer would pass the budget
+  bool trial = false;    // a step of a trial (train/degree_selection.hpp): `step` stands still until it is decided
 };
 
 class session {
@@ -91,6 +93,10 @@ class session {
   // degree, a truncated or foreign file.
   virtual void save(std::filesystem::path const& checkpoint) const = 0;
   virtual void load(std::filesystem::path const& checkpoint) = 0;
+  // The same in memory. set_state throws invalid_argument for a state of another degree.
+  virtual training_state state() const = 0;
+  virtual void set_state(training_state const& state) = 0;
+  virtual std::vector<band_trial> trials() const { return {}; }  // that are over
   virtual profiler& profile() = 0;
   virtual std::size_t peak_bytes() const = 0;
   virtual std::size_t lt_bytes() const = 0;  // of the last step; 0 where the strategy records nothing
@@ -98,7 +104,8 @@ class session {
 };
 
 // The dataset must outlive the session. `start` seeds the Gaussians where given, else the dataset's points or random
-// ones.
+// ones. With options.sh_gain the session measures which bands of spherical harmonics to store, and its row and degree
+// change in its course (train/degree_selection.hpp).
 std::unique_ptr<session> make_session(row_request const& request, train_options const& options, dataset const& data,
                                       gaussian_model const* start = nullptr);
 

@@ -8,7 +8,7 @@
 //   write_splat_ply("model.ply", run.model());
 //
 // The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step),
-// so a checkpoint holds parameters, moments and counters only.
+// so a state holds parameters, moments and counters only.
 
 #include <gart/backward/backward.hpp>
 #include <gart/loss/image_loss.hpp>
@@ -18,9 +18,9 @@
 #include <gart/optim/schedule.hpp>
 #include <gart/render/forward.hpp>
 #include <gart/scene/traits.hpp>
-#include <gart/train/checkpoint.hpp>
 #include <gart/train/render_image.hpp>
 #include <gart/train/session.hpp>
+#include <gart/train/state.hpp>
 #include <gart/train/training_images.hpp>
 #include <gart/train/view_order.hpp>
 
@@ -55,8 +55,10 @@ class trainer {
   int steps_done() const { return step_; }
   gaussian_model model() const { return scene_.to_host(); }
   rendered render(camera const& view, vec3 background);
-  void save(std::filesystem::path const& path) const;
-  void load(std::filesystem::path const& path);
+  training_state state() const;
+  void set_state(training_state const& state);
+  void save(std::filesystem::path const& path) const { write_checkpoint(path, state()); }
+  void load(std::filesystem::path const& path) { set_state(read_checkpoint(path, sh_degree)); }
   std::size_t lt_bytes() const { return fell_back_ ? fallback_.lt_bytes() : backward_.lt_bytes(); }
   gaussians<E>& scene() { return scene_; }
   gaussians<E> const& gradients() const { return gradients_; }

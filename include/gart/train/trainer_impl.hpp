@@ -23,7 +23,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       fallback_(exec),
       loss_(exec),
       images_(data),
-      order_(data.train.size(), options.seed),
+      order_(data.train.size(), options.held_out, options.seed),
       mcmc_(exec, mcmc_options_of(options), options.max_gaussians, options.iterations, options.seed),
       adc_(exec, options.adc, options.max_gaussians, options.iterations, data.extent, options.seed),
       color_(exec),
@@ -31,7 +31,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       value_(exec, 2),
       skipped_(exec, 1) {
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
-  if (data.train.empty()) throw invalid_argument("trainer: the dataset has no training views");
+  if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
   skipped_.zero();
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
@@ -137,63 +137,24 @@ rendered trainer<E, Traits, Tracer, Strategy>::render(camera const& view, vec3 b
 }
 
 template <execution E, class Traits, class Tracer, class Strategy>
-void trainer<E, Traits, Tracer, Strategy>::save(std::filesystem::path const& path) const {
-  checkpoint_writer out;
-  auto const add = [&](std::string const& prefix, gaussians<E> const& g) {
-    gaussian_model const m = g.to_host();
-    out.add(prefix + "mean", m.mean), out.add(prefix + "log_scale", m.log_scale);
-    out.add(prefix + "quaternion", m.quaternion), out.add(prefix + "opacity", m.opacity), out.add(prefix + "sh", m.sh);
-  };
-  add("", scene_), add("first/", state_.first), add("second/", state_.second);
-  out.add("step", std::vector<int>{step_});
-  out.add("sh_degree", std::vector<int>{sh_degree});
-  out.add("growth", std::vector<float>{growth_});
-  out.add("seed", std::vector<u64>{options_.seed});
-  out.add("adc/gradient_sum", adc_.gradient_sum.to_host()), out.add("adc/touched", adc_.touched.to_host());
-  out.write(path);
+training_state trainer<E, Traits, Tracer, Strategy>::state() const {
+  training_state s;
+  s.scene = scene_.to_host(), s.first = state_.first.to_host(), s.second = state_.second.to_host();
+  s.step = step_, s.growth = growth_, s.seed = options_.seed;
+  s.gradient_sum = adc_.gradient_sum.to_host(), s.touched = adc_.touched.to_host();
+  return s;
 }
 
 template <execution E, class Traits, class Tracer, class Strategy>
-void trainer<E, Traits, Tracer, Strategy>::load(std::filesystem::path const& path) {
-  checkpoint_reader in(path);
-  std::vector<int> const degree = in.get<int>("sh_degree"), step = in.get<int>("step");
-  std::vector<u64> const seed = in.get<u64>("seed");
-  std::vector<float> const growth = in.get<float>("growth");
-  if (degree.size() != 1 || step.size() != 1 || seed.size() != 1 || growth.size() != 1)
-    in.fail("a counter is not one number");
-  if (step[0] < 0 || step[0] == std::numeric_limits<int>::max())
-    in.fail("is damaged: it was saved after step " + std::to_string(step[0]));
-  if (!(growth[0] > 0 && std::isfinite(growth[0]))) in.fail("is damaged: its growth is no factor");
-  if (degree[0] != sh_degree)
-    in.fail("is of SH degree " + std::to_string(degree[0]) + ", this run of " + std::to_string(sh_degree) +
-            ": give --sh-degree " + std::to_string(degree[0]));
-  auto const get = [&](std::string const& prefix) {
-    gaussian_model m;
-    m.sh_degree = sh_degree;
-    m.mean = in.get<float>(prefix + "mean"), m.log_scale = in.get<float>(prefix + "log_scale");
-    m.quaternion = in.get<float>(prefix + "quaternion"), m.opacity = in.get<float>(prefix + "opacity");
-    m.sh = in.get<float>(prefix + "sh");
-    gaussian_model shape;
-    shape.resize(m.size(), sh_degree);
-    if (m.mean.size() != shape.mean.size() || m.log_scale.size() != shape.log_scale.size() ||
-        m.quaternion.size() != shape.quaternion.size() || m.sh.size() != shape.sh.size())
-      in.fail("its arrays " + prefix + "* differ in length");
-    return m;
-  };
-  gaussian_model const scene = get(""), first = get("first/"), second = get("second/");
-  if (first.size() != scene.size() || second.size() != scene.size())
-    in.fail("its moments differ in number from its Gaussians");
-  std::vector<float> const gradient_sum = in.get<float>("adc/gradient_sum");
-  std::vector<u32> const touched = in.get<u32>("adc/touched");
-  if (touched.size() != gradient_sum.size()) in.fail("its arrays adc/* differ in length");
-  // Nothing is taken over before all of it is known to be whole.
-  scene_.assign(scene), state_.first.assign(first), state_.second.assign(second);
+void trainer<E, Traits, Tracer, Strategy>::set_state(training_state const& s) {
+  if (s.scene.sh_degree != sh_degree) throw invalid_argument("trainer: the state has another SH degree");
+  scene_.assign(s.scene), state_.first.assign(s.first), state_.second.assign(s.second);
   gradients_ = gaussians<E>(exec_, scene_.size(), sh_degree);
-  adc_.gradient_sum.assign(gradient_sum), adc_.touched.assign(touched);
-  options_.seed = seed[0];
-  order_ = view_order(data_.train.size(), options_.seed);
-  step_ = step[0];
-  growth_ = growth[0];
+  adc_.gradient_sum.assign(s.gradient_sum), adc_.touched.assign(s.touched);
+  options_.seed = s.seed;
+  order_ = view_order(data_.train.size(), options_.held_out, options_.seed);
+  step_ = s.step;
+  growth_ = s.growth;
   mcmc_.set_growth(growth_);
 }
 

@@ -1,8 +1,10 @@
 #pragma once
-// Every training view once an epoch, in an order shuffled by (seed, epoch): a function of the step alone.
+// Every training view once an epoch, those held out excepted, in an order shuffled by (seed, epoch): a function of the
+// step alone.
 
 #include <gart/optim/random.hpp>
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -10,7 +12,12 @@ namespace gart {
 
 class view_order {
  public:
-  view_order(std::size_t views, u64 seed) : order_(views), seed_(seed) {}
+  view_order(std::size_t views, std::vector<std::size_t> const& held_out, u64 seed) : seed_(seed) {
+    for (std::size_t i = 0; i < views; ++i)
+      if (std::find(held_out.begin(), held_out.end(), i) == held_out.end()) views_.push_back(i);
+    order_ = views_;
+  }
+  bool empty() const { return views_.empty(); }
 
   std::size_t at(int step) {
     int const epoch = step / static_cast<int>(order_.size());
@@ -21,7 +28,7 @@ class view_order {
  private:
   void shuffle(int epoch) {
     random_source const source{seed_, static_cast<u32>(epoch), random_use::user};
-    for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = i;
+    order_ = views_;
     for (std::size_t i = order_.size(); i > 1; --i) {
       auto const words = source.words(i);
       std::swap(order_[i - 1], order_[below(words.v[0], words.v[1], i)]);
@@ -29,7 +36,7 @@ class view_order {
     epoch_ = epoch;
   }
 
-  std::vector<std::size_t> order_;
+  std::vector<std::size_t> views_, order_;
   u64 seed_;
   int epoch_ = -1;
 };

@@ -1,0 +1,228 @@
+#include <gart/core/error.hpp>
+#include <gart/loss/metrics.hpp>
+#include <gart/optim/schedule.hpp>
+#include <gart/train/degree_selection.hpp>
+
+#include <algorithm>
+#include <cstdio>
+#include <optional>
+#include <utility>
+
+namespace gart {
+
+namespace {
+
+constexpr int fewest_steps = 50;
+constexpr std::size_t fewest_views = 20, most_held_out = 8;
+
+// The highest band that has a coefficient other than zero.
+int degree_in_use(gaussian_model const& m) {
+  int const all = sh_coefficients(m.sh_degree);
+  int degree = 0;
+  for (std::size_t i = 0; i < m.size(); ++i) {
+    float const* const row = m.sh.data() + i * 3 * static_cast<std::size_t>(all);
+    for (int d = m.sh_degree; d > degree; --d) {
+      if (std::any_of(row + 3 * sh_coefficients(d - 1), row + 3 * sh_coefficients(d), [](float c) { return c != 0; }))
+        degree = d;
+    }
+  }
+  return degree;
+}
+
+bool lower_rows(row_request request) {
+  try {
+    while (request.sh_degree-- > 0) resolve(request);
+    return true;
+  } catch (unsupported const&) {
+    return false;
+  }
+}
+
+class degree_selection final : public session {
+ public:
+  degree_selection(row_request const& request, train_options const& options, dataset const& data,
+                   gaussian_model const& start, trial_plan const& plan)
+      : request_(request),
+        options_(options),
+        data_(data),
+        plan_(plan),
+        gain_wanted_(options.sh_gain),
+        interval_(sh_interval(plan.degree, options.sh_every, options.iterations)),
+        start_degree_(std::min(degree_in_use(start), plan.degree)),
+        never_trained_(options.held_out) {
+    options_.sh_gain = 0;
+    options_.sh_every = interval_;  // a row of a lower degree keeps to the schedule of all
+    hold_out(true);
+    open(with_sh_degree(start, stored_degree(0)));
+  }
+
+  step_report step() override {
+    if (!settled_ && !trial_) arrange();
+    inner_->profile().enable(profile_.enabled());
+    step_report report = inner_->step();
+    if (profile_.enabled()) profile_.take(inner_->profile());
+    if (!trial_) return report;
+    report.trial = true;
+    if (inner_->steps_done() == trial_->start.step + plan_.steps) end_branch();
+    report.step = steps_done();
+    return report;
+  }
+  int steps_done() const override { return trial_ ? trial_->start.step : inner_->steps_done(); }
+  gaussian_model model() const override { return trial_ ? trial_->start.scene : inner_->model(); }
+  rendered render(camera const& view, vec3 background) override { return inner_->render(view, background); }
+  void save(std::filesystem::path const& path) const override { write_checkpoint(path, state()); }
+  void load(std::filesystem::path const& path) override { set_state(read_checkpoint(path)); }
+  training_state state() const override {
+    training_state s = trial_ ? trial_->start : inner_->state();
+    s.trials = trials_;
+    return s;
+  }
+  void set_state(training_state const& s) override {
+    if (s.scene.sh_degree > plan_.degree)
+      throw invalid_argument("the state is of SH degree " + std::to_string(s.scene.sh_degree) +
+                             ", this run of at most " + std::to_string(plan_.degree));
+    trial_.reset();
+    trials_ = s.trials;
+    settled_ = !trials_.empty() && (trials_.back().kept() || trials_.back().band == 1);
+    hold_out(!settled_);
+    open(s);
+  }
+  std::vector<band_trial> trials() const override { return trials_; }
+  profiler& profile() override { return profile_; }
+  std::size_t peak_bytes() const override { return std::max(peak_bytes_, inner_->peak_bytes()); }
+  std::size_t lt_bytes() const override { return inner_->lt_bytes(); }
+  row_info row() const override { return inner_->row(); }
+
+ private:
+  struct trial {
+    training_state start;                // where the branches parted
+    std::optional<training_state> with;  // where the branch with the band ended
+    double psnr_with = 0;
+  };
+
+  int first_step(int band) const { return band * interval_; }
+  int stored_degree(int step) const {
+    return std::max(start_degree_, sh_degree_at(step, plan_.degree, interval_, options_.iterations));
+  }
+
+  // Gives the next step the row it needs, or starts a trial.
+  void arrange() {
+    int const step = inner_->steps_done();
+    if (step >= plan_.begin) {
+      trial_.emplace();
+      trial_->start = inner_->state();
+    } else if (int const degree = stored_degree(step); degree != inner_->row().sh_degree) {
+      open(with_sh_degree(inner_->state(), degree));
+    }
+  }
+
+  void end_branch() {
+    double const psnr = held_out_psnr();
+    training_state const& start = trial_->start;
+    int const band = start.scene.sh_degree;
+    if (!trial_->with) {
+      trial_->psnr_with = psnr;
+      trial_->with = inner_->state();
+      open(with_sh_degree(start, band - 1));
+      return;
+    }
+    band_trial result{band, start.step, trial_->psnr_with, psnr, 0, gain_wanted_};
+    result.forecast = forecast_gain(result.gain(), first_step(band), inner_->steps_done(), options_.iterations);
+    trials_.push_back(result);
+    settled_ = result.kept() || band == 1;
+    if (settled_) {
+      hold_out(false);
+      open(result.kept() ? *trial_->with : inner_->state());
+    }
+    trial_.reset();
+  }
+
+  void hold_out(bool measured) {
+    options_.held_out = never_trained_;
+    if (measured) options_.held_out.insert(options_.held_out.end(), plan_.held_out.begin(), plan_.held_out.end());
+  }
+
+  double held_out_psnr() {
+    vec3 const background(options_.background == background_kind::white ? 1.0f : 0.0f);
+    double sum = 0;
+    for (std::size_t const index : plan_.held_out) {
+      dataset_view const& view = data_.train[index];
+      image_float image = inner_->render(view.view, background).color;
+      image_float const truth = composited(view.image, background);
+      double const share = apply_mask(view.mask, truth, image);
+      sum += masked_psnr(image, truth, share);
+    }
+    return sum / static_cast<double>(plan_.held_out.size());
+  }
+
+  // One session at a time: the old one's memory goes before the new one's comes.
+  void open(gaussian_model const& start) {
+    close();
+    request_.sh_degree = options_.sh_degree = start.sh_degree;
+    inner_ = make_session(request_, options_, data_, &start);
+  }
+  void open(training_state const& state) {
+    open(state.scene);
+    inner_->set_state(state);
+  }
+  void close() {
+    if (!inner_) return;
+    if (profile_.enabled()) profile_.take(inner_->profile());
+    peak_bytes_ = std::max(peak_bytes_, inner_->peak_bytes());
+    inner_.reset();
+  }
+
+  row_request request_;
+  train_options options_;
+  dataset const& data_;
+  trial_plan plan_;
+  double gain_wanted_;
+  int interval_, start_degree_;
+  std::vector<std::size_t> never_trained_;
+  bool settled_ = false;
+  std::unique_ptr<session> inner_;
+  std::optional<trial> trial_;
+  std::vector<band_trial> trials_;
+  profiler profile_;
+  std::size_t peak_bytes_ = 0;
+};
+
+}  // namespace
+
+trial_plan plan_trials(row_request const& request, train_options const& options, std::size_t train_views) {
+  trial_plan plan;
+  plan.degree = request.sh_degree;
+  plan.begin = options.iterations / 2;
+  plan.steps = std::max(fewest_steps, options.iterations / 50);
+  std::size_t const views = std::min(train_views / 10, most_held_out);
+  if (plan.degree == 0) {
+    plan.why = "there is no band to measure";
+  } else if (!(options.sh_gain > 0)) {
+    plan.why = "no gain is asked of a band";
+  } else if (train_views < fewest_views) {
+    plan.why = std::to_string(train_views) + " training views are too few to hold some out and measure";
+  } else if (options.iterations < 4 * plan.steps * plan.degree) {
+    plan.why = "a run under " + std::to_string(4 * plan.steps * plan.degree) + " steps is too short to measure";
+  } else if (!lower_rows(request)) {
+    plan.why = "lower degrees are not compiled for this row";
+  } else {
+    for (std::size_t i = 0; i < views; ++i) plan.held_out.push_back((2 * i + 1) * train_views / (2 * views));
+    char gain[32];
+    std::snprintf(gain, sizeof gain, "%g", static_cast<double>(options.sh_gain));
+    plan.why = std::string("a band that buys less than ") + gain + " dB on " + std::to_string(views) +
+               " views held out goes; measured from step " + std::to_string(plan.begin);
+  }
+  return plan;
+}
+
+double forecast_gain(double gain, int first_step, int now, int iterations) {
+  return gain * (iterations - first_step) / (now - first_step);
+}
+
+std::unique_ptr<session> make_degree_selection(row_request const& request, train_options const& options,
+                                               dataset const& data, gaussian_model const& start,
+                                               trial_plan const& plan) {
+  return std::make_unique<degree_selection>(request, options, data, start, plan);
+}
+
+}  // namespace gart

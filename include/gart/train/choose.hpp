@@ -1,0 +1,59 @@
+#pragma once
+// What a capture asks for, told from its cameras and pixels before training starts: `gart train` and `gart eval` take
+// it where an option does not say otherwise. Each choice comes with its reason in words. What cannot be told before,
+// which bands of spherical harmonics pay, is measured (train/degree_selection.hpp).
+//
+// inspect() reads every pixel's alpha, and of at most 64 training images, evenly spread, the outermost pixels: O(bytes
+// of the images). A border is plain where 95% of those pixels lie within 12 of 255 of their median in every channel:
+// what a bounded object in front of a uniform background looks like, and a photograph of a scene never.
+
+#include <gart/io/dataset.hpp>
+#include <gart/train/options.hpp>
+
+#include <string>
+
+namespace gart {
+
+struct capture_traits {
+  std::size_t distorted = 0;  // training and test views whose lens is no pinhole
+  std::size_t folding = 0;    // of these, lenses that are not one to one over the image
+  double transparent = 0;     // share of the training images' pixels that are not opaque
+  std::size_t masked = 0;     // training views with a mask
+  bool clear_border = false;  // the images' borders are transparent
+  bool plain_border = false;  // or opaque, and of one colour,
+  u8 border[3] = {0, 0, 0};   // which is this
+  std::size_t views = 0;      // training views
+
+  bool bounded() const { return clear_border || plain_border; }
+};
+
+capture_traits inspect(dataset const& data);
+
+template <class T>
+struct chosen {
+  T value;
+  std::string why;
+};
+
+// White for transparent images, as published results have it, and for plain white borders; else black.
+chosen<background_kind> choose_background(capture_traits const& traits);
+
+// Footprints, which the tiles tracer and every strategy but pixel stand on, need a lens that is one to one over the
+// image: where one is not, bvh and pixel; else "auto", the fastest there is.
+chosen<std::string> choose_tracer(capture_traits const& traits);
+chosen<std::string> choose_backward(capture_traits const& traits);
+
+// The capture's points, or random ones in its bounds. A capture's points lie on surfaces, and opacity 0.1 and a scale
+// of 1.0 (times the distance to the neighbours) fill the gaps between them. Random points are mostly in empty space:
+// with MCMC, which moves them, 0.5 and 0.1 let rays through from the first step. What the options say stands.
+struct starting_points {
+  bool random = false;
+  index_t count = 0;
+  float opacity = 0, scale = 0;
+};
+chosen<starting_points> choose_start(dataset const& data, train_options const& options);
+
+// Whether undistort() and the lens agree over the whole image, and neighbours stay neighbours.
+bool one_to_one(camera const& view);
+
+}  // namespace gart

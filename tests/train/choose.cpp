@@ -1,0 +1,154 @@
+// What is chosen for a capture, from captures made by hand.
+#include <support/policies.hpp>
+
+#include <gart/train/choose.hpp>
+#include <gart/train/degree_selection.hpp>
+
+#include <algorithm>
+
+namespace {
+
+constexpr int width = 40, height = 30;
+
+// Views of one colour, with a coloured square in the middle.
+gart::dataset capture(int channels, int border, int views = 3) {
+  gart::dataset data;
+  for (int v = 0; v < views; ++v) {
+    gart::dataset_view view;
+    view.name = std::to_string(v);
+    view.view.width = width, view.view.height = height;
+    view.view.fx = view.view.fy = 40, view.view.cx = 20, view.view.cy = 15;
+    view.image = gart::image8(width, height, channels, static_cast<gart::u8>(border));
+    for (int y = 10; y < 20; ++y)
+      for (int x = 10; x < 30; ++x)
+        for (int c = 0; c < 3; ++c) view.image.at(x, y, c) = static_cast<gart::u8>(60 + 40 * c);
+    if (channels == 4) {
+      for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) view.image.at(x, y, 3) = y >= 10 && y < 20 && x >= 10 && x < 30 ? 255 : 0;
+    }
+    data.train.push_back(view);
+  }
+  return data;
+}
+
+gart::background_kind background_of(gart::dataset const& data) {
+  return gart::choose_background(gart::inspect(data)).value;
+}
+
+using gart::background_kind;
+
+}  // namespace
+
+TEST_CASE("the background is what the images' alpha and borders say") {
+  auto const clear = capture(4, 0);
+  auto const seen = gart::inspect(clear);
+  CHECK(seen.clear_border);
+  CHECK(seen.bounded());
+  CHECK(seen.transparent == doctest::Approx(1 - 200.0 / (width * height)));
+  CHECK(background_of(clear) == background_kind::white);
+
+  CHECK(background_of(capture(3, 255)) == background_kind::white);
+  CHECK(gart::inspect(capture(3, 255)).bounded());
+  CHECK(background_of(capture(3, 3)) == background_kind::black);
+  CHECK(background_of(capture(3, 128)) == background_kind::black);
+  CHECK(gart::inspect(capture(3, 128)).plain_border);
+  CHECK(gart::inspect(capture(3, 128)).border[1] == 128);
+
+  // Alpha that is opaque everywhere says nothing: the border does.
+  auto opaque = capture(4, 250);
+  for (auto& v : opaque.train)
+    for (std::size_t i = 3; i < v.image.data.size(); i += 4) v.image.data[i] = 255;
+  CHECK(gart::inspect(opaque).transparent == 0);
+  CHECK(background_of(opaque) == background_kind::white);
+}
+
+TEST_CASE("a scene that fills the images is unbounded") {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  std::mt19937 random(static_cast<unsigned>(seed));
+  auto data = capture(3, 255);
+  // A quarter of one view's border is something else.
+  auto& image = data.train[1].image;
+  for (int x = 0; x < width; ++x)
+    for (int c = 0; c < 3; ++c) image.at(x, 0, c) = static_cast<gart::u8>(random() % 200);
+  CHECK_FALSE(gart::inspect(data).bounded());
+  CHECK(background_of(data) == background_kind::black);
+  // Noise of a few levels leaves a plain border plain.
+  auto noisy = capture(3, 245);
+  for (auto& v : noisy.train)
+    for (auto& p : v.image.data)
+      p = static_cast<gart::u8>(std::clamp<int>(p + static_cast<int>(random() % 9) - 4, 0, 255));
+  CHECK(gart::inspect(noisy).bounded());
+  CHECK(background_of(noisy) == background_kind::white);
+}
+
+TEST_CASE("masks are counted, and a capture without images has nothing to tell") {
+  auto data = capture(3, 90);
+  data.train[2].mask = gart::image8(width, height, 1, 255);
+  CHECK(gart::inspect(data).masked == 1);
+  gart::dataset const none;
+  CHECK_FALSE(gart::inspect(none).bounded());
+}
+
+TEST_CASE("a lens is traced by tiles where it is one to one over the image, else by what needs no footprints") {
+  auto data = capture(3, 90);
+  CHECK(gart::choose_tracer(gart::inspect(data)).value == "auto");
+  data.train[0].view.lens.k1 = -0.1f, data.train[0].view.lens.p1 = 0.01f;
+  auto const mild = gart::inspect(data);
+  CHECK(mild.distorted == 1);
+  CHECK(mild.folding == 0);
+  CHECK(gart::choose_tracer(mild).value == "auto");
+  // r (1 + k1 r^2) has its maximum at r = 1 / sqrt(-3 k1): for k1 = -1.5 at r = 0.47, where the image is 0.31 away, and
+  // the corners of the image are 0.62 away.
+  data.train[1].view.lens.k1 = -1.5f;
+  auto const strong = gart::inspect(data);
+  CHECK(strong.folding == 1);
+  CHECK(gart::choose_tracer(strong).value == "bvh");
+  CHECK(gart::choose_backward(strong).value == "pixel");
+}
+
+TEST_CASE("training starts from the capture's points, or from random ones as MCMC wants them") {
+  auto data = capture(3, 90);
+  gart::train_options options;
+  options.random_points = 500;
+  auto start = gart::choose_start(data, options).value;
+  CHECK(start.random);
+  CHECK(start.count == 500);
+  CHECK(start.opacity == 0.5f);
+  CHECK(start.scale == 0.1f);
+  options.densify = gart::densify_kind::adc;
+  options.initial_scale = 0.7f;
+  start = gart::choose_start(data, options).value;
+  CHECK(start.opacity == 0.1f);
+  CHECK(start.scale == 0.7f);
+  data.points.position.assign(30, 0.0f), data.points.color.assign(30, 0);
+  options.max_gaussians = 4;
+  start = gart::choose_start(data, options).value;
+  CHECK_FALSE(start.random);
+  CHECK(start.count == 4);
+}
+
+TEST_CASE("bands are measured where views and steps allow, on views evenly spread, within a quarter of the run") {
+  gart::row_request request{"serial"};
+  gart::train_options options;
+  options.sh_gain = 0.02f;
+  auto const plan = gart::plan_trials(request, options, 100);
+  CHECK(plan.held_out == std::vector<std::size_t>{6, 18, 31, 43, 56, 68, 81, 93});
+  CHECK(plan.begin == 15000);
+  CHECK(plan.steps == 600);
+  CHECK(gart::plan_trials(request, options, 20).held_out.size() == 2);
+  CHECK(gart::plan_trials(request, options, 19).held_out.empty());
+  for (int const iterations : {1, 599, 600, 5000, 30000}) {
+    options.iterations = iterations;
+    auto const p = gart::plan_trials(request, options, 40);
+    CAPTURE(iterations);
+    CHECK(p.held_out.empty() == (iterations < 600));
+    if (!p.held_out.empty()) CHECK(4 * p.degree * p.steps <= iterations);
+    CHECK_FALSE(p.why.empty());
+  }
+  request.sh_degree = 0;
+  CHECK(gart::plan_trials(request, options, 40).held_out.empty());
+  request.sh_degree = 3, options.sh_gain = 0;
+  CHECK(gart::plan_trials(request, options, 40).held_out.empty());
+  CHECK(gart::forecast_gain(0.01, 100, 300, 500) == doctest::Approx(0.02));
+}
