@@ -73,7 +73,7 @@ class nearest_three {
     float const side = at(point, axis_[middle]) - at(other, axis_[middle]);
     bool const left = side < 0;
     search(left ? first : middle + 1, left ? middle : last, point, found);
-    if (side * side <= found.d2[2]) search(left ? middle + 1 : first, left ? last : middle, point, found);
+    if (side * side < found.d2[2]) search(left ? middle + 1 : first, left ? last : middle, point, found);
   }
 
   std::vector<float> const& p_;

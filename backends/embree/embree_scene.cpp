@@ -8,6 +8,7 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <atomic>
 #include <string>
 
 namespace gart {
@@ -27,8 +28,19 @@ struct query : context_base {
   void* visitor;
 };
 
+// Embree leaves out, without a word, what reaches beyond its own largest coordinate.
+constexpr float largest_coordinate = 1.8e18f;
+
+struct source_boxes {
+  box const* boxes = nullptr;
+  std::atomic<bool> beyond = false;
+};
+
 void bounds_callback(RTCBoundsFunctionArguments const* args) {
-  box const& b = static_cast<box const*>(args->geometryUserPtr)[args->primID];
+  auto* const source = static_cast<source_boxes*>(args->geometryUserPtr);
+  box const& b = source->boxes[args->primID];
+  for (int k = 0; k < 3; ++k)
+    if (b.lo.x <= b.hi.x && !(b.lo[k] > -largest_coordinate && b.hi[k] < largest_coordinate)) source->beyond = true;
   RTCBounds& out = *args->bounds_o;
   out.lower_x = b.lo.x, out.lower_y = b.lo.y, out.lower_z = b.lo.z;
   out.upper_x = b.hi.x, out.upper_y = b.hi.y, out.upper_z = b.hi.z;
@@ -47,6 +59,7 @@ struct embree_scene::handles {
   RTCDevice device = rtcNewDevice(nullptr);
   RTCScene scene = rtcNewScene(device);
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+  source_boxes source;
 
   handles() {
     // Robust: a box is entered wherever the exact ray would, so no candidate is lost to rounding. Dynamic, low quality:
@@ -76,12 +89,17 @@ char const* embree_scene::version() { return RTC_VERSION_STRING; }
 
 void embree_scene::build(span<box const> boxes) {
   rtcSetGeometryUserPrimitiveCount(handles_->geometry, static_cast<unsigned>(boxes.size()));
-  rtcSetGeometryUserData(handles_->geometry, const_cast<box*>(boxes.data()));
+  handles_->source.boxes = boxes.data();
+  handles_->source.beyond = false;
+  rtcSetGeometryUserData(handles_->geometry, &handles_->source);
   rtcCommitGeometry(handles_->geometry);
   rtcCommitScene(handles_->scene);
   if (RTCError const code = rtcGetDeviceError(handles_->device); code != RTC_ERROR_NONE)
     throw error("Embree failed to build over " + std::to_string(boxes.size()) + " boxes (error " +
                 std::to_string(static_cast<int>(code)) + ")");
+  if (handles_->source.beyond)
+    throw unsupported("a Gaussian reaches 1.8e18 units from the camera, where Embree's coordinates end: take another "
+                      "tracer (--tracer tiles or bvh), or remove it");
 }
 
 void embree_scene::intersect(vec3 origin, vec3 direction, float near, float far, leaf_function leaf,

@@ -33,17 +33,7 @@ void frame::set_size(int width, int height) {
 }
 
 void check_camera(camera const& c, std::string const& where) {
-  auto const finite = [](float v) { return std::isfinite(v); };
-  if (c.width < 1 || c.height < 1)
-    throw io_error(where, "the image size is not positive", "correct the width and height");
-  if (!(c.fx > 0 && c.fy > 0 && finite(c.fx) && finite(c.fy))) {
-    throw io_error(where, "the focal length is not a positive number", "correct fx and fy");
-  }
-  if (!finite(c.cx) || !finite(c.cy)) throw io_error(where, "the principal point is not finite", "correct cx and cy");
-  distortion const& d = c.lens;
-  if (!finite(d.k1) || !finite(d.k2) || !finite(d.p1) || !finite(d.p2)) {
-    throw io_error(where, "the lens distortion is not finite", "correct k1, k2, p1 and p2");
-  }
+  if (camera_fault const fault = fault_of(c); fault.what) throw io_error(where, fault.what, fault.remedy);
 }
 
 void set_pose(camera& view, mat3d const& axes, vec3d const& center, std::string const& where) {

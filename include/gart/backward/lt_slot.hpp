@@ -17,6 +17,7 @@
 
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
+#include <gart/math/sh.hpp>
 
 namespace gart {
 
@@ -24,7 +25,7 @@ namespace detail {
 
 // Three flags: what is clamped.
 GART_HD GART_INLINE u32 clamps_of(vec3 const& c) {
-  return (c.x > 0 ? 0u : 1u) | (c.y > 0 ? 0u : 2u) | (c.z > 0 ? 0u : 4u);
+  return (shows(c.x) ? 0u : 1u) | (shows(c.y) ? 0u : 2u) | (shows(c.z) ? 0u : 4u);
 }
 
 // The half nearest to x in [0, 65504], ties to even; and back.
@@ -54,7 +55,7 @@ struct alignas(16) lt_entry {
 
  private:
   GART_HD GART_INLINE static float signed_by(float l, float c) {
-    return bits_to_float((float_to_bits(l) & 0x7fffffffu) | (c > 0 ? 0u : 0x80000000u));
+    return bits_to_float((float_to_bits(l) & 0x7fffffffu) | (shows(c) ? 0u : 0x80000000u));
   }
 };
 

@@ -30,11 +30,12 @@ struct invalid_argument : error {
   using error::error;
 };
 
-// Memory that could not be had. `advice` names the options that lower the need.
+// Memory that could not be had. `advice` names the options that lower the need. 0 free bytes: not a matter of what is
+// free.
 struct out_of_memory : error {
   out_of_memory(std::string const& where, std::size_t asked_bytes, std::size_t free_bytes, std::string const& advice)
-      : error("out of " + where + " memory: asked for " + std::to_string(asked_bytes) + " bytes, " +
-              std::to_string(free_bytes) + " bytes free (" + advice + ")"),
+      : error("out of " + where + " memory: asked for " + std::to_string(asked_bytes) + " bytes" +
+              (free_bytes ? ", " + std::to_string(free_bytes) + " bytes free" : "") + " (" + advice + ")"),
         asked(asked_bytes),
         available(free_bytes) {}
   std::size_t asked, available;

@@ -46,7 +46,7 @@ class buffer {
     if (n > capacity_) {
       std::size_t const wanted = capacity_ ? static_cast<std::size_t>(static_cast<double>(n) * slack) : n;
       release();
-      data_ = static_cast<T*>(exec_->allocate(wanted * sizeof(T)));
+      data_ = static_cast<T*>(exec_->allocate(bytes_of(wanted)));
       capacity_ = wanted;
     }
     size_ = n;
@@ -85,6 +85,12 @@ class buffer {
   }
 
  private:
+  // More than can be addressed is asked for as half of the address space, which no policy has: the product must not
+  // wrap to a size that can be had.
+  static std::size_t bytes_of(std::size_t n) {
+    std::size_t const most = static_cast<std::size_t>(-1) / 2;
+    return n > most / sizeof(T) ? most : n * sizeof(T);
+  }
   void swap(buffer& other) noexcept {
     std::swap(exec_, other.exec_);
     std::swap(data_, other.data_);

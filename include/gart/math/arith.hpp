@@ -4,6 +4,10 @@
 // hosts with FMA) every policy compute the same bits. Host code that uses gart is built with -ffp-contract=off, which
 // the CMake target carries; on a device the intrinsics are never contracted.
 
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "gart decides hits by IEEE arithmetic: compile what includes it without -ffast-math and -ffinite-math-only"
+#endif
+
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
 

@@ -6,13 +6,14 @@
 // alpha = sigma rho(|p|^2), so with a = alpha dL/dalpha and b = a times the slope of ln rho (math/response.hpp; b = a for
 // a Gaussian) the geometry needs only ten sums over the hits, the moments, all in the Gaussian's own space:
 //   m0 = sum a,  m1 = sum b p,  m2 = sum b p p^T
-//   dL/d logit = (1 - sigma) m0          dL/d mean = M^T m1           dL/d log s_k = m2_kk
+//   dL/d logit = sigmoid(-logit) m0      dL/d mean = M^T m1           dL/d log s_k = m2_kk
 //   dL/d rotation (body frame)_i = m2_jk (s_j / s_k - s_k / s_j), (i, j, k) cyclic
 // for x = mean + R S p is the point of largest response and dL/dM = -(sum b p p^T)(R S)^T. Where a clamp is active
 // (alpha at alpha_max, a colour at 0) the derivative through it is zero.
 
 #include <gart/math/quaternion.hpp>
 #include <gart/math/ray_gaussian.hpp>
+#include <gart/math/sh.hpp>
 
 namespace gart {
 
@@ -68,7 +69,7 @@ struct geometry_gradient {
 GART_HD GART_INLINE geometry_gradient from_moments(float const* m, gaussian_parameters const& p,
                                                    ray_gaussian const& g) {
   geometry_gradient out;
-  out.opacity = m[0] * (1.0f - g.sigma);
+  out.opacity = m[0] * sigmoid(-p.opacity);  // 1 - sigma would lose its digits as sigma nears 1
   for (int j = 0; j < 3; ++j) {
     float const column[3] = {j == 0   ? g.m[0].x
                              : j == 1 ? g.m[0].y
@@ -93,8 +94,8 @@ GART_HD GART_INLINE geometry_gradient from_moments(float const* m, gaussian_para
 
 // A colour channel passes its gradient where it is not clamped at zero.
 GART_HD GART_INLINE vec3 color_gradient_of(vec3 unclamped, vec3 g, float weight) {
-  return {unclamped.x > 0 ? weight * g.x : 0.0f, unclamped.y > 0 ? weight * g.y : 0.0f,
-          unclamped.z > 0 ? weight * g.z : 0.0f};
+  return {shows(unclamped.x) ? weight * g.x : 0.0f, shows(unclamped.y) ? weight * g.y : 0.0f,
+          shows(unclamped.z) ? weight * g.z : 0.0f};
 }
 
 }  // namespace gart

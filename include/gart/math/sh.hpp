@@ -1,11 +1,13 @@
 #pragma once
 // Real spherical harmonics to degree 3 with the signs and order of the 3DGS files: colour is
-// max(0, 0.5 + sum_k c_k Y_k(d)), d the unit direction of the ray.
+// max(0, 0.5 + sum_k c_k Y_k(d)), d the unit direction of the ray. A sum that is no finite number is as black as a
+// negative one: one broken Gaussian must not spoil every ray that meets it.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
+#include <gart/math/lanes.hpp>
 
 namespace gart {
 
@@ -84,11 +86,17 @@ struct sh_row {
   }
 };
 
+// Positive and finite.
+template <class F>
+GART_HD GART_INLINE auto shows(F channel) {
+  return both(channel > F(0.0f), channel <= F(3.402823466e38f));
+}
+
 // The colour a hit shows.
 template <class F = float>
 GART_HD GART_INLINE vec3_of<F> clamped_color(vec3_of<F> const& c) {
   F const zero = 0.0f;
-  return {select(c.x > zero, c.x, zero), select(c.y > zero, c.y, zero), select(c.z > zero, c.z, zero)};
+  return {select(shows(c.x), c.x, zero), select(shows(c.y), c.y, zero), select(shows(c.z), c.z, zero)};
 }
 
 }  // namespace gart

@@ -6,6 +6,8 @@
 //   records.prepare(exec, scene, view.position, options.alpha_min);
 //   tracer.prepare(exec, scene, records.view(), view, options.alpha_min, options.near);
 //   forward<3>(exec, tracer, scene, view, options, 3, targets, record_none{});
+//
+// Errors: invalid_argument for a camera or options that no ray can be traced by.
 
 #include <gart/exec/stage.hpp>
 #include <gart/render/packet_composite.hpp>
@@ -56,6 +58,8 @@ void configure(Tracer& tracer, render_options const& options) {
 template <int ShDegree, execution E, class Tracer, class Record>
 void forward(E& exec, Tracer& tracer, gaussians_view<float const> scene, camera const& view,
              render_options const& options, int active_degree, image_targets const& targets, Record const& record) {
+  require_camera(view);
+  require_options(options);
   pixel_order const order{view.width, view.height};
   composite<ShDegree, Record> const program{view, order, scene.sh, active_degree, options, targets, record};
   tracer.trace(exec, "forward", order.launch_size(), program);

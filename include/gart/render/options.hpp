@@ -1,8 +1,13 @@
 #pragma once
 // What a render leaves out, and what shows where nothing is: the knobs that trade exactness for time.
+// Errors: require_options throws invalid_argument, naming the option; forward() calls it.
 
+#include <gart/core/error.hpp>
 #include <gart/core/types.hpp>
+#include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
+
+#include <string>
 
 namespace gart {
 
@@ -14,5 +19,21 @@ struct render_options {
   int rebuild_every = 1;            // the BVH tracer builds its tree every so many views, else refits it: exact
   vec3 background{0.0f};
 };
+
+// Below this exp has no digits left, and a hit's alpha would be 0.
+inline constexpr float least_alpha_min = 1e-30f;
+
+inline void require_options(render_options const& o) {
+  auto const refuse = [](char const* what, float value) {
+    throw invalid_argument("render options: " + std::string(what) + ", not " + std::to_string(value));
+  };
+  if (!(o.alpha_min >= least_alpha_min && o.alpha_min < 1))
+    refuse("alpha_min must lie between 1e-30 and 1", o.alpha_min);
+  if (!(o.transmittance_min >= 0 && o.transmittance_min < 1))
+    refuse("transmittance_min must be at least 0 and less than 1", o.transmittance_min);
+  if (!(o.near > 0 && is_finite(o.near))) refuse("near must be positive and finite", o.near);
+  for (int k = 0; k < 3; ++k)
+    if (!is_finite(o.background[k])) refuse("the background must be finite", o.background[k]);
+}
 
 }  // namespace gart

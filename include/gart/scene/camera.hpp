@@ -6,7 +6,10 @@
 // The distorted model is u = fx * x_d + cx with, for the undistorted (x, y) = (X/Z, Y/Z) and r2 = x*x + y*y,
 //   x_d = x (1 + k1 r2 + k2 r2^2) + 2 p1 x y + p2 (r2 + 2 x x),  y_d likewise with p1 and p2 exchanged;
 // a ray inverts it by Newton's method (undistort below).
+//
+// Errors: require_camera throws invalid_argument for what no ray can be cast by; everything that renders calls it.
 
+#include <gart/core/error.hpp>
 #include <gart/core/macros.hpp>
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
@@ -35,6 +38,34 @@ GART_HD inline void distort(distortion const& lens, double x, double y, double& 
   double const r2 = x * x + y * y, radial = 1 + r2 * (lens.k1 + r2 * lens.k2);
   u = x * radial + 2 * lens.p1 * x * y + lens.p2 * (r2 + 2 * x * x);
   v = y * radial + 2 * lens.p2 * x * y + lens.p1 * (r2 + 2 * y * y);
+}
+
+// What is wrong with a camera, and what to correct; null where nothing is.
+struct camera_fault {
+  char const* what = nullptr;
+  char const* remedy = nullptr;
+};
+
+inline camera_fault fault_of(camera const& c) {
+  auto const finite = [](auto const&... v) { return (is_finite(static_cast<float>(v)) && ...); };
+  if (c.width < 1 || c.height < 1) return {"the image size is not positive", "correct the width and height"};
+  // Boxes count pixels in 16 bits, launches in 32, padded to blocks of 8 x 4.
+  if (c.width > 65535 || c.height > 65535 || (u64(c.width) + 7) / 8 * 8 * ((u64(c.height) + 3) / 4 * 4) > 0xffffffffu)
+    return {"the image is larger than 65535 pixels a side or 2^32 in all", "render it in parts, or raise --downscale"};
+  if (!(c.fx > 0 && c.fy > 0 && finite(c.fx, c.fy)))
+    return {"the focal length is not a positive number", "correct fx and fy"};
+  if (!finite(c.cx, c.cy)) return {"the principal point is not finite", "correct cx and cy"};
+  if (!finite(c.lens.k1, c.lens.k2, c.lens.p1, c.lens.p2))
+    return {"the lens distortion is not finite", "correct k1, k2, p1 and p2"};
+  for (int k = 0; k < 3; ++k)
+    if (!finite(c.position[k], c.rotation[k][0], c.rotation[k][1], c.rotation[k][2]))
+      return {"the pose is not finite", "correct the position and the rotation"};
+  return {};
+}
+
+inline void require_camera(camera const& c) {
+  if (camera_fault const fault = fault_of(c); fault.what)
+    throw invalid_argument(std::string("camera: ") + fault.what + " (" + fault.remedy + ")");
 }
 
 // Newton's method on the distortion; exact to float after a few steps for lenses that are invertible at the point.

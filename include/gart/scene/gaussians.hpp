@@ -6,15 +6,26 @@
 //   opacity     [N]        logit
 //   sh          [N][K][3]  coefficient-major, colours interleaved (splat files are channel-major; io converts)
 // gaussian_model holds them on the host, gaussians<E> in a policy's memory; gradients and Adam's moments have the same
-// shape.
+// shape. Errors: invalid_argument for more Gaussians than 32-bit indices can serve; out_of_memory.
 
+#include <gart/core/error.hpp>
 #include <gart/core/span.hpp>
 #include <gart/exec/buffer.hpp>
 
 #include <algorithm>
+#include <string>
 #include <vector>
 
 namespace gart {
+
+// Indices have 32 bits, and a launch may take up to 15 of them a Gaussian.
+inline constexpr std::size_t most_gaussians = std::size_t{1} << 28;
+
+inline void require_count(std::size_t n) {
+  if (n > most_gaussians)
+    throw invalid_argument(std::to_string(n) + " Gaussians are more than the " + std::to_string(most_gaussians) +
+                           " that a scene can hold: lower --max-gaussians");
+}
 
 GART_HD constexpr int sh_coefficients(int degree) { return (degree + 1) * (degree + 1); }
 
@@ -64,7 +75,7 @@ template <execution E>
 class gaussians {
  public:
   gaussians() = default;
-  gaussians(E& exec, index_t n, int sh_degree)
+  gaussians(E& exec, std::size_t n, int sh_degree)
       : mean(exec), log_scale(exec), quaternion(exec), opacity(exec), sh(exec), degree_(sh_degree) {
     resize_keep(n);
   }
@@ -81,13 +92,15 @@ class gaussians {
     return {mean.data(), log_scale.data(), quaternion.data(), opacity.data(), sh.data(), size(), degree_};
   }
   // Existing Gaussians stay; new ones are undefined.
-  void resize_keep(index_t n) {
-    mean.resize_keep(std::size_t{3} * n), log_scale.resize_keep(std::size_t{3} * n);
-    quaternion.resize_keep(std::size_t{4} * n), opacity.resize_keep(n);
+  void resize_keep(std::size_t n) {
+    require_count(n);
+    mean.resize_keep(3 * n), log_scale.resize_keep(3 * n);
+    quaternion.resize_keep(4 * n), opacity.resize_keep(n);
     sh.resize_keep(std::size_t{3} * sh_coefficients(degree_) * n);
   }
   void zero() { mean.zero(), log_scale.zero(), quaternion.zero(), opacity.zero(), sh.zero(); }
   void assign(gaussian_model const& m) {
+    require_count(m.size());
     degree_ = m.sh_degree;
     mean.assign(m.mean), log_scale.assign(m.log_scale), quaternion.assign(m.quaternion);
     opacity.assign(m.opacity), sh.assign(m.sh);

@@ -11,8 +11,11 @@ namespace gart {
 
 class camera_footprint {
  public:
-  // Host side: the bounds of what the image sees, in slopes, by sampling its border.
+  // Host side: the bounds of what the image sees, in slopes, by sampling its border. invalid_argument for a camera or a
+  // near distance that have none.
   camera_footprint(camera const& c, float near) : lens_(c.lens), fx_(c.fx), fy_(c.fy), cx_(c.cx), cy_(c.cy) {
+    require_camera(c);
+    if (!(near > 0 && is_finite(near))) throw invalid_argument("footprints: near must be positive and finite");
     mat3d world_to_camera(1.0);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) world_to_camera[i][j] = c.rotation[j][i];

@@ -1,0 +1,450 @@
+// Every extreme scene by every tracer and strategy: finite, the same image bit for bit, and the oracle's image and
+// gradients within what float can do. Broken, huge and tiny parameters. How far float is off, and why.
+#include <extremes/scenes.hpp>
+#include <extremes/ways.hpp>
+
+#include <algorithm>
+#include <cfloat>
+#include <cmath>
+#include <cstdio>
+
+using namespace gart_test;
+
+namespace {
+
+std::vector<double> oracle::parameters::*const expected_groups[] = {
+    &oracle::parameters::mean, &oracle::parameters::log_scale, &oracle::parameters::quaternion,
+    &oracle::parameters::opacity, &oracle::parameters::sh};
+
+struct prepared_extreme {
+  extreme e;
+  oracle::picture picture;
+  std::vector<float> color_gradient;
+  oracle::parameters gradients;
+  double decided = 0;
+};
+
+// With a gradient of zero where rounding may take another branch, for there the derivative of either side is right.
+std::vector<prepared_extreme> const& prepared() {
+  static std::vector<prepared_extreme> const all = [] {
+    std::vector<prepared_extreme> out;
+    number_source random(seed() + 1);
+    for (auto& e : extremes(seed())) {
+      oracle::parameters const parameters(e.scene.model);
+      prepared_extreme p{std::move(e), {}, {}, {}, 0};
+      oracle::scene const& s = p.e.scene;
+      p.picture = oracle::render(parameters, s.view, s.options, s.active_degree);
+      for (auto const& pixel : p.picture.pixels) {
+        bool const aside = pixel.edge || pixel.kink || pixel.slope_rounding > 1e-3;
+        p.decided += !aside / static_cast<double>(p.picture.pixels.size());
+        // Where nothing is decided the gradient is still taken: it must be finite.
+        for (int c = 0; c < 3; ++c)
+          p.color_gradient.push_back(aside && p.e.tolerance != undecided
+                                         ? 0.0f
+                                         : static_cast<float>(random.uniform(-1, 1)));
+      }
+      if (p.e.tolerance != undecided)
+        p.gradients = oracle::gradients(parameters, s.view, s.options, s.active_degree,
+                                        {p.color_gradient.begin(), p.color_gradient.end()});
+      out.push_back(std::move(p));
+    }
+    return out;
+  }();
+  return all;
+}
+
+bool finite(std::vector<float> const& v) {
+  return std::all_of(v.begin(), v.end(), [](float x) { return gart::is_finite(x); });
+}
+
+double relative_error(std::vector<float> const& got, std::vector<double> const& expected) {
+  double error = 0, norm = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    error += (got[i] - expected[i]) * (got[i] - expected[i]);
+    norm += expected[i] * expected[i];
+  }
+  return error == 0 ? 0 : std::sqrt(error / norm);
+}
+
+// The gradient of a quaternion goes as 1 / its norm: times the norm, so that no Gaussian drowns the others.
+template <class T>
+std::vector<T> by_norm(std::vector<T> gradient, gart::gaussian_model const& m) {
+  for (std::size_t i = 0; i < m.size(); ++i) {
+    double norm2 = 0;
+    for (int k = 0; k < 4; ++k) norm2 += double{m.quaternion[4 * i + k]} * m.quaternion[4 * i + k];
+    for (int k = 0; k < 4; ++k) gradient[4 * i + k] = static_cast<T>(gradient[4 * i + k] * std::sqrt(norm2));
+  }
+  return gradient;
+}
+
+struct image_errors {
+  double beyond_rounding = 0;         // in units of 1e-5 and twice what rounding explains: above 1 is wrong
+  double color = 0, transmittance = 0;  // of the pixels that rounding leaves decided to 1e-5
+};
+
+image_errors errors_of(outcome const& got, oracle::picture const& picture) {
+  image_errors worst;
+  for (std::size_t i = 0; i < picture.pixels.size(); ++i) {
+    oracle::pixel const& p = picture.pixels[i];
+    double const transmittance = std::abs(got.transmittance[i] - p.transmittance);
+    double color = 0;
+    for (int c = 0; c < 3; ++c) color = std::max(color, std::abs(got.color[3 * i + c] - p.color[c]));
+    double const error = p.edge ? color : std::max(color, transmittance);
+    worst.beyond_rounding = std::max(worst.beyond_rounding, error / (1e-5 + 2 * p.rounding));
+    if (p.edge || p.rounding > 1e-5) continue;
+    worst.color = std::max(worst.color, color), worst.transmittance = std::max(worst.transmittance, transmittance);
+  }
+  return worst;
+}
+
+double group_error(std::size_t group, gart::gaussian_model const& got, oracle::parameters const& expected,
+                   gart::gaussian_model const& model) {
+  auto const& g = got.*parameter_groups[group].got;
+  auto const& e = expected.*expected_groups[group];
+  return std::string(parameter_groups[group].name) == "quaternion"
+             ? relative_error(by_norm(g, model), by_norm(e, model))
+             : relative_error(g, e);
+}
+
+void check_finite(outcome const& o) {
+  CHECK(finite(o.color));
+  CHECK(finite(o.transmittance));
+  CHECK(finite(o.depth));
+  for (auto const& group : parameter_groups) CHECK(finite(o.gradients.*group.got));
+}
+
+void check_same_image(outcome const& a, outcome const& b) {
+  CHECK(a.color == b.color);
+  CHECK(a.transmittance == b.transmittance);
+  CHECK(a.depth == b.depth);
+  CHECK(a.hits == b.hits);
+}
+
+// The largest relative distance of a group.
+double gradient_distance(outcome const& a, outcome const& b) {
+  double worst = 0;
+  for (auto const& group : parameter_groups) {
+    auto const& e = b.gradients.*group.got;
+    worst = std::max(worst, relative_error(a.gradients.*group.got, {e.begin(), e.end()}));
+  }
+  return worst;
+}
+
+gart::camera small_camera() { return looking_along_z(17, 13, 16); }
+
+std::vector<float> random_gradient(number_source& random, gart::camera const& view) {
+  std::vector<float> g(std::size_t{3} * view.width * view.height);
+  for (float& x : g) x = static_cast<float>(random.uniform(-1, 1));
+  return g;
+}
+
+void append_copy(gart::gaussian_model& to, gart::gaussian_model const& from, std::size_t i) {
+  for (auto const& group : parameter_groups) {
+    auto const begin = (from.*group.got).begin() + static_cast<std::ptrdiff_t>(i * group.width);
+    (to.*group.got).insert((to.*group.got).end(), begin, begin + group.width);
+  }
+}
+
+// Slot 0-2 mean, 3-5 log-scale, 6-9 quaternion, 10 opacity, of the last Gaussian.
+float& last_slot(gart::gaussian_model& m, int slot) {
+  auto const from_end = [](std::vector<float>& v, int k) -> float& { return v[v.size() - static_cast<std::size_t>(k)]; };
+  return slot < 3    ? from_end(m.mean, 3 - slot)
+         : slot < 6  ? from_end(m.log_scale, 6 - slot)
+         : slot < 10 ? from_end(m.quaternion, 10 - slot)
+                     : from_end(m.opacity, 1);
+}
+
+template <class T>
+std::vector<T> rows(std::vector<T> const& v, int width, std::vector<bool> const& wanted, bool value) {
+  std::vector<T> out;
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    if (wanted[i] == value)
+      for (int k = 0; k < width; ++k) out.push_back(v[i * static_cast<std::size_t>(width) + k]);
+  return out;
+}
+
+}  // namespace
+
+// Prints what docs/accuracy.md quotes: GART_TEST_SEED=1 test_extremes --test-case=*budget*
+TEST_CASE_TEMPLATE("error budget: every extreme by every tracer and strategy", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  for (prepared_extreme const& p : prepared()) {
+    oracle::scene const& s = p.e.scene;
+    CAPTURE(s.name);
+    std::vector<outcome> const all = run_all(exec, s.model, s.view, s.options, p.color_gradient);
+    for (outcome const& o : all) {
+      CAPTURE(o.way);
+      check_finite(o);
+      check_same_image(o, all.front());
+    }
+    // What is a hit is decided once: `primitive` decides again what `cleared` reads. The same terms, in another order.
+    CHECK(gradient_distance(all[0], all[1]) < 1e-4);
+    if (p.e.tolerance == undecided) continue;
+
+    CHECK(p.decided >= p.e.decided);
+    image_errors const image = errors_of(all.front(), p.picture);
+    CHECK(image.beyond_rounding <= 1);
+    std::printf("budget (%s): %-46s colour %.0e T %.0e", E::name, s.name.c_str(), image.color, image.transmittance);
+    for (std::size_t g = 0; g < std::size(parameter_groups); ++g) {
+      CAPTURE(parameter_groups[g].name);
+      double recorded = 0, traced_again = 0;
+      for (outcome const& o : all) {
+        CAPTURE(o.way);
+        REQUIRE((o.gradients.*parameter_groups[g].got).size() == (p.gradients.*expected_groups[g]).size());
+        double const error = group_error(g, o.gradients, p.gradients, s.model);
+        CHECK(error <= p.e.tolerance);
+        bool const again = o.way.find("pixel") != std::string::npos || o.way.find("hybrid") != std::string::npos;
+        double& worst = again ? traced_again : recorded;
+        worst = std::max(worst, error);
+      }
+      std::printf(" %s %.0e/%.0e", parameter_groups[g].name, recorded, traced_again);
+    }
+    std::printf("\n");
+  }
+}
+
+TEST_CASE_TEMPLATE("NaN and infinity in every slot of the geometry, and quaternions without a direction", E,
+                   GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  number_source random(seed + 2);
+  gart::gaussian_model const good = cloud(random, 60);
+  gart::gaussian_model mixed;
+  mixed.sh_degree = good.sh_degree;
+  std::vector<bool> broken;
+  auto const add = [&](std::size_t i, auto const& breaks) {
+    append_copy(mixed, good, i), broken.push_back(false);
+    append_copy(mixed, good, i), broken.push_back(true);
+    breaks();
+  };
+  std::size_t next = 0;
+  for (float const bad : {NAN, INFINITY, -INFINITY})
+    for (int slot = 0; slot < 11; ++slot) add(next++, [&] { last_slot(mixed, slot) = bad; });
+  for (float const norm : {0.0f, 1e-38f, 1e-10f, 3e-5f, 1e20f})
+    add(next++, [&] {
+      for (int k = 6; k < 10; ++k) last_slot(mixed, k) *= norm;
+    });
+  for (float const log_scale : {-40.0f, 41.0f, -FLT_MAX, FLT_MAX})
+    add(next++, [&] { last_slot(mixed, 4) = log_scale; });
+  for (; next < good.size(); ++next) append_copy(mixed, good, next), broken.push_back(false);
+
+  E exec;
+  gart::render_options const options;
+  gart::camera const view = small_camera();
+  auto const gradient = random_gradient(random, view);
+  auto const expected = run_all(exec, good, view, options, gradient), got = run_all(exec, mixed, view, options, gradient);
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    CAPTURE(got[i].way);
+    check_finite(got[i]);
+    check_same_image(got[i], expected[i]);
+    for (auto const& group : parameter_groups) {
+      CAPTURE(group.name);
+      auto const& all = got[i].gradients.*group.got;
+      auto const kept = rows(all, group.width, broken, false), lost = rows(all, group.width, broken, true);
+      CHECK(std::all_of(lost.begin(), lost.end(), [](float x) { return x == 0; }));
+      auto const& e = expected[i].gradients.*group.got;
+      CHECK(relative_error(kept, {e.begin(), e.end()}) < 1e-5);  // threads add in another order
+    }
+  }
+}
+
+TEST_CASE_TEMPLATE("NaN and infinity in every slot of the colour: black, and nothing else", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  number_source random(seed + 3);
+  gart::gaussian_model broken = cloud(random, 60), black;
+  black = broken;
+  std::size_t i = 0;
+  for (float const bad : {NAN, INFINITY, -INFINITY})
+    for (std::size_t slot = 0; slot < 12; ++slot, ++i) {
+      broken.sh[12 * i + slot] = bad;
+      for (std::size_t k = 0; k < 4; ++k) black.sh[12 * i + 3 * k + slot % 3] = k == 0 ? -1000.0f : 0.0f;
+    }
+  E exec;
+  gart::render_options const options;
+  gart::camera const view = small_camera();
+  auto const gradient = random_gradient(random, view);
+  auto const expected = run_all(exec, black, view, options, gradient), got = run_all(exec, broken, view, options, gradient);
+  for (std::size_t k = 0; k < got.size(); ++k) {
+    CAPTURE(got[k].way);
+    check_finite(got[k]);
+    check_same_image(got[k], expected[k]);
+    for (auto const& group : parameter_groups) {
+      CAPTURE(group.name);
+      auto const& e = expected[k].gradients.*group.got;
+      CHECK(relative_error(got[k].gradients.*group.got, {e.begin(), e.end()}) < 1e-5);
+    }
+  }
+}
+
+TEST_CASE_TEMPLATE("the largest and the smallest finite numbers in every slot of the geometry", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  number_source random(seed + 4);
+  gart::gaussian_model m = cloud(random, 20);
+  gart::gaussian_model const good = m;
+  for (float const extreme : {FLT_MAX, -FLT_MAX, 1e30f, FLT_MIN, 1e-42f, -0.0f})
+    for (int slot = 0; slot < 11; ++slot) {
+      append_copy(m, good, static_cast<std::size_t>(slot));
+      bool const mean = slot < 3 && std::abs(extreme) > 1;
+      last_slot(m, slot) = mean ? std::copysign(1e18f, extreme) : extreme;
+    }
+  E exec;
+  gart::render_options const options;
+  gart::camera const view = small_camera();
+  auto const gradient = random_gradient(random, view);
+  auto const all = run_all(exec, m, view, options, gradient);
+  for (outcome const& o : all) {
+    CAPTURE(o.way);
+    check_finite(o);
+    check_same_image(o, all.front());
+  }
+  // Farther than Embree's coordinates go it says so; the others do without.
+  for (int slot = 0; slot < 3; ++slot)
+    for (float const place : {FLT_MAX, -FLT_MAX}) {
+      append_copy(m, good, 0);
+      last_slot(m, slot) = place;
+    }
+  using gart::primitive_strategy;
+  auto const tiles = run_one<primitive_strategy, gart::tile_tracer<E>>(exec, m, view, options, gradient);
+  auto const bvh = run_one<primitive_strategy, gart::bvh_tracer<E>>(exec, m, view, options, gradient);
+  check_finite(tiles), check_finite(bvh), check_same_image(tiles, bvh);
+  CHECK(tiles.color == all.front().color);
+#if defined(GART_WITH_EMBREE)
+  if constexpr (!E::device)
+    CHECK_THROWS_AS((run_one<primitive_strategy, gart::embree_tracer<E>>(exec, m, view, options, gradient)),
+                    gart::unsupported);
+#endif
+}
+
+TEST_CASE_TEMPLATE("opacity's gradient keeps its digits while sigma has none left", E, GART_TEST_POLICIES) {
+  // One Gaussian a pixel, its ray at |p| of 1 to 2 in the mean: alpha is below its clamp whatever sigma is.
+  float const logits[] = {3, 6, 9, 12, 15, 17, 20, 30, 40, 60, 80};
+  int const n = static_cast<int>(std::size(logits));
+  number_source random(5);
+  gart::camera view = looking_along_z(8 * n, 1, 100);
+  gart::gaussian_model m;
+  m.sh_degree = 1;
+  for (int i = 0; i < n; ++i) {
+    auto const ray = oracle::ray_through(view, 8 * i + 4, 0);
+    gart::vec3d const at(ray.x * 2 / ray.z, ray.y * 2 / ray.z + 0.014, 2);
+    append(m, random, {at, gart::vec3d(std::log(0.01)), {1, 0, 0, 0}, logits[i]});
+    for (int c = 0; c < 3; ++c) m.sh[m.sh.size() - 12 + static_cast<std::size_t>(c)] = 1;
+  }
+  gart::render_options const options;
+  std::vector<float> const gradient(std::size_t{3} * view.width, 1.0f);
+  oracle::parameters const parameters(m);
+  auto const expected = oracle::gradients(parameters, view, options, 1, {gradient.begin(), gradient.end()});
+  E exec;
+  for (outcome const& o : run_all(exec, m, view, options, gradient)) {
+    CAPTURE(o.way);
+    for (int i = 0; i < n; ++i) {
+      CAPTURE(logits[i]);
+      auto const k = static_cast<std::size_t>(i);
+      REQUIRE(expected.opacity[k] != 0);
+      CHECK(std::abs(o.gradients.opacity[k] / expected.opacity[k] - 1) < 2e-5);
+    }
+  }
+}
+
+namespace {
+
+// Rows of hits at |p| = 0, one row a pixel, that no other pixel meets: T and alpha of each are known.
+struct chains {
+  static constexpr int rays = 64, length = 20;
+  gart::gaussian_model model;
+  gart::camera view = looking_along_z(rays, 1, 100);
+  gart::render_options options;
+  std::vector<double> alpha, before, brightness;  // of each Gaussian; T before it; the sum of its channels
+
+  explicit chains(number_source& random) {
+    model.sh_degree = 1;
+    options.transmittance_min = 0;
+    for (int r = 0; r < rays; ++r) {
+      auto const ray = oracle::ray_through(view, r, 0);
+      double t = 1;
+      for (int k = 0; k < length; ++k) {
+        double const distance = 2 + 0.5 * k, a = 1 - random.log_uniform(0.02, 0.9);
+        append(model, random,
+               {gart::vec3d(ray.x, ray.y, ray.z) * distance, gart::vec3d(std::log(0.002 * distance)), {1, 0, 0, 0},
+                static_cast<float>(std::log(a / (1 - a)))});
+        brightness.push_back(1.5);
+        for (std::size_t c = 0; c < 12; ++c) {
+          float& x = model.sh[model.sh.size() - 12 + c];
+          x = c < 3 ? static_cast<float>(random.uniform(0, 2)) : 0.0f;
+          if (c < 3) brightness.back() += 0.28209479177387814 * double{x};
+        }
+        alpha.push_back(a), before.push_back(t);
+        t *= 1 - a;
+      }
+    }
+  }
+};
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("error budget: derivatives by alpha along a ray", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  number_source random(seed + 6);
+  chains const c(random);
+  std::vector<float> const gradient(std::size_t{3} * c.view.width, 1.0f);
+  oracle::parameters const parameters(c.model);
+  auto const expected = oracle::gradients(parameters, c.view, c.options, 1, {gradient.begin(), gradient.end()});
+  auto const picture = oracle::render(parameters, c.view, c.options, 1);
+  E exec;
+  auto const all = run_all(exec, c.model, c.view, c.options, gradient);
+  double worst_t = 0;
+  for (std::size_t r = 0; r < picture.pixels.size(); ++r) {
+    REQUIRE(picture.pixels[r].hits == chains::length);
+    worst_t = std::max(worst_t, std::abs(all[0].transmittance[r] / picture.pixels[r].transmittance - 1));
+  }
+  std::printf("budget (%s): T after %d hits, relative: %.1e\n", E::name, chains::length, worst_t);
+  CHECK(worst_t < 5e-5);  // 20 factors 1 - alpha, each off by 2^-24 or two over at least 0.02
+  for (outcome const& o : all) {
+    CAPTURE(o.way);
+    // Of dL/dalpha, relative to T c.g: worst of the hits met at T in a decade.
+    double decade[12] = {};
+    for (std::size_t i = 0; i < c.alpha.size(); ++i) {
+      double const by_alpha = c.alpha[i] * (1 - c.alpha[i]);
+      double const error = std::abs(o.gradients.opacity[i] - expected.opacity[i]) / (by_alpha * c.before[i] * c.brightness[i]);
+      auto const bin = static_cast<std::size_t>(std::min(11.0, -std::log10(c.before[i])));
+      decade[bin] = std::max(decade[bin], error);
+      // C.g is 4 at most; C and what lies before the hit are sums of up to 20 floats, then multiplied by g, added up and
+      // subtracted: their roundings are at most 2^-24 of C.g each. 1 / (1 - alpha) magnifies the difference.
+      double const bound = 32 * std::ldexp(4.0, -24) / (c.before[i] * (1 - c.alpha[i]) * c.brightness[i]) + 1e-5;
+      REQUIRE(error < bound);
+    }
+    std::printf("budget (%s): dL/dalpha, %-22s by T:", E::name, o.way.c_str());
+    for (int k = 0; k < 8; ++k) std::printf(" 1e-%d %.0e", k, decade[k]);
+    std::printf("\n");
+  }
+}
+
+TEST_CASE_TEMPLATE("error budget: atomics in any order against sums in one order", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  number_source random(seed + 7);
+  gart::gaussian_model const model = cloud(random, 200);
+  gart::camera const view = looking_along_z(64, 48, 60);
+  auto const gradient = random_gradient(random, view);
+  using tracer = gart::tile_tracer<E>;
+  E exec;
+  std::vector<outcome> by_pixel, ordered;
+  for (int k = 0; k < 5; ++k) {
+    by_pixel.push_back(run_one<gart::pixel_strategy, tracer>(exec, model, view, {}, gradient));
+    ordered.push_back(run_one<gart::deterministic_strategy, tracer>(exec, model, view, {}, gradient));
+  }
+  for (auto const& group : parameter_groups) {
+    double spread = 0;
+    for (int k = 1; k < 5; ++k) {
+      CHECK(ordered[k].gradients.*group.got == ordered[0].gradients.*group.got);
+      auto const& first = by_pixel[0].gradients.*group.got;
+      spread = std::max(spread, relative_error(by_pixel[k].gradients.*group.got, {first.begin(), first.end()}));
+    }
+    std::printf("budget (%s): spread of 5 runs by pixel, %s: %.0e\n", E::name, group.name, spread);
+    CHECK(spread < 1e-5);  // some hundred terms a sum, each rounding 2^-24 of it
+  }
+}
