@@ -1,5 +1,5 @@
-// Replays the corpus: inputs that between them reach all that the fuzzers reached, and every one that once broke a
-// reader. What is named refused_* must be refused.
+// Replays the corpus: a few good inputs of each reader, and those that once broke one. What is named refused_* must be
+// refused.
 
 #include "fuzz/readers.hpp"
 
