@@ -420,6 +420,7 @@ class Pages:
             self.tables["presets"] = table(["scene", "preset", "alpha_min", "t_min", "image PSNR, dB",
                                             "gradient, worst group", "a view, ms", "trained PSNR, dB", "SSIM",
                                             "training, s", "Gaussians"], rows)
+
     def auto(self):
         rows = []
         for path in sorted(glob.glob(os.path.join(self.results, "auto_*.json"))):

@@ -363,8 +363,8 @@ class Bench:
             for preset in PRESETS:
                 folder = os.path.join(self.temporary, "preset")
                 shutil.rmtree(folder, ignore_errors=True)
-                done = run([self.program("gart"), "train", capture, "--out", folder, "--preset", preset, "--backend",
-                            self.a.backend, "--quiet", *shlex.split(self.a.train)])
+                done = run([self.program("gart"), "train", capture, "--out", folder, "--preset", preset, "--no-auto",
+                            "--backend", self.a.backend, "--quiet", *shlex.split(self.a.train)])
                 if done.returncode != 0:
                     self.fail(f"{name}, {preset}: {last_line(done.stderr)}")
                     continue
@@ -401,8 +401,8 @@ class Bench:
                         row.update({k: metrics[k] for k in kept})
                         # Of the whole process, loading and testing included; other work on the machine is not in it.
                         row["cpu_seconds"] = after.ru_utime - before.ru_utime
-                        self.say(f"{name}, seed {seed}, {mode}: {row['psnr']:.3f} dB, {row['seconds']:.1f} s, SH degree "
-                                 f"{row['sh_degree']}, {row['floats_per_gaussian']} floats a Gaussian")
+                        self.say(f"{name}, seed {seed}, {mode}: {row['psnr']:.3f} dB, {row['seconds']:.1f} s, "
+                                 f"{row['floats_per_gaussian']} floats a Gaussian")
                     runs.append(row)
             self.write("auto_" + name, runs, capture=name)
 

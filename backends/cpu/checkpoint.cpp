@@ -123,7 +123,9 @@ training_state state_of(checkpoint_reader const& in) {
   s.step = step[0], s.growth = growth[0], s.seed = seed[0];
   s.gradient_sum = in.get<float>("adc/gradient_sum"), s.touched = in.get<u32>("adc/touched");
   if (s.gradient_sum.size() != s.touched.size()) in.fail("its arrays adc/* differ in length");
-  s.trials = in.get<band_trial>("band_trials");
+  if (in.has("band_trials")) s.trials = in.get<band_trial>("band_trials");
+  for (band_trial const& t : s.trials)
+    if (t.band < 1 || t.band > 3) in.fail("is damaged: a trial of SH band " + std::to_string(t.band));
   return s;
 }
 

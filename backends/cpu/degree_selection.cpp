@@ -13,7 +13,7 @@ namespace gart {
 namespace {
 
 constexpr int fewest_steps = 50;
-constexpr std::size_t fewest_views = 20, most_held_out = 8;
+constexpr std::size_t fewest_views = 20, least_held_out = 2, most_held_out = 8;
 
 // The highest band that has a coefficient other than zero.
 int degree_in_use(gaussian_model const& m) {
@@ -83,7 +83,8 @@ class degree_selection final : public session {
                              ", this run of at most " + std::to_string(plan_.degree));
     trial_.reset();
     trials_ = s.trials;
-    settled_ = !trials_.empty() && (trials_.back().kept() || trials_.back().band == 1);
+    settled_ = (!trials_.empty() && (trials_.back().kept() || trials_.back().band == 1)) ||
+               (s.step >= plan_.begin && s.scene.sh_degree == 0);
     hold_out(!settled_);
     open(s);
   }
@@ -194,7 +195,7 @@ trial_plan plan_trials(row_request const& request, train_options const& options,
   plan.degree = request.sh_degree;
   plan.begin = options.iterations / 2;
   plan.steps = std::max(fewest_steps, options.iterations / 50);
-  std::size_t const views = std::min(train_views / 10, most_held_out);
+  std::size_t const views = std::clamp(train_views / 20, least_held_out, most_held_out);
   if (plan.degree == 0) {
     plan.why = "there is no band to measure";
   } else if (!(options.sh_gain > 0)) {

@@ -66,6 +66,16 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   return all;
 }
 
+nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const& now) {
+  auto const found = config.find("chosen");
+  if (found == config.end() || !found->is_array()) return now;
+  for (auto const& choice : *found) {
+    for (char const* key : {"option", "value", "why"})
+      if (!choice.is_object() || !choice.contains(key) || !choice[key].is_string()) return now;
+  }
+  return *found;
+}
+
 nlohmann::json trials_of(std::vector<gart::band_trial> const& trials) {
   nlohmann::json all = nlohmann::json::array();
   for (auto const& t : trials) {

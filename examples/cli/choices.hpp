@@ -19,6 +19,9 @@ gart::chosen<std::string> background_for(gart::capture_traits const& traits);
 // given, "why" says so.
 nlohmann::json choose(train_arguments& a, gart::dataset const& data);
 
+// What a run that is resumed had chosen, as its config.json has it; `now` where that does not say.
+nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const& now);
+
 // What was measured since: the degree the run ended in, and each trial.
 nlohmann::json trials_of(std::vector<gart::band_trial> const& trials);
 std::string in_words(gart::band_trial const& trial);

@@ -293,7 +293,7 @@ void add_tradeoff(CLI::App& app, command& selected) {
       ->type_name("N")
       ->capture_default_str()
       ->check(between(1, 64));
-  tradeoff->add_option("--background", a->background, "white or black; auto: white for images with alpha, else black")
+  tradeoff->add_option("--background", a->background, "white or black; auto: as gart train chooses")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(one_of({"auto", "white", "black"}));

@@ -1,6 +1,6 @@
-#include "choices.hpp"
 #include "tradeoff_views.hpp"
 
+#include "choices.hpp"
 #include "output.hpp"
 
 #include <gart/core/error.hpp>

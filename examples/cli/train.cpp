@@ -120,7 +120,7 @@ class training_run {
         gart::make_session(row_request_of(a_), train_options_of(a_), data_, a_.start.empty() ? nullptr : &start_);
     if (a_.resume) {
       check_same_dataset(a_, data_);
-      chosen_ = read_json(a_.config_file()).value("chosen", chosen_);
+      chosen_ = chosen_before(read_json(a_.config_file()), chosen_);
       session_->load(a_.checkpoint_file());
       if (fs::exists(a_.history_file())) course_.restore(a_.history_file(), session_->steps_done());
     } else {

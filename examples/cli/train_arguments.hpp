@@ -26,10 +26,10 @@ struct train_arguments {
   gart::train_options defaults;
   int iterations = defaults.iterations;
   gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
+  int kernel_degree = 2, tile_size = 0, window = 0;
   bool automatic = true;
   std::string sh_degree = "auto";
   float sh_gain = 0.02f;
-  int kernel_degree = 2, tile_size = 0, window = 0;
   int downscale = 1, test_every = 8, eval_every = -1;
   float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
   float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;

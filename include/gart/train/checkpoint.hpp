@@ -34,6 +34,7 @@ class checkpoint_reader {
     auto const* values = reinterpret_cast<T const*>(bytes.data());
     return {values, values + bytes.size() / sizeof(T)};
   }
+  bool has(std::string const& name) const { return arrays_.count(name) != 0; }
   [[noreturn]] void fail(std::string const& what) const;
 
  private:
