@@ -61,7 +61,7 @@ TEST_CASE("starting points in one place are found in time, and make Gaussians of
     points.color.insert(points.color.end(), {10, 20, 30});
   }
   auto const start = std::chrono::steady_clock::now();
-  gart::gaussian_model const m = gart::model_from_points(points, {});
+  gart::gaussian_model const m = gart::model_from_points(points, 3, 0.1f, 1.0f);
   std::chrono::duration<double> const elapsed = std::chrono::steady_clock::now() - start;
   CHECK(elapsed.count() < 30);  // a search that goes on through equals takes minutes
   REQUIRE(m.size() == 100000);
