@@ -61,7 +61,7 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   bool const measured = !plan.held_out.empty();
   say("--sh-degree", (measured ? "at most " : "") + std::to_string(options.sh_degree),
       a.sh_degree != "auto" ? by_option
-      : !a.automatic        ? "--no-auto"
+      : !a.automatic        ? "every band; --auto measures which pay"
                             : plan.why);
   return all;
 }

@@ -33,9 +33,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(one_of({"mcmc", "adc", "none"}));
   in_group(r.add_flag(train, "--auto,!--no-auto", a.automatic,
                       "Model only what the scene requires: measure on held-out\ntraining views which bands of "
-                      "spherical harmonics pay, and\nstore no others. The default; --no-auto stores all"));
+                      "spherical harmonics pay, and\nstore no others. --no-auto, the default, stores all and holds\n"
+                      "no view out, which costs short runs quality"));
   in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3",
-                 "Degree of the spherical harmonics of colour; auto: measured,\nor 3 with --no-auto"))
+                 "Degree of the spherical harmonics of colour; auto: 3, or\nmeasured with --auto"))
       ->check(one_of({"auto", "0", "1", "2", "3"}));
   in_group(r.add(train, "--sh-gain", a.sh_gain, "DB", "PSNR on the held-out views that a band must buy by the end"))
       ->check(between(1e-6, 100));

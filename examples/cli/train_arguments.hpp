@@ -27,7 +27,7 @@ struct train_arguments {
   int iterations = defaults.iterations;
   gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
   int kernel_degree = 2, tile_size = 0, window = 0;
-  bool automatic = true;
+  bool automatic = false;
   std::string sh_degree = "auto";
   float sh_gain = 0.02f;
   int downscale = 1, test_every = 8, eval_every = -1;

@@ -88,7 +88,7 @@ TEST_CASE("a run that was stopped and resumed ends with the same bytes") {
 TEST_CASE("what a capture asks for is said with its reasons, measured, kept, and the same after resuming") {
   folder const here;
   write_capture(here / "capture", 20, 2);
-  std::string const run = "train capture --iterations 600 --backend serial --max-gaussians 40 --densify none --out ";
+  std::string const run = "train capture --auto --iterations 600 --backend serial --max-gaussians 40 --densify none --out ";
   auto const whole = here.gart(run + "whole");
   REQUIRE_MESSAGE(whole.code == 0, whole.err);
   CHECK_MESSAGE(has(whole.err, "  --background black: the images' borders are plain black (20 20 20)\n"), whole.err);
@@ -135,7 +135,8 @@ TEST_CASE("an option that is given is not chosen, and --no-auto stores every ban
     return std::string();
   };
   CHECK(degree("--sh-degree 2") == "2: given");
-  CHECK(degree("--no-auto") == "3: --no-auto");
+  CHECK(degree("--no-auto") == "3: every band; --auto measures which pay");
+  CHECK(degree("") == degree("--no-auto"));
   CHECK(has(degree("--auto --sh-gain 0.5"), "at most 3: a band that buys less than 0.5 dB"));
   auto const changed = here.gart("train --resume --no-auto --out run");
   CHECK(changed.code == 2);
