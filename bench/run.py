@@ -340,7 +340,7 @@ class Bench:
         folder = os.path.join(self.temporary, "tradeoff")
         shutil.rmtree(folder, ignore_errors=True)
         done = run([self.program("gart"), "tradeoff", ply, cameras, "--out", folder, "--backend", self.a.backend,
-                    "--quiet", *arguments])
+                    "--clock", self.a.clock, "--quiet", *arguments])
         if done.returncode != 0:
             raise Failure(f"gart tradeoff {ply}: {last_line(done.stderr)}")
         with open(os.path.join(folder, "tradeoff.json")) as f:
@@ -433,6 +433,8 @@ def arguments():
                         help="presets and auto: a capture to train on; may be repeated")
     parser.add_argument("--train", default="", help="presets and auto: further options of gart train, in one string")
     parser.add_argument("--seeds", type=int, default=1, help="auto: runs of each kind")
+    parser.add_argument("--clock", default="wall", choices=("wall", "processor"),
+                        help="tradeoff: what the fronts are drawn over; processor where a CPU has other work")
     parser.add_argument("--commit", help="what was built, where the folder is no git checkout")
     a = parser.parse_args()
     wanted = a.what + (["sanitize"] if a.sanitize else [])

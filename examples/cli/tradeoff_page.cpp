@@ -23,6 +23,10 @@ constexpr char const* groups[] = {"mean", "log_scale", "quaternion", "opacity", 
 double number(json const& value) { return value.is_number() ? value.get<double>() : INFINITY; }
 
 double image_error(json const& s) { return number(s["image"]["rms"]); }
+bool by_processor(json const& result) { return result["clock"] == "processor"; }
+double time_of(json const& result, json const& s) {
+  return number(s[by_processor(result) ? "processor_ms" : "total_ms"]);
+}
 double gradient_error(json const& s) { return number(s["gradient_worst"]); }
 
 // "1.2e-05": errors span many decades.
@@ -44,13 +48,13 @@ std::string milliseconds(json const& value) {
 
 using row = std::vector<std::string>;
 
-row const heads = {"setting", "image max", "PSNR, dB", "mean",     "scale",     "rotation", "opacity",
-                   "sh",      "prepare",   "forward",  "backward", "total, ms", "LT",       "peak"};
+row const heads = {"setting", "image max", "PSNR, dB", "mean",      "scale",     "rotation", "opacity", "sh",
+                   "prepare", "forward",   "backward", "total, ms", "processor", "LT",       "peak"};
 
 row cells_of(json const& s) {
   row out{s["name"].get<std::string>(), small(s["image"]["max"]), decimals(s["image"]["psnr"], 1)};
   for (char const* group : groups) out.push_back(small(s["gradients"][group]));
-  for (char const* stage : {"prepare_ms", "forward_ms", "backward_ms", "total_ms"})
+  for (char const* stage : {"prepare_ms", "forward_ms", "backward_ms", "total_ms", "processor_ms"})
     out.push_back(milliseconds(s[stage]));
   out.push_back(number(s["lt_bytes"]) > 0 ? as_bytes(number(s["lt_bytes"])) : "-");
   out.push_back(as_bytes(number(s["peak_bytes"])));
@@ -80,11 +84,15 @@ std::string method_of(json const& r) {
 
 bool on_front(json const& s, char const* which) { return s["front"][which].get<bool>(); }
 
-std::string figure_of(json const& settings, char const* front, char const* title, char const* error_label,
+std::string figure_of(json const& result, char const* front, char const* title, char const* error_label,
                       double (*error)(json const&)) {
-  scatter plot{title, "forward and backward, ms a view", error_label, {}};
-  for (json const& s : settings) {
-    plot.points.push_back({number(s["total_ms"]), error(s), s["name"].get<std::string>(), on_front(s, front)});
+  scatter plot{
+      title,
+      by_processor(result) ? "forward and backward, ms of all threads a view" : "forward and backward, ms a view",
+      error_label,
+      {}};
+  for (json const& s : result["settings"]) {
+    plot.points.push_back({time_of(result, s), error(s), s["name"].get<std::string>(), on_front(s, front)});
   }
   return to_svg(plot);
 }
@@ -105,10 +113,11 @@ std::string table_of(json const& settings) {
   return html + "</table></div>";
 }
 
-void mark(json& settings, char const* which, double (*error)(json const&)) {
+void mark(json& result, char const* which, double (*error)(json const&)) {
+  json& settings = result["settings"];
   for (json& s : settings) {
     s["front"][which] = std::none_of(settings.begin(), settings.end(), [&](json const& other) {
-      double const t = number(s["total_ms"]), other_t = number(other["total_ms"]), e = error(s), other_e = error(other);
+      double const t = time_of(result, s), other_t = time_of(result, other), e = error(s), other_e = error(other);
       return other_t <= t && other_e <= e && (other_t < t || other_e < e);
     });
   }
@@ -116,9 +125,9 @@ void mark(json& settings, char const* which, double (*error)(json const&)) {
 
 }  // namespace
 
-void mark_fronts(json& settings) {
-  mark(settings, "image", image_error);
-  mark(settings, "gradients", gradient_error);
+void mark_fronts(json& result) {
+  mark(result, "image", image_error);
+  mark(result, "gradients", gradient_error);
 }
 
 std::string tradeoff_table(json const& result) {
@@ -155,9 +164,9 @@ std::string tradeoff_page(json const& result) {
   page += "</style></head><body><main><header><h1>" + title + "</h1><p class=\"soft\">" +
           html_escape(subject_of(result)) +
           ". A setting that another one beats in error and in time is grey.</p></header>";
-  page += "<h2>Image</h2>" + figure_of(settings, "image", "Error of the image against time",
+  page += "<h2>Image</h2>" + figure_of(result, "image", "Error of the image against time",
                                        "root mean square error of the colour, 0 to 1", image_error);
-  page += "<h2>Gradients</h2>" + figure_of(settings, "gradients", "Error of the gradients against time",
+  page += "<h2>Gradients</h2>" + figure_of(result, "gradients", "Error of the gradients against time",
                                            "relative error of the worst parameter group", gradient_error);
   page += "<h2>Every setting</h2>" + table_of(settings);
   page += "<h2>How it was measured</h2><p>" + html_escape(method_of(result)) + "</p>";

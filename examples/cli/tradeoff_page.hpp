@@ -7,8 +7,9 @@
 
 namespace gart_cli {
 
-// Sets front.image and front.gradients of each setting: no other is at least as fast and as close, and better in one.
-void mark_fronts(nlohmann::json& settings);
+// Sets front.image and front.gradients of each of the settings: no other is at least as fast, by "clock", and as close,
+// and better in one.
+void mark_fronts(nlohmann::json& result);
 
 std::string tradeoff_table(nlohmann::json const& result);
 std::string tradeoff_page(nlohmann::json const& result);
