@@ -9,8 +9,8 @@ std::vector<preset> const& presets() {
   static std::vector<preset> const all = [] {
     preset exact{"exact", {}, "leaves out what no image shows"};
     preset balanced{"balanced", {}, ""}, fast{"fast", {}, ""};
-    balanced.render.transmittance_min = 1e-3f;
-    fast.render.alpha_min = 0.02f, fast.render.transmittance_min = 0.01f;
+    balanced.render.alpha_min = 0.01f, balanced.render.transmittance_min = 0.03f;
+    fast.render.alpha_min = 0.05f, fast.render.transmittance_min = 0.05f;
     return std::vector<preset>{exact, balanced, fast};
   }();
   return all;

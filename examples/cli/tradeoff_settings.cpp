@@ -89,10 +89,10 @@ std::vector<setting> settings_of(configuration const& exact) {
   for (int const shrink : {2, 4}) {
     t.add("resolution", "1/" + std::to_string(shrink), [&](c& x) { x.shrink = shrink; });
   }
-  // GRay's cut-offs, and steps towards less of everything.
-  t.add("together", "alpha_min=0.01+t_min=0.03",
-        [](c& x) { x.render.alpha_min = 0.01f, x.render.transmittance_min = 0.03f; });
-  t.add("together", "alpha_min=0.05+t_min=0.05", [](c& x) { x.render.alpha_min = x.render.transmittance_min = 0.05f; });
+  t.add("together", "alpha_min=0.02+t_min=0.01",
+        [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f; });
+  t.add("together", "alpha_min=0.01+t_min=0.03+arithmetic=fast",
+        [](c& x) { x.render.alpha_min = 0.01f, x.render.transmittance_min = 0.03f, x.row.arithmetic = "fast"; });
   t.add("together", "alpha_min=0.02+t_min=0.01+resolution=1/2",
         [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f, x.shrink = 2; });
   return t.take();

@@ -18,7 +18,10 @@ struct configuration {
 struct setting {
   std::string knob, value;
   configuration use;
-  std::string name() const { return value.empty() ? knob : knob + "=" + value; }
+  // A value that names several knobs itself stands alone.
+  std::string name() const {
+    return value.empty() ? knob : value.find('=') != std::string::npos ? value : knob + "=" + value;
+  }
 };
 
 // The first is `exact` as it stands; values that are already its own are left out.
