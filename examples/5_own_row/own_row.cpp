@@ -12,9 +12,9 @@
 // Registered when the program starts; from then on make_session and make_renderer know it. In a library the linker has
 // to be told to keep the symbol: -Wl,--undefined=own_rows.
 using response = gart::generalized_gaussian<4>;
-GART_REGISTER_ROWS(own_rows,
-                   gart::register_row_of<gart::openmp_exec, gart::scene_traits<1, response>,
-                                         gart::tile_tracer<gart::openmp_exec, 8, response>, gart::primitive_strategy>(0))
+GART_REGISTER_ROWS(
+    own_rows, gart::register_row_of<gart::openmp_exec, gart::scene_traits<1, response>,
+                                    gart::tile_tracer<gart::openmp_exec, 8, response>, gart::primitive_strategy>(0))
 
 int main(int argc, char** argv) try {
   if (argc < 3) return std::fprintf(stderr, "usage: own_row DATASET MODEL.ply [ITERATIONS]\n"), 2;

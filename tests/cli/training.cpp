@@ -88,7 +88,8 @@ TEST_CASE("a run that was stopped and resumed ends with the same bytes") {
 TEST_CASE("what a capture asks for is said with its reasons, measured, kept, and the same after resuming") {
   folder const here;
   write_capture(here / "capture", 20, 2);
-  std::string const run = "train capture --auto --iterations 600 --backend serial --max-gaussians 40 --densify none --out ";
+  std::string const run =
+      "train capture --auto --iterations 600 --backend serial --max-gaussians 40 --densify none --out ";
   auto const whole = here.gart(run + "whole");
   REQUIRE_MESSAGE(whole.code == 0, whole.err);
   CHECK_MESSAGE(has(whole.err, "  --background black: the images' borders are plain black (20 20 20)\n"), whole.err);
@@ -182,7 +183,9 @@ TEST_CASE("resuming refuses what contradicts the run, and a run that is not ther
 TEST_CASE("eval scores a trained model as train did, and render draws the same image") {
   folder const here;
   write_capture(here / "capture");
-  REQUIRE(here.gart("train capture --out run --iterations 20 --alpha-min 0.01 --max-hits 4 --tracer bvh" + small).code == 0);
+  REQUIRE(
+      here.gart("train capture --out run --iterations 20 --alpha-min 0.01 --max-hits 4 --tracer bvh" + small).code ==
+      0);
   CHECK(has(text_of(here / "run/model.ply"), "comment gart alpha_min 0.00999999978\n"));
   CHECK(has(text_of(here / "run/model.ply"), "comment gart max_hits 4\n"));
   CHECK(here.json("run/metrics.json")["approximations"]["max_hits"] == 4);

@@ -12,8 +12,9 @@ using namespace cli_test;
 TEST_CASE("SH degree 0 stores and optimises 14 floats a Gaussian") {
   folder const here;
   write_capture(here / "capture");
-  REQUIRE(here.gart("train capture --out run --iterations 3 --sh-degree 0 --densify none --backend serial --quiet")
-              .code == 0);
+  REQUIRE(
+      here.gart("train capture --out run --iterations 3 --sh-degree 0 --densify none --backend serial --quiet").code ==
+      0);
   std::string const ply = text_of(here / "run/model.ply");
   CHECK_FALSE(has(ply, "f_rest"));
   // Beside the 14: the format's normal, three zeros.
@@ -71,9 +72,9 @@ TEST_CASE("what is traded is chosen by name and reported, and tiles and windows 
     for (auto const& file : fs::directory_iterator(here / "usual"))
       CHECK(text_of(file.path()) == text_of(here / ("other/" + file.path().filename().string())));
   }
-  for (auto const& [option, name, value] : {std::array{"--lt-format half", "lt_format", "half"},
-                                            std::array{"--lt-format shared", "lt_format", "shared"},
-                                            std::array{"--arithmetic fast", "arithmetic", "fast"}}) {
+  for (auto const& [option, name, value] :
+       {std::array{"--lt-format half", "lt_format", "half"}, std::array{"--lt-format shared", "lt_format", "shared"},
+        std::array{"--arithmetic fast", "arithmetic", "fast"}}) {
     CAPTURE(option);
     auto const done = here.gart(std::string("train capture --out traded ") + option + openmp);
     REQUIRE_MESSAGE(done.code == 0, done.err);

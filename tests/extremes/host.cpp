@@ -1,6 +1,6 @@
 // What needs no device: memory that ends at any allocation, starting points in one place, what is stored in which type.
-#include <extremes/ways.hpp>
 #include <extremes/scenes.hpp>
+#include <extremes/ways.hpp>
 
 #include <gart/train/initial.hpp>
 

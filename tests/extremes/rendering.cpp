@@ -39,9 +39,8 @@ std::vector<prepared_extreme> const& prepared() {
         p.decided += !aside / static_cast<double>(p.picture.pixels.size());
         // Where nothing is decided the gradient is still taken: it must be finite.
         for (int c = 0; c < 3; ++c)
-          p.color_gradient.push_back(aside && p.e.tolerance != undecided
-                                         ? 0.0f
-                                         : static_cast<float>(random.uniform(-1, 1)));
+          p.color_gradient.push_back(aside && p.e.tolerance != undecided ? 0.0f
+                                                                         : static_cast<float>(random.uniform(-1, 1)));
       }
       if (p.e.tolerance != undecided)
         p.gradients = oracle::gradients(parameters, s.view, s.options, s.active_degree,
@@ -78,7 +77,7 @@ std::vector<T> by_norm(std::vector<T> gradient, gart::gaussian_model const& m) {
 }
 
 struct image_errors {
-  double beyond_rounding = 0;         // in units of 1e-5 and twice what rounding explains: above 1 is wrong
+  double beyond_rounding = 0;           // in units of 1e-5 and twice what rounding explains: above 1 is wrong
   double color = 0, transmittance = 0;  // of the pixels that rounding leaves decided to 1e-5
 };
 
@@ -147,7 +146,9 @@ void append_copy(gart::gaussian_model& to, gart::gaussian_model const& from, std
 
 // Slot 0-2 mean, 3-5 log-scale, 6-9 quaternion, 10 opacity, of the last Gaussian.
 float& last_slot(gart::gaussian_model& m, int slot) {
-  auto const from_end = [](std::vector<float>& v, int k) -> float& { return v[v.size() - static_cast<std::size_t>(k)]; };
+  auto const from_end = [](std::vector<float>& v, int k) -> float& {
+    return v[v.size() - static_cast<std::size_t>(k)];
+  };
   return slot < 3    ? from_end(m.mean, 3 - slot)
          : slot < 6  ? from_end(m.log_scale, 6 - slot)
          : slot < 10 ? from_end(m.quaternion, 10 - slot)
@@ -234,7 +235,8 @@ TEST_CASE_TEMPLATE("NaN and infinity in every slot of the geometry, and quaterni
   gart::render_options const options;
   gart::camera const view = small_camera();
   auto const gradient = random_gradient(random, view);
-  auto const expected = run_all(exec, good, view, options, gradient), got = run_all(exec, mixed, view, options, gradient);
+  auto const expected = run_all(exec, good, view, options, gradient),
+             got = run_all(exec, mixed, view, options, gradient);
   for (std::size_t i = 0; i < got.size(); ++i) {
     CAPTURE(got[i].way);
     check_finite(got[i]);
@@ -266,7 +268,8 @@ TEST_CASE_TEMPLATE("NaN and infinity in every slot of the colour: black, and not
   gart::render_options const options;
   gart::camera const view = small_camera();
   auto const gradient = random_gradient(random, view);
-  auto const expected = run_all(exec, black, view, options, gradient), got = run_all(exec, broken, view, options, gradient);
+  auto const expected = run_all(exec, black, view, options, gradient),
+             got = run_all(exec, broken, view, options, gradient);
   for (std::size_t k = 0; k < got.size(); ++k) {
     CAPTURE(got[k].way);
     check_finite(got[k]);
@@ -368,7 +371,9 @@ struct chains {
       for (int k = 0; k < length; ++k) {
         double const distance = 2 + 0.5 * k, a = 1 - random.log_uniform(0.02, 0.9);
         append(model, random,
-               {gart::vec3d(ray.x, ray.y, ray.z) * distance, gart::vec3d(std::log(0.002 * distance)), {1, 0, 0, 0},
+               {gart::vec3d(ray.x, ray.y, ray.z) * distance,
+                gart::vec3d(std::log(0.002 * distance)),
+                {1, 0, 0, 0},
                 static_cast<float>(std::log(a / (1 - a)))});
         brightness.push_back(1.5);
         for (std::size_t c = 0; c < 12; ++c) {
@@ -409,11 +414,12 @@ TEST_CASE_TEMPLATE("error budget: derivatives by alpha along a ray", E, GART_TES
     double decade[12] = {};
     for (std::size_t i = 0; i < c.alpha.size(); ++i) {
       double const by_alpha = c.alpha[i] * (1 - c.alpha[i]);
-      double const error = std::abs(o.gradients.opacity[i] - expected.opacity[i]) / (by_alpha * c.before[i] * c.brightness[i]);
+      double const error =
+          std::abs(o.gradients.opacity[i] - expected.opacity[i]) / (by_alpha * c.before[i] * c.brightness[i]);
       auto const bin = static_cast<std::size_t>(std::min(11.0, -std::log10(c.before[i])));
       decade[bin] = std::max(decade[bin], error);
-      // C.g is 4 at most; C and what lies before the hit are sums of up to 20 floats, then multiplied by g, added up and
-      // subtracted: their roundings are at most 2^-24 of C.g each. 1 / (1 - alpha) magnifies the difference.
+      // C.g is 4 at most; C and what lies before the hit are sums of up to 20 floats, then multiplied by g, added up
+      // and subtracted: their roundings are at most 2^-24 of C.g each. 1 / (1 - alpha) magnifies the difference.
       double const bound = 32 * std::ldexp(4.0, -24) / (c.before[i] * (1 - c.alpha[i]) * c.brightness[i]) + 1e-5;
       REQUIRE(error < bound);
     }

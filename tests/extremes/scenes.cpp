@@ -9,9 +9,7 @@ namespace gart_test {
 using gart::vec3;
 using gart::vec3d;
 
-double number_source::log_uniform(double low, double high) {
-  return std::exp(uniform(std::log(low), std::log(high)));
-}
+double number_source::log_uniform(double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); }
 
 double number_source::normal() {
   double const radius = std::sqrt(-2 * std::log(1 - uniform(0, 1)));
@@ -119,7 +117,9 @@ gart::gaussian_model cloud(number_source& random, int count, int sh_degree) {
   gart::gaussian_model m;
   m.sh_degree = sh_degree;
   for (int i = 0; i < count; ++i) {
-    shape s{in_ball(random, 1) + vec3d(0, 0, 3), log_axes(random, 0.05, 0.6), {},
+    shape s{in_ball(random, 1) + vec3d(0, 0, 3),
+            log_axes(random, 0.05, 0.6),
+            {},
             static_cast<float>(random.uniform(-3, 3))};
     rotate(s, random, random.log_uniform(0.3, 3));
     append(m, random, s);
@@ -142,8 +142,8 @@ std::vector<extreme> extremes(std::uint64_t seed) {
     all.push_back({s});
   }
   {
-    // Each axis on its own: aspect ratios to e^60, far past what a float ray can resolve. No reference can say more than
-    // that the results are finite, and the same for all.
+    // Each axis on its own: aspect ratios to e^60, far past what a float ray can resolve. No reference can say more
+    // than that the results are finite, and the same for all.
     gart::gaussian_model m = cloud(random, 20);
     for (int i = 0; i < 60; ++i) {
       shape s{in_ball(random, 2) + vec3d(0, 0, 3),
@@ -226,7 +226,9 @@ std::vector<extreme> extremes(std::uint64_t seed) {
   {
     gart::gaussian_model m = none();
     for (int i = 0; i < 60; ++i) {
-      shape s{in_ball(random, 1) + vec3d(0, 0, 3), log_axes(random, 0.05, 0.6), {},
+      shape s{in_ball(random, 1) + vec3d(0, 0, 3),
+              log_axes(random, 0.05, 0.6),
+              {},
               static_cast<float>(random.uniform(-3, 3))};
       rotate(s, random, i % 3 == 0 ? 1.01e-4 : random.log_uniform(1.01e-4, 1e19));
       append(m, random, s);
@@ -234,7 +236,8 @@ std::vector<extreme> extremes(std::uint64_t seed) {
     all.push_back({scene_of("quaternions of every norm", m, ordinary_camera())});
   }
   for (float const near : {0.01f, 1e-6f}) {
-    // Around, on and beside the camera: means on its very centre, surfaces through it, and shapes across the near plane.
+    // Around, on and beside the camera: means on its very centre, surfaces through it, and shapes across the near
+    // plane.
     gart::gaussian_model m = none();
     for (int i = 0; i < 60; ++i) {
       shape s{{0, 0, 0}, log_axes(random, 0.2, 4), {}, static_cast<float>(random.uniform(-4, 1))};
@@ -247,8 +250,8 @@ std::vector<extreme> extremes(std::uint64_t seed) {
       if (i % 4 == 3) s.mean = in_ball(random, 2);
       append(m, random, s);
     }
-    oracle::scene s = scene_of(near < 0.01f ? "around the camera, a near plane of 1e-6" : "around the camera", m,
-                               ordinary_camera());
+    oracle::scene s =
+        scene_of(near < 0.01f ? "around the camera, a near plane of 1e-6" : "around the camera", m, ordinary_camera());
     s.options.near = near;
     all.push_back({s});
   }
@@ -275,8 +278,10 @@ std::vector<extreme> extremes(std::uint64_t seed) {
     // 10,000 faint ones in a row, met by every ray.
     gart::gaussian_model m = none();
     for (int i = 0; i < 10000; ++i) {
-      shape s{{random.uniform(-0.02, 0.02), random.uniform(-0.02, 0.02), random.uniform(2, 40)}, log_axes(random, 0.3, 0.6),
-              {}, static_cast<float>(random.uniform(-9.5, -8))};
+      shape s{{random.uniform(-0.02, 0.02), random.uniform(-0.02, 0.02), random.uniform(2, 40)},
+              log_axes(random, 0.3, 0.6),
+              {},
+              static_cast<float>(random.uniform(-9.5, -8))};
       rotate(s, random);
       append(m, random, s);
     }

@@ -28,7 +28,9 @@ struct extreme {
 class number_source {
  public:
   explicit number_source(std::uint64_t seed) : engine_(seed) {}
-  double uniform(double low, double high) { return low + (high - low) * (static_cast<double>(engine_() >> 11) * 0x1p-53); }
+  double uniform(double low, double high) {
+    return low + (high - low) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
+  }
   double log_uniform(double low, double high);
   double normal();
 

@@ -19,8 +19,8 @@ struct outcome {
 };
 
 template <class Strategy, class Tracer, class E>
-outcome run_one(E& exec, gart::gaussian_model const& model, gart::camera const& view, gart::render_options const& options,
-                std::vector<float> const& color_gradient) {
+outcome run_one(E& exec, gart::gaussian_model const& model, gart::camera const& view,
+                gart::render_options const& options, std::vector<float> const& color_gradient) {
   Tracer tracer(exec);
   gart::gaussians<E> scene(exec, model);
   gart::gaussians<E> gradients(exec, scene.size(), model.sh_degree);
@@ -38,8 +38,12 @@ outcome run_one(E& exec, gart::gaussian_model const& model, gart::camera const& 
   targets.transmittance = transmittance.data(), targets.depth = depth.data(), targets.hits = hits.data();
   gart::forward<1>(exec, tracer, constant, view, options, 1, targets, pass.record());
   pass.template run<1>(exec, tracer, constant, records.view(), view, options, 1, color, gradient, gradients);
-  return {std::string(Tracer::name) + ", " + Strategy::name, color.to_host(), transmittance.to_host(), depth.to_host(),
-          hits.to_host(), gradients.to_host()};
+  return {std::string(Tracer::name) + ", " + Strategy::name,
+          color.to_host(),
+          transmittance.to_host(),
+          depth.to_host(),
+          hits.to_host(),
+          gradients.to_host()};
 }
 
 // The first is tile lists and primitive.

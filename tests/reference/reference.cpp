@@ -83,9 +83,8 @@ TEST_CASE("images and gradients are the oracle's") {
     auto gradient = random_gradient(expected.pixels.size());
     for (std::size_t p = 0; p < expected.pixels.size(); ++p)
       if (undecided(expected.pixels[p], s.options)) gradient[3 * p] = gradient[3 * p + 1] = gradient[3 * p + 2] = 0;
-    auto const got =
-        gart::trace_reference(s.model, s.view, s.options, s.active_degree, gart::all_pixels(s.view), gradient,
-                              kernel_degree);
+    auto const got = gart::trace_reference(s.model, s.view, s.options, s.active_degree, gart::all_pixels(s.view),
+                                           gradient, kernel_degree);
     double worst = 0;
     std::size_t aside = 0;
     for (std::size_t p = 0; p < expected.pixels.size(); ++p) {

@@ -41,8 +41,7 @@ std::vector<capture> captures() {
     gart::train_options options;
     options.sh_degree = 0;
     gart::camera const& full = data.train[data.train.size() / 2].view;
-    found.push_back(
-        {name, gart::initial_model(data, options), gart::resized(full, full.width / 8, full.height / 8)});
+    found.push_back({name, gart::initial_model(data, options), gart::resized(full, full.width / 8, full.height / 8)});
   }
   return found;
 }

@@ -137,8 +137,8 @@ class backward {
         gather_terms<ShDegree, response, only<geometry>>(exec, scene, gaussians_in_frame, view, active_degree, color,
                                                          color_gradient, gradients);
       } else {
-        gather_terms<ShDegree, response, typename Strategy::gather>(exec, scene, gaussians_in_frame, view, active_degree,
-                                                                    color, color_gradient, gradients);
+        gather_terms<ShDegree, response, typename Strategy::gather>(exec, scene, gaussians_in_frame, view,
+                                                                    active_degree, color, color_gradient, gradients);
       }
       if constexpr (ordered)
         parallel_for(
@@ -149,16 +149,16 @@ class backward {
     if constexpr (Strategy::scatter::any) {
       pixel_order const order{view.width, view.height};
       scatter_program<ShDegree, response, typename Strategy::scatter, E> const program{view,
-                                                                             order,
-                                                                             scene.sh,
-                                                                             active_degree,
-                                                                             options.transmittance_min,
-                                                                             options.max_hits,
-                                                                             gaussians_in_frame.data(),
-                                                                             color.data(),
-                                                                             color_gradient.data(),
-                                                                             gradients.sh.data(),
-                                                                             moments_.data()};
+                                                                                       order,
+                                                                                       scene.sh,
+                                                                                       active_degree,
+                                                                                       options.transmittance_min,
+                                                                                       options.max_hits,
+                                                                                       gaussians_in_frame.data(),
+                                                                                       color.data(),
+                                                                                       color_gradient.data(),
+                                                                                       gradients.sh.data(),
+                                                                                       moments_.data()};
       tracer.trace(exec, "backward/scatter", order.launch_size(), program);
     }
     parallel_for(exec, "backward/finish", scene.count,

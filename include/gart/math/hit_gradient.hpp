@@ -3,8 +3,8 @@
 //
 // With w = T alpha, a hit of colour c adds w c to its ray and leaves T (1 - alpha); for the image gradient g,
 //   dL/dalpha = T (c.g) - (what lies behind the hit).g / (1 - alpha),   dL/dc = w g.
-// alpha = sigma rho(|p|^2), so with a = alpha dL/dalpha and b = a times the slope of ln rho (math/response.hpp; b = a for
-// a Gaussian) the geometry needs only ten sums over the hits, the moments, all in the Gaussian's own space:
+// alpha = sigma rho(|p|^2), so with a = alpha dL/dalpha and b = a times the slope of ln rho (math/response.hpp; b = a
+// for a Gaussian) the geometry needs only ten sums over the hits, the moments, all in the Gaussian's own space:
 //   m0 = sum a,  m1 = sum b p,  m2 = sum b p p^T
 //   dL/d logit = sigmoid(-logit) m0      dL/d mean = M^T m1           dL/d log s_k = m2_kk
 //   dL/d rotation (body frame)_i = m2_jk (s_j / s_k - s_k / s_j), (i, j, k) cyclic

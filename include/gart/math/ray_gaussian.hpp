@@ -2,9 +2,9 @@
 // A Gaussian as a ray meets it. In the Gaussian's own space (unit sphere, axes of the ellipsoid) a ray o + t d is
 //   o_g = M (o - mu),  d_g = M d,  M = S^-1 R^T;
 // the response is largest at t = -o_g.d_g / d_g.d_g, where p = o_g + t d_g is the offset from the centre; there it is
-// rho(|p|^2), for a Gaussian exp(-|p|^2 / 2), of the Response that the scene is made of (math/response.hpp). The ray hits
-// where sigma * rho >= alpha_min, that is where |p|^2 is at most the cutoff, 2 ln(sigma / alpha_min) for a Gaussian, and
-// t > near.
+// rho(|p|^2), for a Gaussian exp(-|p|^2 / 2), of the Response that the scene is made of (math/response.hpp). The ray
+// hits where sigma * rho >= alpha_min, that is where |p|^2 is at most the cutoff, 2 ln(sigma / alpha_min) for a
+// Gaussian, and t > near.
 //
 // Everything is relative to a frame, a point of the world held in double (the camera's centre for primary rays): mu is
 // subtracted from it in double, so that scenes far from the origin lose nothing. This file is the only place that

@@ -35,7 +35,8 @@ GART_HD inline relocated_shape relocation(double o, u32 copies, int kernel_degre
   double term = 1, sum = 0;
   for (int j = 1; j <= static_cast<int>(n); ++j) {
     term *= (n - j + 1) / j * p * (j > 1 ? -1 : 1);
-    sum += term / (kernel_degree == 2 ? sqrt(static_cast<double>(j)) : pow(static_cast<double>(j), 1.0 / kernel_degree));
+    sum +=
+        term / (kernel_degree == 2 ? sqrt(static_cast<double>(j)) : pow(static_cast<double>(j), 1.0 / kernel_degree));
   }
   return {p, o / sum};
 }
@@ -284,8 +285,7 @@ class mcmc {
     parallel_for(*exec_, "mcmc_draw", draws,
                  detail::mcmc_draw_kernel<E>{before_.data(), totals_.data(), n, random, source_.data(), copies.data()});
     parallel_for(*exec_, "mcmc_share", n,
-                 detail::mcmc_share_kernel{model.view(), copies.data(), options_.dead_opacity,
-                                            options_.kernel_degree});
+                 detail::mcmc_share_kernel{model.view(), copies.data(), options_.dead_opacity, options_.kernel_degree});
     for_each_element(
         *exec_, "mcmc_copy", draws, model.sh_degree(),
         detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(), target_.data()});

@@ -24,7 +24,7 @@ struct prepare_records {
   vec3d frame;
   float alpha_min;
   span<ray_gaussian> records;
-  GART_KERNEL void operator()(index_t i) const { 
+  GART_KERNEL void operator()(index_t i) const {
     records[i] = prepare<Response>(load_parameters(scene, i), frame, alpha_min);
   }
 };

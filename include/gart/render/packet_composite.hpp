@@ -61,8 +61,8 @@ struct packet_composite {
     if constexpr (Record::any)
       for (u32 left = bits_of(now); left; left &= left - 1) {
         int const l = __builtin_ctz(left);
-        program.record(h.notes[h.row[l]], pixel_of(s.block, l), {color.x.v[l], color.y.v[l], color.z.v[l]},
-                       weight.v[l], {unclamped.x.v[l], unclamped.y.v[l], unclamped.z.v[l]});
+        program.record(h.notes[h.row[l]], pixel_of(s.block, l), {color.x.v[l], color.y.v[l], color.z.v[l]}, weight.v[l],
+                       {unclamped.x.v[l], unclamped.y.v[l], unclamped.z.v[l]});
       }
     return (s.transmittance >= lanes(program.options.transmittance_min)) &
            (s.hits != every_lane(static_cast<int>(program.options.max_hits)));

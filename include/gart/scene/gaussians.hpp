@@ -44,7 +44,8 @@ struct gaussian_model {
 // The same Gaussians with other storage: coefficients past `degree` are dropped, missing ones are zero.
 inline gaussian_model with_sh_degree(gaussian_model model, int degree) {
   if (degree == model.sh_degree) return model;
-  std::size_t const from = std::size_t{3} * sh_coefficients(model.sh_degree), to = std::size_t{3} * sh_coefficients(degree);
+  std::size_t const from = std::size_t{3} * sh_coefficients(model.sh_degree),
+                    to = std::size_t{3} * sh_coefficients(degree);
   std::vector<float> const old = std::move(model.sh);
   model.sh.assign(model.size() * to, 0.0f), model.sh_degree = degree;
   for (std::size_t i = 0; i < model.size(); ++i)
@@ -64,9 +65,7 @@ struct gaussians_view {
   int sh_degree = 0;
 
   GART_HD int sh_stride() const { return 3 * sh_coefficients(sh_degree); }
-  GART_HD operator gaussians_view<T const>() const
-    requires(!std::is_const_v<T>)
-  {
+  GART_HD operator gaussians_view<T const>() const requires(!std::is_const_v<T>) {
     return {mean, log_scale, quaternion, opacity, sh, count, sh_degree};
   }
 };

@@ -73,11 +73,11 @@ class tile_map {
     stage_scope stage(exec, "map");
     u64 const pairs = prints.pairs();
     if (pairs >= (u64{1} << 31))
-      throw out_of_memory(
-          "tile map", pairs * 16, 0,
-          std::to_string(pairs) +
-              " (primitive, tile) pairs, and a map holds 2^31: raise --downscale, lower --max-gaussians or take --tracer "
-              "bvh --backward pixel");
+      throw out_of_memory("tile map", pairs * 16, 0,
+                          std::to_string(pairs) +
+                              " (primitive, tile) pairs, and a map holds 2^31: raise --downscale, lower "
+                              "--max-gaussians or take --tracer "
+                              "bvh --backward pixel");
     int const tile_bits = bits_for(grid.count());
     int const order_bits = order == tile_order::depth ? 32 - tile_bits : E::device ? 3 : 0;
     depth_shift_ = 31 - order_bits > 0 ? 31 - order_bits : 0;  // 31: a depth's sign bit is never set

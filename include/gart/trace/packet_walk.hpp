@@ -28,9 +28,7 @@ struct packet_block {
 
   static constexpr int column(int lane) { return lane % width; }
   static constexpr int row(int lane) { return lane / width; }
-  bool overlaps(pixel_box const& b) const {
-    return b.x0 < x + width && b.x1 > x && b.y0 < y + height && b.y1 > y;
-  }
+  bool overlaps(pixel_box const& b) const { return b.x0 < x + width && b.x1 > x && b.y0 < y + height && b.y1 > y; }
 };
 
 // One hit a lane.
@@ -39,7 +37,7 @@ struct packet_hits {
   lanes t, alpha;
   lanes shade[P::channels];
   lane_ints id;
-  lane_ints row;                   // of `notes`
+  lane_ints row;  // of `notes`
   typename P::note const* notes;
 };
 

@@ -112,7 +112,8 @@ struct walk_tile_packets {
     packets const program = packets_of(rays.program);
     for (int y = tile.y0; y < tile.y1; y += packet_block::height)
       for (int x = tile.x0; x < tile.x1; x += packet_block::width)
-        if (!team.scratch()(program, rays.scene, rays.map, ranges, rays.depths, rays.forward, tile, team.tile(), {x, y}))
+        if (!team.scratch()(program, rays.scene, rays.map, ranges, rays.depths, rays.forward, tile, team.tile(),
+                            {x, y}))
           one_by_one({x, y});
   }
 
@@ -127,7 +128,9 @@ struct walk_tile_packets {
 };
 
 template <class P>
-concept has_packets = requires(P const& p) { packets_of(p); };
+concept has_packets = requires(P const& p) {
+  packets_of(p);
+};
 #endif
 
 }  // namespace trace_kernels
@@ -154,8 +157,8 @@ class tile_tracer {
 
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
-    trace_kernels::walk_tiles<Response, Window, Size, P> const walk{
-        grid_, map_.view(), prints_.depths().data(), scene_, forward_, program};
+    trace_kernels::walk_tiles<Response, Window, Size, P> const walk{grid_,  map_.view(), prints_.depths().data(),
+                                                                    scene_, forward_,    program};
 #if !defined(__CUDACC__)
     if constexpr (!E::device && trace_kernels::has_packets<P>) {
       parallel_for(exec, label, tile_range{grid_.count(), 1},

@@ -1,7 +1,7 @@
 #pragma once
-// The file format of checkpoints: "gart checkpoint 1\n", then named arrays (name length, name, bytes, data; little endian), the last one
-// named "end". Written whole or not at all. Errors: io_error naming the file and the array that is missing, truncated
-// or of another size.
+// The file format of checkpoints: "gart checkpoint 1\n", then named arrays (name length, name, bytes, data; little
+// endian), the last one named "end". Written whole or not at all. Errors: io_error naming the file and the array that
+// is missing, truncated or of another size.
 
 #include <gart/core/span.hpp>
 
