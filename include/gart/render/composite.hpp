@@ -5,6 +5,7 @@
 // until max_hits of them where there is such a cap.
 // The background is added with what transmittance is left.
 
+#include <gart/math/blend.hpp>
 #include <gart/math/sh.hpp>
 #include <gart/render/options.hpp>
 #include <gart/render/record.hpp>
@@ -26,16 +27,6 @@ struct image_targets {
   u32* hits = nullptr;             // composited
   last_hit* last = nullptr;        // the hit that the ray ended with
 };
-
-// Adds a hit of colour c to a ray, or to one a lane; returns its weight T alpha.
-template <class F>
-GART_HD GART_INLINE F blend(F alpha, F t, vec3_of<F> const& c, vec3_of<F>& color, F& depth, F& transmittance) {
-  F const weight = transmittance * alpha;
-  color.x += weight * c.x, color.y += weight * c.y, color.z += weight * c.z;
-  depth += weight * t;
-  transmittance *= F(1.0f) - alpha;
-  return weight;
-}
 
 template <int ShDegree, class Record>
 struct composite {

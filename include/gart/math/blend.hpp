@@ -1,0 +1,19 @@
+#pragma once
+// Front-to-back compositing of one hit: C += T alpha c,  D += T alpha t,  T *= 1 - alpha.
+
+#include <gart/core/macros.hpp>
+#include <gart/math/glm.hpp>
+
+namespace gart {
+
+// Adds a hit of colour c to a ray, or to one a lane; returns its weight T alpha.
+template <class F>
+GART_HD GART_INLINE F blend(F alpha, F t, vec3_of<F> const& c, vec3_of<F>& color, F& depth, F& transmittance) {
+  F const weight = transmittance * alpha;
+  color.x += weight * c.x, color.y += weight * c.y, color.z += weight * c.z;
+  depth += weight * t;
+  transmittance *= F(1.0f) - alpha;
+  return weight;
+}
+
+}  // namespace gart
