@@ -321,7 +321,7 @@ class Bench:
         return path
 
     def traits(self):
-        name, ply, cameras = self.scene(self.a.counts[0])
+        name, ply, cameras = self.a.model[0] if self.a.model else self.scene(self.a.counts[0])
         backend, runs = self.a.backend, []
         for row, sh_degree, kernel_degree, options in TRAIT_ROWS:
             more = {"backward": "primitive", **options}
@@ -428,7 +428,8 @@ def arguments():
     parser.add_argument("--filter", default=".", help="stages and cpu: benchmarks by regular expression")
     parser.add_argument("--min-time", type=float, default=0.2, help="stages and cpu: seconds a benchmark")
     parser.add_argument("--model", nargs=3, action="append", default=[], metavar=("NAME", "PLY", "CAMERAS"),
-                        help="tradeoff: a trained model and its capture or camera JSON; may be repeated")
+                        help="tradeoff, and traits, which takes the first: a trained model and its capture or camera "
+                             "JSON; may be repeated")
     parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("NAME", "DATASET"),
                         help="presets and auto: a capture to train on; may be repeated")
     parser.add_argument("--train", default="", help="presets and auto: further options of gart train, in one string")

@@ -41,10 +41,12 @@ struct packet_hits {
   typename P::note const* notes;
 };
 
-template <class Response, int Size, class P>
+// Window: what a ray traced alone keeps (tile_tracer). A packet keeps eight times that: what runs over is traced again
+// from the start, not resumed.
+template <class Response, int Window, int Size, class P>
 class packet_walk {
  public:
-  static constexpr int window = 256;
+  static constexpr int window = 8 * Window;
   static_assert(Size % packet_block::width == 0 && Size % packet_block::height == 0);
 
   // False where a ray had more hits pending than there is room for; nothing then counts.
@@ -86,7 +88,7 @@ class packet_walk {
  private:
   static constexpr int stride = 8;  // candidates between two looks at what has become certain
   static constexpr int often = 12;  // pending hits of some ray below which looking does not pay
-  static constexpr int rows = 512;
+  static constexpr int rows = 2 * window;
   static constexpr float infinity = 3.402823466e38f;
   static constexpr float everything = -1;  // no bound: the list is at its end
 

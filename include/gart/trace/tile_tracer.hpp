@@ -102,7 +102,7 @@ struct walk_tiles {
 template <class Response, int Window, int Size, ray_program P>
 struct walk_tile_packets {
   using packets = decltype(packets_of(std::declval<P const&>()));
-  using scratch = packet_walk<Response, Size, packets>;
+  using scratch = packet_walk<Response, Window, Size, packets>;
   walk_tiles<Response, Window, Size, P> rays;
   lt_range const* ranges;
 
