@@ -8,7 +8,7 @@ using namespace gart;
 namespace {
 
 template <int ShDegree, class Response, class Entry>
-using forward_kernel = trace_kernels::walk_tiles<Response, 32, 8, composite<ShDegree, record_lt<Entry, 8>>>;
+using forward_kernel = walk_tile_warps<Response, 8, composite<ShDegree, record_lt<Entry, 8>>>;
 
 template <int ShDegree, class Response, class Term, class Entry, gather_sums Sums = gather_sums::atomic>
 using backward_kernel =
@@ -16,9 +16,8 @@ using backward_kernel =
 
 }  // namespace
 
-#define FORWARD(...)                                                                   \
-  template __global__ void detail::run_index_kernel<forward_kernel<__VA_ARGS__>>(index_t, \
-                                                                                 forward_kernel<__VA_ARGS__> const);
+#define FORWARD(...) \
+  template __global__ void detail::run_tile_kernel<forward_kernel<__VA_ARGS__>>(forward_kernel<__VA_ARGS__> const);
 #define BACKWARD(...) \
   template __global__ void detail::run_tile_kernel<backward_kernel<__VA_ARGS__>>(backward_kernel<__VA_ARGS__> const);
 #define ROW(degree, response, entry)        \

@@ -5,20 +5,27 @@
 
 namespace {
 
-template <int TileSize, gart::tile_order Order, gart::execution E>
+template <int TileSize, bool ByDepth, gart::execution E>
 void tile_map(benchmark::State& state, E& exec) {
   gart_bench::frame<E> frame(exec);
+  frame.prepare(exec);
   gart::footprints<E, TileSize> prints(exec);
   prints.measure(exec, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);
   gart::tile_map<E, TileSize> map(exec);
   gart::tile_grid<TileSize> const grid{frame.view.width, frame.view.height};
-  gart_bench::measure(state, exec, [&] { map.build(exec, grid, prints, Order); });
+  gart::depth_order const by_depth(prints.depths().data(), frame.records.view().data(), frame.view);
+  gart_bench::measure(state, exec, [&] {
+    if constexpr (ByDepth)
+      map.build(exec, grid, prints, by_depth);
+    else
+      map.build(exec, grid, prints, gart::cover_order<E::device, TileSize>{});
+  });
   state.counters["pairs"] = static_cast<double>(prints.pairs());
 }
 
 }  // namespace
 
-GART_BENCH("tile_map/4/depth", tile_map<4, gart::tile_order::depth>)
-GART_BENCH("tile_map/8/depth", tile_map<8, gart::tile_order::depth>)
-GART_BENCH("tile_map/16/depth", tile_map<16, gart::tile_order::depth>)
-GART_BENCH("tile_map/8/cover", tile_map<8, gart::tile_order::cover>)
+GART_BENCH("tile_map/4/depth", tile_map<4, true>)
+GART_BENCH("tile_map/8/depth", tile_map<8, true>)
+GART_BENCH("tile_map/16/depth", tile_map<16, true>)
+GART_BENCH("tile_map/8/cover", tile_map<8, false>)

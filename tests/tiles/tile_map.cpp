@@ -2,6 +2,7 @@
 // Gaussian at a time on the host.
 #include <tiles/ellipsoids.hpp>
 
+#include <gart/render/pixels.hpp>
 #include <gart/tiles/tile_map.hpp>
 #include <support/policies.hpp>
 
@@ -42,8 +43,9 @@ struct pass {
     REQUIRE(depths.size() == model.size());
     check_boxes(model, view, near, ranges, depths);
     check_places(exec, ranges);
-    check_map(exec, {view.width, view.height}, ranges, depths, gart::tile_order::cover);
-    check_map(exec, {view.width, view.height}, ranges, depths, gart::tile_order::depth);
+    gart::tile_grid<Size> const grid{view.width, view.height};
+    check_cover_order(exec, grid, ranges);
+    check_depth_order(exec, model, view, near, ranges);
   }
 
  private:
@@ -77,10 +79,10 @@ struct pass {
     CHECK(prints.pairs() == pairs);
   }
 
-  void check_map(E& exec, gart::tile_grid<Size> const& grid, std::vector<gart::lt_range> const& ranges,
-                 std::vector<float> const& depths, gart::tile_order order) {
-    map.build(exec, grid, prints, order);
-    int const shift = map.view().depth_shift;
+  // Whether the map holds each overlapping pair once, tile after tile, sorted by `key` of a primitive and its cell.
+  template <class Key>
+  void check_pairs(E& exec, gart::tile_grid<Size> const& grid, std::vector<gart::lt_range> const& ranges,
+                   Key const& key) const {
     auto const offsets = host_copy(exec, map.view().offsets);
     auto const primitives = host_copy(exec, map.view().primitives);
     std::vector<u32> expected, starts{0};
@@ -88,20 +90,63 @@ struct pass {
       gart::pixel_box const area = grid.tile(t);
       for (u32 i = 0; i < ranges.size(); ++i)
         if (!ranges[i].box.empty() && !gart::intersect(ranges[i].box, area).empty()) expected.push_back(i);
-      auto const key = [&](u32 i) -> u64 {
-        if (order == gart::tile_order::depth) return gart::depth_key(depths[i], shift);
-        return E::device ? (gart::intersect(ranges[i].box, area).area() - 1) * 8 / (Size * Size) : 0;
-      };
-      std::stable_sort(expected.begin() + starts.back(), expected.end(), [&](u32 a, u32 b) { return key(a) < key(b); });
+      std::stable_sort(expected.begin() + starts.back(), expected.end(),
+                       [&](u32 a, u32 b) { return key(t, a) < key(t, b); });
       starts.push_back(static_cast<u32>(expected.size()));
     }
-    CAPTURE(static_cast<int>(order));
     CHECK(offsets == starts);
     CHECK(primitives == expected);
-    if (order == gart::tile_order::cover) return;
-    CHECK(shift < 24);  // an exponent and some of the mantissa are left to order by
-    for (float depth : depths)
-      if (gart::near_depth(depth, shift) > depth) FAIL_CHECK("a depth is rounded up: " << depth);
+  }
+
+  void check_cover_order(E& exec, gart::tile_grid<Size> const& grid, std::vector<gart::lt_range> const& ranges) {
+    map.build(exec, grid, prints, gart::cover_order<E::device, Size>{});
+    check_pairs(exec, grid, ranges, [&](u32 t, u32 i) -> u32 {
+      return E::device ? (gart::intersect(ranges[i].box, grid.tile(t)).area() - 1) * 8 / (Size * Size) : 0;
+    });
+  }
+
+  // No pixel of a pair hits nearer than the pair's key says, nor nearer than the keys before it in its list.
+  void check_depth_order(E& exec, gart::gaussian_model const& model, gart::camera const& view, float near,
+                         std::vector<gart::lt_range> const& ranges) {
+    gart::tile_grid<Size> const grid{view.width, view.height};
+    u32 const n = static_cast<u32>(model.size());
+    gart::gaussians_view<float const> const all{model.mean.data(),    model.log_scale.data(), model.quaternion.data(),
+                                                model.opacity.data(), model.sh.data(),        n,
+                                                model.sh_degree};
+    gart::buffer<gart::ray_gaussian, E> records(exec);
+    std::vector<gart::ray_gaussian> gaussians;
+    for (u32 i = 0; i < n; ++i)
+      gaussians.push_back(gart::prepare(gart::load_parameters(all, i), view.position, alpha_min));
+    records.assign(gaussians);
+    map.build(exec, grid, prints, gart::depth_order(prints.depths().data(), records.data(), view));
+    gart::tile_map_view const made = map.view();
+    auto const offsets = host_copy(exec, made.offsets);
+    auto const primitives = host_copy(exec, made.primitives);
+    auto const keys = host_copy(exec, made.keys);
+    gart::tile_map_view const on_host{{}, {}, {keys.data(), keys.size()}, made.order_bits, made.depth_shift};
+    CHECK(made.depth_shift < 24);  // an exponent and some of the mantissa are left to order by
+    CHECK(std::is_sorted(keys.begin(), keys.end()));
+    REQUIRE(offsets.size() == grid.count() + 1);
+    std::vector<u32> key_of(std::size_t{n} * grid.count());
+    long hits = 0;
+    for (u32 t = 0; t < grid.count(); ++t)
+      for (u32 k = offsets[t]; k < offsets[t + 1]; ++k) {
+        u32 const i = primitives[k];
+        key_of[std::size_t{t} * n + i] = keys[k];
+        gart::pixel_box const cell = gart::intersect(ranges[i].box, grid.tile(t));
+        for (int y = cell.y0; y < cell.y1; ++y)
+          for (int x = cell.x0; x < cell.x1; ++x) {
+            gart::vec3 const d = gart::pixel_ray(view, {x, y}).direction;
+            gart::response const r = gart::evaluate(gaussians[i], gart::primary_ray{d});
+            if (!gart::is_hit(gaussians[i], r, near)) continue;
+            ++hits;
+            float const cosine = glm::dot(d, view.rotation[2]) * 1.000002f;  // as the tracer bounds z
+            if (!(r.t * cosine >= on_host.depth(k)))
+              FAIL_CHECK("a hit of Gaussian " << i << " at " << r.t * cosine << " before " << on_host.depth(k));
+          }
+      }
+    CAPTURE(hits);
+    check_pairs(exec, grid, ranges, [&](u32 t, u32 i) { return key_of[std::size_t{t} * n + i]; });
   }
 };
 

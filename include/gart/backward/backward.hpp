@@ -81,11 +81,17 @@ class backward {
         prints_ = &own_prints_;
       }
       if (byte_budget && prints_->slots() * sizeof(entry) > byte_budget) return false;
+      // Hits know their slot by its number, of 32 bits.
+      if (prints_->slots() >= 0xffffffffu)
+        throw out_of_memory("LT buffer", prints_->slots() * sizeof(entry), 0,
+                            std::to_string(prints_->slots()) +
+                                " slots, and a buffer holds 2^32: raise --downscale, lower --max-gaussians or take "
+                                "--backward pixel");
       // On a device sorted by cover also where the tracer has lists sorted by depth: lanes in step are worth the sort.
       if constexpr (!E::device && requires { tracer.map(); }) {
         lists_ = tracer.map();
       } else {
-        map_.build(exec, grid_, *prints_, tile_order::cover);
+        map_.build(exec, grid_, *prints_, cover_order<E::device, TileSize>{});
         lists_ = map_.view();
       }
       slots_.resize(prints_->slots());

@@ -14,29 +14,33 @@ struct record_lt {
   lt_range const* ranges = nullptr;
   Entry* slots = nullptr;
 
-  GART_HD GART_INLINE void operator()(pixel at, hit const& h, vec3 const& color, float weight,
-                                      vec3 const& unclamped) const {
-    lt_range const range = ranges[h.id];
+  static constexpr bool any = true;
+  // The number of the hit's slot. Boxes hold every hit; memory stays safe regardless.
+  static constexpr u32 none = 0xffffffffu;
+  GART_HD GART_INLINE u32 place_of(u32 id, pixel at) const { return place_of(ranges[id], at); }
+  GART_HD GART_INLINE u32 place_of(lt_range const& range, pixel at) const {
     pixel_box const& b = range.box;
     u32 const x = static_cast<u32>(at.x), y = static_cast<u32>(at.y);
-    if (x < b.x0 || x >= b.x1 || y < b.y0 || y >= b.y1) return;  // boxes hold every hit; memory stays safe regardless
-    slots[lt_index<Size>(range, x, y)] = Entry::of(color, weight, unclamped);
+    if (x < b.x0 || x >= b.x1 || y < b.y0 || y >= b.y1) return none;
+    return static_cast<u32>(lt_index<Size>(range, x, y));
+  }
+  GART_HD GART_INLINE void operator()(u32 place, vec3 const& color, float weight, vec3 const& unclamped) const {
+    if (place != none) slots[place] = Entry::of(color, weight, unclamped);
   }
 
-  static constexpr bool any = true;
-  struct place {
+  struct cell {
     Entry* first;
-    pixel_box cell;
+    pixel_box pixels;
   };
-  place place_of(u32 id, pixel_box const& tile) const {
+  cell cell_of(u32 id, pixel_box const& tile) const {
     lt_range const range = ranges[id];
-    pixel_box const cell = intersect(range.box, tile);
-    return {slots + range.offset + tile_offset(range.box, cell), cell};
+    pixel_box const pixels = intersect(range.box, tile);
+    return {slots + range.offset + tile_offset(range.box, pixels), pixels};
   }
-  GART_INLINE void operator()(place const& p, pixel at, vec3 const& color, float weight, vec3 const& unclamped) const {
+  GART_INLINE void operator()(cell const& c, pixel at, vec3 const& color, float weight, vec3 const& unclamped) const {
     u32 const x = static_cast<u32>(at.x), y = static_cast<u32>(at.y);
-    if (x < p.cell.x0 || x >= p.cell.x1 || y < p.cell.y0 || y >= p.cell.y1) return;
-    p.first[pixel_offset(p.cell, x, y)] = Entry::of(color, weight, unclamped);
+    if (x < c.pixels.x0 || x >= c.pixels.x1 || y < c.pixels.y0 || y >= c.pixels.y1) return;
+    c.first[pixel_offset(c.pixels, x, y)] = Entry::of(color, weight, unclamped);
   }
 };
 

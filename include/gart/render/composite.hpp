@@ -61,14 +61,31 @@ struct composite {
   }
   GART_HD primary_ray ray_of(index_t, state const& s) const { return {s.direction}; }
   GART_HD GART_INLINE bool on_hit(state& s, hit const& h) const {
-    constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
+    constexpr std::size_t stride = row_floats;
     vec3 const unclamped = s.basis.unclamped(sh_row<ShDegree>(sh + stride * h.id, active_degree).v);
-    float const weight = blend(h.alpha, h.t, clamped_color(unclamped), s.color, s.depth, s.transmittance);
-    record(s.at, h, s.color, weight, unclamped);
+    set_last(s, h.t, h.id);
+    return add(s, h.t, h.alpha, unclamped, record.place_of(h.id, s.at));
+  }
+
+  // The same in steps, for rays that meet a Gaussian together (trace/warp_walk.hpp).
+  static constexpr int row_floats = 3 * sh_basis<ShDegree>::size;
+  static constexpr bool records_hits = Record::any;
+  GART_HD float const* rows_from() const { return sh; }
+  GART_HD int row_floats_read() const { return 3 * sh_coefficients(active_degree); }
+  GART_HD GART_INLINE vec3 shade(state const& s, float const* row) const {
+    return s.basis.unclamped(*reinterpret_cast<float const(*)[row_floats]>(row));
+  }
+  GART_HD GART_INLINE u32 place_of(state const& s, lt_range const& range) const {
+    return record.place_of(range, s.at);
+  }
+  GART_HD GART_INLINE bool add(state& s, float t, float alpha, vec3 const& unclamped, u32 place) const {
+    float const weight = blend(alpha, t, clamped_color(unclamped), s.color, s.depth, s.transmittance);
+    record(place, s.color, weight, unclamped);
     ++s.hits;
-    s.last = {h.t, h.id};
     return s.transmittance >= options.transmittance_min && s.hits != options.max_hits;
   }
+  GART_HD GART_INLINE void set_last(state& s, float t, u32 id) const { s.last = {t, id}; }
+
   GART_HD void end(index_t, state const& s) const {
     std::size_t const a = order.address(s.at);
     if (out.color) {

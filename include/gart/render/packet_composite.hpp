@@ -11,7 +11,7 @@ namespace gart {
 template <int ShDegree, class Record>
 struct packet_composite {
   static constexpr int channels = 3;  // colour before the clamp
-  using note = typename Record::place;
+  using note = typename Record::cell;
   using scalar = composite<ShDegree, Record>;
   struct state {
     packet_block block;
@@ -42,11 +42,11 @@ struct packet_composite {
     return s;
   }
 
-  void shade(state const& s, u32 id, pixel_box const& tile, lanes (&out)[channels], note& place) const {
+  void shade(state const& s, u32 id, pixel_box const& tile, lanes (&out)[channels], note& cell) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
     vec3_of<lanes> const c = s.basis.unclamped(program.sh + stride * id, sh_coefficients(program.active_degree));
     out[0] = c.x, out[1] = c.y, out[2] = c.z;
-    place = program.record.place_of(id, tile);
+    cell = program.record.cell_of(id, tile);
   }
 
   lane_mask on_hits(state& s, lane_mask now, packet_hits<packet_composite> const& h) const {

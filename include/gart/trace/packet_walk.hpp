@@ -51,7 +51,7 @@ class packet_walk {
 
   // False where a ray had more hits pending than there is room for; nothing then counts.
   bool operator()(P const& program, traced_scene const& scene, tile_map_view const& map, lt_range const* ranges,
-                  float const* depths, vec3 const& forward, pixel_box const& tile, u32 tile_index, packet_block block) {
+                  vec3 const& forward, pixel_box const& tile, u32 tile_index, packet_block block) {
     auto state = program.begin(block);
     vec3_of<lanes> const& d = state.directions;
     // z = t * cosine; rounded up, so that what is said to lie nearer than a depth does.
@@ -66,7 +66,7 @@ class packet_walk {
       if (!block.overlaps(ranges[id].box)) continue;
       if (++since >= stride && top_ >= often) {
         since = 0;
-        pass_on(program, state, cosine, near_depth(depths[id], map.depth_shift));
+        pass_on(program, state, cosine, map.depth(k));
         if (!any(alive_)) break;
       }
       ray_gaussian const& g = scene.gaussians[id];

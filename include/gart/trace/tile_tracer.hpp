@@ -14,6 +14,7 @@
 #include <gart/trace/packet_walk.hpp>
 #include <gart/trace/pending_hits.hpp>
 #include <gart/trace/ray_program.hpp>
+#include <gart/trace/warp_walk.hpp>
 
 namespace gart {
 
@@ -27,7 +28,6 @@ struct walk_tiles {
   static constexpr u32 stride = 8;
   tile_grid<Size> grid;
   tile_map_view map;
-  float const* depths;
   traced_scene scene;
   vec3 forward;  // the camera's axis
   P program;
@@ -72,7 +72,7 @@ struct walk_tiles {
         next_id = list[k + 1 < end ? k + 1 : k];
         next = scene.gaussians[next_id];
         if ((k - first) % stride == 0) {
-          float const bound = near_depth(depths[id], map.depth_shift);  // of all that is left of the list
+          float const bound = map.depth(k);  // of all that is left of the list
           while (!pending.empty() && pending.front().t * cosine < bound)
             if (!pass_on()) return;
           if (resume < end && pending.empty() && limit.t * cosine < bound) break;
@@ -112,7 +112,7 @@ struct walk_tile_packets {
     packets const program = packets_of(rays.program);
     for (int y = tile.y0; y < tile.y1; y += packet_block::height)
       for (int x = tile.x0; x < tile.x1; x += packet_block::width)
-        if (!team.scratch()(program, rays.scene, rays.map, ranges, rays.depths, rays.forward, tile, team.tile(),
+        if (!team.scratch()(program, rays.scene, rays.map, ranges, rays.forward, tile, team.tile(),
                             {x, y}))
           one_by_one({x, y});
   }
@@ -133,6 +133,11 @@ concept has_packets = requires(P const& p) {
 };
 #endif
 
+template <class P>
+concept has_warps = requires {
+  P::row_floats;
+};
+
 }  // namespace trace_kernels
 
 // Size: side of a tile. Window: hits a ray keeps at most, a power of two; a smaller one is walked again more often.
@@ -150,15 +155,22 @@ class tile_tracer {
                float alpha_min, float near) {
     grid_ = {view.width, view.height};
     prints_.template measure<Response>(exec, scene, view, alpha_min, near);
-    map_.build(exec, grid_, prints_, tile_order::depth);
+    map_.build(exec, grid_, prints_, depth_order(prints_.depths().data(), records.data(), view));
     scene_ = {records.data(), scene.count, near};
     forward_ = view.rotation[2];
   }
 
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
-    trace_kernels::walk_tiles<Response, Window, Size, P> const walk{grid_,  map_.view(), prints_.depths().data(),
-                                                                    scene_, forward_,    program};
+#if defined(__CUDACC__)
+    if constexpr (E::device && trace_kernels::has_warps<P> && Size % 8 == 0) {
+      using walk = walk_tile_warps<Response, Size, P>;
+      parallel_for(exec, label, tile_range{grid_.count() * walk::blocks_per_tile, walk::lanes},
+                   walk{grid_, map_.view(), prints_.ranges().data(), scene_, forward_, program});
+      return;
+    }
+#endif
+    trace_kernels::walk_tiles<Response, Window, Size, P> const walk{grid_, map_.view(), scene_, forward_, program};
 #if !defined(__CUDACC__)
     if constexpr (!E::device && trace_kernels::has_packets<P>) {
       parallel_for(exec, label, tile_range{grid_.count(), 1},

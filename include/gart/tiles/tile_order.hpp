@@ -1,0 +1,76 @@
+#pragma once
+// The orders of a tile's list. An order turns a (primitive, tile) pair into the low bits of its key:
+//   take(free_bits)   how many of the key's free bits it uses, asked once, before anything else
+//   of(i)             what it needs of primitive i, for all its tiles
+//   key(p, cell)      of the pair whose pixels are `cell`, the primitive's box cut by the tile
+
+#include <gart/math/rectangle_depth.hpp>
+#include <gart/scene/camera.hpp>
+#include <gart/tiles/grid.hpp>
+
+namespace gart {
+
+// A depth (not negative) as an integer of the same order, `shift` low bits dropped; and the depth it stands for, which
+// is not larger.
+GART_HD GART_INLINE u32 depth_key(float depth, int shift) { return float_to_bits(depth) >> shift; }
+GART_HD GART_INLINE float near_depth(u32 key, int shift) { return bits_to_float(key << shift); }
+
+// By how near the pair's pixels can hit the primitive: what the tile-list tracer reads. No hit of the pair has a smaller
+// z than its key stands for.
+class depth_order {
+ public:
+  // depths: near depth of each primitive, anywhere. gaussians: null where that is all there is to go by; else the depth
+  // is bounded in each tile (math/rectangle_depth.hpp), for a camera without a lens.
+  depth_order(float const* depths, ray_gaussian const* gaussians, camera const& view)
+      : depths_(depths), gaussians_(view.lens.any() ? nullptr : gaussians), rotation_(view.rotation) {
+    to_u_ = 1 / view.fx, to_v_ = 1 / view.fy, cx_ = view.cx, cy_ = view.cy;
+    float const u = std::fmax(std::fabs(view.cx), std::fabs(static_cast<float>(view.width) - view.cx)) * to_u_;
+    float const v = std::fmax(std::fabs(view.cy), std::fabs(static_cast<float>(view.height) - view.cy)) * to_v_;
+    reach_ = 1.01f + u + v;
+  }
+
+  int take(int free_bits) {
+    shift_ = 31 - free_bits > 0 ? 31 - free_bits : 0;  // 31: a depth's sign bit is never set
+    return free_bits;
+  }
+  int shift() const { return shift_; }
+
+  struct primitive {
+    rectangle_depth in;
+    float depth;
+  };
+  GART_HD primitive of(index_t i) const {
+    return {rectangle_depth(gaussians_ ? gaussians_[i] : ray_gaussian{}, rotation_, reach_), depths_[i]};
+  }
+  GART_HD u32 key(primitive const& p, pixel_box const& cell) const {
+    // Rays go through the middle of pixels; a little more, for the rounding of directions.
+    constexpr float inset = 0.45f;
+    float const z = p.in((cell.x0 + inset - cx_) * to_u_, (cell.x1 - inset - cx_) * to_u_,
+                         (cell.y0 + inset - cy_) * to_v_, (cell.y1 - inset - cy_) * to_v_);
+    return depth_key(z > p.depth && z <= 3.402823466e38f ? z : p.depth, shift_);
+  }
+
+ private:
+  float const* depths_;
+  ray_gaussian const* gaussians_;
+  mat3 rotation_;
+  float to_u_, to_v_, cx_, cy_, reach_;
+  int shift_ = 0;
+};
+
+// On a device by how much of the tile a box covers, in eight classes, so that lanes that walk the boxes in step have
+// walks of like length; on a host not at all.
+template <bool Device, int Size>
+struct cover_order {
+  static constexpr int bits = Device ? 3 : 0;
+  int take(int) const { return bits; }
+  int shift() const { return 0; }
+
+  struct primitive {};
+  GART_HD primitive of(index_t) const { return {}; }
+  GART_HD u32 key(primitive, pixel_box const& cell) const {
+    return ((cell.area() - 1) << bits) / tile_grid<Size>::pixels;
+  }
+};
+
+}  // namespace gart
