@@ -112,7 +112,7 @@ struct evaluate_all {
   GART_KERNEL void operator()(gart::index_t k) const {
     gart::ray_gaussian const g = scene.gaussians[k];
     gart::response const r = gart::evaluate(g, ray);
-    hits[k] = {gart::is_hit(g, r, scene.near) ? r.t : -1.0f, k, gart::hit_alpha(g, r)};
+    hits[k] = {gart::is_hit(g, r, scene.near) ? r.t : -1.0f, k, gart::hit_alpha(g, r.d2)};
   }
 };
 

@@ -81,7 +81,7 @@ TEST_CASE("t, response and alpha against double") {
     double const aspect = std::exp(std::max({p[3], p[4], p[5]}) - std::min({p[3], p[4], p[5]}));
     worst_t = std::max(worst_t, std::fabs(got.t - e.t) / aspect);
     worst_d2 = std::max(worst_d2, std::fabs(got.d2 - e.d2) / (1 + e.d2));
-    if (e.d2 < 12) worst_alpha = std::max(worst_alpha, std::fabs(gart::hit_alpha(g, got) - std::min(0.99, e.alpha)));
+    if (e.d2 < 12) worst_alpha = std::max(worst_alpha, std::fabs(gart::hit_alpha(g, got.d2) - std::min(0.99, e.alpha)));
     // The same ray from the frame's own origin.
     gart::ray_gaussian const local = gart::prepare(stored(p), gart::vec3d(r.origin), 1.0f / 255);
     gart::response const primary = gart::evaluate(local, gart::primary_ray{r.direction});
@@ -106,7 +106,7 @@ TEST_CASE("what is a hit") {
   CHECK(gart::is_hit(record, ahead, 1.9f));
   CHECK_FALSE(gart::is_hit(record, ahead, 2.0f));
   CHECK_FALSE(gart::is_hit(record, gart::evaluate(record, gart::primary_ray{{0, 0, -1}}), 0.01f));
-  CHECK(gart::hit_alpha(record, ahead) == doctest::Approx(0.5));
+  CHECK(gart::hit_alpha(record, ahead.d2) == doctest::Approx(0.5));
 
   auto const never = [&](gart::gaussian_parameters const& p) {
     gart::ray_gaussian const r = gart::prepare(p, gart::vec3d(0.0), 1.0f / 255);
@@ -128,7 +128,7 @@ TEST_CASE("what is a hit") {
   p = g, p.log_scale.x = 41, never(p);
   p = g, p.opacity = 50;
   gart::ray_gaussian const solid = gart::prepare(p, gart::vec3d(0.0), 1.0f / 255);
-  CHECK(gart::hit_alpha(solid, gart::evaluate(solid, gart::primary_ray{{0, 0, 1}})) == gart::alpha_max);
+  CHECK(gart::hit_alpha(solid, gart::evaluate(solid, gart::primary_ray{{0, 0, 1}}).d2) == gart::alpha_max);
 }
 
 TEST_CASE("scenes far from the origin lose nothing to the frame") {

@@ -26,7 +26,7 @@ void compare(std::mt19937_64& random) {
     }
     auto const r = gart::evaluate<Response>(g, gart::primary_ray_of<gart::lanes>{d});
     auto const hit = gart::is_hit(g, r, 0.01f);
-    auto const alpha = gart::hit_alpha<Response>(g, r);
+    auto const alpha = gart::hit_alpha<Response>(g, r.d2);
     auto const m = gart::hit_moments<Response>(g, r, gradient);
     gart::sh_basis<3, gart::lanes> const basis(d);
     for (int l = 0; l < gart::lane_count; ++l) {
@@ -36,7 +36,7 @@ void compare(std::mt19937_64& random) {
       CHECK(same(r.d2.v[l], expected.d2));
       CHECK((hit[l] != 0) == gart::is_hit(g, expected, 0.01f));
       CHECK(((gart::bits_of(hit) >> l & 1) != 0) == (hit[l] != 0));
-      CHECK(same(alpha.v[l], gart::hit_alpha<Response>(g, expected)));
+      CHECK(same(alpha.v[l], gart::hit_alpha<Response>(g, expected.d2)));
       gart::moments const expected_moments = gart::hit_moments<Response>(g, expected, float(gradient.v[l]));
       for (int i = 0; i < gart::moment_count; ++i) CHECK(same(m.v[i].v[l], expected_moments.v[i]));
       gart::sh_basis<3> const expected_basis(one);

@@ -26,7 +26,7 @@ GART_HD outcome outcome_of(sample const& s) {
   gart::response const r = gart::evaluate(g, gart::primary_ray{s.direction});
   float const x = s.gaussian.log_scale.x;
   float const e = gart::exponential(x);
-  return {e, gart::logarithm(e), g.sigma, g.cutoff, r.t, r.d2, gart::hit_alpha(g, r)};
+  return {e, gart::logarithm(e), g.sigma, g.cutoff, r.t, r.d2, gart::hit_alpha(g, r.d2)};
 }
 
 struct evaluate_samples {

@@ -51,10 +51,6 @@ inline constexpr int tile_size_of<Tracer> = Tracer::tile_size;
 template <execution E, class Strategy, int TileSize = 8>
 class backward {
  public:
-  template <class Term>
-  using only =
-      std::conditional_t<(std::is_same_v<Term, gart::color> ? Strategy::gather::color : Strategy::gather::geometry),
-                         terms<Term>, terms<>>;
   using record_type = typename Strategy::template record<TileSize>;
   static constexpr bool records = Strategy::gather::any;
   static constexpr bool ordered = records && Strategy::ordered;
@@ -88,7 +84,7 @@ class backward {
                                 " slots, and a buffer holds 2^32: raise --downscale, lower --max-gaussians or take "
                                 "--backward pixel");
       // On a device sorted by cover also where the tracer has lists sorted by depth: lanes in step are worth the sort.
-      if constexpr (!E::device && requires { tracer.map(); }) {
+            if constexpr (!E::device && requires { tracer.map(); }) {
         lists_ = tracer.map();
       } else {
         map_.build(exec, grid_, *prints_, cover_order<E::device, TileSize>{});
@@ -135,17 +131,8 @@ class backward {
     if constexpr (!ordered) gradients.sh.zero();
     if constexpr (records) {
       if constexpr (ordered) rows_.resize(prints_->pairs() * pair_row<ShDegree>::quads);
-      if constexpr (E::device) {
-        // Colour and geometry in a launch each: together their sums and coefficients leave too few registers for enough
-        // warps to hide memory behind.
-        gather_terms<ShDegree, response, only<gart::color>>(exec, scene, gaussians_in_frame, view, active_degree, color,
-                                                            color_gradient, gradients);
-        gather_terms<ShDegree, response, only<geometry>>(exec, scene, gaussians_in_frame, view, active_degree, color,
-                                                         color_gradient, gradients);
-      } else {
-        gather_terms<ShDegree, response, typename Strategy::gather>(exec, scene, gaussians_in_frame, view,
-                                                                    active_degree, color, color_gradient, gradients);
-      }
+      gather_terms<ShDegree, response>(exec, scene, gaussians_in_frame, view, active_degree, color, color_gradient,
+                                       gradients);
       if constexpr (ordered)
         parallel_for(
             exec, "backward/sum", scene.count * pair_row<ShDegree>::quads,
@@ -185,40 +172,35 @@ class backward {
   };
   using entry = typename entry_of<record_type>::type;
 
-  template <int ShDegree, class Response, class Terms>
+  template <int ShDegree, class Response>
   void gather_terms(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians_in_frame,
                     camera const& view, int active_degree, span<float const> image, span<float const> image_gradient,
                     gaussians<E>& gradients) {
-    if constexpr (Terms::any) {
-      constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
-      using kernel_type = gather_kernel<ShDegree, Response, Terms, entry, TileSize, sums, validity, E>;
-      kernel_type const kernel{view,
-                               grid_,
-                               lists_,
-                               prints_->ranges().data(),
-                               slots_.data(),
-                               gaussians_in_frame.data(),
-                               scene.sh,
-                               active_degree,
-                               image.data(),
-                               image_gradient.data(),
-                               gradients.sh.data(),
-                               moments_.data(),
-                               prints_->pair_offsets().data(),
-                               rows_.data(),
-                               last_.data(),
-                               near_};
-      char const* const label = !Terms::geometry ? "backward/gather colour"
-                                : !Terms::color  ? "backward/gather geometry"
-                                                 : "backward/gather";
+    constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
+    using kernel_type =
+        gather_kernel<ShDegree, Response, typename Strategy::gather, entry, TileSize, sums, validity, E>;
+    kernel_type const kernel{view,
+                             grid_,
+                             lists_,
+                             prints_->ranges().data(),
+                             slots_.data(),
+                             gaussians_in_frame.data(),
+                             active_degree,
+                             image.data(),
+                             image_gradient.data(),
+                             gradients.sh.data(),
+                             moments_.data(),
+                             prints_->pair_offsets().data(),
+                             rows_.data(),
+                             last_.data(),
+                             near_};
 #if !defined(__CUDACC__)
-      if constexpr (!E::device) {
-        parallel_for(exec, label, tile_range{grid_.count(), 1}, packet_gather<kernel_type>{kernel});
-        return;
-      }
-#endif
-      parallel_for(exec, label, tile_range{grid_.count(), 64}, kernel);
+    if constexpr (!E::device) {
+      parallel_for(exec, "backward/gather", tile_range{grid_.count(), 1}, packet_gather<kernel_type>{kernel});
+      return;
     }
+#endif
+    parallel_for(exec, "backward/gather", tile_range{grid_.count(), 64}, kernel);
   }
 
   buffer<float, E> moments_;

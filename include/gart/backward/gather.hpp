@@ -41,10 +41,11 @@ struct gather_kernel {
   // What a lane needs of a pixel: direction and (colour . gradient), gradient, SH basis. Records are an odd number of
   // 16-byte words apart where they can be, so that lanes on neighbouring pixels read different banks.
   struct pixel_data {
-    static constexpr int basis_quads = ShDegree == 0 ? 0 : (bands + 3) / 4;  // of degree 0 it is a constant
+    // Of degree 0 it is a constant.
+    static constexpr int basis_quads = !Terms::color || ShDegree == 0 ? 0 : (bands + 3) / 4;
     quad direction_total, gradient;
     quad basis[basis_quads];
-    quad last;  // t and id of the ray's last hit, where validity is recomputed; and what makes the words odd in number
+    quad last;  // t and place of the ray's last hit, where validity is recomputed; and what makes the words odd in number
     quad spread[basis_quads % 2 ? 1 : 0];
   };
   struct scratch {
@@ -57,7 +58,6 @@ struct gather_kernel {
   lt_range const* ranges = nullptr;
   Entry const* slots = nullptr;
   ray_gaussian const* records = nullptr;
-  float const* sh = nullptr;
   int active_degree = ShDegree;
   float const* color = nullptr;           // [H][W][3]
   float const* color_gradient = nullptr;  // [H][W][3]
@@ -100,23 +100,26 @@ struct gather_kernel {
     pixel const at{static_cast<int>(area.x0 + p % area.width()), static_cast<int>(area.y0 + p / area.width())};
     std::size_t const a = 3 * (static_cast<std::size_t>(at.y) * view.width + at.x);
     vec3 const d = pixel_ray(view, at).direction;
-    sh_basis<ShDegree> const basis(d);
     vec3 const c(color[a], color[a + 1], color[a + 2]);
     vec3 const g(color_gradient[a], color_gradient[a + 1], color_gradient[a + 2]);
     out.direction_total = {{d.x, d.y, d.z, c.x * g.x + c.y * g.y + c.z * g.z}};
     out.gradient = {{g.x, g.y, g.z, 0}};
     if constexpr (recomputed) {
       last_hit const end = last[a / 3];
-      out.last = {{end.t, bits_to_float(end.id), 0, 0}};
+      out.last = {{end.t, bits_to_float(end.place), 0, 0}};
     }
-    GART_UNROLL
-    for (int k = 0; k < 4 * pixel_data::basis_quads; ++k) out.basis[k / 4].v[k % 4] = k < bands ? basis.y[k] : 0.0f;
+    if constexpr (pixel_data::basis_quads > 0) {
+      sh_basis<ShDegree> const basis(d);
+      GART_UNROLL
+      for (int k = 0; k < 4 * pixel_data::basis_quads; ++k) out.basis[k / 4].v[k % 4] = k < bands ? basis.y[k] : 0.0f;
+    }
   }
 
   GART_HD void gather(scratch const& s, pixel_box const& area, u32 id) const {
     lt_range const range = ranges[id];
     pixel_box const cell = intersect(range.box, area);
-    Entry const* slot = slots + range.offset + tile_offset(range.box, cell);
+    u32 const first = static_cast<u32>(range.offset) + tile_offset(range.box, cell);
+    Entry const* slot = slots + first;
     float sh_sum[sh_stride] = {};
     float moment_sum[moment_stride] = {};
     lane_data const data(*this, id);
@@ -135,7 +138,7 @@ struct gather_kernel {
       if constexpr (recomputed) {
         quad const d = at.direction_total;
         response const r = evaluate<Response>(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
-        bool const reached = !before(at.last.v[0], float_to_bits(at.last.v[1]), r.t, id);
+        bool const reached = !before(at.last.v[0], float_to_bits(at.last.v[1]), r.t, first + k);
         if (!is_hit(data.gaussian, r, near) || !reached) continue;
       } else if (!entry.written()) {
         continue;
@@ -153,29 +156,23 @@ struct gather_kernel {
     ray_gaussian gaussian;
     GART_HD record_data(gather_kernel const& k, u32 id) : gaussian(k.records[id]) {}
   };
-  struct geometry_data : record_data {
-    sh_row<ShDegree> coefficients;
-    GART_HD geometry_data(gather_kernel const& k, u32 id)
-        : record_data(k, id), coefficients(k.sh + static_cast<std::size_t>(sh_stride) * id, k.active_degree) {}
-  };
-  using lane_data =
-      std::conditional_t<Terms::geometry, geometry_data, std::conditional_t<recomputed, record_data, no_data>>;
+  using lane_data = std::conditional_t<Terms::geometry || recomputed, record_data, no_data>;
 
   // One hit: its pixel, its record.
   GART_HD GART_INLINE void add(pixel_data const& at, Entry const& entry, lane_data const& data,
                                float (&sh_sum)[sh_stride], float (&moment_sum)[moment_stride]) const {
     quad const g = at.gradient;
     vec3 const dl(g.v[0], g.v[1], g.v[2]);
-    sh_basis<ShDegree> basis;
-    if constexpr (ShDegree == 0) basis = sh_basis<ShDegree>(vec3(0.0f));
-    GART_UNROLL
-    for (int q = 0; q < pixel_data::basis_quads; ++q) {
-      quad const four = at.basis[q];
-      GART_UNROLL
-      for (int i = 0; i < 4; ++i)
-        if (4 * q + i < bands) basis.y[4 * q + i] = four.v[i];
-    }
     if constexpr (Terms::color) {
+      sh_basis<ShDegree> basis;
+      if constexpr (ShDegree == 0) basis = sh_basis<ShDegree>(vec3(0.0f));
+      GART_UNROLL
+      for (int q = 0; q < pixel_data::basis_quads; ++q) {
+        quad const four = at.basis[q];
+        GART_UNROLL
+        for (int i = 0; i < 4; ++i)
+          if (4 * q + i < bands) basis.y[4 * q + i] = four.v[i];
+      }
       float const w = entry.weight();
       vec3 const cg(entry.clamped(0) ? 0.0f : w * dl.x, entry.clamped(1) ? 0.0f : w * dl.y,
                     entry.clamped(2) ? 0.0f : w * dl.z);
@@ -189,12 +186,10 @@ struct gather_kernel {
     if constexpr (Terms::geometry) {
       quad const d = at.direction_total;
       response const r = evaluate<Response>(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
-      float const alpha = hit_alpha<Response>(data.gaussian, r), before = entry.weight() / alpha;
-      vec3 const c = clamped_color(basis.unclamped(data.coefficients.v)), l = entry.color();
-      float const color_g = c.x * dl.x + c.y * dl.y + c.z * dl.z;
-      float const behind = d.v[3] - (l.x * dl.x + l.y * dl.y + l.z * dl.z);
-      moments const m =
-          hit_moments<Response>(data.gaussian, r, alpha_gradient(before, color_g, behind, alpha));
+      float const alpha = hit_alpha<Response>(data.gaussian, r.d2);
+      vec3 const opaque = entry.color();
+      float const opaque_g = opaque.x * dl.x + opaque.y * dl.y + opaque.z * dl.z;
+      moments const m = hit_moments<Response>(data.gaussian, r, alpha_gradient(opaque_g, d.v[3], alpha));
       GART_UNROLL
       for (int i = 0; i < moment_count; ++i) moment_sum[i] += m.v[i];
     }

@@ -1,20 +1,20 @@
 #pragma once
 // What a slot of the LT buffer holds of a hit, one struct a format: the forward pass packs (of), the gather unpacks.
-// The weight w = T alpha stands for the transmittance T before the hit, which is w / alpha; with it goes, for each
-// channel of the hit's colour, whether it was clamped at zero. L is the ray's colour with the hit, not negative.
+// V, the colour that the pixel would have if the hit were opaque, is what the gradient of alpha needs
+// (math/hit_gradient.hpp); the weight w = T alpha what the gradient of colour needs, with, for each channel of the hit's
+// colour, whether it was clamped at zero.
 //
-//   float4   16 bytes  L, whose free sign bits hold the clamps; w
-//   half      8 bytes  the same in four halves: L within 2^-11 relatively (2^-25 absolutely), at most 65504; 2^15 w, so
+//   float4   16 bytes  V, whose free sign bits hold the clamps; w
+//   half      8 bytes  the same in four halves: V within 2^-11 relatively (2^-25 absolutely), at most 65504; 2^15 w, so
 //                      that a weight keeps its 2^-11 down to 2e-9
-//   shared    8 bytes  L with 9 bits a channel and one exponent: within 0.002 of its largest channel, at most 65408; w,
-//   whose
-//                      three lowest bits hold the clamps (a relative error of 2^-20)
-//   weight    4 bytes  w as in shared; no L: enough for the gradient of colour (hybrid)
+//   shared    8 bytes  V with 9 bits a channel and one exponent: within 0.002 of its largest channel, at most 65408; w,
+//                      whose three lowest bits hold the clamps (a relative error of 2^-20)
+//   weight    4 bytes  w as in shared; no V: enough for the gradient of colour (hybrid)
 //
-// The gradient of alpha is a difference of the pixel's colour and L, over 1 - alpha: an error of L counts by how little
-// of the ray lies behind the hit. Relative errors of a whole gradient, group by group, against double, at most
-// (tests/traits): float4 5e-4, half 1e-2 and shared 4e-2 on clouds and long rays; on stacks of hits at the clamp 5e-4,
-// 0.15 and 0.6.
+// The gradient of alpha is the difference of V and the pixel's colour, over 1 - alpha: an error of V counts by how little
+// of the ray the hit and what lies behind it are. Relative errors of a whole gradient, group by group, against double,
+// at most (tests/traits): float4 5e-4, half 1e-2 and shared 4e-2 on clouds and long rays; on stacks of hits at the clamp
+// 5e-4, 0.15 and 0.6.
 // Slots that no hit wrote hold what the clear left there, all bits set, which `written` tells.
 
 #include <gart/math/arith.hpp>
@@ -44,11 +44,11 @@ GART_HD GART_INLINE float from_half(u32 half) {
 
 struct alignas(16) lt_entry {
   static constexpr char const* name = "float4";
-  float r, g, b;  // L; negative where the hit's colour was clamped
+  float r, g, b;  // V; negative where the hit's colour was clamped
   float w;
 
-  GART_HD GART_INLINE static lt_entry of(vec3 const& l, float weight, vec3 const& c) {
-    return {signed_by(l.x, c.x), signed_by(l.y, c.y), signed_by(l.z, c.z), weight};
+  GART_HD GART_INLINE static lt_entry of(vec3 const& v, float weight, vec3 const& c) {
+    return {signed_by(v.x, c.x), signed_by(v.y, c.y), signed_by(v.z, c.z), weight};
   }
   GART_HD GART_INLINE bool written() const { return w >= 0.0f; }
   GART_HD GART_INLINE float weight() const { return w; }
@@ -58,8 +58,8 @@ struct alignas(16) lt_entry {
   GART_HD GART_INLINE vec3 color() const { return {fabsf(r), fabsf(g), fabsf(b)}; }
 
  private:
-  GART_HD GART_INLINE static float signed_by(float l, float c) {
-    return bits_to_float((float_to_bits(l) & 0x7fffffffu) | (shows(c) ? 0u : 0x80000000u));
+  GART_HD GART_INLINE static float signed_by(float v, float c) {
+    return bits_to_float((float_to_bits(v) & 0x7fffffffu) | (shows(c) ? 0u : 0x80000000u));
   }
 };
 
@@ -67,10 +67,10 @@ struct alignas(8) lt_half_entry {
   static constexpr char const* name = "half";
   u32 rg, bw;  // r in the low half of rg, b in that of bw; sign bits of r, g, b: clamped
 
-  GART_HD GART_INLINE static lt_half_entry of(vec3 const& l, float weight, vec3 const& c) {
+  GART_HD GART_INLINE static lt_half_entry of(vec3 const& v, float weight, vec3 const& c) {
     u32 const clamps = detail::clamps_of(c);
-    return {half_of(l.x) | half_of(l.y) << 16 | (clamps & 1u) << 15 | (clamps & 2u) << 30,
-            half_of(l.z) | half_of(mul(weight, 32768.0f)) << 16 | (clamps & 4u) << 13};
+    return {half_of(v.x) | half_of(v.y) << 16 | (clamps & 1u) << 15 | (clamps & 2u) << 30,
+            half_of(v.z) | half_of(mul(weight, 32768.0f)) << 16 | (clamps & 4u) << 13};
   }
   GART_HD GART_INLINE bool written() const { return !(bw >> 31); }
   GART_HD GART_INLINE float weight() const { return mul(detail::from_half(bw >> 16), 1.0f / 32768.0f); }
@@ -101,16 +101,16 @@ struct alignas(8) lt_shared_entry : weight_entry {
   static constexpr char const* name = "shared";
   u32 rgb;  // 9 bits each from the lowest, and the exponent
 
-  GART_HD GART_INLINE static lt_shared_entry of(vec3 const& l, float weight, vec3 const& c) {
-    float largest = l.x > l.y ? l.x : l.y;
-    largest = largest > l.z ? largest : l.z;
+  GART_HD GART_INLINE static lt_shared_entry of(vec3 const& v, float weight, vec3 const& c) {
+    float largest = v.x > v.y ? v.x : v.y;
+    largest = largest > v.z ? largest : v.z;
     largest = largest < most ? largest : most;
     // The exponent of the largest channel once it is rounded to 9 bits; below 2^-16 all share the least.
     u32 const rounded = (float_to_bits(largest) + 0x4000u) >> 23, exponent = rounded > least ? rounded : least;
     float const steps = bits_to_float((262u - exponent) << 23);
     lt_shared_entry out;
-    out.w = weight_entry::of(l, weight, c).w;
-    out.rgb = in_steps(l.x, steps) | in_steps(l.y, steps) << 9 | in_steps(l.z, steps) << 18 | (exponent - least) << 27;
+    out.w = weight_entry::of(v, weight, c).w;
+    out.rgb = in_steps(v.x, steps) | in_steps(v.y, steps) << 9 | in_steps(v.z, steps) << 18 | (exponent - least) << 27;
     return out;
   }
   GART_HD GART_INLINE vec3 color() const {

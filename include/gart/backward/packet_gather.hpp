@@ -25,9 +25,8 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     packet_block block;
     vec3_of<lanes> direction, gradient;
     lanes total, last_t;  // colour . gradient; the ray's last hit
-    lane_ints last_id;
-    sh_basis<ShDegree, lanes> basis;
-    lanes bands_of[lane_count][band_groups];  // the same basis, a pixel after another
+    lane_ints last_place;
+    lanes bands_of[lane_count][band_groups];  // the SH basis, a pixel after another
   };
   struct scratch {
     packet_data data[packets];
@@ -65,21 +64,20 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
       }
       out.total.v[l] = total;
       last_hit const end = recomputed && inside ? gather.last[a] : last_hit{};
-      out.last_t.v[l] = end.t, out.last_id[l] = static_cast<int>(end.id);
+      out.last_t.v[l] = end.t, out.last_place[l] = signed_order(end.place);
     }
-    out.basis = sh_basis<ShDegree, lanes>(out.direction);
+    sh_basis<ShDegree, lanes> const basis(out.direction);
     for (int l = 0; l < lane_count; ++l)
       for (int k = 0; k < band_groups * lane_count; ++k)
-        out.bands_of[l][k / lane_count].v[k % lane_count] = k < bands ? out.basis.y[k].v[l] : 0.0f;
+        out.bands_of[l][k / lane_count].v[k % lane_count] = k < bands ? basis.y[k].v[l] : 0.0f;
   }
 
   void sum(scratch const& s, pixel_box const& area, u32 id) const {
     lt_range const range = gather.ranges[id];
     pixel_box const cell = intersect(range.box, area);
-    Entry const* const slots = gather.slots + range.offset + tile_offset(range.box, cell);
+    u32 const first = static_cast<u32>(range.offset) + tile_offset(range.box, cell);
+    Entry const* const slots = gather.slots + first;
     ray_gaussian const& g = gather.records[id];
-    float const* const coefficients = gather.sh + static_cast<std::size_t>(sh_stride) * id;
-    int const active_bands = sh_coefficients(gather.active_degree);
     lanes sh_sum[3][band_groups];
     lanes moment_sum[moment_count];
     for (auto& channel : sh_sum)
@@ -94,8 +92,8 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
       response_of<lanes> const r = evaluate<Response>(g, primary_ray_of<lanes>{at.direction});
       lane_ints const slot = y * every_lane(static_cast<int>(cell.width())) + x;
       if constexpr (recomputed) {
-        lane_mask const reached =
-            (r.t < at.last_t) | ((r.t == at.last_t) & (every_lane(static_cast<int>(id)) <= at.last_id));
+        lane_ints const place = slot + every_lane(signed_order(first));
+        lane_mask const reached = (r.t < at.last_t) | ((r.t == at.last_t) & (place <= at.last_place));
         hit &= is_hit(g, r, gather.near) & reached;
       } else {
         for (int l = 0; l < lane_count; ++l)
@@ -103,16 +101,14 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
       }
       if (!any(hit)) continue;
 
-      lanes weight = 0.0f;
-      vec3_of<lanes> l_color(0.0f, 0.0f, 0.0f);
+      vec3_of<lanes> opaque(0.0f, 0.0f, 0.0f);
       for (u32 left = bits_of(hit); left; left &= left - 1) {
         int const l = __builtin_ctz(left);
         Entry const entry = slots[slot[l]];
-        float const w = entry.weight();
-        weight.v[l] = w;
+        [[maybe_unused]] float const w = entry.weight();
         if constexpr (Terms::geometry) {
           vec3 const c = entry.color();
-          for (int k = 0; k < 3; ++k) l_color[k].v[l] = c[k];
+          for (int k = 0; k < 3; ++k) opaque[k].v[l] = c[k];
         }
         if constexpr (Terms::color)
           for (int c = 0; c < 3; ++c) {
@@ -121,10 +117,9 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
           }
       }
       if constexpr (Terms::geometry) {
-        vec3_of<lanes> const c = clamped_color(at.basis.unclamped(coefficients, active_bands));
-        lanes const alpha = hit_alpha<Response>(g, r);
-        lanes const color_g = dot(c, at.gradient), behind = at.total - dot(l_color, at.gradient);
-        moments_of<lanes> const m = hit_moments<Response>(g, r, alpha_gradient(weight / alpha, color_g, behind, alpha));
+        lanes const alpha = hit_alpha<Response>(g, r.d2);
+        moments_of<lanes> const m =
+            hit_moments<Response>(g, r, alpha_gradient(dot(opaque, at.gradient), at.total, alpha));
         for (int i = 0; i < moment_count; ++i) moment_sum[i] += select(hit, m.v[i], 0.0f);
       }
     }
@@ -140,6 +135,8 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     gather.finish(box, area, id, sh_sum, moment_sum);
   }
 
+  // As a signed number of the same order.
+  static int signed_order(u32 place) { return static_cast<int>(place ^ 0x80000000u); }
   static lanes dot(vec3_of<lanes> const& a, vec3_of<lanes> const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
   static lane_ints lane_columns() {
     lane_ints r;

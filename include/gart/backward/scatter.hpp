@@ -47,7 +47,7 @@ struct scatter_program {
     float const* g = color_gradient + 3 * order.address(at);
     s.gradient.g = {g[0], g[1], g[2]};
     s.left = max_hits;
-    s.gradient.behind = c[0] * g[0] + c[1] * g[1] + c[2] * g[2];
+    s.gradient.color_g = c[0] * g[0] + c[1] * g[1] + c[2] * g[2];
     return s;
   }
   GART_HD primary_ray ray_of(index_t, state const& s) const { return {s.direction}; }

@@ -1,8 +1,9 @@
 #pragma once
 // Gradients of one hit and of one Gaussian: the only gradient code of the renderer.
 //
-// With w = T alpha, a hit of colour c adds w c to its ray and leaves T (1 - alpha); for the image gradient g,
-//   dL/dalpha = T (c.g) - (what lies behind the hit).g / (1 - alpha),   dL/dc = w g.
+// With w = T alpha, a hit of colour c adds w c to its ray and leaves T (1 - alpha). With L the colour before the hit and
+// V = L + T c the colour the pixel would have if the hit were opaque, C the colour it has, and g the image gradient,
+//   C = alpha V + (1 - alpha) (the colour without the hit),   dL/dalpha = (V - C).g / (1 - alpha),   dL/dc = w g.
 // alpha = sigma rho(|p|^2), so with a = alpha dL/dalpha and b = a times the slope of ln rho (math/response.hpp; b = a
 // for a Gaussian) the geometry needs only ten sums over the hits, the moments, all in the Gaussian's own space:
 //   m0 = sum a,  m1 = sum b p,  m2 = sum b p p^T
@@ -27,24 +28,25 @@ struct moments_of {
 };
 using moments = moments_of<float>;
 
-// dL/dalpha of a hit: T before it, its colour.g, and what lies behind it.g.
+// dL/dalpha of a hit: V.g and C.g.
 template <class F>
-GART_HD GART_INLINE F alpha_gradient(F transmittance, F color_g, F behind_g, F alpha) {
-  return transmittance * color_g - behind_g / (F(1.0f) - alpha);
+GART_HD GART_INLINE F alpha_gradient(F opaque_g, F color_g, F alpha) {
+  return (opaque_g - color_g) / (F(1.0f) - alpha);
 }
 
-// The front-to-back walk of a ray's gradient: what a hit's derivative needs of the hits before and behind it.
+// The front-to-back walk of a ray's gradient.
 struct ray_gradient {
-  vec3 g;        // dL/d colour of the pixel
-  float behind;  // (colour of all hits not yet passed, and the background).g
+  vec3 g;           // dL/d colour of the pixel
+  float color_g;    // C.g, the background in it
+  float front = 0;  // L.g
   float transmittance = 1;
 
   // dL/dalpha of the hit; moves past it. `weight` returns w.
   GART_HD GART_INLINE float pass(float alpha, vec3 color, float& weight) {
     float const cg = color.x * g.x + color.y * g.y + color.z * g.z;
+    float const gradient = alpha_gradient(front + transmittance * cg, color_g, alpha);
     weight = transmittance * alpha;
-    behind -= weight * cg;
-    float const gradient = gart::alpha_gradient(transmittance, cg, behind, alpha);
+    front += weight * cg;
     transmittance *= 1.0f - alpha;
     return gradient;
   }
@@ -52,7 +54,7 @@ struct ray_gradient {
 
 template <class Response = generalized_gaussian<>, class F>
 GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, response_of<F> const& r, F alpha_gradient) {
-  F const raw = unclamped_alpha<Response>(gaussian, r);
+  F const raw = unclamped_alpha<Response>(gaussian, r.d2);
   F const a = select(raw < F(alpha_max), raw * alpha_gradient, F(0.0f));
   F const b = a * Response::slope(r.d2);
   vec3_of<F> const p = orthogonal_offset(r), bp = {b * p.x, b * p.y, b * p.z};

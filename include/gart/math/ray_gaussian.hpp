@@ -157,14 +157,15 @@ GART_HD GART_INLINE auto is_hit(ray_gaussian const& g, response_of<F> const& r, 
   return both(r.d2 <= F(g.cutoff), r.t > F(near));
 }
 
+// Of the squared offset at a hit, r.d2.
 template <class Response = generalized_gaussian<>, class F>
-GART_HD GART_INLINE F unclamped_alpha(ray_gaussian const& g, response_of<F> const& r) {
-  return mul(F(g.sigma), Response::response(r.d2));
+GART_HD GART_INLINE F unclamped_alpha(ray_gaussian const& g, F d2) {
+  return mul(F(g.sigma), Response::response(d2));
 }
 
 template <class Response = generalized_gaussian<>, class F>
-GART_HD GART_INLINE F hit_alpha(ray_gaussian const& g, response_of<F> const& r) {
-  F const a = unclamped_alpha<Response>(g, r);
+GART_HD GART_INLINE F hit_alpha(ray_gaussian const& g, F d2) {
+  F const a = unclamped_alpha<Response>(g, d2);
   return select(a < F(alpha_max), a, F(alpha_max));
 }
 

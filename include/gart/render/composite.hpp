@@ -13,10 +13,11 @@
 
 namespace gart {
 
-// Where a ray's list ends; before every hit where it has none.
+// Where a ray's list ends; before every hit where it has none. Places stand for ids: those of the hits of a pixel have
+// the order of their Gaussians.
 struct last_hit {
   float t = -1;
-  u32 id = 0;
+  u32 place = 0;  // what the record calls it by
 };
 
 // Row-major, one entry a pixel; null where not wanted.
@@ -63,7 +64,6 @@ struct composite {
   GART_HD GART_INLINE bool on_hit(state& s, hit const& h) const {
     constexpr std::size_t stride = row_floats;
     vec3 const unclamped = s.basis.unclamped(sh_row<ShDegree>(sh + stride * h.id, active_degree).v);
-    set_last(s, h.t, h.id);
     return add(s, h.t, h.alpha, unclamped, record.place_of(h.id, s.at));
   }
 
@@ -75,16 +75,15 @@ struct composite {
   GART_HD GART_INLINE vec3 shade(state const& s, float const* row) const {
     return s.basis.unclamped(*reinterpret_cast<float const(*)[row_floats]>(row));
   }
-  GART_HD GART_INLINE u32 place_of(state const& s, lt_range const& range) const {
-    return record.place_of(range, s.at);
-  }
   GART_HD GART_INLINE bool add(state& s, float t, float alpha, vec3 const& unclamped, u32 place) const {
-    float const weight = blend(alpha, t, clamped_color(unclamped), s.color, s.depth, s.transmittance);
-    record(place, s.color, weight, unclamped);
+    vec3 const c = clamped_color(unclamped);
+    [[maybe_unused]] vec3 const opaque = opaque_color(c, s.color, s.transmittance);
+    float const weight = blend(alpha, t, c, s.color, s.depth, s.transmittance);
+    record(place, opaque, weight, unclamped);
     ++s.hits;
+    s.last = {t, place};
     return s.transmittance >= options.transmittance_min && s.hits != options.max_hits;
   }
-  GART_HD GART_INLINE void set_last(state& s, float t, u32 id) const { s.last = {t, id}; }
 
   GART_HD void end(index_t, state const& s) const {
     std::size_t const a = order.address(s.at);

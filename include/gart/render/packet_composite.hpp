@@ -20,7 +20,8 @@ struct packet_composite {
     sh_basis<ShDegree, lanes> basis;
     vec3_of<lanes> color;
     lanes transmittance, depth, last_t;
-    lane_ints hits, last_id;
+    lane_ints hits;
+    u32 last_place[lane_count];
   };
 
   scalar program;
@@ -31,7 +32,7 @@ struct packet_composite {
 
   state begin(packet_block const& block) const {
     last_hit const none;
-    state s{block, {}, {}, {}, {0.0f, 0.0f, 0.0f}, 1.0f, 0.0f, none.t, {}, every_lane(static_cast<int>(none.id))};
+    state s{block, {}, {}, {}, {0.0f, 0.0f, 0.0f}, 1.0f, 0.0f, none.t, {}, {}};
     for (int l = 0; l < lane_count; ++l) {
       pixel const at = pixel_of(block, l);
       vec3 const d = pixel_ray(program.view, at).direction;
@@ -53,15 +54,17 @@ struct packet_composite {
     vec3_of<lanes> const unclamped(h.shade[0], h.shade[1], h.shade[2]);
     vec3_of<lanes> color = s.color;
     lanes depth = s.depth, transmittance = s.transmittance;
-    lanes const weight = blend(h.alpha, h.t, clamped_color(unclamped), color, depth, transmittance);
+    vec3_of<lanes> const c = clamped_color(unclamped), opaque = opaque_color(c, s.color, s.transmittance);
+    lanes const weight = blend(h.alpha, h.t, c, color, depth, transmittance);
     for (int k = 0; k < 3; ++k) s.color[k] = select(now, color[k], s.color[k]);
     s.depth = select(now, depth, s.depth), s.transmittance = select(now, transmittance, s.transmittance);
     s.hits -= now;
-    s.last_t = select(now, h.t, s.last_t), s.last_id = select(now, h.id, s.last_id);
+    s.last_t = select(now, h.t, s.last_t);
     if constexpr (Record::any)
       for (u32 left = bits_of(now); left; left &= left - 1) {
         int const l = __builtin_ctz(left);
-        program.record(h.notes[h.row[l]], pixel_of(s.block, l), {color.x.v[l], color.y.v[l], color.z.v[l]}, weight.v[l],
+        s.last_place[l] = program.record.place_of(h.notes[h.row[l]], pixel_of(s.block, l));
+        program.record(h.notes[h.row[l]], pixel_of(s.block, l), {opaque.x.v[l], opaque.y.v[l], opaque.z.v[l]}, weight.v[l],
                        {unclamped.x.v[l], unclamped.y.v[l], unclamped.z.v[l]});
       }
     return (s.transmittance >= lanes(program.options.transmittance_min)) &
@@ -75,7 +78,7 @@ struct packet_composite {
       one.at = pixel_of(s.block, l);
       one.color = {s.color.x.v[l], s.color.y.v[l], s.color.z.v[l]};
       one.transmittance = s.transmittance.v[l], one.depth = s.depth.v[l], one.hits = static_cast<u32>(s.hits[l]);
-      one.last = {s.last_t.v[l], static_cast<u32>(s.last_id[l])};
+      one.last = {s.last_t.v[l], s.last_place[l]};
       program.end(0, one);
     }
   }

@@ -23,6 +23,28 @@ GART_HD constexpr u32 pixel_offset(pixel_box const& cell, u32 x, u32 y) {
   return (y - cell.y0) * cell.width() + (x - cell.x0);
 }
 
+// The cell of a primitive and a tile, one 16-byte word, by which many pixels find their slots. Slots are counted in 32
+// bits.
+struct alignas(16) slot_cell {
+  u32 first = 0;  // slot of the cell's first pixel
+  u32 width = 0;
+  u16 x = 0, y = 0, x1 = 0, y1 = 0;
+  static constexpr u32 none = 0xffffffffu;
+
+  slot_cell() = default;
+  GART_HD GART_INLINE slot_cell(lt_range const& range, pixel_box const& tile) {
+    pixel_box const cell = intersect(range.box, tile);
+    first = static_cast<u32>(range.offset) + tile_offset(range.box, cell);
+    width = cell.width();
+    x = cell.x0, y = cell.y0, x1 = cell.x1, y1 = cell.y1;
+  }
+  // Boxes hold every hit; memory stays safe regardless.
+  GART_HD GART_INLINE u32 place_of(int px, int py) const {
+    if (px < x || px >= x1 || py < y || py >= y1) return none;
+    return first + static_cast<u32>(py - y) * width + static_cast<u32>(px - x);
+  }
+};
+
 // The cell of the box that holds pixel (x, y), which must lie in the box.
 template <int Size>
 GART_HD constexpr pixel_box cell_of(pixel_box const& box, u32 x, u32 y) {

@@ -76,7 +76,7 @@ class packet_walk {
       if (free_count_ == 0 && !sweep()) return false;
       int const row = free_[--free_count_];
       ids_[row] = static_cast<int>(id);
-      pool_[row].alpha = hit_alpha<Response>(g, r);
+      pool_[row].alpha = hit_alpha<Response>(g, r.d2);
       program.shade(state, id, tile, pool_[row].shade, notes_[row]);
       if (!insert(hit, r.t, row)) return false;
     }

@@ -24,7 +24,7 @@ struct window_visitor {
     ray_gaussian const g = scene.gaussians[id];
     response const r = evaluate<Response>(g, ray);
     if (is_hit(g, r, scene.near) && before(last_t, last_id, r.t, id) && window.wants(r.t, id))
-      window.insert({r.t, id, hit_alpha<Response>(g, r)});
+      window.insert({r.t, id, hit_alpha<Response>(g, r.d2)});
   }
 };
 
