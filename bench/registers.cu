@@ -10,9 +10,9 @@ namespace {
 template <int ShDegree, class Response, class Entry>
 using forward_kernel = walk_tile_warps<Response, 8, composite<ShDegree, record_lt<Entry, 8>>>;
 
-template <int ShDegree, class Response, class Term, class Entry, gather_sums Sums = gather_sums::atomic>
+template <int ShDegree, class Response, class Entry, gather_sums Sums = gather_sums::atomic>
 using backward_kernel =
-    gather_kernel<ShDegree, Response, terms<Term>, Entry, 8, Sums, slot_validity::recomputed, cuda_exec>;
+    gather_kernel<ShDegree, Response, terms<color, geometry>, Entry, 8, Sums, slot_validity::recomputed, cuda_exec>;
 
 }  // namespace
 
@@ -20,10 +20,9 @@ using backward_kernel =
   template __global__ void detail::run_tile_kernel<forward_kernel<__VA_ARGS__>>(forward_kernel<__VA_ARGS__> const);
 #define BACKWARD(...) \
   template __global__ void detail::run_tile_kernel<backward_kernel<__VA_ARGS__>>(backward_kernel<__VA_ARGS__> const);
-#define ROW(degree, response, entry)        \
-  FORWARD(degree, response, entry)          \
-  BACKWARD(degree, response, color, entry)  \
-  BACKWARD(degree, response, geometry, entry)
+#define ROW(degree, response, entry) \
+  FORWARD(degree, response, entry)   \
+  BACKWARD(degree, response, entry)
 
 using plain = generalized_gaussian<>;
 using fast = generalized_gaussian<2, arithmetic::fast>;
@@ -40,5 +39,4 @@ ROW(3, generalized_gaussian<8>, lt_entry)
 ROW(3, fast, lt_entry)
 ROW(3, plain, lt_half_entry)
 ROW(3, plain, lt_shared_entry)
-BACKWARD(3, plain, color, lt_entry, gather_sums::ordered)
-BACKWARD(3, plain, geometry, lt_entry, gather_sums::ordered)
+BACKWARD(3, plain, lt_entry, gather_sums::ordered)

@@ -21,6 +21,8 @@
 
 #if defined(__CUDA_ARCH__)
 #define GART_UNROLL _Pragma("unroll")
+#define GART_NO_UNROLL _Pragma("unroll 1")
 #else
 #define GART_UNROLL
+#define GART_NO_UNROLL
 #endif

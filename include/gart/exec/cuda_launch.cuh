@@ -44,6 +44,16 @@ class cuda_team {
   Scratch& scratch_;
 };
 
+// A block's shared memory by an address that the compiler keeps: it would work out the block's window again at each use.
+template <class T>
+__device__ GART_INLINE T& kept_address(void* shared) {
+  u32 address = static_cast<u32>(__cvta_generic_to_shared(shared));
+  asm volatile("" : "+r"(address));
+  void* const kept = __cvta_shared_to_generic(address);
+  __builtin_assume(__isShared(kept));
+  return *static_cast<T*>(kept);
+}
+
 template <class K>
 __global__ void __launch_bounds__(block_size_of<K>(), min_blocks_of<K>()) run_index_kernel(index_t n, K const kernel) {
   u64 const i = u64{blockIdx.x} * block_size_of<K>() + threadIdx.x;
@@ -54,7 +64,7 @@ template <class K>
 __global__ void __launch_bounds__(block_size_of<K>(), min_blocks_of<K>()) run_tile_kernel(K const kernel) {
   static_assert(alignof(typename K::scratch) <= 16);
   extern __shared__ __align__(16) unsigned char memory[];
-  cuda_team<typename K::scratch> team(*reinterpret_cast<typename K::scratch*>(memory));
+  cuda_team<typename K::scratch> team(kept_address<typename K::scratch>(memory));
   kernel(team);
 }
 

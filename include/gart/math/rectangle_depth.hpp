@@ -14,6 +14,7 @@ namespace gart {
 
 class rectangle_depth {
  public:
+  rectangle_depth() = default;
   // `g`: relative to the camera's centre. rotation: its columns are the camera's axes. reach: at least 1 + |u| + |v| of
   // every slope asked for.
   GART_HD rectangle_depth(ray_gaussian const& g, mat3 const& rotation, float reach) {

@@ -19,6 +19,7 @@ struct tile_map_view {
   span<u32 const> keys;        // of all lists, sorted
   int order_bits = 0;          // low bits of a key: the order's
   int depth_shift = 0;         // of depth_order: bits of a depth that keys leave out
+  span<u32 const> longest_first;  // the tiles, if asked for (rank_tiles)
 
   // In lists sorted by depth_order: no hit of entry k, or of any after it in its list, has a smaller z.
   GART_HD GART_INLINE float depth(u32 k) const {
@@ -34,26 +35,67 @@ inline int bits_for(u32 count) {
 
 namespace tile_kernels {
 
+// A team takes some primitives; its lanes take the pairs of all of them in turn, since boxes differ in size by orders of
+// magnitude.
 template <execution E, int Size, class Order>
 struct emit_pairs {
+  static constexpr int block_size = 128;
+  static constexpr u32 share = 128;  // primitives of a team
+  struct scratch {
+    typename Order::primitive primitive[share];
+    pixel_box box[share];
+    u32 first[share];  // of the team's pairs
+  };
+
   tile_grid<Size> grid;
   span<lt_range const> ranges;
   span<u64 const> offsets;
+  u64 pairs;
   Order order;
   int order_bits;
   span<u32> keys, primitives, counts;
+
+  template <class Team>
+  GART_HD void operator()(Team const& team) const {
+    u32 const begin = team.tile() * share, left = static_cast<u32>(ranges.size()) - begin;
+    u32 const n = left < share ? left : share;
+    u64 const at = offsets[begin];
+    u32 const total = static_cast<u32>((left > share ? offsets[begin + share] : pairs) - at);
+    if (total == 0) return;
+    scratch& s = team.scratch();
+    team.for_each(n, [&](index_t k) {
+      s.box[k] = ranges[begin + k].box;
+      s.first[k] = static_cast<u32>(offsets[begin + k] - at);
+      if (!s.box[k].empty()) s.primitive[k] = order.of(begin + k);
+    });
+    team.barrier();
+    team.for_each(total, [&](index_t pair) { emit(s, at + pair, pair, begin, n); });
+    team.barrier();
+  }
+
+ private:
+  GART_HD GART_INLINE void emit(scratch const& s, u64 at, u32 pair, u32 begin, u32 n) const {
+    u32 k = 0;  // the last primitive whose pairs begin no later
+    for (u32 step = share / 2; step > 0; step /= 2)
+      if (k + step < n && s.first[k + step] <= pair) k += step;
+    pixel_box const box = s.box[k], tiles = tiles_of<Size>(box);
+    u32 const number = pair - s.first[k], y = tiles.y0 + number / tiles.width(), x = tiles.x0 + number % tiles.width();
+    u32 const tile = y * grid.columns() + x;
+    keys[at] = tile << order_bits | order.key(s.primitive[k], intersect(box, grid.tile(x, y)));
+    primitives[at] = begin + k;
+    E::atomic_add(&counts[tile], 1u);
+  }
+};
+
+// Longer lists have smaller keys.
+struct rank_tiles {
+  static constexpr u32 step = 16, most = 255;
+  span<u32 const> offsets;
+  span<u32> keys, tiles;
   GART_KERNEL void operator()(index_t i) const {
-    pixel_box const box = ranges[i].box, tiles = tiles_of<Size>(box);
-    if (tiles.empty()) return;
-    auto const primitive = order.of(i);
-    u64 at = offsets[i];
-    for (u32 y = tiles.y0; y < tiles.y1; ++y)
-      for (u32 x = tiles.x0; x < tiles.x1; ++x, ++at) {
-        u32 const tile = y * grid.columns() + x;
-        keys[at] = tile << order_bits | order.key(primitive, intersect(box, grid.tile(x, y)));
-        primitives[at] = i;
-        E::atomic_add(&counts[tile], 1u);
-      }
+    u32 const steps = (offsets[i + 1] - offsets[i]) / step;
+    keys[i] = most - (steps < most ? steps : most);
+    tiles[i] = i;
   }
 };
 
@@ -62,7 +104,8 @@ struct emit_pairs {
 template <execution E, int Size>
 class tile_map {
  public:
-  explicit tile_map(E& exec) : keys_(exec), primitives_(exec), counts_(exec), offsets_(exec) {}
+  explicit tile_map(E& exec)
+      : keys_(exec), primitives_(exec), counts_(exec), offsets_(exec), ranks_(exec), longest_first_(exec) {}
 
   template <class Order>
   void build(E& exec, tile_grid<Size> const& grid, footprints<E, Size> const& prints, Order order) {
@@ -80,18 +123,28 @@ class tile_map {
     keys_.resize(pairs), primitives_.resize(pairs);
     counts_.resize(grid.count()), offsets_.resize(grid.count() + 1);
     counts_.zero();
-    parallel_for(exec, "map/emit", static_cast<index_t>(prints.ranges().size()),
-                 tile_kernels::emit_pairs<E, Size, Order>{grid, prints.ranges(), prints.pair_offsets(), order,
-                                                          order_bits_, keys_, primitives_, counts_});
+    using emit = tile_kernels::emit_pairs<E, Size, Order>;
+    parallel_for(exec, "map/emit", tile_range{(static_cast<u32>(prints.ranges().size()) + emit::share - 1) / emit::share, emit::block_size},
+                 emit{grid, prints.ranges(), prints.pair_offsets(), pairs, order, order_bits_, keys_, primitives_, counts_});
     sort_pairs(exec, keys_.view(), primitives_.view(), tile_bits + order_bits_);
     span<u32> const offsets = offsets_.view();
     exclusive_scan(exec, span<u32 const>(counts_), offsets.subspan(0, grid.count()), offsets.subspan(grid.count(), 1));
   }
 
-  tile_map_view view() const { return {primitives_, offsets_, keys_, order_bits_, depth_shift_}; }
+  // After build: the tiles by the length of their lists, longest first, in 255 steps of 16. Lists differ by orders of
+  // magnitude, and a long one begun last would keep the whole device waiting.
+  void rank_tiles(E& exec) {
+    stage_scope stage(exec, "map");
+    index_t const tiles = static_cast<index_t>(counts_.size());
+    ranks_.resize(tiles), longest_first_.resize(tiles);
+    parallel_for(exec, "map/rank", tiles, tile_kernels::rank_tiles{offsets_, ranks_, longest_first_});
+    sort_pairs(exec, ranks_.view(), longest_first_.view(), 8);
+  }
+
+  tile_map_view view() const { return {primitives_, offsets_, keys_, order_bits_, depth_shift_, longest_first_}; }
 
  private:
-  buffer<u32, E> keys_, primitives_, counts_, offsets_;
+  buffer<u32, E> keys_, primitives_, counts_, offsets_, ranks_, longest_first_;
   int order_bits_ = 0, depth_shift_ = 0;
 };
 

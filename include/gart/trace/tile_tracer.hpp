@@ -84,7 +84,7 @@ struct walk_tiles {
           resume = k < resume ? k : resume;
           continue;
         }
-        h.alpha = hit_alpha<Response>(g, r);
+        h.alpha = hit_alpha<Response>(g, r.d2);
         if (pending.insert(h, nearer)) {
           limit = h;
           resume = h.place < resume ? h.place : resume;
@@ -149,13 +149,14 @@ class tile_tracer {
   static constexpr int tile_size = Size;
   static constexpr int window = Window;
 
-  explicit tile_tracer(E& exec) : prints_(exec), map_(exec) {}
+  explicit tile_tracer(E& exec) : prints_(exec), map_(exec), next_(exec), put_aside_(exec) {}
 
   void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
                float alpha_min, float near) {
     grid_ = {view.width, view.height};
     prints_.template measure<Response>(exec, scene, view, alpha_min, near);
     map_.build(exec, grid_, prints_, depth_order(prints_.depths().data(), records.data(), view));
+    if constexpr (E::device) map_.rank_tiles(exec);
     scene_ = {records.data(), scene.count, near};
     forward_ = view.rotation[2];
   }
@@ -165,8 +166,13 @@ class tile_tracer {
 #if defined(__CUDACC__)
     if constexpr (E::device && trace_kernels::has_warps<P> && Size % 8 == 0) {
       using walk = walk_tile_warps<Response, Size, P>;
-      parallel_for(exec, label, tile_range{grid_.count() * walk::blocks_per_tile, walk::lanes},
-                   walk{grid_, map_.view(), prints_.ranges().data(), scene_, forward_, program});
+      u32 const most = static_cast<u32>(exec.multiprocessors()) * walk::min_blocks;
+      u32 const parts = grid_.count() * walk::tile_parts, teams = parts < most ? parts : most;
+      next_.resize(1), put_aside_.resize(teams * walk::aside_floats);
+      next_.zero();
+      parallel_for(exec, label, tile_range{teams, walk::block_size},
+                   walk{grid_, map_.view(), prints_.ranges().data(), scene_, forward_, program, next_.data(),
+                        put_aside_.data()});
       return;
     }
 #endif
@@ -188,6 +194,8 @@ class tile_tracer {
   tile_grid<Size> grid_;
   footprints<E, Size> prints_;
   tile_map<E, Size> map_;
+  buffer<u32, E> next_;         // of the device's walk (trace/warp_walk.hpp)
+  buffer<float, E> put_aside_;
   traced_scene scene_;
   vec3 forward_{0, 0, 1};
 };

@@ -7,15 +7,16 @@
 // a register of sixteen 4-bit numbers. Hits are passed on when some ray has no room for another: many rays then have
 // some to pass on, and do it together.
 //
-// A ray that has no room even then drops its farthest hit, and goes on with the nearer ones; when the list is at its
-// end, the rays that dropped hits walk it again, from the first candidate dropped and strictly after their last hit.
+// What a ray has no room for even then it puts aside, in memory of its own: its farthest hits, in no order, of which the
+// nearest fill the window again when it runs empty. Where even that memory is full a hit is lost: the ray then passes on
+// what lies before it, and walks the list again, strictly after its last hit.
 //
 // Beside what every ray program offers, one for warps offers
 //   order                        the pixels (render/pixels.hpp)
 //   row_floats, row_floats_read  what it reads of a Gaussian to shade a hit, and how much of that is to be read (the
 //                                rest is zero); rows_from, where the rows of all Gaussians begin
 //   shade(state, row)            what a hit shows
-//   place_of(state, range)       where it is recorded, if records_hits
+//   records_hits                 whether hits have places in the LT buffer (tiles/layout.hpp)
 //   add(state, t, alpha, shown, place)  composites a hit; false ends the ray
 
 #include <gart/math/ray_gaussian.hpp>
@@ -26,15 +27,24 @@
 
 #include <cuda_pipeline.h>
 
+#include <utility>
+
 namespace gart {
 
 template <class Response, int Size, class P>
 class walk_tile_warps {
- public:
-  static constexpr int lanes = 32, block_size = lanes, min_blocks = 12;
+  using pixel = decltype(std::declval<P const&>().at(index_t{}));
+  static constexpr int lanes = 32, warps = 2;
   static constexpr int block_width = 8, block_height = 4;
+  static constexpr int tile_blocks = Size * Size / lanes;
   static_assert(Size % block_width == 0);
-  static constexpr u32 blocks_per_tile = Size * Size / lanes;
+
+ public:
+  static constexpr int block_size = warps * lanes, min_blocks = 7;
+  static constexpr u32 tile_parts = tile_blocks;
+  // Floats of memory for what the rays of a team put aside.
+  static constexpr int aside = 112;  // hits a ray can put aside
+  static constexpr std::size_t aside_floats = std::size_t{6} * aside * block_size;
 
   tile_grid<Size> grid;
   tile_map_view map;
@@ -42,11 +52,15 @@ class walk_tile_warps {
   traced_scene scene;
   vec3 forward;  // the camera's axis
   P program;
+  u32* next = nullptr;        // part of a tile that is to be taken next, zero at first
+  float* put_aside = nullptr;  // [teams][aside_floats]
 
  private:
-  static constexpr int window = 16;  // pending hits of a ray
+  static constexpr int window = 16;  // pending hits of a ray: as many as `order_` has room for
   static constexpr int group = 4;    // candidates read ahead at once
-  static constexpr int row_words = (P::row_floats + 3) / 4;
+  // 16-byte words of a candidate: its record, then its row, which may not be a whole number of them.
+  static constexpr int record_words = sizeof(ray_gaussian) / sizeof(quad), row_words = (P::row_floats + 3) / 4;
+  static constexpr bool whole_rows = P::row_floats % 4 == 0;
   static constexpr u32 everyone = 0xffffffffu;
   static constexpr u32 nothing = 0xffffffffu;
 
@@ -55,39 +69,64 @@ class walk_tile_warps {
     quad row[row_words];
   };
 
- public:
-  struct scratch {
+  struct warp_scratch {
     candidate ahead[2][group];
     // Of the candidates that 32 entries of the list leave.
-    lt_range range[lanes];
+    slot_cell cell[P::records_hits ? lanes : 1];
     u32 id[lanes], entry[lanes];
     float depth[lanes];
-    // The pending hits of each lane.
+    // The pending hits of each lane. Key: a hit's place where hits are recorded, else its Gaussian's entry in the list.
     float t[window][lanes], alpha[window][lanes], red[window][lanes], green[window][lanes], blue[window][lanes];
-    u32 entry_of[window][lanes];
-    u32 place[P::records_hits ? window : 1][lanes];
+    u32 key[window][lanes];
   };
 
+  struct pending {
+    float t, alpha;
+    vec3 shown;
+    u32 key;
+  };
+
+ public:
+  struct scratch {
+    warp_scratch warp[warps];
+  };
+
+  // As many teams as the device holds: their warps take parts of tiles, those of the longest lists first, until there are
+  // no more.
   template <class Team>
   __device__ void operator()(Team const& team) const {
-    u32 const tile = team.tile() / blocks_per_tile, part = team.tile() % blocks_per_tile;
+    int const warp = static_cast<int>(threadIdx.x) / lanes;
+    warp_scratch& s = team.scratch().warp[warp];
+    float* const memory = put_aside + team.tile() * aside_floats + warp * (aside_floats / warps);
+    u32 const parts = grid.count() * tile_parts;
+    while (true) {
+      u32 part = 0;
+      if (threadIdx.x % lanes == 0) part = atomicAdd(next, 1u);
+      part = __shfl_sync(everyone, part, 0);
+      if (part >= parts) return;
+      trace(s, memory, map.longest_first[part / tile_parts], part % tile_parts);
+    }
+  }
+
+ private:
+  __device__ GART_INLINE void trace(warp_scratch& s, float* memory, u32 tile, u32 part) const {
     pixel_box const area = grid.tile(tile);
     pixel const corner{static_cast<int>(area.x0 + part % (Size / block_width) * block_width),
                        static_cast<int>(area.y0 + part / (Size / block_width) * block_height)};
     if (!program.order.inside(corner)) return;
-    rays r(*this, team.scratch(), corner);
-    for (u32 first = map.offsets[tile], end = map.offsets[tile + 1]; first < end;) first = r.walk(first, end);
+    rays r(*this, s, memory, area, corner);
+    while (r.walk(map.offsets[tile], map.offsets[tile + 1])) {}
     r.end();
   }
 
- private:
   class rays {
    public:
-    __device__ rays(walk_tile_warps const& k, scratch& s, pixel corner)
-        : k_(k), s_(s), lane_(static_cast<int>(threadIdx.x)), corner_(corner) {
-      pixel const at{corner.x + lane_ % block_width, corner.y + lane_ / block_width};
-      index_ = k.program.order.index(at);
-      alive_ = k.program.order.inside(at);
+    __device__ GART_INLINE rays(walk_tile_warps const& k, warp_scratch& s, float* memory, pixel_box const& area, pixel corner)
+        : k_(k), s_(s), lane_(static_cast<int>(threadIdx.x) % lanes), area_(area), corner_(corner) {
+      aside_ = memory + lane_;
+      at_ = {corner.x + lane_ % block_width, corner.y + lane_ / block_width};
+      index_ = k.program.order.index(at_);
+      alive_ = k.program.order.inside(at_);
       state_ = k.program.begin(index_);
       ray_ = k.program.ray_of(index_, state_);
       vec3 const& d = ray_.direction;
@@ -98,9 +137,10 @@ class walk_tile_warps {
         s.ahead[w / (group * row_words)][w / row_words % group].row[w % row_words] = {};
     }
 
-    // Once along the list, from `first`. Where to begin again for the hits that were dropped: `end`, where none were.
-    __device__ u32 walk(u32 first, u32 end) {
-      limit_t_ = infinity, limit_entry_ = nothing, resume_ = end;
+    // Once along the list. Whether to walk it again, for hits that were lost.
+    __device__ GART_INLINE bool walk(u32 first, u32 end) {
+      limit_t_ = lost_t_ = infinity, limit_key_ = lost_key_ = nothing;
+      order_ = 0, free_ = (1u << window) - 1, count_ = aside_count_ = 0;
       u32 id = 0;
       float depth = 0;
       auto const look_ahead = [&](u32 entry) {
@@ -110,21 +150,20 @@ class walk_tile_warps {
       for (u32 from = first; from < end; from += lanes) {
         int const count = leave_out(from + lane_ < end, from + lane_, id, depth);
         look_ahead(from + lanes + lane_);
-        if (!meet(count)) return end;
+        if (!meet(count)) return false;
       }
       pass_on(infinity);
-      alive_ = alive_ && resume_ < end;
-      return __reduce_min_sync(everyone, alive_ ? resume_ : end);
+      alive_ = alive_ && lost_t_ < infinity;
+      return __any_sync(everyone, alive_);
     }
 
-    __device__ void end() {
-      if (last_entry_ != nothing) k_.program.set_last(state_, last_t_, k_.map.primitives[last_entry_]);
+    __device__ GART_INLINE void end() {
       if (k_.program.active(index_)) k_.program.end(index_, state_);
     }
 
    private:
     // Keeps, of 32 entries, those whose boxes overlap the block; how many.
-    __device__ int leave_out(bool exists, u32 entry, u32 id, float depth) {
+    __device__ GART_INLINE int leave_out(bool exists, u32 entry, u32 id, float depth) {
       lt_range range;
       if (exists) range = k_.ranges[id];
       pixel_box const& b = range.box;
@@ -134,21 +173,21 @@ class walk_tile_warps {
       if (wanted) {
         int const to = __popc(all & ((1u << lane_) - 1));
         s_.id[to] = id, s_.entry[to] = entry, s_.depth[to] = depth;
-        if constexpr (P::records_hits) s_.range[to] = range;
+        if constexpr (P::records_hits) s_.cell[to] = slot_cell(range, area_);
       }
       __syncwarp();
       return __popc(all);
     }
 
     // All candidates that were left, a group read while the one before is evaluated. False when all rays have ended.
-    __device__ bool meet(int count) {
+    __device__ GART_INLINE bool meet(int count) {
       bool more = true;
       read(0, 0, count);
       for (int first = 0, side = 0; first < count && more; first += group, side ^= 1) {
         read(side ^ 1, first + group, count);
         __pipeline_wait_prior(1);
         __syncwarp();
-        for (int c = 0; c < group && first + c < count && more; ++c) more = evaluate(s_.ahead[side][c], first + c);
+        more = evaluate(s_.ahead[side], first, count);
         __syncwarp();
       }
       __pipeline_wait_prior(0);
@@ -156,119 +195,225 @@ class walk_tile_warps {
       return more;
     }
 
-    __device__ void read(int side, int first, int count) {
-      constexpr int record_words = sizeof(ray_gaussian) / sizeof(quad);
-      if (int const c = lane_ / record_words; c < group && first + c < count) {
-        int const w = lane_ % record_words;
-        __pipeline_memcpy_async(reinterpret_cast<quad*>(&s_.ahead[side][c].gaussian) + w,
-                                reinterpret_cast<quad const*>(k_.scene.gaussians + s_.id[first + c]) + w, sizeof(quad));
-      }
-      constexpr int step = P::row_floats % 4 == 0 ? 4 : 1, steps = P::row_floats / step;
-      for (int w = lane_; w < group * steps; w += lanes) {
-        int const c = w / steps, at = w % steps * step;
-        if (first + c >= count || at >= k_.program.row_floats_read()) continue;
-        __pipeline_memcpy_async(
-            reinterpret_cast<float*>(s_.ahead[side][c].row) + at,
-            k_.program.rows_from() + static_cast<std::size_t>(P::row_floats) * s_.id[first + c] + at,
-            step * sizeof(float));
+    // Eight lanes a candidate.
+    __device__ GART_INLINE void read(int side, int first, int count) {
+      constexpr int readers = lanes / group;
+      int const reader = lane_ % readers, number = first + lane_ / readers;
+      if (number < count) {
+        u32 const id = s_.id[number];
+        candidate& to = s_.ahead[side][lane_ / readers];
+        quad const* const record = reinterpret_cast<quad const*>(k_.scene.gaussians + id);
+        float const* const row = k_.program.rows_from() + static_cast<std::size_t>(P::row_floats) * id;
+        if constexpr (whole_rows) {
+          GART_UNROLL
+          for (int w = 0; w < record_words + row_words; w += readers) {
+            int const word = w + reader, in_row = word - record_words;
+            bool const is_record = in_row < 0;
+            if (is_record || (in_row < row_words && 4 * in_row < k_.program.row_floats_read()))
+              __pipeline_memcpy_async(reinterpret_cast<quad*>(&to) + word,
+                                      is_record ? record + word : reinterpret_cast<quad const*>(row) + in_row,
+                                      sizeof(quad));
+          }
+        } else {
+          if (reader < record_words)
+            __pipeline_memcpy_async(reinterpret_cast<quad*>(&to) + reader, record + reader, sizeof(quad));
+          for (int w = reader; w < k_.program.row_floats_read(); w += readers)
+            __pipeline_memcpy_async(reinterpret_cast<float*>(to.row) + w, row + w, sizeof(float));
+        }
       }
       __pipeline_commit();
     }
 
-    // One candidate, all rays. False when all have ended.
-    __device__ GART_INLINE bool evaluate(candidate const& c, int number) {
-      u32 const entry = s_.entry[number];
-      response const r = gart::evaluate<Response>(c.gaussian, ray_);
-      bool hit = alive_ && is_hit(c.gaussian, r, k_.scene.near) && nearer(last_t_, last_entry_, r.t, entry) &&
-                 nearer(r.t, entry, limit_t_, limit_entry_);
-      if (!__any_sync(everyone, hit)) return true;
-      if (__any_sync(everyone, hit && count_ == window)) {
-        pass_on(s_.depth[number]);
-        hit = hit && alive_;
-        if (!__any_sync(everyone, alive_)) return false;
+    // The candidates of a group, all rays. False when all have ended.
+    __device__ GART_INLINE bool evaluate(candidate const (&from)[group], int first, int count) {
+      float t[group], d2[group];
+      u32 found = 0;
+      GART_UNROLL
+      for (int c = 0; c < group; ++c) {  // one beside the other: the arithmetic of each waits for itself
+        response const r = gart::evaluate<Response>(from[c].gaussian, ray_);
+        t[c] = r.t, d2[c] = r.d2;
+        bool const exists = first + c < count;
+        if (exists && is_hit(from[c].gaussian, r, last_t_)) found |= 1u << c;
+        if (exists && r.t == last_t_ && follows_last(from[c].gaussian, r, first + c)) found |= 1u << c;
       }
-      if (hit && (count_ < window || make_room(r.t, entry))) {
-        int const slot = __ffs(static_cast<int>(free_)) - 1;
-        free_ &= free_ - 1;
-        s_.t[slot][lane_] = r.t;
-        s_.entry_of[slot][lane_] = entry;
-        s_.alpha[slot][lane_] = hit_alpha<Response>(c.gaussian, r);
-        vec3 const shown = k_.program.shade(state_, reinterpret_cast<float const*>(c.row));
-        s_.red[slot][lane_] = shown.x, s_.green[slot][lane_] = shown.y, s_.blue[slot][lane_] = shown.z;
-        if constexpr (P::records_hits) s_.place[slot][lane_] = k_.program.place_of(state_, s_.range[number]);
-        insert(slot, r.t, entry);
+      bool tried = false;
+      GART_NO_UNROLL
+      for (int c = 0; c < group; ++c) {
+        bool const hit = alive_ && (found >> c & 1);
+        if (!__any_sync(everyone, hit)) continue;
+        if (!tried && __any_sync(everyone, hit && count_ == window)) {
+          tried = true;
+          pass_on(s_.depth[first + c]);
+          if (!__any_sync(everyone, alive_)) return false;
+        }
+        if (hit && alive_) {
+          static_assert(group == 4);
+          take(from[c], c < 2 ? c < 1 ? t[0] : t[1] : c < 3 ? t[2] : t[3],
+               c < 2 ? c < 1 ? d2[0] : d2[1] : c < 3 ? d2[2] : d2[3], first + c);
+        }
       }
       return true;
     }
 
-    // The order of hits, (t, id); entries stand for ids, which are asked for only where distances are equal.
-    __device__ GART_INLINE bool nearer(float t, u32 entry, float other_t, u32 other) const {
+    // A hit at the distance of the last one passed on.
+    __device__ bool follows_last(ray_gaussian const& g, response const& r, int number) const {
+      return r.d2 <= g.cutoff && r.t > k_.scene.near && last_key_ != nothing &&
+             nearer(last_t_, last_key_, r.t, key_of(number));
+    }
+
+    __device__ GART_INLINE u32 key_of(int number) const {
+      if constexpr (P::records_hits)
+        return s_.cell[number].place_of(at_.x, at_.y);
+      else
+        return s_.entry[number];
+    }
+
+    // The order of hits, (t, id). The places of a pixel's hits have the order of their ids; entries are asked for them.
+    __device__ GART_INLINE bool nearer(float t, u32 key, float other_t, u32 other) const {
       if (t != other_t) return t < other_t;
-      return entry != nothing && other != nothing && k_.map.primitives[entry] < k_.map.primitives[other];
+      if constexpr (P::records_hits)
+        return key < other;
+      else
+        return k_.map.primitives[key] < k_.map.primitives[other];
     }
 
-    // From the back, where most belong.
-    __device__ GART_INLINE void insert(int slot, float t, u32 entry) {
-      int k = count_++;
-      for (; k > 0; --k) {
-        int const before = static_cast<int>(order_ >> (4 * (k - 1))) & 15;
-        if (!nearer(t, entry, s_.t[before][lane_], s_.entry_of[before][lane_])) break;
+    // A hit that one ray, or some, have found.
+    __device__ GART_INLINE void take(candidate const& c, float t, float d2, int number) {
+      pending const h{t, hit_alpha<Response>(c.gaussian, d2),
+                      k_.program.shade(state_, reinterpret_cast<float const*>(c.row)), key_of(number)};
+      if (t >= limit_t_ && !nearer(t, h.key, limit_t_, limit_key_)) {
+        put_aside(h);
+        return;
       }
-      u64 const low = (u64{1} << (4 * k)) - 1;
-      order_ = (order_ & low) | u64(slot) << (4 * k) | (order_ & ~low) << 4;
+      if (count_ == window) {
+        pending const farthest = take_farthest();
+        if (!nearer(t, h.key, farthest.t, farthest.key)) {
+          put(farthest);
+          limit_t_ = t, limit_key_ = h.key;
+          put_aside(h);
+          return;
+        }
+        limit_t_ = farthest.t, limit_key_ = farthest.key;
+        put_aside(farthest);
+      }
+      put(h);
     }
 
-    // The window is full: the farthest hit is dropped. False where that is the new one.
-    __device__ GART_INLINE bool make_room(float t, u32 entry) {
-      int const farthest = static_cast<int>(order_ >> 60);
-      float const farthest_t = s_.t[farthest][lane_];
-      u32 const farthest_entry = s_.entry_of[farthest][lane_];
-      bool const fits = nearer(t, entry, farthest_t, farthest_entry);
-      limit_t_ = fits ? farthest_t : t;
-      limit_entry_ = fits ? farthest_entry : entry;
-      resume_ = limit_entry_ < resume_ ? limit_entry_ : resume_;
-      if (fits) {
-        --count_;
-        free_ |= 1u << farthest;
-        order_ &= (u64{1} << 60) - 1;
+    __device__ GART_INLINE void put(pending const& h) {
+      int const slot = __ffs(static_cast<int>(free_)) - 1;
+      free_ &= free_ - 1;
+      s_.t[slot][lane_] = h.t, s_.alpha[slot][lane_] = h.alpha;
+      s_.red[slot][lane_] = h.shown.x, s_.green[slot][lane_] = h.shown.y, s_.blue[slot][lane_] = h.shown.z;
+      s_.key[slot][lane_] = h.key;
+      int bits = 4 * count_++;
+      for (; bits > 0; bits -= 4) {  // from the back, where most belong
+        int const before = slot_of(bits / 4 - 1);
+        if (!nearer(h.t, h.key, s_.t[before][lane_], s_.key[before][lane_])) break;
       }
-      return fits;
+      u64 const low = (u64{1} << bits) - 1;
+      order_ = (order_ & low) | u64(slot) << bits | (order_ & ~low) << 4;
+    }
+
+    __device__ GART_INLINE pending take_slot(int slot) {
+      --count_;
+      free_ |= 1u << slot;
+      return {s_.t[slot][lane_], s_.alpha[slot][lane_],
+              {s_.red[slot][lane_], s_.green[slot][lane_], s_.blue[slot][lane_]}, s_.key[slot][lane_]};
+    }
+
+    // The slot of the pending hit that is k-th in order.
+    __device__ GART_INLINE int slot_of(int k) const { return static_cast<int>(order_ >> (4 * k)) & 15; }
+
+    // Of a full window.
+    __device__ GART_INLINE pending take_farthest() {
+      int const slot = slot_of(window - 1);
+      order_ &= (u64{1} << (4 * (window - 1))) - 1;
+      return take_slot(slot);
+    }
+
+    __device__ GART_INLINE void put_aside(pending const& h) {
+      if (aside_count_ < aside)
+        write_aside(aside_count_++, h);
+      else if (nearer(h.t, h.key, lost_t_, lost_key_))
+        lost_t_ = h.t, lost_key_ = h.key;
+    }
+
+    __device__ GART_INLINE void write_aside(int k, pending const& h) {
+      float* const to = aside_ + 6 * lanes * k;
+      to[0] = h.t, to[lanes] = h.alpha, to[2 * lanes] = bits_to_float(h.key);
+      to[3 * lanes] = h.shown.x, to[4 * lanes] = h.shown.y, to[5 * lanes] = h.shown.z;
+    }
+
+    __device__ GART_INLINE pending read_aside(int k) const {
+      float const* const from = aside_ + 6 * lanes * k;
+      return {from[0], from[lanes], {from[3 * lanes], from[4 * lanes], from[5 * lanes]}, aside_key(k)};
+    }
+    __device__ GART_INLINE float aside_time(int k) const { return aside_[6 * lanes * k]; }
+    __device__ GART_INLINE u32 aside_key(int k) const { return float_to_bits(aside_[6 * lanes * k + 2 * lanes]); }
+
+    // The nearest of the hits put aside, as many as there is room for.
+    __device__ GART_INLINE void fill() {
+      limit_t_ = infinity, limit_key_ = nothing;
+      for (int k = 0; k < aside_count_;) {
+        if (count_ < window) {
+          put(read_aside(k));
+          if (k < --aside_count_) write_aside(k, read_aside(aside_count_));
+          continue;
+        }
+        float t = aside_time(k);
+        u32 key = aside_key(k);
+        int const farthest = slot_of(window - 1);
+        float const farthest_t = s_.t[farthest][lane_];
+        u32 const farthest_key = s_.key[farthest][lane_];
+        if (nearer(t, key, farthest_t, farthest_key)) {
+          pending const h = read_aside(k);
+          write_aside(k, take_farthest());
+          put(h);
+          t = farthest_t, key = farthest_key;
+        }
+        if (nearer(t, key, limit_t_, limit_key_)) limit_t_ = t, limit_key_ = key;
+        ++k;
+      }
     }
 
     // Hits nearer than `depth`, which nothing that is left of the list comes before.
     __device__ GART_INLINE void pass_on(float depth) {
-      while (alive_ && count_ > 0) {
-        int const slot = static_cast<int>(order_) & 15;
-        float const t = s_.t[slot][lane_];
-        if (!(t * cosine_ < depth)) break;
-        order_ >>= 4, --count_;
-        free_ |= 1u << slot;
-        last_t_ = t, last_entry_ = s_.entry_of[slot][lane_];
-        u32 place = 0;
-        if constexpr (P::records_hits) place = s_.place[slot][lane_];
-        alive_ = k_.program.add(state_, t, s_.alpha[slot][lane_],
-                                {s_.red[slot][lane_], s_.green[slot][lane_], s_.blue[slot][lane_]}, place);
+      while (true) {
+        while (alive_ && count_ > 0) {
+          int const slot = slot_of(0);
+          float const t = s_.t[slot][lane_];
+          if (!(t * cosine_ < depth) || (t >= lost_t_ && !nearer(t, s_.key[slot][lane_], lost_t_, lost_key_))) break;
+          order_ >>= 4;
+          pending const h = take_slot(slot);
+          last_t_ = h.t, last_key_ = h.key;
+          alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::records_hits ? h.key : 0);
+        }
+        bool const empty = alive_ && count_ == 0 && aside_count_ > 0 && limit_t_ * cosine_ < depth;
+        if (!__any_sync(everyone, empty)) return;
+        if (alive_ && aside_count_ > 0 && count_ < window) fill();
       }
     }
 
     static constexpr float infinity = __builtin_huge_valf();
 
     walk_tile_warps const& k_;
-    scratch& s_;
+    warp_scratch& s_;
+    float* aside_;  // [aside][6], a lane's numbers 32 apart
     int lane_;
-    pixel corner_;
+    pixel_box area_;
+    pixel corner_, at_;
     index_t index_;
     primary_ray ray_;
     typename P::state state_;
     float cosine_;
     bool alive_;
     float last_t_;  // the last hit passed on: at first (near, none), t > near
-    u32 last_entry_ = nothing;
-    float limit_t_ = infinity;  // the nearest hit dropped
-    u32 limit_entry_ = nothing, resume_ = nothing;
-    u64 order_ = 0;  // slots of the pending hits, nearest first, 4 bits each
-    u32 free_ = (1u << window) - 1;
-    int count_ = 0;
+    u32 last_key_ = nothing;
+    float limit_t_, lost_t_;  // the nearest hit put aside, and the nearest lost: what is pending lies before the one, what
+    u32 limit_key_, lost_key_;  // is passed on before the other
+    u64 order_;                 // slots of the pending hits, nearest first, 4 bits each
+    u32 free_;
+    int count_, aside_count_;
   };
 };
 
