@@ -9,14 +9,15 @@ there leaves its chart and its table as they are; a result that names a failed m
 import argparse
 import glob
 import json
-import math
 import os
 import re
 
+from charts import SOFT, Svg, bars, lines, scatter, stacked
+from tables import clock_of, source, table
+from training_pages import TrainingPages
+
 HERE = os.path.dirname(os.path.abspath(__file__))
-COLORS = ["#4269d0", "#efb118", "#ff725c", "#6cc5b0", "#3ca951", "#a463f2", "#97bbf5", "#9c6b4e", "#9498a0"]
 STRATEGIES = ("pixel", "hybrid", "primitive")
-INK, SOFT, GRID = "#1f2328", "#57606a", "#d8dee4"
 
 # The parts of a step and the stages that make them up: stages nest, so each part names the outermost ones.
 COMPONENTS = (
@@ -42,216 +43,7 @@ def backward_ms(run):
     return run.get("stages_ms", {}).get("backward")
 
 
-def text_of(value):
-    return str(value).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-
-
-def ticks(top, wanted=5):
-    """Round numbers from 0 to at least `top`."""
-    if top <= 0:
-        return [0, 1]
-    step = 10.0 ** len(str(int(top)))
-    while top / step < wanted:
-        for divisor in (2, 2.5, 2):
-            if top / step >= wanted:
-                break
-            step /= divisor
-    out = [0.0]
-    while out[-1] < top:
-        out.append(out[-1] + step)
-    return out
-
-
-class Svg:
-    """A drawing on a light ground of its own, so that it reads on light and on dark pages."""
-
-    def __init__(self, width, height, title):
-        self.width, self.height, self.parts = width, height, []
-        self.text(20, 30, title, size=16, weight="600")
-
-    def add(self, markup):
-        self.parts.append(markup)
-
-    def text(self, x, y, value, size=12, anchor="start", color=INK, weight="400"):
-        self.add(f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" text-anchor="{anchor}" fill="{color}" '
-                 f'font-weight="{weight}">{text_of(value)}</text>')
-
-    def line(self, x0, y0, x1, y1, color=GRID, width=1):
-        self.add(f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{y1:.1f}" stroke="{color}" '
-                 f'stroke-width="{width}"/>')
-
-    def bar(self, x, y, width, height, color, hint):
-        self.add(f'<rect x="{x:.1f}" y="{y:.1f}" width="{max(width, 0):.1f}" height="{height:.1f}" fill="{color}">'
-                 f"<title>{text_of(hint)}</title></rect>")
-
-    def legend(self, x, y, entries):
-        for name, color in entries:
-            self.bar(x, y - 9, 11, 11, color, name)
-            self.text(x + 16, y, name, color=SOFT)
-            x += 34 + 7 * len(name)
-
-    def write(self, path):
-        os.makedirs(os.path.dirname(path), exist_ok=True)
-        with open(path + ".part", "w") as f:
-            f.write(f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width} {self.height}" '
-                    f'width="{self.width}" height="{self.height}" font-family="system-ui, sans-serif">\n'
-                    f'<rect width="{self.width}" height="{self.height}" rx="8" fill="#ffffff" stroke="{GRID}"/>\n'
-                    + "\n".join(self.parts) + "\n</svg>\n")
-        os.replace(path + ".part", path)
-        print("wrote", path)
-
-
-def axis(svg, left, right, top, bottom, values, unit):
-    """A vertical scale; returns the height of a value."""
-    y_of = lambda v: bottom - (bottom - top) * v / values[-1]
-    for v in values:
-        svg.line(left, y_of(v), right, y_of(v))
-        svg.text(left - 8, y_of(v) + 4, f"{v:g}", anchor="end", color=SOFT)
-    svg.text(left, top - 12, unit, color=SOFT)
-    return y_of
-
-
-def bars(path, title, unit, groups, note):
-    """groups: [(label, [(series, value)])]; a bar each, side by side."""
-    series = list(dict.fromkeys(name for _, row in groups for name, _ in row))
-    color = {name: COLORS[i % len(COLORS)] for i, name in enumerate(series)}
-    svg = Svg(760, 400, title)
-    svg.legend(20, 56, color.items())
-    y_of = axis(svg, 70, 740, 104, 330, ticks(max(v for _, row in groups for _, v in row)), unit)
-    share = 670 / len(groups)
-    for g, (label, row) in enumerate(groups):
-        width = min(70, 0.75 * share / len(row))
-        x = 70 + share * (g + 0.5) - width * len(row) / 2
-        for name, value in row:
-            svg.bar(x + 2, y_of(value), width - 4, y_of(0) - y_of(value), color[name],
-                    f"{label}, {name}: {value:.3g} {unit}")
-            svg.text(x + width / 2, y_of(value) - 5, f"{value:.3g}", size=11, anchor="middle")
-            x += width
-        svg.text(70 + share * (g + 0.5), 352, label, anchor="middle")
-    svg.text(20, 384, note, size=11, color=SOFT)
-    svg.write(path)
-
-
-def stacked(path, title, unit, rows, note):
-    """rows: [(label, [(part, value)])]; one horizontal bar a row."""
-    names = list(dict.fromkeys(name for _, parts in rows for name, value in parts if value > 0))
-    color = {name: COLORS[i % len(COLORS)] for i, name in enumerate(names)}
-    height = 120 + 40 * len(rows) + 50
-    svg = Svg(860, height, title)
-    svg.legend(20, 56, color.items())
-    values = ticks(max(sum(v for _, v in parts) for _, parts in rows))
-    left, right, top, bottom = 210, 780, 80, 80 + 40 * len(rows)
-    x_of = lambda v: left + (right - left) * v / values[-1]
-    for v in values:
-        svg.line(x_of(v), top, x_of(v), bottom)
-        svg.text(x_of(v), bottom + 18, f"{v:g}", anchor="middle", color=SOFT)
-    svg.text(right + 12, bottom + 18, unit, color=SOFT)
-    for r, (label, parts) in enumerate(rows):
-        y, at = top + 40 * r + 8, 0.0
-        svg.text(left - 10, y + 17, label, anchor="end")
-        for name, value in parts:
-            if value > 0:
-                svg.bar(x_of(at), y, x_of(at + value) - x_of(at), 24, color[name],
-                        f"{label}, {name}: {value:.3g} {unit}")
-                at += value
-        svg.text(x_of(at) + 6, y + 17, f"{at:.3g}", size=11)
-    svg.text(20, height - 16, note, size=11, color=SOFT)
-    svg.write(path)
-
-
-def lines(path, title, unit, x_title, series, note):
-    """series: [(name, [(x, y)])]."""
-    svg = Svg(760, 420, title)
-    color = {name: COLORS[i % len(COLORS)] for i, (name, _) in enumerate(series)}
-    svg.legend(20, 56, color.items())
-    points = [p for _, row in series for p in row]
-    y_of = axis(svg, 70, 720, 104, 330, ticks(max(y for _, y in points)), unit)
-    low, high = min(x for x, _ in points), max(x for x, _ in points)
-    x_of = lambda x: 90 + 610 * (x - low) / max(high - low, 1e-9)
-    for x in sorted({x for x, _ in points}):
-        svg.text(x_of(x), 350, f"{x:g}", anchor="middle", color=SOFT)
-    svg.text(395, 372, x_title, anchor="middle", color=SOFT)
-    for name, row in series:
-        path_of = " ".join(f"{x_of(x):.1f},{y_of(y):.1f}" for x, y in sorted(row))
-        svg.add(f'<polyline points="{path_of}" fill="none" stroke="{color[name]}" stroke-width="2"/>')
-        for x, y in row:
-            svg.add(f'<circle cx="{x_of(x):.1f}" cy="{y_of(y):.1f}" r="3.5" fill="{color[name]}">'
-                    f"<title>{text_of(name)}: {x:g} M, {y:.3g} {unit}</title></circle>")
-    svg.text(20, 404, note, size=11, color=SOFT)
-    svg.write(path)
-
-
-def scatter(svg, top, points, x_title, y_title):
-    """points: [(label, x, y, on the front)] over two logarithmic scales, in a panel 400 high that begins at `top`."""
-    left, right, bottom = 80, 1010, top + 360
-    xs, ys = [p[1] for p in points], [p[2] for p in points]
-    spread = lambda values, room: (math.log10(min(values)) - room, math.log10(max(values)) + room)
-    (x_low, x_high), (y_low, y_high) = spread(xs, 0.06), spread(ys, 0.2)
-    x_of = lambda v: left + (right - left) * (math.log10(v) - x_low) / (x_high - x_low)
-    y_of = lambda v: bottom - (bottom - top) * (math.log10(v) - y_low) / (y_high - y_low)
-
-    def decade_ticks(low, high):
-        steps = (1, 2, 3, 5, 7) if high - low < 1 else (1, 2, 5) if high - low < 2.3 else (1,)
-        values = (m * 10.0 ** e for e in range(math.floor(low), math.ceil(high) + 1) for m in steps)
-        return [v for v in values if low <= math.log10(v) <= high]
-
-    for v in decade_ticks(x_low, x_high):
-        svg.line(x_of(v), top, x_of(v), bottom)
-        svg.text(x_of(v), bottom + 18, f"{v:g}", anchor="middle", color=SOFT)
-    for v in decade_ticks(y_low, y_high):
-        svg.line(left, y_of(v), right, y_of(v))
-        svg.text(left - 8, y_of(v) + 4, f"{v:g}", anchor="end", color=SOFT)
-    svg.text(right, bottom + 36, x_title, anchor="end", color=SOFT)
-    svg.text(left, top - 10, y_title, color=SOFT)
-
-    front = sorted((p for p in points if p[3]), key=lambda p: p[1])
-    corners = [(x_of(front[0][1]), y_of(front[0][2]))]
-    for _, x, y, _ in front[1:]:
-        corners += [(x_of(x), corners[-1][1]), (x_of(x), y_of(y))]
-    svg.add(f'<polyline points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in corners)}" fill="none" '
-            f'stroke="{COLORS[0]}" stroke-width="1.6"/>')
-    taken = []
-    for label, x, y, on_front in sorted(points, key=lambda p: p[3]):
-        taken.append((x_of(x) - 4, y_of(y) - 4, x_of(x) + 4, y_of(y) + 4))
-        svg.add(f'<circle cx="{x_of(x):.1f}" cy="{y_of(y):.1f}" r="4" fill="{COLORS[0] if on_front else "#b9c0c6"}">'
-                f"<title>{text_of(label)}: {x:.3g} ms, error {y:.2g}</title></circle>")
-    # The front chooses the places of its labels first; further off, a thin line leads to the point.
-    for label, x, y, on_front in sorted(points, key=lambda p: (not p[3], p[1])):
-        at, width = (x_of(x), y_of(y)), 6.3 * len(label)
-        for reach in (8, 20, 36, 56, 80, 110) if on_front else (8, 20, 36):
-            for across, down in ((1, 0), (-1, 0), (1, -1), (1, 1), (-1, -1), (-1, 1), (0, -1), (0, 1)):
-                end = (at[0] + across * reach, at[1] + down * reach)
-                x0 = end[0] if across > 0 else end[0] - width if across < 0 else end[0] - width / 2
-                box = (x0, end[1] - 7, x0 + width, end[1] + 7)
-                if box[0] < left or box[2] > right + 40 or box[1] < top or box[3] > bottom:
-                    continue
-                if any(box[0] < o[2] and o[0] < box[2] and box[1] < o[3] and o[1] < box[3] for o in taken):
-                    continue
-                break
-            else:
-                continue
-            taken.append(box)
-            if reach > 10:
-                svg.line(*at, *end)
-            svg.text(x0, end[1] + 4, label, size=11, color=INK if on_front else "#8b949e")
-            break
-
-
-def table(header, rows):
-    out = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    return out + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
-
-
-def clock_of(tradeoff):
-    return "processor_ms" if tradeoff["clock"] == "processor" else "total_ms"
-
-
-def source(result):
-    machine = result["machine"]
-    return f"{machine.get('gpu', machine['cpu'])}, commit {result['commit']}, {result['date']}"
-
-
-class Pages:
+class Pages(TrainingPages):
     def __init__(self, results, docs):
         self.results, self.docs, self.tables = results, docs, {}
 
@@ -410,46 +202,6 @@ class Pages:
             self.tables["uncut"] = table(["scene", "setting", "alpha_min", "image, max", "PSNR, dB",
                                           "gradient, worst group"], uncut)
 
-    def presets(self):
-        rows = []
-        for path in sorted(glob.glob(os.path.join(self.results, "presets_*.json"))):
-            result = self.load(os.path.basename(path)[:-5])
-            trade = self.load("tradeoff_" + result["scene"])
-            of = {r["name"].replace("preset=", ""): r for r in trade["runs"]} if trade else {}
-            for r in result["runs"]:
-                a, t = r["approximations"], of.get(r["preset"])
-                rows.append([result["scene"], r["preset"], f"{a['alpha_min']:.3g}", f"{a['t_min']:.3g}"] +
-                            ([f"{t['image']['psnr']:.1f}", f"{t['gradient_worst']:.1e}", f"{t[clock_of(trade)]:.1f}"] if t
-                             else ["", "", ""]) +
-                            [f"{r['psnr']:.2f}", f"{r['ssim']:.4f}", f"{r['seconds']:.0f}", f"{r['gaussians']:,}"])
-            rows.append([f"{result['scene']}: {source(result)}"] + [""] * 10)
-        if rows:
-            self.tables["presets"] = table(["scene", "preset", "alpha_min", "t_min", "image PSNR, dB",
-                                            "gradient, worst group", "a view, ms", "trained PSNR, dB", "SSIM",
-                                            "training, s", "Gaussians"], rows)
-
-    def auto(self):
-        rows = []
-        for path in sorted(glob.glob(os.path.join(self.results, "auto_*.json"))):
-            result = self.load(os.path.basename(path)[:-5])
-            runs = [r for r in result["runs"] if "error" not in r]
-            full = {r["seed"]: r for r in runs if r["mode"] == "--no-auto"}
-            for r in runs:
-                base = full.get(r["seed"], {})
-                change = f"{r['psnr'] - base['psnr']:+.3f}" if r["mode"] == "--auto" and base else ""
-                gains = ", ".join(f"{t['band']}: {t['gain']:+.3f} ({t['forecast']:+.3f})" for t in r["sh_trials"])
-                rows.append([result["capture"], "full" if r["mode"] == "--no-auto" else "auto", r["sh_degree"],
-                             r["floats_per_gaussian"], f"{r['psnr']:.3f}", change, f"{r['seconds']:.0f}",
-                             f"{r['cpu_seconds']:.0f}", f"{r['model_bytes'] / 1e3:,.0f}",
-                             f"{r['checkpoint_bytes'] / 1e3:,.0f}", f"{r['peak_bytes'] / 1e6:.1f}", gains])
-            first = runs[0] if runs else {}
-            rows.append([f"{result['capture']}: {first.get('image_size', '')}, {first.get('options', '')}; "
-                         f"{first.get('backend', '')}, {source(result)}"] + [""] * 11)
-        if rows:
-            self.tables["auto"] = table(["capture", "model", "SH", "floats", "PSNR, dB", "against full", "training, s",
-                                         "CPU, s", "PLY, kB", "checkpoint, kB", "peak, MB",
-                                         "bands tried: gain (forecast), dB"], rows)
-
     def write_tables(self):
         for path in sorted(glob.glob(os.path.join(self.docs, "*.md"))):
             with open(path) as f:
@@ -485,6 +237,8 @@ def main():
     pages.tradeoff()
     pages.presets()
     pages.auto()
+    pages.curves()
+    pages.long()
     pages.write_tables()
 
 

@@ -3,7 +3,7 @@
 
     python3 bench/run.py --build DIR --scenes DIR --what tests,stages,paper
 
-What (comma-separated; default all but sanitize, cpu, traits, tradeoff, presets and auto):
+What (comma-separated; default tests and paper):
   tests       every CUDA test of the build
   sanitize    compute-sanitizer memcheck and racecheck over a training step of each strategy
   stages      gart_bench_cuda on the first scene: each stage on its own, and tile sizes 4, 8 and 16
@@ -17,6 +17,13 @@ What (comma-separated; default all but sanitize, cpu, traits, tradeoff, presets 
   presets     `gart train` with each --preset on every --capture: what they cost in quality
   auto        `gart train --auto` against --no-auto on every --capture: scores, seconds, bytes, what was chosen and
               measured; a file auto_NAME.json each
+  curves      a short training of every --capture by each strategy, same seed: the loss curves against each other and
+              against the noise from run to run, the test scores, and whether deterministic gives the same bits twice
+  long        a full training of every --capture: every step checked (gart train --check-finite), five seeds, and
+              deterministic twice; --long names those to run. long.json is written after each, and what is in it already
+              of the same commit, machine and options is not run again
+
+On a host, deterministic needs -DGART_VARIANTS=ON. curves.json and long.json keep the captures that are not named.
 
 Scenes are DIR/NAME.ply with DIR/NAME.json, a list of cameras {"name","width","height","fx","fy","cx","cy","c2w"}.
 synth_1000k is the scene of a million Gaussians, and so on. A missing one is made by --generator, a command in which
@@ -33,22 +40,18 @@ import glob
 import json
 import os
 import re
-import resource
 import shlex
 import shutil
-import subprocess
 import sys
 import tempfile
 import time
 
-PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff", "presets", "auto")
-PRESETS = ("exact", "balanced", "fast")
+from common import Failure, commit_of, first_match, last_line, machine, run
+from training import LONG_PARTS, Trainings
+
+TRAININGS = ("presets", "auto", "curves", "long")
+PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff") + TRAININGS
 SKIPPED = 77
-# Steps and Gaussians of a full training where --train does not say.
-FULL_TRAINING = {"lego": "--iterations 30000 --max-gaussians 300000",
-                 "tandt_train": "--iterations 30000 --max-gaussians 1000000",
-                 "fox": "--iterations 30000 --max-gaussians 500000",
-                 "many_cameras": "--iterations 30000 --max-gaussians 500000"}
 
 # Rows of docs/traits.md: name, SH degree, kernel degree, options of gart bench.
 TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
@@ -60,49 +63,7 @@ TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
                ("window 16", 3, 2, {"window": 16}), ("window 64", 3, 2, {"window": 64})])
 
 
-class Failure(Exception):
-    pass
-
-
-def run(command, **options):
-    """The finished process; never raises for an exit code."""
-    return subprocess.run([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                          errors="replace", **options)
-
-
-def last_line(text):
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
-    return lines[-1] if lines else "no output"
-
-
-def first_match(pattern, text):
-    found = re.search(pattern, text, re.MULTILINE)
-    return found.group(1).strip() if found else "unknown"
-
-
-def machine():
-    cpuinfo = open("/proc/cpuinfo").read() if os.path.exists("/proc/cpuinfo") else ""
-    out = {"cpu": first_match(r"^model name\s*:\s*(.*)$", cpuinfo), "cores": os.cpu_count()}
-    if shutil.which("nvidia-smi"):
-        query = run(["nvidia-smi", "--query-gpu=name,driver_version,memory.total", "--format=csv,noheader"]).stdout
-        fields = [f.strip() for f in query.splitlines()[0].split(",")] if query.strip() else []
-        if len(fields) == 3:
-            out["gpu"], out["driver"], out["gpu_memory"] = fields
-    return out
-
-
-def commit_of(argument):
-    if argument:
-        return argument
-    folder = os.path.dirname(os.path.abspath(__file__))
-    head = run(["git", "-C", folder, "rev-parse", "--short=12", "HEAD"])
-    if head.returncode != 0:
-        return "unknown"
-    changed = run(["git", "-C", folder, "status", "--porcelain", "--untracked-files=no"]).stdout.strip()
-    return head.stdout.strip() + (" with changes" if changed else "")
-
-
-class Bench:
+class Bench(Trainings):
     def __init__(self, a):
         self.a = a
         self.commit = commit_of(a.commit)
@@ -124,11 +85,14 @@ class Bench:
         self.failures.append(text)
         self.say("FAILED  " + text)
 
+    def stamp(self):
+        return {"machine": self.machine, "commit": self.commit,
+                "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d %H:%M UTC")}
+
     def write(self, what, runs, **more):
         os.makedirs(self.a.out, exist_ok=True)
         path = os.path.join(self.a.out, what + ".json")
-        result = {"what": what, "machine": self.machine, "commit": self.commit,
-                  "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
+        result = {"what": what, **self.stamp(),
                   "command": " ".join(shlex.quote(x) for x in ["python3"] + sys.argv), **more, "runs": runs}
         with open(path + ".part", "w") as f:
             json.dump(result, f, indent=1)
@@ -357,56 +321,6 @@ class Bench:
             self.write("tradeoff_" + name, result.pop("settings"), scene=name, **result)
             self.say(f"{name}: {len(result['absent'])} settings not compiled, {result['seconds']:.0f} s")
 
-    def presets(self):
-        for name, capture in self.a.capture:
-            runs = []
-            for preset in PRESETS:
-                folder = os.path.join(self.temporary, "preset")
-                shutil.rmtree(folder, ignore_errors=True)
-                done = run([self.program("gart"), "train", capture, "--out", folder, "--preset", preset, "--no-auto",
-                            "--backend", self.a.backend, "--quiet", *shlex.split(self.a.train)])
-                if done.returncode != 0:
-                    self.fail(f"{name}, {preset}: {last_line(done.stderr)}")
-                    continue
-                with open(os.path.join(folder, "metrics.json")) as f:
-                    metrics = json.load(f)
-                kept = ("psnr", "ssim", "seconds", "gaussians", "iterations", "approximations", "backend", "image_size",
-                        "test_views", "peak_bytes")
-                runs.append({"preset": preset, **{key: metrics[key] for key in kept}})
-                self.say(f"{name}, {preset}: {metrics['psnr']:.2f} dB, {metrics['seconds']:.0f} s")
-            self.write("presets_" + name, runs, scene=name, train=self.a.train)
-
-    def auto(self):
-        kept = ("psnr", "ssim", "test_views", "seconds", "gaussians", "sh_degree", "floats_per_gaussian", "model_bytes",
-                "checkpoint_bytes", "peak_bytes", "profiled_step_ms", "background", "backend", "tracer", "backward",
-                "image_size", "train_views", "iterations", "sh_trials", "chosen")
-        for name, folder in self.a.capture:
-            runs = []
-            options = self.a.train or FULL_TRAINING.get(name, "")
-            for seed in range(1, self.a.seeds + 1):
-                for mode in ("--no-auto", "--auto"):
-                    out = os.path.join(self.temporary, "run")
-                    command = [self.program("gart"), "train", folder, "--out", out, mode, "--backend", self.a.backend,
-                               "--seed", seed, "--eval-every", 0, "--quiet", *shlex.split(options)]
-                    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-                    done = run(command)
-                    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-                    row = {"mode": mode, "seed": seed, "options": options}
-                    if done.returncode != 0:
-                        row["error"] = last_line(done.stderr)
-                        self.fail(f"{name}, {mode}: {row['error']}")
-                    else:
-                        with open(os.path.join(out, "metrics.json")) as f:
-                            metrics = json.load(f)
-                        row.update({k: metrics[k] for k in kept})
-                        # Of the whole process, loading and testing included; other work on the machine is not in it.
-                        row["cpu_seconds"] = after.ru_utime - before.ru_utime
-                        self.say(f"{name}, seed {seed}, {mode}: {row['psnr']:.3f} dB, {row['seconds']:.1f} s, "
-                                 f"{row['floats_per_gaussian']} floats a Gaussian")
-                    runs.append(row)
-            self.write("auto_" + name, runs, capture=name)
-
-
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     listed = lambda text: [x for x in text.split(",") if x]
@@ -424,16 +338,20 @@ def arguments():
     parser.add_argument("--backwards", type=listed, default=["pixel", "hybrid", "primitive"])
     parser.add_argument("--views", type=int, default=4, help="cameras of the strategies")
     parser.add_argument("--repeats", type=int, default=20, help="measured steps a camera; the median counts")
-    parser.add_argument("--backend", default="cuda", help="of traits, tradeoff, presets and auto")
+    parser.add_argument("--backend", default="cuda", help="of traits, tradeoff and the trainings")
     parser.add_argument("--filter", default=".", help="stages and cpu: benchmarks by regular expression")
     parser.add_argument("--min-time", type=float, default=0.2, help="stages and cpu: seconds a benchmark")
     parser.add_argument("--model", nargs=3, action="append", default=[], metavar=("NAME", "PLY", "CAMERAS"),
                         help="tradeoff, and traits, which takes the first: a trained model and its capture or camera "
                              "JSON; may be repeated")
     parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("NAME", "DATASET"),
-                        help="presets and auto: a capture to train on; may be repeated")
-    parser.add_argument("--train", default="", help="presets and auto: further options of gart train, in one string")
-    parser.add_argument("--seeds", type=int, default=1, help="auto: runs of each kind")
+                        help="presets, auto, curves and long: a capture to train on; may be repeated")
+    parser.add_argument("--train", default="",
+                        help="the same: options of gart train, in one string; --iterations, where it is not among "
+                             "them, is 1000 for curves and 30000 for the others")
+    parser.add_argument("--seeds", type=int, help="auto: runs of each kind, 1 where not given; long: seeds, 5")
+    parser.add_argument("--long", type=listed, default=list(LONG_PARTS),
+                        help="of " + ",".join(LONG_PARTS) + ": the trainings of long to run")
     parser.add_argument("--clock", default="wall", choices=("wall", "processor"),
                         help="tradeoff: what the fronts are drawn over; processor where a CPU has other work")
     parser.add_argument("--commit", help="what was built, where the folder is no git checkout")
@@ -444,6 +362,11 @@ def arguments():
     unknown = [w for w in wanted if w not in PARTS + ("paper",)]
     if unknown:
         parser.error(f"--what {unknown[0]}: not one of {', '.join(PARTS)}, paper")
+    unknown = [w for w in a.long if w not in LONG_PARTS]
+    if unknown:
+        parser.error(f"--long {unknown[0]}: not one of {', '.join(LONG_PARTS)}")
+    if any(p in wanted for p in TRAININGS) and not a.capture:
+        parser.error(f"--capture NAME DIR is missing: {', '.join(TRAININGS)} train on captures")
     a.parts = [p for p in PARTS if p in wanted]
     if not os.path.isdir(a.build):
         parser.error(f"--build {a.build}: no such folder")

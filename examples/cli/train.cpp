@@ -183,7 +183,7 @@ class training_run {
       if (interrupt.wanted() || (a_.stop_at > 0 && before >= a_.stop_at)) return false;
       session_->profile().enable(before % profile_every == profile_every - 1);
       stopwatch const step;
-      gart::step_report const report = session_->step();
+      gart::step_report const report = checked_step();
       double const seconds = step.seconds();
       if (session_->profile().enabled()) ++profiled_steps_, profiled_seconds_ += seconds;
       session_->profile().enable(false);
@@ -197,6 +197,7 @@ class training_run {
                           ": the loss is not a number (the last checkpoint is whole: " + a_.checkpoint_file().string() +
                           ")");
       }
+      finite_steps_ += a_.check_finite, skipped_updates_ += report.skipped;
       ++steps_, step_seconds_ += seconds, course_.seconds += seconds, gaussians_ = report.gaussians;
       if (!report.trial) course_.add(report);
       say_new_trials();
@@ -212,6 +213,14 @@ class training_run {
       }
     }
     return true;
+  }
+
+  gart::step_report checked_step() {
+    try {
+      return session_->step();
+    } catch (gart::not_finite const& e) {
+      throw gart::error(std::string(e.what()) + "; the last checkpoint is whole: " + a_.checkpoint_file().string());
+    }
   }
 
   void say_new_trials() {
@@ -327,6 +336,8 @@ class training_run {
     m["kernel_degree"] = row_.kernel_degree;
     m["approximations"] = approximations_of(train_options_of(a_).render, row_);
     m["approximations"]["preset"] = a_.preset;
+    m["finite_steps"] = finite_steps_;
+    if (a_.check_finite) m["skipped_updates"] = skipped_updates_;
     m["seconds"] = course_.seconds;
     m["iterations_per_second"] = course_.seconds > 0 ? a_.iterations / course_.seconds : 0;
     m["wall_seconds"] = {
@@ -355,6 +366,8 @@ class training_run {
   std::unique_ptr<gart::session> session_;
   std::size_t gaussians_ = 0;
   int steps_ = 0, profiled_steps_ = 0;
+  int finite_steps_ = 0;               // steps of this process after which everything was finite, by --check-finite
+  std::uint64_t skipped_updates_ = 0;  // numbers that Adam left as they were in them
   double load_seconds_ = 0, step_seconds_ = 0, test_seconds_ = 0, save_seconds_ = 0, profiled_seconds_ = 0;
 };
 

@@ -121,6 +121,9 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->type_name("M")
       ->capture_default_str()
       ->check(between(0, 1e6));
+  in_group(train.add_flag("--check-finite", a.check_finite,
+                          "After each step look for numbers that are not finite in all\nparameters and Adam's moments, "
+                          "and stop at the first with exit\ncode 1; metrics.json says how many steps were checked"));
   in_group(train.add_option("--stop-at", a.stop_at,
                             "Stop after this step as Ctrl-C would, 0: do not; the run can\nthen be resumed"))
       ->type_name("N")
@@ -184,6 +187,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.background = a.background == "white"    ? gart::background_kind::white
                  : a.background == "random" ? gart::background_kind::random
                                             : gart::background_kind::black;
+  o.check_finite = a.check_finite;
   o.seed = a.seed;
   o.render.alpha_min = a.alpha_min;
   o.render.transmittance_min = a.t_min;

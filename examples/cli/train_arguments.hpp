@@ -15,7 +15,7 @@ namespace gart_cli {
 
 struct train_arguments {
   std::filesystem::path dataset, out;
-  bool resume = false, quiet = false;
+  bool resume = false, quiet = false, check_finite = false;
   int threads = 0, stop_at = 0;
   float checkpoint_minutes = 10;
 

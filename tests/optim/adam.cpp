@@ -77,7 +77,7 @@ TEST_CASE_TEMPLATE("elements whose gradient is not finite stay, and are counted"
   gaussians<E> model(exec, start);
   gaussians<E> const gradient(exec, g);
   optimizer_state<E> state(exec, 300, 0);
-  buffer<u32, E> skipped(exec, std::vector<u32>{0});
+  buffer<u64, E> skipped(exec, std::vector<u64>{0});
   adam_step(exec, model, gradient, state, {}, 1, 0, skipped.view());
   adam_step(exec, model, gradient, state, {}, 2, 0);
   gaussian_model const got = model.to_host(), first = state.first.to_host(), second = state.second.to_host();

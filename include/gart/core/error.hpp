@@ -41,4 +41,12 @@ struct out_of_memory : error {
   std::size_t asked, available;
 };
 
+// A number of a training that is not finite any more (optim/finite.hpp). `group` as the message names it.
+struct not_finite : error {
+  not_finite(std::string const& what, std::string group_name, std::size_t first)
+      : error(what), group(std::move(group_name)), gaussian(first) {}
+  std::string group;
+  std::size_t gaussian;
+};
+
 }  // namespace gart

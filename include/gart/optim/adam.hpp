@@ -50,7 +50,7 @@ struct adam_kernel {
   adam_group groups[5];
   index_t group_tiles, rows;
   float beta1, beta2, epsilon, second_correction;  // 1 / sqrt(1 - b2^t); the rates carry 1 / (1 - b1^t)
-  u32* skipped;
+  u64* skipped;
 
   template <class Team>
   GART_HD void operator()(Team const& team) const {
@@ -71,7 +71,7 @@ struct adam_kernel {
     float const v = fma(beta2, group.second[i], mul(mul(1.0f - beta2, g), g));
     float const p = group.parameter[i] - rate * m / (square_root(v) * second_correction + epsilon);
     if (!is_finite(g) || !is_finite(v) || !is_finite(p)) {
-      if (skipped) E::atomic_add(skipped, 1u);
+      if (skipped) E::atomic_add(skipped, u64{1});
       return;
     }
     group.parameter[i] = p, group.first[i] = m, group.second[i] = v;
@@ -84,7 +84,7 @@ struct adam_kernel {
 // up by the elements that were not finite.
 template <execution E>
 void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optimizer_state<E>& state,
-               learning_rates const& rates, int step, int active_sh_degree, span<u32> skipped = {},
+               learning_rates const& rates, int step, int active_sh_degree, span<u64> skipped = {},
                adam_options const& options = {}) {
   if (model.size() == 0) return;
   using kernel = detail::adam_kernel<E>;

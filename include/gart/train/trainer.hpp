@@ -14,6 +14,7 @@
 #include <gart/loss/image_loss.hpp>
 #include <gart/optim/adam.hpp>
 #include <gart/optim/adc.hpp>
+#include <gart/optim/finite.hpp>
 #include <gart/optim/mcmc.hpp>
 #include <gart/optim/schedule.hpp>
 #include <gart/render/forward.hpp>
@@ -23,6 +24,8 @@
 #include <gart/train/state.hpp>
 #include <gart/train/training_images.hpp>
 #include <gart/train/view_order.hpp>
+
+#include <optional>
 
 namespace gart {
 
@@ -100,7 +103,7 @@ class trainer {
   mcmc<E> mcmc_;
   adaptive_density<E> adc_;
   buffer<float, E> color_, color_gradient_, value_;
-  buffer<u32, E> skipped_;
+  std::optional<finite_check<E>> finite_;  // where options.check_finite asks for it
   int step_ = 0;
   float growth_ = 1;
   bool fell_back_ = false;

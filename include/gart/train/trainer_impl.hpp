@@ -28,11 +28,10 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       adc_(exec, options.adc, options.max_gaussians, options.iterations, data.extent, options.seed),
       color_(exec),
       color_gradient_(exec),
-      value_(exec, 2),
-      skipped_(exec, 1) {
+      value_(exec, 2) {
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
-  skipped_.zero();
+  if (options.check_finite) finite_.emplace(exec);
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
 }
@@ -75,6 +74,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   update(view, degree);
 
   step_report report;
+  if (finite_) report.skipped = (*finite_)(scene_, state_, "step " + std::to_string(step_) + ", view " + view.name);
   report.step = step_;
   report.gaussians = scene_.size();
   report.view = view.name;
@@ -108,7 +108,7 @@ void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, int 
   bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
   if (use_mcmc) mcmc_.add_penalties(scene_, gradients_);
   if (use_adc) adc_.accumulate(scene_, gradients_, view.view);
-  adam_step(exec_, scene_, gradients_, state_, rates, step_, degree, skipped_.view());
+  adam_step(exec_, scene_, gradients_, state_, rates, step_, degree, finite_ ? finite_->skipped() : span<u64>{});
   density_change change;
   if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean);
   if (use_adc) change = adc_.after_step(scene_, state_, step_);

@@ -1,0 +1,153 @@
+"""What bench/plot.py draws of the trainings of bench/training.py: presets, auto, curves and long."""
+import glob
+import os
+
+from charts import courses
+from tables import clock_of, source, table
+
+
+def shown(value, form):
+    """A number in a format, or nothing where it was not measured."""
+    return format(value, form) if value is not None else ""
+
+
+def share(value):
+    return f"{100 * value:.2g}%"
+
+
+def reason(error):
+    """The first clause of an error, for a cell of a table."""
+    return error.split(";")[0].replace("|", "\\|")
+
+
+def bits(both):
+    """What two runs of `deterministic` came to, in words."""
+    if both["same_model"] is None:
+        return ""
+    if both["same_model"] and both["same_losses"]:
+        return "the same bits twice, model and losses"
+    return f"**not the same bits twice**: model {both['same_model']}, losses {both['same_losses']}"
+
+
+def mean_and_spread(values, form):
+    if not values:
+        return ""
+    deviation = f" +- {values['deviation']:{form}}" if values["deviation"] is not None else ""
+    return f"{values['mean']:{form}}{deviation} ({values['least']:{form}} to {values['most']:{form}})"
+
+
+class TrainingPages:
+    """A base of plot.py's Pages, which loads results and writes tables."""
+
+    def presets(self):
+        rows = []
+        for path in sorted(glob.glob(os.path.join(self.results, "presets_*.json"))):
+            result = self.load(os.path.basename(path)[:-5])
+            trade = self.load("tradeoff_" + result["scene"])
+            of = {r["name"].replace("preset=", ""): r for r in trade["runs"]} if trade else {}
+            for r in result["runs"]:
+                a, t = r["approximations"], of.get(r["preset"])
+                rows.append([result["scene"], r["preset"], f"{a['alpha_min']:.3g}", f"{a['t_min']:.3g}"] +
+                            ([f"{t['image']['psnr']:.1f}", f"{t['gradient_worst']:.1e}", f"{t[clock_of(trade)]:.1f}"] if t
+                             else ["", "", ""]) +
+                            [f"{r['psnr']:.2f}", f"{r['ssim']:.4f}", f"{r['seconds']:.0f}", f"{r['gaussians']:,}"])
+            rows.append([f"{result['scene']}: {source(result)}"] + [""] * 10)
+        if rows:
+            self.tables["presets"] = table(["scene", "preset", "alpha_min", "t_min", "image PSNR, dB",
+                                            "gradient, worst group", "a view, ms", "trained PSNR, dB", "SSIM",
+                                            "training, s", "Gaussians"], rows)
+
+    def auto(self):
+        rows = []
+        for path in sorted(glob.glob(os.path.join(self.results, "auto_*.json"))):
+            result = self.load(os.path.basename(path)[:-5])
+            runs = [r for r in result["runs"] if "error" not in r]
+            full = {r["seed"]: r for r in runs if r["mode"] == "--no-auto"}
+            for r in runs:
+                base = full.get(r["seed"], {})
+                change = f"{r['psnr'] - base['psnr']:+.3f}" if r["mode"] == "--auto" and base else ""
+                gains = ", ".join(f"{t['band']}: {t['gain']:+.3f} ({t['forecast']:+.3f})" for t in r["sh_trials"])
+                rows.append([result["capture"], "full" if r["mode"] == "--no-auto" else "auto", r["sh_degree"],
+                             r["floats_per_gaussian"], f"{r['psnr']:.3f}", change, f"{r['seconds']:.0f}",
+                             f"{r['cpu_seconds']:.0f}", f"{r['model_bytes'] / 1e3:,.0f}",
+                             f"{r['checkpoint_bytes'] / 1e3:,.0f}", f"{r['peak_bytes'] / 1e6:.1f}", gains])
+            first = runs[0] if runs else {}
+            rows.append([f"{result['capture']}: {first.get('image_size', '')}, {first.get('options', '')}; "
+                         f"{first.get('backend', '')}, {source(result)}"] + [""] * 11)
+        if rows:
+            self.tables["auto"] = table(["capture", "model", "SH", "floats", "PSNR, dB", "against full", "training, s",
+                                         "CPU, s", "PLY, kB", "checkpoint, kB", "peak, MB",
+                                         "bands tried: gain (forecast), dB"], rows)
+
+    def curves(self):
+        result = self.load("curves")
+        if not result:
+            return
+        panels, rows, notes = [], [], []
+        for entry in result["runs"]:
+            name, runs, noise = entry["capture"], entry["runs"], entry["noise"]
+            good = [r for r in runs if "error" not in r]
+            # The one with the widest line first: what the others lie on.
+            series = [(r["strategy"], r["curve"]) for r in good if r["run"] == 1 and r["curve"]]
+            if series:
+                panels.append((name, series, source(entry)))
+            for r in runs:
+                label = r["strategy"] + (", again" if r["run"] == 2 else "")
+                if "error" in r:
+                    rows.append([name, label, "failed", "", "", "", reason(r["error"])])
+                    continue
+                said, apart = "", r["difference"]
+                if r["strategy"] == "primitive":
+                    apart = None  # they are the mean that the others are compared with
+                    if r["run"] == 2 and noise:
+                        said = "the two runs of `primitive` against each other"
+                        apart = noise
+                if r["strategy"] == "deterministic" and r["run"] == 2:
+                    said = bits(entry["deterministic"])
+                end = r["curve"][-1][1] if r["curve"] else None
+                rows.append([name, label, shown(r["psnr"], ".2f"), shown(end, ".4g"),
+                             share(apart["largest"]) if apart else "", share(apart["mean"]) if apart else "", said])
+            first = good[0] if good else {}
+            notes += ["", f"{name}: {first.get('image_size', '')}, {entry['options']}, {first.get('backend', '')}; "
+                          f"means over {entry['window']} steps; {source(entry)}."]
+        rows = table(["capture", "strategy", "test PSNR, dB", "loss at the end", "largest difference",
+                      "mean difference", ""], rows)
+        if panels:
+            courses(self.figure("curves"), "Loss by strategy", "training loss", panels)
+            rows = ["![Loss by strategy](figures/curves.svg)", ""] + rows
+        self.tables["curves"] = rows + notes
+
+    def long(self):
+        result = self.load("long")
+        if not result:
+            return
+        rows, notes = [], []
+        for entry in result["runs"]:
+            name, summary = entry["capture"], entry["summary"]
+            seeds = summary["seeds"]
+            if seeds["runs"]:
+                rows.append([name, f"{seeds['runs']} seeds", mean_and_spread(seeds["psnr"], ".2f"),
+                             mean_and_spread(seeds["ssim"], ".4f"), mean_and_spread(seeds["seconds"], ".1f"), ""])
+            for r in entry["runs"]:
+                if r["part"] == "seeds" and "error" not in r:
+                    continue
+                label = {"finite": "every step checked", "deterministic": f"deterministic, run {r['run']}"}.get(
+                    r["part"], f"seed {r['seed']}")
+                if "error" in r:
+                    rows.append([name, label, "failed", "", "", reason(r["error"])])
+                    continue
+                against = summary[r["part"]]["time_against_seeds"]
+                said = [f"{against:.2f} times the seconds of the seeds"] if against else []
+                if r["part"] == "finite":
+                    said = [f"{r['finite_steps']:,} of {r['iterations']:,} steps finite, "
+                            f"{r['skipped_updates']:,} updates left out"] + said
+                elif r["run"] == 2:
+                    said = [bits(summary["deterministic"])] + said
+                else:
+                    said = []
+                rows.append([name, label, shown(r["psnr"], ".2f"), shown(r["ssim"], ".4f"), f"{r['seconds']:.1f}",
+                             "; ".join(text for text in said if text)])
+            first = next((r for r in entry["runs"] if "error" not in r), {})
+            notes += ["", f"{name}: {first.get('image_size', '')}, {entry['options']}, {first.get('backend', '')}, "
+                          f"{first.get('gaussians', 0):,} Gaussians at the end; {source(entry)}."]
+        self.tables["long"] = table(["capture", "runs", "PSNR, dB", "SSIM", "training, s", ""], rows) + notes

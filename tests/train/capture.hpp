@@ -1,0 +1,51 @@
+#pragma once
+// A capture so small that a training on it takes a moment: views of one cloud, to be learnt from another.
+
+#include <support/policies.hpp>
+#include <support/trace_scene.hpp>
+
+#include <gart/io/dataset.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+#include <utility>
+
+namespace gart_test {
+
+inline gart::gaussian_model cloud(std::uint64_t seed, float spread) {
+  std::mt19937_64 engine(seed);
+  std::normal_distribution<float> normal;
+  gart::gaussian_model m;
+  m.resize(150, 1);
+  for (auto& x : m.mean) x = spread * normal(engine);
+  for (auto& x : m.log_scale) x = -1.8f + 0.3f * normal(engine);
+  for (auto& x : m.quaternion) x = normal(engine);
+  for (auto& x : m.opacity) x = normal(engine);
+  for (auto& x : m.sh) x = 0.5f * normal(engine);
+  return m;
+}
+
+template <class E>
+gart::dataset capture(E& exec, std::uint64_t seed) {
+  gart::gaussian_model const truth = cloud(seed, 0.6f);
+  gart::dataset data;
+  for (int v = 0; v < 4; ++v) {
+    gart::dataset_view view;
+    view.name = std::to_string(v);
+    view.view.width = 29, view.view.height = 22;
+    view.view.fx = view.view.fy = 30, view.view.cx = 14.5f, view.view.cy = 11;
+    float const angle = 0.4f * static_cast<float>(v), c = std::cos(angle), s = std::sin(angle);
+    view.view.rotation = gart::mat3(gart::vec3(c, 0, -s), gart::vec3(0, 1, 0), gart::vec3(s, 0, c));
+    view.view.position = gart::vec3d(-4.0 * s, 0, -4.0 * c);
+    auto const picture = render_scene(exec, truth, view.view, gart::render_options{}, 1, tracer_kind::tiles);
+    view.image = gart::image8(view.view.width, view.view.height, 3);
+    for (std::size_t i = 0; i < picture.color.size(); ++i)
+      view.image.data[i] = static_cast<gart::u8>(std::lround(255 * std::clamp(picture.color[i], 0.0f, 1.0f)));
+    data.train.push_back(std::move(view));
+  }
+  return data;
+}
+
+}  // namespace gart_test
