@@ -38,6 +38,12 @@ bool lower_rows(row_request request) {
   }
 }
 
+struct running_trial {
+  training_state start;                // where the branches parted
+  std::optional<training_state> with;  // where the branch with the band ended
+  double psnr_with = 0;
+};
+
 class degree_selection final : public session {
  public:
   degree_selection(row_request const& request, train_options const& options, dataset const& data,
@@ -95,12 +101,6 @@ class degree_selection final : public session {
   row_info row() const override { return inner_->row(); }
 
  private:
-  struct trial {
-    training_state start;                // where the branches parted
-    std::optional<training_state> with;  // where the branch with the band ended
-    double psnr_with = 0;
-  };
-
   int first_step(int band) const { return band * interval_; }
   int stored_degree(int step) const {
     return std::max(start_degree_, sh_degree_at(step, plan_.degree, interval_, options_.iterations));
@@ -182,7 +182,7 @@ class degree_selection final : public session {
   std::vector<std::size_t> never_trained_;
   bool settled_ = false;
   std::unique_ptr<session> inner_;
-  std::optional<trial> trial_;
+  std::optional<running_trial> trial_;
   std::vector<band_trial> trials_;
   profiler profile_;
   std::size_t peak_bytes_ = 0;

@@ -164,6 +164,29 @@ std::vector<T> rows(std::vector<T> const& v, int width, std::vector<bool> const&
   return out;
 }
 
+// Every way: `model` without its broken Gaussians gives what `expected` does, and they get no gradient.
+template <class E>
+void check_same(number_source& random, gart::gaussian_model const& model, std::vector<bool> const& broken,
+                gart::gaussian_model const& expected) {
+  E exec;
+  gart::camera const view = small_camera();
+  auto const gradient = random_gradient(random, view);
+  auto const wanted = run_all(exec, expected, view, {}, gradient), got = run_all(exec, model, view, {}, gradient);
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    CAPTURE(got[i].way);
+    check_finite(got[i]);
+    check_same_image(got[i], wanted[i]);
+    for (auto const& group : parameter_groups) {
+      CAPTURE(group.name);
+      auto const& all = got[i].gradients.*group.got;
+      auto const kept = rows(all, group.width, broken, false), lost = rows(all, group.width, broken, true);
+      CHECK(std::all_of(lost.begin(), lost.end(), [](float x) { return x == 0; }));
+      auto const& e = wanted[i].gradients.*group.got;
+      CHECK(relative_error(kept, {e.begin(), e.end()}) < 1e-5);  // threads add in another order
+    }
+  }
+}
+
 }  // namespace
 
 // Prints what docs/accuracy.md quotes: GART_TEST_SEED=1 test_extremes --test-case=*budget*
@@ -231,25 +254,7 @@ TEST_CASE_TEMPLATE("NaN and infinity in every slot of the geometry, and quaterni
     add(next++, [&] { last_slot(mixed, 4) = log_scale; });
   for (; next < good.size(); ++next) append_copy(mixed, good, next), broken.push_back(false);
 
-  E exec;
-  gart::render_options const options;
-  gart::camera const view = small_camera();
-  auto const gradient = random_gradient(random, view);
-  auto const expected = run_all(exec, good, view, options, gradient),
-             got = run_all(exec, mixed, view, options, gradient);
-  for (std::size_t i = 0; i < got.size(); ++i) {
-    CAPTURE(got[i].way);
-    check_finite(got[i]);
-    check_same_image(got[i], expected[i]);
-    for (auto const& group : parameter_groups) {
-      CAPTURE(group.name);
-      auto const& all = got[i].gradients.*group.got;
-      auto const kept = rows(all, group.width, broken, false), lost = rows(all, group.width, broken, true);
-      CHECK(std::all_of(lost.begin(), lost.end(), [](float x) { return x == 0; }));
-      auto const& e = expected[i].gradients.*group.got;
-      CHECK(relative_error(kept, {e.begin(), e.end()}) < 1e-5);  // threads add in another order
-    }
-  }
+  check_same<E>(random, mixed, broken, good);
 }
 
 TEST_CASE_TEMPLATE("NaN and infinity in every slot of the colour: black, and nothing else", E, GART_TEST_POLICIES) {
@@ -264,22 +269,7 @@ TEST_CASE_TEMPLATE("NaN and infinity in every slot of the colour: black, and not
       broken.sh[12 * i + slot] = bad;
       for (std::size_t k = 0; k < 4; ++k) black.sh[12 * i + 3 * k + slot % 3] = k == 0 ? -1000.0f : 0.0f;
     }
-  E exec;
-  gart::render_options const options;
-  gart::camera const view = small_camera();
-  auto const gradient = random_gradient(random, view);
-  auto const expected = run_all(exec, black, view, options, gradient),
-             got = run_all(exec, broken, view, options, gradient);
-  for (std::size_t k = 0; k < got.size(); ++k) {
-    CAPTURE(got[k].way);
-    check_finite(got[k]);
-    check_same_image(got[k], expected[k]);
-    for (auto const& group : parameter_groups) {
-      CAPTURE(group.name);
-      auto const& e = expected[k].gradients.*group.got;
-      CHECK(relative_error(got[k].gradients.*group.got, {e.begin(), e.end()}) < 1e-5);
-    }
-  }
+  check_same<E>(random, broken, std::vector<bool>(broken.size(), false), black);
 }
 
 TEST_CASE_TEMPLATE("the largest and the smallest finite numbers in every slot of the geometry", E, GART_TEST_POLICIES) {

@@ -157,7 +157,9 @@ std::vector<extreme> extremes(std::uint64_t seed) {
   }
   {
     // Thin axes of 1e-3 at distance 3: the roundings of a ray, 2e-7 there, are 2e-4 of them, and the gradient along
-    // the thin axis is off by as much, times the hits' offsets of up to 3.
+    // the thin axis is off by as much, times the hits' offsets of up to 3. Now and then one Gaussian all but along a
+    // pixel's ray carries its group: there one rounding of each parameter moves the gradient in double by 1e-2. Of 400
+    // seeds the worst is off by 4.5e-3.
     gart::gaussian_model needles = none(), pancakes = none();
     for (int i = 0; i < 60; ++i) {
       shape s{through_image(random) * random.uniform(2, 4), {std::log(1e3), std::log(1e-3), std::log(1e-3)}, {}, 1};
@@ -169,8 +171,8 @@ std::vector<extreme> extremes(std::uint64_t seed) {
       rotate(s, random);
       append(pancakes, random, s);
     }
-    all.push_back({scene_of("needles of 1 to 1e6", needles, ordinary_camera()), 2e-3, 0.5});
-    all.push_back({scene_of("pancakes of 1e6 to 1", pancakes, ordinary_camera()), 2e-3, 0.5});
+    all.push_back({scene_of("needles of 1 to 1e6", needles, ordinary_camera()), 1e-2, 0.5});
+    all.push_back({scene_of("pancakes of 1e6 to 1", pancakes, ordinary_camera()), 1e-2, 0.5});
   }
   {
     // Thin axes of 1e-6 at distance 3, their planes through the camera and a pixel: d_g and p change by their own size
@@ -193,7 +195,8 @@ std::vector<extreme> extremes(std::uint64_t seed) {
     float const logits[] = {-5.5f, -5.54f, 4.6f, 6, 9, 12, 17, 25, 40, 80, 88, 1e4f, 1e30f, FLT_MAX};
     for (std::size_t i = 0; i < 30; ++i) m.opacity[2 * i] = logits[i % std::size(logits)];
     all.push_back({scene_of("sigma to its float limits", m, ordinary_camera())});
-    // Thirty hits at up to 0.99 a ray: a transmittance of 1e-60 and less.
+    // Thirty hits at up to 0.99 a ray: a transmittance of 1e-60 and less. Behind the first few, C - L is rounding, and
+    // the gradient of opacity, which 1 - sigma makes small, shows it: of 400 seeds the worst is off by 2.9e-4.
     m = cloud(random, 90);
     for (std::size_t i = 0; i < m.size(); ++i) {
       m.opacity[i] = static_cast<float>(random.uniform(2.0, 12));
@@ -201,7 +204,7 @@ std::vector<extreme> extremes(std::uint64_t seed) {
     }
     oracle::scene s = scene_of("transmittance to underflow", m, ordinary_camera());
     s.options.transmittance_min = 0;
-    all.push_back({s});
+    all.push_back({s, 1e-3});
   }
   {
     // Floats at 1e7 are 1 apart; the camera is not on one of them.

@@ -187,7 +187,8 @@ TEST_CASE("names are unique and fit for files") {
   }
   f.put("scene/transforms.json", scene(lens, frames));
   std::set<std::string> names;
-  for (gart::dataset_view const& v : gart::load_dataset(f.path / "scene", all_train()).train) {
+  gart::dataset const data = gart::load_dataset(f.path / "scene", all_train());
+  for (gart::dataset_view const& v : data.train) {
     names.insert(v.name);
     CHECK(v.name.find_first_of("/ \\") == std::string::npos);
   }

@@ -76,11 +76,12 @@ TEST_CASE("the clamps, the thresholds and the hit that ends a ray") {
 }
 
 TEST_CASE("what rounding could turn is marked") {
-  oracle::parameters sure, alpha, clamp, color;
+  oracle::parameters sure, alpha, clamp, held, color;
   double const alpha_min = 1.0f / 255.0f;
   add(sure, 0, 3.0, 1, 0.0, 0.7);
   add(alpha, 0, 3.0, 1, std::log(alpha_min / (1 - alpha_min)), 0.7);
   add(clamp, 0, 3.0, 1, std::log(99.0), 0.7);
+  add(held, 0, 3.0, 1, std::log(99.0) + 0.01, 0.7);
   add(color, 0, 3.0, 1, 0.0, 0.0);
   auto const pixel_of = [](oracle::parameters const& m, gart::render_options const& o) {
     return oracle::render(m, one_pixel(), o, 0).pixels[0];
@@ -91,6 +92,7 @@ TEST_CASE("what rounding could turn is marked") {
   CHECK(p.rounding < 1e-5);
   CHECK(pixel_of(alpha, options()).edge);
   CHECK(pixel_of(clamp, options()).kink);
+  CHECK_FALSE(pixel_of(held, options()).kink);  // surely held, and surely without a derivative
   CHECK(pixel_of(color, options()).kink);
   auto at_near = options();
   at_near.near = 3.0f;

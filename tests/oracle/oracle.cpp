@@ -126,6 +126,7 @@ std::vector<hit> hits_of(std::vector<prepared> const& gaussians, int kernel_degr
     h.alpha_slack = alpha_ulps + 1.5 * n * std::pow(radius / 3, n - 1) * along;
     // Towards the cusp of degree 1 the direction of the gradient is lost, and with it its sign.
     h.at_cusp = kernel_degree == 1 && radius < 1e3 * p_error.norm();
+    h.at_clamp = std::abs(response / alpha_max - 1) < h.alpha_slack;
     h.clamps = response > alpha_max ? 8u : 0u;
     h.marginal = std::abs(response - alpha_min) <= (decision_slack + h.alpha_slack) * alpha_min ||
                  std::abs(t - near) <= h.t_slack;
@@ -181,7 +182,7 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
     steps.push_back({h, s.color, transmittance, Vector3d::Zero(), 0});
     brightest = std::max(brightest, s.color.maxCoeff());
     out.edge |= h.marginal;
-    out.kink |= s.kink || h.at_cusp || std::abs(h.alpha / alpha_max - 1) * (h.clamps & 8 ? 0 : 1) < h.alpha_slack;
+    out.kink |= s.kink || h.at_cusp || h.at_clamp;
     if (!h.counted) continue;
     transmittance *= 1 - h.alpha;
     relative_error += h.alpha / (1 - h.alpha) * h.alpha_slack;

@@ -39,6 +39,7 @@ struct hit {
   bool counted = true;    // false: just misses a threshold, and is listed because float may see a hit
   bool marginal = false;  // within rounding of alpha_min or near, on either side
   bool at_cusp = false;   // within rounding of the cusp of degree 1: alpha's gradient has no sure direction
+  bool at_clamp = false;  // within rounding of 0.99, on either side: alpha's gradient may be zero or not
   unsigned clamps = 0;    // bits 0-2: colour channel held at 0; bit 3: alpha held at 0.99
 };
 
