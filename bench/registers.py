@@ -43,15 +43,15 @@ for name, (stack, stores, loads, registers) in zip(plain, figures):
     row = (f"SH {sh}" + (f", kernel degree {response.group(1)}" if response.group(1) != "2" else "") +
            (", fast" if response.group(2) == "1" else "") +
            (f", LT {entry}" if entry in ("half", "shared") else "") + (", ordered" if ordered else ""))
-    kernel = "forward" if "walk_tiles" in name else "colour" if "terms<gart::color>" in name else "geometry"
+    kernel = "forward" if "walk_tile_warps" in name else "gather"
     rows.setdefault(row, {})[kernel] = {"registers": int(registers), "stack": int(stack),
                                         "spilled": int(stores) + int(loads)}
 with open(a.out + ".part", "w") as f:
     json.dump({"what": "registers", "arch": a.arch, "rows": rows}, f, indent=1)
     f.write("\n")
 os.replace(a.out + ".part", a.out)
-print("| row | forward | gather colour | gather geometry |\n|---|---|---|---|")
+print("| row | forward | gather |\n|---|---|---|")
 for row in sorted(rows):
-    cells = [rows[row].get(k) for k in ("forward", "colour", "geometry")]
+    cells = [rows[row].get(k) for k in ("forward", "gather")]
     text = [f"{c['registers']}" + (f", {c['spilled']} B spilled" if c["spilled"] else "") if c else "" for c in cells]
     print(f"| {row} | " + " | ".join(text) + " |")
