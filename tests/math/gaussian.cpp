@@ -235,7 +235,7 @@ TEST_CASE("the walk along a ray gives the derivative of its colour by each alpha
   };
   gart::ray_gradient walk;
   walk.g = gart::vec3(static_cast<float>(weight), 0, 0);
-  walk.behind = static_cast<float>(weight * color(alphas));
+  walk.color_g = static_cast<float>(weight * color(alphas));
   for (int k = 0; k < 4; ++k) {
     double up[4], down[4];
     std::copy_n(alphas, 4, up), std::copy_n(alphas, 4, down);

@@ -57,8 +57,10 @@ TEST_CASE_TEMPLATE("the same bits on every policy", E, GART_TEST_POLICIES) {
   std::normal_distribution<float> n;
   std::vector<sample> samples(50000);
   for (sample& s : samples) {
-    s.gaussian = {{n(random), n(random), 4 + n(random)}, {3 * n(random) - 2, 3 * n(random) - 2, 3 * n(random) - 2},
-                  {n(random), n(random), n(random), n(random)}, 3 * n(random)};
+    s.gaussian = {{n(random), n(random), 4 + n(random)},
+                  {3 * n(random) - 2, 3 * n(random) - 2, 3 * n(random) - 2},
+                  {n(random), n(random), n(random), n(random)},
+                  3 * n(random)};
     gart::vec3 const d(0.3f * n(random), 0.3f * n(random), 1.0f);
     s.direction = d / std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
   }

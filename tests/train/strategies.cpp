@@ -44,8 +44,9 @@ TEST_CASE_TEMPLATE("every strategy trains along the same loss curve", E, GART_TE
   auto const data = capture(exec, seed);
   auto const reference = train<gart::primitive_strategy>(exec, data, seed);
   CHECK(reference.loss.back() < 0.8f * reference.loss.front());
-  for (auto const& other : {train<gart::pixel_strategy>(exec, data, seed), train<gart::hybrid_strategy>(exec, data, seed),
-                            train<gart::deterministic_strategy>(exec, data, seed)}) {
+  for (auto const& other :
+       {train<gart::pixel_strategy>(exec, data, seed), train<gart::hybrid_strategy>(exec, data, seed),
+        train<gart::deterministic_strategy>(exec, data, seed)}) {
     for (int i = 0; i < steps; ++i) {
       CAPTURE(i);
       CHECK(other.loss[i] == doctest::Approx(reference.loss[i]).epsilon(i < 20 ? 1e-3 : 2e-2));

@@ -84,7 +84,7 @@ class backward {
                                 " slots, and a buffer holds 2^32: raise --downscale, lower --max-gaussians or take "
                                 "--backward pixel");
       // On a device sorted by cover also where the tracer has lists sorted by depth: lanes in step are worth the sort.
-            if constexpr (!E::device && requires { tracer.map(); }) {
+      if constexpr (!E::device && requires { tracer.map(); }) {
         lists_ = tracer.map();
       } else {
         map_.build(exec, grid_, *prints_, cover_order<E::device, TileSize>{});
@@ -131,8 +131,7 @@ class backward {
     if constexpr (!ordered) gradients.sh.zero();
     if constexpr (records) {
       if constexpr (ordered) rows_.resize(prints_->pairs() * pair_row<ShDegree>::quads);
-      gather_terms<ShDegree, response>(exec, scene, gaussians_in_frame, view, active_degree, color, color_gradient,
-                                       gradients);
+      gather_terms<ShDegree, response>(exec, gaussians_in_frame, view, active_degree, color, color_gradient, gradients);
       if constexpr (ordered)
         parallel_for(
             exec, "backward/sum", scene.count * pair_row<ShDegree>::quads,
@@ -173,9 +172,8 @@ class backward {
   using entry = typename entry_of<record_type>::type;
 
   template <int ShDegree, class Response>
-  void gather_terms(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians_in_frame,
-                    camera const& view, int active_degree, span<float const> image, span<float const> image_gradient,
-                    gaussians<E>& gradients) {
+  void gather_terms(E& exec, span<ray_gaussian const> gaussians_in_frame, camera const& view, int active_degree,
+                    span<float const> image, span<float const> image_gradient, gaussians<E>& gradients) {
     constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
     using kernel_type =
         gather_kernel<ShDegree, Response, typename Strategy::gather, entry, TileSize, sums, validity, E>;

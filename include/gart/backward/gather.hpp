@@ -45,7 +45,8 @@ struct gather_kernel {
     static constexpr int basis_quads = !Terms::color || ShDegree == 0 ? 0 : (bands + 3) / 4;
     quad direction_total, gradient;
     quad basis[basis_quads];
-    quad last;  // t and place of the ray's last hit, where validity is recomputed; and what makes the words odd in number
+    quad last;  // t and place of the ray's last hit, where validity is recomputed; and what makes the words odd in
+                // number
     quad spread[basis_quads % 2 ? 1 : 0];
   };
   struct scratch {

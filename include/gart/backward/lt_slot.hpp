@@ -1,8 +1,8 @@
 #pragma once
 // What a slot of the LT buffer holds of a hit, one struct a format: the forward pass packs (of), the gather unpacks.
 // V, the colour that the pixel would have if the hit were opaque, is what the gradient of alpha needs
-// (math/hit_gradient.hpp); the weight w = T alpha what the gradient of colour needs, with, for each channel of the hit's
-// colour, whether it was clamped at zero.
+// (math/hit_gradient.hpp); the weight w = T alpha what the gradient of colour needs, with, for each channel of the
+// hit's colour, whether it was clamped at zero.
 //
 //   float4   16 bytes  V, whose free sign bits hold the clamps; w
 //   half      8 bytes  the same in four halves: V within 2^-11 relatively (2^-25 absolutely), at most 65504; 2^15 w, so
@@ -11,11 +11,11 @@
 //                      whose three lowest bits hold the clamps (a relative error of 2^-20)
 //   weight    4 bytes  w as in shared; no V: enough for the gradient of colour (hybrid)
 //
-// The gradient of alpha is the difference of V and the pixel's colour, over 1 - alpha: an error of V counts by how little
-// of the ray the hit and what lies behind it are. Relative errors of a whole gradient, group by group, against double,
-// at most (tests/traits): float4 5e-4, half 1e-2 and shared 4e-2 on clouds and long rays; on stacks of hits at the clamp
-// 5e-4, 0.15 and 0.6.
-// Slots that no hit wrote hold what the clear left there, all bits set, which `written` tells.
+// The gradient of alpha is the difference of V and the pixel's colour, over 1 - alpha: an error of V counts by how
+// little of the ray the hit and what lies behind it are. Relative errors of a whole gradient, group by group, against
+// double, at most (tests/traits): float4 5e-4, half 1e-2 and shared 4e-2 on clouds and long rays; on stacks of hits at
+// the clamp 5e-4, 0.15 and 0.6. Slots that no hit wrote hold what the clear left there, all bits set, which `written`
+// tells.
 
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>

@@ -37,8 +37,7 @@ struct record_lt {
     return {slots + range.offset + tile_offset(range.box, pixels), pixels};
   }
   u32 place_of(cell const& c, pixel at) const {
-    return static_cast<u32>(c.first - slots) +
-           pixel_offset(c.pixels, static_cast<u32>(at.x), static_cast<u32>(at.y));
+    return static_cast<u32>(c.first - slots) + pixel_offset(c.pixels, static_cast<u32>(at.x), static_cast<u32>(at.y));
   }
   GART_INLINE void operator()(cell const& c, pixel at, vec3 const& opaque, float weight, vec3 const& unclamped) const {
     u32 const x = static_cast<u32>(at.x), y = static_cast<u32>(at.y);

@@ -1,8 +1,9 @@
 #pragma once
 // Gradients of one hit and of one Gaussian: the only gradient code of the renderer.
 //
-// With w = T alpha, a hit of colour c adds w c to its ray and leaves T (1 - alpha). With L the colour before the hit and
-// V = L + T c the colour the pixel would have if the hit were opaque, C the colour it has, and g the image gradient,
+// With w = T alpha, a hit of colour c adds w c to its ray and leaves T (1 - alpha). With L the colour before the hit
+// and V = L + T c the colour the pixel would have if the hit were opaque, C the colour it has, and g the image
+// gradient,
 //   C = alpha V + (1 - alpha) (the colour without the hit),   dL/dalpha = (V - C).g / (1 - alpha),   dL/dc = w g.
 // alpha = sigma rho(|p|^2), so with a = alpha dL/dalpha and b = a times the slope of ln rho (math/response.hpp; b = a
 // for a Gaussian) the geometry needs only ten sums over the hits, the moments, all in the Gaussian's own space:

@@ -5,8 +5,8 @@
 // With rows m_k of M in the camera's axes and d = (u, v, 1), the depth of the largest response is
 //   z = N / Q,  N = -sum_k o_k (m_k . d),  Q = sum_k (m_k . d)^2.
 // N is linear in the slopes and Q convex, so {N >= c Q} is convex for c >= 0: z is quasi-concave where it is positive,
-// and its least value over a rectangle lies at a corner. What rounding can move z, at a corner or at a hit, is taken off
-// N and added to |m_k . d| in a way that leaves the one linear and the other convex: the bound holds for every ray.
+// and its least value over a rectangle lies at a corner. What rounding can move z, at a corner or at a hit, is taken
+// off N and added to |m_k . d| in a way that leaves the one linear and the other convex: the bound holds for every ray.
 
 #include <gart/math/ray_gaussian.hpp>
 

@@ -36,9 +36,9 @@ struct adam_group {
   float const* gradient;
   float* first;
   float* second;
-  index_t stride;   // floats a Gaussian
-  index_t active;   // of these, the first so many are trained
-  index_t head;     // of these, the first so many have rate_head
+  index_t stride;  // floats a Gaussian
+  index_t active;  // of these, the first so many are trained
+  index_t head;    // of these, the first so many have rate_head
   float rate_head, rate_rest;
 };
 

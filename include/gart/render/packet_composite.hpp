@@ -64,8 +64,8 @@ struct packet_composite {
       for (u32 left = bits_of(now); left; left &= left - 1) {
         int const l = __builtin_ctz(left);
         s.last_place[l] = program.record.place_of(h.notes[h.row[l]], pixel_of(s.block, l));
-        program.record(h.notes[h.row[l]], pixel_of(s.block, l), {opaque.x.v[l], opaque.y.v[l], opaque.z.v[l]}, weight.v[l],
-                       {unclamped.x.v[l], unclamped.y.v[l], unclamped.z.v[l]});
+        program.record(h.notes[h.row[l]], pixel_of(s.block, l), {opaque.x.v[l], opaque.y.v[l], opaque.z.v[l]},
+                       weight.v[l], {unclamped.x.v[l], unclamped.y.v[l], unclamped.z.v[l]});
       }
     return (s.transmittance >= lanes(program.options.transmittance_min)) &
            (s.hits != every_lane(static_cast<int>(program.options.max_hits)));

@@ -1,9 +1,9 @@
 #pragma once
 // What the forward pass leaves of each hit for the backward pass to find. A record says where a hit belongs (place_of,
 // when it is found) and is called once a hit, after it has been composited, with that place, the colour
-// that the pixel would have if the hit were opaque, its weight T alpha and its own colour before the clamp; it is part of a strategy
-// (backward/strategies.hpp). Where many pixels of a tile meet one Gaussian, the cell of its hits there can be asked for
-// once and written to many times.
+// that the pixel would have if the hit were opaque, its weight T alpha and its own colour before the clamp; it is part
+// of a strategy (backward/strategies.hpp). Where many pixels of a tile meet one Gaussian, the cell of its hits there
+// can be asked for once and written to many times.
 
 #include <gart/render/pixels.hpp>
 #include <gart/tiles/layout.hpp>

@@ -14,11 +14,11 @@
 namespace gart {
 
 struct tile_map_view {
-  span<u32 const> primitives;  // all lists, tile after tile
-  span<u32 const> offsets;     // [tiles + 1]
-  span<u32 const> keys;        // of all lists, sorted
-  int order_bits = 0;          // low bits of a key: the order's
-  int depth_shift = 0;         // of depth_order: bits of a depth that keys leave out
+  span<u32 const> primitives;     // all lists, tile after tile
+  span<u32 const> offsets;        // [tiles + 1]
+  span<u32 const> keys;           // of all lists, sorted
+  int order_bits = 0;             // low bits of a key: the order's
+  int depth_shift = 0;            // of depth_order: bits of a depth that keys leave out
   span<u32 const> longest_first;  // the tiles, if asked for (rank_tiles)
 
   // In lists sorted by depth_order: no hit of entry k, or of any after it in its list, has a smaller z.
@@ -35,8 +35,8 @@ inline int bits_for(u32 count) {
 
 namespace tile_kernels {
 
-// A team takes some primitives; its lanes take the pairs of all of them in turn, since boxes differ in size by orders of
-// magnitude.
+// A team takes some primitives; its lanes take the pairs of all of them in turn, since boxes differ in size by orders
+// of magnitude.
 template <execution E, int Size, class Order>
 struct emit_pairs {
   static constexpr int block_size = 128;
@@ -124,8 +124,10 @@ class tile_map {
     counts_.resize(grid.count()), offsets_.resize(grid.count() + 1);
     counts_.zero();
     using emit = tile_kernels::emit_pairs<E, Size, Order>;
-    parallel_for(exec, "map/emit", tile_range{(static_cast<u32>(prints.ranges().size()) + emit::share - 1) / emit::share, emit::block_size},
-                 emit{grid, prints.ranges(), prints.pair_offsets(), pairs, order, order_bits_, keys_, primitives_, counts_});
+    parallel_for(
+        exec, "map/emit",
+        tile_range{(static_cast<u32>(prints.ranges().size()) + emit::share - 1) / emit::share, emit::block_size},
+        emit{grid, prints.ranges(), prints.pair_offsets(), pairs, order, order_bits_, keys_, primitives_, counts_});
     sort_pairs(exec, keys_.view(), primitives_.view(), tile_bits + order_bits_);
     span<u32> const offsets = offsets_.view();
     exclusive_scan(exec, span<u32 const>(counts_), offsets.subspan(0, grid.count()), offsets.subspan(grid.count(), 1));

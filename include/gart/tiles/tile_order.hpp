@@ -15,8 +15,8 @@ namespace gart {
 GART_HD GART_INLINE u32 depth_key(float depth, int shift) { return float_to_bits(depth) >> shift; }
 GART_HD GART_INLINE float near_depth(u32 key, int shift) { return bits_to_float(key << shift); }
 
-// By how near the pair's pixels can hit the primitive: what the tile-list tracer reads. No hit of the pair has a smaller
-// z than its key stands for.
+// By how near the pair's pixels can hit the primitive: what the tile-list tracer reads. No hit of the pair has a
+// smaller z than its key stands for.
 class depth_order {
  public:
   // depths: near depth of each primitive, anywhere. gaussians: null where that is all there is to go by; else the depth

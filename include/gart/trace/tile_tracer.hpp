@@ -112,8 +112,7 @@ struct walk_tile_packets {
     packets const program = packets_of(rays.program);
     for (int y = tile.y0; y < tile.y1; y += packet_block::height)
       for (int x = tile.x0; x < tile.x1; x += packet_block::width)
-        if (!team.scratch()(program, rays.scene, rays.map, ranges, rays.forward, tile, team.tile(),
-                            {x, y}))
+        if (!team.scratch()(program, rays.scene, rays.map, ranges, rays.forward, tile, team.tile(), {x, y}))
           one_by_one({x, y});
   }
 
@@ -194,7 +193,7 @@ class tile_tracer {
   tile_grid<Size> grid_;
   footprints<E, Size> prints_;
   tile_map<E, Size> map_;
-  buffer<u32, E> next_;         // of the device's walk (trace/warp_walk.hpp)
+  buffer<u32, E> next_;  // of the device's walk (trace/warp_walk.hpp)
   buffer<float, E> put_aside_;
   traced_scene scene_;
   vec3 forward_{0, 0, 1};

@@ -1,15 +1,15 @@
 #pragma once
 // The walk of tile lists on a device: a warp takes a block of 8 x 4 pixels of a tile, a lane a ray. The same as
 // walk_tiles (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that all rays of the warp meet a
-// candidate together. So candidates that miss the block are left out by one vote, the others come through shared memory,
-// read ahead while the ones before are evaluated, and what a hit shows is computed as it is found, where its Gaussian is
-// the same for all lanes; a ray's pending hits lie in shared memory, each lane in a bank of its own, and their order is
-// a register of sixteen 4-bit numbers. Hits are passed on when some ray has no room for another: many rays then have
-// some to pass on, and do it together.
+// candidate together. So candidates that miss the block are left out by one vote, the others come through shared
+// memory, read ahead while the ones before are evaluated, and what a hit shows is computed as it is found, where its
+// Gaussian is the same for all lanes; a ray's pending hits lie in shared memory, each lane in a bank of its own, and
+// their order is a register of sixteen 4-bit numbers. Hits are passed on when some ray has no room for another: many
+// rays then have some to pass on, and do it together.
 //
-// What a ray has no room for even then it puts aside, in memory of its own: its farthest hits, in no order, of which the
-// nearest fill the window again when it runs empty. Where even that memory is full a hit is lost: the ray then passes on
-// what lies before it, and walks the list again, strictly after its last hit.
+// What a ray has no room for even then it puts aside, in memory of its own: its farthest hits, in no order, of which
+// the nearest fill the window again when it runs empty. Where even that memory is full a hit is lost: the ray then
+// passes on what lies before it, and walks the list again, strictly after its last hit.
 //
 // Beside what every ray program offers, one for warps offers
 //   order                        the pixels (render/pixels.hpp)
@@ -52,7 +52,7 @@ class walk_tile_warps {
   traced_scene scene;
   vec3 forward;  // the camera's axis
   P program;
-  u32* next = nullptr;        // part of a tile that is to be taken next, zero at first
+  u32* next = nullptr;         // part of a tile that is to be taken next, zero at first
   float* put_aside = nullptr;  // [teams][aside_floats]
 
  private:
@@ -91,8 +91,8 @@ class walk_tile_warps {
     warp_scratch warp[warps];
   };
 
-  // As many teams as the device holds: their warps take parts of tiles, those of the longest lists first, until there are
-  // no more.
+  // As many teams as the device holds: their warps take parts of tiles, those of the longest lists first, until there
+  // are no more.
   template <class Team>
   __device__ void operator()(Team const& team) const {
     int const warp = static_cast<int>(threadIdx.x) / lanes;
@@ -115,13 +115,15 @@ class walk_tile_warps {
                        static_cast<int>(area.y0 + part / (Size / block_width) * block_height)};
     if (!program.order.inside(corner)) return;
     rays r(*this, s, memory, area, corner);
-    while (r.walk(map.offsets[tile], map.offsets[tile + 1])) {}
+    while (r.walk(map.offsets[tile], map.offsets[tile + 1])) {
+    }
     r.end();
   }
 
   class rays {
    public:
-    __device__ GART_INLINE rays(walk_tile_warps const& k, warp_scratch& s, float* memory, pixel_box const& area, pixel corner)
+    __device__ GART_INLINE rays(walk_tile_warps const& k, warp_scratch& s, float* memory, pixel_box const& area,
+                                pixel corner)
         : k_(k), s_(s), lane_(static_cast<int>(threadIdx.x) % lanes), area_(area), corner_(corner) {
       aside_ = memory + lane_;
       at_ = {corner.x + lane_ % block_width, corner.y + lane_ / block_width};
@@ -248,8 +250,14 @@ class walk_tile_warps {
         }
         if (hit && alive_) {
           static_assert(group == 4);
-          take(from[c], c < 2 ? c < 1 ? t[0] : t[1] : c < 3 ? t[2] : t[3],
-               c < 2 ? c < 1 ? d2[0] : d2[1] : c < 3 ? d2[2] : d2[3], first + c);
+          take(from[c],
+               c < 2   ? c < 1 ? t[0] : t[1]
+                 : c < 3 ? t[2]
+                       : t[3],
+               c < 2   ? c < 1 ? d2[0] : d2[1]
+                 : c < 3 ? d2[2]
+                       : d2[3],
+               first + c);
         }
       }
       return true;
@@ -317,8 +325,10 @@ class walk_tile_warps {
     __device__ GART_INLINE pending take_slot(int slot) {
       --count_;
       free_ |= 1u << slot;
-      return {s_.t[slot][lane_], s_.alpha[slot][lane_],
-              {s_.red[slot][lane_], s_.green[slot][lane_], s_.blue[slot][lane_]}, s_.key[slot][lane_]};
+      return {s_.t[slot][lane_],
+              s_.alpha[slot][lane_],
+              {s_.red[slot][lane_], s_.green[slot][lane_], s_.blue[slot][lane_]},
+              s_.key[slot][lane_]};
     }
 
     // The slot of the pending hit that is k-th in order.
@@ -409,7 +419,8 @@ class walk_tile_warps {
     bool alive_;
     float last_t_;  // the last hit passed on: at first (near, none), t > near
     u32 last_key_ = nothing;
-    float limit_t_, lost_t_;  // the nearest hit put aside, and the nearest lost: what is pending lies before the one, what
+    float limit_t_,
+        lost_t_;  // the nearest hit put aside, and the nearest lost: what is pending lies before the one, what
     u32 limit_key_, lost_key_;  // is passed on before the other
     u64 order_;                 // slots of the pending hits, nearest first, 4 bits each
     u32 free_;
