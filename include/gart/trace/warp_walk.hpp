@@ -400,7 +400,7 @@ class walk_tile_warps {
         }
         bool const empty = alive_ && count_ == 0 && aside_count_ > 0 && limit_t_ * cosine_ < depth;
         if (!__any_sync(everyone, empty)) return;
-        if (alive_ && aside_count_ > 0 && count_ < window) fill();
+        if (alive_ && aside_count_ > 0 && count_ <= window / 2) fill();
       }
     }
 
