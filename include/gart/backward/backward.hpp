@@ -3,8 +3,7 @@
 //   prepare()  before the forward pass: footprints, tile map and LT buffer, where the strategy records
 //   record(), targets()  what the forward pass is given
 //   run()      gathers and scatters what the strategy says, then turns the moments of each Gaussian into the gradients
-//   of
-//              its mean, log-scale, quaternion and opacity. Overwrites `gradients`.
+//              of its mean, log-scale, quaternion and opacity. Overwrites `gradients`.
 //
 // Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, 36 bytes a Gaussian, 8
 // a (primitive, tile) pair and the LT buffer: 4 or 16 bytes for each pixel of each box.

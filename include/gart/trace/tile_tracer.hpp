@@ -1,9 +1,14 @@
 #pragma once
 // The traverser on tile lists, for the primary rays of a camera: no tree. A tile's list holds every Gaussian that any
-// of its pixels can hit, sorted by conservative near depth, so a pixel walks the list and keeps the hits found in a
-// small window sorted by (t, id); the first of them is next as soon as it lies nearer than all that is left of the list
-// can. When the window overflows its nearest are kept, and the ray resumes strictly after its last hit from the first
-// candidate whose hit was dropped: exact for any number of hits. The hits are those of the other tracers, bit for bit.
+// of its pixels can hit, sorted by how near it can be hit there (tiles/tile_order.hpp). A pixel walks the list and keeps
+// the hits found in a small window sorted by (t, id); the first of them is next as soon as it lies nearer than all that
+// is left of the list can. When the window overflows its nearest are kept, and the ray resumes strictly after its last
+// hit from the first candidate whose hit was dropped: exact for any number of hits. The hits are those of the other
+// tracers, bit for bit.
+//
+// Rays that meet the same Gaussians are walked together where their program can: packets of lanes on a host
+// (trace/packet_walk.hpp), warps on a device (trace/warp_walk.hpp, tiles of a multiple of 8). Other programs' rays are
+// walked one by one.
 //
 // Ray programs must also say where a ray's pixel is: at(i), with x and y. Cost: the footprints, one sort of the
 // (primitive, tile) pairs, and a walk of each tile's list up to where its rays end.
@@ -139,7 +144,8 @@ concept has_warps = requires {
 
 }  // namespace trace_kernels
 
-// Size: side of a tile. Window: hits a ray keeps at most, a power of two; a smaller one is walked again more often.
+// Size: side of a tile. Window: hits that a ray walked alone keeps at most, a power of two; a smaller one is walked
+// again more often.
 template <execution E, int Size = 8, class Response = generalized_gaussian<>, int Window = 32>
 class tile_tracer {
  public:

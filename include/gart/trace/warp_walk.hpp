@@ -9,7 +9,8 @@
 //
 // What a ray has no room for even then it puts aside, in memory of its own: its farthest hits, in no order, of which
 // the nearest fill the window again when it runs empty. Where even that memory is full a hit is lost: the ray then
-// passes on what lies before it, and walks the list again, strictly after its last hit.
+// passes on what lies before it, and walks the list again, strictly after its last hit. This memory is 24 bytes for
+// each of 112 hits, for as many rays as the device holds at a time: 159 MB on 132 multiprocessors.
 //
 // Beside what every ray program offers, one for warps offers
 //   order                        the pixels (render/pixels.hpp)
@@ -42,9 +43,8 @@ class walk_tile_warps {
  public:
   static constexpr int block_size = warps * lanes, min_blocks = 7;
   static constexpr u32 tile_parts = tile_blocks;
-  // Floats of memory for what the rays of a team put aside.
   static constexpr int aside = 112;  // hits a ray can put aside
-  static constexpr std::size_t aside_floats = std::size_t{6} * aside * block_size;
+  static constexpr std::size_t aside_floats = std::size_t{6} * aside * block_size;  // of a team's rays
 
   tile_grid<Size> grid;
   tile_map_view map;
@@ -115,8 +115,8 @@ class walk_tile_warps {
                        static_cast<int>(area.y0 + part / (Size / block_width) * block_height)};
     if (!program.order.inside(corner)) return;
     rays r(*this, s, memory, area, corner);
-    while (r.walk(map.offsets[tile], map.offsets[tile + 1])) {
-    }
+    bool again = true;
+    while (again) again = r.walk(map.offsets[tile], map.offsets[tile + 1]);
     r.end();
   }
 
@@ -248,19 +248,17 @@ class walk_tile_warps {
           pass_on(s_.depth[first + c]);
           if (!__any_sync(everyone, alive_)) return false;
         }
-        if (hit && alive_) {
-          static_assert(group == 4);
-          take(from[c],
-               c < 2   ? c < 1 ? t[0] : t[1]
-                 : c < 3 ? t[2]
-                       : t[3],
-               c < 2   ? c < 1 ? d2[0] : d2[1]
-                 : c < 3 ? d2[2]
-                       : d2[3],
-               first + c);
-        }
+        if (hit && alive_) take(from[c], pick(t, c), pick(d2, c), first + c);
       }
       return true;
+    }
+
+    // v[c] of an array in registers.
+    __device__ GART_INLINE static float pick(float const (&v)[group], int c) {
+      float out = v[0];
+      GART_UNROLL
+      for (int k = 1; k < group; ++k) out = c == k ? v[k] : out;
+      return out;
     }
 
     // A hit at the distance of the last one passed on.
