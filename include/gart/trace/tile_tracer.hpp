@@ -1,10 +1,10 @@
 #pragma once
-// The traverser on tile lists, for the primary rays of a camera: no tree. A tile's list holds every Gaussian that any of
-// its pixels can hit, sorted by how near it can be hit there (tiles/tile_order.hpp). A pixel walks the list and keeps the
-// hits found in a small window sorted by (t, id); the first of them is next as soon as it lies nearer than all that is
-// left of the list can. When the window overflows its nearest are kept, and the ray resumes strictly after its last hit
-// from the first candidate whose hit was dropped: exact for any number of hits. The hits are those of the other tracers,
-// bit for bit.
+// The traverser on tile lists, for the primary rays of a camera: no tree. A tile's list holds every Gaussian that any
+// of its pixels can hit, sorted by how near it can be hit there (tiles/tile_order.hpp). A pixel walks the list and
+// keeps the hits found in a small window sorted by (t, id); the first of them is next as soon as it lies nearer than
+// all that is left of the list can. When the window overflows its nearest are kept, and the ray resumes strictly after
+// its last hit from the first candidate whose hit was dropped: exact for any number of hits. The hits are those of the
+// other tracers, bit for bit.
 //
 // Rays that meet the same Gaussians are walked together where their program can: packets of lanes on a host
 // (trace/packet_walk.hpp), warps on a device (trace/warp_walk.hpp, tiles of a multiple of 8). Other programs' rays are
