@@ -41,7 +41,7 @@ void history::restore(std::filesystem::path const& file, int step) {
     }
     return saved[key];
   };
-  // A loss that was not finite is null in the file, and no point of a curve.
+  // A loss that was not finite is null in the file, and no point of a curve; nor is what no run writes.
   auto const usable = [step](nlohmann::json const& row, std::size_t columns) {
     return row.is_array() && row.size() == columns &&
            std::all_of(row.begin(), row.end(), [](auto const& v) { return v.is_number(); }) &&
@@ -49,7 +49,7 @@ void history::restore(std::filesystem::path const& file, int step) {
   };
   train.clear(), test.clear();
   for (auto const& row : rows("train")) {
-    if (usable(row, 5)) train.push_back({row[0], row[1], row[2], row[3], row[4]});
+    if (usable(row, 5) && row[1] >= 0.0 && row[4] >= 0.0) train.push_back({row[0], row[1], row[2], row[3], row[4]});
   }
   for (auto const& row : rows("test")) {
     if (usable(row, 3)) test.push_back({row[0], row[1], row[2]});
