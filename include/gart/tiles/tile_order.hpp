@@ -43,6 +43,7 @@ class depth_order {
     return {rectangle_depth(gaussians_ ? gaussians_[i] : ray_gaussian{}, rotation_, reach_), depths_[i]};
   }
   GART_HD u32 key(primitive const& p, pixel_box const& cell) const {
+    if (!gaussians_) return depth_key(p.depth, shift_);
     // Rays go through the middle of pixels; a little more, for the rounding of directions.
     constexpr float inset = 0.45f;
     float const z = p.in((cell.x0 + inset - cx_) * to_u_, (cell.x1 - inset - cx_) * to_u_,
