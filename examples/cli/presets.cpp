@@ -9,9 +9,9 @@ std::vector<preset> const& presets() {
   static std::vector<preset> const all = [] {
     // The quickstart model and capture on a CPU: bench/results/tradeoff_quickstart.json, presets_quickstart.json.
     preset exact{
-        "exact", {}, "image at 101 dB to the reference in double, gradient to\n  0.06%; trained: 29.28 dB in 32 s"};
-    preset balanced{"balanced", {}, "1.4 times as fast; 42 dB, 27%; trained: 29.30 dB in 24 s"};
-    preset fast{"fast", {}, "2.3 times as fast; 31 dB, 70%; trained: 29.38 dB in 18 s"};
+        "exact", {}, "image at 102 dB to the reference in double, gradient to\n  0.05%; trained: 29.28 dB in 15 s"};
+    preset balanced{"balanced", {}, "1.4 times as fast; 42 dB, 26%; trained: 29.30 dB in 12 s"};
+    preset fast{"fast", {}, "2.0 times as fast; 31 dB, 67%; trained: 29.39 dB in 9 s"};
     balanced.render.alpha_min = 0.01f, balanced.render.transmittance_min = 0.03f;
     fast.render.alpha_min = 0.05f, fast.render.transmittance_min = 0.05f;
     return std::vector<preset>{exact, balanced, fast};
