@@ -3,14 +3,10 @@
 // walk_tiles (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that all rays of the warp meet a
 // candidate together. So candidates that miss the block are left out by one vote, the others come through shared
 // memory, read ahead while the ones before are evaluated, and what a hit shows is computed as it is found, where its
-// Gaussian is the same for all lanes; a ray's pending hits lie in shared memory, each lane in a bank of its own, and
-// their order is a register of sixteen 4-bit numbers. Hits are passed on when some ray has no room for another: many
-// rays then have some to pass on, and do it together.
-//
-// What a ray has no room for even then it puts aside, in memory of its own: its farthest hits, in no order, of which
-// the nearest fill the window again when it runs empty. Where even that memory is full a hit is lost: the ray then
-// passes on what lies before it, and walks the list again, strictly after its last hit. This memory is 24 bytes for
-// each of 112 hits, for as many rays as the device holds at a time: 159 MB on 132 multiprocessors.
+// Gaussian is the same for all lanes. A ray's pending hits are in a queue (trace/lane_queue.hpp). Hits are passed on
+// when the window of some ray's queue is full: many rays then have some to pass on, and do it together. Where a queue
+// loses a hit the ray passes on what lies before it, and walks the list again, strictly after its last hit. The queues
+// take 3 KB of device memory for each ray that the device holds at a time: 182 MB on 132 multiprocessors.
 //
 // Beside what every ray program offers, one for warps offers
 //   order                        the pixels (render/pixels.hpp)
@@ -22,6 +18,7 @@
 
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/tiles/tile_map.hpp>
+#include <gart/trace/lane_queue.hpp>
 #include <gart/trace/ray_program.hpp>
 
 #if defined(__CUDACC__)
@@ -43,8 +40,9 @@ class walk_tile_warps {
  public:
   static constexpr int block_size = warps * lanes, min_blocks = 7;
   static constexpr u32 tile_parts = tile_blocks;
-  static constexpr int aside = 112;  // hits a ray can put aside
-  static constexpr std::size_t aside_floats = std::size_t{6} * aside * block_size;  // of a team's rays
+  using key_order = std::conditional_t<P::records_hits, place_order, entry_order>;
+  using queue = lane_queue<key_order>;
+  static constexpr std::size_t aside_floats = queue::floats_aside * block_size;  // of a team's rays
 
   tile_grid<Size> grid;
   tile_map_view map;
@@ -56,7 +54,6 @@ class walk_tile_warps {
   float* put_aside = nullptr;  // [teams][aside_floats]
 
  private:
-  static constexpr int window = 16;  // pending hits of a ray: as many as `order_` has room for
   static constexpr int group = 4;    // candidates read ahead at once
   // 16-byte words of a candidate: its record, then its row, which may not be a whole number of them.
   static constexpr int record_words = sizeof(ray_gaussian) / sizeof(quad), row_words = (P::row_floats + 3) / 4;
@@ -75,15 +72,7 @@ class walk_tile_warps {
     slot_cell cell[P::records_hits ? lanes : 1];
     u32 id[lanes], entry[lanes];
     float depth[lanes];
-    // The pending hits of each lane. Key: a hit's place where hits are recorded, else its Gaussian's entry in the list.
-    float t[window][lanes], alpha[window][lanes], red[window][lanes], green[window][lanes], blue[window][lanes];
-    u32 key[window][lanes];
-  };
-
-  struct pending {
-    float t, alpha;
-    vec3 shown;
-    u32 key;
+    typename queue::scratch pending;
   };
 
  public:
@@ -124,8 +113,13 @@ class walk_tile_warps {
    public:
     __device__ GART_INLINE rays(walk_tile_warps const& k, warp_scratch& s, float* memory, pixel_box const& area,
                                 pixel corner)
-        : k_(k), s_(s), lane_(static_cast<int>(threadIdx.x) % lanes), area_(area), corner_(corner) {
-      aside_ = memory + lane_;
+        : k_(k),
+          s_(s),
+          lane_(static_cast<int>(threadIdx.x) % lanes),
+          area_(area),
+          corner_(corner),
+          before_(order_of(k)),
+          pending_(s.pending, memory, lane_, before_) {
       at_ = {corner.x + lane_ % block_width, corner.y + lane_ / block_width};
       index_ = k.program.order.index(at_);
       alive_ = k.program.order.inside(at_);
@@ -141,8 +135,7 @@ class walk_tile_warps {
 
     // Once along the list. Whether to walk it again, for hits that were lost.
     __device__ GART_INLINE bool walk(u32 first, u32 end) {
-      limit_t_ = lost_t_ = infinity, limit_key_ = lost_key_ = nothing;
-      order_ = 0, free_ = (1u << window) - 1, count_ = aside_count_ = 0;
+      pending_.clear();
       u32 id = 0;
       float depth = 0;
       auto const look_ahead = [&](u32 entry) {
@@ -155,7 +148,7 @@ class walk_tile_warps {
         if (!meet(count)) return false;
       }
       pass_on(infinity);
-      alive_ = alive_ && lost_t_ < infinity;
+      alive_ = alive_ && pending_.lost();
       return __any_sync(everyone, alive_);
     }
 
@@ -243,12 +236,14 @@ class walk_tile_warps {
       for (int c = 0; c < group; ++c) {
         bool const hit = alive_ && (found >> c & 1);
         if (!__any_sync(everyone, hit)) continue;
-        if (!tried && __any_sync(everyone, hit && count_ == window)) {
+        if (!tried && __any_sync(everyone, hit && pending_.full())) {
           tried = true;
           pass_on(s_.depth[first + c]);
           if (!__any_sync(everyone, alive_)) return false;
         }
-        if (hit && alive_) take(from[c], pick(t, c), pick(d2, c), first + c);
+        if (hit && alive_)
+          pending_.add({pick(t, c), hit_alpha<Response>(from[c].gaussian, pick(d2, c)),
+                        k_.program.shade(state_, reinterpret_cast<float const*>(from[c].row)), key_of(first + c)});
       }
       return true;
     }
@@ -263,8 +258,7 @@ class walk_tile_warps {
 
     // A hit at the distance of the last one passed on.
     __device__ bool follows_last(ray_gaussian const& g, response const& r, int number) const {
-      return r.d2 <= g.cutoff && r.t > k_.scene.near && last_key_ != nothing &&
-             nearer(last_t_, last_key_, r.t, key_of(number));
+      return r.d2 <= g.cutoff && r.t > k_.scene.near && last_key_ != nothing && before_(last_key_, key_of(number));
     }
 
     __device__ GART_INLINE u32 key_of(int number) const {
@@ -274,139 +268,26 @@ class walk_tile_warps {
         return s_.entry[number];
     }
 
-    // The order of hits, (t, id). The places of a pixel's hits have the order of their ids; entries are asked for them.
-    __device__ GART_INLINE bool nearer(float t, u32 key, float other_t, u32 other) const {
-      if (t != other_t) return t < other_t;
-      if constexpr (P::records_hits)
-        return key < other;
-      else
-        return k_.map.primitives[key] < k_.map.primitives[other];
-    }
-
-    // A hit that one ray, or some, have found.
-    __device__ GART_INLINE void take(candidate const& c, float t, float d2, int number) {
-      pending const h{t, hit_alpha<Response>(c.gaussian, d2),
-                      k_.program.shade(state_, reinterpret_cast<float const*>(c.row)), key_of(number)};
-      if (t >= limit_t_ && !nearer(t, h.key, limit_t_, limit_key_)) {
-        put_aside(h);
-        return;
-      }
-      if (count_ == window) {
-        pending const farthest = take_farthest();
-        if (!nearer(t, h.key, farthest.t, farthest.key)) {
-          put(farthest);
-          limit_t_ = t, limit_key_ = h.key;
-          put_aside(h);
-          return;
-        }
-        limit_t_ = farthest.t, limit_key_ = farthest.key;
-        put_aside(farthest);
-      }
-      put(h);
-    }
-
-    __device__ GART_INLINE void put(pending const& h) {
-      int const slot = __ffs(static_cast<int>(free_)) - 1;
-      free_ &= free_ - 1;
-      s_.t[slot][lane_] = h.t, s_.alpha[slot][lane_] = h.alpha;
-      s_.red[slot][lane_] = h.shown.x, s_.green[slot][lane_] = h.shown.y, s_.blue[slot][lane_] = h.shown.z;
-      s_.key[slot][lane_] = h.key;
-      int bits = 4 * count_++;
-      for (; bits > 0; bits -= 4) {  // from the back, where most belong
-        int const before = slot_of(bits / 4 - 1);
-        if (!nearer(h.t, h.key, s_.t[before][lane_], s_.key[before][lane_])) break;
-      }
-      u64 const low = (u64{1} << bits) - 1;
-      order_ = (order_ & low) | u64(slot) << bits | (order_ & ~low) << 4;
-    }
-
-    __device__ GART_INLINE pending take_slot(int slot) {
-      --count_;
-      free_ |= 1u << slot;
-      return {s_.t[slot][lane_],
-              s_.alpha[slot][lane_],
-              {s_.red[slot][lane_], s_.green[slot][lane_], s_.blue[slot][lane_]},
-              s_.key[slot][lane_]};
-    }
-
-    // The slot of the pending hit that is k-th in order.
-    __device__ GART_INLINE int slot_of(int k) const { return static_cast<int>(order_ >> (4 * k)) & 15; }
-
-    // Of a full window.
-    __device__ GART_INLINE pending take_farthest() {
-      int const slot = slot_of(window - 1);
-      order_ &= (u64{1} << (4 * (window - 1))) - 1;
-      return take_slot(slot);
-    }
-
-    __device__ GART_INLINE void put_aside(pending const& h) {
-      if (aside_count_ < aside)
-        write_aside(aside_count_++, h);
-      else if (nearer(h.t, h.key, lost_t_, lost_key_))
-        lost_t_ = h.t, lost_key_ = h.key;
-    }
-
-    __device__ GART_INLINE void write_aside(int k, pending const& h) {
-      float* const to = aside_ + 6 * lanes * k;
-      to[0] = h.t, to[lanes] = h.alpha, to[2 * lanes] = bits_to_float(h.key);
-      to[3 * lanes] = h.shown.x, to[4 * lanes] = h.shown.y, to[5 * lanes] = h.shown.z;
-    }
-
-    __device__ GART_INLINE pending read_aside(int k) const {
-      float const* const from = aside_ + 6 * lanes * k;
-      return {from[0], from[lanes], {from[3 * lanes], from[4 * lanes], from[5 * lanes]}, aside_key(k)};
-    }
-    __device__ GART_INLINE float aside_time(int k) const { return aside_[6 * lanes * k]; }
-    __device__ GART_INLINE u32 aside_key(int k) const { return float_to_bits(aside_[6 * lanes * k + 2 * lanes]); }
-
-    // The nearest of the hits put aside, as many as there is room for.
-    __device__ GART_INLINE void fill() {
-      limit_t_ = infinity, limit_key_ = nothing;
-      for (int k = 0; k < aside_count_;) {
-        if (count_ < window) {
-          put(read_aside(k));
-          if (k < --aside_count_) write_aside(k, read_aside(aside_count_));
-          continue;
-        }
-        float t = aside_time(k);
-        u32 key = aside_key(k);
-        int const farthest = slot_of(window - 1);
-        float const farthest_t = s_.t[farthest][lane_];
-        u32 const farthest_key = s_.key[farthest][lane_];
-        if (nearer(t, key, farthest_t, farthest_key)) {
-          pending const h = read_aside(k);
-          write_aside(k, take_farthest());
-          put(h);
-          t = farthest_t, key = farthest_key;
-        }
-        if (nearer(t, key, limit_t_, limit_key_)) limit_t_ = t, limit_key_ = key;
-        ++k;
-      }
-    }
-
     // Hits nearer than `depth`, which nothing that is left of the list comes before.
     __device__ GART_INLINE void pass_on(float depth) {
-      while (true) {
-        while (alive_ && count_ > 0) {
-          int const slot = slot_of(0);
-          float const t = s_.t[slot][lane_];
-          if (!(t * cosine_ < depth) || (t >= lost_t_ && !nearer(t, s_.key[slot][lane_], lost_t_, lost_key_))) break;
-          order_ >>= 4;
-          pending const h = take_slot(slot);
-          last_t_ = h.t, last_key_ = h.key;
-          alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::records_hits ? h.key : 0);
-        }
-        bool const empty = alive_ && count_ == 0 && aside_count_ > 0 && limit_t_ * cosine_ < depth;
-        if (!__any_sync(everyone, empty)) return;
-        if (alive_ && aside_count_ > 0 && count_ <= window / 2) fill();
-      }
+      if (!alive_) return;
+      pending_.pass_on(depth, cosine_, [this](waiting_hit const& h) {
+        last_t_ = h.t, last_key_ = h.key;
+        return alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::records_hits ? h.key : 0);
+      });
+    }
+
+    __device__ GART_INLINE static key_order order_of(walk_tile_warps const& k) {
+      if constexpr (P::records_hits)
+        return {};
+      else
+        return {k.map.primitives.data()};
     }
 
     static constexpr float infinity = __builtin_huge_valf();
 
     walk_tile_warps const& k_;
     warp_scratch& s_;
-    float* aside_;  // [aside][6], a lane's numbers 32 apart
     int lane_;
     pixel_box area_;
     pixel corner_, at_;
@@ -417,12 +298,8 @@ class walk_tile_warps {
     bool alive_;
     float last_t_;  // the last hit passed on: at first (near, none), t > near
     u32 last_key_ = nothing;
-    float limit_t_,
-        lost_t_;  // the nearest hit put aside, and the nearest lost: what is pending lies before the one, what
-    u32 limit_key_, lost_key_;  // is passed on before the other
-    u64 order_;                 // slots of the pending hits, nearest first, 4 bits each
-    u32 free_;
-    int count_, aside_count_;
+    key_order before_;
+    queue pending_;
   };
 };
 

@@ -1,0 +1,211 @@
+#pragma once
+// The pending hits of one ray of a warp (trace/warp_walk.hpp), in the order (t, id). The latest 16 lie in a window in
+// shared memory, each lane in a bank of its own, their order a register of sixteen 4-bit numbers. A full window puts
+// its farther half aside as a run: eight hits in order, in memory of its own, of which the next one's t is kept in a
+// register. The next hit of all is the window's first or that of a run. So a hit is written at most once and read at
+// most once, and moves no other but those of its window.
+//
+// Where all runs are taken a hit is lost: what is passed on from then on lies before the nearest hit that was.
+// Memory: 32 bytes for each of 96 hits a lane. Device only.
+
+#include <gart/core/types.hpp>
+#include <gart/math/arith.hpp>
+#include <gart/math/glm.hpp>
+
+#if defined(__CUDACC__)
+
+namespace gart {
+
+struct waiting_hit {
+  float t, alpha;
+  vec3 shown;
+  u32 key;  // a hit's place where hits are recorded (tiles/layout.hpp), else its Gaussian's entry in the list
+};
+
+// Order of hits at one t: places of a pixel's hits have the order of their ids; entries are asked for them.
+struct place_order {
+  GART_HD GART_INLINE bool operator()(u32 a, u32 b) const { return a < b; }
+};
+struct entry_order {
+  u32 const* ids;
+  GART_HD GART_INLINE bool operator()(u32 a, u32 b) const { return ids[a] < ids[b]; }
+};
+
+template <class KeyOrder>
+class lane_queue {
+  static constexpr int lanes = 32;
+  static constexpr int window = 16;  // as many as `order_` has room for
+  static constexpr int run = window / 2, runs = 12;
+  static_assert(runs < 16);  // free_run: some 4 bits of 64 are always zero
+  static constexpr float infinity = __builtin_huge_valf();
+
+ public:
+  struct scratch {  // of a warp
+    float t[window][lanes], alpha[window][lanes], red[window][lanes], green[window][lanes], blue[window][lanes];
+    u32 key[window][lanes];
+  };
+  static constexpr std::size_t floats_aside = std::size_t{8} * runs * run;  // of a lane
+
+  // aside: of the warp's lanes, on a boundary of 16 bytes.
+  __device__ GART_INLINE lane_queue(scratch& s, float* aside, int lane, KeyOrder before)
+      : s_(s), aside_(reinterpret_cast<quad*>(aside) + 2 * lane), lane_(lane), before_(before) {
+    clear();
+  }
+
+  __device__ GART_INLINE void clear() {
+    order_ = 0, free_ = (1u << window) - 1, count_ = 0;
+    left_ = 0, next_t_ = infinity, next_run_ = 0;
+    lost_t_ = infinity, lost_key_ = 0;
+    GART_UNROLL
+    for (int r = 0; r < runs; ++r) first_t_[r] = infinity;
+  }
+
+  __device__ GART_INLINE bool full() const { return count_ == window; }
+  __device__ GART_INLINE bool lost() const { return lost_t_ < infinity; }
+
+  __device__ GART_INLINE void add(waiting_hit const& h) {
+    if (lost() && !nearer(h.t, h.key, lost_t_, lost_key_)) return;
+    if (full()) {
+      int const to = free_run();
+      if (to < runs) {
+        put_aside(to);
+      } else {
+        int const farthest = slot_of(window - 1);
+        float const t = s_.t[farthest][lane_];
+        u32 const key = s_.key[farthest][lane_];
+        bool const nearer_than_it = nearer(h.t, h.key, t, key);
+        lost_t_ = nearer_than_it ? t : h.t, lost_key_ = nearer_than_it ? key : h.key;
+        if (!nearer_than_it) return;
+        order_ &= (u64{1} << (4 * (window - 1))) - 1;
+        give_back(farthest);
+      }
+    }
+    put(h);
+  }
+
+  // Passes on hits with t * cosine < depth until f(hit) is false.
+  template <class F>
+  __device__ GART_INLINE void pass_on(float depth, float cosine, F&& f) {
+    while (true) {
+      int const slot = slot_of(0);
+      float t = count_ > 0 ? s_.t[slot][lane_] : infinity;
+      bool const from_run =
+          next_t_ < t || (next_t_ == t && t < infinity && before_(key_of(next_record()), s_.key[slot][lane_]));
+      t = from_run ? next_t_ : t;
+      if (t == infinity || !(t * cosine < depth)) return;
+      if (t >= lost_t_ && !nearer(t, from_run ? key_of(next_record()) : s_.key[slot][lane_], lost_t_, lost_key_))
+        return;
+      if (!f(from_run ? take_of_run() : take_first())) return;
+    }
+  }
+
+ private:
+  __device__ GART_INLINE bool nearer(float t, u32 key, float other_t, u32 other) const {
+    return t != other_t ? t < other_t : before_(key, other);
+  }
+
+  // The slot of the window's hit that is k-th in order.
+  __device__ GART_INLINE int slot_of(int k) const { return static_cast<int>(order_ >> (4 * k)) & 15; }
+
+  __device__ GART_INLINE void put(waiting_hit const& h) {
+    int const slot = __ffs(static_cast<int>(free_)) - 1;
+    free_ &= free_ - 1;
+    s_.t[slot][lane_] = h.t, s_.alpha[slot][lane_] = h.alpha;
+    s_.red[slot][lane_] = h.shown.x, s_.green[slot][lane_] = h.shown.y, s_.blue[slot][lane_] = h.shown.z;
+    s_.key[slot][lane_] = h.key;
+    int bits = 4 * count_++;
+    for (; bits > 0; bits -= 4) {  // from the back, where most belong
+      int const other = slot_of(bits / 4 - 1);
+      if (!nearer(h.t, h.key, s_.t[other][lane_], s_.key[other][lane_])) break;
+    }
+    u64 const low = (u64{1} << bits) - 1;
+    order_ = (order_ & low) | u64(slot) << bits | (order_ & ~low) << 4;
+  }
+
+  __device__ GART_INLINE waiting_hit at(int slot) const {
+    return {s_.t[slot][lane_],
+            s_.alpha[slot][lane_],
+            {s_.red[slot][lane_], s_.green[slot][lane_], s_.blue[slot][lane_]},
+            s_.key[slot][lane_]};
+  }
+
+  __device__ GART_INLINE void give_back(int slot) { free_ |= 1u << slot, --count_; }
+
+  __device__ GART_INLINE waiting_hit take_first() {
+    int const slot = slot_of(0);
+    order_ >>= 4;
+    give_back(slot);
+    return at(slot);
+  }
+
+  // Runs. left_: how many each still has, 4 bits a run.
+  __device__ GART_INLINE int free_run() const {
+    u64 const any = left_ | left_ >> 1 | left_ >> 2 | left_ >> 3;
+    return (__ffsll(static_cast<long long>(~any & 0x1111111111111111ull)) - 1) / 4;
+  }
+  __device__ GART_INLINE quad* record(int r, int k) const { return aside_ + 2 * lanes * (r * run + k); }
+  __device__ GART_INLINE quad* next_record(int r) const {
+    return record(r, run - (static_cast<int>(left_ >> (4 * r)) & 15));
+  }
+  __device__ GART_INLINE quad* next_record() const { return next_record(next_run_); }
+  __device__ GART_INLINE static u32 key_of(quad const* record) { return float_to_bits(record[1].v[1]); }
+
+  // The farther half of a full window.
+  __device__ GART_INLINE void put_aside(int to) {
+    float first = 0;
+    GART_UNROLL
+    for (int k = 0; k < run; ++k) {
+      int const slot = slot_of(window - run + k);
+      waiting_hit const h = at(slot);
+      give_back(slot);
+      quad* const out = record(to, k);
+      out[0] = {{h.alpha, h.shown.x, h.shown.y, h.shown.z}};
+      out[1] = {{h.t, bits_to_float(h.key), 0, 0}};
+      if (k == 0) first = h.t;
+    }
+    order_ &= (u64{1} << (4 * (window - run))) - 1;
+    left_ |= u64{run} << (4 * to);
+    set_first(to, first);
+  }
+
+  __device__ GART_INLINE waiting_hit take_of_run() {
+    int const from = next_run_;
+    quad const* const out = next_record();
+    quad const a = out[0], b = out[1];
+    left_ -= u64{1} << (4 * from);
+    bool const more = (left_ >> (4 * from) & 15) != 0;
+    set_first(from, more ? out[2 * lanes + 1].v[0] : infinity);
+    return {b.v[0], a.v[0], {a.v[1], a.v[2], a.v[3]}, float_to_bits(b.v[1])};
+  }
+
+  // The t of a run's next hit; which run is next.
+  __device__ GART_INLINE void set_first(int r, float t) {
+    next_t_ = infinity;
+    int ties = 0;
+    GART_UNROLL
+    for (int k = 0; k < runs; ++k) {
+      if (k == r) first_t_[k] = t;
+      ties += first_t_[k] == next_t_;
+      if (first_t_[k] < next_t_) next_t_ = first_t_[k], next_run_ = k, ties = 0;
+    }
+    if (ties == 0 || next_t_ == infinity) return;
+    GART_UNROLL
+    for (int k = 1; k < runs; ++k)
+      if (k > next_run_ && first_t_[k] == next_t_ && before_(key_of(next_record(k)), key_of(next_record()))) next_run_ = k;
+  }
+
+  scratch& s_;
+  quad* aside_;  // [runs][run][lanes][2], from the lane's own: alpha and what is shown; t and key
+  int lane_;
+  KeyOrder before_;
+  u64 order_, left_;
+  u32 free_;
+  int count_;
+  float first_t_[runs], next_t_, lost_t_;
+  int next_run_;
+  u32 lost_key_;
+};
+
+}  // namespace gart
+
+#endif
