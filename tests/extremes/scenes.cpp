@@ -171,8 +171,8 @@ std::vector<extreme> extremes(std::uint64_t seed) {
       rotate(s, random);
       append(pancakes, random, s);
     }
-    all.push_back({scene_of("needles of 1 to 1e6", needles, ordinary_camera()), 1e-2, 0.5});
-    all.push_back({scene_of("pancakes of 1e6 to 1", pancakes, ordinary_camera()), 1e-2, 0.5});
+    all.push_back({scene_of("needles of 1 to 1e6", needles, ordinary_camera()), 1e-2});
+    all.push_back({scene_of("pancakes of 1e6 to 1", pancakes, ordinary_camera()), 1e-2});
   }
   {
     // Thin axes of 1e-6 at distance 3, their planes through the camera and a pixel: d_g and p change by their own size
@@ -217,14 +217,14 @@ std::vector<extreme> extremes(std::uint64_t seed) {
     s.view.position = centre + vec3d(0.3, 0.7, -0.6);
     all.push_back({s});
     // A thousand times its size away, through a long lens: a rounding of the ray is 2e-4 of the size, and a tenth of
-    // that of the smallest axes.
+    // that of the smallest axes. On up to half of the rays it leaves the order of some two hits open.
     m = cloud(random, 60);
     for (std::size_t i = 0; i < m.size(); ++i) {
       for (int a = 0; a < 3; ++a) m.mean[3 * i + a] *= 1e4f;
       m.mean[3 * i + 2] += 1e7f;
       for (int a = 0; a < 3; ++a) m.log_scale[3 * i + a] += std::log(1e4f);
     }
-    all.push_back({scene_of("1e7 away", m, looking_along_z(17, 13, 7000)), 1e-2, 0.5});
+    all.push_back({scene_of("1e7 away", m, looking_along_z(17, 13, 7000)), 1e-2, 0.4});
   }
   {
     gart::gaussian_model m = none();

@@ -21,7 +21,7 @@ struct extreme {
   // some tens of hits a ray, 2^-24 each, magnified up to 1 / (1 - 0.99). Others say why theirs is larger.
   double tolerance = 1e-4;
   // Least share of pixels that rounding leaves decided, so that the comparison cannot come to nothing.
-  double decided = 0.8;
+  double decided = 0.9;
 };
 
 // Random numbers whose bits do not depend on the standard library.

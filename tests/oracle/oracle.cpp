@@ -111,7 +111,8 @@ std::vector<hit> hits_of(std::vector<prepared> const& gaussians, int kernel_degr
     double const response = g.sigma * std::exp(-4.5 * std::pow(radius / 3, n));
     if (response < 0.5 * alpha_min) continue;
 
-    Matrix3d const magnitude = g.to_unit.cwiseAbs();
+    // An element of the rotation near 0 is a difference of products near 1, and off by their roundings.
+    Matrix3d const magnitude = 0.5 * (g.to_unit.cwiseAbs().colwise() + g.to_unit.rowwise().norm());
     Vector3d const o_error = ulps * (magnitude * g.from_mean.cwiseAbs()), d_error = ulps * (magnitude * d.cwiseAbs());
     hit h;
     h.t = t, h.id = static_cast<std::uint32_t>(i);
