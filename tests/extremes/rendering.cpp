@@ -408,8 +408,8 @@ TEST_CASE_TEMPLATE("error budget: derivatives by alpha along a ray", E, GART_TES
           std::abs(o.gradients.opacity[i] - expected.opacity[i]) / (by_alpha * c.before[i] * c.brightness[i]);
       auto const bin = static_cast<std::size_t>(std::min(11.0, -std::log10(c.before[i])));
       decade[bin] = std::max(decade[bin], error);
-      // C.g is 4 at most; C and what lies before the hit are sums of up to 20 floats, then multiplied by g, added up
-      // and subtracted: their roundings are at most 2^-24 of C.g each. 1 / (1 - alpha) magnifies the difference.
+      // C.g is 4 at most; C and V are sums of up to 20 floats, then multiplied by g, added up and subtracted: their
+      // roundings are at most 2^-24 of C.g each. 1 / (1 - alpha) magnifies the difference.
       double const bound = 32 * std::ldexp(4.0, -24) / (c.before[i] * (1 - c.alpha[i]) * c.brightness[i]) + 1e-5;
       REQUIRE(error < bound);
     }

@@ -195,8 +195,8 @@ std::vector<extreme> extremes(std::uint64_t seed) {
     float const logits[] = {-5.5f, -5.54f, 4.6f, 6, 9, 12, 17, 25, 40, 80, 88, 1e4f, 1e30f, FLT_MAX};
     for (std::size_t i = 0; i < 30; ++i) m.opacity[2 * i] = logits[i % std::size(logits)];
     all.push_back({scene_of("sigma to its float limits", m, ordinary_camera())});
-    // Thirty hits at up to 0.99 a ray: a transmittance of 1e-60 and less. Behind the first few, C - L is rounding, and
-    // the gradient of opacity, which 1 - sigma makes small, shows it: of 400 seeds the worst is off by 2.9e-4.
+    // Thirty hits at up to 0.99 a ray: a transmittance of 1e-60 and less. Behind the first few, V - C is rounding, and
+    // the gradient of opacity, which 1 - sigma makes small, shows it: of 400 seeds the worst is off by 3.5e-4.
     m = cloud(random, 90);
     for (std::size_t i = 0; i < m.size(); ++i) {
       m.opacity[i] = static_cast<float>(random.uniform(2.0, 12));
@@ -291,7 +291,7 @@ std::vector<extreme> extremes(std::uint64_t seed) {
     brighten(m);
     oracle::scene s = scene_of("10,000 hits on a ray", m, looking_along_z(3, 1, 1000));
     s.options.alpha_min = 1e-6f, s.options.transmittance_min = 0;
-    all.push_back({s, 1e-3});  // the running difference C - L has seen 10,000 roundings by its end
+    all.push_back({s, 1e-3});  // the sums V and C have seen 10,000 roundings by its end
   }
   {
     // Three thousand on one centre: one shape 2,000 times (ties, by id), and 1,000 others between them.
