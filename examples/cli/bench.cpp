@@ -1,6 +1,7 @@
 #include "commands.hpp"
 #include "options.hpp"
 #include "output.hpp"
+#include "processor_time.hpp"
 #include "progress.hpp"
 
 #include <gart/io/dataset.hpp>
@@ -66,7 +67,7 @@ int run_bench(bench_arguments const& a) {
   options.rates = {0, 0, 0, 0, 0, 0, 0};
 
   std::map<std::string, double> stages;
-  double wall = 0, hits = 0, lt_bytes = 0;
+  double wall = 0, processor = 0, hits = 0, lt_bytes = 0;
   std::size_t peak = 0;
   gart::row_info row;
   progress say(a.quiet);
@@ -75,22 +76,25 @@ int run_bench(bench_arguments const& a) {
     auto const session = gart::make_session(request, options, data, &file.model);
     row = session->row();
     std::map<std::string, std::vector<double>> samples;
-    std::vector<double> walls;
+    std::vector<double> walls, processors;
     for (int i = -a.warmups; i < a.repeats; ++i) {
       // Times by stage and the whole step's wall time are taken in turns: timing the stages costs a little itself.
       session->profile().enable(false);
+      double const before = processor_ms();
       auto const start = std::chrono::steady_clock::now();
       session->step();
       double const ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+      double const used = processor_ms() - before;
       session->profile().enable(true);
       session->profile().clear();
       session->step();
       if (i < 0) continue;
-      walls.push_back(ms);
+      walls.push_back(ms), processors.push_back(used);
       for (auto const& [label, time] : session->profile().stages()) samples[label].push_back(time.milliseconds);
     }
     for (auto& [label, list] : samples) stages[label] += median(list) / static_cast<double>(cameras.size());
     wall += median(walls) / static_cast<double>(cameras.size());
+    processor += median(processors) / static_cast<double>(cameras.size());
     auto const image = session->render(cameras[v].view, gart::vec3(0.0f));
     hits += std::accumulate(image.hits.data.begin(), image.hits.data.end(), 0.0) /
             static_cast<double>(image.hits.data.size() * cameras.size());
@@ -116,6 +120,7 @@ int run_bench(bench_arguments const& a) {
                            {"warmups", a.warmups},
                            {"repeats", a.repeats},
                            {"step_ms", wall},
+                           {"step_processor_ms", processor},
                            {"stages_ms", stages},
                            {"hits_per_ray", hits},
                            {"lt_bytes", lt_bytes},
@@ -124,7 +129,7 @@ int run_bench(bench_arguments const& a) {
   std::printf("%s, %s, %s: %zu Gaussians, %d x %d, medians of %d, mean over %zu views\n", row.backend.c_str(),
               row.tracer.c_str(), row.backward.c_str(), file.model.size(), cameras[0].view.width,
               cameras[0].view.height, a.repeats, cameras.size());
-  std::printf("  %-24s %10.3f ms\n", "whole step", wall);
+  std::printf("  %-24s %10.3f ms\n  %-24s %10.3f ms\n", "whole step", wall, "of the processor", processor);
   for (auto const& [label, ms] : stages) std::printf("  %-24s %10.3f ms\n", label.c_str(), ms);
   std::printf("  %-24s %10.1f\n  %-24s %10s\n  %-24s %10s\n", "hits a ray", hits, "LT buffer",
               as_bytes(lt_bytes).c_str(), "peak memory", as_bytes(static_cast<double>(peak)).c_str());
@@ -168,7 +173,8 @@ void add_bench(CLI::App& app, command& selected) {
   bench->footer(
       "\nStages nest: \"backward\" is everything between the image's gradient and the parameters', \"backward/...\" "
       "its\n"
-      "parts. On a GPU stages are device time, by events; \"whole step\" is wall time, with one wait a step.\n"
+      "parts. On a GPU stages are device time, by events; \"whole step\" is wall time, with one wait a step,\n"
+      "\"of the processor\" that of all threads together.\n"
       "\nExamples:\n"
       "  gart bench run/model.ply lego --backend cuda --backward primitive --json bench.json\n"
       "  gart bench scene.ply path.json --views 1 --repeats 5");

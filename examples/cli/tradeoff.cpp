@@ -1,6 +1,7 @@
 #include "commands.hpp"
 #include "options.hpp"
 #include "output.hpp"
+#include "processor_time.hpp"
 #include "progress.hpp"
 #include "tradeoff_page.hpp"
 #include "tradeoff_settings.hpp"
@@ -11,7 +12,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <ctime>
 #include <memory>
 #include <random>
 
@@ -48,9 +48,6 @@ double mean(std::vector<double> const& values) {
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
-
-// Milliseconds of all of the program's threads.
-double processor_ms() { return 1000.0 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 // The geometry after one more step of training, about: every number moves by up to Adam's rate for it.
 void move_geometry(gart::gaussian_model& model, float extent, std::mt19937& engine) {
