@@ -11,6 +11,7 @@
 #include <gart/backward/packet_gather.hpp>
 #include <gart/backward/scatter.hpp>
 #include <gart/backward/strategies.hpp>
+#include <gart/backward/warp_gather.hpp>
 #include <gart/render/forward.hpp>
 #include <gart/tiles/tile_map.hpp>
 
@@ -194,6 +195,12 @@ class backward {
 #if !defined(__CUDACC__)
     if constexpr (!E::device) {
       parallel_for(exec, "backward/gather", tile_range{grid_.count(), 1}, packet_gather<kernel_type>{kernel});
+      return;
+    }
+#endif
+#if defined(__CUDACC__)
+    if constexpr (E::device && requires { Strategy::by_warp; }) {
+      parallel_for(exec, "backward/gather", tile_range{grid_.count(), 64}, warp_gather<kernel_type>{kernel});
       return;
     }
 #endif

@@ -96,7 +96,7 @@ struct gather_kernel {
     }
   }
 
- private:
+ protected:
   GART_HD void load_pixel(pixel_data& out, pixel_box const& area, index_t p) const {
     pixel const at{static_cast<int>(area.x0 + p % area.width()), static_cast<int>(area.y0 + p / area.width())};
     std::size_t const a = 3 * (static_cast<std::size_t>(at.y) * view.width + at.x);
@@ -133,18 +133,9 @@ struct gather_kernel {
       Entry const entry = next;
       next = after;
       after = slot[k + 2 < last ? k + 2 : last];
-      pixel_data const& at = s.pixels[p];
+      visit(s.pixels[p], entry, first + k, data, sh_sum, moment_sum);
       ++p;
       if (++column == width) column = 0, p += skip;
-      if constexpr (recomputed) {
-        quad const d = at.direction_total;
-        response const r = evaluate<Response>(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
-        bool const reached = !before(at.last.v[0], float_to_bits(at.last.v[1]), r.t, first + k);
-        if (!is_hit(data.gaussian, r, near) || !reached) continue;
-      } else if (!entry.written()) {
-        continue;
-      }
-      add(at, entry, data, sh_sum, moment_sum);
     }
     finish(range.box, area, id, sh_sum, moment_sum);
   }
@@ -158,6 +149,20 @@ struct gather_kernel {
     GART_HD record_data(gather_kernel const& k, u32 id) : gaussian(k.records[id]) {}
   };
   using lane_data = std::conditional_t<Terms::geometry || recomputed, record_data, no_data>;
+
+  // The slot of that number: added if it is a hit.
+  GART_HD GART_INLINE void visit(pixel_data const& at, Entry const& entry, u32 number, lane_data const& data,
+                                 float (&sh_sum)[sh_stride], float (&moment_sum)[moment_stride]) const {
+    if constexpr (recomputed) {
+      quad const d = at.direction_total;
+      response const r = evaluate<Response>(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
+      bool const reached = !before(at.last.v[0], float_to_bits(at.last.v[1]), r.t, number);
+      if (!is_hit(data.gaussian, r, near) || !reached) return;
+    } else if (!entry.written()) {
+      return;
+    }
+    add(at, entry, data, sh_sum, moment_sum);
+  }
 
   // One hit: its pixel, its record.
   GART_HD GART_INLINE void add(pixel_data const& at, Entry const& entry, lane_data const& data,

@@ -65,4 +65,11 @@ struct cleared_strategy : primitive_strategy {
   static constexpr slot_validity validity = slot_validity::cleared;
 };
 
+// The primitive strategy with a warp a primitive (backward/warp_gather.hpp): what a lane a primitive is measured
+// against, on a device.
+struct warp_strategy : primitive_strategy {
+  static constexpr char const* name = "warp";
+  static constexpr bool by_warp = true;
+};
+
 }  // namespace gart

@@ -1,12 +1,12 @@
 #pragma once
 // The pending hits of one ray of a warp (trace/warp_walk.hpp), in the order (t, id). The latest 16 lie in a window in
 // shared memory, each lane in a bank of its own, their order a register of sixteen 4-bit numbers. A full window puts
-// its farther half aside as a run: eight hits in order, in memory of its own, of which the next one's t is kept in a
-// register. The next hit of all is the window's first or that of a run. So a hit is written at most once and read at
-// most once, and moves no other but those of its window.
+// all but its first hit aside as a run, in order, in memory of its own; of each run the next hit's t is in a register.
+// The next hit of all is the window's first or that of a run. So a hit is put aside once at most, and the order of
+// others is never made anew for it.
 //
 // Where all runs are taken a hit is lost: what is passed on from then on lies before the nearest hit that was.
-// Memory: 32 bytes for each of 96 hits a lane. Device only.
+// Memory: 24 bytes for each of 210 hits a lane. Device only.
 
 #include <gart/core/types.hpp>
 #include <gart/math/arith.hpp>
@@ -35,20 +35,24 @@ template <class KeyOrder>
 class lane_queue {
   static constexpr int lanes = 32;
   static constexpr int window = 16;  // as many as `order_` has room for
-  static constexpr int run = window / 2, runs = 12;
-  static_assert(runs < 16);  // free_run: some 4 bits of 64 are always zero
+  static constexpr int run = window - 1, runs = 14;
+  static_assert(run < 16 && runs < 16);  // `left_` has 4 bits a run; free_run: some of them are always zero
   static constexpr float infinity = __builtin_huge_valf();
+
+  struct alignas(8) pair {
+    float a, b;
+  };
 
  public:
   struct scratch {  // of a warp
     float t[window][lanes], alpha[window][lanes], red[window][lanes], green[window][lanes], blue[window][lanes];
     u32 key[window][lanes];
   };
-  static constexpr std::size_t floats_aside = std::size_t{8} * runs * run;  // of a lane
+  static constexpr std::size_t floats_aside = std::size_t{6} * runs * run;  // of a lane
 
-  // aside: of the warp's lanes, on a boundary of 16 bytes.
+  // aside: of the warp's lanes, on a boundary of 8 bytes.
   __device__ GART_INLINE lane_queue(scratch& s, float* aside, int lane, KeyOrder before)
-      : s_(s), aside_(reinterpret_cast<quad*>(aside) + 2 * lane), lane_(lane), before_(before) {
+      : s_(s), aside_(reinterpret_cast<pair*>(aside) + 3 * runs * run * lane), lane_(lane), before_(before) {
     clear();
   }
 
@@ -62,23 +66,27 @@ class lane_queue {
 
   __device__ GART_INLINE bool full() const { return count_ == window; }
   __device__ GART_INLINE bool lost() const { return lost_t_ < infinity; }
+  __device__ GART_INLINE float lost_t() const { return lost_t_; }  // infinity: none
 
+  // For a window that is full, and for one that soon will be: lanes that put hits aside do so together.
+  __device__ GART_INLINE void make_room() {
+    if (count_ < window - 3) return;
+    int const to = free_run();
+    if (to < runs) put_aside(to);
+  }
+
+  // Needs room, where there can be.
   __device__ GART_INLINE void add(waiting_hit const& h) {
     if (lost() && !nearer(h.t, h.key, lost_t_, lost_key_)) return;
     if (full()) {
-      int const to = free_run();
-      if (to < runs) {
-        put_aside(to);
-      } else {
-        int const farthest = slot_of(window - 1);
-        float const t = s_.t[farthest][lane_];
-        u32 const key = s_.key[farthest][lane_];
-        bool const nearer_than_it = nearer(h.t, h.key, t, key);
-        lost_t_ = nearer_than_it ? t : h.t, lost_key_ = nearer_than_it ? key : h.key;
-        if (!nearer_than_it) return;
-        order_ &= (u64{1} << (4 * (window - 1))) - 1;
-        give_back(farthest);
-      }
+      int const farthest = slot_of(window - 1);
+      float const t = s_.t[farthest][lane_];
+      u32 const key = s_.key[farthest][lane_];
+      bool const fits = nearer(h.t, h.key, t, key);
+      lost_t_ = fits ? t : h.t, lost_key_ = fits ? key : h.key;
+      if (!fits) return;
+      order_ &= (u64{1} << (4 * (window - 1))) - 1;
+      give_back(farthest);
     }
     put(h);
   }
@@ -143,39 +151,38 @@ class lane_queue {
     u64 const any = left_ | left_ >> 1 | left_ >> 2 | left_ >> 3;
     return (__ffsll(static_cast<long long>(~any & 0x1111111111111111ull)) - 1) / 4;
   }
-  __device__ GART_INLINE quad* record(int r, int k) const { return aside_ + 2 * lanes * (r * run + k); }
-  __device__ GART_INLINE quad* next_record(int r) const {
+  __device__ GART_INLINE pair* record(int r, int k) const { return aside_ + 3 * (r * run + k); }
+  __device__ GART_INLINE pair* next_record(int r) const {
     return record(r, run - (static_cast<int>(left_ >> (4 * r)) & 15));
   }
-  __device__ GART_INLINE quad* next_record() const { return next_record(next_run_); }
-  __device__ GART_INLINE static u32 key_of(quad const* record) { return float_to_bits(record[1].v[1]); }
+  __device__ GART_INLINE pair* next_record() const { return next_record(next_run_); }
+  __device__ GART_INLINE static u32 key_of(pair const* record) { return float_to_bits(record[0].b); }
 
-  // The farther half of a full window.
+  // All but the first of the window, at a run's end.
   __device__ GART_INLINE void put_aside(int to) {
-    float first = 0;
-    GART_UNROLL
-    for (int k = 0; k < run; ++k) {
-      int const slot = slot_of(window - run + k);
+    int const count = count_ - 1;
+    u64 rest = order_ >> 4;
+    float const first = s_.t[rest & 15][lane_];
+    pair* out = record(to, run - count);
+    for (int k = 0; k < count; ++k, rest >>= 4, out += 3) {
+      int const slot = static_cast<int>(rest) & 15;
       waiting_hit const h = at(slot);
-      give_back(slot);
-      quad* const out = record(to, k);
-      out[0] = {{h.alpha, h.shown.x, h.shown.y, h.shown.z}};
-      out[1] = {{h.t, bits_to_float(h.key), 0, 0}};
-      if (k == 0) first = h.t;
+      out[0] = {h.t, bits_to_float(h.key)}, out[1] = {h.alpha, h.shown.x}, out[2] = {h.shown.y, h.shown.z};
     }
-    order_ &= (u64{1} << (4 * (window - run))) - 1;
-    left_ |= u64{run} << (4 * to);
+    int const kept = slot_of(0);
+    order_ = kept, free_ = ((1u << window) - 1) & ~(1u << kept), count_ = 1;
+    left_ |= u64(count) << (4 * to);
     set_first(to, first);
   }
 
   __device__ GART_INLINE waiting_hit take_of_run() {
     int const from = next_run_;
-    quad const* const out = next_record();
-    quad const a = out[0], b = out[1];
+    pair const* const out = next_record();
+    pair const a = out[0], b = out[1], c = out[2];
     left_ -= u64{1} << (4 * from);
     bool const more = (left_ >> (4 * from) & 15) != 0;
-    set_first(from, more ? out[2 * lanes + 1].v[0] : infinity);
-    return {b.v[0], a.v[0], {a.v[1], a.v[2], a.v[3]}, float_to_bits(b.v[1])};
+    set_first(from, more ? out[3].a : infinity);
+    return {a.a, b.a, {b.b, c.a, c.b}, float_to_bits(a.b)};
   }
 
   // The t of a run's next hit; which run is next.
@@ -191,11 +198,12 @@ class lane_queue {
     if (ties == 0 || next_t_ == infinity) return;
     GART_UNROLL
     for (int k = 1; k < runs; ++k)
-      if (k > next_run_ && first_t_[k] == next_t_ && before_(key_of(next_record(k)), key_of(next_record()))) next_run_ = k;
+      if (k > next_run_ && first_t_[k] == next_t_ && before_(key_of(next_record(k)), key_of(next_record())))
+        next_run_ = k;
   }
 
   scratch& s_;
-  quad* aside_;  // [runs][run][lanes][2], from the lane's own: alpha and what is shown; t and key
+  pair* aside_;  // the lane's own, [runs][run][3]: t and key, alpha and what is shown
   int lane_;
   KeyOrder before_;
   u64 order_, left_;

@@ -6,7 +6,7 @@
 // Gaussian is the same for all lanes. A ray's pending hits are in a queue (trace/lane_queue.hpp). Hits are passed on
 // when the window of some ray's queue is full: many rays then have some to pass on, and do it together. Where a queue
 // loses a hit the ray passes on what lies before it, and walks the list again, strictly after its last hit. The queues
-// take 3 KB of device memory for each ray that the device holds at a time: 182 MB on 132 multiprocessors.
+// take 5 KB of device memory for each ray that the device holds at a time: 298 MB on 132 multiprocessors.
 //
 // Beside what every ray program offers, one for warps offers
 //   order                        the pixels (render/pixels.hpp)
@@ -54,7 +54,7 @@ class walk_tile_warps {
   float* put_aside = nullptr;  // [teams][aside_floats]
 
  private:
-  static constexpr int group = 4;    // candidates read ahead at once
+  static constexpr int group = 4;  // candidates read ahead at once
   // 16-byte words of a candidate: its record, then its row, which may not be a whole number of them.
   static constexpr int record_words = sizeof(ray_gaussian) / sizeof(quad), row_words = (P::row_floats + 3) / 4;
   static constexpr bool whole_rows = P::row_floats % 4 == 0;
@@ -145,7 +145,7 @@ class walk_tile_warps {
       for (u32 from = first; from < end; from += lanes) {
         int const count = leave_out(from + lane_ < end, from + lane_, id, depth);
         look_ahead(from + lanes + lane_);
-        if (!meet(count)) return false;
+        if (!meet(count)) break;
       }
       pass_on(infinity);
       alive_ = alive_ && pending_.lost();
@@ -174,7 +174,7 @@ class walk_tile_warps {
       return __popc(all);
     }
 
-    // All candidates that were left, a group read while the one before is evaluated. False when all rays have ended.
+    // All candidates that were left, a group read while the one before is evaluated. False when no ray needs more.
     __device__ GART_INLINE bool meet(int count) {
       bool more = true;
       read(0, 0, count);
@@ -219,7 +219,7 @@ class walk_tile_warps {
       __pipeline_commit();
     }
 
-    // The candidates of a group, all rays. False when all have ended.
+    // The candidates of a group, all rays. False when no ray needs more: all have ended, or have lost a nearer hit.
     __device__ GART_INLINE bool evaluate(candidate const (&from)[group], int first, int count) {
       float t[group], d2[group];
       u32 found = 0;
@@ -236,10 +236,14 @@ class walk_tile_warps {
       for (int c = 0; c < group; ++c) {
         bool const hit = alive_ && (found >> c & 1);
         if (!__any_sync(everyone, hit)) continue;
-        if (!tried && __any_sync(everyone, hit && pending_.full())) {
-          tried = true;
-          pass_on(s_.depth[first + c]);
-          if (!__any_sync(everyone, alive_)) return false;
+        if (__any_sync(everyone, hit && pending_.full())) {
+          if (!tried) {
+            tried = true;
+            float const depth = s_.depth[first + c];
+            pass_on(depth);
+            if (!__any_sync(everyone, alive_ && !(pending_.lost_t() * cosine_ <= depth))) return false;
+          }
+          if (__any_sync(everyone, hit && alive_ && pending_.full())) pending_.make_room();
         }
         if (hit && alive_)
           pending_.add({pick(t, c), hit_alpha<Response>(from[c].gaussian, pick(d2, c)),
