@@ -311,6 +311,36 @@ TEST_CASE_TEMPLATE("penalties add their own gradient", E, GART_TEST_POLICIES) {
   CHECK(got.mean == g.mean);
 }
 
+TEST_CASE_TEMPLATE("a scene in other units, with its unit, takes the same steps", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  index_t const n = 200;
+  gaussian_model const m = gart_test::random_model(n, 0, random);
+  gaussian_model larger = m;
+  for (float& v : larger.mean) v *= 8;
+  for (float& v : larger.log_scale) v += std::log(8.0f);
+  gaussian_model none = m;
+  for (auto* v : {&none.mean, &none.log_scale, &none.quaternion, &none.opacity, &none.sh})
+    std::fill(v->begin(), v->end(), 0.0f);
+  auto const after = [&](gaussian_model const& start, float unit, gaussian_model& gradient) {
+    training<E> t(start);
+    mcmc_options options;
+    options.unit = unit;
+    mcmc<E> densifier(t.exec, options, n, 1000, 1);
+    gaussians<E> sums(t.exec, none);
+    densifier.add_penalties(t.model, sums);
+    gradient = sums.to_host();
+    densifier.add_noise(t.model, 3, 1e-6f * unit);  // rates of means are in units of the scene
+    return t.model.to_host();
+  };
+  gaussian_model g, g_larger;
+  gaussian_model const moved = after(m, 1, g), moved_larger = after(larger, 8, g_larger);
+  for (index_t i = 0; i < 3 * n; ++i) {
+    CHECK(std::abs(moved_larger.mean[i] / 8 - moved.mean[i]) < 1e-5 * (1 + std::abs(moved.mean[i])));
+    CHECK(g_larger.log_scale[i] == doctest::Approx(g.log_scale[i]).epsilon(1e-5));
+  }
+}
+
 TEST_CASE_TEMPLATE("the same seed and step give the same model", E, GART_TEST_POLICIES) {
   std::mt19937_64 random(3);
   gaussian_model const start = gart_test::random_model(2000, 1, random);

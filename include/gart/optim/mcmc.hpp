@@ -205,13 +205,14 @@ class mcmc {
 
   void set_growth(float growth) { options_.growth = growth; }
 
-  // Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale); before the optimizer's step.
+  // Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale / unit); before the optimizer's
+  // step.
   void add_penalties(gaussians<E> const& model, gaussians<E>& gradient) {
     if (model.size() == 0) return;
     float const n = static_cast<float>(model.size());
     parallel_for(*exec_, "mcmc_penalties", model.size(),
                  detail::mcmc_penalty_kernel{model.view(), gradient.view(), options_.opacity_penalty / n,
-                                             options_.scale_penalty / (3 * n)});
+                                             options_.scale_penalty / (3 * n * options_.unit)});
   }
 
   bool due(int step) const {
@@ -259,12 +260,13 @@ class mcmc {
     return change;
   }
 
-  // mean += noise * mean_rate * sigmoid(-100 (opacity - 0.005)) * covariance * normal.
+  // mean += noise / unit^2 * mean_rate * sigmoid(-100 (opacity - 0.005)) * covariance * normal.
   void add_noise(gaussians<E>& model, int step, float mean_rate) {
     if (options_.noise == 0) return;
     parallel_for(*exec_, "mcmc_noise", model.size(),
-                 detail::mcmc_noise_kernel{
-                     model.view(), {seed_, static_cast<u32>(step), random_use::noise}, options_.noise * mean_rate});
+                 detail::mcmc_noise_kernel{model.view(),
+                                           {seed_, static_cast<u32>(step), random_use::noise},
+                                           options_.noise * mean_rate / (options_.unit * options_.unit)});
   }
 
  private:
