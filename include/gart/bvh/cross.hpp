@@ -66,6 +66,27 @@ struct grid_crossing {
   }
 };
 
+// What of a node a ray is tested against, in registers: 16 bytes at a time on a device.
+#if defined(__CUDA_ARCH__)
+GART_HD GART_INLINE bvh_node load_bounds(bvh_node const& n) {
+  constexpr int quads = static_cast<int>((offsetof(bvh_node, child) + 15) / 16);
+  quad words[quads];
+  GART_UNROLL
+  for (int q = 0; q < quads; ++q) words[q] = reinterpret_cast<quad const*>(&n)[q];
+  bvh_node out;
+  auto const word = [&](int i) { return words[i / 4].v[i % 4]; };
+  GART_UNROLL
+  for (int k = 0; k < 3; ++k) out.origin[k] = word(k);
+  out.shape = float_to_bits(word(3));
+  GART_UNROLL
+  for (int i = 0; i < 6 * bvh_width / 4; ++i)
+    out.plane[i / (3 * bvh_width / 4)][i / (bvh_width / 4) % 3][i % (bvh_width / 4)] = float_to_bits(word(4 + i));
+  return out;
+}
+#else
+GART_HD GART_INLINE bvh_node const& load_bounds(bvh_node const& n) { return n; }
+#endif
+
 // The children that the ray crosses somewhere in [near, far], a bit each; entry: where it enters them, at least near.
 #if defined(__CUDACC__)
 GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, float near, float far,

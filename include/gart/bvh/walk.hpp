@@ -75,10 +75,11 @@ GART_HD GART_INLINE void walk(bvh_view const& tree, Ray const& r, Visitor& visit
   for (;;) {
     bvh_node const& n = tree.nodes[node];
     float entry[bvh_width];
-    u32 const crossed = cross_children(n, slab, visitor.near(), visitor.far(), entry);
-    for (u32 leaves = crossed & n.leaf_mask(); leaves != 0; leaves &= leaves - 1)
+    auto const& bounds = load_bounds(n);
+    u32 const crossed = cross_children(bounds, slab, visitor.near(), visitor.far(), entry);
+    for (u32 leaves = crossed & bounds.leaf_mask(); leaves != 0; leaves &= leaves - 1)
       visitor.leaf(n.child[lowest_bit(leaves)]);
-    u32 order = near_to_far(crossed & n.inner_mask(), entry);
+    u32 order = near_to_far(crossed & bounds.inner_mask(), entry);
     while (order == 0) {
       if (top == 0) return;
       --top;
