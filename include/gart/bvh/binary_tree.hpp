@@ -1,10 +1,10 @@
 #pragma once
 // The binary tree that a wide one is made from (Karras, "Maximizing parallelism in the construction of BVHs, octrees,
 // and k-d trees", HPG 2012): boxes sorted by the Morton codes of their centres, one thread an inner node, boxes fitted
-// from the leaves up. As they are fitted it is also decided which nodes become wide ones (bvh/collapse.hpp).
+// from the leaves up. As they are fitted it is also worked out which nodes become wide ones (bvh/shares.hpp).
 
 #include <gart/bvh/morton.hpp>
-#include <gart/bvh/node.hpp>
+#include <gart/bvh/shares.hpp>
 #include <gart/core/span.hpp>
 #include <gart/exec/concepts.hpp>
 
@@ -16,7 +16,7 @@ struct alignas(16) binary_node {
   float lo[2][3], hi[2][3];
   u32 child[2];  // a node, or leaf | index of the box
   u32 up;        // parent << 1 | side; the root's is 0
-  u8 slots[2];   // children that a wide node gets from this side of it
+  u32 shares;    // wide_shares
 
   GART_HD box child_box(int c) const {
     return {vec3(lo[c][0], lo[c][1], lo[c][2]), vec3(hi[c][0], hi[c][1], hi[c][2])};
@@ -122,57 +122,48 @@ struct link_single {
     root.child[0] = root.child[1] = binary_node::leaf;
     root.up = 0;
     for (int k = 0; k < 3; ++k) root.lo[1][k] = infinity, root.hi[1][k] = -infinity;
-    root.slots[1] = 0;
     leaf_up[0] = 0;
   }
 };
 
-// From every leaf up: boxes, and which nodes are wide. A node whose sides offer more children than a wide node holds
-// closes the side that offers more: that one becomes a wide node and offers itself alone; then, if it must, the other.
-// So every wide node but the root has more than bvh_width / 2 children, with no look at the tree as a whole. Empty
-// boxes offer nothing: they are in no wide node.
+// From every leaf up: boxes, and what wide nodes would cost (bvh/shares.hpp).
 template <execution E>
 struct fit {
   span<box const> boxes;
   span<u32 const> order;
   span<u32 const> leaf_up;
   span<binary_node> nodes;
+  span<wide_costs> costs;
   span<u32> arrivals;
-  span<u32> is_wide;
   GART_KERNEL void operator()(index_t i) const {
     box b = boxes[order[i]];
-    u32 slots = is_empty(b) ? 0 : 1;
+    wide_costs cost{};
     u32 up = leaf_up[i];
     for (;;) {
       u32 const index = up >> 1, side = up & 1;
       binary_node& here = nodes[index];
       for (int k = 0; k < 3; ++k) here.lo[side][k] = b.lo[k], here.hi[side][k] = b.hi[k];
-      here.slots[side] = static_cast<u8>(slots);
       E::fence();
       // The second child to arrive goes on with the union.
       if (boxes.size() > 1 && E::atomic_add(&arrivals[index], 1u) == 0) return;
       E::fence();
       binary_node const volatile& n = here;
-      u32 offered[2];
-      offered[side] = slots;
-      offered[1 - side] = n.slots[1 - side];
-      bool close[2] = {false, false};
-      for (int k = 0; k < 2 && offered[0] + offered[1] > bvh_width; ++k) {
-        u32 const more = offered[1] > offered[0] ? 1 : 0;
-        close[more] = true, offered[more] = 1;
-      }
-      for (int k = 0; k < 2; ++k)
-        if (!(n.child[k] & binary_node::leaf)) is_wide[n.child[k]] = close[k];
-      if (index == 0) {
-        is_wide[0] = 1;
-        return;
-      }
       for (int k = 0; k < 3; ++k) {
         float const lo = n.lo[1 - side][k], hi = n.hi[1 - side][k];
         b.lo[k] = b.lo[k] < lo ? b.lo[k] : lo;
         b.hi[k] = b.hi[k] > hi ? b.hi[k] : hi;
       }
-      slots = offered[0] + offered[1];
+      u32 const other = n.child[1 - side];
+      wide_costs beside{};
+      if (!(other & binary_node::leaf)) {
+        wide_costs const volatile& from = costs[other];
+        for (int k = 0; k < bvh_width; ++k) beside.of[k] = from.of[k];
+      }
+      wide_shares shares;
+      cost = costs_of(half_area(b), side == 0 ? cost : beside, side == 0 ? beside : cost, shares);
+      here.shares = shares.bits;
+      if (index == 0) return;
+      costs[index] = cost;
       up = n.up;
     }
   }

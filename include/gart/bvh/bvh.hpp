@@ -3,10 +3,9 @@
 // Morton codes and the policy's own sort (bvh/binary_tree.hpp), collapsed in one kernel (bvh/collapse.hpp). The same
 // boxes give the same tree on every policy. refit keeps the order of the boxes and fits the tree to where they are now.
 //
-// Shapes: n boxes make at most n / (bvh_width / 2) + 1 nodes; node 0 is the root. Cost: O(n) work beside the sort,
-// which refit goes without, and 64 bytes a box of scratch; nothing waits for the device.
-// Boxes that are empty (empty_box) are never met. Errors: invalid_argument where a refit brings another number of
-// boxes.
+// Shapes: n boxes make at most max(n - 1, 1) nodes, about n / 5 of them in use; node 0 is the root. Cost: O(n) work
+// beside the sort, which refit goes without, and about 120 bytes a box of scratch; nothing waits for the device. Boxes
+// that are empty (empty_box) are never met. Errors: invalid_argument where a refit brings another number of boxes.
 
 #include <gart/bvh/binary_tree.hpp>
 #include <gart/exec/buffer.hpp>
@@ -27,6 +26,7 @@ class bvh {
         binary_(exec),
         leaf_up_(exec),
         arrivals_(exec),
+        costs_(exec),
         is_wide_(exec),
         place_(exec),
         codes_(exec),
@@ -43,6 +43,7 @@ class bvh {
   buffer<bvh_kernels::binary_node, E> binary_;
   buffer<u32, E> leaf_up_;  // by sorted position: parent << 1 | side
   buffer<u32, E> arrivals_;
+  buffer<bvh_kernels::wide_costs, E> costs_;
   buffer<u32, E> is_wide_;  // by binary node
   buffer<u32, E> place_;
   buffer<u64, E> codes_;

@@ -37,10 +37,11 @@ void bvh<E>::refit(E& exec, span<box const> boxes) {
   if (boxes.size() != count_) throw invalid_argument("bvh::refit: as many boxes as the tree was built over are needed");
   if (count_ == 0) return;
   index_t const inner = static_cast<index_t>(binary_.size());
-  arrivals_.resize(inner), is_wide_.resize(inner), place_.resize(inner);
-  nodes_.resize(count_ / (bvh_width / 2) + 1);
+  arrivals_.resize(inner), costs_.resize(inner), is_wide_.resize(inner), place_.resize(inner);
+  nodes_.resize(inner);
   arrivals_.zero();
-  parallel_for(exec, "bvh/fit", count_, bvh_kernels::fit<E>{boxes, order_, leaf_up_, binary_, arrivals_, is_wide_});
+  parallel_for(exec, "bvh/fit", count_, bvh_kernels::fit<E>{boxes, order_, leaf_up_, binary_, costs_, arrivals_});
+  parallel_for(exec, "bvh/choose", inner, bvh_kernels::choose_wide{binary_, is_wide_});
   exclusive_scan(exec, span<u32 const>(is_wide_), place_.view());
   parallel_for(exec, "bvh/collapse", inner, bvh_kernels::collapse{binary_, is_wide_, place_, nodes_});
 }

@@ -1,9 +1,38 @@
 #pragma once
-// From a binary tree whose wide nodes have been chosen to the wide tree: one thread a node.
+// From a binary tree to the wide one: which nodes become wide, then what stands in them. One thread a node for each.
 
 #include <gart/bvh/binary_tree.hpp>
 
 namespace gart::bvh_kernels {
+
+// Up to the root, then down again with the node's share of the children: no thread waits for another.
+struct choose_wide {
+  span<binary_node const> nodes;
+  span<u32> is_wide;
+  GART_KERNEL void operator()(index_t i) const {
+    u64 path[2] = {0, 0};  // sides, the last in the lowest bit: as deep as a walk's stack and more
+    int depth = 0;
+    u32 at = i;
+    for (; at != 0; ++depth) {
+      u32 const up = nodes[at].up;
+      path[1] = path[1] << 1 | path[0] >> 63;
+      path[0] = path[0] << 1 | (up & 1);
+      at = up >> 1;
+    }
+    int share = 1;
+    for (; depth > 0; --depth) {
+      binary_node const& n = nodes[at];
+      wide_shares const shares{n.shares};
+      int const used = shares.used(share), children = used == 1 ? bvh_width : used;
+      int const first = shares.first(children), side = static_cast<int>(path[0] & 1);
+      share = side == 0 ? first : children - first;
+      at = n.child[side];
+      path[0] = path[0] >> 1 | path[1] << 63;
+      path[1] >>= 1;
+    }
+    is_wide[i] = wide_shares{nodes[i].shares}.used(share) == 1;
+  }
+};
 
 struct collapse {
   span<binary_node const> binary;
@@ -56,7 +85,7 @@ struct collapse {
       u32 const index = between[--top];
       binary_node const& n = binary[index];
       for (int side = 1; side >= 0; --side) {
-        if (n.slots[side] == 0) continue;
+        if (is_empty(n.child_box(side))) continue;
         u32 const child = n.child[side];
         bool const is_leaf = child & binary_node::leaf;
         if (!is_leaf && !is_wide[child]) {
