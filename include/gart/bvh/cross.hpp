@@ -88,7 +88,35 @@ GART_HD GART_INLINE bvh_node const& load_bounds(bvh_node const& n) { return n; }
 #endif
 
 // The children that the ray crosses somewhere in [near, far], a bit each; entry: where it enters them, at least near.
-#if defined(__CUDACC__)
+#if !defined(__CUDACC__) && defined(__AVX2__)
+// A child is a lane. Intrinsics stand where GCC finds no vector code for the language's words.
+GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, float near, float far, float (&entry)[bvh_width]) {
+  using floats = float __attribute__((vector_size(4 * bvh_width)));
+  using ints = int __attribute__((vector_size(4 * bvh_width)));
+  auto const planes = [](u32 const(&side)[bvh_width / 4]) {
+#if GART_BVH_WIDTH == 4
+    return __builtin_convertvector((ints)_mm_cvtepu8_epi32(_mm_loadu_si32(side)), floats);
+#else
+    return __builtin_convertvector((ints)_mm256_cvtepu8_epi32(_mm_loadu_si64(side)), floats);
+#endif
+  };
+  grid_crossing const grid(n, r);
+  floats from = floats{} + near, to = floats{} + far;
+  for (int k = 0; k < 3; ++k) {
+    bool const backwards = r.inverse[k] < 0;
+    floats const enter = planes(n.plane[backwards][k]) * grid.step[k] + grid.enter[k];
+    floats const leave = planes(n.plane[!backwards][k]) * grid.step[k] + grid.leave[k];
+    from = enter > from ? enter : from;
+    to = leave < to ? leave : to;
+  }
+  std::memcpy(entry, &from, sizeof from);
+#if GART_BVH_WIDTH == 4
+  return static_cast<u32>(_mm_movemask_ps((__m128)(from <= to)));
+#else
+  return static_cast<u32>(_mm256_movemask_ps((__m256)(from <= to)));
+#endif
+}
+#else
 GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, float near, float far,
                                        float (&entry)[bvh_width]) {
   grid_crossing const grid(n, r);
@@ -118,51 +146,9 @@ GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, flo
   }
   return crossed;
 }
-#else
-// On a host a child is a lane. Intrinsics stand where GCC knows no vector for the language's words.
-using child_floats = float __attribute__((vector_size(4 * bvh_width)));
-using child_ints = int __attribute__((vector_size(4 * bvh_width)));
-
-GART_INLINE child_floats planes_of(u32 const (&side)[bvh_width / 4]) {
-#if defined(__AVX2__) && GART_BVH_WIDTH == 4
-  return __builtin_convertvector((child_ints)_mm_cvtepu8_epi32(_mm_loadu_si32(side)), child_floats);
-#elif defined(__AVX2__)
-  return __builtin_convertvector((child_ints)_mm256_cvtepu8_epi32(_mm_loadu_si64(side)), child_floats);
-#else
-  child_floats out;
-  for (int c = 0; c < bvh_width; ++c) out[c] = static_cast<float>(side[c / 4] >> 8 * (c % 4) & 0xffu);
-  return out;
-#endif
-}
-
-GART_INLINE u32 bits_of(child_ints mask) {
-#if defined(__AVX2__) && GART_BVH_WIDTH == 4
-  return static_cast<u32>(_mm_movemask_ps((__m128)mask));
-#elif defined(__AVX2__)
-  return static_cast<u32>(_mm256_movemask_ps((__m256)mask));
-#else
-  u32 bits = 0;
-  for (int c = 0; c < bvh_width; ++c) bits |= (mask[c] ? 1u : 0u) << c;
-  return bits;
-#endif
-}
-
-GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, float near, float far, float (&entry)[bvh_width]) {
-  grid_crossing const grid(n, r);
-  child_floats from = child_floats{} + near, to = child_floats{} + far;
-  for (int k = 0; k < 3; ++k) {
-    bool const backwards = r.inverse[k] < 0;
-    child_floats const enter = planes_of(n.plane[backwards][k]) * grid.step[k] + grid.enter[k];
-    child_floats const leave = planes_of(n.plane[!backwards][k]) * grid.step[k] + grid.leave[k];
-    from = enter > from ? enter : from;
-    to = leave < to ? leave : to;
-  }
-  std::memcpy(entry, &from, sizeof from);
-  return bits_of(from <= to);
-}
 #endif
 
-// Where the ray enters child c, at least near: what cross_children gave for it.
+// Where the ray enters child c, at least near: what cross_children gave for it, but for a rounding.
 GART_HD GART_INLINE float enter_child(bvh_node const& n, int c, slab_ray const& r, float near) {
   grid_crossing const grid(n, r);
   float from = near;

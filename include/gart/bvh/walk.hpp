@@ -25,6 +25,7 @@ GART_HD GART_INLINE u32 distance_key(float entry) { return float_to_bits(larger(
 // The children in `wanted` by distance, nearest in the lowest bits: 4 bits each, 8 + c, so that 0 is none left.
 GART_HD GART_INLINE u32 near_to_far(u32 wanted, float const (&entry)[bvh_width]) {
   u32 order = 0;
+  if (wanted == 0) return order;
 #if defined(__CUDA_ARCH__)
   u32 keys[bvh_width];
   GART_UNROLL
