@@ -11,21 +11,25 @@
 #include <random>
 #include <vector>
 
-// What a walk asks of its visitor: the part of the ray that matters, and what to do with a leaf. This one counts all
-// boxes; one that sought the nearest would lower far() as it goes.
+// What a walk asks of its visitor: the part of the ray that matters, and what to do with a leaf. A walk proposes boxes;
+// which of them the ray crosses, the visitor finds out. This one counts all; one that sought the nearest would lower
+// far() as it goes.
 struct counter {
+  gart::span<gart::box const> boxes;
+  gart::slab_ray ray;
   gart::u32 count = 0;
   float near() const { return 0.0f; }
   float far() const { return gart::infinity; }
-  void leaf(gart::u32 /*box*/) { ++count; }
+  void leaf(gart::u32 box) { count += crosses(boxes[box], ray, near(), far()); }
 };
 
 struct count_boxes {
   gart::bvh_view tree;
+  gart::span<gart::box const> boxes;
   gart::span<gart::ray const> rays;
   gart::span<gart::u32> counts;
   void operator()(gart::index_t i) const {
-    counter crossed;
+    counter crossed{boxes, gart::slab_ray(rays[i])};
     walk(tree, rays[i], crossed);
     counts[i] = crossed.count;
   }
@@ -57,7 +61,8 @@ int main(int argc, char** argv) {
   auto const start = std::chrono::steady_clock::now();
   tree.build(exec, scene);
   auto const built = std::chrono::steady_clock::now();
-  parallel_for(exec, "count boxes", static_cast<gart::index_t>(rays.size()), count_boxes{tree.view(), queries, counts});
+  parallel_for(exec, "count boxes", static_cast<gart::index_t>(rays.size()),
+               count_boxes{tree.view(), scene, queries, counts});
   auto const done = std::chrono::steady_clock::now();
 
   unsigned long long crossed = 0;

@@ -238,3 +238,34 @@ TEST_CASE_TEMPLATE("random scenes, hits behind the origin and at the near distan
   add(two, {0, 0, 0.75f}, 0.125f);
   check_rays(exec, two, {along_z()}, 0.5f, 1);
 }
+
+// Boxes prune and nothing else: what the exact test would hit is met, at any size, place and thinness.
+TEST_CASE_TEMPLATE("Gaussians of every size and place are met as without a tree", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed() + 3);
+  std::uniform_real_distribution<float> unit(-1, 1);
+  auto const point = [&](float reach) { return reach * vec3(unit(random), unit(random), unit(random)); };
+  float sizes = 39, places = 1;
+  SUBCASE("around the frame") {}
+  SUBCASE("to 1e7") { places = 1e7f; }
+  SUBCASE("of one size, to 1e7") { sizes = 2, places = 1e7f; }
+  E exec;
+  gart::gaussian_model model;
+  for (int i = 0; i < 600; ++i) {
+    add(model, point(i % 2 ? places : 3.0f), 1.0f, 5 * unit(random));
+    for (int k = 0; k < 3; ++k) model.log_scale[3 * i + k] = sizes * unit(random);
+    for (int k = 0; k < 4; ++k) model.quaternion[4 * i + k] = unit(random);
+  }
+  // What is never hit, as far out as floats go.
+  add(model, vec3(1e30f, 0, 0), 1.0f);
+  add(model, vec3(-3e38f), 1.0f);
+  std::vector<gart::ray> rays;
+  for (int i = 0; i < 60; ++i) {
+    float const* const mean = &model.mean[3 * (random() % 600)];
+    vec3 const origin = i % 3 ? point(i % 2 ? places : 3.0f) : vec3(0.0f);
+    vec3 const d = vec3(mean[0], mean[1], mean[2]) - origin;
+    float const length = std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
+    if (length > 0) rays.push_back({origin, d / length});
+  }
+  check_rays(exec, model, rays, 0.01f, 0);
+}

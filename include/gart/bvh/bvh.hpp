@@ -1,32 +1,16 @@
 #pragma once
-// A binary bounding volume hierarchy over boxes, built on the policy's own sort (Karras, "Maximizing parallelism in the
-// construction of BVHs, octrees, and k-d trees", HPG 2012): Morton codes of the box centres, a radix sort, one thread
-// an inner node, boxes fitted from the leaves up. refit keeps the tree and fits its boxes to new ones.
+// A bounding volume hierarchy over boxes with wide, compressed nodes (bvh/node.hpp), on every policy: a binary tree by
+// Morton codes and the policy's own sort (bvh/binary_tree.hpp), collapsed in one kernel (bvh/collapse.hpp). The same
+// boxes give the same tree on every policy. refit keeps the order of the boxes and fits the tree to where they are now.
 //
-// Shapes: n boxes make max(n - 1, 1) nodes of 64 bytes; node 0 is the root. Cost: O(n) work beside the sort.
-// Boxes that are empty (empty_box) are never met.
+// Shapes: n boxes make at most max(n - 1, 1) nodes, about n / 5 of them in use; node 0 is the root. Cost: O(n) work
+// beside the sort, which refit goes without, and about 120 bytes a box of scratch; nothing waits for the device. Boxes
+// that are empty (empty_box) are never met. Errors: invalid_argument where a refit brings another number of boxes.
 
-#include <gart/bvh/box.hpp>
-#include <gart/core/span.hpp>
+#include <gart/bvh/binary_tree.hpp>
 #include <gart/exec/buffer.hpp>
 
 namespace gart {
-
-// Both children's boxes lie in their parent, so that one 64-byte load decides both ways.
-struct alignas(16) bvh_node {
-  static constexpr u32 leaf = 0x80000000u;
-  float lo[2][3], hi[2][3];
-  u32 child[2];  // a node, or leaf | index of the box
-  u32 parent;    // of this node; the root's is itself
-  u32 unused;
-
-  GART_HD box child_box(int c) const {
-    return {vec3(lo[c][0], lo[c][1], lo[c][2]), vec3(hi[c][0], hi[c][1], hi[c][2])};
-  }
-  GART_HD void set_child_box(int c, box const& b) {
-    for (int k = 0; k < 3; ++k) lo[c][k] = b.lo[k], hi[c][k] = b.hi[k];
-  }
-};
 
 struct bvh_view {
   bvh_node const* nodes = nullptr;
@@ -38,7 +22,16 @@ class bvh {
  public:
   bvh() = default;
   explicit bvh(E& exec)
-      : nodes_(exec), leaf_parent_(exec), arrivals_(exec), codes_(exec), order_(exec), bounds_(exec) {}
+      : nodes_(exec),
+        binary_(exec),
+        leaf_up_(exec),
+        arrivals_(exec),
+        costs_(exec),
+        is_wide_(exec),
+        place_(exec),
+        codes_(exec),
+        order_(exec),
+        bounds_(exec) {}
 
   void build(E& exec, span<box const> boxes);
   // For the same number of boxes as the last build.
@@ -47,8 +40,12 @@ class bvh {
 
  private:
   buffer<bvh_node, E> nodes_;
-  buffer<u32, E> leaf_parent_;  // by sorted position: parent << 1 | side
+  buffer<bvh_kernels::binary_node, E> binary_;
+  buffer<u32, E> leaf_up_;  // by sorted position: parent << 1 | side
   buffer<u32, E> arrivals_;
+  buffer<bvh_kernels::wide_costs, E> costs_;
+  buffer<u32, E> is_wide_;  // by binary node
+  buffer<u32, E> place_;
   buffer<u64, E> codes_;
   buffer<u32, E> order_;
   buffer<box, E> bounds_;

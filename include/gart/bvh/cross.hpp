@@ -1,0 +1,163 @@
+#pragma once
+// A ray and a node: which children's boxes it crosses, all of them at once.
+
+#include <gart/bvh/node.hpp>
+
+#if !defined(__CUDACC__) && defined(__AVX2__)
+#include <immintrin.h>
+#endif
+
+namespace gart {
+
+// A finite inverse of every direction, so that 0 * inf never makes a slab test lie.
+GART_HD GART_INLINE float slab_inverse(float d) {
+  float const tiny = 1e-20f;
+  return 1.0f / (d < tiny && d > -tiny ? (d < 0 ? -tiny : tiny) : d);
+}
+
+struct slab_ray {
+  vec3 origin, inverse;
+  template <class Ray>
+  GART_HD GART_INLINE explicit slab_ray(Ray const& r)
+      : origin(origin_of(r)),
+        inverse(slab_inverse(r.direction.x), slab_inverse(r.direction.y), slab_inverse(r.direction.z)) {}
+};
+
+// Whether the ray crosses the box somewhere in [near, far].
+GART_HD GART_INLINE bool crosses(box const& b, slab_ray const& r, float near, float far) {
+  for (int k = 0; k < 3; ++k) {
+    float const t0 = (b.lo[k] - r.origin[k]) * r.inverse[k], t1 = (b.hi[k] - r.origin[k]) * r.inverse[k];
+    near = fmaxf(near, fminf(t0, t1)), far = fminf(far, fmaxf(t0, t1));
+  }
+  return near <= far && b.lo.x <= b.hi.x;
+}
+
+// b where a is not a number.
+GART_HD GART_INLINE float larger(float a, float b) {
+#if defined(__CUDA_ARCH__)
+  return fmaxf(a, b);
+#else
+  return a > b ? a : b;
+#endif
+}
+GART_HD GART_INLINE float smaller(float a, float b) {
+#if defined(__CUDA_ARCH__)
+  return fminf(a, b);
+#else
+  return a < b ? a : b;
+#endif
+}
+
+// A node's grid along a ray: it crosses plane q of axis k at q * step[k] + enter[k], or + leave[k] on the way out. The
+// two lie apart by more than all roundings of either: a few of the distance to the far end of the grid. What overflows
+// ends as an infinity on the safe side or as no number, and that prunes nothing.
+struct grid_crossing {
+  float step[3], enter[3], leave[3];
+
+  GART_HD GART_INLINE grid_crossing(bvh_node const& n, slab_ray const& r) {
+    GART_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      bvh_axis const a = n.axis(k);
+      float const begin = (a.origin - r.origin[k]) * r.inverse[k];
+      step[k] = a.step() * r.inverse[k];
+      float const slack = 4.8e-7f * (fabsf(begin) + 256.0f * fabsf(step[k]));
+      enter[k] = begin - slack, leave[k] = begin + slack;
+    }
+  }
+};
+
+// What of a node a ray is tested against, in registers: 16 bytes at a time on a device.
+#if defined(__CUDA_ARCH__)
+GART_HD GART_INLINE bvh_node load_bounds(bvh_node const& n) {
+  constexpr int quads = static_cast<int>((offsetof(bvh_node, child) + 15) / 16);
+  quad words[quads];
+  GART_UNROLL
+  for (int q = 0; q < quads; ++q) words[q] = reinterpret_cast<quad const*>(&n)[q];
+  bvh_node out;
+  auto const word = [&](int i) { return words[i / 4].v[i % 4]; };
+  GART_UNROLL
+  for (int k = 0; k < 3; ++k) out.origin[k] = word(k);
+  out.shape = float_to_bits(word(3));
+  GART_UNROLL
+  for (int i = 0; i < 6 * bvh_width / 4; ++i)
+    out.plane[i / (3 * bvh_width / 4)][i / (bvh_width / 4) % 3][i % (bvh_width / 4)] = float_to_bits(word(4 + i));
+  return out;
+}
+#else
+GART_HD GART_INLINE bvh_node const& load_bounds(bvh_node const& n) { return n; }
+#endif
+
+// The children that the ray crosses somewhere in [near, far], a bit each; entry: where it enters them, at least near.
+#if !defined(__CUDACC__) && defined(__AVX2__)
+// A child is a lane. Intrinsics stand where GCC finds no vector code for the language's words.
+GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, float near, float far, float (&entry)[bvh_width]) {
+  using floats = float __attribute__((vector_size(4 * bvh_width)));
+  using ints = int __attribute__((vector_size(4 * bvh_width)));
+  auto const planes = [](u32 const(&side)[bvh_width / 4]) {
+#if GART_BVH_WIDTH == 4
+    return __builtin_convertvector((ints)_mm_cvtepu8_epi32(_mm_loadu_si32(side)), floats);
+#else
+    return __builtin_convertvector((ints)_mm256_cvtepu8_epi32(_mm_loadu_si64(side)), floats);
+#endif
+  };
+  grid_crossing const grid(n, r);
+  floats from = floats{} + near, to = floats{} + far;
+  for (int k = 0; k < 3; ++k) {
+    bool const backwards = r.inverse[k] < 0;
+    floats const enter = planes(n.plane[backwards][k]) * grid.step[k] + grid.enter[k];
+    floats const leave = planes(n.plane[!backwards][k]) * grid.step[k] + grid.leave[k];
+    from = enter > from ? enter : from;
+    to = leave < to ? leave : to;
+  }
+  std::memcpy(entry, &from, sizeof from);
+#if GART_BVH_WIDTH == 4
+  return static_cast<u32>(_mm_movemask_ps((__m128)(from <= to)));
+#else
+  return static_cast<u32>(_mm256_movemask_ps((__m256)(from <= to)));
+#endif
+}
+#else
+GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, float near, float far,
+                                       float (&entry)[bvh_width]) {
+  grid_crossing const grid(n, r);
+  u32 first[3][bvh_width / 4], last[3][bvh_width / 4];
+  GART_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    GART_UNROLL
+    for (int w = 0; w < bvh_width / 4; ++w) {
+      u32 const lower = n.plane[0][k][w], upper = n.plane[1][k][w];
+      first[k][w] = r.inverse[k] < 0 ? upper : lower, last[k][w] = r.inverse[k] < 0 ? lower : upper;
+    }
+  }
+  auto const plane = [](u32 const(&side)[bvh_width / 4], int c) {
+    return static_cast<float>(side[c / 4] >> 8 * (c % 4) & 0xffu);
+  };
+  u32 crossed = 0;
+  GART_UNROLL
+  for (int c = 0; c < bvh_width; ++c) {
+    float from = near, to = far;
+    GART_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      from = larger(plane(first[k], c) * grid.step[k] + grid.enter[k], from);
+      to = smaller(plane(last[k], c) * grid.step[k] + grid.leave[k], to);
+    }
+    entry[c] = from;
+    crossed |= (from <= to ? 1u : 0u) << c;
+  }
+  return crossed;
+}
+#endif
+
+// Where the ray enters child c, at least near: what cross_children gave for it, but for a rounding.
+GART_HD GART_INLINE float enter_child(bvh_node const& n, int c, slab_ray const& r, float near) {
+  grid_crossing const grid(n, r);
+  float from = near;
+  GART_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    u8 const plane = reinterpret_cast<u8 const*>(n.plane[r.inverse[k] < 0][k])[c];
+    from = larger(static_cast<float>(plane) * grid.step[k] + grid.enter[k], from);
+  }
+  return from;
+}
+
+}  // namespace gart
