@@ -35,7 +35,10 @@ class packet_slots {
 
   template <class Entry>
   GART_INLINE void fetch_to_write(Entry const* slots) const {
-    for (int r = 0; r < packet_block::height; ++r) prefetch_to_write(slots + first_ + r * width_);
+    for (int r = 0; r < packet_block::height; ++r) {
+      Entry const* const row = slots + first_ + r * width_;
+      prefetch_to_write(row), prefetch_to_write(row + packet_block::width - 1);
+    }
   }
 
   template <class Entry>

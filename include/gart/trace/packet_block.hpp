@@ -29,19 +29,14 @@ struct packet_block {
   }
   // The lanes whose pixels lie in the box.
   lane_mask within(pixel_box const& b) const {
-    u32 const columns = span_of(b.x0 - x, b.x1 - x, width), rows = span_of(b.y0 - y, b.y1 - y, height);
-    u32 bits = 0;
-    for (int r = 0; r < height; ++r) bits |= (rows >> r & 1u ? columns : 0u) << (r * width);
-    return lanes_of(bits);
+    constexpr u32 first_column = lane_count == 16 ? 0x1111u : lane_count == 8 ? 0x11u : 1u;
+    u32 const columns = (1u << clamped(b.x1 - x, width)) - (1u << clamped(b.x0 - x, width));
+    u32 const rows = (1u << width * clamped(b.y1 - y, height)) - (1u << width * clamped(b.y0 - y, height));
+    return lanes_of(columns * first_column & rows);
   }
 
  private:
-  // Bits [from, to) of the lowest n.
-  static u32 span_of(int from, int to, int n) {
-    u32 const below = from < 0 ? 0u : from > n ? (1u << n) - 1 : (1u << from) - 1;
-    u32 const upto = to < 0 ? 0u : to > n ? (1u << n) - 1 : (1u << to) - 1;
-    return upto & ~below;
-  }
+  static int clamped(int v, int most) { return v < 0 ? 0 : v > most ? most : v; }
 };
 
 }  // namespace gart

@@ -1,7 +1,7 @@
 #pragma once
 // The walk of tile lists on a host: rays in packets, a lane a pixel (math/lanes.hpp). The same as walk_tiles
 // (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that a candidate is evaluated for all rays of a
-// packet at once, and that its hits stay together: what waits for its turn is a list of rows, one Gaussian's hits with
+// packet at once, and that its hits stay together: what waits for its turn is a list of rows, each one Gaussian's hits with
 // some of the rays, in an order that sorts the hits of each ray by (t, id). Where rays meet two Gaussians in opposite
 // orders no one place suits all hits of a candidate, and it takes two rows.
 //
@@ -16,8 +16,6 @@
 #include <gart/tiles/tile_map.hpp>
 #include <gart/trace/packet_block.hpp>
 #include <gart/trace/ray_program.hpp>
-
-#include <algorithm>
 
 #if !defined(__CUDACC__)
 
@@ -37,8 +35,8 @@ class packet_walk {
     vec3_of<lanes> const& d = state.directions;
     // z = t * cosine; rounded up, so that what is said to lie nearer than a depth does.
     lanes const cosine = (d.x * lanes(forward.x) + d.y * lanes(forward.y) + d.z * lanes(forward.z)) * lanes(1.000002f);
-    alive_ = state.inside, waiting_ = lanes_of(0), count_ = 0;
-    for (free_count_ = 0; free_count_ < rows; ++free_count_) free_[free_count_] = static_cast<u16>(free_count_);
+    alive_ = state.inside, waiting_ = lanes_of(0), count_ = used_ = 0, free_ = ends;
+    pool_[ends].nearer = pool_[ends].farther = ends;
     u32 const* const list = map.primitives.data();
     u32 const end = map.offsets[tile + 1];
     int since = 0;
@@ -56,7 +54,7 @@ class packet_walk {
       lane_mask const hit = alive_ & is_hit(g, r, scene.near);
       if (!any(hit)) continue;
       program.expect(state, id);
-      if (!insert({r.t, hit_alpha<Response>(g, r.d2), hit, id})) return false;
+      if (!insert(hit, r.t, hit_alpha<Response>(g, r.d2), id)) return false;
     }
     pass_on(program, state, cosine, everything);
     program.end(state);
@@ -71,41 +69,47 @@ class packet_walk {
   static constexpr u32 ahead = 6;   // candidates whose records are fetched while one is looked at
   static constexpr float everything = -1;  // no bound: the list is at its end
 
+  static constexpr u16 ends = rows;  // before the first and behind the last
+
   struct row {
     lanes t, alpha;
     lane_mask rays;
+    u16 nearer, farther;  // its neighbours
     u32 id;
-    // Which of the rays meet this before the other.
-    GART_INLINE lane_mask before(row const& other) const {
-      return id < other.id ? t <= other.t : t < other.t;
-    }
   };
 
   // From the back, where most hits belong. Every ray's hit may stand behind the last row it must follow and before the
   // first that must follow it; rays that share a gap share a row.
-  bool insert(row const& hits) {
-    lane_mask settled = hits.rays & ~waiting_, left = hits.rays & waiting_;
-    int gap = count_;
-    for (int k = count_ - 1; any(left); --k) {
-      row const& other = pool_[order_[k]];
-      lane_mask const both = left & other.rays, nearer = both & hits.before(other), farther = both & ~nearer;
+  bool insert(lane_mask rays, lanes t, lanes alpha, u32 id) {
+    lane_mask settled = rays & ~waiting_, left = rays & waiting_;
+    u16 gap = ends;  // before this row
+    for (u16 at = pool_[ends].nearer; any(left) && at != ends; at = pool_[at].nearer) {
+      row const& other = pool_[at];
+      lane_mask const both = left & other.rays;
+      lane_mask const nearer = both & (id < other.id ? t <= other.t : t < other.t), farther = both & ~nearer;
       settled |= farther, left &= ~farther;
       if (any(nearer)) {
-        if (any(settled) && !put(hits, settled, gap)) return false;
-        settled = lanes_of(0), gap = k;
+        if (any(settled) && !put(settled, t, alpha, id, gap)) return false;
+        settled = lanes_of(0), gap = at;
       }
-      if (k == 0) break;
     }
-    waiting_ |= hits.rays;
-    return put(hits, settled | left, gap);
+    waiting_ |= rays;
+    return put(settled | left, t, alpha, id, gap);
   }
 
-  bool put(row const& hits, lane_mask rays, int gap) {
-    if (free_count_ == 0) return false;
-    u16 const at = free_[--free_count_];
-    pool_[at] = hits, pool_[at].rays = rays;
-    for (int k = count_++; k > gap; --k) order_[k] = order_[k - 1];
-    order_[gap] = at;
+  GART_INLINE bool put(lane_mask rays, lanes t, lanes alpha, u32 id, u16 gap) {
+    u16 at = free_;
+    if (at != ends)
+      free_ = pool_[at].farther;
+    else if (used_ < rows)
+      at = used_++;
+    else
+      return false;
+    row& r = pool_[at];
+    r.t = t, r.alpha = alpha, r.rays = rays, r.id = id;
+    r.farther = gap, r.nearer = pool_[gap].nearer;
+    pool_[r.nearer].farther = at, pool_[gap].nearer = at;
+    ++count_;
     return true;
   }
 
@@ -113,9 +117,8 @@ class packet_walk {
   template <class State>
   void pass_on(P const& program, State& state, lanes const& cosine, float bound) {
     lane_mask stay = lanes_of(0);
-    int k = 0, kept = 0;
-    for (; k < count_ && any(alive_ & ~stay); ++k) {
-      u16 const at = order_[k];
+    u16 last = ends;  // of those that stay
+    for (u16 at = pool_[ends].farther; at != ends && any(alive_ & ~stay);) {
       row& r = pool_[at];
       lane_mask const rays = r.rays & alive_;
       lane_mask now = rays;
@@ -127,22 +130,24 @@ class packet_walk {
       if (any(now)) alive_ &= program.on_hit(state, now, r.t, r.alpha, r.id) | ~now;
       r.rays = rays & ~now;
       stay |= r.rays;
-      if (any(r.rays))
-        order_[kept++] = at;
-      else
-        free_[free_count_++] = at;
+      u16 const next = r.farther;
+      if (any(r.rays)) {
+        last = at;
+      } else {
+        pool_[last].farther = next, pool_[next].nearer = last;
+        r.farther = free_, free_ = at, --count_;
+      }
+      at = next;
     }
-    if (k > kept) std::copy(order_ + k, order_ + count_, order_ + kept);
-    count_ -= k - kept;
     waiting_ = stay;
   }
 
   lane_mask alive_;
   lane_mask waiting_;  // rays that have hits in rows
-  int count_ = 0, free_count_ = 0;
-  u16 order_[rows];  // of the rows that wait, nearest first
-  u16 free_[rows];
-  row pool_[rows];
+  int count_ = 0;      // rows that wait
+  u16 used_ = 0;       // rows taken so far,
+  u16 free_ = ends;    // and those of them that are free again, linked by `farther`
+  row pool_[rows + 1];
 };
 
 }  // namespace gart
