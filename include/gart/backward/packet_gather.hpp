@@ -120,6 +120,13 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
       if (!any(hit)) continue;
 
       packet_entries const e = slots.template read<Terms::geometry>(gather.slots, hit);
+      // Geometry first: its steps wait for each other, and those of colour fill the time to the next packet's.
+      if constexpr (Terms::geometry) {
+        lanes const alpha = hit_alpha<Response>(g, r.d2);
+        moments_of<lanes> const m =
+            hit_moments<Response>(g, r, alpha_gradient(dot(e.opaque, at.gradient), at.total, alpha));
+        for (int i = 0; i < moment_count; ++i) moment_sum[i] += select(hit, m.v[i], 0.0f);
+      }
       if constexpr (Terms::color) {
         alignas(lanes) float cg[3][lane_count];
         for (int c = 0; c < 3; ++c)
@@ -131,20 +138,14 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
               for (int c = 0; c < 3; ++c)
                 sh_sum[odd][c][b] = fma(at.bands_of[l + odd][b], lanes(cg[c][l + odd]), sh_sum[odd][c][b]);
       }
-      if constexpr (Terms::geometry) {
-        lanes const alpha = hit_alpha<Response>(g, r.d2);
-        moments_of<lanes> const m =
-            hit_moments<Response>(g, r, alpha_gradient(dot(e.opaque, at.gradient), at.total, alpha));
-        for (int i = 0; i < moment_count; ++i) moment_sum[i] += select(hit, m.v[i], 0.0f);
-      }
     }
 
-    float sh[sh_stride], moments[moment_stride] = {};
+    float sh[sh_stride], moments[16];
     for (int b = 0; b < band_groups; ++b)
       write_in_turns(sh + 3 * lane_count * b, sh_stride - 3 * lane_count * b, sh_sum[0][0][b] + sh_sum[1][0][b],
                      sh_sum[0][1][b] + sh_sum[1][1][b], sh_sum[0][2][b] + sh_sum[1][2][b]);
     sums_of(moment_sum, moments);
-    gather.finish(range.box, area, id, sh, moments);
+    gather.finish(range.box, area, id, sh, reinterpret_cast<float const(&)[moment_stride]>(moments));
   }
 
   static lanes dot(vec3_of<lanes> const& a, vec3_of<lanes> const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }

@@ -138,26 +138,29 @@ GART_INLINE lane_mask lanes_of(u32 bits) {
 }
 GART_INLINE bool any(lane_mask m) { return bits_of(m) != 0; }
 
-// out[k]: the sum of all lanes of a[k].
+// out[k]: the sum of all lanes of a[k]; zeros from N on.
 template <int N>
-GART_INLINE void sums_of(lanes const (&a)[N], float* out) {
-#if defined(GART_LANES_AVX512)
+GART_INLINE void sums_of(lanes const (&a)[N], float (&out)[16]) {
   static_assert(N <= 16);
+#if defined(GART_LANES_AVX512)
   // Numbers and lanes change places, and halves are added, until each lane holds one number's sum.
   __m512 x[16];
   for (int k = 0; k < 16; ++k) x[k] = k < N ? (__m512)a[k < N ? k : 0].v : _mm512_setzero_ps();
   for (int k = 0; k < 8; ++k)
-    x[k] = _mm512_add_ps(_mm512_maskz_unpacklo_ps(0xffff, x[2 * k], x[2 * k + 1]), _mm512_maskz_unpackhi_ps(0xffff, x[2 * k], x[2 * k + 1]));
+    x[k] = _mm512_add_ps(_mm512_maskz_unpacklo_ps(0xffff, x[2 * k], x[2 * k + 1]),
+                         _mm512_maskz_unpackhi_ps(0xffff, x[2 * k], x[2 * k + 1]));
   for (int k = 0; k < 4; ++k) {
     __m512d const p = _mm512_castps_pd(x[2 * k]), q = _mm512_castps_pd(x[2 * k + 1]);
-    x[k] = _mm512_add_ps(_mm512_castpd_ps(_mm512_maskz_unpacklo_pd(0xff, p, q)), _mm512_castpd_ps(_mm512_maskz_unpackhi_pd(0xff, p, q)));
+    x[k] = _mm512_add_ps(_mm512_castpd_ps(_mm512_maskz_unpacklo_pd(0xff, p, q)),
+                         _mm512_castpd_ps(_mm512_maskz_unpackhi_pd(0xff, p, q)));
   }
   for (int n = 2; n > 0; n /= 2)
     for (int k = 0; k < n; ++k)
       x[k] = _mm512_add_ps(_mm512_maskz_shuffle_f32x4(0xffff, x[2 * k], x[2 * k + 1], 0x88),
                            _mm512_maskz_shuffle_f32x4(0xffff, x[2 * k], x[2 * k + 1], 0xdd));
-  _mm512_mask_storeu_ps(out, static_cast<__mmask16>((1u << N) - 1), x[0]);
+  _mm512_storeu_ps(out, x[0]);
 #else
+  for (float& one : out) one = 0;
   for (int k = 0; k < N; ++k) {
     lanes s = a[k];
     for (int half = lane_count / 2; half > 0; half /= 2)
@@ -182,9 +185,12 @@ GART_INLINE void write_in_turns(float* out, int n, lanes a, lanes b, lanes c) {
   static constexpr table at;
   for (int k = 0; k < 3 && 16 * k < n; ++k) {
     __m512 const x = _mm512_permutex2var_ps((__m512)a.v, _mm512_load_si512(at.ab[k]), (__m512)b.v);
-    int const left = n - 16 * k;
-    _mm512_mask_storeu_ps(out + 16 * k, static_cast<__mmask16>(left >= 16 ? 0xffffu : (1u << left) - 1),
-                          _mm512_permutex2var_ps(x, _mm512_load_si512(at.abc[k]), (__m512)c.v));
+    __m512 const y = _mm512_permutex2var_ps(x, _mm512_load_si512(at.abc[k]), (__m512)c.v);
+    // A store by mask is no source for the loads that follow.
+    if (int const left = n - 16 * k; left >= 16)
+      _mm512_storeu_ps(out + 16 * k, y);
+    else
+      _mm512_mask_storeu_ps(out + 16 * k, static_cast<__mmask16>((1u << left) - 1), y);
   }
 #else
   for (int l = 0; l < lane_count && 3 * l < n; ++l) {

@@ -92,7 +92,8 @@ GART_HD GART_INLINE void undistort(distortion const& lens, F u, F v, F& x, F& y)
     F const dx = select(folds, F(0.0f), divide(fma(ex, by_yy, -mul(ey, by_xy)), det));
     F const dy = select(folds, F(0.0f), divide(fma(ey, by_xx, -mul(ex, by_xy)), det));
     x = select(going, add(x, -dx), x), y = select(going, add(y, -dy), y);
-    going = both(going, fma(dx, dx, mul(dy, dy)) >= F(1e-16f));
+    // The next step would be of the order of this one's square.
+    going = both(going, fma(dx, dx, mul(dy, dy)) >= F(1e-10f));
     if (!any(going)) break;
   }
 }
