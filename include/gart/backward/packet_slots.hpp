@@ -23,10 +23,11 @@ class packet_slots {
  public:
   lane_mask inside;  // the pixels that have a slot
 
+  packet_slots() = default;
   // `cell`: the part of the Gaussian's box that lies in the packet's tile.
   packet_slots(lt_range const& range, pixel_box const& cell, packet_block const& block)
       : inside(block.within(cell)),
-        width_(cell.width()),
+        width_(static_cast<int>(cell.width())),
         first_(static_cast<std::ptrdiff_t>(range.offset) + tile_offset(range.box, cell) + (block.y - cell.y0) * width_ +
                (block.x - cell.x0)) {}
 
@@ -48,7 +49,7 @@ class packet_slots {
     if constexpr (std::is_same_v<Entry, lt_entry>) {
       lanes const from[4] = {Entry::signed_by(opaque.x, unclamped.x), Entry::signed_by(opaque.y, unclamped.y),
                              Entry::signed_by(opaque.z, unclamped.z), weight};
-      write_fours(reinterpret_cast<float*>(slots) + 4 * first_, 4 * width_, hits, from);
+      write_fours(reinterpret_cast<float*>(slots) + 4 * first_, std::ptrdiff_t{4} * width_, hits, from);
     } else {
       for (u32 left = bits_of(hits); left; left &= left - 1) {
         int const l = __builtin_ctz(left);
@@ -64,7 +65,7 @@ class packet_slots {
     packet_entries out;
     if constexpr (std::is_same_v<Entry, lt_entry>) {
       lanes to[4];
-      read_fours(reinterpret_cast<float const*>(slots) + 4 * first_, 4 * width_, hits, to);
+      read_fours(reinterpret_cast<float const*>(slots) + 4 * first_, std::ptrdiff_t{4} * width_, hits, to);
       for (int c = 0; c < 3; ++c) out.opaque[c] = magnitude(to[c]), out.clamped[c] = negative(to[c]);
       out.weight = to[3];
     } else {
@@ -111,7 +112,7 @@ class packet_slots {
     return r;
   }
 
-  std::ptrdiff_t width_;
+  int width_;
   std::ptrdiff_t first_;  // of the packet's first pixel: before the cell where that pixel lies outside of it
 };
 

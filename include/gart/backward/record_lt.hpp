@@ -29,18 +29,17 @@ struct record_lt {
   }
 
 #if !defined(__CUDACC__)
-  GART_INLINE void expect(u32 id, packet_block const& block) const { slots_of(id, block).fetch_to_write(slots); }
-  GART_INLINE lane_words operator()(u32 id, packet_block const& block, lane_mask hits, vec3_of<lanes> const& opaque,
-                                    lanes weight, vec3_of<lanes> const& unclamped) const {
-    packet_slots const at = slots_of(id, block);
+  using note = packet_slots;
+  GART_INLINE note expect(u32 id, packet_block const& block) const {
+    lt_range const range = ranges[id];
+    packet_slots const at(range, cell_of<Size>(range.box, static_cast<u32>(block.x), static_cast<u32>(block.y)), block);
+    at.fetch_to_write(slots);
+    return at;
+  }
+  GART_INLINE lane_words operator()(note const& at, lane_mask hits, vec3_of<lanes> const& opaque, lanes weight,
+                                    vec3_of<lanes> const& unclamped) const {
     at.write(slots, hits, opaque, weight, unclamped);
     return at.places();
-  }
-
- private:
-  GART_INLINE packet_slots slots_of(u32 id, packet_block const& block) const {
-    lt_range const range = ranges[id];
-    return {range, cell_of<Size>(range.box, static_cast<u32>(block.x), static_cast<u32>(block.y)), block};
   }
 #endif
 };

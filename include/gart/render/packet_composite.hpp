@@ -10,6 +10,8 @@ namespace gart {
 
 template <int ShDegree, class Record>
 struct packet_composite {
+  using note = typename Record::note;
+  using shaded = vec3_of<lanes>;  // colour before the clamp
   using scalar = composite<ShDegree, Record>;
   struct state {
     packet_block block;
@@ -40,21 +42,24 @@ struct packet_composite {
     return s;
   }
 
-  GART_INLINE void expect(state const& s, u32 id) const {
+  GART_INLINE note expect(state const& s, u32 id) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
     float const* const row = program.sh + stride * id;
     for (std::size_t k = 0; k < stride; k += 16) prefetch(row + k);
-    program.record.expect(id, s.block);
+    return program.record.expect(id, s.block);
   }
 
-  GART_INLINE lane_mask on_hit(state& s, lane_mask now, lanes t, lanes alpha, u32 id) const {
+  GART_INLINE shaded shade(state const& s, u32 id) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
-    vec3_of<lanes> const unclamped =
-        s.basis.unclamped(program.sh + stride * id, sh_coefficients(program.active_degree));
+    return s.basis.unclamped(program.sh + stride * id, sh_coefficients(program.active_degree));
+  }
+
+  GART_INLINE lane_mask on_hit(state& s, lane_mask now, lanes t, lanes alpha, shaded const& unclamped,
+                               note const& at) const {
     vec3_of<lanes> const c = clamped_color(unclamped), opaque = opaque_color(c, s.color, s.transmittance);
     // A hit of no alpha leaves a ray as it is.
     lanes const weight = blend(select(now, alpha, 0.0f), select(now, t, 0.0f), c, s.color, s.depth, s.transmittance);
-    lane_words const places = program.record(id, s.block, now, opaque, weight, unclamped);
+    lane_words const places = program.record(at, now, opaque, weight, unclamped);
     s.hits += select(now, every_lane(1), every_lane(0));
     s.last_t = select(now, t, s.last_t), s.last_place = select(now, places, s.last_place);
     lane_mask on = s.transmittance >= lanes(program.options.transmittance_min);

@@ -3,7 +3,7 @@
 // when it is found) and is called once a hit, after it has been composited, with that place, the colour
 // that the pixel would have if the hit were opaque, its weight T alpha and its own colour before the clamp; it is part
 // of a strategy (backward/strategies.hpp). On hosts it also takes the hits of one Gaussian with a packet of rays at once
-// (trace/packet_walk.hpp), and says their places.
+// (trace/packet_walk.hpp), by the note it made when they were found, and says their places.
 
 #include <gart/render/pixels.hpp>
 #include <gart/tiles/layout.hpp>
@@ -20,9 +20,9 @@ struct record_none {
                                       vec3 const& /*unclamped*/) const {}
 
 #if !defined(__CUDACC__)
-  void expect(u32 /*id*/, packet_block const&) const {}
-  lane_words operator()(u32 /*id*/, packet_block const&, lane_mask, vec3_of<lanes> const&, lanes,
-                        vec3_of<lanes> const&) const {
+  struct note {};
+  note expect(u32 /*id*/, packet_block const&) const { return {}; }
+  lane_words operator()(note, lane_mask, vec3_of<lanes> const&, lanes, vec3_of<lanes> const&) const {
     return every_lane(0);
   }
 #endif

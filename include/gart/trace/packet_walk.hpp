@@ -7,8 +7,9 @@
 //
 // A packet program is the ray program for packets:
 //   begin(block)                      the state of a block's rays; says `directions` and which lanes are `inside`
-//   expect(state, id)                 what will be read and written for a Gaussian's hits may be fetched
-//   on_hit(state, lanes, t, alpha, id)  composites a Gaussian's hits with the rays of a mask; the rays that go on
+//   expect(state, id)                 a note on a Gaussian that was hit; what its hits will read and write may be fetched
+//   shade(state, id)                  what it shows each ray, of type `shaded`
+//   on_hit(state, lanes, t, alpha, shaded, note)  composites its hits with the rays of a mask; the rays that go on
 //   end(state)
 // A packet that has more hits waiting than there are rows for says so, and its rays are traced one by one.
 
@@ -53,8 +54,7 @@ class packet_walk {
       response_of<lanes> const r = evaluate<Response>(g, primary_ray_of<lanes>{d});
       lane_mask const hit = alive_ & is_hit(g, r, scene.near);
       if (!any(hit)) continue;
-      program.expect(state, id);
-      if (!insert(hit, r.t, hit_alpha<Response>(g, r.d2), id)) return false;
+      if (!insert({r.t, hit_alpha<Response>(g, r.d2), hit, id, program.expect(state, id)})) return false;
     }
     pass_on(program, state, cosine, everything);
     program.end(state);
@@ -65,39 +65,43 @@ class packet_walk {
   static constexpr int rows = 16 * Window;
   static constexpr int stride = 8;  // candidates between two looks at what has become certain
   static constexpr int often = 12;  // rows below which looking does not pay
+  static constexpr int together = 4;  // rows shaded at a time
   static constexpr int crowded = rows / 2;
   static constexpr u32 ahead = 6;   // candidates whose records are fetched while one is looked at
   static constexpr float everything = -1;  // no bound: the list is at its end
 
   static constexpr u16 ends = rows;  // before the first and behind the last
 
-  struct row {
+  struct hits {
     lanes t, alpha;
     lane_mask rays;
-    u16 nearer, farther;  // its neighbours
     u32 id;
+    typename P::note note;
+  };
+  struct row : hits {
+    u16 nearer, farther;  // its neighbours
   };
 
   // From the back, where most hits belong. Every ray's hit may stand behind the last row it must follow and before the
   // first that must follow it; rays that share a gap share a row.
-  bool insert(lane_mask rays, lanes t, lanes alpha, u32 id) {
-    lane_mask settled = rays & ~waiting_, left = rays & waiting_;
+  GART_INLINE bool insert(hits const& h) {
+    lane_mask settled = h.rays & ~waiting_, left = h.rays & waiting_;
     u16 gap = ends;  // before this row
     for (u16 at = pool_[ends].nearer; any(left) && at != ends; at = pool_[at].nearer) {
       row const& other = pool_[at];
       lane_mask const both = left & other.rays;
-      lane_mask const nearer = both & (id < other.id ? t <= other.t : t < other.t), farther = both & ~nearer;
+      lane_mask const nearer = both & (h.id < other.id ? h.t <= other.t : h.t < other.t), farther = both & ~nearer;
       settled |= farther, left &= ~farther;
       if (any(nearer)) {
-        if (any(settled) && !put(settled, t, alpha, id, gap)) return false;
+        if (any(settled) && !put(h, settled, gap)) return false;
         settled = lanes_of(0), gap = at;
       }
     }
-    waiting_ |= rays;
-    return put(settled | left, t, alpha, id, gap);
+    waiting_ |= h.rays;
+    return put(h, settled | left, gap);
   }
 
-  GART_INLINE bool put(lane_mask rays, lanes t, lanes alpha, u32 id, u16 gap) {
+  GART_INLINE bool put(hits const& h, lane_mask rays, u16 gap) {
     u16 at = free_;
     if (at != ends)
       free_ = pool_[at].farther;
@@ -106,7 +110,7 @@ class packet_walk {
     else
       return false;
     row& r = pool_[at];
-    r.t = t, r.alpha = alpha, r.rays = rays, r.id = id;
+    r.t = h.t, r.alpha = h.alpha, r.rays = rays, r.id = h.id, r.note = h.note;
     r.farther = gap, r.nearer = pool_[gap].nearer;
     pool_[r.nearer].farther = at, pool_[gap].nearer = at;
     ++count_;
@@ -117,27 +121,41 @@ class packet_walk {
   template <class State>
   void pass_on(P const& program, State& state, lanes const& cosine, float bound) {
     lane_mask stay = lanes_of(0);
-    u16 last = ends;  // of those that stay
-    for (u16 at = pool_[ends].farther; at != ends && any(alive_ & ~stay);) {
-      row& r = pool_[at];
-      lane_mask const rays = r.rays & alive_;
-      lane_mask now = rays;
-      if (bound != everything) {
-        now &= ~stay & (r.t * cosine < lanes(bound));
-        // A row goes as one, unless rows run out.
-        if (any(rays & ~now) && count_ < crowded) now = lanes_of(0);
+    u16 last = ends, at = pool_[ends].farther;  // of those that stay; the next to look at
+    for (;;) {
+      // A few rows at a time, shaded side by side: a colour's sum is a chain of steps that wait for each other.
+      row const* ready[together];
+      lane_mask now[together];
+      typename P::shaded shaded[together];
+      int n = 0;
+      while (n < together && at != ends && any(alive_ & ~stay)) {
+        row& r = pool_[at];
+        lane_mask const rays = r.rays & alive_;
+        lane_mask pass = rays;
+        if (bound != everything) {
+          pass &= ~stay & (r.t * cosine < lanes(bound));
+          // A row goes as one, unless rows run out.
+          if (any(rays & ~pass) && count_ < crowded) pass = lanes_of(0);
+        }
+        if (any(pass)) ready[n] = &r, now[n++] = pass;
+        u16 const next = r.farther;
+        r.rays = rays & ~pass;
+        stay |= r.rays;
+        if (any(r.rays)) {
+          last = at;
+        } else {
+          pool_[last].farther = next, pool_[next].nearer = last;
+          r.farther = free_, free_ = at, --count_;
+        }
+        at = next;
       }
-      if (any(now)) alive_ &= program.on_hit(state, now, r.t, r.alpha, r.id) | ~now;
-      r.rays = rays & ~now;
-      stay |= r.rays;
-      u16 const next = r.farther;
-      if (any(r.rays)) {
-        last = at;
-      } else {
-        pool_[last].farther = next, pool_[next].nearer = last;
-        r.farther = free_, free_ = at, --count_;
+      if (n == 0) break;
+      for (int i = 0; i < n; ++i) shaded[i] = program.shade(state, ready[i]->id);
+      for (int i = 0; i < n; ++i) {
+        row const& r = *ready[i];
+        lane_mask const rays = now[i] & alive_;
+        if (any(rays)) alive_ &= program.on_hit(state, rays, r.t, r.alpha, shaded[i], r.note) | ~rays;
       }
-      at = next;
     }
     waiting_ = stay;
   }
