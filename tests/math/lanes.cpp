@@ -2,6 +2,7 @@
 #include <gart/math/hit_gradient.hpp>
 #include <gart/math/lanes.hpp>
 #include <gart/math/sh.hpp>
+#include <gart/render/pixels.hpp>
 #include <support/policies.hpp>
 
 namespace {
@@ -34,8 +35,8 @@ void compare(std::mt19937_64& random) {
       gart::response const expected = gart::evaluate<Response>(g, gart::primary_ray{one});
       CHECK(same(r.t.v[l], expected.t));
       CHECK(same(r.d2.v[l], expected.d2));
-      CHECK((hit[l] != 0) == gart::is_hit(g, expected, 0.01f));
-      CHECK(((gart::bits_of(hit) >> l & 1) != 0) == (hit[l] != 0));
+      CHECK(hit[l] == gart::is_hit(g, expected, 0.01f));
+      CHECK(((gart::bits_of(hit) >> l & 1) != 0) == hit[l]);
       CHECK(same(alpha.v[l], gart::hit_alpha<Response>(g, expected.d2)));
       gart::moments const expected_moments = gart::hit_moments<Response>(g, expected, float(gradient.v[l]));
       for (int i = 0; i < gart::moment_count; ++i) CHECK(same(m.v[i].v[l], expected_moments.v[i]));
@@ -56,21 +57,66 @@ TEST_CASE("a lane has the bits of a float") {
   compare<gart::generalized_gaussian<2, gart::arithmetic::fast>>(random);
 }
 
-TEST_CASE("lanes: select, reads, sums and the sign of zero") {
-  gart::lanes a;
-  float from[64];
-  gart::lane_ints index;
+TEST_CASE("lanes: select, masks, sums and the sign of zero") {
+  gart::lanes a, many[10];
   float sum = 0;
-  for (int i = 0; i < 64; ++i) from[i] = 0.5f * static_cast<float>(i);
-  for (int l = 0; l < gart::lane_count; ++l)
-    a.v[l] = static_cast<float>(l - 2), index[l] = 63 - 3 * l, sum += static_cast<float>(l - 2);
-  gart::lanes const chosen = gart::select(a < gart::lanes(0.0f), gart::lanes(7.0f), a), read = gart::read(from, index);
+  for (int l = 0; l < gart::lane_count; ++l) a.v[l] = static_cast<float>(l - 2), sum += static_cast<float>(l - 2);
+  gart::lanes const chosen = gart::select(a < gart::lanes(0.0f), gart::lanes(7.0f), a);
   for (int l = 0; l < gart::lane_count; ++l) {
     CHECK(chosen.v[l] == (l < 2 ? 7.0f : static_cast<float>(l - 2)));
-    CHECK(read.v[l] == from[63 - 3 * l]);
+    CHECK((a <= gart::lanes(-1.0f))[l] == (l < 2));
+    CHECK(gart::lanes_of(5u)[l] == (l == 0 || l == 2));
+    CHECK(gart::negative(-gart::magnitude(a))[l]);
+    CHECK(gart::equal(gart::every_lane(0x80000000u), gart::every_lane(1u))[l] == false);
+    CHECK(gart::at_most(gart::every_lane(1u), gart::every_lane(0x80000000u))[l]);
   }
-  CHECK(gart::sum_of(a) == sum);
+  float sums[16];
+  for (int k = 0; k < 10; ++k) many[k] = static_cast<float>(k) * a;
+  gart::sums_of(many, sums);
+  for (int k = 0; k < 16; ++k) CHECK(sums[k] == (k < 10 ? static_cast<float>(k) * sum : 0.0f));
   CHECK(std::signbit(float(gart::lanes(-0.0f).v[0])));
   CHECK(gart::any(a == gart::lanes(0.0f)));
   CHECK_FALSE(gart::any(a > gart::lanes(1000.0f)));
+}
+
+TEST_CASE("lanes: numbers in turns and in fours") {
+  gart::lanes from[4], to[4];
+  for (int k = 0; k < 4; ++k)
+    for (int l = 0; l < gart::lane_count; ++l) from[k].v[l] = static_cast<float>(100 * k + l + 1);
+  for (int n : {3, 12, 27, 48}) {
+    if (n > 3 * gart::lane_count) continue;
+    std::vector<float> turns(static_cast<std::size_t>(n) + 1, -1.0f);
+    gart::write_in_turns(turns.data(), n, from[0], from[1], from[2]);
+    for (int i = 0; i < n; ++i) CHECK(turns[static_cast<std::size_t>(i)] == from[i % 3].v[i / 3]);
+    CHECK(turns.back() == -1.0f);
+  }
+  int const stride = 23;
+  for (gart::u32 bits : {0u, 1u, 0xa6c5u, 0xffffu}) {
+    gart::lane_mask const m = gart::lanes_of(bits & ((1u << gart::lane_count) - 1));
+    std::vector<float> memory(4 * stride, -1.0f);
+    gart::write_fours(memory.data(), stride, m, from);
+    gart::read_fours(memory.data(), stride, m, to);
+    for (int l = 0; l < gart::lane_count; ++l)
+      for (int k = 0; k < 4; ++k) {
+        CHECK(memory[static_cast<std::size_t>(l / 4 * stride + l % 4 * 4 + k)] == (m[l] ? from[k].v[l] : -1.0f));
+        CHECK(to[k].v[l] == (m[l] ? from[k].v[l] : 0.0f));
+      }
+  }
+}
+
+TEST_CASE("a packet's rays have the bits of single ones, through lenses too") {
+  gart::camera view;
+  view.width = 64, view.height = 48, view.fx = 40, view.fy = 41, view.cx = 31, view.cy = 25;
+  for (gart::distortion const& lens : {gart::distortion{}, gart::distortion{0.06f, -0.08f, -0.002f, 0.003f}}) {
+    view.lens = lens;
+    for (int y = 0; y < view.height; y += gart::packet_block::height)
+      for (int x = 0; x < view.width; x += gart::packet_block::width) {
+        auto const d = gart::pixel_directions(view, {x, y});
+        for (int l = 0; l < gart::lane_count; ++l) {
+          gart::vec3 const one =
+              gart::pixel_ray(view, {x + gart::packet_block::column(l), y + gart::packet_block::row(l)}).direction;
+          for (int k = 0; k < 3; ++k) CHECK(same(d[k].v[l], one[k]));
+        }
+      }
+  }
 }

@@ -118,7 +118,10 @@ struct pass {
     for (u32 i = 0; i < n; ++i)
       gaussians.push_back(gart::prepare(gart::load_parameters(all, i), view.position, alpha_min));
     records.assign(gaussians);
-    map.build(exec, grid, prints, gart::depth_order(prints.depths().data(), records.data(), view));
+    gart::buffer<gart::lens_shift, E> shifts(exec);
+    shifts.resize(grid.count());
+    gart::parallel_for(exec, "lens", grid.count(), gart::lens_shifts<Size>{view, grid, shifts});
+    map.build(exec, grid, prints, gart::depth_order(prints.depths().data(), records.data(), view, shifts.data()));
     gart::tile_map_view const made = map.view();
     auto const offsets = host_copy(exec, made.offsets);
     auto const primitives = host_copy(exec, made.primitives);

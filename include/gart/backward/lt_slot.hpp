@@ -57,9 +57,10 @@ struct alignas(16) lt_entry {
   }
   GART_HD GART_INLINE vec3 color() const { return {fabsf(r), fabsf(g), fabsf(b)}; }
 
- private:
-  GART_HD GART_INLINE static float signed_by(float v, float c) {
-    return bits_to_float((float_to_bits(v) & 0x7fffffffu) | (shows(c) ? 0u : 0x80000000u));
+  template <class F>
+  GART_HD GART_INLINE static F signed_by(F v, F c) {
+    F const size = magnitude(v);
+    return select(shows(c), size, -size);
   }
 };
 

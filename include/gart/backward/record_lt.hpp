@@ -3,6 +3,7 @@
 // (tiles/layout.hpp).
 
 #include <gart/backward/lt_slot.hpp>
+#include <gart/backward/packet_slots.hpp>
 #include <gart/render/record.hpp>
 #include <gart/tiles/layout.hpp>
 
@@ -27,23 +28,20 @@ struct record_lt {
     if (place != slot_cell::none) slots[place] = Entry::of(opaque, weight, unclamped);
   }
 
-  struct cell {
-    Entry* first;
-    pixel_box pixels;
-  };
-  cell cell_of(u32 id, pixel_box const& tile) const {
+#if !defined(__CUDACC__)
+  using note = packet_slots;
+  GART_INLINE note expect(u32 id, packet_block const& block) const {
     lt_range const range = ranges[id];
-    pixel_box const pixels = intersect(range.box, tile);
-    return {slots + range.offset + tile_offset(range.box, pixels), pixels};
+    packet_slots const at(range, cell_of<Size>(range.box, static_cast<u32>(block.x), static_cast<u32>(block.y)), block);
+    at.fetch_to_write(slots);
+    return at;
   }
-  u32 place_of(cell const& c, pixel at) const {
-    return static_cast<u32>(c.first - slots) + pixel_offset(c.pixels, static_cast<u32>(at.x), static_cast<u32>(at.y));
+  GART_INLINE lane_words operator()(note const& at, lane_mask hits, vec3_of<lanes> const& opaque, lanes weight,
+                                    vec3_of<lanes> const& unclamped) const {
+    at.write(slots, hits, opaque, weight, unclamped);
+    return at.places();
   }
-  GART_INLINE void operator()(cell const& c, pixel at, vec3 const& opaque, float weight, vec3 const& unclamped) const {
-    u32 const x = static_cast<u32>(at.x), y = static_cast<u32>(at.y);
-    if (x < c.pixels.x0 || x >= c.pixels.x1 || y < c.pixels.y0 || y >= c.pixels.y1) return;
-    c.first[pixel_offset(c.pixels, x, y)] = Entry::of(opaque, weight, unclamped);
-  }
+#endif
 };
 
 }  // namespace gart

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include <sys/mman.h>
 #include <unistd.h>
 
 namespace gart {
@@ -27,14 +28,18 @@ class host_memory {
   ~host_memory() { deallocate(workspace_, workspace_bytes_); }
 
   void* allocate(std::size_t bytes) {
-    void* p = ::operator new (bytes, std::align_val_t{64}, std::nothrow);
+    void* p = ::operator new (bytes, alignment_of(bytes), std::nothrow);
     if (!p) throw out_of_memory("host", bytes, free_bytes(), "lower --max-gaussians or raise --downscale");
+#if defined(MADV_HUGEPAGE)
+    // A hint: without it what reads slots all over a buffer waits for the addresses of its pages too.
+    if (bytes >= large) madvise(p, bytes, MADV_HUGEPAGE);
+#endif
     memory.allocated(bytes);
     return p;
   }
   void deallocate(void* p, std::size_t bytes) {
     if (!p) return;
-    ::operator delete (p, std::align_val_t{64});
+    ::operator delete (p, alignment_of(bytes));
     memory.released(bytes);
   }
   void copy_in(void* dst, void const* src, std::size_t bytes) { copy(dst, src, bytes); }
@@ -70,6 +75,10 @@ class host_memory {
   }
 
  private:
+  static constexpr std::size_t huge_page = std::size_t{1} << 21, large = 4 * huge_page;
+  static std::align_val_t alignment_of(std::size_t bytes) {
+    return std::align_val_t{bytes >= large ? huge_page : std::size_t{64}};
+  }
   static std::size_t free_bytes() {
     long const pages = sysconf(_SC_AVPHYS_PAGES), page = sysconf(_SC_PAGESIZE);
     return pages > 0 && page > 0 ? static_cast<std::size_t>(pages) * static_cast<std::size_t>(page) : 0;

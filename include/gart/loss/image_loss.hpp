@@ -96,7 +96,10 @@ struct loss_tiles {
       std::ptrdiff_t const begin = x < 0 ? -x : 0, end = row_inside ? image.width - x : 0;
       std::ptrdiff_t const start = at.channel * image.pixels() + static_cast<std::ptrdiff_t>(y) * image.width + x;
       std::ptrdiff_t const cell = row * halo_pitch + first;
-      for (std::ptrdiff_t v = 0; v < block; ++v) f(cell + v, start + v, v >= begin && v < end);
+      if (block > 1 && begin == 0 && end >= block)  // nothing to ask of each
+        for (std::ptrdiff_t v = 0; v < block; ++v) f(cell + v, start + v, true);
+      else
+        for (std::ptrdiff_t v = 0; v < block; ++v) f(cell + v, start + v, v >= begin && v < end);
     });
   }
 
@@ -192,6 +195,12 @@ struct ssim_kernel {
         s.square[row * tiles::width + column + v] = d[v] * d[v];
       }
       int const y = at.y + row;
+      if (tiles::block > 1 && y < image_height && at.x + column + tiles::block <= image_width) {
+        std::size_t const i = plane + static_cast<std::size_t>(y) * image_width + at.x + column;
+        for (int p = 0; p < 3; ++p)
+          for (int v = 0; v < tiles::block; ++v) partials[p * 3 * pixels + i + v] = out[p][v];
+        return;
+      }
       for (int v = 0; v < tiles::block; ++v) {
         int const x = at.x + column + v;
         if (y < image_height && x < image_width) {

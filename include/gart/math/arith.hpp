@@ -93,6 +93,8 @@ GART_HD GART_INLINE bool is_finite(float f) { return (float_to_bits(f) & 0x7f800
 
 // For formulas over floats and over lanes of them (math/lanes.hpp).
 GART_HD GART_INLINE bool both(bool a, bool b) { return a && b; }
+GART_HD GART_INLINE bool any(bool a) { return a; }
+GART_HD GART_INLINE float magnitude(float a) { return fabsf(a); }
 GART_HD GART_INLINE float select(bool which, float a, float b) { return which ? a : b; }
 
 // x 2^n, where `biased` is n + 1.5 * 2^23.

@@ -54,9 +54,9 @@ struct sh_basis {
     GART_UNROLL
     for (int k = 0; k < size; ++k) {
       if (k >= bands) break;
-      r += y[k] * F(coefficients[3 * k]);
-      g += y[k] * F(coefficients[3 * k + 1]);
-      b += y[k] * F(coefficients[3 * k + 2]);
+      r = fma(y[k], F(coefficients[3 * k]), r);
+      g = fma(y[k], F(coefficients[3 * k + 1]), g);
+      b = fma(y[k], F(coefficients[3 * k + 2]), b);
     }
     return {r, g, b};
   }

@@ -10,8 +10,8 @@ namespace gart {
 
 template <int ShDegree, class Record>
 struct packet_composite {
-  static constexpr int channels = 3;  // colour before the clamp
-  using note = typename Record::cell;
+  using note = typename Record::note;
+  using shaded = vec3_of<lanes>;  // colour before the clamp
   using scalar = composite<ShDegree, Record>;
   struct state {
     packet_block block;
@@ -20,8 +20,7 @@ struct packet_composite {
     sh_basis<ShDegree, lanes> basis;
     vec3_of<lanes> color;
     lanes transmittance, depth, last_t;
-    lane_ints hits;
-    u32 last_place[lane_count];
+    lane_words hits, last_place;
   };
 
   scalar program;
@@ -33,42 +32,39 @@ struct packet_composite {
   state begin(packet_block const& block) const {
     last_hit const none;
     state s{block, {}, {}, {}, {0.0f, 0.0f, 0.0f}, 1.0f, 0.0f, none.t, {}, {}};
+    u32 inside = 0;
     for (int l = 0; l < lane_count; ++l) {
-      pixel const at = pixel_of(block, l);
-      vec3 const d = pixel_ray(program.view, at).direction;
-      s.inside[l] = program.order.inside(at) ? -1 : 0;
-      for (int k = 0; k < 3; ++k) s.directions[k].v[l] = d[k];
+      inside |= (program.order.inside(pixel_of(block, l)) ? 1u : 0u) << l;
     }
+    s.inside = lanes_of(inside);
+    s.directions = pixel_directions(program.view, block);
     s.basis = sh_basis<ShDegree, lanes>(s.directions);
     return s;
   }
 
-  void shade(state const& s, u32 id, pixel_box const& tile, lanes (&out)[channels], note& cell) const {
+  GART_INLINE note expect(state const& s, u32 id) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
-    vec3_of<lanes> const c = s.basis.unclamped(program.sh + stride * id, sh_coefficients(program.active_degree));
-    out[0] = c.x, out[1] = c.y, out[2] = c.z;
-    cell = program.record.cell_of(id, tile);
+    float const* const row = program.sh + stride * id;
+    for (std::size_t k = 0; k < stride; k += 16) prefetch(row + k);
+    return program.record.expect(id, s.block);
   }
 
-  lane_mask on_hits(state& s, lane_mask now, packet_hits<packet_composite> const& h) const {
-    vec3_of<lanes> const unclamped(h.shade[0], h.shade[1], h.shade[2]);
-    vec3_of<lanes> color = s.color;
-    lanes depth = s.depth, transmittance = s.transmittance;
+  GART_INLINE shaded shade(state const& s, u32 id) const {
+    constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
+    return s.basis.unclamped(program.sh + stride * id, sh_coefficients(program.active_degree));
+  }
+
+  GART_INLINE lane_mask on_hit(state& s, lane_mask now, lanes t, lanes alpha, shaded const& unclamped,
+                               note const& at) const {
     vec3_of<lanes> const c = clamped_color(unclamped), opaque = opaque_color(c, s.color, s.transmittance);
-    lanes const weight = blend(h.alpha, h.t, c, color, depth, transmittance);
-    for (int k = 0; k < 3; ++k) s.color[k] = select(now, color[k], s.color[k]);
-    s.depth = select(now, depth, s.depth), s.transmittance = select(now, transmittance, s.transmittance);
-    s.hits -= now;
-    s.last_t = select(now, h.t, s.last_t);
-    if constexpr (Record::any)
-      for (u32 left = bits_of(now); left; left &= left - 1) {
-        int const l = __builtin_ctz(left);
-        s.last_place[l] = program.record.place_of(h.notes[h.row[l]], pixel_of(s.block, l));
-        program.record(h.notes[h.row[l]], pixel_of(s.block, l), {opaque.x.v[l], opaque.y.v[l], opaque.z.v[l]},
-                       weight.v[l], {unclamped.x.v[l], unclamped.y.v[l], unclamped.z.v[l]});
-      }
-    return (s.transmittance >= lanes(program.options.transmittance_min)) &
-           (s.hits != every_lane(static_cast<int>(program.options.max_hits)));
+    // A hit of no alpha leaves a ray as it is.
+    lanes const weight = blend(select(now, alpha, 0.0f), select(now, t, 0.0f), c, s.color, s.depth, s.transmittance);
+    lane_words const places = program.record(at, now, opaque, weight, unclamped);
+    s.hits += select(now, every_lane(1), every_lane(0));
+    s.last_t = select(now, t, s.last_t), s.last_place = select(now, places, s.last_place);
+    lane_mask on = s.transmittance >= lanes(program.options.transmittance_min);
+    if (program.options.max_hits > 0) on &= ~equal(s.hits, every_lane(program.options.max_hits));
+    return on;
   }
 
   void end(state const& s) const {
@@ -77,7 +73,7 @@ struct packet_composite {
       typename scalar::state one;
       one.at = pixel_of(s.block, l);
       one.color = {s.color.x.v[l], s.color.y.v[l], s.color.z.v[l]};
-      one.transmittance = s.transmittance.v[l], one.depth = s.depth.v[l], one.hits = static_cast<u32>(s.hits[l]);
+      one.transmittance = s.transmittance.v[l], one.depth = s.depth.v[l], one.hits = s.hits[l];
       one.last = {s.last_t.v[l], s.last_place[l]};
       program.end(0, one);
     }

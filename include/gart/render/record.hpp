@@ -2,12 +2,13 @@
 // What the forward pass leaves of each hit for the backward pass to find. A record says where a hit belongs (place_of,
 // when it is found) and is called once a hit, after it has been composited, with that place, the colour
 // that the pixel would have if the hit were opaque, its weight T alpha and its own colour before the clamp; it is part
-// of a strategy (backward/strategies.hpp). Where many pixels of a tile meet one Gaussian, the cell of its hits there
-// can be asked for once and written to many times.
+// of a strategy (backward/strategies.hpp). On hosts it also takes the hits of one Gaussian with a packet of rays at once
+// (trace/packet_walk.hpp), by the note it made when they were found, and says their places.
 
 #include <gart/render/pixels.hpp>
 #include <gart/tiles/layout.hpp>
 #include <gart/trace/hit.hpp>
+#include <gart/trace/packet_block.hpp>
 
 namespace gart {
 
@@ -18,10 +19,13 @@ struct record_none {
   GART_HD GART_INLINE void operator()(u32 /*place*/, vec3 const& /*opaque*/, float /*weight*/,
                                       vec3 const& /*unclamped*/) const {}
 
-  struct cell {};
-  cell cell_of(u32, pixel_box const&) const { return {}; }
-  u32 place_of(cell const&, pixel) const { return 0; }
-  void operator()(cell const&, pixel, vec3 const&, float, vec3 const&) const {}
+#if !defined(__CUDACC__)
+  struct note {};
+  note expect(u32 /*id*/, packet_block const&) const { return {}; }
+  lane_words operator()(note, lane_mask, vec3_of<lanes> const&, lanes, vec3_of<lanes> const&) const {
+    return every_lane(0);
+  }
+#endif
 };
 
 }  // namespace gart

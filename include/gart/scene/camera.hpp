@@ -13,6 +13,7 @@
 #include <gart/core/macros.hpp>
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
+#include <gart/math/lanes.hpp>
 
 #include <string>
 #include <vector>
@@ -68,35 +69,50 @@ inline void require_camera(camera const& c) {
     throw invalid_argument(std::string("camera: ") + fault.what + " (" + fault.remedy + ")");
 }
 
-// Newton's method on the distortion; exact to float after a few steps for lenses that are invertible at the point.
-GART_HD inline vec2 undistort(distortion const& lens, vec2 distorted) {
-  vec2 p = distorted;
+// Newton's method on the distortion; exact to float after a few steps for lenses that are invertible at the point. F: of
+// one point, or of one a lane.
+template <class F>
+GART_HD GART_INLINE void undistort(distortion const& lens, F u, F v, F& x, F& y) {
+  F const k1 = lens.k1, k2 = lens.k2, lens_p1 = lens.p1, lens_p2 = lens.p2;
+  F const p1 = mul(F(2.0f), lens_p1), p2 = mul(F(2.0f), lens_p2);
+  x = u, y = v;
+  auto going = F(0.0f) <= F(0.0f);
   for (int i = 0; i < 10; ++i) {
-    float const x = p.x, y = p.y, xx = mul(x, x), yy = mul(y, y), xy = mul(x, y), r2 = add(xx, yy);
-    float const radial = fma(r2, fma(r2, lens.k2, lens.k1), 1.0f);
-    float const slope = fma(mul(4.0f, lens.k2), r2, mul(2.0f, lens.k1));  // d radial / d x = slope * x
-    float const p1 = mul(2.0f, lens.p1), p2 = mul(2.0f, lens.p2);
-    float const ex = add(fma(x, radial, fma(p1, xy, mul(lens.p2, fma(2.0f, xx, r2)))), -distorted.x);
-    float const ey = add(fma(y, radial, fma(p2, xy, mul(lens.p1, fma(2.0f, yy, r2)))), -distorted.y);
-    float const by_xx = fma(slope, xx, fma(p1, y, fma(mul(3.0f, p2), x, radial)));
-    float const by_xy = fma(slope, xy, fma(p1, x, mul(p2, y)));
-    float const by_yy = fma(slope, yy, fma(p2, x, fma(mul(3.0f, p1), y, radial)));
-    float const det = fma(by_xx, by_yy, -mul(by_xy, by_xy));
-    if (!(det != 0)) break;
-    vec2 const step(divide(fma(ex, by_yy, -mul(ey, by_xy)), det), divide(fma(ey, by_xx, -mul(ex, by_xy)), det));
-    p = vec2(add(p.x, -step.x), add(p.y, -step.y));
-    if (fma(step.x, step.x, mul(step.y, step.y)) < 1e-16f) break;
+    F const xx = mul(x, x), yy = mul(y, y), xy = mul(x, y), r2 = add(xx, yy);
+    F const radial = fma(r2, fma(r2, k2, k1), F(1.0f));
+    F const slope = fma(mul(F(4.0f), k2), r2, mul(F(2.0f), k1));  // d radial / d x = slope * x
+    F const ex = add(fma(x, radial, fma(p1, xy, mul(lens_p2, fma(F(2.0f), xx, r2)))), -u);
+    F const ey = add(fma(y, radial, fma(p2, xy, mul(lens_p1, fma(F(2.0f), yy, r2)))), -v);
+    F const by_xx = fma(slope, xx, fma(p1, y, fma(mul(F(3.0f), p2), x, radial)));
+    F const by_xy = fma(slope, xy, fma(p1, x, mul(p2, y)));
+    F const by_yy = fma(slope, yy, fma(p2, x, fma(mul(F(3.0f), p1), y, radial)));
+    F const det = fma(by_xx, by_yy, -mul(by_xy, by_xy));
+    // Where the lens folds there is nowhere to go.
+    auto const folds = det == F(0.0f);
+    F const dx = select(folds, F(0.0f), divide(fma(ex, by_yy, -mul(ey, by_xy)), det));
+    F const dy = select(folds, F(0.0f), divide(fma(ey, by_xx, -mul(ex, by_xy)), det));
+    x = select(going, add(x, -dx), x), y = select(going, add(y, -dy), y);
+    // The next step would be of the order of this one's square.
+    going = both(going, fma(dx, dx, mul(dy, dy)) >= F(1e-10f));
+    if (!any(going)) break;
   }
+}
+
+GART_HD inline vec2 undistort(distortion const& lens, vec2 distorted) {
+  vec2 p;
+  undistort(lens, distorted.x, distorted.y, p.x, p.y);
   return p;
 }
 
 // Unit direction, in the world, of the ray through the image point (u, v). It decides hits, so its arithmetic is fixed.
-GART_HD inline vec3 ray_direction(camera const& c, float u, float v) {
-  vec2 p(divide(add(u, -c.cx), c.fx), divide(add(v, -c.cy), c.fy));
-  if (c.lens.any()) p = undistort(c.lens, p);
-  vec3 d;
-  for (int k = 0; k < 3; ++k) d[k] = fma(c.rotation[0][k], p.x, fma(c.rotation[1][k], p.y, c.rotation[2][k]));
-  float const inverse = divide(1.0f, square_root(fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)))));
+template <class F>
+GART_HD GART_INLINE vec3_of<F> ray_direction(camera const& c, F u, F v) {
+  F x = divide(add(u, F(-c.cx)), F(c.fx)), y = divide(add(v, F(-c.cy)), F(c.fy));
+  if (c.lens.any()) undistort(c.lens, F(x), F(y), x, y);
+  vec3_of<F> d;
+  for (int k = 0; k < 3; ++k)
+    d[k] = fma(F(c.rotation[0][k]), x, fma(F(c.rotation[1][k]), y, F(c.rotation[2][k])));
+  F const inverse = divide(F(1.0f), square_root(fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)))));
   return {mul(d.x, inverse), mul(d.y, inverse), mul(d.z, inverse)};
 }
 

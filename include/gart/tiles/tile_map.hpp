@@ -81,7 +81,7 @@ struct emit_pairs {
     pixel_box const box = s.box[k], tiles = tiles_of<Size>(box);
     u32 const number = pair - s.first[k], y = tiles.y0 + number / tiles.width(), x = tiles.x0 + number % tiles.width();
     u32 const tile = y * grid.columns() + x;
-    keys[at] = tile << order_bits | order.key(s.primitive[k], intersect(box, grid.tile(x, y)));
+    keys[at] = tile << order_bits | order.key(s.primitive[k], intersect(box, grid.tile(x, y)), tile);
     primitives[at] = begin + k;
     E::atomic_add(&counts[tile], 1u);
   }

@@ -117,7 +117,7 @@ struct walk_tile_packets {
     packets const program = packets_of(rays.program);
     for (int y = tile.y0; y < tile.y1; y += packet_block::height)
       for (int x = tile.x0; x < tile.x1; x += packet_block::width)
-        if (!team.scratch()(program, rays.scene, rays.map, ranges, rays.forward, tile, team.tile(), {x, y}))
+        if (!team.scratch()(program, rays.scene, rays.map, ranges, rays.forward, team.tile(), {x, y}))
           one_by_one({x, y});
   }
 
@@ -154,13 +154,17 @@ class tile_tracer {
   static constexpr int tile_size = Size;
   static constexpr int window = Window;
 
-  explicit tile_tracer(E& exec) : prints_(exec), map_(exec), next_(exec), put_aside_(exec) {}
+  explicit tile_tracer(E& exec) : prints_(exec), map_(exec), shifts_(exec), next_(exec), put_aside_(exec) {}
 
   void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
                float alpha_min, float near) {
     grid_ = {view.width, view.height};
     prints_.template measure<Response>(exec, scene, view, alpha_min, near);
-    map_.build(exec, grid_, prints_, depth_order(prints_.depths().data(), records.data(), view));
+    if (view.lens.any()) {
+      shifts_.resize(grid_.count());
+      parallel_for(exec, "map/lens", grid_.count(), lens_shifts<Size>{view, grid_, shifts_});
+    }
+    map_.build(exec, grid_, prints_, depth_order(prints_.depths().data(), records.data(), view, shifts_.data()));
     if constexpr (E::device) map_.rank_tiles(exec);
     scene_ = {records.data(), scene.count, near};
     forward_ = view.rotation[2];
@@ -199,6 +203,7 @@ class tile_tracer {
   tile_grid<Size> grid_;
   footprints<E, Size> prints_;
   tile_map<E, Size> map_;
+  buffer<lens_shift, E> shifts_;
   buffer<u32, E> next_;  // of the device's walk (trace/warp_walk.hpp)
   buffer<float, E> put_aside_;
   traced_scene scene_;

@@ -1,0 +1,121 @@
+#pragma once
+// The slots (backward/lt_slot.hpp) of a Gaussian's hits with a packet's rays (trace/packet_walk.hpp): those of a row of
+// pixels lie one after another, rows the width of the cell apart.
+
+#include <gart/backward/lt_slot.hpp>
+#include <gart/tiles/layout.hpp>
+#include <gart/trace/packet_block.hpp>
+
+#include <type_traits>
+
+#if !defined(__CUDACC__)
+
+namespace gart {
+
+// What the slots of a packet hold.
+struct packet_entries {
+  vec3_of<lanes> opaque;  // V
+  lanes weight;
+  lane_mask clamped[3];  // channels of the hit's colour
+};
+
+class packet_slots {
+ public:
+  lane_mask inside;  // the pixels that have a slot
+
+  packet_slots() = default;
+  // `cell`: the part of the Gaussian's box that lies in the packet's tile.
+  packet_slots(lt_range const& range, pixel_box const& cell, packet_block const& block)
+      : inside(block.within(cell)),
+        width_(static_cast<int>(cell.width())),
+        first_(static_cast<std::ptrdiff_t>(range.offset) + tile_offset(range.box, cell) + (block.y - cell.y0) * width_ +
+               (block.x - cell.x0)) {}
+
+  // Numbers of the slots, for lanes inside.
+  lane_words places() const { return every_lane(static_cast<u32>(first_)) + rows() * static_cast<u32>(width_) + columns(); }
+
+  template <class Entry>
+  GART_INLINE void fetch_to_write(Entry const* slots) const {
+    for (int r = 0; r < packet_block::height; ++r) {
+      Entry const* const row = slots + first_ + r * width_;
+      prefetch_to_write(row), prefetch_to_write(row + packet_block::width - 1);
+    }
+  }
+
+  template <class Entry>
+  GART_INLINE void write(Entry* slots, lane_mask hits, vec3_of<lanes> const& opaque, lanes weight,
+             vec3_of<lanes> const& unclamped) const {
+    hits &= inside;
+    if constexpr (std::is_same_v<Entry, lt_entry>) {
+      lanes const from[4] = {Entry::signed_by(opaque.x, unclamped.x), Entry::signed_by(opaque.y, unclamped.y),
+                             Entry::signed_by(opaque.z, unclamped.z), weight};
+      write_fours(reinterpret_cast<float*>(slots) + 4 * first_, std::ptrdiff_t{4} * width_, hits, from);
+    } else {
+      for (u32 left = bits_of(hits); left; left &= left - 1) {
+        int const l = __builtin_ctz(left);
+        slots[first_of(l)] = Entry::of({opaque.x.v[l], opaque.y.v[l], opaque.z.v[l]}, weight.v[l],
+                                       {unclamped.x.v[l], unclamped.y.v[l], unclamped.z.v[l]});
+      }
+    }
+  }
+
+  // Zeros where there are no hits. Geometry: whether V is wanted.
+  template <bool Geometry, class Entry>
+  packet_entries read(Entry const* slots, lane_mask hits) const {
+    packet_entries out;
+    if constexpr (std::is_same_v<Entry, lt_entry>) {
+      lanes to[4];
+      read_fours(reinterpret_cast<float const*>(slots) + 4 * first_, std::ptrdiff_t{4} * width_, hits, to);
+      for (int c = 0; c < 3; ++c) out.opaque[c] = magnitude(to[c]), out.clamped[c] = negative(to[c]);
+      out.weight = to[3];
+    } else {
+      out.opaque = {0.0f, 0.0f, 0.0f}, out.weight = 0.0f;
+      u32 clamped[3] = {};
+      for (u32 left = bits_of(hits); left; left &= left - 1) {
+        int const l = __builtin_ctz(left);
+        Entry const entry = slots[first_of(l)];
+        out.weight.v[l] = entry.weight();
+        for (int c = 0; c < 3; ++c) clamped[c] |= (entry.clamped(c) ? 1u : 0u) << l;
+        if constexpr (Geometry) {
+          vec3 const v = entry.color();
+          for (int c = 0; c < 3; ++c) out.opaque[c].v[l] = v[c];
+        }
+      }
+      for (int c = 0; c < 3; ++c) out.clamped[c] = lanes_of(clamped[c]);
+    }
+    return out;
+  }
+
+  // Whether the hits' slots were written, for entries that say so.
+  template <class Entry>
+  lane_mask written(Entry const* slots) const {
+    u32 bits = 0;
+    for (u32 left = bits_of(inside); left; left &= left - 1) {
+      int const l = __builtin_ctz(left);
+      bits |= (slots[first_of(l)].written() ? 1u : 0u) << l;
+    }
+    return lanes_of(bits);
+  }
+
+ private:
+  std::ptrdiff_t first_of(int l) const {
+    return first_ + packet_block::row(l) * width_ + packet_block::column(l);
+  }
+  static lane_words rows() {
+    lane_words r;
+    for (int l = 0; l < lane_count; ++l) r[l] = static_cast<u32>(packet_block::row(l));
+    return r;
+  }
+  static lane_words columns() {
+    lane_words r;
+    for (int l = 0; l < lane_count; ++l) r[l] = static_cast<u32>(packet_block::column(l));
+    return r;
+  }
+
+  int width_;
+  std::ptrdiff_t first_;  // of the packet's first pixel: before the cell where that pixel lies outside of it
+};
+
+}  // namespace gart
+
+#endif
