@@ -45,6 +45,13 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   target_compile_options(gart_private_flags INTERFACE $<$<COMPILE_LANGUAGE:CXX>:${GART_ARCH_FLAG}>
                                                       $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=${GART_ARCH_FLAG}>)
 endif()
+# Processors from Skylake to Cascade Lake decode branches that cross 32 bytes slowly.
+include(CheckCXXCompilerFlag)
+check_cxx_compiler_flag(-Wa,-mbranches-within-32B-boundaries GART_ALIGNS_BRANCHES)
+if(GART_ALIGNS_BRANCHES)
+  target_compile_options(gart_private_flags INTERFACE
+    $<$<COMPILE_LANGUAGE:CXX>:-Wa,-mbranches-within-32B-boundaries>)
+endif()
 if(GART_SANITIZE)
   target_compile_options(gart_private_flags INTERFACE
     $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer>)

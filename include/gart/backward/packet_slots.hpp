@@ -32,7 +32,9 @@ class packet_slots {
                (block.x - cell.x0)) {}
 
   // Numbers of the slots, for lanes inside.
-  lane_words places() const { return every_lane(static_cast<u32>(first_)) + rows() * static_cast<u32>(width_) + columns(); }
+  lane_words places() const {
+    return every_lane(static_cast<u32>(first_)) + rows() * static_cast<u32>(width_) + columns();
+  }
 
   template <class Entry>
   GART_INLINE void fetch_to_write(Entry const* slots) const {
@@ -44,7 +46,7 @@ class packet_slots {
 
   template <class Entry>
   GART_INLINE void write(Entry* slots, lane_mask hits, vec3_of<lanes> const& opaque, lanes weight,
-             vec3_of<lanes> const& unclamped) const {
+                         vec3_of<lanes> const& unclamped) const {
     hits &= inside;
     if constexpr (std::is_same_v<Entry, lt_entry>) {
       lanes const from[4] = {Entry::signed_by(opaque.x, unclamped.x), Entry::signed_by(opaque.y, unclamped.y),
@@ -98,9 +100,7 @@ class packet_slots {
   }
 
  private:
-  std::ptrdiff_t first_of(int l) const {
-    return first_ + packet_block::row(l) * width_ + packet_block::column(l);
-  }
+  std::ptrdiff_t first_of(int l) const { return first_ + packet_block::row(l) * width_ + packet_block::column(l); }
   static lane_words rows() {
     lane_words r;
     for (int l = 0; l < lane_count; ++l) r[l] = static_cast<u32>(packet_block::row(l));

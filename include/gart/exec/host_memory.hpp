@@ -28,7 +28,7 @@ class host_memory {
   ~host_memory() { deallocate(workspace_, workspace_bytes_); }
 
   void* allocate(std::size_t bytes) {
-    void* p = ::operator new (bytes, alignment_of(bytes), std::nothrow);
+    void* p = ::operator new(bytes, alignment_of(bytes), std::nothrow);
     if (!p) throw out_of_memory("host", bytes, free_bytes(), "lower --max-gaussians or raise --downscale");
 #if defined(MADV_HUGEPAGE)
     // A hint: without it what reads slots all over a buffer waits for the addresses of its pages too.
@@ -39,7 +39,7 @@ class host_memory {
   }
   void deallocate(void* p, std::size_t bytes) {
     if (!p) return;
-    ::operator delete (p, alignment_of(bytes));
+    ::operator delete(p, alignment_of(bytes));
     memory.released(bytes);
   }
   void copy_in(void* dst, void const* src, std::size_t bytes) { copy(dst, src, bytes); }

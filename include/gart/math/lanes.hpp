@@ -100,12 +100,8 @@ GART_INLINE lanes select(lane_mask m, lanes a, lanes b) {
 GART_INLINE lane_words select(lane_mask m, lane_words a, lane_words b) {
   return (lane_words)_mm512_mask_blend_epi32(m.m, (__m512i)b, (__m512i)a);
 }
-GART_INLINE lane_mask equal(lane_words a, lane_words b) {
-  return {_mm512_cmpeq_epi32_mask((__m512i)a, (__m512i)b)};
-}
-GART_INLINE lane_mask at_most(lane_words a, lane_words b) {
-  return {_mm512_cmple_epu32_mask((__m512i)a, (__m512i)b)};
-}
+GART_INLINE lane_mask equal(lane_words a, lane_words b) { return {_mm512_cmpeq_epi32_mask((__m512i)a, (__m512i)b)}; }
+GART_INLINE lane_mask at_most(lane_words a, lane_words b) { return {_mm512_cmple_epu32_mask((__m512i)a, (__m512i)b)}; }
 GART_INLINE lane_mask negative(lanes a) { return {_mm512_movepi32_mask((__m512i)a.v)}; }  // -0 too
 #else
 GART_INLINE lanes select(lane_mask m, lanes a, lanes b) { return m.m ? a.v : b.v; }

@@ -2,8 +2,8 @@
 // What the forward pass leaves of each hit for the backward pass to find. A record says where a hit belongs (place_of,
 // when it is found) and is called once a hit, after it has been composited, with that place, the colour
 // that the pixel would have if the hit were opaque, its weight T alpha and its own colour before the clamp; it is part
-// of a strategy (backward/strategies.hpp). On hosts it also takes the hits of one Gaussian with a packet of rays at once
-// (trace/packet_walk.hpp), by the note it made when they were found, and says their places.
+// of a strategy (backward/strategies.hpp). On hosts it also takes the hits of one Gaussian with a packet of rays at
+// once (trace/packet_walk.hpp), by the note it made when they were found, and says their places.
 
 #include <gart/render/pixels.hpp>
 #include <gart/tiles/layout.hpp>

@@ -30,8 +30,8 @@ struct camera {
   int width = 0, height = 0;
   float fx = 0, fy = 0, cx = 0, cy = 0;
   distortion lens;
-  mat3 rotation{1.0f};    // camera to world; columns are the camera's axes in the world
-  vec3d position{0.0};    // the centre in the world, in double: everything else is relative to it
+  mat3 rotation{1.0f};  // camera to world; columns are the camera's axes in the world
+  vec3d position{0.0};  // the centre in the world, in double: everything else is relative to it
 };
 
 // The image point, in units of the focal length about the principal point, of the slopes x = X/Z and y = Y/Z.
@@ -69,8 +69,8 @@ inline void require_camera(camera const& c) {
     throw invalid_argument(std::string("camera: ") + fault.what + " (" + fault.remedy + ")");
 }
 
-// Newton's method on the distortion; exact to float after a few steps for lenses that are invertible at the point. F: of
-// one point, or of one a lane.
+// Newton's method on the distortion; exact to float after a few steps for lenses that are invertible at the point. F:
+// of one point, or of one a lane.
 template <class F>
 GART_HD GART_INLINE void undistort(distortion const& lens, F u, F v, F& x, F& y) {
   F const k1 = lens.k1, k2 = lens.k2, lens_p1 = lens.p1, lens_p2 = lens.p2;
@@ -110,8 +110,7 @@ GART_HD GART_INLINE vec3_of<F> ray_direction(camera const& c, F u, F v) {
   F x = divide(add(u, F(-c.cx)), F(c.fx)), y = divide(add(v, F(-c.cy)), F(c.fy));
   if (c.lens.any()) undistort(c.lens, F(x), F(y), x, y);
   vec3_of<F> d;
-  for (int k = 0; k < 3; ++k)
-    d[k] = fma(F(c.rotation[0][k]), x, fma(F(c.rotation[1][k]), y, F(c.rotation[2][k])));
+  for (int k = 0; k < 3; ++k) d[k] = fma(F(c.rotation[0][k]), x, fma(F(c.rotation[1][k]), y, F(c.rotation[2][k])));
   F const inverse = divide(F(1.0f), square_root(fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)))));
   return {mul(d.x, inverse), mul(d.y, inverse), mul(d.z, inverse)};
 }

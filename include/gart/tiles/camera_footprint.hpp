@@ -58,7 +58,7 @@ class camera_footprint {
     // one.
     double const x0 = clamp(s.u.lo, u_), x1 = clamp(s.u.hi, u_), y0 = clamp(s.w.lo, w_), y1 = clamp(s.w.hi, w_);
     detail::interval u, v;
-    constexpr int steps = 8;
+    constexpr int steps = 4;
     for (int k = 0; k <= steps; ++k) {
       double const f = static_cast<double>(k) / steps, x = x0 + f * (x1 - x0), y = y0 + f * (y1 - y0);
       double const border[4][2] = {{x, y0}, {x, y1}, {x0, y}, {x1, y}};

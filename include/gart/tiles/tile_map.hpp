@@ -36,7 +36,7 @@ inline int bits_for(u32 count) {
 namespace tile_kernels {
 
 // A team takes some primitives; its lanes take the pairs of all of them in turn, since boxes differ in size by orders
-// of magnitude.
+// of magnitude. A host's one lane takes them box by box.
 template <execution E, int Size, class Order>
 struct emit_pairs {
   static constexpr int block_size = 128;
@@ -69,20 +69,32 @@ struct emit_pairs {
       if (!s.box[k].empty()) s.primitive[k] = order.of(begin + k);
     });
     team.barrier();
-    team.for_each(total, [&](index_t pair) { emit(s, at + pair, pair, begin, n); });
+    if constexpr (E::device)
+      team.for_each(total, [&](index_t pair) { find(s, at, pair, begin, n); });
+    else
+      for (u32 k = 0; k < n; ++k) {
+        pixel_box const tiles = tiles_of<Size>(s.box[k]);
+        u64 to = at + s.first[k];
+        for (u32 y = tiles.y0; y < tiles.y1; ++y)
+          for (u32 x = tiles.x0; x < tiles.x1; ++x) emit(s, k, x, y, to++, begin);
+      }
     team.barrier();
   }
 
  private:
-  GART_HD GART_INLINE void emit(scratch const& s, u64 at, u32 pair, u32 begin, u32 n) const {
+  GART_HD GART_INLINE void find(scratch const& s, u64 at, u32 pair, u32 begin, u32 n) const {
     u32 k = 0;  // the last primitive whose pairs begin no later
     for (u32 step = share / 2; step > 0; step /= 2)
       if (k + step < n && s.first[k + step] <= pair) k += step;
-    pixel_box const box = s.box[k], tiles = tiles_of<Size>(box);
-    u32 const number = pair - s.first[k], y = tiles.y0 + number / tiles.width(), x = tiles.x0 + number % tiles.width();
+    pixel_box const tiles = tiles_of<Size>(s.box[k]);
+    u32 const number = pair - s.first[k];
+    emit(s, k, tiles.x0 + number % tiles.width(), tiles.y0 + number / tiles.width(), at + pair, begin);
+  }
+
+  GART_HD GART_INLINE void emit(scratch const& s, u32 k, u32 x, u32 y, u64 to, u32 begin) const {
     u32 const tile = y * grid.columns() + x;
-    keys[at] = tile << order_bits | order.key(s.primitive[k], intersect(box, grid.tile(x, y)), tile);
-    primitives[at] = begin + k;
+    keys[to] = tile << order_bits | order.key(s.primitive[k], intersect(s.box[k], grid.tile(x, y)), tile);
+    primitives[to] = begin + k;
     E::atomic_add(&counts[tile], 1u);
   }
 };

@@ -1,16 +1,15 @@
 #pragma once
 // The walk of tile lists on a host: rays in packets, a lane a pixel (math/lanes.hpp). The same as walk_tiles
 // (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that a candidate is evaluated for all rays of a
-// packet at once, and that its hits stay together: what waits for its turn is a list of rows, each one Gaussian's hits with
-// some of the rays, in an order that sorts the hits of each ray by (t, id). Where rays meet two Gaussians in opposite
-// orders no one place suits all hits of a candidate, and it takes two rows.
+// packet at once, and that its hits stay together: what waits for its turn is a list of rows, each one Gaussian's hits
+// with some of the rays, in an order that sorts the hits of each ray by (t, id). Where rays meet two Gaussians in
+// opposite orders no one place suits all hits of a candidate, and it takes two rows.
 //
 // A packet program is the ray program for packets:
 //   begin(block)                      the state of a block's rays; says `directions` and which lanes are `inside`
-//   expect(state, id)                 a note on a Gaussian that was hit; what its hits will read and write may be fetched
-//   shade(state, id)                  what it shows each ray, of type `shaded`
-//   on_hit(state, lanes, t, alpha, shaded, note)  composites its hits with the rays of a mask; the rays that go on
-//   end(state)
+//   expect(state, id)                 a note on a Gaussian that was hit; what its hits will read and write may be
+//   fetched shade(state, id)                  what it shows each ray, of type `shaded` on_hit(state, lanes, t, alpha,
+//   shaded, note)  composites its hits with the rays of a mask; the rays that go on end(state)
 // A packet that has more hits waiting than there are rows for says so, and its rays are traced one by one.
 
 #include <gart/math/ray_gaussian.hpp>
@@ -63,11 +62,11 @@ class packet_walk {
 
  private:
   static constexpr int rows = 16 * Window;
-  static constexpr int stride = 8;  // candidates between two looks at what has become certain
-  static constexpr int often = 12;  // rows below which looking does not pay
+  static constexpr int stride = 16;   // candidates between two looks at what has become certain
+  static constexpr int often = 12;    // rows below which looking does not pay
   static constexpr int together = 4;  // rows shaded at a time
   static constexpr int crowded = rows / 2;
-  static constexpr u32 ahead = 6;   // candidates whose records are fetched while one is looked at
+  static constexpr u32 ahead = 6;          // candidates whose records are fetched while one is looked at
   static constexpr float everything = -1;  // no bound: the list is at its end
 
   static constexpr u16 ends = rows;  // before the first and behind the last
