@@ -35,7 +35,7 @@ class packet_walk {
     vec3_of<lanes> const& d = state.directions;
     // z = t * cosine; rounded up, so that what is said to lie nearer than a depth does.
     lanes const cosine = (d.x * lanes(forward.x) + d.y * lanes(forward.y) + d.z * lanes(forward.z)) * lanes(1.000002f);
-    alive_ = state.inside, waiting_ = lanes_of(0), count_ = used_ = 0, free_ = ends;
+    alive_ = state.inside, farthest_ = 0.0f, count_ = used_ = 0, free_ = ends;
     pool_[ends].nearer = pool_[ends].farther = ends;
     u32 const* const list = map.primitives.data();
     u32 const end = map.offsets[tile + 1];
@@ -81,10 +81,11 @@ class packet_walk {
     u16 nearer, farther;  // its neighbours
   };
 
-  // From the back, where most hits belong. Every ray's hit may stand behind the last row it must follow and before the
-  // first that must follow it; rays that share a gap share a row.
+  // Hits behind all others of their rays stand last; the rest go forward from there. A hit may stand behind the last row
+  // that it must follow and before the first that must follow it; rays that share a gap share a row.
   GART_INLINE bool insert(hits const& h) {
-    lane_mask settled = h.rays & ~waiting_, left = h.rays & waiting_;
+    lane_mask settled = h.rays & (h.t > farthest_), left = h.rays & ~settled;
+    farthest_ = select(settled, h.t, farthest_);
     u16 gap = ends;  // before this row
     for (u16 at = pool_[ends].nearer; any(left) && at != ends; at = pool_[at].nearer) {
       row const& other = pool_[at];
@@ -96,7 +97,6 @@ class packet_walk {
         settled = lanes_of(0), gap = at;
       }
     }
-    waiting_ |= h.rays;
     return put(h, settled | left, gap);
   }
 
@@ -156,11 +156,10 @@ class packet_walk {
         if (any(rays)) alive_ &= program.on_hit(state, rays, r.t, r.alpha, shaded[i], r.note) | ~rays;
       }
     }
-    waiting_ = stay;
   }
 
   lane_mask alive_;
-  lane_mask waiting_;  // rays that have hits in rows
+  lanes farthest_;     // of each ray's hits so far
   int count_ = 0;      // rows that wait
   u16 used_ = 0;       // rows taken so far,
   u16 free_ = ends;    // and those of them that are free again, linked by `farther`
