@@ -21,8 +21,8 @@
 
 namespace gart {
 
-// Window: what a ray traced alone keeps (tile_tracer). A packet keeps 16 times that: what runs over is traced again
-// from the start, not resumed.
+// Window: what a ray traced alone keeps (tile_tracer). A packet keeps 32 times that in rows: what runs over is traced
+// again from the start, not resumed.
 template <class Response, int Window, int Size, class P>
 class packet_walk {
  public:
@@ -61,7 +61,7 @@ class packet_walk {
   }
 
  private:
-  static constexpr int rows = 16 * Window;
+  static constexpr int rows = 32 * Window;
   static constexpr int stride = 16;   // candidates between two looks at what has become certain
   static constexpr int often = 12;    // rows below which looking does not pay
   static constexpr int together = 4;  // rows shaded at a time
@@ -81,8 +81,8 @@ class packet_walk {
     u16 nearer, farther;  // its neighbours
   };
 
-  // Hits behind all others of their rays stand last; the rest go forward from there. A hit may stand behind the last row
-  // that it must follow and before the first that must follow it; rays that share a gap share a row.
+  // Hits behind all others of their rays stand last; the rest go forward from there. A hit may stand behind the last
+  // row that it must follow and before the first that must follow it; rays that share a gap share a row.
   GART_INLINE bool insert(hits const& h) {
     lane_mask settled = h.rays & (h.t > farthest_), left = h.rays & ~settled;
     farthest_ = select(settled, h.t, farthest_);
@@ -159,10 +159,10 @@ class packet_walk {
   }
 
   lane_mask alive_;
-  lanes farthest_;     // of each ray's hits so far
-  int count_ = 0;      // rows that wait
-  u16 used_ = 0;       // rows taken so far,
-  u16 free_ = ends;    // and those of them that are free again, linked by `farther`
+  lanes farthest_;   // of each ray's hits so far
+  int count_ = 0;    // rows that wait
+  u16 used_ = 0;     // rows taken so far,
+  u16 free_ = ends;  // and those of them that are free again, linked by `farther`
   row pool_[rows + 1];
 };
 
