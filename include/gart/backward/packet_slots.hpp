@@ -25,14 +25,14 @@ class packet_slots {
 
   packet_slots() = default;
   // `cell`: the part of the Gaussian's box that lies in the packet's tile.
-  packet_slots(lt_range const& range, pixel_box const& cell, packet_block const& block)
+  GART_INLINE packet_slots(lt_range const& range, pixel_box const& cell, packet_block const& block)
       : inside(block.within(cell)),
         width_(static_cast<int>(cell.width())),
         first_(static_cast<std::ptrdiff_t>(range.offset) + tile_offset(range.box, cell) + (block.y - cell.y0) * width_ +
                (block.x - cell.x0)) {}
 
   // Numbers of the slots, for lanes inside.
-  lane_words places() const {
+  GART_INLINE lane_words places() const {
     return every_lane(static_cast<u32>(first_)) + rows() * static_cast<u32>(width_) + columns();
   }
 
@@ -63,7 +63,7 @@ class packet_slots {
 
   // Zeros where there are no hits. Geometry: whether V is wanted.
   template <bool Geometry, class Entry>
-  packet_entries read(Entry const* slots, lane_mask hits) const {
+  GART_INLINE packet_entries read(Entry const* slots, lane_mask hits) const {
     packet_entries out;
     if constexpr (std::is_same_v<Entry, lt_entry>) {
       lanes to[4];
@@ -90,7 +90,7 @@ class packet_slots {
 
   // Whether the hits' slots were written, for entries that say so.
   template <class Entry>
-  lane_mask written(Entry const* slots) const {
+  GART_INLINE lane_mask written(Entry const* slots) const {
     u32 bits = 0;
     for (u32 left = bits_of(inside); left; left &= left - 1) {
       int const l = __builtin_ctz(left);
@@ -100,13 +100,15 @@ class packet_slots {
   }
 
  private:
-  std::ptrdiff_t first_of(int l) const { return first_ + packet_block::row(l) * width_ + packet_block::column(l); }
-  static lane_words rows() {
+  GART_INLINE std::ptrdiff_t first_of(int l) const {
+    return first_ + packet_block::row(l) * width_ + packet_block::column(l);
+  }
+  GART_INLINE static lane_words rows() {
     lane_words r;
     for (int l = 0; l < lane_count; ++l) r[l] = static_cast<u32>(packet_block::row(l));
     return r;
   }
-  static lane_words columns() {
+  GART_INLINE static lane_words columns() {
     lane_words r;
     for (int l = 0; l < lane_count; ++l) r[l] = static_cast<u32>(packet_block::column(l));
     return r;

@@ -96,10 +96,7 @@ struct loss_tiles {
       std::ptrdiff_t const begin = x < 0 ? -x : 0, end = row_inside ? image.width - x : 0;
       std::ptrdiff_t const start = at.channel * image.pixels() + static_cast<std::ptrdiff_t>(y) * image.width + x;
       std::ptrdiff_t const cell = row * halo_pitch + first;
-      if (block > 1 && begin == 0 && end >= block)  // nothing to ask of each
-        for (std::ptrdiff_t v = 0; v < block; ++v) f(cell + v, start + v, true);
-      else
-        for (std::ptrdiff_t v = 0; v < block; ++v) f(cell + v, start + v, v >= begin && v < end);
+      for (std::ptrdiff_t v = 0; v < block; ++v) f(cell + v, start + v, v >= begin && v < end);
     });
   }
 
@@ -147,8 +144,8 @@ struct ssim_kernel {
   tiles grid;
   float const* centred_truth;
   float const* difference;
-  float* partials;   // [3 partials][3][H][W]
-  float* tile_loss;  // [tiles], divided by the count of values
+  float* partials;     // [3 partials][3][H][W]
+  float* tile_loss;    // [tiles], divided by the count of values
   float* tile_square;
   float weight;
 
@@ -174,7 +171,8 @@ struct ssim_kernel {
       float sums[4][tiles::block];
       tiles::template convolve<4>(&s.rows[0][row * tiles::width + column], tiles::rows_size, tiles::width, sums);
       float out[3][tiles::block];
-      float const* const d = &s.halo[1][(row + ssim_window::radius) * tiles::halo_pitch + column + ssim_window::radius];
+      float const* const d =
+          &s.halo[1][(row + ssim_window::radius) * tiles::halo_pitch + column + ssim_window::radius];
       for (int v = 0; v < tiles::block; ++v) {
         float const difference_mean = sums[1][v], centred = sums[0][v] + difference_mean;
         float const mean = centred + 0.5f, truth_mean = sums[0][v] + 0.5f;
@@ -194,12 +192,6 @@ struct ssim_kernel {
         s.square[row * tiles::width + column + v] = d[v] * d[v];
       }
       int const y = at.y + row;
-      if (tiles::block > 1 && y < image_height && at.x + column + tiles::block <= image_width) {
-        std::size_t const i = plane + static_cast<std::size_t>(y) * image_width + at.x + column;
-        for (int p = 0; p < 3; ++p)
-          for (int v = 0; v < tiles::block; ++v) partials[p * 3 * pixels + i + v] = out[p][v];
-        return;
-      }
       for (int v = 0; v < tiles::block; ++v) {
         int const x = at.x + column + v;
         if (y < image_height && x < image_width) {
@@ -256,8 +248,9 @@ struct loss_gradient_kernel {
     for (int p = 0; p < 3; ++p) {
       float const* const from = partials + p * 3 * pixels;
       float* const to = s.halo[p];
-      grid.each_halo_cell(
-          team, at, [=](std::ptrdiff_t cell, std::ptrdiff_t i, bool inside) { to[cell] = inside ? from[i] : 0.0f; });
+      grid.each_halo_cell(team, at, [=](std::ptrdiff_t cell, std::ptrdiff_t i, bool inside) {
+        to[cell] = inside ? from[i] : 0.0f;
+      });
     }
     team.barrier();
     tiles::template convolve_rows<3>(team, &s.halo[0][0], &s.rows[0][0]);

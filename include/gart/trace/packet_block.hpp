@@ -15,7 +15,9 @@ struct packet_block {
 
   static constexpr int column(int lane) { return lane % width; }
   static constexpr int row(int lane) { return lane / width; }
-  bool overlaps(pixel_box const& b) const { return b.x0 < x + width && b.x1 > x && b.y0 < y + height && b.y1 > y; }
+  GART_INLINE bool overlaps(pixel_box const& b) const {
+    return b.x0 < x + width && b.x1 > x && b.y0 < y + height && b.y1 > y;
+  }
   // The middle of each lane's pixel.
   lanes centres_x() const {
     lanes r;
@@ -28,7 +30,7 @@ struct packet_block {
     return lanes(static_cast<float>(y)) + r + lanes(0.5f);
   }
   // The lanes whose pixels lie in the box.
-  lane_mask within(pixel_box const& b) const {
+  GART_INLINE lane_mask within(pixel_box const& b) const {
     constexpr u32 first_column = lane_count == 16 ? 0x1111u : lane_count == 8 ? 0x11u : 1u;
     u32 const columns = (1u << clamped(b.x1 - x, width)) - (1u << clamped(b.x0 - x, width));
     u32 const rows = (1u << width * clamped(b.y1 - y, height)) - (1u << width * clamped(b.y0 - y, height));
@@ -36,7 +38,7 @@ struct packet_block {
   }
 
  private:
-  static int clamped(int v, int most) { return v < 0 ? 0 : v > most ? most : v; }
+  GART_INLINE static int clamped(int v, int most) { return v < 0 ? 0 : v > most ? most : v; }
 };
 
 }  // namespace gart
