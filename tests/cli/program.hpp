@@ -70,6 +70,8 @@ class folder {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     kill(child, SIGINT);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    kill(child, SIGINT);  // one wish, told by the terminal and by who waits
     waitpid(child, &status, 0);
     return outcome_of(status);
   }

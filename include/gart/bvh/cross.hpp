@@ -94,11 +94,7 @@ GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, float near,
   using floats = float __attribute__((vector_size(4 * bvh_width)));
   using ints = int __attribute__((vector_size(4 * bvh_width)));
   auto const planes = [](u32 const(&side)[bvh_width / 4]) {
-#if GART_BVH_WIDTH == 4
-    return __builtin_convertvector((ints)_mm_cvtepu8_epi32(_mm_loadu_si32(side)), floats);
-#else
     return __builtin_convertvector((ints)_mm256_cvtepu8_epi32(_mm_loadu_si64(side)), floats);
-#endif
   };
   grid_crossing const grid(n, r);
   floats from = floats{} + near, to = floats{} + far;
@@ -110,11 +106,7 @@ GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, float near,
     to = leave < to ? leave : to;
   }
   std::memcpy(entry, &from, sizeof from);
-#if GART_BVH_WIDTH == 4
-  return static_cast<u32>(_mm_movemask_ps((__m128)(from <= to)));
-#else
   return static_cast<u32>(_mm256_movemask_ps((__m256)(from <= to)));
-#endif
 }
 #else
 GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, float near, float far,

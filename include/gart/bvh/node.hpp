@@ -14,10 +14,7 @@
 
 namespace gart {
 
-#if !defined(GART_BVH_WIDTH)
-#define GART_BVH_WIDTH 8
-#endif
-inline constexpr int bvh_width = GART_BVH_WIDTH;  // children of a node, at most: 4 or 8
+inline constexpr int bvh_width = 8;  // children of a node, at most
 
 static_assert(std::endian::native == std::endian::little);  // child c of a side is byte c of its words
 
