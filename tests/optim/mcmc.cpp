@@ -23,7 +23,10 @@ struct training {
     gaussian_model ones = m;
     for (auto* v : {&ones.mean, &ones.log_scale, &ones.quaternion, &ones.opacity, &ones.sh})
       std::fill(v->begin(), v->end(), 1.0f);
-    state.first.assign(ones), state.second.assign(ones);
+    gaussian_model numbers = m;  // 1 more than the Gaussian's
+    for (auto* v : {&numbers.mean, &numbers.log_scale, &numbers.quaternion, &numbers.opacity, &numbers.sh})
+      for (std::size_t k = 0; k < v->size(); ++k) (*v)[k] = static_cast<float>(k / (v->size() / m.size()) + 1);
+    state.first.assign(ones), state.second.assign(numbers);
   }
   mcmc<E> densifier(index_t most, float growth = 1.05f, u64 seed = 1) {
     mcmc_options options;
@@ -99,8 +102,8 @@ TEST_CASE_TEMPLATE("every dead Gaussian moves onto a live one, which shares with
     index_t const source = static_cast<index_t>(tag_of(got, i));
     bool const moved = copies[source] > 0;
     REQUIRE(row == gart_test::row(got, source));
-    REQUIRE(gart_test::all_zero(gart_test::row(first, i)) == moved);
-    REQUIRE(gart_test::all_zero(gart_test::row(second, i)) == moved);
+    REQUIRE(gart_test::all_zero(gart_test::row(first, i)) == dead[i]);
+    for (float const v : gart_test::row(second, i)) REQUIRE(v == static_cast<float>(source + 1));
     auto expected = gart_test::row(start, source);
     if (moved) {
       relocated_shape const s = relocation(sigmoid(expected[10]), copies[source] + 1);
@@ -178,12 +181,13 @@ TEST_CASE_TEMPLATE("growth reaches the budget exactly and stops", E, GART_TEST_P
   training<E> t(start);
   auto densifier = t.densifier(1100);
   CHECK(densifier.densify(t.model, t.state, 600).added == 50);
-  gaussian_model got = t.model.to_host(), first = t.state.first.to_host();
+  gaussian_model const got = t.model.to_host(), first = t.state.first.to_host(), second = t.state.second.to_host();
   REQUIRE(got.size() == 1050);
   REQUIRE(t.state.second.size() == 1050);
   for (index_t i = 0; i < 1050; ++i) {
     REQUIRE(gart_test::row(got, i) == gart_test::row(got, static_cast<index_t>(tag_of(got, i))));
-    if (i >= 1000) REQUIRE(gart_test::all_zero(gart_test::row(first, i)));
+    REQUIRE(gart_test::all_zero(gart_test::row(first, i)) == (i >= 1000));
+    REQUIRE(gart_test::row(second, i)[0] == static_cast<float>(tag_of(got, i) + 1));
   }
   CHECK(densifier.densify(t.model, t.state, 700).added == 50);
   CHECK(t.model.size() == 1100);

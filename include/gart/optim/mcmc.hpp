@@ -7,7 +7,9 @@
 //   o' = 1 - (1 - o)^(1/N),  scale' = scale * o / sum_{j=1..N} C(N, j) (-1)^(j-1) o'^j / sqrt(j),
 // which keeps the integral of the composited opacity across a line through the centre. (The paper's double sum, with
 // sum_i C(i-1, j-1) = C(N, j).) For a generalised Gaussian of degree n (math/response.hpp) it is the n-th root of j.
-// Moments of copies and sources are cleared.
+// A copy takes its source's second moment, and no momentum; sources keep theirs. With cleared moments (as in the paper)
+// Adam's next steps are several times the learning rate, and one that no view sees for some steps would meanwhile follow
+// the penalties alone, at that rate.
 //
 // Weights are 32-bit fixed point and their sums 64-bit integers, so the draws are exact for any count and have the same
 // bits on every policy. A Gaussian whose opacity or geometry is not finite counts as dead. Where none is alive nothing
@@ -124,8 +126,8 @@ struct mcmc_copy_body {
   GART_HD void operator()(index_t draw, index_t column) const {
     index_t const from = source[draw], to = target[draw];
     row_element(model, to, column) = row_element(model, from, column);
-    row_element(first, to, column) = row_element(second, to, column) = 0;
-    row_element(first, from, column) = row_element(second, from, column) = 0;
+    row_element(first, to, column) = 0;
+    row_element(second, to, column) = row_element(second, from, column);
   }
 };
 
