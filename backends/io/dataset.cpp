@@ -296,9 +296,8 @@ void measure_extent(dataset& data) {
   }
 }
 
-// The point nearest to all view axes, the minimum of sum |(I - d d^T)(x - p)|^2, by Cramer's rule, and how far it is.
-// Of a capture that looks at no one point: what lies an extent in front of the cameras. Sets the box around it.
-void measure_bounds(dataset& data, bool keep_bounds) {
+// The box around the point nearest to all view axes: the minimum of sum |(I - d d^T)(x - p)|^2, by Cramer's rule.
+void measure_bounds(dataset& data) {
   std::vector<camera const*> cameras;
   for (auto const* views : {&data.train, &data.test}) {
     for (dataset_view const& v : *views) cameras.push_back(&v.view);
@@ -333,22 +332,14 @@ void measure_bounds(dataset& data, bool keep_bounds) {
     }
     std::size_t in_front = 0;
     double distance = 0;
-    std::vector<double> distances;
     for (camera const* c : cameras) {
       vec3d const to = x + mean - c->position, d(c->rotation[2]);
-      distances.push_back(length(to));
-      distance += distances.back() / n;
+      distance += length(to) / n;
       in_front += to.x * d.x + to.y * d.y + to.z * d.z > 0;
     }
     looks_inwards = distance > 0 && 2 * in_front > cameras.size();
-    if (looks_inwards) {
-      center = x + mean, radius = distance;
-      std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
-      data.distance = static_cast<float>(distances[distances.size() / 2]);
-    }
+    if (looks_inwards) center = x + mean, radius = distance;
   }
-  if (!looks_inwards) data.distance = data.extent;
-  if (keep_bounds) return;
   data.bounds_min = center - vec3d(radius), data.bounds_max = center + vec3d(radius);
   if (data.points.size() == 0) {
     data.notes.push_back(std::string("no starting points: random ones fill a box of half width ") +
@@ -454,7 +445,7 @@ dataset load(fs::path const& path, dataset_options const& options) {
     data.points.color.assign(data.points.position.size(), 128);
   if (!data.train.empty()) measure_extent(data);
   drop_points_in_cameras(data);
-  measure_bounds(data, c.synthetic_bounds);
+  if (!c.synthetic_bounds) measure_bounds(data);
   return data;
 }
 

@@ -40,7 +40,6 @@ struct dataset {
   point_cloud points;               // empty: start at random
   std::vector<std::string> notes;   // one line each: what was skipped, scaled or assumed
   float extent = 1;                 // 1.1 x the largest distance of a training camera from their mean
-  float distance = 1;               // median, of the cameras from the point they look at; the extent if at none
   bool alpha = false;               // images carry alpha: composited over the background chosen
   // Random starting points lie in this box; Blender's [-1.3, 1.3]^3, else around the cameras.
   vec3d bounds_min{-1.3}, bounds_max{1.3};

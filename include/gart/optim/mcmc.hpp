@@ -7,9 +7,7 @@
 //   o' = 1 - (1 - o)^(1/N),  scale' = scale * o / sum_{j=1..N} C(N, j) (-1)^(j-1) o'^j / sqrt(j),
 // which keeps the integral of the composited opacity across a line through the centre. (The paper's double sum, with
 // sum_i C(i-1, j-1) = C(N, j).) For a generalised Gaussian of degree n (math/response.hpp) it is the n-th root of j.
-// A copy takes its source's second moment, and no momentum; sources keep theirs. With cleared moments (as in the paper)
-// Adam's next steps are several times the learning rate, and one that no view sees for some steps would meanwhile follow
-// the penalties alone, at that rate.
+// Moments of copies and sources are cleared: kept, they cost a short training of lego 4.8 dB (28.5 to 23.7).
 //
 // Weights are 32-bit fixed point and their sums 64-bit integers, so the draws are exact for any count and have the same
 // bits on every policy. A Gaussian whose opacity or geometry is not finite counts as dead. Where none is alive nothing
@@ -126,8 +124,8 @@ struct mcmc_copy_body {
   GART_HD void operator()(index_t draw, index_t column) const {
     index_t const from = source[draw], to = target[draw];
     row_element(model, to, column) = row_element(model, from, column);
-    row_element(first, to, column) = 0;
-    row_element(second, to, column) = row_element(second, from, column);
+    row_element(first, to, column) = row_element(second, to, column) = 0;
+    row_element(first, from, column) = row_element(second, from, column) = 0;
   }
 };
 
@@ -207,14 +205,13 @@ class mcmc {
 
   void set_growth(float growth) { options_.growth = growth; }
 
-  // Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale / unit); before the optimizer's
-  // step.
+  // Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale); before the optimizer's step.
   void add_penalties(gaussians<E> const& model, gaussians<E>& gradient) {
     if (model.size() == 0) return;
     float const n = static_cast<float>(model.size());
     parallel_for(*exec_, "mcmc_penalties", model.size(),
                  detail::mcmc_penalty_kernel{model.view(), gradient.view(), options_.opacity_penalty / n,
-                                             options_.scale_penalty / (3 * n * options_.unit)});
+                                             options_.scale_penalty / (3 * n)});
   }
 
   bool due(int step) const {
@@ -262,13 +259,12 @@ class mcmc {
     return change;
   }
 
-  // mean += noise / unit^2 * mean_rate * sigmoid(-100 (opacity - 0.005)) * covariance * normal.
+  // mean += noise * mean_rate * sigmoid(-100 (opacity - 0.005)) * covariance * normal.
   void add_noise(gaussians<E>& model, int step, float mean_rate) {
     if (options_.noise == 0) return;
     parallel_for(*exec_, "mcmc_noise", model.size(),
-                 detail::mcmc_noise_kernel{model.view(),
-                                           {seed_, static_cast<u32>(step), random_use::noise},
-                                           options_.noise * mean_rate / (options_.unit * options_.unit)});
+                 detail::mcmc_noise_kernel{
+                     model.view(), {seed_, static_cast<u32>(step), random_use::noise}, options_.noise * mean_rate});
   }
 
  private:

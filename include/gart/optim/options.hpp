@@ -21,9 +21,6 @@ struct mcmc_options {
   float dead_opacity = 0.005f;
   float noise = 5e5f;               // times the learning rate of the means
   float opacity_penalty = 0.01f, scale_penalty = 0.01f;
-  // The length that noise and penalty take for 1: a step of noise grows with the square of a Gaussian's size. A trainer
-  // multiplies it by the distance of the cameras from what they look at, for which the constants were chosen.
-  float unit = 1;
   int kernel_degree = 2;            // of the Gaussians that are relocated; a trainer sets its own
 };
 

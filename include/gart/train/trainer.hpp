@@ -82,9 +82,8 @@ class trainer {
   void differentiate(Pass& pass, Loss&& loss, std::size_t view, render_options const& render, int degree);
   void update(dataset_view const& view, int degree);
   vec3 background_of(int step) const;
-  static mcmc_options mcmc_options_of(train_options const& options, dataset const& data) {
+  static mcmc_options mcmc_options_of(train_options const& options) {
     mcmc_options m = options.mcmc;
-    m.unit *= data.distance;
     m.kernel_degree = Traits::response::degree;
     return m;
   }
