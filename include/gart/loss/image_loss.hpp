@@ -60,11 +60,11 @@ struct difference_kernel {
 };
 
 // Tiles of one channel, with a halo of the window's radius. A lane of a device takes one pixel at a time; a host's
-// takes 16, which its compiler puts in vector registers, and its tiles are wide, for long runs of memory.
+// takes 16, which its compiler puts in vector registers, and its tiles are large: long runs of memory, little halo.
 template <execution E>
 struct loss_tiles {
   static constexpr int block = E::device ? 1 : 16;
-  static constexpr int width = E::device ? 32 : 96, height = 16;
+  static constexpr int width = E::device ? 32 : 96, height = E::device ? 16 : 32;
   static constexpr int halo_width = width + 2 * ssim_window::radius, halo_height = height + 2 * ssim_window::radius;
   static constexpr int halo_pitch = (halo_width + block - 1) / block * block;
   static constexpr int halo_size = halo_pitch * halo_height;

@@ -7,10 +7,12 @@
 
 #include <gart/exec/concepts.hpp>
 #include <gart/math/arith.hpp>
+#include <gart/math/lanes.hpp>
 #include <gart/optim/options.hpp>
 #include <gart/scene/gaussians.hpp>
 
 #include <cmath>
+#include <cstring>
 
 namespace gart {
 
@@ -59,23 +61,72 @@ struct adam_kernel {
     index_t const count = rows - row < rows_per_tile ? rows - row : rows_per_tile;
     adam_group const& group = groups[group_index];
     std::size_t const base = std::size_t{row} * group.stride;
-    team.for_each(count * group.stride, [&](index_t e) {
-      index_t const column = e % group.stride;
-      if (column < group.active) update(group, base + e, column < group.head ? group.rate_head : group.rate_rest);
-    });
+#if !defined(__CUDACC__)
+    if constexpr (!E::device) return update_rows(group, base, count * group.stride);
+#endif
+    team.for_each(count * group.stride, [&](index_t e) { update(group, base + e, e % group.stride); });
   }
 
-  GART_HD void update(adam_group const& group, std::size_t i, float rate) const {
-    float const g = group.gradient[i];
-    float const m = fma(beta1, group.first[i], mul(1.0f - beta1, g));
-    float const v = fma(beta2, group.second[i], mul(mul(1.0f - beta2, g), g));
-    float const p = group.parameter[i] - rate * m / (square_root(v) * second_correction + epsilon);
-    if (!is_finite(g) || !is_finite(v) || !is_finite(p)) {
+  template <class Number>
+  struct element {
+    Number parameter, first, second;
+  };
+  template <class Number>
+  GART_HD GART_INLINE element<Number> moved(element<Number> const& e, Number g, Number rate) const {
+    Number const m = fma(Number(beta1), e.first, mul(Number(1.0f - beta1), g));
+    Number const v = fma(Number(beta2), e.second, mul(mul(Number(1.0f - beta2), g), g));
+    return {e.parameter - rate * m / (square_root(v) * Number(second_correction) + Number(epsilon)), m, v};
+  }
+
+  GART_HD void update(adam_group const& group, std::size_t i, index_t column) const {
+    if (column >= group.active) return;
+    float const g = group.gradient[i], rate = column < group.head ? group.rate_head : group.rate_rest;
+    auto const to = moved<float>({group.parameter[i], group.first[i], group.second[i]}, g, rate);
+    if (!is_finite(g) || !is_finite(to.second) || !is_finite(to.parameter)) {
       if (skipped) E::atomic_add(skipped, u64{1});
       return;
     }
-    group.parameter[i] = p, group.first[i] = m, group.second[i] = v;
+    group.parameter[i] = to.parameter, group.first[i] = to.first, group.second[i] = to.second;
   }
+
+#if !defined(__CUDACC__)
+  // Elements a lane each, whatever their columns; where one is not finite, one by one.
+  void update_rows(adam_group const& group, std::size_t base, index_t count) const {
+    constexpr index_t most = 48;  // columns of a group
+    float rates[most + lane_count], trained[most + lane_count];
+    for (index_t k = 0; k < group.stride + lane_count; ++k) {
+      index_t const column = k % group.stride;
+      rates[k] = column < group.head ? group.rate_head : group.rate_rest;
+      trained[k] = column < group.active ? 1.0f : 0.0f;
+    }
+    auto const read = [](float const* p) {
+      lanes out;
+      std::memcpy(&out, p, sizeof out);
+      return out;
+    };
+    auto const write = [](float* p, lanes x) { std::memcpy(p, &x, sizeof x); };
+    index_t e = 0, column = 0;
+    for (; e + lane_count <= count; e += lane_count) {
+      std::size_t const i = base + e;
+      lane_mask const wanted = read(trained + column) > lanes(0.0f);
+      lanes const g = read(group.gradient + i);
+      element<lanes> const from{read(group.parameter + i), read(group.first + i), read(group.second + i)};
+      auto const to = moved(from, g, read(rates + column));
+      lanes const infinity(__builtin_huge_valf());
+      lane_mask const finite =
+          (magnitude(g) < infinity) & (magnitude(to.second) < infinity) & (magnitude(to.parameter) < infinity);
+      if (any(wanted & ~finite)) {
+        for (index_t k = 0; k < lane_count; ++k) update(group, i + k, (column + k) % group.stride);
+      } else {
+        write(group.parameter + i, select(wanted, to.parameter, from.parameter));
+        write(group.first + i, select(wanted, to.first, from.first));
+        write(group.second + i, select(wanted, to.second, from.second));
+      }
+      column = (column + lane_count) % group.stride;
+    }
+    for (; e < count; ++e) update(group, base + e, e % group.stride);
+  }
+#endif
 };
 
 }  // namespace detail
