@@ -22,6 +22,8 @@ class camera_footprint {
     detail::interval u, w;
     double least_cosine = 1;
     constexpr int steps = 64;
+    // A loop: unrolled, a lens would take the registers of cameras without one.
+    GART_NO_UNROLL
     for (int k = 0; k <= steps; ++k) {
       double const s = static_cast<double>(k) / steps;
       double const border[4][2] = {
@@ -59,6 +61,8 @@ class camera_footprint {
     double const x0 = clamp(s.u.lo, u_), x1 = clamp(s.u.hi, u_), y0 = clamp(s.w.lo, w_), y1 = clamp(s.w.hi, w_);
     detail::interval u, v;
     constexpr int steps = 4;
+    // A loop: unrolled, a lens would take the registers of cameras without one.
+    GART_NO_UNROLL
     for (int k = 0; k <= steps; ++k) {
       double const f = static_cast<double>(k) / steps, x = x0 + f * (x1 - x0), y = y0 + f * (y1 - y0);
       double const border[4][2] = {{x, y0}, {x, y1}, {x0, y}, {x1, y}};
