@@ -161,12 +161,15 @@ class Bench(Trainings):
         runs = []
         for program in programs:
             name, start = os.path.basename(program), time.time()
-            done = run([program])
+            done = run([program], env={**os.environ, "GART_SCENES": os.path.abspath(self.a.scenes)})
             result = {0: "passed", SKIPPED: "skipped"}.get(done.returncode, "failed")
             row = {"test": name, "result": result, "seconds": round(time.time() - start, 1)}
             totals = re.search(r"assertions:\s*(\d+)", done.stdout)
             if totals:
                 row["assertions"] = int(totals.group(1))
+            said = re.findall(r"MESSAGE: (.* differ)$", done.stdout, re.MULTILINE)
+            if said:
+                row["said"] = said
             if result == "failed":
                 row["output"] = done.stdout[-3000:] + done.stderr[-1000:]
                 self.fail(name)
