@@ -43,7 +43,7 @@ GART_HD inline primary_ray pixel_ray(camera const& c, pixel p) {
 #if !defined(__CUDACC__)
 // The directions of a packet's rays, the same bits.
 inline vec3_of<lanes> pixel_directions(camera const& c, packet_block const& block) {
-  return ray_direction(c, block.centres_x(), block.centres_y());
+  return ray_directions(c, block.centres_x(), block.centres_y());
 }
 #endif
 

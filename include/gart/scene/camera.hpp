@@ -104,9 +104,10 @@ GART_HD inline vec2 undistort(distortion const& lens, vec2 distorted) {
   return p;
 }
 
-// Unit direction, in the world, of the ray through the image point (u, v). It decides hits, so its arithmetic is fixed.
+// Unit direction, in the world, of the ray through the image point (u, v), or of one a lane. It decides hits, so its
+// arithmetic is fixed.
 template <class F>
-GART_HD GART_INLINE vec3_of<F> ray_direction(camera const& c, F u, F v) {
+GART_HD GART_INLINE vec3_of<F> ray_directions(camera const& c, F u, F v) {
   F x = divide(add(u, F(-c.cx)), F(c.fx)), y = divide(add(v, F(-c.cy)), F(c.fy));
   if (c.lens.any()) undistort(c.lens, F(x), F(y), x, y);
   vec3_of<F> d;
@@ -114,6 +115,8 @@ GART_HD GART_INLINE vec3_of<F> ray_direction(camera const& c, F u, F v) {
   F const inverse = divide(F(1.0f), square_root(fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)))));
   return {mul(d.x, inverse), mul(d.y, inverse), mul(d.z, inverse)};
 }
+
+GART_HD inline vec3 ray_direction(camera const& c, float u, float v) { return ray_directions(c, u, v); }
 
 // The same camera for an image of another size: intrinsics scale per axis.
 inline camera resized(camera c, int width, int height) {

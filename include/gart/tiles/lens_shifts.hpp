@@ -8,6 +8,7 @@
 // inverse there whose shift changes by at most d / (1 - d) times the distance. Where d reaches a half the widening is
 // infinite: nothing is said of such tiles.
 
+#include <gart/core/span.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/tiles/grid.hpp>
 
