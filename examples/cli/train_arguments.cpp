@@ -53,7 +53,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       r.add(train, "--mcmc-noise", a.mcmc_noise, "X", "Strength of the random steps of mcmc over the usual; 0: none"))
       ->check(between(0, 1e6));
   in_group(r.add(train, "--mcmc-penalty", a.mcmc_penalty, "X",
-                 "Strength of the penalty of mcmc on size over the usual;\n0: none"))
+                 "Strength of the penalties of mcmc on opacity and size over\nthe usual; 0: none"))
       ->check(between(0, 1e6));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
   in_group(r.add(train, "--seed", a.seed, "N",
@@ -187,7 +187,8 @@ gart::train_options train_options_of(train_arguments const& a) {
                                    : gart::densify_kind::none;
   o.initial_opacity = a.initial_opacity;
   o.initial_scale = a.initial_scale;
-  o.mcmc.noise *= a.mcmc_noise, o.mcmc.scale_penalty *= a.mcmc_penalty;
+  o.mcmc.noise *= a.mcmc_noise;
+  o.mcmc.opacity_penalty *= a.mcmc_penalty, o.mcmc.scale_penalty *= a.mcmc_penalty;
   o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
   o.sh_degree = most_sh_degree(a);
   o.sh_gain = a.automatic && a.sh_degree == "auto" ? a.sh_gain : 0;

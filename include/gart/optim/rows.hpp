@@ -8,6 +8,8 @@
 
 namespace gart {
 
+inline constexpr index_t geometry_columns = 10;
+
 GART_HD constexpr index_t row_width(int sh_degree) { return 11 + 3 * sh_coefficients(sh_degree); }
 
 template <class T>
