@@ -213,6 +213,12 @@ TEST_CASE_TEMPLATE("opacities are reset, with their moments", E, GART_TEST_POLIC
   CHECK(t.state.first.to_host().mean == std::vector<float>(9, 1.0f));
 }
 
+TEST_CASE("what alpha_min hides counts as dead") {
+  CHECK(least_opacity(0.005f, 1.0f / 255) == doctest::Approx(0.005f));
+  CHECK(least_opacity(0.005f, 1e-6f) == 0.005f);
+  CHECK(least_opacity(0.005f, 0.05f) == doctest::Approx(0.06375f));
+}
+
 TEST_CASE_TEMPLATE("all may go, and none may be there", E, GART_TEST_POLICIES) {
   std::mt19937_64 random(1);
   gaussian_model m = plain(100, random);

@@ -160,8 +160,8 @@ struct adc_split_kernel {
 
 struct adc_reset_kernel {
   float* opacity;
+  float most;
   GART_HD void operator()(index_t i) const {
-    float const most = -4.59511985f;  // the logit of 0.01
     if (opacity[i] > most) opacity[i] = most;
   }
 };
@@ -254,9 +254,11 @@ class adaptive_density {
     return change;
   }
 
-  // Opacities above 0.01 become 0.01.
+  // Opacities above twice prune_opacity become that.
   void reset_opacity(gaussians<E>& model, optimizer_state<E>& state) {
-    parallel_for(*exec_, "adc_reset", model.size(), detail::adc_reset_kernel{model.opacity.data()});
+    double const most = std::min(2.0 * options_.prune_opacity, 0.99);
+    parallel_for(*exec_, "adc_reset", model.size(),
+                 detail::adc_reset_kernel{model.opacity.data(), static_cast<float>(std::log(most / (1 - most)))});
     state.first.opacity.zero(), state.second.opacity.zero();
   }
 

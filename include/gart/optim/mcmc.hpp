@@ -7,11 +7,13 @@
 //   o' = 1 - (1 - o)^(1/N),  scale' = scale * o / sum_{j=1..N} C(N, j) (-1)^(j-1) o'^j / sqrt(j),
 // which keeps the integral of the composited opacity across a line through the centre. (The paper's double sum, with
 // sum_i C(i-1, j-1) = C(N, j).) For a generalised Gaussian of degree n (math/response.hpp) it is the n-th root of j.
-// Their moments are cleared, but for the second ones of the geometry, which a copy takes from its source. A first
-// moment fills up in 10 steps and a second one in 1,000, so that a cleared pair steps up to 6.5 times its rate for a
-// hundred steps: opacity and colour are better for it, means are thrown about. (Training views after 3,000 of 30,000
-// steps: all cleared 27.7 dB on lego and 17.3 on tandt_train; so 32.3 and 18.8; all second ones kept 29.3 and 19.6, at
-// more hits a ray and half again the time.)
+// Their moments are cleared. A first moment fills up in 10 steps and a second one in 1,000, so that a cleared pair
+// steps up to 6.5 times its rate for a hundred steps. While the count grows, a tenth of all Gaussians is at it: in a
+// short run that finds them better places, in a long one it keeps them from settling. Long runs therefore keep the
+// second moments of the geometry, and copies take their source's (options.settle_from). Test PSNR, cleared and kept:
+// lego at a quarter, 2,000 steps, 28.96 and 27.45; lego, 7,000, 35.89 and 34.59; 30,000, 36.38 and 36.46;
+// tandt_train, 7,000, 21.11 and 20.87; 30,000, 21.92 and 22.05, with SSIM 0.828 and 0.840, and in 236 and 180 s. Those
+// of opacity and colour are cleared in any run: kept they leave Gaussians fainter, and steps take half again the time.
 //
 // Weights are 32-bit fixed point and their sums 64-bit integers, so the draws are exact for any count and have the same
 // bits on every policy. A Gaussian whose opacity or geometry is not finite counts as dead. Where none is alive nothing
@@ -124,12 +126,13 @@ struct mcmc_copy_body {
   gaussians_view<float> model, first, second;
   u32 const* source;
   u32 const* target;
+  index_t settled;  // columns that keep their second moment
 
   GART_HD void operator()(index_t draw, index_t column) const {
     index_t const from = source[draw], to = target[draw];
     row_element(model, to, column) = row_element(model, from, column);
     row_element(first, to, column) = row_element(first, from, column) = 0;
-    if (column < geometry_columns)
+    if (column < settled)
       row_element(second, to, column) = row_element(second, from, column);
     else
       row_element(second, to, column) = row_element(second, from, column) = 0;
@@ -139,11 +142,11 @@ struct mcmc_copy_body {
 struct mcmc_noise_kernel {
   gaussians_view<float> model;
   random_source random;
-  float amount;
+  float amount, dead_opacity;
 
   GART_HD void operator()(index_t i) const {
     float const o = sigmoid(model.opacity[i]);
-    float const gate = amount / (1.0f + expf(100.0f * (0.995f - (1.0f - o))));
+    float const gate = amount / (1.0f + expf(100.0f * (o - dead_opacity)));
     float const* const q = model.quaternion + std::size_t{4} * i;
     float const norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
     if (!(gate > 0) || !(norm > 1e-16f)) return;
@@ -266,12 +269,14 @@ class mcmc {
     return change;
   }
 
-  // mean += noise * mean_rate * sigmoid(-100 (opacity - 0.005)) * covariance * normal.
+  // mean += noise * mean_rate * sigmoid(-100 (opacity - dead_opacity)) * covariance * normal.
   void add_noise(gaussians<E>& model, int step, float mean_rate) {
     if (options_.noise == 0) return;
     parallel_for(*exec_, "mcmc_noise", model.size(),
-                 detail::mcmc_noise_kernel{
-                     model.view(), {seed_, static_cast<u32>(step), random_use::noise}, options_.noise * mean_rate});
+                 detail::mcmc_noise_kernel{model.view(),
+                                           {seed_, static_cast<u32>(step), random_use::noise},
+                                           options_.noise * mean_rate,
+                                           options_.dead_opacity});
   }
 
  private:
@@ -295,7 +300,8 @@ class mcmc {
                  detail::mcmc_share_kernel{model.view(), copies.data(), options_.dead_opacity, options_.kernel_degree});
     for_each_element(
         *exec_, "mcmc_copy", draws, model.sh_degree(),
-        detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(), target_.data()});
+        detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(), target_.data(),
+                               iterations_ >= options_.settle_from ? geometry_columns : 0});
   }
 
   E* exec_;

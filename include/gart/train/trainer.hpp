@@ -85,7 +85,13 @@ class trainer {
   static mcmc_options mcmc_options_of(train_options const& options) {
     mcmc_options m = options.mcmc;
     m.kernel_degree = Traits::response::degree;
+    m.dead_opacity = least_opacity(m.dead_opacity, options.render.alpha_min);
     return m;
+  }
+  static adc_options adc_options_of(train_options const& options) {
+    adc_options a = options.adc;
+    a.prune_opacity = least_opacity(a.prune_opacity, options.render.alpha_min);
+    return a;
   }
 
   E& exec_;

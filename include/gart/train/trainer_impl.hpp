@@ -25,7 +25,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       images_(data),
       order_(data.train.size(), options.held_out, options.seed),
       mcmc_(exec, mcmc_options_of(options), options.max_gaussians, options.iterations, options.seed),
-      adc_(exec, options.adc, options.max_gaussians, options.iterations, data.extent, options.seed),
+      adc_(exec, adc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
       color_(exec),
       color_gradient_(exec),
       value_(exec, 2) {
