@@ -22,6 +22,7 @@
 #include <gart/optim/rows.hpp>
 #include <gart/scene/camera.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
