@@ -1,7 +1,8 @@
 #pragma once
 // Ctrl-C and SIGTERM as a wish that is asked for between steps, so that a run ends with its files whole. A second one
 // ends the program at once, but not within a second of the first: one wish may come twice, from a terminal to all of
-// its programs and from the one that waits for this.
+// its programs and from the one that waits for this. After a wish the handler stays, for the second may come while the
+// program takes its leave.
 
 #include <csignal>
 #include <ctime>
@@ -28,6 +29,7 @@ class interrupt_guard {
     sigaction(SIGTERM, &action, &old_term_);
   }
   ~interrupt_guard() {
+    if (wanted_) return;
     sigaction(SIGINT, &old_int_, nullptr);
     sigaction(SIGTERM, &old_term_, nullptr);
   }

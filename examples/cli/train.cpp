@@ -69,7 +69,8 @@ class training_run {
 
   int run() {
     prepare();
-    bool const finished = train();
+    interrupt_guard const interrupt;  // until all is saved and said
+    bool const finished = train(interrupt);
     stopwatch const saving;
     save();
     save_seconds_ += saving.seconds();
@@ -173,8 +174,7 @@ class training_run {
   }
 
   // True when all steps are done, false when it was asked to stop.
-  bool train() {
-    interrupt_guard const interrupt;
+  bool train(interrupt_guard const& interrupt) {
     recent_steps recent;
     stopwatch since_start;
     double last_checkpoint = 0;

@@ -69,9 +69,12 @@ class folder {
       if (waitpid(child, &status, WNOHANG) == child) return outcome_of(status);
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
-    kill(child, SIGINT);
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    kill(child, SIGINT);  // one wish, told by the terminal and by who waits
+    // One wish, told by the terminal and by all who wait, while the program saves and takes its leave.
+    for (int told = 0; told < 20; ++told) {
+      kill(child, SIGINT);
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      if (waitpid(child, &status, WNOHANG) == child) return outcome_of(status);
+    }
     waitpid(child, &status, 0);
     return outcome_of(status);
   }
