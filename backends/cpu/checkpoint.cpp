@@ -89,6 +89,10 @@ void write_checkpoint(std::filesystem::path const& path, training_state const& s
   out.add("seed", std::vector<u64>{state.seed});
   out.add("adc/gradient_sum", state.gradient_sum), out.add("adc/touched", state.touched);
   out.add("band_trials", state.trials);
+  if (exposure_state const& e = state.exposures; !e.value.empty()) {
+    out.add("exposure", e.value), out.add("exposure/first", e.first), out.add("exposure/second", e.second);
+    out.add("exposure/visits", e.visits);
+  }
   out.write(path);
 }
 
@@ -123,6 +127,14 @@ training_state state_of(checkpoint_reader const& in) {
   s.step = step[0], s.growth = growth[0], s.seed = seed[0];
   s.gradient_sum = in.get<float>("adc/gradient_sum"), s.touched = in.get<u32>("adc/touched");
   if (s.gradient_sum.size() != s.touched.size()) in.fail("its arrays adc/* differ in length");
+  if (in.has("exposure")) {
+    exposure_state& e = s.exposures;
+    e.value = in.get<float>("exposure"), e.visits = in.get<u32>("exposure/visits");
+    e.first = in.get<float>("exposure/first"), e.second = in.get<float>("exposure/second");
+    std::size_t const floats = exposure::floats * e.visits.size();
+    if (e.value.size() != floats || e.first.size() != floats || e.second.size() != floats)
+      in.fail("its arrays exposure* differ in length");
+  }
   if (in.has("band_trials")) s.trials = in.get<band_trial>("band_trials");
   for (band_trial const& t : s.trials)
     if (t.band < 1 || t.band > 3) in.fail("is damaged: a trial of SH band " + std::to_string(t.band));

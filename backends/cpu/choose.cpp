@@ -1,3 +1,4 @@
+#include <gart/exposure/exposure_field.hpp>
 #include <gart/train/choose.hpp>
 
 #include <algorithm>
@@ -12,6 +13,7 @@ namespace {
 constexpr std::size_t most_images = 64;
 constexpr int plain_levels = 12;      // of 255
 constexpr double plain_share = 0.95;  // of the border's pixels
+constexpr double brightness_step_most = 0.03;
 constexpr int white_from = 230, black_to = 25;
 
 std::string percent(double share) {
@@ -57,6 +59,28 @@ void look_at_borders(dataset const& data, capture_traits& traits) {
     alike += near;
   });
   traits.plain_border = most(alike);
+}
+
+// Of opaque photographs, every seventh pixel of a row; 0 where fewer than two are.
+double brightness_step(std::vector<dataset_view> const& views) {
+  std::vector<view_exposure> poses;
+  std::vector<double> level;
+  for (dataset_view const& v : views) {
+    if (v.image.channels != 3 || v.image.empty()) continue;
+    double sum = 0;
+    std::size_t values = 0;
+    for (std::size_t i = 0; i < v.image.data.size(); i += 7) sum += v.image.data[i], ++values;
+    poses.push_back({v.name, v.view.position, v.view.rotation[2], {}});
+    level.push_back(std::log(std::max(sum / static_cast<double>(values), 1.0)));
+  }
+  exposure_field const field(std::move(poses));
+  std::vector<double> steps;
+  for (std::size_t i = 0; i < level.size() && level.size() > 1; ++i)
+    steps.push_back(std::abs(level[i] - level[field.nearest(i)]));
+  if (steps.empty()) return 0;
+  auto const middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
 }
 
 std::string lenses(capture_traits const& t) {
@@ -115,6 +139,7 @@ capture_traits inspect(dataset const& data) {
   }
   if (pixels) traits.transparent = static_cast<double>(clear) / static_cast<double>(pixels);
   look_at_borders(data, traits);
+  traits.brightness_step = brightness_step(data.train);
   return traits;
 }
 
@@ -141,6 +166,14 @@ chosen<std::string> choose_tracer(capture_traits const& t) {
 chosen<std::string> choose_backward(capture_traits const& t) {
   if (t.folding) return {"pixel", folds(t)};
   return {"auto", "the fastest there is"};
+}
+
+chosen<bool> choose_exposure(capture_traits const& t) {
+  if (t.bounded() || t.transparent > 0) return {false, "a bounded object, lit alike in all images"};
+  std::string const step = percent(t.brightness_step);
+  if (t.brightness_step > brightness_step_most)
+    return {true, "the brightness of neighbouring photographs differs by " + step};
+  return {false, "the brightness of neighbouring photographs differs by " + step + " only"};
 }
 
 chosen<starting_points> choose_start(dataset const& data, train_options const& options) {

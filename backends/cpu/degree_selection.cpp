@@ -94,6 +94,7 @@ class degree_selection final : public session {
     hold_out(!settled_);
     open(s);
   }
+  exposure_field exposures() const override { return inner_->exposures(); }
   std::vector<band_trial> trials() const override { return trials_; }
   profiler& profile() override { return profile_; }
   std::size_t peak_bytes() const override { return std::max(peak_bytes_, inner_->peak_bytes()); }
@@ -145,10 +146,12 @@ class degree_selection final : public session {
 
   double held_out_psnr() {
     vec3 const background(options_.background == background_kind::white ? 1.0f : 0.0f);
+    exposure_field const exposures = inner_->exposures();
     double sum = 0;
     for (std::size_t const index : plan_.held_out) {
       dataset_view const& view = data_.train[index];
       image_float image = inner_->render(view.view, background).color;
+      apply(exposures.at(view.view), image);
       image_float const truth = composited(view.image, background);
       double const share = apply_mask(view.mask, truth, image);
       sum += masked_psnr(image, truth, share);

@@ -6,6 +6,7 @@
 #include "progress.hpp"
 
 #include <gart/io/dataset.hpp>
+#include <gart/io/exposure_file.hpp>
 #include <gart/io/image_file.hpp>
 
 #include <cstdio>
@@ -18,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct eval_arguments {
-  fs::path model, dataset, out, renders;
+  fs::path model, dataset, out, renders, exposures;
   row_options row;
   std::string background = "auto";
   int downscale = 1, test_every = 8;
@@ -46,9 +47,13 @@ int run_eval(eval_arguments const& a) {
   if (a.max_hits >= 0) options.max_hits = static_cast<gart::u32>(a.max_hits);
   renderer->set_model(file.model);
 
+  gart::exposure_field const exposures =
+      a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures);
+
   progress say(a.quiet);
   scores const result = evaluate(
-      data.test, options.background, [&](gart::camera const& view) { return renderer->render(view, options); },
+      data.test, options.background, exposures,
+      [&](gart::camera const& view) { return renderer->render(view, options); },
       [&](std::size_t i, view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
         if (!a.renders.empty()) {
           gart::write_png(a.renders / (s.name + ".png"), gart::to_8bit(render));
@@ -86,6 +91,7 @@ void add_eval(CLI::App& app, command& selected) {
   eval->add_option("--out", a->out, "Where the scores go")->type_name("METRICS.json")->required();
   eval->add_option("--renders", a->renders, "Also keep NAME.png and NAME_truth.png of each view here")
       ->type_name("DIR");
+  add_exposures(*eval, a->exposures);
   eval->add_option("--background", a->background, "white or black; auto: as gart train chooses")
       ->type_name("NAME")
       ->capture_default_str()

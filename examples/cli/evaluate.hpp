@@ -1,6 +1,7 @@
 #pragma once
 // Scores of rendered views against photographs: PSNR and SSIM (gart/loss/metrics.hpp), the mean over views.
 
+#include <gart/exposure/exposure_field.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/train/session.hpp>
 
@@ -16,12 +17,15 @@ namespace gart_cli {
 struct view_score {
   std::string name;
   double psnr = 0, ssim = 0;
+  double own_psnr = 0;      // without an exposure: of the scene's own colours
   double milliseconds = 0;  // of rendering, to an image in host memory
 };
 
 struct scores {
   double psnr = std::numeric_limits<double>::quiet_NaN();  // stays so where there are no views
   double ssim = std::numeric_limits<double>::quiet_NaN();
+  double own_psnr = std::numeric_limits<double>::quiet_NaN();
+  bool exposed = false;
   std::vector<view_score> views;
 };
 
@@ -30,10 +34,11 @@ using render_view = std::function<gart::rendered(gart::camera const&)>;
 using keep_view = std::function<void(std::size_t index, view_score const&, gart::image_float const& render,
                                      gart::image_float const& truth)>;
 
-scores evaluate(std::vector<gart::dataset_view> const& views, gart::vec3 background, render_view const& render,
-                keep_view const& keep = {});
+// Where there are exposures each view is scored with its own, as the field gives it for the camera.
+scores evaluate(std::vector<gart::dataset_view> const& views, gart::vec3 background,
+                gart::exposure_field const& exposures, render_view const& render, keep_view const& keep = {});
 
-// "psnr", "ssim", "test_views" and "views"; null where there is no number.
+// "psnr", "ssim", "test_views" and "views", and with exposures "psnr_own_colours"; null where there is no number.
 nlohmann::json to_json(scores const& result);
 
 }  // namespace gart_cli

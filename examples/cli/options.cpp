@@ -93,6 +93,12 @@ void add_max_hits(CLI::App& app, int& max_hits) {
       ->check(between(0, max_hits_most));
 }
 
+void add_exposures(CLI::App& app, std::filesystem::path& file) {
+  app.add_option("--exposures", file,
+                 "exposures.json of the model's training: each view gets the exposure\nof the training views about it")
+      ->type_name("FILE");
+}
+
 void use_threads([[maybe_unused]] int threads) {
 #if defined(_OPENMP)
   if (threads > 0) omp_set_num_threads(threads);

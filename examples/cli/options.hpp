@@ -55,6 +55,8 @@ void add_row_options(CLI::App& app, row_options& options);
 void use_threads(int threads);
 // --max-hits of a model to be rendered: negative where the model says.
 void add_max_hits(CLI::App& app, int& max_hits);
+// --exposures of a model that was trained with them.
+void add_exposures(CLI::App& app, std::filesystem::path& file);
 
 CLI::Validator backend_names();
 CLI::Validator tracer_names();

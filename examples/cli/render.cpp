@@ -4,6 +4,7 @@
 #include "progress.hpp"
 
 #include <gart/io/dataset.hpp>
+#include <gart/io/exposure_file.hpp>
 #include <gart/io/image_file.hpp>
 
 #include <algorithm>
@@ -20,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct render_arguments {
-  fs::path model, cameras, out, json;
+  fs::path model, cameras, out, json, exposures;
   row_options row;
   std::string background = "black";
   int downscale = 1;
@@ -72,6 +73,9 @@ int run_render(render_arguments const& a) {
   if (a.t_min >= 0) options.transmittance_min = a.t_min;
   if (a.max_hits >= 0) options.max_hits = static_cast<gart::u32>(a.max_hits);
 
+  gart::exposure_field const exposures =
+      a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures);
+
   progress say(a.quiet);
   auto const row = renderer->row();
   nlohmann::json timings = {{"backend", row.backend},
@@ -86,7 +90,8 @@ int run_render(render_arguments const& a) {
     if (a.downscale > 1)
       view = gart::resized(view, std::max(1, view.width / a.downscale), std::max(1, view.height / a.downscale));
     auto const start = std::chrono::steady_clock::now();
-    gart::rendered const image = renderer->render(view, options);
+    gart::rendered image = renderer->render(view, options);
+    if (!exposures.empty()) apply(exposures.at(view), image.color);
     double const ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     total += ms;
     gart::write_png(a.out / (name + ".png"), gart::to_8bit(image.color));
@@ -130,6 +135,7 @@ void add_render(CLI::App& app, command& selected) {
       ->type_name("")
       ->required();
   render->add_option("--out", a->out, "Folder of the images; made where there is none")->type_name("DIR")->required();
+  add_exposures(*render, a->exposures);
   render->add_option("--background", a->background, "black or white: what it was trained on")
       ->type_name("NAME")
       ->capture_default_str()

@@ -8,6 +8,7 @@
 #include "report.hpp"
 #include "train_arguments.hpp"
 
+#include <gart/io/exposure_file.hpp>
 #include <gart/io/file.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
@@ -166,7 +167,8 @@ class training_run {
   // The first checkpoint is written before the first step: what cannot be saved is then known before it costs anything.
   // An earlier run's results go, lest they be taken for this one's.
   void begin_anew() {
-    for (char const* old : {"checkpoint.gart", "history.json", "metrics.json", "report.html"}) fs::remove(a_.out / old);
+    for (char const* old : {"checkpoint.gart", "history.json", "metrics.json", "report.html", "exposures.json"})
+      fs::remove(a_.out / old);
     nlohmann::json config = config_of(a_, data_);
     config["chosen"] = chosen_;
     write_json(a_.config_file(), config);
@@ -244,8 +246,8 @@ class training_run {
   scores test(int step, keep_view const& keep = {}) {
     stopwatch const testing;
     scores const result = evaluate(
-        data_.test, eval_background_, [this](gart::camera const& c) { return session_->render(c, eval_background_); },
-        keep);
+        data_.test, eval_background_, session_->exposures(),
+        [this](gart::camera const& c) { return session_->render(c, eval_background_); }, keep);
     if (!result.views.empty()) {
       course_.test.push_back({step, result.psnr, result.ssim});
       say_.note("step " + with_commas(step) + ": test PSNR " + fixed(result.psnr, 2) + " dB, SSIM " +
@@ -266,6 +268,8 @@ class training_run {
     gart::gaussian_model const model = session_->model();
     gaussians_ = model.size();
     gart::write_splat_ply(a_.model_file(), model, traits());
+    if (auto const exposures = session_->exposures(); !exposures.empty())
+      gart::write_exposures(a_.out / "exposures.json", exposures);
   }
 
   // Only what is not as everywhere goes into the header, so that an ordinary model is byte for byte an ordinary file.
@@ -328,6 +332,7 @@ class training_run {
     m["format"] = data_.format, m["split"] = data_.split, m["resize_filter"] = data_.resize_filter;
     m["train_views"] = data_.train.size(), m["image_size"] = image_size(), m["notes"] = data_.notes;
     m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
+    m["exposure"] = a_.exposure == "on";
     m["iterations"] = a_.iterations, m["gaussians"] = gaussians_, m["sh_degree"] = session_->row().sh_degree;
     m["floats_per_gaussian"] = 11 + 3 * gart::sh_coefficients(session_->row().sh_degree);
     m["chosen"] = chosen_, m["sh_trials"] = trials_of(session_->trials());
@@ -381,6 +386,7 @@ void add_train(CLI::App& app, command& selected) {
   train->footer(
       "\nWrites into DIR:\n"
       "  model.ply         the Gaussians, as other viewers read them\n"
+      "  exposures.json    with --exposure: of each training view, for gart render and gart eval\n"
       "  report.html       one page: scores, curves, test views with their errors, where time and memory went\n"
       "  metrics.json      the same in figures\n"
       "  renders/          each test view: NAME.png, and NAME_truth.png beside it\n"

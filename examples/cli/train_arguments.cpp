@@ -65,6 +65,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(kernel_degree_names());
 
   group = "Capture";
+  in_group(r.add(train, "--exposure", a.exposure, "NAME",
+                 "on: learn the exposure and white balance of each photograph;\ntest views get theirs from the "
+                 "training views about them.\nauto: where neighbouring photographs differ in brightness"))
+      ->check(one_of({"auto", "on", "off"}));
   in_group(r.add(train, "--downscale", a.downscale, "N", "Shrink images by this whole factor"))->check(between(1, 64));
   in_group(r.add(train, "--background", a.background, "NAME",
                  "white, black, or random (another at each step; tests on black);\nauto: white for transparent "
@@ -187,6 +191,7 @@ gart::train_options train_options_of(train_arguments const& a) {
                                    : gart::densify_kind::none;
   o.initial_opacity = a.initial_opacity;
   o.initial_scale = a.initial_scale;
+  o.exposure = a.exposure == "on";
   o.mcmc.noise *= a.mcmc_noise;
   o.mcmc.opacity_penalty *= a.mcmc_penalty, o.mcmc.scale_penalty *= a.mcmc_penalty;
   o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);

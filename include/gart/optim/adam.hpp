@@ -31,6 +31,33 @@ struct adam_options {
   float beta1 = 0.9f, beta2 = 0.999f, epsilon = 1e-15f;
 };
 
+template <class Number>
+struct adam_element {
+  Number parameter, first, second;
+};
+
+// What a step does to an element. `rate` carries first_correction.
+struct adam_rule {
+  float beta1 = 0, beta2 = 0, epsilon = 0, second_correction = 1;  // 1 / sqrt(1 - b2^t)
+
+  adam_rule() = default;
+  adam_rule(adam_options const& o, int step)
+      : beta1(o.beta1),
+        beta2(o.beta2),
+        epsilon(o.epsilon),
+        second_correction(static_cast<float>(1.0 / std::sqrt(1.0 - std::pow(static_cast<double>(o.beta2), step)))) {}
+  static double first_correction(adam_options const& o, int step) {
+    return 1.0 / (1.0 - std::pow(static_cast<double>(o.beta1), step));
+  }
+
+  template <class Number>
+  GART_HD GART_INLINE adam_element<Number> moved(adam_element<Number> const& e, Number g, Number rate) const {
+    Number const m = fma(Number(beta1), e.first, mul(Number(1.0f - beta1), g));
+    Number const v = fma(Number(beta2), e.second, mul(mul(Number(1.0f - beta2), g), g));
+    return {e.parameter - rate * m / (square_root(v) * Number(second_correction) + Number(epsilon)), m, v};
+  }
+};
+
 namespace detail {
 
 struct adam_group {
@@ -51,7 +78,7 @@ struct adam_kernel {
   struct scratch {};
   adam_group groups[5];
   index_t group_tiles, rows;
-  float beta1, beta2, epsilon, second_correction;  // 1 / sqrt(1 - b2^t); the rates carry 1 / (1 - b1^t)
+  adam_rule rule;  // the rates carry 1 / (1 - b1^t)
   u64* skipped;
 
   template <class Team>
@@ -67,21 +94,10 @@ struct adam_kernel {
     team.for_each(count * group.stride, [&](index_t e) { update(group, base + e, e % group.stride); });
   }
 
-  template <class Number>
-  struct element {
-    Number parameter, first, second;
-  };
-  template <class Number>
-  GART_HD GART_INLINE element<Number> moved(element<Number> const& e, Number g, Number rate) const {
-    Number const m = fma(Number(beta1), e.first, mul(Number(1.0f - beta1), g));
-    Number const v = fma(Number(beta2), e.second, mul(mul(Number(1.0f - beta2), g), g));
-    return {e.parameter - rate * m / (square_root(v) * Number(second_correction) + Number(epsilon)), m, v};
-  }
-
   GART_HD void update(adam_group const& group, std::size_t i, index_t column) const {
     if (column >= group.active) return;
     float const g = group.gradient[i], rate = column < group.head ? group.rate_head : group.rate_rest;
-    auto const to = moved<float>({group.parameter[i], group.first[i], group.second[i]}, g, rate);
+    auto const to = rule.moved<float>({group.parameter[i], group.first[i], group.second[i]}, g, rate);
     if (!is_finite(g) || !is_finite(to.second) || !is_finite(to.parameter)) {
       if (skipped) E::atomic_add(skipped, u64{1});
       return;
@@ -110,8 +126,8 @@ struct adam_kernel {
       std::size_t const i = base + e;
       lane_mask const wanted = read(trained + column) > lanes(0.0f);
       lanes const g = read(group.gradient + i);
-      element<lanes> const from{read(group.parameter + i), read(group.first + i), read(group.second + i)};
-      auto const to = moved(from, g, read(rates + column));
+      adam_element<lanes> const from{read(group.parameter + i), read(group.first + i), read(group.second + i)};
+      auto const to = rule.moved(from, g, read(rates + column));
       lanes const infinity(__builtin_huge_valf());
       lane_mask const finite =
           (magnitude(g) < infinity) & (magnitude(to.second) < infinity) & (magnitude(to.parameter) < infinity);
@@ -139,7 +155,7 @@ void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optim
                adam_options const& options = {}) {
   if (model.size() == 0) return;
   using kernel = detail::adam_kernel<E>;
-  double const correction = 1.0 / (1.0 - std::pow(static_cast<double>(options.beta1), step));
+  double const correction = adam_rule::first_correction(options, step);
   auto const rate = [&](float r) { return static_cast<float>(r * correction); };
   auto const p = model.view();
   auto const g = gradient.view();
@@ -156,8 +172,7 @@ void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optim
   k.groups[4] = {p.opacity, g.opacity, m.opacity, v.opacity, 1, 1, 1, rate(rates.opacity), 0};
   k.rows = p.count;
   k.group_tiles = p.count / kernel::rows_per_tile + (p.count % kernel::rows_per_tile != 0);
-  k.beta1 = options.beta1, k.beta2 = options.beta2, k.epsilon = options.epsilon;
-  k.second_correction = static_cast<float>(1.0 / std::sqrt(1.0 - std::pow(static_cast<double>(options.beta2), step)));
+  k.rule = adam_rule(options, step);
   k.skipped = skipped.data();
   parallel_for(exec, "adam", tile_range{5 * k.group_tiles, 256}, k);
 }

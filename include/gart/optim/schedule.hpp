@@ -19,6 +19,7 @@ inline float exponential_decay(float from, float to, int step, int steps) {
 // The rates of one step; `extent` is the scene's.
 inline learning_rates rates_at(learning_rates rates, float extent, int step, int steps) {
   rates.mean = exponential_decay(rates.mean, rates.mean_final, step, steps) * extent;
+  rates.exposure = exponential_decay(rates.exposure, rates.exposure_final, step, steps);
   return rates;
 }
 

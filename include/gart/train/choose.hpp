@@ -15,14 +15,15 @@
 namespace gart {
 
 struct capture_traits {
-  std::size_t distorted = 0;  // training and test views whose lens is no pinhole
-  std::size_t folding = 0;    // of these, lenses that are not one to one over the image
-  double transparent = 0;     // share of the training images' pixels that are not opaque
-  std::size_t masked = 0;     // training views with a mask
-  bool clear_border = false;  // the images' borders are transparent
-  bool plain_border = false;  // or opaque, and of one colour,
-  u8 border[3] = {0, 0, 0};   // which is this
-  std::size_t views = 0;      // training views
+  std::size_t distorted = 0;   // training and test views whose lens is no pinhole
+  std::size_t folding = 0;     // of these, lenses that are not one to one over the image
+  double transparent = 0;      // share of the training images' pixels that are not opaque
+  std::size_t masked = 0;      // training views with a mask
+  bool clear_border = false;   // the images' borders are transparent
+  bool plain_border = false;   // or opaque, and of one colour,
+  u8 border[3] = {0, 0, 0};    // which is this
+  std::size_t views = 0;       // training views
+  double brightness_step = 0;  // median over opaque photographs of |ln| of the mean brightness over the nearest pose's
 
   bool bounded() const { return clear_border || plain_border; }
 };
@@ -42,6 +43,10 @@ chosen<background_kind> choose_background(capture_traits const& traits);
 // image: where one is not, bvh and pixel; else "auto", the fastest there is.
 chosen<std::string> choose_tracer(capture_traits const& traits);
 chosen<std::string> choose_backward(capture_traits const& traits);
+
+// Exposures are learned where photographs of neighbouring poses differ in brightness by more than 3%, the median
+// (exposure/exposure.hpp), and the scene is unbounded; renderings and fixed exposures give 1 to 2%.
+chosen<bool> choose_exposure(capture_traits const& traits);
 
 // The capture's points, or random ones in its bounds. A capture's points lie on surfaces, and opacity 0.1 and a scale
 // of 1.0 (times the distance to the neighbours) fill the gaps between them. Random points are mostly in empty space:

@@ -6,6 +6,7 @@
 // the policy throws.
 
 #include <gart/exec/profile.hpp>
+#include <gart/exposure/exposure_field.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/train/options.hpp>
@@ -97,6 +98,8 @@ class session {
   // The same in memory. set_state throws invalid_argument for a state of another degree.
   virtual training_state state() const = 0;
   virtual void set_state(training_state const& state) = 0;
+  // Of the training views so far; empty where none are learned. render() shows the scene's own colours.
+  virtual exposure_field exposures() const { return {}; }
   virtual std::vector<band_trial> trials() const { return {}; }  // that are over
   virtual profiler& profile() = 0;
   virtual std::size_t peak_bytes() const = 0;

@@ -4,6 +4,7 @@
 //
 // Errors: read_checkpoint throws io_error naming the file and the array that is missing, truncated or of another size.
 
+#include <gart/exposure/exposure.hpp>
 #include <gart/scene/gaussians.hpp>
 
 #include <filesystem>
@@ -32,6 +33,7 @@ struct training_state {
   u64 seed = 1;
   std::vector<float> gradient_sum;  // adaptive density's statistic since it last densified: [N], or empty
   std::vector<u32> touched;
+  exposure_state exposures;
   std::vector<band_trial> trials;  // that are over
 };
 

@@ -11,6 +11,7 @@
 // so a state holds parameters, moments and counters only.
 
 #include <gart/backward/backward.hpp>
+#include <gart/exposure/exposure_training.hpp>
 #include <gart/loss/image_loss.hpp>
 #include <gart/optim/adam.hpp>
 #include <gart/optim/adc.hpp>
@@ -62,6 +63,7 @@ class trainer {
   void set_state(training_state const& state);
   void save(std::filesystem::path const& path) const { write_checkpoint(path, state()); }
   void load(std::filesystem::path const& path) { set_state(read_checkpoint(path, sh_degree)); }
+  exposure_field exposures() const;  // of the views that were trained on; empty where none are learned
   std::size_t lt_bytes() const { return fell_back_ ? fallback_.lt_bytes() : backward_.lt_bytes(); }
   gaussians<E>& scene() { return scene_; }
   gaussians<E> const& gradients() const { return gradients_; }
@@ -109,7 +111,8 @@ class trainer {
   mcmc<E> mcmc_;
   adaptive_density<E> adc_;
   buffer<float, E> color_, color_gradient_, value_;
-  std::optional<finite_check<E>> finite_;  // where options.check_finite asks for it
+  std::optional<exposure_training<E>> exposures_;  // where options.exposure asks for them
+  std::optional<finite_check<E>> finite_;          // where options.check_finite asks for it
   int step_ = 0;
   float growth_ = 1;
   bool fell_back_ = false;

@@ -3,6 +3,7 @@
 
 #include <gart/train/trainer.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -32,6 +33,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
   if (options.check_finite) finite_.emplace(exec);
+  if (options.exposure) exposures_.emplace(exec, data.train.size());
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
 }
@@ -94,8 +96,11 @@ void trainer<E, Traits, Tracer, Strategy>::differentiate(Pass& pass, Loss&& loss
   forward<sh_degree>(exec_, tracer_, constant, view.view, render, degree, pass.targets(color_.data()), pass.record());
   {
     stage_scope stage(exec_, "loss");
+    span<float const> const image = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
     loss(loss_input<E>{exec_, view, images_.get(exec_, index, render.background), view.view.width, view.view.height,
-                       color_, color_gradient_, value_});
+                       image, color_gradient_, value_});
+    learning_rates const rates = rates_at(options_.rates, data_.extent, step_, options_.iterations);
+    if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }
   pass.template run<sh_degree>(exec_, tracer_, constant, records_.view(), view.view, render, degree, color_,
                                color_gradient_, gradients_);
@@ -137,10 +142,25 @@ rendered trainer<E, Traits, Tracer, Strategy>::render(camera const& view, vec3 b
 }
 
 template <execution E, class Traits, class Tracer, class Strategy>
+exposure_field trainer<E, Traits, Tracer, Strategy>::exposures() const {
+  std::vector<view_exposure> views;
+  exposure_state const learned = exposures_ ? exposures_->state() : exposure_state{};
+  for (std::size_t i = 0; i < learned.visits.size(); ++i) {
+    if (learned.visits[i] == 0) continue;
+    dataset_view const& v = data_.train[i];
+    view_exposure e{v.name, v.view.position, v.view.rotation[2], {}};
+    std::copy_n(learned.value.data() + i * exposure::floats, exposure::floats, e.value.m);
+    views.push_back(std::move(e));
+  }
+  return exposure_field(std::move(views));
+}
+
+template <execution E, class Traits, class Tracer, class Strategy>
 training_state trainer<E, Traits, Tracer, Strategy>::state() const {
   training_state s;
   s.scene = scene_.to_host(), s.first = state_.first.to_host(), s.second = state_.second.to_host();
   s.step = step_, s.growth = growth_, s.seed = options_.seed;
+  if (exposures_) s.exposures = exposures_->state();
   s.gradient_sum = adc_.gradient_sum.to_host(), s.touched = adc_.touched.to_host();
   return s;
 }
@@ -151,6 +171,11 @@ void trainer<E, Traits, Tracer, Strategy>::set_state(training_state const& s) {
   scene_.assign(s.scene), state_.first.assign(s.first), state_.second.assign(s.second);
   gradients_ = gaussians<E>(exec_, scene_.size(), sh_degree);
   adc_.gradient_sum.assign(s.gradient_sum), adc_.touched.assign(s.touched);
+  if (exposures_) {
+    if (s.exposures.visits.size() != data_.train.size())
+      throw invalid_argument("trainer: the state has exposures of another number of training views");
+    exposures_->set_state(s.exposures);
+  }
   options_.seed = s.seed;
   order_ = view_order(data_.train.size(), options_.held_out, options_.seed);
   step_ = s.step;

@@ -1,0 +1,134 @@
+#pragma once
+// Exposures of the training views, learned with the Gaussians (exposure.hpp): applied to the rendered image before the
+// loss, by Adam on the twelve numbers of the step's view.
+//
+//   dL/dx = M^T dL/dx',   dL/dM = sum over pixels of dL/dx' (x, 1)^T.
+//
+// The rate is per visit: a view is seen once an epoch, so that a run of few epochs needs a larger one (exposure_rate).
+// Memory: 37 words a view and a copy of the image. Cost: two passes over the image and two launches over a few numbers
+// a step; no host read. The sums are in a fixed order. Where a gradient is not finite the view's exposure stays.
+
+#include <gart/algorithm/segmented_reduce.hpp>
+#include <gart/exec/buffer.hpp>
+#include <gart/exposure/exposure.hpp>
+#include <gart/math/arith.hpp>
+#include <gart/optim/adam.hpp>
+
+namespace gart {
+
+namespace detail {
+
+struct expose_kernel {
+  exposure const* view;
+  float const* image;
+  float* exposed;
+  GART_HD void operator()(index_t pixel) const {
+    float const* const x = image + std::size_t{3} * pixel;
+    exposure const e = *view;
+    for (int c = 0; c < 3; ++c) exposed[std::size_t{3} * pixel + c] = e.channel(c, x[0], x[1], x[2]);
+  }
+};
+
+// A lane takes every lanes-th pixel, turns its gradient and sums what it says of the exposure.
+struct exposure_gradient_kernel {
+  exposure const* view;
+  float const* image;
+  float* gradient;  // in: dL/dx', out: dL/dx
+  index_t pixels, lanes;
+  float* sums;  // [lanes][12]
+
+  GART_HD void operator()(index_t lane) const {
+    exposure const e = *view;
+    float sum[exposure::floats] = {};
+    for (index_t pixel = lane; pixel < pixels; pixel += lanes) {
+      float const* const x = image + std::size_t{3} * pixel;
+      float* const g = gradient + std::size_t{3} * pixel;
+      float const d[3] = {g[0], g[1], g[2]};
+      for (int c = 0; c < 3; ++c) {
+        for (int k = 0; k < 3; ++k) sum[4 * c + k] = fma(d[c], x[k], sum[4 * c + k]);
+        sum[4 * c + 3] += d[c];
+        g[c] = fma(e.m[c], d[0], fma(e.m[4 + c], d[1], e.m[8 + c] * d[2]));
+      }
+    }
+    for (int k = 0; k < exposure::floats; ++k) sums[std::size_t{exposure::floats} * lane + k] = sum[k];
+  }
+};
+
+struct exposure_adam_kernel {
+  float const* gradient;
+  float* value;
+  float* first;
+  float* second;
+  adam_rule rule;
+  float rate;
+
+  GART_HD void operator()(index_t k) const {
+    auto const to = rule.moved<float>({value[k], first[k], second[k]}, gradient[k], rate);
+    if (!is_finite(to.second) || !is_finite(to.parameter)) return;
+    value[k] = to.parameter, first[k] = to.first, second[k] = to.second;
+  }
+};
+
+}  // namespace detail
+
+template <execution E>
+class exposure_training {
+ public:
+  exposure_training(E& exec, std::size_t views)
+      : exec_(&exec),
+        value_(exec, identities(views)),
+        first_(exec, std::vector<float>(views * exposure::floats)),
+        second_(exec, std::vector<float>(views * exposure::floats)),
+        visits_(views),
+        exposed_(exec),
+        sums_(exec),
+        gradient_(exec, exposure::floats),
+        ends_(exec, std::vector<u32>{0, lanes}) {}
+
+  // The image [H][W][3] as the view's photograph would show it; until the next call.
+  span<float const> expose(std::size_t view, span<float const> image) {
+    exposed_.resize(image.size());
+    parallel_for(*exec_, "expose", static_cast<index_t>(image.size() / 3),
+                 detail::expose_kernel{at(view), image.data(), exposed_.data()});
+    return exposed_;
+  }
+
+  // Turns dL/d exposed into dL/d image, and takes Adam's step for the view.
+  void step(std::size_t view, span<float const> image, span<float> gradient, float rate) {
+    sums_.resize(std::size_t{lanes} * exposure::floats);
+    parallel_for(*exec_, "exposure_gradient", lanes,
+                 detail::exposure_gradient_kernel{at(view), image.data(), gradient.data(),
+                                                  static_cast<index_t>(image.size() / 3), lanes, sums_.data()});
+    segmented_reduce(*exec_, sums_, exposure::floats, span<u32 const>(ends_), gradient_.view());
+    std::size_t const row = view * exposure::floats;
+    int const visit = static_cast<int>(++visits_[view]);
+    adam_options const adam;
+    parallel_for(*exec_, "exposure_adam", exposure::floats,
+                 detail::exposure_adam_kernel{gradient_.data(), value_.data() + row, first_.data() + row,
+                                              second_.data() + row, adam_rule(adam, visit),
+                                              static_cast<float>(rate * adam_rule::first_correction(adam, visit))});
+  }
+
+  exposure_state state() const { return {value_.to_host(), first_.to_host(), second_.to_host(), visits_}; }
+  void set_state(exposure_state const& s) {
+    value_.assign(s.value), first_.assign(s.first), second_.assign(s.second), visits_ = s.visits;
+  }
+
+ private:
+  static constexpr index_t lanes = E::device ? 4096 : 64;
+  static std::vector<float> identities(std::size_t views) {
+    exposure const identity;
+    std::vector<float> all;
+    for (std::size_t v = 0; v < views; ++v) all.insert(all.end(), identity.m, identity.m + exposure::floats);
+    return all;
+  }
+  exposure* at(std::size_t view) { return reinterpret_cast<exposure*>(value_.data()) + view; }
+
+  E* exec_;
+  buffer<float, E> value_, first_, second_;
+  std::vector<u32> visits_;
+  buffer<float, E> exposed_, sums_, gradient_;
+  buffer<u32, E> ends_;
+};
+
+}  // namespace gart

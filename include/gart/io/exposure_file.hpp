@@ -1,0 +1,16 @@
+#pragma once
+// Exposures of training views as JSON, to be read by `gart render` and `gart eval`, and by hand:
+//   {"views": [{"name": "00002", "position": [x, y, z], "direction": [x, y, z], "matrix": [12 numbers]}, ...]}
+// position and direction: of the camera and its axis, in the world; matrix: a row of M, then its offset, three times
+// (exposure/exposure.hpp). Written whole or not at all. Errors: io_error naming the file, the view and the field.
+
+#include <gart/exposure/exposure_field.hpp>
+
+#include <filesystem>
+
+namespace gart {
+
+void write_exposures(std::filesystem::path const& path, exposure_field const& field);
+exposure_field read_exposures(std::filesystem::path const& path);
+
+}  // namespace gart

@@ -1,0 +1,167 @@
+// Exposures as they are learned: their gradients against sums in double, and known gains found again.
+#include "capture.hpp"
+
+#include <gart/train/trainer.hpp>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+using namespace gart_test;
+
+namespace {
+
+std::vector<float> values(std::mt19937_64& random, std::size_t n) {
+  std::normal_distribution<float> normal;
+  std::vector<float> out(n);
+  for (float& x : out) x = normal(random);
+  return out;
+}
+
+gart::exposure_state some_state(std::mt19937_64& random, std::size_t views) {
+  std::size_t const n = views * gart::exposure::floats;
+  return {values(random, n), std::vector<float>(n), std::vector<float>(n), std::vector<gart::u32>(views)};
+}
+
+template <class E>
+using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::primitive_strategy>;
+
+// The Gaussians of the capture stand still: exposures alone are learned.
+gart::train_options still(int iterations) {
+  gart::train_options options;
+  options.iterations = iterations;
+  options.max_gaussians = 400;
+  options.densify = gart::densify_kind::none;
+  options.sh_degree = 1;
+  options.sh_every = 1;
+  options.exposure = true;
+  auto& r = options.rates;
+  r.mean = r.mean_final = r.log_scale = r.quaternion = r.opacity = r.sh_dc = r.sh_rest = 0;
+  return options;
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("the exposed image and both gradients are what the matrix says, in double", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  std::mt19937_64 random(seed);
+  E exec;
+  // More pixels than lanes on any policy, fewer, and one.
+  for (std::size_t const pixels : {std::size_t{1}, std::size_t{50}, std::size_t{9001}}) {
+    CAPTURE(pixels);
+    gart::exposure_training<E> training(exec, 3);
+    auto const start = some_state(random, 3);
+    training.set_state(start);
+    auto const image = values(random, 3 * pixels), weights = values(random, 3 * pixels);
+    gart::buffer<float, E> const x(exec, image), g(exec, weights);
+
+    gart::span<float const> const exposed = training.expose(1, x);
+    std::vector<float> shown(exposed.size());
+    exec.copy_out(shown.data(), exposed.data(), shown.size() * sizeof(float));
+    training.step(1, x, g, 0.01f);
+    auto const turned = g.to_host();
+    auto const state = training.state();
+
+    float const* const m = start.value.data() + gart::exposure::floats;
+    double by_matrix[gart::exposure::floats] = {}, size[gart::exposure::floats] = {};
+    double worst_image = 0, worst_gradient = 0;
+    for (std::size_t p = 0; p < pixels; ++p) {
+      for (int c = 0; c < 3; ++c) {
+        double y = m[4 * c + 3], t = 0;
+        for (int k = 0; k < 3; ++k) {
+          double const entry = static_cast<double>(weights[3 * p + c]) * image[3 * p + k];
+          y += static_cast<double>(m[4 * c + k]) * image[3 * p + k];
+          t += static_cast<double>(m[4 * k + c]) * weights[3 * p + k];
+          by_matrix[4 * c + k] += entry, size[4 * c + k] += std::abs(entry);
+        }
+        by_matrix[4 * c + 3] += weights[3 * p + c], size[4 * c + 3] += std::abs(weights[3 * p + c]);
+        worst_image = std::max(worst_image, std::abs(y - shown[3 * p + c]));
+        worst_gradient = std::max(worst_gradient, std::abs(t - turned[3 * p + c]));
+      }
+    }
+    CHECK(worst_image < 1e-5);
+    CHECK(worst_gradient < 1e-5);
+    for (int k = 0; k < gart::exposure::floats; ++k) {
+      // Adam's first moment after one step is a tenth of the gradient.
+      CHECK(std::abs(10 * state.first[gart::exposure::floats + k] - by_matrix[k]) < 1e-5 * size[k] + 1e-6);
+      // And its first step is the rate, against the gradient.
+      float const step = state.value[gart::exposure::floats + k] - m[k];
+      CHECK(step == doctest::Approx(by_matrix[k] > 0 ? -0.01 : 0.01).epsilon(1e-3));
+    }
+    CHECK(state.visits == std::vector<gart::u32>{0, 1, 0});
+    for (int k = 0; k < gart::exposure::floats; ++k) CHECK(state.value[k] == start.value[k]);
+  }
+}
+
+TEST_CASE_TEMPLATE("a gradient that is not finite leaves its number of the exposure as it is", E, GART_TEST_POLICIES) {
+  E exec;
+  gart::exposure_training<E> training(exec, 1);
+  gart::buffer<float, E> const x(exec, std::vector<float>{0.5f, 0.25f, 0.75f});
+  gart::buffer<float, E> const g(exec, std::vector<float>{std::numeric_limits<float>::quiet_NaN(), 1, 1});
+  training.step(0, x, g, 0.1f);
+  auto const state = training.state();
+  gart::exposure const identity;
+  for (int k = 0; k < 4; ++k) CHECK(state.value[k] == identity.m[k]);
+  for (int k = 4; k < gart::exposure::floats; ++k)
+    CHECK(state.value[k] == doctest::Approx(identity.m[k] - 0.1f).epsilon(1e-4));
+}
+
+TEST_CASE_TEMPLATE("gains of photographs are found, and the images then agree", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  auto data = capture(exec, seed);
+  float const gains[] = {0.6f, 0.8f, 0.9f, 0.7f};
+  for (std::size_t v = 0; v < data.train.size(); ++v)
+    for (auto& level : data.train[v].image.data) level = static_cast<gart::u8>(std::lround(gains[v] * level));
+  auto const options = still(600);
+  run_of<E> run(exec, options, data, cloud(seed, 0.6f));
+  float const before = run.step().psnr;
+  gart::step_report last;
+  while (run.steps_done() < options.iterations) last = run.step();
+  CHECK(last.psnr > before + 8);
+  CHECK(last.psnr > 30);
+  auto const field = run.exposures();
+  REQUIRE(field.views().size() == 4);
+  for (std::size_t v = 0; v < 4; ++v) {
+    // Of a grey that is common in the view: what the matrix does to single colours is not told apart by so few.
+    auto const& e = field.views()[v].value;
+    CHECK(e.channel(0, 0.3f, 0.3f, 0.3f) == doctest::Approx(0.3f * gains[v]).epsilon(0.12));
+    CHECK(field.views()[v].name == data.train[v].name);
+  }
+}
+
+TEST_CASE_TEMPLATE("a state carries exposures, and one of another number of views is refused", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  auto data = capture(exec, seed);
+  auto options = still(40);
+  run_of<E> run(exec, options, data, cloud(seed + 1, 0.6f));
+  for (int i = 0; i < 9; ++i) run.step();
+  auto const state = run.state();
+  CHECK(state.exposures.visits.size() == 4);
+  run_of<E> other(exec, options, data, cloud(seed + 1, 0.6f));
+  other.set_state(state);
+  CHECK(other.state().exposures.value == state.exposures.value);
+  CHECK(other.state().exposures.second == state.exposures.second);
+  float const next = run.step().loss, again = other.step().loss;
+  CHECK(again == doctest::Approx(next).epsilon(1e-5));
+
+  data.train.pop_back();
+  run_of<E> fewer(exec, options, data, cloud(seed + 1, 0.6f));
+  CHECK_THROWS_WITH_AS(fewer.set_state(state), doctest::Contains("another number of training views"),
+                       gart::invalid_argument);
+
+  // A view that is held out is not visited, and has no exposure of its own.
+  data = capture(exec, seed);
+  options.held_out = {2};
+  run_of<E> some(exec, options, data, cloud(seed + 1, 0.6f));
+  for (int i = 0; i < 9; ++i) some.step();
+  CHECK(some.exposures().views().size() == 3);
+  options.exposure = false;
+  run_of<E> none(exec, options, data, cloud(seed + 1, 0.6f));
+  none.step();
+  CHECK(none.exposures().empty());
+}

@@ -1,0 +1,106 @@
+// The exposure of a view that was not trained on, from views whose exposures are known; and when they are learned.
+#include <support/policies.hpp>
+
+#include <gart/exposure/exposure_field.hpp>
+#include <gart/train/choose.hpp>
+
+#include <cmath>
+
+namespace {
+
+gart::camera camera_at(double x, double y, float angle) {
+  gart::camera c;
+  c.width = 4, c.height = 3, c.fx = c.fy = 4, c.cx = 2, c.cy = 1.5f;
+  c.position = {x, y, 0};
+  float const cosine = std::cos(angle), sine = std::sin(angle);
+  c.rotation = gart::mat3(gart::vec3(cosine, 0, -sine), gart::vec3(0, 1, 0), gart::vec3(sine, 0, cosine));
+  return c;
+}
+
+gart::view_exposure exposed(gart::camera const& c, float gain, float offset) {
+  gart::view_exposure v{"view", c.position, c.rotation[2], {}};
+  for (int k = 0; k < 3; ++k) v.value.m[5 * k] = gain, v.value.m[4 * k + 3] = offset;
+  return v;
+}
+
+}  // namespace
+
+TEST_CASE("without views every view has the identity, with one that one's") {
+  gart::exposure const identity;
+  auto const none = gart::exposure_field().at(camera_at(0, 0, 0));
+  for (int k = 0; k < gart::exposure::floats; ++k) CHECK(none.m[k] == identity.m[k]);
+  gart::exposure_field const one({exposed(camera_at(1, 2, 0.3f), 0.7f, 0.1f)});
+  for (double const far : {0.0, 1e-3, 10.0, 1e6}) {
+    auto const e = one.at(camera_at(1 + far, 2, 0.3f));
+    CHECK(e.m[0] == doctest::Approx(0.7f).epsilon(1e-6));
+    CHECK(e.m[3] == doctest::Approx(0.1f).epsilon(1e-6));
+  }
+}
+
+TEST_CASE("a training view keeps its own, one between two has what lies between, one far from all their mean") {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<float> gain(0.5f, 1.5f);
+  std::vector<gart::view_exposure> views;
+  double mean = 0;
+  for (int i = 0; i < 20; ++i) {
+    views.push_back(exposed(camera_at(3.0 * i, 0.2 * i, 0.05f * static_cast<float>(i)), gain(random), 0.01f));
+    mean += static_cast<double>(views.back().value.m[0]) / 20;
+  }
+  gart::exposure_field const field(views);
+  for (int i = 0; i < 20; ++i) {
+    auto const e = field.at(camera_at(3.0 * i, 0.2 * i, 0.05f * static_cast<float>(i)));
+    CHECK(e.m[0] == doctest::Approx(views[static_cast<std::size_t>(i)].value.m[0]).epsilon(0.01));
+  }
+  auto const far = field.at(camera_at(1e9, 1e9, 3));
+  CHECK(far.m[0] == doctest::Approx(mean).epsilon(0.02));
+  CHECK(far.m[3] == doctest::Approx(0.01f).epsilon(1e-3));
+  CHECK(far.m[1] == doctest::Approx(0.0f));
+
+  // A line is followed between the views it was sampled at, by any scale of the scene.
+  for (double const scale : {1e-3, 1.0, 1e4}) {
+    CAPTURE(scale);
+    std::vector<gart::view_exposure> line;
+    for (int i = 0; i < 20; ++i)
+      line.push_back(exposed(camera_at(scale * i, 0, 0), 0.6f + 0.02f * static_cast<float>(i), 0));
+    auto const between = gart::exposure_field(line).at(camera_at(scale * 9.4, 0, 0));
+    CHECK(between.m[0] == doctest::Approx(0.6 + 0.02 * 9.4).epsilon(0.005));
+  }
+}
+
+TEST_CASE("views in one place, or one of them twice, are no difficulty") {
+  std::vector<gart::view_exposure> views(5, exposed(camera_at(1, 1, 0), 0.8f, 0));
+  views.push_back(exposed(camera_at(1, 1, 0), 1.4f, 0));
+  auto const e = gart::exposure_field(views).at(camera_at(1, 1, 0));
+  CHECK(e.m[0] == doctest::Approx(0.9f).epsilon(1e-4));
+}
+
+TEST_CASE("exposures are learned where neighbouring photographs differ in brightness, and nowhere else") {
+  auto const learned = [](float difference, int channels, bool plain) {
+    gart::dataset data;
+    for (int i = 0; i < 12; ++i) {
+      gart::dataset_view v;
+      v.view = camera_at(i, 0, 0);
+      v.image = gart::image8(40, 30, channels, 0);
+      for (int y = 0; y < 30; ++y) {
+        for (int x = 0; x < 40; ++x) {
+          bool const inside = !plain || (x > 5 && x < 34 && y > 5 && y < 24);
+          for (int c = 0; c < 3; ++c) {
+            double const level = inside ? 60 + 2 * x + y : 0;
+            v.image.at(x, y, c) = static_cast<gart::u8>(std::lround(level * (i % 2 ? 1 + difference : 1)));
+          }
+          if (channels == 4) v.image.at(x, y, 3) = inside ? 255 : 0;
+        }
+      }
+      data.train.push_back(std::move(v));
+    }
+    return gart::choose_exposure(gart::inspect(data));
+  };
+  CHECK(learned(0.08f, 3, false).value);
+  CHECK(learned(0.08f, 3, false).why.find("7.") != std::string::npos);
+  CHECK_FALSE(learned(0.01f, 3, false).value);
+  CHECK_FALSE(learned(0.08f, 3, true).value);
+  CHECK_FALSE(learned(0.08f, 4, true).value);
+  CHECK_FALSE(gart::choose_exposure(gart::inspect(gart::dataset{})).value);
+}
