@@ -60,7 +60,7 @@ struct mcmc_weight_kernel {
   GART_HD void operator()(index_t i) const {
     float const o = sigmoid(model.opacity[i]);
     bool alive = o > dead_opacity && is_finite(model.opacity[i]);
-    for (index_t c = 0; c < 10; ++c) alive = alive && is_finite(row_element(model, i, c));
+    for (index_t c = 0; c < geometry_columns; ++c) alive = alive && is_finite(row_element(model, i, c));
     dead[i] = !alive;
     u32 const fixed = static_cast<u32>(static_cast<double>(o < 1 ? o : 1.0f) * 4294967295.0 * alive);
     weight[i] = alive && fixed == 0 ? 1u : fixed;
