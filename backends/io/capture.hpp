@@ -35,6 +35,9 @@ struct capture {
   bool synthetic_bounds = false;  // Blender's box, not one around the cameras
 };
 
+// Which files a path means, and what to say about the choice.
+capture read_capture(std::filesystem::path const& path);
+
 // A COLMAP model folder: binary or text, whichever `text` says.
 capture read_colmap(std::filesystem::path const& model, bool text);
 bool has_colmap_model(std::filesystem::path const& folder, bool text);

@@ -18,6 +18,7 @@
 #include <cstdio>
 #include <memory>
 #include <mutex>
+#include <optional>
 
 #include <sys/resource.h>
 
@@ -70,8 +71,8 @@ class training_run {
 
   int run() {
     prepare();
-    interrupt_guard const interrupt;  // until all is saved and said
-    bool const finished = train(interrupt);
+    std::optional<interrupt_guard> interrupt(std::in_place);  // until a run that it stops is saved
+    bool const finished = train(*interrupt);
     stopwatch const saving;
     save();
     save_seconds_ += saving.seconds();
@@ -81,6 +82,7 @@ class training_run {
                 ".\nContinue with: gart train --resume --out " + a_.out.string());
       return exit_interrupted;
     }
+    interrupt.reset();  // all is saved, and --resume concludes anew: Ctrl-C may end it at once
     conclude();
     return 0;
   }

@@ -213,6 +213,28 @@ TEST_CASE_TEMPLATE("opacities are reset, with their moments", E, GART_TEST_POLIC
   CHECK(t.state.first.to_host().mean == std::vector<float>(9, 1.0f));
 }
 
+TEST_CASE_TEMPLATE("a reset leaves every Gaussian above what is pruned", E, GART_TEST_POLICIES) {
+  std::mt19937_64 random(1);
+  gaussian_model m = plain(3, random);
+  m.opacity = {2.0f, static_cast<float>(logit(0.07)), static_cast<float>(logit(0.99))};
+  adc_options options;
+  options.prune_opacity = 0.06f;
+  training<E> t(m, 1000, options);
+  t.density.after_step(t.model, t.state, 3000);
+  gaussian_model const got = t.model.to_host();
+  CHECK(gart_test::sigmoid(got.opacity[0]) == doctest::Approx(0.12));
+  CHECK(got.opacity[1] == m.opacity[1]);
+  CHECK(gart_test::sigmoid(got.opacity[2]) == doctest::Approx(0.12));
+  CHECK(t.density.densify(t.model, t.state, 3001).removed == 0);
+
+  // However much is pruned, no opacity is 1.
+  options.prune_opacity = 0.6f;
+  m.opacity[1] = 20;
+  training<E> most(m, 1000, options);
+  most.density.after_step(most.model, most.state, 3000);
+  CHECK(gart_test::sigmoid(most.model.to_host().opacity[1]) == doctest::Approx(0.99));
+}
+
 TEST_CASE("what alpha_min hides counts as dead") {
   CHECK(least_opacity(0.005f, 1.0f / 255) == doctest::Approx(0.005f));
   CHECK(least_opacity(0.005f, 1e-6f) == 0.005f);

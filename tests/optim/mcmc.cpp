@@ -284,6 +284,31 @@ TEST_CASE_TEMPLATE("noise has the covariance of the Gaussian, squared, and spare
   CHECK(got.opacity == start.opacity);
 }
 
+TEST_CASE_TEMPLATE("noise moves what counts as dead, wherever that begins", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  index_t const n = 300;
+  gaussian_model const start = gart_test::random_model(n, 0, random);
+  // How far each coordinate moves with opacities of `opacity`, where `dead` counts as dead.
+  auto const moves = [&](double opacity, float dead) {
+    gaussian_model m = start;
+    std::fill(m.opacity.begin(), m.opacity.end(), static_cast<float>(logit(opacity)));
+    std::fill(m.mean.begin(), m.mean.end(), 0.0f);
+    training<E> t(m);
+    mcmc_options options;
+    options.dead_opacity = dead;
+    mcmc<E>(t.exec, options, n, 1000, 1).add_noise(t.model, 7, 2e-6f);
+    return t.model.to_host().mean;
+  };
+  auto const at_usual = moves(0.005, 0.005f), at_raised = moves(0.2, 0.2f), below = moves(0.005, 0.2f),
+             above = moves(0.2, 0.005f);
+  for (std::size_t i = 0; i < at_usual.size(); ++i) {
+    CHECK(at_raised[i] == doctest::Approx(at_usual[i]).epsilon(1e-4).scale(0));
+    CHECK(below[i] == doctest::Approx(2 * at_usual[i]).epsilon(1e-4).scale(0));
+    CHECK(std::abs(above[i]) <= 1e-6f * std::abs(at_usual[i]));
+  }
+}
+
 TEST_CASE_TEMPLATE("noise leaves the mean of a broken Gaussian finite", E, GART_TEST_POLICIES) {
   std::mt19937_64 random(1);
   gaussian_model start = gart_test::random_model(3, 0, random);

@@ -68,7 +68,7 @@ struct adc_rule {
   }
   GART_HD u32 outcome(index_t i) const {
     bool finite = is_finite(model.opacity[i]);
-    for (index_t c = 0; c < 10; ++c) finite = finite && is_finite(row_element(model, i, c));
+    for (index_t c = 0; c < geometry_columns; ++c) finite = finite && is_finite(row_element(model, i, c));
     float const opacity = 1.0f / (1.0f + expf(-model.opacity[i])), scale = largest_scale(i);
     if (!finite || !(opacity >= prune_opacity)) return 0;
     bool const grows = statistic(i) >= gradient;

@@ -10,10 +10,9 @@
 // Their moments are cleared. A first moment fills up in 10 steps and a second one in 1,000, so that a cleared pair
 // steps up to 6.5 times its rate for a hundred steps. While the count grows, a tenth of all Gaussians is at it: in a
 // short run that finds them better places, in a long one it keeps them from settling. Long runs therefore keep the
-// second moments of the geometry, and copies take their source's (options.settle_from). Test PSNR, cleared and kept:
-// lego at a quarter, 2,000 steps, 28.96 and 27.45; lego, 7,000, 35.89 and 34.59; 30,000, 36.38 and 36.46;
-// tandt_train, 7,000, 21.11 and 20.87; 30,000, 21.92 and 22.05, with SSIM 0.828 and 0.840, and in 236 and 180 s. Those
-// of opacity and colour are cleared in any run: kept they leave Gaussians fainter, and steps take half again the time.
+// second moments of the geometry, and copies take their source's (options.settle_from): lego at a quarter loses 1.5 dB
+// by it in 2,000 steps, tandt_train wins 0.14 in 30,000 (bench/results/mcmc_moments.json). Those of opacity and colour
+// are cleared in any run: kept they leave Gaussians fainter, and steps take half again the time.
 //
 // Weights are 32-bit fixed point and their sums 64-bit integers, so the draws are exact for any count and have the same
 // bits on every policy. A Gaussian whose opacity or geometry is not finite counts as dead. Where none is alive nothing
@@ -60,7 +59,7 @@ struct mcmc_weight_kernel {
   GART_HD void operator()(index_t i) const {
     float const o = sigmoid(model.opacity[i]);
     bool alive = o > dead_opacity && is_finite(model.opacity[i]);
-    for (index_t c = 0; c < 10; ++c) alive = alive && is_finite(row_element(model, i, c));
+    for (index_t c = 0; c < geometry_columns; ++c) alive = alive && is_finite(row_element(model, i, c));
     dead[i] = !alive;
     u32 const fixed = static_cast<u32>(static_cast<double>(o < 1 ? o : 1.0f) * 4294967295.0 * alive);
     weight[i] = alive && fixed == 0 ? 1u : fixed;

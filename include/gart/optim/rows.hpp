@@ -8,6 +8,7 @@
 
 namespace gart {
 
+// mean, log_scale and quaternion: what places and shapes a Gaussian, and comes first in a row.
 inline constexpr index_t geometry_columns = 10;
 
 GART_HD constexpr index_t row_width(int sh_degree) { return 11 + 3 * sh_coefficients(sh_degree); }

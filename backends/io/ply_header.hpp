@@ -1,0 +1,62 @@
+#pragma once
+// A PLY file in memory, its header read: which elements it has, of which properties, in which encoding. What follows
+// the header is not looked at.
+
+#include <gart/core/error.hpp>
+#include <gart/core/types.hpp>
+#include <gart/io/ply.hpp>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace gart::io::ply {
+
+enum class encoding { ascii, little, big };
+enum class scalar { i8, u8, i16, u16, i32, u32, f32, f64 };
+
+constexpr std::size_t scalar_size(scalar type) {
+  constexpr std::size_t sizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+  return sizes[static_cast<int>(type)];
+}
+
+struct property {
+  std::string name;
+  scalar type = scalar::f32;
+  bool list = false;
+  scalar count_type = scalar::u8;
+};
+
+struct element {
+  std::string name;
+  u64 count = 0;
+  std::vector<property> properties;
+  // What a record needs at the least: bytes, or in ascii one digit and one separator a value.
+  u64 smallest(encoding e) const {
+    u64 bytes = 0;
+    for (property const& p : properties)
+      bytes += e == encoding::ascii ? 2 : scalar_size(p.list ? p.count_type : p.type);
+    return bytes;
+  }
+};
+
+struct header {
+  encoding format = encoding::little;
+  std::vector<element> elements;
+  ply_traits traits;
+  std::size_t size = 0;  // bytes
+};
+
+struct ply_file {
+  std::string name;
+  std::vector<u8> bytes;
+  header head;
+
+  [[noreturn]] void refuse(std::string const& what, std::string const& remedy) const {
+    throw io_error(name, what, remedy);
+  }
+};
+
+ply_file open(std::filesystem::path const& path);
+
+}  // namespace gart::io::ply
