@@ -237,3 +237,43 @@ TEST_CASE("a run without test views says so instead of scoring nothing") {
   CHECK(has(eval.err, "no test views"));
   CHECK_FALSE(fs::exists(here / "scores.json"));
 }
+
+TEST_CASE("exposures are learned, said, saved, resumed and used again by eval and render") {
+  folder const here;
+  write_capture(here / "capture");
+  std::string const train = "train capture --out run --iterations 60 --exposure on" + small;
+  REQUIRE(here.gart(train + " --stop-at 30").code == 130);
+  REQUIRE(here.gart("train --resume --out run --quiet").code == 0);
+  REQUIRE(here.gart("train capture --out whole --iterations 60 --exposure on" + small).code == 0);
+  CHECK(text_of(here / "run/exposures.json") == text_of(here / "whole/exposures.json"));
+
+  auto const metrics = here.json("run/metrics.json");
+  CHECK(metrics["exposure"] == true);
+  CHECK(metrics.contains("psnr_own_colours"));
+  auto const exposures = here.json("run/exposures.json");
+  CHECK(exposures["views"].size() == metrics["train_views"].get<std::size_t>());
+  CHECK(exposures["views"][0]["matrix"].size() == 12);
+
+  std::string const eval = "eval run/model.ply capture --quiet --backend serial --out ";
+  REQUIRE(here.gart(eval + "with.json --exposures run/exposures.json").code == 0);
+  REQUIRE(here.gart(eval + "without.json").code == 0);
+  CHECK(here.json("with.json")["psnr"].get<double>() == doctest::Approx(metrics["psnr"].get<double>()).epsilon(1e-4));
+  CHECK(here.json("without.json")["psnr"].get<double>() ==
+        doctest::Approx(metrics["psnr_own_colours"].get<double>()).epsilon(1e-4));
+  CHECK_FALSE(here.json("without.json").contains("psnr_own_colours"));
+
+  std::string const render = "render run/model.ply capture --quiet --backend serial --out ";
+  REQUIRE(here.gart(render + "exposed --exposures run/exposures.json").code == 0);
+  REQUIRE(here.gart(render + "own").code == 0);
+  auto const name = metrics["views"][0]["name"].get<std::string>() + ".png";
+  CHECK(text_of(here / ("exposed/" + name)) != text_of(here / ("own/" + name)));
+
+  auto const missing = here.gart(render + "no --exposures nowhere.json");
+  CHECK(missing.code == 1);
+  CHECK(has(missing.err, "nowhere.json"));
+
+  // A run without them leaves no file of an earlier one.
+  REQUIRE(here.gart("train capture --out run --iterations 5 --exposure off" + small).code == 0);
+  CHECK_FALSE(fs::exists(here / "run/exposures.json"));
+  CHECK(here.json("run/metrics.json")["exposure"] == false);
+}

@@ -3,12 +3,12 @@
 // about the same pose it saw about the same. A photograph that is kept for testing is not looked at.
 //
 // Where a view stands is six numbers: the camera's position over the median distance of a training view to its nearest,
-// and its axis over 0.2. Of each of the twelve numbers of the exposure
-//   minimise over a, b:  sum_i w_i (m_i - a - b . d_i)^2 + 0.05 (sum_i w_i) |b|^2 r^2,   w_i = (|d_i|^2 + 1e-4)^-3,
+// and its axis over 0.1. Of each of the twelve numbers of the exposure
+//   minimise over a, b:  sum_i w_i (m_i - a - b . d_i)^2 + 0.02 (sum_i w_i) |b|^2 r^2,   w_i = (|d_i|^2 + 1e-4)^-3,
 // where d_i leads to training view i and r^2 is the weighted mean of |d_i|^2: a line through the nearest, since a
 // camera on its way passes between them, and the constant a is what the view gets. (A weighted mean, which b = 0 is,
-// leaves errors a tenth larger.) Far from all views it comes to their mean. Cost: O(views) in double for each call.
-// Without views it is the identity.
+// leaves errors a quarter larger where one view is left out of the others.) Far from all views it comes to their mean.
+// Cost: O(views) in double for each call. Without views it is the identity.
 
 #include <gart/exposure/exposure.hpp>
 #include <gart/math/glm.hpp>
@@ -89,7 +89,7 @@ class exposure_field {
         for (int k = 0; k < exposure::floats; ++k) right[r][k] += w * static_cast<double>(views_[i].value.m[k]);
       }
     }
-    for (int k = 1; k < size; ++k) a[k][k] += 0.05 * spread;
+    for (int k = 1; k < size; ++k) a[k][k] += 0.02 * spread;
     eliminate(a, right);
     for (int k = 0; k < exposure::floats; ++k) out.m[k] = static_cast<float>(right[0][k] / a[0][0]);
     return out;
@@ -101,7 +101,7 @@ class exposure_field {
 
   std::array<double, size> row_of(view_exposure const& v, camera const& view) const {
     vec3d const moved = (v.position - view.position) / spacing_;
-    vec3d const turned = (vec3d(v.direction) - vec3d(view.rotation[2])) / 0.2;
+    vec3d const turned = (vec3d(v.direction) - vec3d(view.rotation[2])) / 0.1;
     return {1, moved.x, moved.y, moved.z, turned.x, turned.y, turned.z};
   }
 

@@ -1,12 +1,14 @@
 #pragma once
 // Exposures of the training views, learned with the Gaussians (exposure.hpp): applied to the rendered image before the
-// loss, by Adam on the twelve numbers of the step's view.
-//
+// loss, and moved by Adam, the twelve numbers of the step's view alone. With x' the exposed image,
 //   dL/dx = M^T dL/dx',   dL/dM = sum over pixels of dL/dx' (x, 1)^T.
 //
-// The rate is per visit: a view is seen once an epoch, so that a run of few epochs needs a larger one (exposure_rate).
-// Memory: 37 words a view and a copy of the image. Cost: two passes over the image and two launches over a few numbers
-// a step; no host read. The sums are in a fixed order. Where a gradient is not finite the view's exposure stays.
+// The scene's own colours are those of an exposure that is the identity; nothing holds the views' mean to it but that
+// they start there.
+//
+// Buffers: 37 words a view, a copy of the image, and a few sums. Cost: two passes over the image and three launches
+// over a few numbers a step; no host read. The order of all sums depends on the image's size only. A number whose
+// gradient is not finite stays as it is.
 
 #include <gart/algorithm/segmented_reduce.hpp>
 #include <gart/exec/buffer.hpp>
@@ -83,7 +85,11 @@ class exposure_training {
         exposed_(exec),
         sums_(exec),
         gradient_(exec, exposure::floats),
-        ends_(exec, std::vector<u32>{0, lanes}) {}
+        ends_(exec, std::vector<u32>(runs + 1)) {
+    std::vector<u32> ends(runs + 1);
+    for (u32 r = 0; r <= runs; ++r) ends[r] = r * runs;
+    ends_.assign(ends);
+  }
 
   // The image [H][W][3] as the view's photograph would show it; until the next call.
   span<float const> expose(std::size_t view, span<float const> image) {
@@ -95,11 +101,16 @@ class exposure_training {
 
   // Turns dL/d exposed into dL/d image, and takes Adam's step for the view.
   void step(std::size_t view, span<float const> image, span<float> gradient, float rate) {
-    sums_.resize(std::size_t{lanes} * exposure::floats);
+    constexpr index_t lanes = runs * runs;
+    sums_.resize(std::size_t{lanes + runs} * exposure::floats);
+    auto const by_lane = sums_.view().subspan(0, std::size_t{lanes} * exposure::floats);
+    auto const by_run = sums_.view().subspan(by_lane.size(), std::size_t{runs} * exposure::floats);
     parallel_for(*exec_, "exposure_gradient", lanes,
                  detail::exposure_gradient_kernel{at(view), image.data(), gradient.data(),
-                                                  static_cast<index_t>(image.size() / 3), lanes, sums_.data()});
-    segmented_reduce(*exec_, sums_, exposure::floats, span<u32 const>(ends_), gradient_.view());
+                                                  static_cast<index_t>(image.size() / 3), lanes, by_lane.data()});
+    span<u32 const> const ends = ends_;
+    segmented_reduce(*exec_, by_lane, exposure::floats, ends, by_run);
+    segmented_reduce(*exec_, by_run, exposure::floats, ends.subspan(0, 2), gradient_.view());
     std::size_t const row = view * exposure::floats;
     int const visit = static_cast<int>(++visits_[view]);
     adam_options const adam;
@@ -115,7 +126,7 @@ class exposure_training {
   }
 
  private:
-  static constexpr index_t lanes = E::device ? 4096 : 64;
+  static constexpr index_t runs = E::device ? 128 : 8;  // of as many lanes: two short sums, not a long one
   static std::vector<float> identities(std::size_t views) {
     exposure const identity;
     std::vector<float> all;

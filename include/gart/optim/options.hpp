@@ -14,7 +14,7 @@ struct learning_rates {
   float opacity = 5e-2f;
   float sh_dc = 2.5e-3f;
   float sh_rest = 2.5e-3f / 20;
-  float exposure = 0.05f, exposure_final = 0.005f;
+  float exposure = 0.05f, exposure_final = 0.005f;  // a visit of the view; decays like the means'
 };
 
 // The opacity below which a Gaussian is of no use: `usual`, for the usual alpha_min of 1/255, and in proportion above.
