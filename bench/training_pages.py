@@ -68,8 +68,8 @@ class TrainingPages:
                 change = f"{r['psnr'] - base['psnr']:+.3f}" if r["mode"] == "--auto" and base else ""
                 gains = ", ".join(f"{t['band']}: {t['gain']:+.3f} ({t['forecast']:+.3f})" for t in r["sh_trials"])
                 rows.append([result["capture"], "full" if r["mode"] == "--no-auto" else "auto", r["sh_degree"],
-                             r["floats_per_gaussian"], f"{r['psnr']:.3f}", change, f"{r['seconds']:.0f}",
-                             f"{r['cpu_seconds']:.0f}", f"{r['model_bytes'] / 1e3:,.0f}",
+                             r["floats_per_gaussian"], f"{r['psnr']:.3f}", change, shown(r["seconds"], ".0f"),
+                             shown(r["cpu_seconds"], ".0f"), f"{r['model_bytes'] / 1e3:,.0f}",
                              f"{r['checkpoint_bytes'] / 1e3:,.0f}", f"{r['peak_bytes'] / 1e6:.1f}", gains])
             first = runs[0] if runs else {}
             rows.append([f"{result['capture']}: {first.get('image_size', '')}, {first.get('options', '')}; "

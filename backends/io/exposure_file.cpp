@@ -24,7 +24,7 @@ void read_numbers(json const& view, char const* key, std::size_t count, T* to, s
   for (std::size_t k = 0; k < count; ++k) {
     if (!(*found)[k].is_number()) refuse();
     to[k] = (*found)[k].get<T>();
-    if (!std::isfinite(to[k])) refuse();
+    if (!std::isfinite(static_cast<float>(to[k]))) refuse();
   }
 }
 
@@ -38,7 +38,7 @@ void write_exposures(std::filesystem::path const& path, exposure_field const& fi
                      {"direction", {v.direction.x, v.direction.y, v.direction.z}},
                      {"matrix", v.value.m}});
   }
-  write_file(path, json{{"views", std::move(views)}}.dump(1) + "\n");
+  write_file(path, json{{"views", std::move(views)}}.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
 exposure_field read_exposures(std::filesystem::path const& path) {

@@ -3,6 +3,7 @@
 #include "fuzz/support.hpp"
 
 #include <gart/io/dataset.hpp>
+#include <gart/io/exposure_file.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
 
@@ -181,6 +182,30 @@ bool camera_json(std::string_view input) {
   static scratch_folder const folder("camera_json");
   fs::path const file = folder.put("cameras.json", input);
   return accepted(folder, [&] { check_cameras(gart::load_cameras(file)); });
+}
+
+bool exposures(std::string_view input) {
+  static scratch_folder const folder("exposures");
+  fs::path const file = folder.put("exposures.json", input), again = folder.path() / "again.json";
+  return accepted(folder, [&] {
+    gart::exposure_field const field = gart::read_exposures(file);
+    promise(!field.empty(), "no view");
+    gart::camera view;
+    for (auto const& position : {gart::vec3d(0.0), field.views()[0].position, gart::vec3d(1e7)}) {
+      view.position = position;
+      gart::exposure const e = field.at(view);
+      // The numbers may be of any size; beyond what the sums in double can hold there is nothing to promise.
+      bool small = true, sound = true;
+      for (auto const& v : field.views())
+        for (float const m : v.value.m) small = small && std::abs(m) < 1e30f;
+      for (float const m : e.m) sound = sound && std::isfinite(m);
+      promise(sound || !small, "an exposure that is not finite");
+    }
+    gart::write_exposures(again, field);
+    gart::exposure_field const back = gart::read_exposures(again);
+    promise(back.views().size() == field.views().size() && back.views()[0].position == field.views()[0].position,
+            "exposures that are others when written and read again");
+  });
 }
 
 bool png(std::string_view input) {

@@ -32,6 +32,7 @@ constexpr reader readers[] = {
     {"transforms", gart_fuzz::transforms},
     {"blender", gart_fuzz::blender},
     {"camera_json", gart_fuzz::camera_json},
+    {"exposures", gart_fuzz::exposures},
     {"png", gart_fuzz::png},
     {"jpeg", gart_fuzz::jpeg},
     {"checkpoint", gart_fuzz::checkpoint},

@@ -66,6 +66,7 @@ TEST_CASE("a file that holds no exposures is refused by name, view and field") {
   refused("0,0,1,0]", "0,0,1e999,0]", "list 'views'");
   refused("0,0,1,0]", "0,0,1e99,0]", "'matrix' is not a list of 12 finite numbers");
   refused("0,0,1,0]", "0,0,1]", "'matrix'");
+  refused("[0, 0, 0]", "[0, 1e200, 0]", "'position'");
   refused("\"matrix\"", "\"matrices\"", "'matrix'");
   CHECK_THROWS_AS(gart::read_exposures(folder.path / "nowhere.json"), gart::io_error);
 }

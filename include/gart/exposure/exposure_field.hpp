@@ -35,16 +35,20 @@ class exposure_field {
   exposure_field() = default;
   explicit exposure_field(std::vector<view_exposure> views) : views_(std::move(views)) {
     std::vector<double> nearest;
+    double farthest = 0;
     for (auto const& a : views_) {
       double least = HUGE_VAL;
-      for (auto const& b : views_)
-        if (double const d = glm::distance(a.position, b.position); d > 0) least = std::min(least, d);
+      for (auto const& b : views_) {
+        double const d = glm::distance(a.position, b.position);
+        if (d > 0) least = std::min(least, d);
+        farthest = std::max(farthest, d);
+      }
       if (least < HUGE_VAL) nearest.push_back(least);
     }
     if (nearest.empty()) return;
     auto const middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
     std::nth_element(nearest.begin(), middle, nearest.end());
-    spacing_ = *middle;
+    spacing_ = std::max(*middle, 1e-12 * farthest);
   }
 
   bool empty() const { return views_.empty(); }
