@@ -236,6 +236,7 @@ def main():
     pages.cpu()
     pages.tradeoff()
     pages.presets()
+    pages.cutoffs()
     pages.auto()
     pages.curves()
     pages.long()

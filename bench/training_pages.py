@@ -57,6 +57,18 @@ class TrainingPages:
                                             "gradient, worst group", "a view, ms", "trained PSNR, dB", "SSIM",
                                             "training, s", "Gaussians"], rows)
 
+    def cutoffs(self):
+        result = self.load("cutoffs")
+        if not result:
+            return
+        order = lambda r: (r["capture"], r["alpha_min"], r["t_min"], r["arithmetic"], r["lt_format"])
+        rows = [[r["capture"], f"{r['alpha_min']:.3g}", f"{r['t_min']:.3g}",
+                 ", ".join(x for x in (r["arithmetic"], r["lt_format"]) if x not in ("exact", "float4")),
+                 f"{r['psnr']:.2f}", f"{r['ssim']:.4f}", shown(r["seconds"], ".0f")]
+                for r in sorted(result["runs"], key=order)]
+        self.tables["cutoffs"] = table(["capture", "alpha_min", "t_min", "besides", "trained PSNR, dB", "SSIM",
+                                        "training, s"], rows) + ["", f"7,000 steps; {source(result)}."]
+
     def auto(self):
         rows = []
         for path in sorted(glob.glob(os.path.join(self.results, "auto_*.json"))):
