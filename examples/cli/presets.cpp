@@ -12,8 +12,8 @@ std::vector<preset> const& presets() {
         "exact", {}, "image at 102 dB to the reference in double, gradient to\n  0.05%; trained: 29.28 dB in 15 s"};
     preset balanced{"balanced", {}, "1.4 times as fast; 42 dB, 26%; trained: 29.30 dB in 12 s"};
     preset fast{"fast", {}, "2.0 times as fast; 31 dB, 67%; trained: 29.39 dB in 9 s"};
-    // No more of t_min: a ray that ends early leaves what lies behind without a gradient, and training loses by that far
-    // more than the image does (docs/tradeoffs.md).
+    // No more of t_min: a ray that ends early leaves what lies behind without a gradient, and training loses by that
+    // far more than the image does (docs/tradeoffs.md).
     balanced.render.alpha_min = 0.01f, balanced.render.transmittance_min = 0.001f;
     fast.render.alpha_min = 0.02f, fast.render.transmittance_min = 0.001f;
     return std::vector<preset>{exact, balanced, fast};
