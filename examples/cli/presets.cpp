@@ -9,9 +9,9 @@ std::vector<preset> const& presets() {
   static std::vector<preset> const all = [] {
     // The quickstart model and capture on a CPU: bench/results/tradeoff_quickstart.json, presets_quickstart.json.
     preset exact{
-        "exact", {}, "image at 102 dB to the reference in double, gradient to\n  0.05%; trained: 29.28 dB in 15 s"};
-    preset balanced{"balanced", {}, "1.4 times as fast; 42 dB, 26%; trained: 29.30 dB in 12 s"};
-    preset fast{"fast", {}, "2.0 times as fast; 31 dB, 67%; trained: 29.39 dB in 9 s"};
+        "exact", {}, "image at 102 dB to the reference in double, gradient to\n  0.05%; trained: 29.28 dB in 13 s"};
+    preset balanced{"balanced", {}, "1.2 times as fast; 45 dB, 18%; trained: 29.33 dB in 11 s"};
+    preset fast{"fast", {}, "1.5 times as fast; 38 dB, 35%; trained: 29.41 dB in 10 s"};
     // No more of t_min: a ray that ends early leaves what lies behind without a gradient, and training loses by that
     // far more than the image does (docs/tradeoffs.md).
     balanced.render.alpha_min = 0.01f, balanced.render.transmittance_min = 0.001f;

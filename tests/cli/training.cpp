@@ -250,6 +250,7 @@ TEST_CASE("exposures are learned, said, saved, resumed and used again by eval an
   auto const metrics = here.json("run/metrics.json");
   CHECK(metrics["exposure"] == true);
   CHECK(metrics.contains("psnr_own_colours"));
+  CHECK(has(text_of(here / "run/report.html"), "exposure of the training views about it"));
   auto const exposures = here.json("run/exposures.json");
   CHECK(exposures["views"].size() == metrics["train_views"].get<std::size_t>());
   CHECK(exposures["views"][0]["matrix"].size() == 12);
