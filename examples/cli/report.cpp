@@ -223,17 +223,17 @@ std::string settings(json const& m, json const& config) {
   }
   double const max_hits = number_of(m["approximations"], "max_hits");
   std::string const cap = max_hits > 0 ? " or after " + fixed(max_hits, 0) + " hits" : "";
-  html +=
-      "</div><h2>How it was measured</h2><p>Split: " + text_of(m, "split") + "; " + count_of(m, "test_views") +
-      " test views. Images resized: " + text_of(m, "resize_filter") + ". Background: " + text_of(m, "background") +
-      ". Approximations: preset " + text_of(m["approximations"], "preset") +
-      "; a Gaussian is hit where its alpha is at least " + fixed(number_of(m["approximations"], "alpha_min"), 6) +
-      ", and a ray ends below a transmittance of " + fixed(number_of(m["approximations"], "t_min"), 6) + cap +
-      ". PSNR and SSIM (11 x 11 Gaussian window, sigma 1.5) are taken per view on [0, 1] and averaged over views.";
+  html += "</div><h2>How it was measured</h2><p>Split: " + text_of(m, "split") + "; " + count_of(m, "test_views") +
+          " test views. Images resized: " + text_of(m, "resize_filter") + ". Background: " + text_of(m, "background") +
+          ". Approximations: preset " + text_of(m["approximations"], "preset") +
+          "; a Gaussian is hit where its alpha is at least " + fixed(number_of(m["approximations"], "alpha_min"), 6) +
+          ", and a ray ends below a transmittance of " + fixed(number_of(m["approximations"], "t_min"), 6) + cap +
+          ". PSNR and SSIM (11 x 11 Gaussian window, sigma 1.5) are taken per view on [0, 1] and averaged over views.";
   if (m.contains("psnr_own_colours")) {
-    html += " Each test view has the exposure of the training views about it, not of its own photograph; without, in the "
-            "scene's own colours, PSNR is " +
-            fixed(number_of(m, "psnr_own_colours"), 2) + " dB.";
+    html +=
+        " Each test view has the exposure of the training views about it, not of its own photograph; without, in the "
+        "scene's own colours, PSNR is " +
+        fixed(number_of(m, "psnr_own_colours"), 2) + " dB.";
   }
   html += "</p>";
   if (m.contains("notes") && !m["notes"].empty()) {
