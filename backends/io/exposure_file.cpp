@@ -12,12 +12,14 @@ namespace {
 
 using nlohmann::json;
 
+constexpr char remedy[] = "take the exposures.json that gart train wrote beside the model";
+
 // `count` finite numbers of a view's field.
 template <class T>
 void read_numbers(json const& view, char const* key, std::size_t count, T* to, std::string const& where) {
   auto const refuse = [&] {
     throw io_error(where, std::string("'") + key + "' is not a list of " + std::to_string(count) + " finite numbers",
-                   "take the file that gart train wrote beside the model");
+                   remedy);
   };
   auto const found = view.find(key);
   if (found == view.end() || !found->is_array() || found->size() != count) refuse();
@@ -46,12 +48,11 @@ exposure_field read_exposures(std::filesystem::path const& path) {
   json const file = json::parse(bytes.begin(), bytes.end(), nullptr, false);
   auto const views = file.is_object() ? file.find("views") : file.end();
   if (!file.is_object() || views == file.end() || !views->is_array() || views->empty())
-    throw io_error(path.string(), "is no JSON object with a list 'views'",
-                   "take the exposures.json that gart train wrote beside the model");
+    throw io_error(path.string(), "is no JSON object with a list 'views'", remedy);
   std::vector<view_exposure> all;
   for (json const& view : *views) {
     std::string const where = path.string() + ": view " + std::to_string(all.size());
-    if (!view.is_object()) throw io_error(where, "is not an object", "take the file that gart train wrote");
+    if (!view.is_object()) throw io_error(where, "is not an object", remedy);
     view_exposure v;
     if (auto const name = view.find("name"); name != view.end() && name->is_string()) v.name = name->get<std::string>();
     read_numbers(view, "position", 3, &v.position.x, where);

@@ -4,6 +4,7 @@
 #include "history.hpp"
 #include "interrupt.hpp"
 #include "output.hpp"
+#include "process_memory.hpp"
 #include "progress.hpp"
 #include "report.hpp"
 #include "train_arguments.hpp"
@@ -19,8 +20,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-
-#include <sys/resource.h>
 
 namespace gart_cli {
 
@@ -39,16 +38,6 @@ class stopwatch {
   using clock = std::chrono::steady_clock;
   clock::time_point start_ = clock::now();
 };
-
-double peak_process_bytes() {
-  rusage use{};
-  getrusage(RUSAGE_SELF, &use);
-#if defined(__APPLE__)
-  return static_cast<double>(use.ru_maxrss);
-#else
-  return 1024.0 * static_cast<double>(use.ru_maxrss);
-#endif
-}
 
 // The running means that the progress line shows.
 struct recent_steps {

@@ -45,7 +45,7 @@ chosen<std::string> choose_tracer(capture_traits const& traits);
 chosen<std::string> choose_backward(capture_traits const& traits);
 
 // Exposures are learned where photographs of neighbouring poses differ in brightness by more than 3%, the median
-// (exposure/exposure.hpp), and the scene is unbounded; renderings and fixed exposures give 1 to 2%.
+// (exposure/exposure.hpp), and the scene is unbounded (what captures give: bench/results/exposure.json).
 chosen<bool> choose_exposure(capture_traits const& traits);
 
 // The capture's points, or random ones in its bounds. A capture's points lie on surfaces, and opacity 0.1 and a scale
