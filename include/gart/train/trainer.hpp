@@ -81,8 +81,9 @@ class trainer {
   using fallback_strategy = typename fallback_of<Strategy>::type;
 
   template <class Pass, class Loss>
-  void differentiate(Pass& pass, Loss&& loss, std::size_t view, render_options const& render, int degree);
-  void update(dataset_view const& view, int degree);
+  void differentiate(Pass& pass, Loss&& loss, std::size_t view, render_options const& render,
+                     learning_rates const& rates, int degree);
+  void update(dataset_view const& view, learning_rates const& rates, int degree);
   vec3 background_of(int step) const;
   static mcmc_options mcmc_options_of(train_options const& options) {
     mcmc_options m = options.mcmc;

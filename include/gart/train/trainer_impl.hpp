@@ -51,6 +51,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   std::size_t const index = order_.at(step_);
   dataset_view const& view = data_.train[index];
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
+  learning_rates const rates = rates_at(options_.rates, data_.extent, step_, options_.iterations);
   render_options render = options_.render;
   render.background = background_of(step_);
   auto const constant = std::as_const(scene_).view();
@@ -68,12 +69,12 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
     if constexpr (std::is_same_v<fallback_strategy, Strategy>)
       throw out_of_memory("LT budget", 0, options_.lt_budget, "this strategy has no smaller one: raise --lt-budget");
     prepare(fallback_, 0);
-    differentiate(fallback_, loss, index, render, degree);
+    differentiate(fallback_, loss, index, render, rates, degree);
   } else {
-    differentiate(backward_, loss, index, render, degree);
+    differentiate(backward_, loss, index, render, rates, degree);
   }
   ++step_;
-  update(view, degree);
+  update(view, rates, degree);
 
   step_report report;
   if (finite_) report.skipped = (*finite_)(scene_, state_, "step " + std::to_string(step_) + ", view " + view.name);
@@ -90,7 +91,8 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
 template <execution E, class Traits, class Tracer, class Strategy>
 template <class Pass, class Loss>
 void trainer<E, Traits, Tracer, Strategy>::differentiate(Pass& pass, Loss&& loss, std::size_t index,
-                                                         render_options const& render, int degree) {
+                                                         render_options const& render, learning_rates const& rates,
+                                                         int degree) {
   dataset_view const& view = data_.train[index];
   auto const constant = std::as_const(scene_).view();
   forward<sh_degree>(exec_, tracer_, constant, view.view, render, degree, pass.targets(color_.data()), pass.record());
@@ -99,7 +101,6 @@ void trainer<E, Traits, Tracer, Strategy>::differentiate(Pass& pass, Loss&& loss
     span<float const> const image = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
     loss(loss_input<E>{exec_, view, images_.get(exec_, index, render.background), view.view.width, view.view.height,
                        image, color_gradient_, value_});
-    learning_rates const rates = rates_at(options_.rates, data_.extent, step_, options_.iterations);
     if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }
   pass.template run<sh_degree>(exec_, tracer_, constant, records_.view(), view.view, render, degree, color_,
@@ -108,8 +109,7 @@ void trainer<E, Traits, Tracer, Strategy>::differentiate(Pass& pass, Loss&& loss
 
 // The optimizer's step and what grows, moves and prunes the Gaussians.
 template <execution E, class Traits, class Tracer, class Strategy>
-void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, int degree) {
-  learning_rates const rates = rates_at(options_.rates, data_.extent, step_ - 1, options_.iterations);
+void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, learning_rates const& rates, int degree) {
   bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
   if (use_mcmc) mcmc_.add_penalties(scene_, gradients_);
   if (use_adc) adc_.accumulate(scene_, gradients_, view.view);
