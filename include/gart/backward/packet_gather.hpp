@@ -22,7 +22,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
   static constexpr int band_groups = (bands + lane_count - 1) / lane_count;
 
   struct packet_data {
-    packet_block block;
+    int x, y;  // in the tile
     vec3_of<lanes> direction, gradient;
     lanes total, last_t;  // colour . gradient; the ray's last hit
     lane_words last_place;
@@ -31,6 +31,8 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
   struct scratch {
     packet_data data[packets];
   };
+
+  static_assert(Size <= packet_cell::most);
 
   gather_type gather;
 
@@ -56,7 +58,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
  private:
   // Pixels beyond the image are given the gradient zero and no hit.
   void load(packet_data& out, pixel_box const& area, packet_block const& block) const {
-    out.block = block, out.direction = pixel_directions(gather.view, block);
+    out.x = block.x % Size, out.y = block.y % Size, out.direction = pixel_directions(gather.view, block);
     for (int l = 0; l < lane_count; ++l) {
       pixel const at{block.x + packet_block::column(l), block.y + packet_block::row(l)};
       bool const inside = at.x < area.x1 && at.y < area.y1;
@@ -96,36 +98,60 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     }
   }
 
+  // A packet's hits of one Gaussian.
+  struct packet_hits {
+    packet_data const* at;
+    packet_slots slots;
+    lane_mask rays;
+    response_of<lanes> response;
+  };
+
+  // Of all packets of the tile, before the first is summed up: the steps of one evaluation wait for each other.
+  GART_INLINE int find(scratch const& s, packet_cell const& cell, ray_gaussian const& g,
+                       packet_hits (&found)[packets + 1]) const {
+    int count = 0;
+    for (packet_data const& at : s.data) {
+      packet_hits& h = found[count];
+      h.at = &at, h.slots = packet_slots(cell, at.x, at.y), h.rays = h.slots.inside;
+      if (!any(h.rays)) continue;
+      response_of<lanes> const r = h.response = evaluate<Response>(g, primary_ray_of<lanes>{at.direction});
+      if constexpr (recomputed)
+        h.rays &= is_hit(g, r, gather.near) &
+                  ((r.t < at.last_t) | ((r.t == at.last_t) & at_most(h.slots.places(), at.last_place)));
+      else
+        h.rays &= h.slots.written(gather.slots);
+      count += any(h.rays) ? 1 : 0;
+    }
+    return count;
+  }
+
   void sum(scratch const& s, pixel_box const& area, u32 id) const {
     lt_range const range = gather.ranges[id];
-    pixel_box const cell = intersect(range.box, area);
     ray_gaussian const& g = gather.records[id];
+    packet_hits found[packets + 1];
+    int const count = find(s, packet_cell(id, range, area), g, found);
+    if (Sums == gather_sums::atomic && count == 0) return;
+
     lanes sh_sum[2][3][band_groups];  // of even and of odd lanes: additions to one sum wait for each other
     lanes moment_sum[moment_count];
     for (auto& half : sh_sum)
       for (auto& channel : half)
         for (lanes& group : channel) group = 0.0f;
-    for (lanes& m : moment_sum) m = 0.0f;
+#pragma GCC unroll 16
+    for (int k = 0; k < moment_count; ++k) moment_sum[k] = 0.0f;
 
-    for (packet_data const& at : s.data) {
-      if (!at.block.overlaps(cell)) continue;
-      packet_slots const slots(range, cell, at.block);
-      response_of<lanes> const r = evaluate<Response>(g, primary_ray_of<lanes>{at.direction});
-      lane_mask hit = slots.inside;
-      if constexpr (recomputed)
-        hit &= is_hit(g, r, gather.near) &
-               ((r.t < at.last_t) | ((r.t == at.last_t) & at_most(slots.places(), at.last_place)));
-      else
-        hit &= slots.written(gather.slots);
-      if (!any(hit)) continue;
-
-      packet_entries const e = slots.template read<Terms::geometry>(gather.slots, hit);
+    for (int i = 0; i < count; ++i) {
+      packet_data const& at = *found[i].at;
+      lane_mask const hit = found[i].rays;
+      response_of<lanes> const& r = found[i].response;
+      packet_entries const e = found[i].slots.template read<Terms::geometry>(gather.slots, hit);
       // Geometry first: its steps wait for each other, and those of colour fill the time to the next packet's.
       if constexpr (Terms::geometry) {
         lanes const alpha = hit_alpha<Response>(g, r.d2);
         moments_of<lanes> const m =
             hit_moments<Response>(g, r, alpha_gradient(dot(e.opaque, at.gradient), at.total, alpha));
-        for (int i = 0; i < moment_count; ++i) moment_sum[i] += select(hit, m.v[i], 0.0f);
+#pragma GCC unroll 16
+        for (int k = 0; k < moment_count; ++k) moment_sum[k] += select(hit, m.v[k], 0.0f);
       }
       if constexpr (Terms::color) {
         alignas(lanes) float cg[3][lane_count];
@@ -145,7 +171,23 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
       write_in_turns(sh + 3 * lane_count * b, sh_stride - 3 * lane_count * b, sh_sum[0][0][b] + sh_sum[1][0][b],
                      sh_sum[0][1][b] + sh_sum[1][1][b], sh_sum[0][2][b] + sh_sum[1][2][b]);
     sums_of(moment_sum, moments);
-    gather.finish(range.box, area, id, sh, reinterpret_cast<float const(&)[moment_stride]>(moments));
+    if constexpr (Sums == gather_sums::atomic)
+      add(id, sh, moments);
+    else
+      gather.finish(range.box, area, id, sh, reinterpret_cast<float const(&)[moment_stride]>(moments));
+  }
+
+  // Under one lock for both rows.
+  GART_INLINE void add(u32 id, float const* sh, float const* moments) const {
+    float* const sh_row = gather.sh_gradient + static_cast<std::size_t>(sh_stride) * id;
+    float* const moment_row = gather.moments_out + static_cast<std::size_t>(moment_stride) * id;
+    int const active = 3 * sh_coefficients(gather.active_degree);
+    E::exclusively(moment_row, [&] {
+      if constexpr (Terms::color)
+        for (int k = 0; k < active; ++k) sh_row[k] += sh[k];
+      if constexpr (Terms::geometry)
+        for (int k = 0; k < moment_count; ++k) moment_row[k] += moments[k];
+    });
   }
 
   static lanes dot(vec3_of<lanes> const& a, vec3_of<lanes> const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }

@@ -3,8 +3,7 @@
 // pixels lie one after another, rows the width of the cell apart.
 
 #include <gart/backward/lt_slot.hpp>
-#include <gart/tiles/layout.hpp>
-#include <gart/trace/packet_block.hpp>
+#include <gart/trace/packet_cell.hpp>
 
 #include <type_traits>
 
@@ -24,12 +23,11 @@ class packet_slots {
   lane_mask inside;  // the pixels that have a slot
 
   packet_slots() = default;
-  // `cell`: the part of the Gaussian's box that lies in the packet's tile.
-  GART_INLINE packet_slots(lt_range const& range, pixel_box const& cell, packet_block const& block)
-      : inside(block.within(cell)),
-        width_(static_cast<int>(cell.width())),
-        first_(static_cast<std::ptrdiff_t>(range.offset) + tile_offset(range.box, cell) + (block.y - cell.y0) * width_ +
-               (block.x - cell.x0)) {}
+  // Of the packet at (x, y) in the tile.
+  GART_INLINE packet_slots(packet_cell const& cell, int x, int y)
+      : inside(cell.inside(x, y)),
+        width_(static_cast<int>(cell.width)),
+        first_(cell.first + static_cast<std::ptrdiff_t>(y) * width_ + x) {}
 
   // Numbers of the slots, for lanes inside.
   GART_INLINE lane_words places() const {

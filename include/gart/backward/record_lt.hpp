@@ -30,9 +30,8 @@ struct record_lt {
 
 #if !defined(__CUDACC__)
   using note = packet_slots;
-  GART_INLINE note expect(u32 id, packet_block const& block) const {
-    lt_range const range = ranges[id];
-    packet_slots const at(range, cell_of<Size>(range.box, static_cast<u32>(block.x), static_cast<u32>(block.y)), block);
+  GART_INLINE note expect(packet_cell const& cell, packet_block const& block) const {
+    packet_slots const at(cell, block.x % Size, block.y % Size);
     at.fetch_to_write(slots);
     return at;
   }

@@ -14,6 +14,8 @@
 //   template <int N> static void atomic_add_row(float* row, float const (&values)[N], int n);
 //       in kernels: row[0..n) += values as one row; values past n are zero; a row of a multiple of 4 floats is aligned
 //       to 16 bytes, and no other function adds to it in the same launch
+//   template <class F> static void exclusively(void const* what, F f);
+//       in kernels, of host policies: calls f while no other thread is in a call for the same `what`
 //   static void fence();                   in kernels: what was written before is seen by who sees what comes after
 //   profiler profile; memory_use memory;
 // copy_out waits for the data; all else is ordered on the queue. The source of copy_in may be reused on return.

@@ -22,15 +22,21 @@ class openmp_exec : public host_memory {
   static T atomic_add(T* p, T v) {
     return std::atomic_ref<T>(*p).fetch_add(v, std::memory_order_relaxed);
   }
-  // One lock from a striped table and plain vector adds: x86 has no atomic float add, and a compare-and-swap for each
-  // of tens of floats costs more than the rest of a hit.
-  template <int N>
-  static void atomic_add_row(float* row, float const (&values)[N], int n) {
-    auto& lock = row_locks[(reinterpret_cast<std::uintptr_t>(row) >> 4) * 0x9E3779B97F4A7C15ull >> 52];
+  // Calls f while no other thread is in a call for the same `what`. One lock from a striped table: x86 has no atomic
+  // float add, and a compare-and-swap for each of tens of floats costs more than the rest of a hit.
+  template <class F>
+  static void exclusively(void const* what, F&& f) {
+    auto& lock = row_locks[(reinterpret_cast<std::uintptr_t>(what) >> 4) * 0x9E3779B97F4A7C15ull >> 52];
     while (lock.test_and_set(std::memory_order_acquire)) {
     }
-    for (int i = 0; i < n; ++i) row[i] += values[i];
+    f();
     lock.clear(std::memory_order_release);
+  }
+  template <int N>
+  static void atomic_add_row(float* row, float const (&values)[N], int n) {
+    exclusively(row, [&] {
+      for (int i = 0; i < n; ++i) row[i] += values[i];
+    });
   }
   static void fence() { std::atomic_thread_fence(std::memory_order_seq_cst); }
 

@@ -12,6 +12,7 @@
 #include <gart/exec/serial.hpp>
 #include <gart/exec/stage.hpp>
 
+#include <algorithm>
 #include <memory>
 
 namespace gart {
@@ -64,10 +65,13 @@ template <tile_kernel K>
 void parallel_for(openmp_exec& exec, char const* label, tile_range range, K const& kernel) {
   if (range.tiles == 0) return;
   stage_scope scope(exec, label);
+  // Tiles that lie together go to one thread: neighbours write to the same Gaussians, and a line that two cores write to
+  // goes to and fro between them.
+  index_t const chunk = std::max<index_t>(1, range.tiles / static_cast<index_t>(16 * exec.threads()));
 #pragma omp parallel num_threads(exec.threads())
   {
     auto scratch = std::make_unique_for_overwrite<typename K::scratch>();
-#pragma omp for schedule(dynamic, 4)
+#pragma omp for schedule(dynamic, chunk)
     for (index_t t = 0; t < range.tiles; ++t) {
       host_team<typename K::scratch> team(t, *scratch);
       kernel(team);

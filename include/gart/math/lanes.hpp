@@ -141,6 +141,7 @@ GART_INLINE void sums_of(lanes const (&a)[N], float (&out)[16]) {
 #if defined(GART_LANES_AVX512)
   // Numbers and lanes change places, and halves are added, until each lane holds one number's sum.
   __m512 x[16];
+#pragma GCC unroll 16
   for (int k = 0; k < 16; ++k) x[k] = k < N ? (__m512)a[k < N ? k : 0].v : _mm512_setzero_ps();
   for (int k = 0; k < 8; ++k)
     x[k] = _mm512_add_ps(_mm512_maskz_unpacklo_ps(0xffff, x[2 * k], x[2 * k + 1]),

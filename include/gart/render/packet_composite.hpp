@@ -42,11 +42,13 @@ struct packet_composite {
     return s;
   }
 
-  GART_INLINE note expect(state const& s, u32 id) const {
+  GART_INLINE note expect(state const& s, packet_cell const& cell) const {
+    return program.record.expect(cell, s.block);
+  }
+  GART_INLINE void fetch(u32 id) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
     float const* const row = program.sh + stride * id;
     for (std::size_t k = 0; k < stride; k += 16) prefetch(row + k);
-    return program.record.expect(id, s.block);
   }
 
   GART_INLINE shaded shade(state const& s, u32 id) const {

@@ -8,7 +8,7 @@
 #include <gart/render/pixels.hpp>
 #include <gart/tiles/layout.hpp>
 #include <gart/trace/hit.hpp>
-#include <gart/trace/packet_block.hpp>
+#include <gart/trace/packet_cell.hpp>
 
 namespace gart {
 
@@ -21,7 +21,7 @@ struct record_none {
 
 #if !defined(__CUDACC__)
   struct note {};
-  note expect(u32 /*id*/, packet_block const&) const { return {}; }
+  note expect(packet_cell const&, packet_block const&) const { return {}; }
   lane_words operator()(note, lane_mask, vec3_of<lanes> const&, lanes, vec3_of<lanes> const&) const {
     return every_lane(0);
   }

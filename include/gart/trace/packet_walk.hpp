@@ -6,15 +6,18 @@
 // opposite orders no one place suits all hits of a candidate, and it takes two rows.
 //
 // A packet program is the ray program for packets:
-//   begin(block)                      the state of a block's rays; says `directions` and which lanes are `inside`
-//   expect(state, id)                 a note on a Gaussian that was hit; what its hits will read and write may be
-//   fetched shade(state, id)                  what it shows each ray, of type `shaded` on_hit(state, lanes, t, alpha,
-//   shaded, note)  composites its hits with the rays of a mask; the rays that go on end(state)
+// - begin(block): the state of a block's rays; says `directions` and which lanes are `inside`
+// - expect(state, cell): a note on a Gaussian that may be hit; what its hits will write may be fetched
+// - fetch(id): a Gaussian was hit; what shade will read may be fetched
+// - shade(state, id): what it shows each ray, of type `shaded`
+// - on_hit(state, lanes, t, alpha, shaded, note): composites its hits with the rays of a mask; the rays that go on
+// - end(state)
+//
 // A packet that has more hits waiting than there are rows for says so, and its rays are traced one by one.
 
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/tiles/tile_map.hpp>
-#include <gart/trace/packet_block.hpp>
+#include <gart/trace/packet_cell.hpp>
 #include <gart/trace/ray_program.hpp>
 
 #if !defined(__CUDACC__)
@@ -26,7 +29,10 @@ namespace gart {
 template <class Response, int Window, int Size, class P>
 class packet_walk {
  public:
-  static_assert(Size % packet_block::width == 0 && Size % packet_block::height == 0);
+  static_assert(Size % packet_block::width == 0 && Size % packet_block::height == 0 && Size <= packet_cell::most);
+
+  // To be called before the first packet of a tile, whose pixels are `area`.
+  void enter(pixel_box const& area) { area_ = area, loaded_ = ~u32{0}; }
 
   // False where more hits waited than there is room for; nothing then counts.
   bool operator()(P const& program, traced_scene const& scene, tile_map_view const& map, lt_range const* ranges,
@@ -37,23 +43,23 @@ class packet_walk {
     lanes const cosine = (d.x * lanes(forward.x) + d.y * lanes(forward.y) + d.z * lanes(forward.z)) * lanes(1.000002f);
     alive_ = state.inside, farthest_ = 0.0f, count_ = used_ = 0, free_ = ends;
     pool_[ends].nearer = pool_[ends].farther = ends;
-    u32 const* const list = map.primitives.data();
+    int const x = block.x % Size, y = block.y % Size;
     u32 const end = map.offsets[tile + 1];
-    int since = 0;
-    for (u32 k = map.offsets[tile]; k < end; ++k) {
-      u32 const id = list[k];
-      if (k + ahead < end) prefetch(&scene.gaussians[list[k + ahead]]), prefetch(&ranges[list[k + ahead]]);
-      if (!block.overlaps(ranges[id].box)) continue;
-      if (++since >= stride && count_ >= often) {
-        since = 0;
-        pass_on(program, state, cosine, map.depth(k));
-        if (!any(alive_)) break;
+    for (u32 first = map.offsets[tile]; first < end && any(alive_); first += most) {
+      int const cells = load(scene, map, ranges, first, end);
+      for (int k = 0; k < cells;) {
+        float const bound = map.depth(first + static_cast<u32>(k));
+        int n = 0;
+        for (; k < cells && n < batch; ++k) {
+          near_[n] = static_cast<u16>(k);
+          n += any(cells_[k].inside(x, y)) ? 1 : 0;
+        }
+        if (count_ >= often) {
+          pass_on(program, state, cosine, bound);
+          if (!any(alive_)) break;
+        }
+        if (!take(program, scene, state, d, n)) return false;
       }
-      ray_gaussian const& g = scene.gaussians[id];
-      response_of<lanes> const r = evaluate<Response>(g, primary_ray_of<lanes>{d});
-      lane_mask const hit = alive_ & is_hit(g, r, scene.near);
-      if (!any(hit)) continue;
-      if (!insert({r.t, hit_alpha<Response>(g, r.d2), hit, id, program.expect(state, id)})) return false;
     }
     pass_on(program, state, cosine, everything);
     program.end(state);
@@ -62,11 +68,12 @@ class packet_walk {
 
  private:
   static constexpr int rows = 32 * Window;
-  static constexpr int stride = 16;   // candidates between two looks at what has become certain
+  static constexpr int batch = 16;    // candidates between two looks at what has become certain
   static constexpr int often = 12;    // rows below which looking does not pay
+  static constexpr u32 most = 256;    // candidates of a tile looked at at a time
+  static constexpr u32 ahead = 6;     // whose ranges are fetched while one is looked at
   static constexpr int together = 4;  // rows shaded at a time
   static constexpr int crowded = rows / 2;
-  static constexpr u32 ahead = 6;          // candidates whose records are fetched while one is looked at
   static constexpr float everything = -1;  // no bound: the list is at its end
 
   static constexpr u16 ends = rows;  // before the first and behind the last
@@ -81,6 +88,46 @@ class packet_walk {
     u16 nearer, farther;  // its neighbours
   };
 
+  // The tile's candidates from `first` on, once for all packets of a tile that has no more of them.
+  int load(traced_scene const& scene, tile_map_view const& map, lt_range const* ranges, u32 first, u32 end) {
+    u32 const n = end - first < most ? end - first : most;
+    if (loaded_ == first) return static_cast<int>(n);
+    u32 const* const list = map.primitives.data() + first;
+    for (u32 k = 0; k < n; ++k) {
+      if (k + ahead < n) prefetch(&ranges[list[k + ahead]]);
+      prefetch(&scene.gaussians[list[k]]);
+      cells_[k] = packet_cell(list[k], ranges[list[k]], area_);
+    }
+    loaded_ = first;
+    return static_cast<int>(n);
+  }
+
+  // The hits of the batch's n candidates. All are evaluated before the first is put in its place: the steps of one
+  // evaluation wait for each other, and where a hit goes is what a processor guesses wrong.
+  template <class State>
+  GART_INLINE bool take(P const& program, traced_scene const& scene, State const& state, vec3_of<lanes> const& d,
+                        int n) {
+    int count = 0;
+    for (int i = 0; i < n; ++i) {
+      packet_cell const& cell = cells_[near_[i]];
+      ray_gaussian const& g = scene.gaussians[cell.id];
+      response_of<lanes> const r = evaluate<Response>(g, primary_ray_of<lanes>{d});
+      hits& h = found_[count];
+      h.t = r.t, h.alpha = r.d2, h.rays = alive_ & is_hit(g, r, scene.near), h.id = cell.id;
+      h.note = program.expect(state, cell);
+      count += any(h.rays) ? 1 : 0;
+    }
+    for (int i = 0; i < count; ++i) {
+      hits& h = found_[i];
+      h.alpha = hit_alpha<Response>(scene.gaussians[h.id], h.alpha);
+    }
+    for (int i = 0; i < count; ++i) {
+      program.fetch(found_[i].id);
+      if (!insert(found_[i])) return false;
+    }
+    return true;
+  }
+
   // Hits behind all others of their rays stand last; the rest go forward from there. A hit may stand behind the last
   // row that it must follow and before the first that must follow it; rays that share a gap share a row.
   GART_INLINE bool insert(hits const& h) {
@@ -90,7 +137,8 @@ class packet_walk {
     for (u16 at = pool_[ends].nearer; any(left) && at != ends; at = pool_[at].nearer) {
       row const& other = pool_[at];
       lane_mask const both = left & other.rays;
-      lane_mask const nearer = both & (h.id < other.id ? h.t <= other.t : h.t < other.t), farther = both & ~nearer;
+      lane_mask const first = lanes_of(h.id < other.id ? ~u32{0} : u32{0});  // of two at one t; ids are no guess
+      lane_mask const nearer = both & ((h.t < other.t) | (first & (h.t == other.t))), farther = both & ~nearer;
       settled |= farther, left &= ~farther;
       if (any(nearer)) {
         if (any(settled) && !put(h, settled, gap)) return false;
@@ -164,6 +212,12 @@ class packet_walk {
   u16 used_ = 0;     // rows taken so far,
   u16 free_ = ends;  // and those of them that are free again, linked by `farther`
   row pool_[rows + 1];
+
+  pixel_box area_;
+  packet_cell cells_[most];  // of the tile's list, from entry loaded_ of the map on
+  u32 loaded_;
+  u16 near_[batch + 1];  // those of a batch whose boxes the packet overlaps
+  hits found_[batch + 1];
 };
 
 }  // namespace gart

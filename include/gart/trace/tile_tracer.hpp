@@ -115,6 +115,7 @@ struct walk_tile_packets {
   void operator()(Team const& team) const {
     pixel_box const tile = rays.grid.tile(team.tile());
     packets const program = packets_of(rays.program);
+    team.scratch().enter(tile);
     for (int y = tile.y0; y < tile.y1; y += packet_block::height)
       for (int x = tile.x0; x < tile.x1; x += packet_block::width)
         if (!team.scratch()(program, rays.scene, rays.map, ranges, rays.forward, team.tile(), {x, y}))
