@@ -183,7 +183,8 @@ class training_run {
       if (report.backward != row_.backward && !fell_back_) {
         fell_back_ = true;
         say_.note("step " + with_commas(report.step) +
-                  ": the LT buffer would pass --lt-budget, this step and others like it are " + report.backward);
+                  ": the LT buffer would pass --lt-budget or its 2^32 slots, this step and others like it are " +
+                  report.backward);
       }
       if (!std::isfinite(report.loss)) {
         throw gart::error("step " + std::to_string(report.step) + ", view " + report.view +

@@ -79,6 +79,9 @@ TEST_CASE_TEMPLATE("sums past 2^32 and pairs past 2^31", E, GART_TEST_POLICIES) 
   gart::backward<E, gart::primitive_strategy> pass(exec);
   CHECK_FALSE(pass.prepare(exec, no_tracer{}, scene.view(), view, 1.0f / 255, 0.01f, u64{1} << 40));
   CHECK(pass.lt_bytes() == 0);
+  // Nor are slots that have no number of 32 bits.
+  CHECK_FALSE(pass.prepare(exec, no_tracer{}, scene.view(), view, 1.0f / 255, 0.01f));
+  CHECK(pass.lt_bytes() == 0);
 }
 
 TEST_CASE_TEMPLATE("more bytes than there are, and more than can be counted", E, GART_TEST_POLICIES) {

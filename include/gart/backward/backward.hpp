@@ -63,8 +63,9 @@ class backward {
 
   explicit backward(E& exec) : moments_(exec), own_prints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec) {}
 
-  // After the tracer's own preparation: a tracer that has the view's footprints lends them. False, and
-  // nothing allocated, where the LT buffer would take more than byte_budget (0: no limit).
+  // After the tracer's own preparation: a tracer that has the view's footprints lends them. False, and nothing
+  // allocated, where the LT buffer would take more than byte_budget (0: no limit) or have more slots than there are
+  // numbers of 32 bits, by which hits know theirs.
   template <class Tracer>
   bool prepare(E& exec, Tracer const& tracer, gaussians_view<float const> scene, camera const& view, float alpha_min,
                float near, u64 byte_budget = 0) {
@@ -77,12 +78,7 @@ class backward {
         prints_ = &own_prints_;
       }
       if (byte_budget && prints_->slots() * sizeof(entry) > byte_budget) return false;
-      // Hits know their slot by its number, of 32 bits.
-      if (prints_->slots() >= 0xffffffffu)
-        throw out_of_memory("LT buffer", prints_->slots() * sizeof(entry), 0,
-                            std::to_string(prints_->slots()) +
-                                " slots, and a buffer holds 2^32: raise --downscale, lower --max-gaussians or take "
-                                "--backward pixel");
+      if (prints_->slots() >= slot_cell::none) return false;
       // On a device sorted by cover also where the tracer has lists sorted by depth: lanes in step are worth the sort.
       if constexpr (!E::device && requires { tracer.map(); }) {
         lists_ = tracer.map();

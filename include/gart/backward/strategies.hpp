@@ -32,6 +32,7 @@ struct hybrid_strategy {
   using record = record_lt<weight_entry, Size>;
   using gather = terms<color>;
   using scatter = terms<geometry>;
+  using fallback = pixel_strategy;  // where there are more slots than numbers for them
 };
 
 // Four channels; no ray is traced twice.

@@ -83,7 +83,10 @@ class compiled_renderer final : public renderer {
     records_.template prepare<typename Traits::response>(exec_, scene, view.position, options.alpha_min);
     configure(tracer_, options);
     tracer_.prepare(exec_, scene, records_.view(), view, options.alpha_min, options.near);
-    pass_.prepare(exec_, tracer_, scene, view, options.alpha_min, options.near);
+    if (!pass_.prepare(exec_, tracer_, scene, view, options.alpha_min, options.near))
+      throw out_of_memory("LT buffer", 0, 0,
+                          "the view has more slots than the 2^32 that can be numbered: render it smaller, or take "
+                          "--backward pixel");
     forward<sh_degree>(exec_, tracer_, scene, view, options, sh_degree, pass_.targets(color_.data()), pass_.record());
     pass_.template run<sh_degree>(exec_, tracer_, scene, records_.view(), view, options, sh_degree, color_,
                                   color_gradient_, gradients_);

@@ -64,7 +64,7 @@ class trainer {
   void save(std::filesystem::path const& path) const { write_checkpoint(path, state()); }
   void load(std::filesystem::path const& path) { set_state(read_checkpoint(path, sh_degree)); }
   exposure_field exposures() const;  // of the views that were trained on; empty where none are learned
-  std::size_t lt_bytes() const { return fell_back_ ? fallback_.lt_bytes() : backward_.lt_bytes(); }
+  std::size_t lt_bytes() const { return lt_bytes_; }  // of the last step
   gaussians<E>& scene() { return scene_; }
   gaussians<E> const& gradients() const { return gradients_; }
 
@@ -79,6 +79,7 @@ class trainer {
     using type = typename S::fallback;
   };
   using fallback_strategy = typename fallback_of<Strategy>::type;
+  using last_strategy = typename fallback_of<fallback_strategy>::type;
 
   template <class Pass, class Loss>
   void differentiate(Pass& pass, Loss&& loss, std::size_t view, render_options const& render,
@@ -106,6 +107,7 @@ class trainer {
   Tracer tracer_;
   backward<E, Strategy, tile_size_of<Tracer>> backward_;
   backward<E, fallback_strategy, tile_size_of<Tracer>> fallback_;
+  backward<E, last_strategy, tile_size_of<Tracer>> last_;
   image_loss<E> loss_;
   training_images<E> images_;
   view_order order_;
@@ -116,7 +118,7 @@ class trainer {
   std::optional<finite_check<E>> finite_;          // where options.check_finite asks for it
   int step_ = 0;
   float growth_ = 1;
-  bool fell_back_ = false;
+  std::size_t lt_bytes_ = 0;
 };
 
 }  // namespace gart

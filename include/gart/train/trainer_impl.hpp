@@ -22,6 +22,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       tracer_(exec),
       backward_(exec),
       fallback_(exec),
+      last_(exec),
       loss_(exec),
       images_(data),
       order_(data.train.size(), options.held_out, options.seed),
@@ -61,17 +62,17 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   records_.template prepare<typename Traits::response>(exec_, constant, view.view.position, render.alpha_min);
   configure(tracer_, render);
   tracer_.prepare(exec_, constant, records_.view(), view.view, render.alpha_min, render.near);
-  auto const prepare = [&](auto& pass, u64 budget) {
-    return pass.prepare(exec_, tracer_, constant, view.view, render.alpha_min, render.near, budget);
+  // With less memory where the LT buffer would pass its budget, and with none where it would pass all numbers.
+  auto const with = [&](auto& pass, u64 budget) {
+    if (!pass.prepare(exec_, tracer_, constant, view.view, render.alpha_min, render.near, budget)) return false;
+    differentiate(pass, loss, index, render, rates, degree);
+    lt_bytes_ = pass.lt_bytes();
+    return true;
   };
-  fell_back_ = !prepare(backward_, options_.lt_budget);
-  if (fell_back_) {
-    if constexpr (std::is_same_v<fallback_strategy, Strategy>)
-      throw out_of_memory("LT budget", 0, options_.lt_budget, "this strategy has no smaller one: raise --lt-budget");
-    prepare(fallback_, 0);
-    differentiate(fallback_, loss, index, render, rates, degree);
-  } else {
-    differentiate(backward_, loss, index, render, rates, degree);
+  char const* used = Strategy::name;
+  if (!with(backward_, options_.lt_budget)) {
+    used = fallback_strategy::name;
+    if (!with(fallback_, 0)) used = last_strategy::name, with(last_, 0);
   }
   ++step_;
   update(view, rates, degree);
@@ -81,7 +82,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   report.step = step_;
   report.gaussians = scene_.size();
   report.view = view.name;
-  report.backward = fell_back_ ? fallback_strategy::name : Strategy::name;
+  report.backward = used;
   std::vector<float> const value = value_.to_host();
   report.loss = value[0];
   report.psnr = value[1] > 0 ? -10.0f * std::log10(value[1]) : 99.0f;
