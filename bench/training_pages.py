@@ -47,6 +47,8 @@ class TrainingPages:
             of = {r["name"].replace("preset=", ""): r for r in trade["runs"]} if trade else {}
             for r in result["runs"]:
                 a, t = r["approximations"], of.get(r["preset"])
+                if t and any(abs(t["approximations"][k] - a[k]) > 1e-6 for k in ("alpha_min", "t_min")):
+                    t = None  # of a preset that was another then
                 rows.append([result["scene"], r["preset"], f"{a['alpha_min']:.3g}", f"{a['t_min']:.3g}"] +
                             ([f"{t['image']['psnr']:.1f}", f"{t['gradient_worst']:.1e}", f"{t[clock_of(trade)]:.1f}"] if t
                              else ["", "", ""]) +

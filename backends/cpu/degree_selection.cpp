@@ -53,7 +53,7 @@ class degree_selection final : public session {
         data_(data),
         plan_(plan),
         gain_wanted_(options.sh_gain),
-        interval_(plan.sh_every),
+        interval_(sh_interval(plan.degree, options.sh_every, options.iterations)),
         start_degree_(std::min(degree_in_use(start), plan.degree)),
         never_trained_(options.held_out) {
     options_.sh_gain = 0;
@@ -196,9 +196,7 @@ class degree_selection final : public session {
 trial_plan plan_trials(row_request const& request, train_options const& options, std::size_t train_views) {
   trial_plan plan;
   plan.degree = request.sh_degree;
-  // Early, since views that are held out are missed; late enough for a band to have shown what it is worth.
-  plan.sh_every = std::clamp(options.iterations / (10 * std::max(plan.degree, 1)), 1, options.sh_every);
-  plan.begin = std::clamp(2 * plan.degree * plan.sh_every, options.iterations / 4, options.iterations / 2);
+  plan.begin = options.iterations / 2;
   plan.steps = std::max(fewest_steps, options.iterations / 50);
   std::size_t const views = std::clamp(train_views / 20, least_held_out, most_held_out);
   if (plan.degree == 0) {

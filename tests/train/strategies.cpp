@@ -3,6 +3,7 @@
 
 #include <gart/train/trainer.hpp>
 
+#include <string>
 #include <vector>
 
 using namespace gart_test;
@@ -13,19 +14,24 @@ constexpr int steps = 150;
 
 struct course {
   std::vector<float> loss;
+  std::string backward;  // of the last step
   gart::gaussian_model model;
 };
 
 template <class Strategy, class E>
-course train(E& exec, gart::dataset const& data, std::uint64_t seed) {
+course train(E& exec, gart::dataset const& data, std::uint64_t seed, std::uint64_t lt_budget = 0) {
   gart::train_options options;
+  options.lt_budget = lt_budget;
   options.iterations = steps;
   options.densify = gart::densify_kind::none;
   options.sh_degree = 1;
   gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy> run(exec, options, data,
                                                                               cloud(seed + 1, 0.7f));
   course out;
-  for (int i = 0; i < steps; ++i) out.loss.push_back(run.step().loss);
+  for (int i = 0; i < steps; ++i) {
+    auto const report = run.step();
+    out.loss.push_back(report.loss), out.backward = report.backward;
+  }
   out.model = run.model();
   return out;
 }
@@ -51,6 +57,24 @@ TEST_CASE_TEMPLATE("every strategy trains along the same loss curve", E, GART_TE
       CAPTURE(i);
       CHECK(other.loss[i] == doctest::Approx(reference.loss[i]).epsilon(i < 20 ? 1e-3 : 2e-2));
     }
+  }
+}
+
+TEST_CASE_TEMPLATE("steps whose LT buffer has no room are done with less, to the same effect", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  auto const data = capture(exec, seed);
+  auto const reference = train<gart::primitive_strategy>(exec, data, seed);
+  auto const less = train<gart::primitive_strategy>(exec, data, seed, 1);
+  auto const none = train<gart::hybrid_strategy>(exec, data, seed, 1);
+  CHECK(reference.backward == "primitive");
+  CHECK(less.backward == "hybrid");
+  CHECK(none.backward == "pixel");
+  for (int i = 0; i < 20; ++i) {
+    CAPTURE(i);
+    CHECK(less.loss[i] == doctest::Approx(reference.loss[i]).epsilon(1e-3));
+    CHECK(none.loss[i] == doctest::Approx(reference.loss[i]).epsilon(1e-3));
   }
 }
 

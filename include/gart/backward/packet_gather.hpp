@@ -98,40 +98,10 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     }
   }
 
-  // A packet's hits of one Gaussian.
-  struct packet_hits {
-    packet_data const* at;
-    packet_slots slots;
-    lane_mask rays;
-    response_of<lanes> response;
-  };
-
-  // Of all packets of the tile, before the first is summed up: the steps of one evaluation wait for each other.
-  GART_INLINE int find(scratch const& s, packet_cell const& cell, ray_gaussian const& g,
-                       packet_hits (&found)[packets + 1]) const {
-    int count = 0;
-    for (packet_data const& at : s.data) {
-      packet_hits& h = found[count];
-      h.at = &at, h.slots = packet_slots(cell, at.x, at.y), h.rays = h.slots.inside;
-      if (!any(h.rays)) continue;
-      response_of<lanes> const r = h.response = evaluate<Response>(g, primary_ray_of<lanes>{at.direction});
-      if constexpr (recomputed)
-        h.rays &= is_hit(g, r, gather.near) &
-                  ((r.t < at.last_t) | ((r.t == at.last_t) & at_most(h.slots.places(), at.last_place)));
-      else
-        h.rays &= h.slots.written(gather.slots);
-      count += any(h.rays) ? 1 : 0;
-    }
-    return count;
-  }
-
   void sum(scratch const& s, pixel_box const& area, u32 id) const {
     lt_range const range = gather.ranges[id];
+    packet_cell const cell(id, range, area);
     ray_gaussian const& g = gather.records[id];
-    packet_hits found[packets + 1];
-    int const count = find(s, packet_cell(id, range, area), g, found);
-    if (Sums == gather_sums::atomic && count == 0) return;
-
     lanes sh_sum[2][3][band_groups];  // of even and of odd lanes: additions to one sum wait for each other
     lanes moment_sum[moment_count];
     for (auto& half : sh_sum)
@@ -140,10 +110,31 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
 #pragma GCC unroll 16
     for (int k = 0; k < moment_count; ++k) moment_sum[k] = 0.0f;
 
+    // All packets are evaluated before the first is summed up: the steps of one wait for each other.
+    struct {
+      response_of<lanes> r;
+      lane_mask hit;
+      packet_slots slots;
+      packet_data const* at;
+    } found[packets + 1];
+    int count = 0;
+    for (packet_data const& at : s.data) {
+      auto& f = found[count];
+      f.at = &at, f.slots = packet_slots(cell, at.x, at.y);
+      if (!any(f.slots.inside)) continue;
+      f.r = evaluate<Response>(g, primary_ray_of<lanes>{at.direction});
+      f.hit = f.slots.inside;
+      if constexpr (recomputed)
+        f.hit &= is_hit(g, f.r, gather.near) &
+                 ((f.r.t < at.last_t) | ((f.r.t == at.last_t) & at_most(f.slots.places(), at.last_place)));
+      else
+        f.hit &= f.slots.written(gather.slots);
+      count += any(f.hit) ? 1 : 0;
+    }
     for (int i = 0; i < count; ++i) {
       packet_data const& at = *found[i].at;
-      lane_mask const hit = found[i].rays;
-      response_of<lanes> const& r = found[i].response;
+      lane_mask const hit = found[i].hit;
+      response_of<lanes> const& r = found[i].r;
       packet_entries const e = found[i].slots.template read<Terms::geometry>(gather.slots, hit);
       // Geometry first: its steps wait for each other, and those of colour fill the time to the next packet's.
       if constexpr (Terms::geometry) {
@@ -171,23 +162,20 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
       write_in_turns(sh + 3 * lane_count * b, sh_stride - 3 * lane_count * b, sh_sum[0][0][b] + sh_sum[1][0][b],
                      sh_sum[0][1][b] + sh_sum[1][1][b], sh_sum[0][2][b] + sh_sum[1][2][b]);
     sums_of(moment_sum, moments);
-    if constexpr (Sums == gather_sums::atomic)
-      add(id, sh, moments);
-    else
+    if constexpr (Sums == gather_sums::atomic) {
+      // One lock for both rows.
+      float* const moments_row = gather.moments_out + static_cast<std::size_t>(moment_stride) * id;
+      float* const sh_row = gather.sh_gradient + static_cast<std::size_t>(sh_stride) * id;
+      int const active = 3 * sh_coefficients(gather.active_degree);
+      E::exclusively(moments_row, [&] {
+        if constexpr (Terms::color)
+          for (int i = 0; i < active; ++i) sh_row[i] += sh[i];
+        if constexpr (Terms::geometry)
+          for (int i = 0; i < moment_count; ++i) moments_row[i] += moments[i];
+      });
+    } else {
       gather.finish(range.box, area, id, sh, reinterpret_cast<float const(&)[moment_stride]>(moments));
-  }
-
-  // Under one lock for both rows.
-  GART_INLINE void add(u32 id, float const* sh, float const* moments) const {
-    float* const sh_row = gather.sh_gradient + static_cast<std::size_t>(sh_stride) * id;
-    float* const moment_row = gather.moments_out + static_cast<std::size_t>(moment_stride) * id;
-    int const active = 3 * sh_coefficients(gather.active_degree);
-    E::exclusively(moment_row, [&] {
-      if constexpr (Terms::color)
-        for (int k = 0; k < active; ++k) sh_row[k] += sh[k];
-      if constexpr (Terms::geometry)
-        for (int k = 0; k < moment_count; ++k) moment_row[k] += moments[k];
-    });
+    }
   }
 
   static lanes dot(vec3_of<lanes> const& a, vec3_of<lanes> const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }

@@ -4,9 +4,9 @@
 // floats for them (11 + 3 (degree + 1)^2 a Gaussian: 14, 23, 38 or 59).
 //
 // The course. Storage follows the schedule of degrees (optim/schedule.hpp): a band gets memory at the step it is first
-// used in, which changes no bit of the training. A few training views, evenly spread, are held out. From a quarter of the
-// run on (later where the last band comes later, at half of it at the latest) the highest band is on trial: it goes or
-// stays, and where it went the next one is tried. Then the views that were held out join the training.
+// used in, which changes no bit of the training. A few training views, evenly spread, are held out. From half the run
+// on the highest band is on trial: it goes or stays, and where it went the next one is tried. Then the views that were
+// held out join the training.
 //
 // A trial is a branching. From one state (parameters, moments, step) `steps` steps are trained with the band and as
 // many without, on the same views, random numbers and rates, and the mean PSNR of the held-out views is compared where
@@ -37,7 +37,6 @@ namespace gart {
 
 struct trial_plan {
   int degree = 0;                     // the most that is stored
-  int sh_every = 1;                   // steps after which another band is used
   int begin = 0;                      // step of the first trial
   int steps = 0;                      // of a branch
   std::vector<std::size_t> held_out;  // training views by index; empty: nothing is measured, every band is stored
