@@ -112,7 +112,7 @@ class packet_walk {
       packet_cell const& cell = cells_[near_[i]];
       ray_gaussian const& g = scene.gaussians[cell.id];
       response_of<lanes> const r = evaluate<Response>(g, primary_ray_of<lanes>{d});
-      hits& h = found_[count];
+      hits& h = found_[count];  // alpha: |p|^2 for now
       h.t = r.t, h.alpha = r.d2, h.rays = alive_ & is_hit(g, r, scene.near), h.id = cell.id;
       h.note = program.expect(state, cell);
       count += any(h.rays) ? 1 : 0;
@@ -137,7 +137,8 @@ class packet_walk {
     for (u16 at = pool_[ends].nearer; any(left) && at != ends; at = pool_[at].nearer) {
       row const& other = pool_[at];
       lane_mask const both = left & other.rays;
-      lane_mask const first = lanes_of(h.id < other.id ? ~u32{0} : u32{0});  // of two at one t; ids are no guess
+      // Of two at one t; no branch, for ids are in no order.
+      lane_mask const first = lanes_of(h.id < other.id ? ~u32{0} : u32{0});
       lane_mask const nearer = both & ((h.t < other.t) | (first & (h.t == other.t))), farther = both & ~nearer;
       settled |= farther, left &= ~farther;
       if (any(nearer)) {
