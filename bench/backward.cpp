@@ -24,7 +24,8 @@ struct backward_frame {
                                          gart_bench::sh_degree, pass.targets(color.data()), pass.record());
   }
   void prepare(E& exec) {
-    pass.prepare(exec, frame.tracer, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);
+    if (!pass.prepare(exec, frame.tracer, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near))
+      throw pass.no_room();
   }
   void run(E& exec) {
     pass.template run<gart_bench::sh_degree>(exec, frame.tracer, frame.scene(), frame.records.view(), frame.view,

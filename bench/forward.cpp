@@ -10,7 +10,8 @@ void forward(benchmark::State& state, E& exec) {
   gart_bench::frame<E, By> frame(exec);
   frame.prepare(exec);
   gart::backward<E, Strategy> pass(exec);
-  pass.prepare(exec, frame.tracer, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);
+  if (!pass.prepare(exec, frame.tracer, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near))
+    throw pass.no_room();
   gart::buffer<float, E> color(exec, 3 * frame.pixels());
   gart_bench::measure(state, exec, [&] {
     gart::forward<gart_bench::sh_degree>(exec, frame.tracer, frame.scene(), frame.view, frame.options,

@@ -19,7 +19,8 @@ class interrupt_guard {
       clock_gettime(CLOCK_MONOTONIC, &now);
       long const tenths = static_cast<long>(now.tv_sec) * 10 + now.tv_nsec / 100000000;
       if (!wanted_) {
-        wanted_ = 1, first_ = tenths;
+        wanted_ = 1;
+        first_ = tenths;
       } else if (tenths - first_ >= 10) {
         std::signal(signal, SIG_DFL);
         std::raise(signal);

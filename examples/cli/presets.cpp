@@ -43,10 +43,10 @@ std::string presets_help() {
       "What is left out for speed; options given besides win.\nMeasured on the quickstart's model and capture, 2 "
       "cores;\nfull size: trained for 7,000 steps on an H200:";
   for (preset const& p : presets()) {
-    char line[160];
-    std::snprintf(line, sizeof line, "\n%s: --alpha-min %.4g --t-min %.4g;\n  %s", p.name.c_str(), p.render.alpha_min,
-                  p.render.transmittance_min, p.cost.c_str());
-    text += line;
+    char knobs[80];
+    std::snprintf(knobs, sizeof knobs, ": --alpha-min %.4g --t-min %.4g;\n  ", p.render.alpha_min,
+                  p.render.transmittance_min);
+    text += "\n" + p.name + knobs + p.cost;
   }
   return text;
 }

@@ -134,7 +134,7 @@ gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, ga
   auto const constant = std::as_const(scene).view();
   records.template prepare<typename Tracer::response_type>(exec, constant, view.position, options.alpha_min);
   tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
-  pass.prepare(exec, tracer, constant, view, options.alpha_min, options.near);
+  if (!pass.prepare(exec, tracer, constant, view, options.alpha_min, options.near)) throw pass.no_room();
   gart::forward<Degree>(exec, tracer, constant, view, options, active_degree, pass.targets(color.data()),
                         pass.record());
   pass.template run<Degree>(exec, tracer, constant, records.view(), view, options, active_degree, color, gradient,

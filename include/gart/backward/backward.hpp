@@ -15,6 +15,8 @@
 #include <gart/render/forward.hpp>
 #include <gart/tiles/tile_map.hpp>
 
+#include <string>
+
 namespace gart {
 
 namespace backward_kernels {
@@ -67,7 +69,7 @@ class backward {
   // allocated, where the LT buffer would take more than byte_budget (0: no limit) or have more slots than there are
   // numbers of 32 bits, by which hits know theirs.
   template <class Tracer>
-  bool prepare(E& exec, Tracer const& tracer, gaussians_view<float const> scene, camera const& view, float alpha_min,
+  [[nodiscard]] bool prepare(E& exec, Tracer const& tracer, gaussians_view<float const> scene, camera const& view, float alpha_min,
                float near, u64 byte_budget = 0) {
     if constexpr (records) {
       grid_ = {view.width, view.height};
@@ -154,6 +156,15 @@ class backward {
   }
 
   std::size_t lt_bytes() const { return records ? slots_.size() * sizeof(entry) : 0; }
+
+  // What to throw where prepare() said no without a budget.
+  out_of_memory no_room() const {
+    u64 const slots = prints_ ? prints_->slots() : 0;
+    return out_of_memory("LT buffer", slots * sizeof(entry), 0,
+                         std::to_string(slots) +
+                             " slots, and there are numbers for 2^32: render smaller, with fewer Gaussians, or take "
+                             "--backward pixel, which needs none");
+  }
 
  private:
   template <class R>

@@ -116,7 +116,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
       lane_mask hit;
       packet_slots slots;
       packet_data const* at;
-    } found[packets + 1];
+    } found[packets];
     int count = 0;
     for (packet_data const& at : s.data) {
       auto& f = found[count];

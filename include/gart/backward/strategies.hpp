@@ -32,7 +32,7 @@ struct hybrid_strategy {
   using record = record_lt<weight_entry, Size>;
   using gather = terms<color>;
   using scatter = terms<geometry>;
-  using fallback = pixel_strategy;  // where there are more slots than numbers for them
+  using fallback = pixel_strategy;  // where that has no room either: it needs none
 };
 
 // Four channels; no ray is traced twice.
@@ -44,7 +44,7 @@ struct primitive_strategy {
   using record = record_lt<lt_entry, Size>;
   using gather = terms<color, geometry>;
   using scatter = terms<>;
-  using fallback = hybrid_strategy;  // where the LT buffer would pass its budget: a quarter of it
+  using fallback = hybrid_strategy;  // where the LT buffer has no room: a quarter of it
 };
 
 // The primitive strategy with slots of another format (backward/lt_slot.hpp): less memory for less exact gradients.

@@ -217,8 +217,8 @@ class packet_walk {
   pixel_box area_;
   packet_cell cells_[most];  // of the tile's list, from entry loaded_ of the map on
   u32 loaded_;
-  u16 near_[batch + 1];  // those of a batch whose boxes the packet overlaps
-  hits found_[batch + 1];
+  u16 near_[batch];  // those of a batch whose boxes the packet overlaps
+  hits found_[batch];
 };
 
 }  // namespace gart

@@ -83,10 +83,7 @@ class compiled_renderer final : public renderer {
     records_.template prepare<typename Traits::response>(exec_, scene, view.position, options.alpha_min);
     configure(tracer_, options);
     tracer_.prepare(exec_, scene, records_.view(), view, options.alpha_min, options.near);
-    if (!pass_.prepare(exec_, tracer_, scene, view, options.alpha_min, options.near))
-      throw out_of_memory("LT buffer", 0, 0,
-                          "the view has more slots than the 2^32 that can be numbered: render it smaller, or take "
-                          "--backward pixel");
+    if (!pass_.prepare(exec_, tracer_, scene, view, options.alpha_min, options.near)) throw pass_.no_room();
     forward<sh_degree>(exec_, tracer_, scene, view, options, sh_degree, pass_.targets(color_.data()), pass_.record());
     pass_.template run<sh_degree>(exec_, tracer_, scene, records_.view(), view, options, sh_degree, color_,
                                   color_gradient_, gradients_);
@@ -113,8 +110,7 @@ template <execution E, class Traits, class Tracer, class Strategy>
 void register_row_of(int rank, bool (*available)(std::string*) = always_available) {
   register_row(
       {row_of<E, Traits, Tracer, Strategy>(),
-       rank,
-       available,
+       rank, available,
        []() -> std::unique_ptr<renderer> { return std::make_unique<compiled_renderer<E, Traits, Tracer, Strategy>>(); },
        [](train_options const& options, dataset const& data, gaussian_model const& start) -> std::unique_ptr<session> {
          return std::make_unique<compiled_session<E, Traits, Tracer, Strategy>>(options, data, start);

@@ -62,17 +62,21 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   records_.template prepare<typename Traits::response>(exec_, constant, view.view.position, render.alpha_min);
   configure(tracer_, render);
   tracer_.prepare(exec_, constant, records_.view(), view.view, render.alpha_min, render.near);
-  // With less memory where the LT buffer would pass its budget, and with none where it would pass all numbers.
-  auto const with = [&](auto& pass, u64 budget) {
-    if (!pass.prepare(exec_, tracer_, constant, view.view, render.alpha_min, render.near, budget)) return false;
+  // With less memory where the LT buffer would pass its budget or the numbers of its slots, and then with none.
+  auto const with = [&](auto& pass) {
+    if (!pass.prepare(exec_, tracer_, constant, view.view, render.alpha_min, render.near, options_.lt_budget))
+      return false;
     differentiate(pass, loss, index, render, rates, degree);
     lt_bytes_ = pass.lt_bytes();
     return true;
   };
   char const* used = Strategy::name;
-  if (!with(backward_, options_.lt_budget)) {
+  if (!with(backward_)) {
     used = fallback_strategy::name;
-    if (!with(fallback_, 0)) used = last_strategy::name, with(last_, 0);
+    if (!with(fallback_)) {
+      used = last_strategy::name;
+      if (!with(last_)) throw last_.no_room();
+    }
   }
   ++step_;
   update(view, rates, degree);
