@@ -21,8 +21,8 @@ std::vector<preset> const& presets() {
                 "opaque Gaussians"};
     // No more of t_min: a ray that ends early leaves what lies behind without a gradient, and training loses by that
     // far more than the image does (docs/tradeoffs.md).
-    balanced.render.alpha_min = 0.01f, balanced.render.transmittance_min = 0.001f;
-    fast.render.alpha_min = 0.02f, fast.render.transmittance_min = 0.001f;
+    balanced.render.alpha_min = 0.006f, balanced.render.transmittance_min = 0.001f;
+    fast.render.alpha_min = 0.01f, fast.render.transmittance_min = 0.001f;
     return std::vector<preset>{exact, balanced, fast};
   }();
   return all;
