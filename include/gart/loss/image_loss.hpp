@@ -96,7 +96,11 @@ struct loss_tiles {
       std::ptrdiff_t const begin = x < 0 ? -x : 0, end = row_inside ? image.width - x : 0;
       std::ptrdiff_t const start = at.channel * image.pixels() + static_cast<std::ptrdiff_t>(y) * image.width + x;
       std::ptrdiff_t const cell = row * halo_pitch + first;
-      for (std::ptrdiff_t v = 0; v < block; ++v) f(cell + v, start + v, v >= begin && v < end);
+      // Most blocks lie inside, and without a question for each cell they are moved as vectors.
+      if (block > 1 && begin == 0 && end >= block)
+        for (std::ptrdiff_t v = 0; v < block; ++v) f(cell + v, start + v, true);
+      else
+        for (std::ptrdiff_t v = 0; v < block; ++v) f(cell + v, start + v, v >= begin && v < end);
     });
   }
 
@@ -191,15 +195,18 @@ struct ssim_kernel {
         s.loss[row * tiles::width + column + v] = weight * error + (1.0f - weight) * fabsf(d[v]);
         s.square[row * tiles::width + column + v] = d[v] * d[v];
       }
-      int const y = at.y + row;
+      int const y = at.y + row, x = at.x + column, left = y < image_height ? image_width - x : 0;
+      float* const to = partials + plane + static_cast<std::size_t>(y) * image_width + x;
+      if (tiles::block > 1 && left >= tiles::block) {
+        for (int p = 0; p < 3; ++p)
+          for (int v = 0; v < tiles::block; ++v) to[p * 3 * pixels + v] = out[p][v];
+        return;
+      }
       for (int v = 0; v < tiles::block; ++v) {
-        int const x = at.x + column + v;
-        if (y < image_height && x < image_width) {
-          std::size_t const i = plane + static_cast<std::size_t>(y) * image_width + x;
-          for (int p = 0; p < 3; ++p) partials[p * 3 * pixels + i] = out[p][v];
-        } else {
+        if (v < left)
+          for (int p = 0; p < 3; ++p) to[p * 3 * pixels + v] = out[p][v];
+        else
           s.loss[row * tiles::width + column + v] = s.square[row * tiles::width + column + v] = 0;
-        }
       }
     });
     team.barrier();

@@ -1,7 +1,6 @@
 #pragma once
 // The tile-primitive map: for every tile, the primitives whose boxes overlap it. One pair for each overlap is emitted
-// in primitive order, radix sorted by tile, and a prefix sum over the counts of the tiles says where each tile's list
-// begins.
+// in primitive order and radix sorted by tile; a tile's list begins where its number first stands in a key.
 //
 // One 32-bit key sorts both by tile and within it, in the bits that the tile's number leaves free, by an order
 // (tiles/tile_order.hpp).
@@ -53,7 +52,7 @@ struct emit_pairs {
   u64 pairs;
   Order order;
   int order_bits;
-  span<u32> keys, primitives, counts;
+  span<u32> keys, primitives;
 
   template <class Team>
   GART_HD void operator()(Team const& team) const {
@@ -95,7 +94,18 @@ struct emit_pairs {
     u32 const tile = y * grid.columns() + x;
     keys[to] = tile << order_bits | order.key(s.primitive[k], intersect(s.box[k], grid.tile(x, y)), tile);
     primitives[to] = begin + k;
-    E::atomic_add(&counts[tile], 1u);
+  }
+};
+
+// Of sorted keys, over 0 to their count: pair i begins the lists from the tile after its predecessor's to its own.
+struct begin_lists {
+  span<u32 const> keys;
+  int order_bits;
+  span<u32> offsets;  // [tiles + 1]
+  GART_KERNEL void operator()(index_t i) const {
+    u32 const tiles = static_cast<u32>(offsets.size()) - 1;
+    u32 const last = i < keys.size() ? keys[i] >> order_bits : tiles;
+    for (u32 tile = i > 0 ? (keys[i - 1] >> order_bits) + 1 : 0; tile <= last; ++tile) offsets[tile] = i;
   }
 };
 
@@ -117,7 +127,7 @@ template <execution E, int Size>
 class tile_map {
  public:
   explicit tile_map(E& exec)
-      : keys_(exec), primitives_(exec), counts_(exec), offsets_(exec), ranks_(exec), longest_first_(exec) {}
+      : keys_(exec), primitives_(exec), offsets_(exec), ranks_(exec), longest_first_(exec) {}
 
   template <class Order>
   void build(E& exec, tile_grid<Size> const& grid, footprints<E, Size> const& prints, Order order) {
@@ -132,24 +142,22 @@ class tile_map {
     int const tile_bits = bits_for(grid.count());
     order_bits_ = order.take(32 - tile_bits);
     depth_shift_ = order.shift();
-    keys_.resize(pairs), primitives_.resize(pairs);
-    counts_.resize(grid.count()), offsets_.resize(grid.count() + 1);
-    counts_.zero();
+    keys_.resize(pairs), primitives_.resize(pairs), offsets_.resize(grid.count() + 1);
     using emit = tile_kernels::emit_pairs<E, Size, Order>;
     parallel_for(
         exec, "map/emit",
         tile_range{(static_cast<u32>(prints.ranges().size()) + emit::share - 1) / emit::share, emit::block_size},
-        emit{grid, prints.ranges(), prints.pair_offsets(), pairs, order, order_bits_, keys_, primitives_, counts_});
+        emit{grid, prints.ranges(), prints.pair_offsets(), pairs, order, order_bits_, keys_, primitives_});
     sort_pairs(exec, keys_.view(), primitives_.view(), tile_bits + order_bits_);
-    span<u32> const offsets = offsets_.view();
-    exclusive_scan(exec, span<u32 const>(counts_), offsets.subspan(0, grid.count()), offsets.subspan(grid.count(), 1));
+    parallel_for(exec, "map/begin", static_cast<index_t>(pairs) + 1,
+                 tile_kernels::begin_lists{keys_, order_bits_, offsets_});
   }
 
   // After build: the tiles by the length of their lists, longest first, in 255 steps of 16. Lists differ by orders of
   // magnitude, and a long one begun last would keep the whole device waiting.
   void rank_tiles(E& exec) {
     stage_scope stage(exec, "map");
-    index_t const tiles = static_cast<index_t>(counts_.size());
+    index_t const tiles = static_cast<index_t>(offsets_.size() - 1);
     ranks_.resize(tiles), longest_first_.resize(tiles);
     parallel_for(exec, "map/rank", tiles, tile_kernels::rank_tiles{offsets_, ranks_, longest_first_});
     sort_pairs(exec, ranks_.view(), longest_first_.view(), 8);
@@ -158,7 +166,7 @@ class tile_map {
   tile_map_view view() const { return {primitives_, offsets_, keys_, order_bits_, depth_shift_, longest_first_}; }
 
  private:
-  buffer<u32, E> keys_, primitives_, counts_, offsets_, ranks_, longest_first_;
+  buffer<u32, E> keys_, primitives_, offsets_, ranks_, longest_first_;
   int order_bits_ = 0, depth_shift_ = 0;
 };
 
