@@ -388,7 +388,7 @@ void add_train(CLI::App& app, command& selected) {
       "  gart train lego --out run --downscale 4 --iterations 2000 --max-gaussians 20000\n"
       "  gart train --resume --out run");
   train->callback([a, train, &selected] {
-    apply_preset(*train, *a);
+    fill_in(*train, *a);
     selected = [a] { return training_run(*a).run(); };
   });
 }

@@ -33,10 +33,11 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(one_of({"mcmc", "adc", "none"}));
   in_group(r.add_flag(train, "--auto,!--no-auto", a.automatic,
                       "Model only what the scene requires: measure on held-out\ntraining views which bands of "
-                      "spherical harmonics pay, and\nstore no others. --no-auto, the default, stores all and holds\n"
-                      "no view out, which costs short runs quality"));
+                      "spherical harmonics pay, and\nstore no others. --no-auto stores all and holds no view out.\n"
+                      "Where neither is given: --auto from " +
+                          std::to_string(measured_from) + " steps on; shorter\nruns would miss the views held out"));
   in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3",
-                 "Degree of the spherical harmonics of colour; auto: 3, or\nmeasured with --auto"))
+                 "Degree of the spherical harmonics of colour; auto: 3, or\nwhat --auto measures"))
       ->check(one_of({"auto", "0", "1", "2", "3"}));
   in_group(r.add(train, "--sh-gain", a.sh_gain, "DB", "PSNR on the held-out views that a band must buy by the end"))
       ->check(between(1e-6, 100));
@@ -141,13 +142,14 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(between(0, 1e9));
 }
 
-void apply_preset(CLI::App const& train, train_arguments& a) {
+void fill_in(CLI::App const& train, train_arguments& a) {
   preset const& chosen = preset_named(a.preset);
   auto const set = [&](char const* option, auto& value, auto const& by_preset) {
     if (train.get_option(option)->count() == 0) value = by_preset;
   };
   set("--alpha-min", a.alpha_min, chosen.render.alpha_min);
   set("--t-min", a.t_min, chosen.render.transmittance_min);
+  set("--auto", a.automatic, a.iterations >= measured_from);
 }
 
 void continue_run(train_arguments& a) {

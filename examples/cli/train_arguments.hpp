@@ -49,8 +49,10 @@ struct train_arguments {
 };
 
 void add_arguments(CLI::App& train, train_arguments& a);
-// Sets what the preset says and the command line does not.
-void apply_preset(CLI::App const& train, train_arguments& a);
+// Sets what the command line leaves open: what the preset says, and --auto in runs of measured_from steps or more.
+void fill_in(CLI::App const& train, train_arguments& a);
+// A run in which views held out of its first half are missed no more at its end (docs/auto.md).
+inline constexpr int measured_from = 5000;
 // Takes the options of the run in `out`, and its dataset where none was named. io_error where there is no such run.
 void continue_run(train_arguments& a);
 gart::row_request row_request_of(train_arguments const& a);

@@ -125,9 +125,9 @@ TEST_CASE("what a capture asks for is said with its reasons, measured, kept, and
 TEST_CASE("an option that is given is not chosen, and --no-auto stores every band unmeasured") {
   folder const here;
   write_capture(here / "capture", 20, 2);
-  auto const degree = [&](std::string const& options) {
-    auto const run = here.gart(
-        "train capture --out run --iterations 600 --stop-at 1 --backend serial --max-gaussians 40 " + options);
+  auto const degree = [&](std::string const& options, std::string const& steps = "600") {
+    auto const run = here.gart("train capture --out run --iterations " + steps +
+                               " --stop-at 1 --backend serial --max-gaussians 40 " + options);
     CHECK_MESSAGE(run.code == 130, run.err);
     auto const config = here.json("run/config.json");
     for (auto const& choice : config["chosen"])
@@ -138,6 +138,8 @@ TEST_CASE("an option that is given is not chosen, and --no-auto stores every ban
   CHECK(degree("--sh-degree 2") == "2: given");
   CHECK(degree("--no-auto") == "3: every band; --auto measures which pay");
   CHECK(degree("") == degree("--no-auto"));
+  CHECK(has(degree("", "5000"), "at most 3: a band that buys less than 0.02 dB"));
+  CHECK(degree("--no-auto", "5000") == degree("--no-auto"));
   CHECK(has(degree("--auto --sh-gain 0.5"), "at most 3: a band that buys less than 0.5 dB"));
   auto const changed = here.gart("train --resume --no-auto --out run");
   CHECK(changed.code == 2);
