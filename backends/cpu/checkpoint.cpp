@@ -88,7 +88,7 @@ void write_checkpoint(std::filesystem::path const& path, training_state const& s
   out.add("growth", std::vector<float>{state.growth});
   out.add("seed", std::vector<u64>{state.seed});
   out.add("adc/gradient_sum", state.gradient_sum), out.add("adc/touched", state.touched);
-  out.add("band_trials", state.trials);
+  out.add("sh_trials", state.trials);
   if (exposure_state const& e = state.exposures; !e.value.empty()) {
     out.add("exposure", e.value), out.add("exposure/first", e.first), out.add("exposure/second", e.second);
     out.add("exposure/visits", e.visits);
@@ -135,7 +135,7 @@ training_state state_of(checkpoint_reader const& in) {
     if (e.value.size() != floats || e.first.size() != floats || e.second.size() != floats)
       in.fail("its arrays exposure* differ in length");
   }
-  if (in.has("band_trials")) s.trials = in.get<band_trial>("band_trials");
+  if (in.has("sh_trials")) s.trials = in.get<band_trial>("sh_trials");
   for (band_trial const& t : s.trials)
     if (t.band < 1 || t.band > 3) in.fail("is damaged: a trial of SH band " + std::to_string(t.band));
   return s;

@@ -4,7 +4,9 @@
 #include <gart/train/degree_selection.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -41,8 +43,20 @@ bool lower_rows(row_request request) {
 struct running_trial {
   training_state start;                // where the branches parted
   std::optional<training_state> with;  // where the branch with the band ended
-  double psnr_with = 0;
+  std::vector<double> psnr_with;       // of each view held out
 };
+
+double mean(std::vector<double> const& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+// Standard error of the mean of a - b; of at least two.
+double mean_error(std::vector<double> const& a, std::vector<double> const& b) {
+  double const middle = mean(a) - mean(b), n = static_cast<double>(a.size());
+  double squares = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) squares += (a[i] - b[i] - middle) * (a[i] - b[i] - middle);
+  return std::sqrt(squares / (n - 1) / n);
+}
 
 class degree_selection final : public session {
  public:
@@ -119,7 +133,7 @@ class degree_selection final : public session {
   }
 
   void end_branch() {
-    double const psnr = held_out_psnr();
+    std::vector<double> const psnr = held_out_psnr();
     training_state const& start = trial_->start;
     int const band = start.scene.sh_degree;
     if (!trial_->with) {
@@ -128,7 +142,8 @@ class degree_selection final : public session {
       open(with_sh_degree(start, band - 1));
       return;
     }
-    band_trial result{band, start.step, trial_->psnr_with, psnr, 0, gain_wanted_};
+    band_trial result{band, start.step, mean(trial_->psnr_with), mean(psnr), 0, gain_wanted_};
+    result.error = mean_error(trial_->psnr_with, psnr);
     result.forecast = forecast_gain(result.gain(), first_step(band), inner_->steps_done(), options_.iterations);
     trials_.push_back(result);
     settled_ = result.kept() || band == 1;
@@ -144,19 +159,19 @@ class degree_selection final : public session {
     if (measured) options_.held_out.insert(options_.held_out.end(), plan_.held_out.begin(), plan_.held_out.end());
   }
 
-  double held_out_psnr() {
+  std::vector<double> held_out_psnr() {
     vec3 const background(options_.background == background_kind::white ? 1.0f : 0.0f);
     exposure_field const exposures = inner_->exposures();
-    double sum = 0;
+    std::vector<double> psnr;
     for (std::size_t const index : plan_.held_out) {
       dataset_view const& view = data_.train[index];
       image_float image = inner_->render(view.view, background).color;
       apply(exposures.at(view.view), image);
       image_float const truth = composited(view.image, background);
       double const share = apply_mask(view.mask, truth, image);
-      sum += masked_psnr(image, truth, share);
+      psnr.push_back(masked_psnr(image, truth, share));
     }
-    return sum / static_cast<double>(plan_.held_out.size());
+    return psnr;
   }
 
   // One session at a time: the old one's memory goes before the new one's comes.

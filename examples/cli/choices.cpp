@@ -86,6 +86,7 @@ nlohmann::json trials_of(std::vector<gart::band_trial> const& trials) {
                    {"psnr_with", t.with},
                    {"psnr_without", t.without},
                    {"gain", t.gain()},
+                   {"gain_error", t.error},
                    {"forecast", t.forecast},
                    {"gain_wanted", t.gain_wanted},
                    {"kept", t.kept()}});
@@ -95,8 +96,9 @@ nlohmann::json trials_of(std::vector<gart::band_trial> const& trials) {
 
 std::string in_words(gart::band_trial const& t) {
   return "SH band " + std::to_string(t.band) + ": " + fixed(t.with, 3) + " dB on the views held out, " +
-         fixed(t.without, 3) + " dB without it: a gain of " + fixed(t.gain(), 3) + " dB, by the end at most " +
-         fixed(t.forecast, 3) + " dB: " + (t.kept() ? "stays" : "goes");
+         fixed(t.without, 3) + " dB without it: a gain of " + fixed(t.gain(), 3) + " dB, give or take " +
+         fixed(t.error, 3) + ", by the end at most " + fixed(t.forecast, 3) + " dB: " +
+         (!t.told() ? "the views differ too much to tell, and it stays" : t.kept() ? "stays" : "goes");
 }
 
 }  // namespace gart_cli

@@ -197,11 +197,12 @@ std::string choices(json const& m) {
   html +=
       "<p class=\"soft\">Bands of spherical harmonics on trial: PSNR of training views held out, where two branches of "
       "the run end, with the band and without.</p><div class=\"box\"><table><tr><th>Band</th><th class=\"n\">with, "
-      "dB</th><th class=\"n\">without, dB</th><th class=\"n\">gain by the end, at most, dB</th><th></th></tr>";
+      "dB</th><th class=\"n\">without, dB</th><th class=\"n\">gain, give or take, dB</th><th class=\"n\">by the end, at "
+      "most, dB</th><th></th></tr>";
   for (auto const& t : m["sh_trials"]) {
     html += "<tr><td>" + count_of(t, "band") + "</td><td class=\"n\">" + fixed(number_of(t, "psnr_with"), 3) +
             "</td><td class=\"n\">" + fixed(number_of(t, "psnr_without"), 3) + "</td><td class=\"n\">" +
-            fixed(number_of(t, "forecast"), 3) + "</td><td>" + (t.value("kept", true) ? "stays" : "goes") +
+            fixed(number_of(t, "gain_error"), 3) + "</td><td class=\"n\">" + fixed(number_of(t, "forecast"), 3) + "</td><td>" + (t.value("kept", true) ? "stays" : "goes") +
             "</td></tr>";
   }
   return html + "</table></div><p>The model has SH degree " + count_of(m, "sh_degree") + ": " +

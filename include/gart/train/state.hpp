@@ -7,6 +7,7 @@
 #include <gart/exposure/exposure.hpp>
 #include <gart/scene/gaussians.hpp>
 
+#include <algorithm>
 #include <filesystem>
 #include <vector>
 
@@ -21,9 +22,13 @@ struct band_trial {
   double without = 0;   // and where the other did
   double forecast = 0;  // the gain to be expected at the end of the run
   double gain_wanted = 0;
+  double error = 0;  // standard error of the gain, from how far the views that judged it differ
 
+  static constexpr double tellable = 0.05;  // dB
   double gain() const { return with - without; }
-  bool kept() const { return !(forecast < gain_wanted); }
+  // A gain that is not told to 0.05 dB, or to what is wanted of it, is no reason to drop the band.
+  bool told() const { return error <= std::max(gain_wanted, tellable); }
+  bool kept() const { return !(forecast < gain_wanted) || !told(); }
 };
 
 struct training_state {
