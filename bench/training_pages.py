@@ -85,7 +85,8 @@ class TrainingPages:
             for r in runs:
                 base = full.get(r["seed"], {})
                 change = f"{r['psnr'] - base['psnr']:+.3f}" if r["mode"] == "--auto" and base else ""
-                gains = ", ".join(f"{t['band']}: {t['gain']:+.3f}{told(t)} ({t['forecast']:+.3f})" for t in r["sh_trials"])
+                gains = ", ".join(f"{t['band']}: {t['gain']:+.3f}{told(t)} ({t['forecast']:+.3f})"
+                                  for t in r["sh_trials"])
                 rows.append([result["capture"], "full" if r["mode"] == "--no-auto" else "auto", r["sh_degree"],
                              r["floats_per_gaussian"], f"{r['psnr']:.3f}", change, shown(r["seconds"], ".0f"),
                              shown(r["cpu_seconds"], ".0f"), f"{r['model_bytes'] / 1e3:,.0f}",

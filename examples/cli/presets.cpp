@@ -11,14 +11,13 @@ std::vector<preset> const& presets() {
     // size on a GPU: presets_lego.json, presets_tandt_train.json.
     preset exact{"exact",
                  {},
-                 "image at 102 dB to the reference in double, gradient to\n  0.05%; trained: 29.28 dB in 13 s; full "
-                 "size: lego 35.88, tandt_train 23.22 dB"};
-    preset balanced{
-        "balanced", {}, "1.2 times as fast; 45 dB, 18%; trained: 29.33 dB in 11 s;\n  full size: 35.89, 22.73 dB"};
-    preset fast{"fast",
-                {},
-                "1.5 times as fast; 38 dB, 35%; trained: 29.41 dB in 10 s;\n  full size: 35.24, 19.34 dB: for few and "
-                "opaque Gaussians"};
+                 "image at 102 dB to the reference in double, gradient to\n  0.05%; trained: 29.28 dB in 9 s;\n  full "
+                 "size: lego 35.84, tandt_train 23.16 dB"};
+    preset balanced{"balanced",
+                    {},
+                    "1.2 times as fast; 53 dB, 9%; trained: 29.31 dB in 9 s;\n  full size: 35.91, 23.11 dB"};
+    preset fast{
+        "fast", {}, "1.5 times as fast; 45 dB, 18%; trained: 29.33 dB in 7 s;\n  full size: 35.89, 22.62 dB"};
     // No more of t_min: a ray that ends early leaves what lies behind without a gradient, and training loses by that
     // far more than the image does (docs/tradeoffs.md).
     balanced.render.alpha_min = 0.006f, balanced.render.transmittance_min = 0.001f;

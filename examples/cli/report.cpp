@@ -196,14 +196,15 @@ std::string choices(json const& m) {
   if (!m.contains("sh_trials") || m["sh_trials"].empty()) return html;
   html +=
       "<p class=\"soft\">Bands of spherical harmonics on trial: PSNR of training views held out, where two branches of "
-      "the run end, with the band and without.</p><div class=\"box\"><table><tr><th>Band</th><th class=\"n\">with, "
-      "dB</th><th class=\"n\">without, dB</th><th class=\"n\">gain, give or take, dB</th><th class=\"n\">by the end, at "
-      "most, dB</th><th></th></tr>";
+      "the run end, with the band and without; and how sure the views are of the gain.</p><div "
+      "class=\"box\"><table><tr><th>Band</th><th class=\"n\">with, dB</th><th class=\"n\">without, dB</th><th "
+      "class=\"n\">gain, dB</th><th class=\"n\">by the end, at most, dB</th><th></th></tr>";
   for (auto const& t : m["sh_trials"]) {
     html += "<tr><td>" + count_of(t, "band") + "</td><td class=\"n\">" + fixed(number_of(t, "psnr_with"), 3) +
             "</td><td class=\"n\">" + fixed(number_of(t, "psnr_without"), 3) + "</td><td class=\"n\">" +
-            fixed(number_of(t, "gain_error"), 3) + "</td><td class=\"n\">" + fixed(number_of(t, "forecast"), 3) + "</td><td>" + (t.value("kept", true) ? "stays" : "goes") +
-            "</td></tr>";
+            fixed(number_of(t, "gain"), 3) + " &plusmn; " + fixed(number_of(t, "gain_error"), 3) +
+            "</td><td class=\"n\">" + fixed(number_of(t, "forecast"), 3) + "</td><td>" +
+            (t.value("kept", true) ? "stays" : "goes") + "</td></tr>";
   }
   return html + "</table></div><p>The model has SH degree " + count_of(m, "sh_degree") + ": " +
          count_of(m, "floats_per_gaussian") + " floats a Gaussian.</p>";
@@ -223,7 +224,9 @@ std::string settings(json const& m, json const& config) {
     row("--" + name, fraction ? text : value.is_string() ? value.get<std::string>() : value.dump());
   }
   double const max_hits = number_of(m["approximations"], "max_hits");
-  std::string const cap = max_hits > 0 ? " or after " + fixed(max_hits, 0) + " hits" : "";
+  std::string cap = max_hits > 0 ? " or after " + fixed(max_hits, 0) + " hits" : "";
+  if (text_of(m["approximations"], "adam") == "seen")
+    cap += "; each step moved only the Gaussians that its view showed";
   html += "</div><h2>How it was measured</h2><p>Split: " + text_of(m, "split") + "; " + count_of(m, "test_views") +
           " test views. Images resized: " + text_of(m, "resize_filter") + ". Background: " + text_of(m, "background") +
           ". Approximations: preset " + text_of(m["approximations"], "preset") +

@@ -332,7 +332,7 @@ class training_run {
     m["backend"] = row_.backend, m["tracer"] = row_.tracer, m["backward"] = row_.backward;
     m["kernel_degree"] = row_.kernel_degree;
     m["approximations"] = approximations_of(train_options_of(a_).render, row_);
-    m["approximations"]["preset"] = a_.preset;
+    m["approximations"]["preset"] = a_.preset, m["approximations"]["adam"] = a_.adam;
     m["finite_steps"] = finite_steps_;
     if (a_.check_finite) m["skipped_updates"] = skipped_updates_;
     m["seconds"] = course_.seconds;

@@ -56,6 +56,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--mcmc-penalty", a.mcmc_penalty, "X",
                  "Strength of the penalties of mcmc on opacity and size over\nthe usual; 0: none"))
       ->check(between(0, 1e6));
+  in_group(r.add(train, "--adam", a.adam, "NAME",
+                 "all: each step moves every Gaussian; seen: those only that\nits view shows, which takes less time "
+                 "where views show a\nsmall part of the scene"))
+      ->check(one_of({"all", "seen"}));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
   in_group(r.add(train, "--seed", a.seed, "N",
                  "Seed of everything random; on the serial backend the same\nseed gives the same bits"));
@@ -196,6 +200,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.exposure = a.exposure == "on";
   o.mcmc.noise *= a.mcmc_noise;
   o.mcmc.opacity_penalty *= a.mcmc_penalty, o.mcmc.scale_penalty *= a.mcmc_penalty;
+  o.adam.seen_only = a.adam == "seen";
   o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
   o.sh_degree = most_sh_degree(a);
   o.sh_gain = a.automatic && a.sh_degree == "auto" ? a.sh_gain : 0;

@@ -32,7 +32,7 @@ struct train_arguments {
   float sh_gain = 0.02f;
   int downscale = 1, test_every = 8, eval_every = -1;
   float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
-  std::string exposure = "auto";
+  std::string exposure = "auto", adam = "all";
   float mcmc_noise = 1, mcmc_penalty = 1;
   float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;
   gart::u32 max_hits = defaults.render.max_hits;
@@ -51,7 +51,7 @@ struct train_arguments {
 void add_arguments(CLI::App& train, train_arguments& a);
 // Sets what the command line leaves open: what the preset says, and --auto in runs of measured_from steps or more.
 void fill_in(CLI::App const& train, train_arguments& a);
-// A run in which views held out of its first half are missed no more at its end (docs/auto.md).
+// Shorter runs end with a lower score for the views that are held out of their first half (docs/auto.md).
 inline constexpr int measured_from = 5000;
 // Takes the options of the run in `out`, and its dataset where none was named. io_error where there is no such run.
 void continue_run(train_arguments& a);

@@ -186,12 +186,14 @@ TEST_CASE("resuming refuses what contradicts the run, and a run that is not ther
 TEST_CASE("eval scores a trained model as train did, and render draws the same image") {
   folder const here;
   write_capture(here / "capture");
-  REQUIRE(
-      here.gart("train capture --out run --iterations 20 --alpha-min 0.01 --max-hits 4 --tracer bvh" + small).code ==
-      0);
+  auto const trained = here.gart(
+      "train capture --out run --iterations 20 --alpha-min 0.01 --max-hits 4 --tracer bvh --adam seen" + small);
+  REQUIRE(trained.code == 0);
   CHECK(has(text_of(here / "run/model.ply"), "comment gart alpha_min 0.00999999978\n"));
   CHECK(has(text_of(here / "run/model.ply"), "comment gart max_hits 4\n"));
   CHECK(here.json("run/metrics.json")["approximations"]["max_hits"] == 4);
+  CHECK(here.json("run/metrics.json")["approximations"]["adam"] == "seen");
+  CHECK(has(text_of(here / "run/report.html"), "only the Gaussians that its view showed"));
   auto const eval =
       here.gart("eval run/model.ply capture --out scores.json --renders views --backend serial --tracer bvh");
   REQUIRE_MESSAGE(eval.code == 0, eval.err);

@@ -4,6 +4,8 @@
 
 #include "models.hpp"
 
+#include <algorithm>
+
 using namespace gart;
 
 namespace {
@@ -89,6 +91,47 @@ TEST_CASE_TEMPLATE("elements whose gradient is not finite stay, and are counted"
   CHECK(second.sh[17] == 0);
   CHECK(got.mean[4] != start.mean[4]);
   CHECK(got.opacity[298] != start.opacity[298]);
+}
+
+TEST_CASE_TEMPLATE("what a step did not show stays, if so asked, and all else moves as ever", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  E exec;
+  index_t const n = 700;
+  for (int const degree : {0, 3}) {
+    CAPTURE(degree);
+    gaussian_model start = gart_test::random_model(n, degree, random);
+    gaussian_model g = gart_test::random_model(n, degree, random);
+    std::vector<bool> seen(n);
+    for (index_t i = 0; i < n; ++i) {
+      seen[i] = i > 0 && random() % 4 > 0 ? seen[i - 1] : random() % 2;  // in runs
+      if (seen[i] && random() % 8 > 0) continue;
+      // Penalties leave a gradient of opacity and size where there is no other; one number of six is enough to be seen.
+      float* const color = &g.sh[3 * static_cast<std::size_t>(sh_coefficients(degree)) * i];
+      float const kept = g.mean[3 * i + 1];
+      std::fill_n(&g.mean[3 * i], 3, 0.0f), std::fill_n(color, 3, 0.0f);
+      if (seen[i]) (random() % 2 ? g.mean[3 * i + random() % 3] : color[random() % 3]) = kept;
+    }
+    gaussians<E> const gradient(exec, g);
+    gaussians<E> all(exec, start), some(exec, start);
+    optimizer_state<E> state_of_all(exec, n, degree), state_of_some(exec, n, degree);
+    adam_options options;
+    options.seen_only = true;
+    for (int step = 1; step <= 3; ++step) {
+      adam_step(exec, all, gradient, state_of_all, {}, step, degree);
+      adam_step(exec, some, gradient, state_of_some, {}, step, degree, {}, options);
+    }
+    gaussian_model moved = all.to_host(), got = some.to_host();
+    gaussian_model first = state_of_all.first.to_host(), got_first = state_of_some.first.to_host();
+    gaussian_model second = state_of_all.second.to_host(), got_second = state_of_some.second.to_host();
+    std::vector<float> const zeros(row_width(degree));
+    for (index_t i = 0; i < n; ++i) {
+      CAPTURE(i);
+      CHECK(gart_test::row(got, i) == gart_test::row(seen[i] ? moved : start, i));
+      CHECK(gart_test::row(got_first, i) == (seen[i] ? gart_test::row(first, i) : zeros));
+      CHECK(gart_test::row(got_second, i) == (seen[i] ? gart_test::row(second, i) : zeros));
+    }
+  }
 }
 
 TEST_CASE_TEMPLATE("Adam of nothing", E, GART_TEST_POLICIES) {

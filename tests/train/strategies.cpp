@@ -1,5 +1,5 @@
-// Training by each strategy: the same loss curve, also where a step has to do with less memory, and with sums in a fixed
-// order the same bits twice.
+// Training by each strategy: the same loss curve, also where a step has to do with less memory, and with sums in a
+// fixed order the same bits twice.
 #include "capture.hpp"
 
 #include <gart/train/trainer.hpp>

@@ -69,8 +69,8 @@ class backward {
   // allocated, where the LT buffer would take more than byte_budget (0: no limit) or have more slots than there are
   // numbers of 32 bits, by which hits know theirs.
   template <class Tracer>
-  [[nodiscard]] bool prepare(E& exec, Tracer const& tracer, gaussians_view<float const> scene, camera const& view, float alpha_min,
-               float near, u64 byte_budget = 0) {
+  [[nodiscard]] bool prepare(E& exec, Tracer const& tracer, gaussians_view<float const> scene, camera const& view,
+                             float alpha_min, float near, u64 byte_budget = 0) {
     if constexpr (records) {
       grid_ = {view.width, view.height};
       if constexpr (requires { tracer.prints(); }) {

@@ -15,7 +15,8 @@
 //       in kernels: row[0..n) += values as one row; values past n are zero; a row of a multiple of 4 floats is aligned
 //       to 16 bytes, and no other function adds to it in the same launch
 //   template <class F> static void exclusively(void const* what, F f);
-//       in kernels, of host policies: calls f while no other thread is in a call for the same `what`; f makes none itself
+//       in kernels, of host policies: calls f while no other thread is in a call for the same `what`; in f there
+//       is no call of it
 //   static void fence();                   in kernels: what was written before is seen by who sees what comes after
 //   profiler profile; memory_use memory;
 // copy_out waits for the data; all else is ordered on the queue. The source of copy_in may be reused on return.

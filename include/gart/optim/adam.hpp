@@ -4,6 +4,10 @@
 //   m = b1 m + (1 - b1) g,  v = b2 v + (1 - b2) g^2,  p -= rate * m / (1 - b1^t) / (sqrt(v / (1 - b2^t)) + epsilon).
 // An element whose gradient (or update) is not finite keeps its value and moments, and is counted. Bound by memory:
 // 28 bytes moved an element.
+//
+// With options.seen_only a Gaussian without a gradient of its mean and of its constant colour, one that no ray of the
+// step met, keeps its parameters and moments: 24 bytes of it are read, for each of five groups, and none written. Its
+// moments wait until it is seen again instead of fading, and so do penalties on it.
 
 #include <gart/exec/concepts.hpp>
 #include <gart/math/arith.hpp>
@@ -25,10 +29,6 @@ struct optimizer_state {
   optimizer_state(E& exec, index_t n, int sh_degree) : first(exec, n, sh_degree), second(exec, n, sh_degree) {
     first.zero(), second.zero();
   }
-};
-
-struct adam_options {
-  float beta1 = 0.9f, beta2 = 0.999f, epsilon = 1e-15f;
 };
 
 template <class Number>
@@ -72,11 +72,11 @@ struct adam_group {
 };
 
 // Group g has tiles [g * group_tiles, (g + 1) * group_tiles), each of `rows_per_tile` Gaussians.
-template <execution E>
+template <execution E, bool SeenOnly>
 struct adam_kernel {
   static constexpr index_t rows_per_tile = 128;
   struct scratch {};
-  adam_group groups[5];
+  adam_group groups[5];  // the first is of the colour, the second of the means
   index_t group_tiles, rows;
   adam_rule rule;  // the rates carry 1 / (1 - b1^t)
   u64* skipped;
@@ -87,11 +87,19 @@ struct adam_kernel {
     index_t const row = (team.tile() - group_index * group_tiles) * rows_per_tile;
     index_t const count = rows - row < rows_per_tile ? rows - row : rows_per_tile;
     adam_group const& group = groups[group_index];
-    std::size_t const base = std::size_t{row} * group.stride;
 #if !defined(__CUDACC__)
-    if constexpr (!E::device) return update_rows(group, base, count * group.stride);
+    if constexpr (!E::device) return update_rows(group, row, row + count);
 #endif
-    team.for_each(count * group.stride, [&](index_t e) { update(group, base + e, e % group.stride); });
+    std::size_t const base = std::size_t{row} * group.stride;
+    team.for_each(count * group.stride, [&](index_t e) {
+      if (!SeenOnly || seen(row + e / group.stride)) update(group, base + e, e % group.stride);
+    });
+  }
+
+  GART_HD bool seen(index_t row) const {
+    float const* const color = groups[0].gradient + std::size_t{groups[0].stride} * row;
+    float const* const mean = groups[1].gradient + std::size_t{groups[1].stride} * row;
+    return mean[0] != 0 || mean[1] != 0 || mean[2] != 0 || color[0] != 0 || color[1] != 0 || color[2] != 0;
   }
 
   GART_HD void update(adam_group const& group, std::size_t i, index_t column) const {
@@ -106,15 +114,34 @@ struct adam_kernel {
   }
 
 #if !defined(__CUDACC__)
-  // Elements a lane each, whatever their columns; where one is not finite, one by one.
-  void update_rows(adam_group const& group, std::size_t base, index_t count) const {
-    constexpr index_t most = 48;  // columns of a group
+  // Of a group's columns, and on from the first again as far as lanes reach.
+  struct columns {
+    static constexpr index_t most = 48;
     float rates[most + lane_count], trained[most + lane_count];
-    for (index_t k = 0; k < group.stride + lane_count; ++k) {
-      index_t const column = k % group.stride;
-      rates[k] = column < group.head ? group.rate_head : group.rate_rest;
-      trained[k] = column < group.active ? 1.0f : 0.0f;
+    explicit columns(adam_group const& group) {
+      for (index_t k = 0; k < group.stride + lane_count; ++k) {
+        index_t const column = k % group.stride;
+        rates[k] = column < group.head ? group.rate_head : group.rate_rest;
+        trained[k] = column < group.active ? 1.0f : 0.0f;
+      }
     }
+  };
+
+  void update_rows(adam_group const& group, index_t row, index_t end) const {
+    columns const of(group);
+    if constexpr (!SeenOnly) return update_run(group, of, row, end);
+    while (row < end) {
+      while (row < end && !seen(row)) ++row;
+      index_t const first = row;
+      while (row < end && seen(row)) ++row;
+      update_run(group, of, first, row);
+    }
+  }
+
+  // Elements a lane each, whatever their columns; where one is not finite, one by one.
+  void update_run(adam_group const& group, columns const& of, index_t first, index_t end) const {
+    std::size_t const base = std::size_t{first} * group.stride;
+    index_t const count = (end - first) * group.stride;
     auto const read = [](float const* p) {
       lanes out;
       std::memcpy(&out, p, sizeof out);
@@ -124,10 +151,10 @@ struct adam_kernel {
     index_t e = 0, column = 0;
     for (; e + lane_count <= count; e += lane_count) {
       std::size_t const i = base + e;
-      lane_mask const wanted = read(trained + column) > lanes(0.0f);
+      lane_mask const wanted = read(of.trained + column) > lanes(0.0f);
       lanes const g = read(group.gradient + i);
       adam_element<lanes> const from{read(group.parameter + i), read(group.first + i), read(group.second + i)};
-      auto const to = rule.moved(from, g, read(rates + column));
+      auto const to = rule.moved(from, g, read(of.rates + column));
       lanes const infinity(__builtin_huge_valf());
       lane_mask const finite =
           (magnitude(g) < infinity) & (magnitude(to.second) < infinity) & (magnitude(to.parameter) < infinity);
@@ -154,7 +181,6 @@ void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optim
                learning_rates const& rates, int step, int active_sh_degree, span<u64> skipped = {},
                adam_options const& options = {}) {
   if (model.size() == 0) return;
-  using kernel = detail::adam_kernel<E>;
   double const correction = adam_rule::first_correction(options, step);
   auto const rate = [&](float r) { return static_cast<float>(r * correction); };
   auto const p = model.view();
@@ -164,17 +190,22 @@ void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optim
   int const degree = active_sh_degree < p.sh_degree ? active_sh_degree : p.sh_degree;
   index_t const active_sh = 3 * sh_coefficients(degree);
 
-  kernel k{};
-  k.groups[0] = {p.sh, g.sh, m.sh, v.sh, sh, active_sh, 3, rate(rates.sh_dc), rate(rates.sh_rest)};
-  k.groups[1] = {p.mean, g.mean, m.mean, v.mean, 3, 3, 3, rate(rates.mean), 0};
-  k.groups[2] = {p.log_scale, g.log_scale, m.log_scale, v.log_scale, 3, 3, 3, rate(rates.log_scale), 0};
-  k.groups[3] = {p.quaternion, g.quaternion, m.quaternion, v.quaternion, 4, 4, 4, rate(rates.quaternion), 0};
-  k.groups[4] = {p.opacity, g.opacity, m.opacity, v.opacity, 1, 1, 1, rate(rates.opacity), 0};
-  k.rows = p.count;
-  k.group_tiles = p.count / kernel::rows_per_tile + (p.count % kernel::rows_per_tile != 0);
-  k.rule = adam_rule(options, step);
-  k.skipped = skipped.data();
-  parallel_for(exec, "adam", tile_range{5 * k.group_tiles, 256}, k);
+  auto const launch = [&](auto k) {
+    k.groups[0] = {p.sh, g.sh, m.sh, v.sh, sh, active_sh, 3, rate(rates.sh_dc), rate(rates.sh_rest)};
+    k.groups[1] = {p.mean, g.mean, m.mean, v.mean, 3, 3, 3, rate(rates.mean), 0};
+    k.groups[2] = {p.log_scale, g.log_scale, m.log_scale, v.log_scale, 3, 3, 3, rate(rates.log_scale), 0};
+    k.groups[3] = {p.quaternion, g.quaternion, m.quaternion, v.quaternion, 4, 4, 4, rate(rates.quaternion), 0};
+    k.groups[4] = {p.opacity, g.opacity, m.opacity, v.opacity, 1, 1, 1, rate(rates.opacity), 0};
+    k.rows = p.count;
+    k.group_tiles = p.count / k.rows_per_tile + (p.count % k.rows_per_tile != 0);
+    k.rule = adam_rule(options, step);
+    k.skipped = skipped.data();
+    parallel_for(exec, "adam", tile_range{5 * k.group_tiles, 256}, k);
+  };
+  if (options.seen_only)
+    launch(detail::adam_kernel<E, true>{});
+  else
+    launch(detail::adam_kernel<E, false>{});
 }
 
 }  // namespace gart

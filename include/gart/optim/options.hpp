@@ -17,6 +17,11 @@ struct learning_rates {
   float exposure = 0.05f, exposure_final = 0.005f;  // a visit of the view; decays like the means'
 };
 
+struct adam_options {
+  float beta1 = 0.9f, beta2 = 0.999f, epsilon = 1e-15f;
+  bool seen_only = false;  // Gaussians that the step's view did not show stay as they are (adam.hpp)
+};
+
 // The opacity below which a Gaussian is of no use: `usual`, for the usual alpha_min of 1/255, and in proportion above.
 // What is fainter than alpha_min is never hit and gets no gradient, so that it would stay as it is for good.
 inline float least_opacity(float usual, float alpha_min) { return std::max(usual, 255 * usual * alpha_min); }

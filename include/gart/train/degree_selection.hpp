@@ -21,8 +21,8 @@
 //   forecast = gain (iterations - first) / (now - first),    first: the step the band was first used in,
 // an upper bound for a gain of that course; the band stays if forecast >= sh_gain. A gain that is not positive has no
 // future. (It also covers the others' errors shrinking, against which the same share weighs more in dB.)
-//   A few views may differ by more than a band is worth: where a part of the scene is seen by few cameras, the branches'
-// random steps alone move a view by a dB. The standard error of the gain over the views says so; where it is over
+//   A few views may differ by more than a band is worth: where a part of the scene is seen by few cameras, chance alone
+// sets two branches a dB apart in a view. The standard error of the gain over the views says so; where it is over
 // 0.05 dB, and over sh_gain, nothing can be told and the band stays.
 //
 // Per Gaussian degrees are not chosen: rows of one length keep loads aligned and the kernels' loops straight.

@@ -38,6 +38,7 @@ struct train_options {
   u64 seed = 1;
   render_options render;  // its background is set from `background`
   learning_rates rates;
+  adam_options adam;
   mcmc_options mcmc;
   adc_options adc;
 };

@@ -118,7 +118,8 @@ void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, lear
   bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
   if (use_mcmc) mcmc_.add_penalties(scene_, gradients_);
   if (use_adc) adc_.accumulate(scene_, gradients_, view.view);
-  adam_step(exec_, scene_, gradients_, state_, rates, step_, degree, finite_ ? finite_->skipped() : span<u64>{});
+  adam_step(exec_, scene_, gradients_, state_, rates, step_, degree, finite_ ? finite_->skipped() : span<u64>{},
+            options_.adam);
   density_change change;
   if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean);
   if (use_adc) change = adc_.after_step(scene_, state_, step_);
