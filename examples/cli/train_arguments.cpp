@@ -57,8 +57,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "Strength of the penalties of mcmc on opacity and size over\nthe usual; 0: none"))
       ->check(between(0, 1e6));
   in_group(r.add(train, "--adam", a.adam, "NAME",
-                 "all: each step moves every Gaussian; seen: those only that\nits view shows, which takes less time "
-                 "where views show a\nsmall part of the scene"))
+                 "all: each step moves every Gaussian; seen: only those that\nits view shows, as sparse Adam does; for "
+                 "views that show a\nsmall part of a large scene"))
       ->check(one_of({"all", "seen"}));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
   in_group(r.add(train, "--seed", a.seed, "N",

@@ -5,9 +5,9 @@
 // An element whose gradient (or update) is not finite keeps its value and moments, and is counted. Bound by memory:
 // 28 bytes moved an element.
 //
-// With options.seen_only a Gaussian without a gradient of its mean and of its constant colour, one that no ray of the
-// step met, keeps its parameters and moments: 24 bytes of it are read, for each of five groups, and none written. Its
-// moments wait until it is seen again instead of fading, and so do penalties on it.
+// With options.seen_only a Gaussian whose mean has no gradient, one that no ray of the step met, keeps its parameters and
+// moments: 12 bytes of it are read for each of five groups, and none written. Its moments wait until it is seen again
+// instead of fading, and so do penalties on it.
 
 #include <gart/exec/concepts.hpp>
 #include <gart/math/arith.hpp>
@@ -76,7 +76,7 @@ template <execution E, bool SeenOnly>
 struct adam_kernel {
   static constexpr index_t rows_per_tile = 128;
   struct scratch {};
-  adam_group groups[5];  // the first is of the colour, the second of the means
+  adam_group groups[5];  // the second is of the means
   index_t group_tiles, rows;
   adam_rule rule;  // the rates carry 1 / (1 - b1^t)
   u64* skipped;
@@ -88,7 +88,7 @@ struct adam_kernel {
     index_t const count = rows - row < rows_per_tile ? rows - row : rows_per_tile;
     adam_group const& group = groups[group_index];
 #if !defined(__CUDACC__)
-    if constexpr (!E::device) return update_rows(group, row, row + count);
+    if constexpr (!E::device) return update_rows(group, row, count);
 #endif
     std::size_t const base = std::size_t{row} * group.stride;
     team.for_each(count * group.stride, [&](index_t e) {
@@ -97,9 +97,8 @@ struct adam_kernel {
   }
 
   GART_HD bool seen(index_t row) const {
-    float const* const color = groups[0].gradient + std::size_t{groups[0].stride} * row;
-    float const* const mean = groups[1].gradient + std::size_t{groups[1].stride} * row;
-    return mean[0] != 0 || mean[1] != 0 || mean[2] != 0 || color[0] != 0 || color[1] != 0 || color[2] != 0;
+    float const* const mean = groups[1].gradient + std::size_t{3} * row;
+    return (mean[0] != 0) | (mean[1] != 0) | (mean[2] != 0);
   }
 
   GART_HD void update(adam_group const& group, std::size_t i, index_t column) const {
@@ -114,60 +113,60 @@ struct adam_kernel {
   }
 
 #if !defined(__CUDACC__)
-  // Of a group's columns, and on from the first again as far as lanes reach.
-  struct columns {
-    static constexpr index_t most = 48;
+  // Elements a lane each, whatever their columns; where one is not finite, one by one. Lanes of Gaussians that were not
+  // seen keep what they had.
+  void update_rows(adam_group const& group, index_t row, index_t rows_here) const {
+    constexpr index_t most = 48;  // columns of a group
     float rates[most + lane_count], trained[most + lane_count];
-    explicit columns(adam_group const& group) {
-      for (index_t k = 0; k < group.stride + lane_count; ++k) {
-        index_t const column = k % group.stride;
-        rates[k] = column < group.head ? group.rate_head : group.rate_rest;
-        trained[k] = column < group.active ? 1.0f : 0.0f;
-      }
+    for (index_t k = 0; k < group.stride + lane_count; ++k) {
+      index_t const column = k % group.stride;
+      rates[k] = column < group.head ? group.rate_head : group.rate_rest;
+      trained[k] = column < group.active ? 1.0f : 0.0f;
     }
-  };
-
-  void update_rows(adam_group const& group, index_t row, index_t end) const {
-    columns const of(group);
-    if constexpr (!SeenOnly) return update_run(group, of, row, end);
-    while (row < end) {
-      while (row < end && !seen(row)) ++row;
-      index_t const first = row;
-      while (row < end && seen(row)) ++row;
-      update_run(group, of, first, row);
-    }
-  }
-
-  // Elements a lane each, whatever their columns; where one is not finite, one by one.
-  void update_run(adam_group const& group, columns const& of, index_t first, index_t end) const {
-    std::size_t const base = std::size_t{first} * group.stride;
-    index_t const count = (end - first) * group.stride;
+    float shown[rows_per_tile + lane_count];
+    for (index_t r = 0; SeenOnly && r < rows_here; ++r) shown[r] = seen(row + r) ? 1.0f : 0.0f;
     auto const read = [](float const* p) {
       lanes out;
       std::memcpy(&out, p, sizeof out);
       return out;
     };
     auto const write = [](float* p, lanes x) { std::memcpy(p, &x, sizeof x); };
-    index_t e = 0, column = 0;
+    std::size_t const base = std::size_t{row} * group.stride;
+    index_t const count = rows_here * group.stride;
+    index_t e = 0, column = 0, at = 0;  // the element, and its column and row
     for (; e + lane_count <= count; e += lane_count) {
       std::size_t const i = base + e;
-      lane_mask const wanted = read(of.trained + column) > lanes(0.0f);
+      lane_mask wanted = read(trained + column) > lanes(0.0f);
+      index_t const first_column = column;
+      if (SeenOnly && column + lane_count <= group.stride) {
+        if (shown[at] == 0) wanted = lanes_of(0);
+      } else if constexpr (SeenOnly) {
+        lanes of_rows;
+        for (index_t k = 0, c = column, r = at; k < lane_count; ++k) {
+          of_rows.v[k] = shown[r];
+          if (++c == group.stride) c = 0, ++r;
+        }
+        wanted &= of_rows > lanes(0.0f);
+      }
+      for (column += lane_count; column >= group.stride; column -= group.stride) ++at;
+      if (SeenOnly && !any(wanted)) continue;
       lanes const g = read(group.gradient + i);
       adam_element<lanes> const from{read(group.parameter + i), read(group.first + i), read(group.second + i)};
-      auto const to = rule.moved(from, g, read(of.rates + column));
+      auto const to = rule.moved(from, g, read(rates + first_column));
       lanes const infinity(__builtin_huge_valf());
       lane_mask const finite =
           (magnitude(g) < infinity) & (magnitude(to.second) < infinity) & (magnitude(to.parameter) < infinity);
       if (any(wanted & ~finite)) {
-        for (index_t k = 0; k < lane_count; ++k) update(group, i + k, (column + k) % group.stride);
+        for (index_t k = 0; k < lane_count; ++k)
+          if (!SeenOnly || seen(row + (e + k) / group.stride)) update(group, i + k, (first_column + k) % group.stride);
       } else {
         write(group.parameter + i, select(wanted, to.parameter, from.parameter));
         write(group.first + i, select(wanted, to.first, from.first));
         write(group.second + i, select(wanted, to.second, from.second));
       }
-      column = (column + lane_count) % group.stride;
     }
-    for (; e < count; ++e) update(group, base + e, e % group.stride);
+    for (; e < count; ++e)
+      if (!SeenOnly || shown[e / group.stride] > 0) update(group, base + e, e % group.stride);
   }
 #endif
 };
