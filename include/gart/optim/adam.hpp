@@ -5,9 +5,9 @@
 // An element whose gradient (or update) is not finite keeps its value and moments, and is counted. Bound by memory:
 // 28 bytes moved an element.
 //
-// With options.seen_only a Gaussian whose mean has no gradient, one that no ray of the step met, keeps its parameters and
-// moments: 12 bytes of it are read for each of five groups, and none written. Its moments wait until it is seen again
-// instead of fading, and so do penalties on it.
+// With options.seen_only a Gaussian whose mean has no gradient, one that no ray of the step met, keeps its parameters
+// and moments: 12 bytes of it are read for each of five groups, and none written. Its moments wait until it is seen
+// again instead of fading, and so do penalties on it.
 
 #include <gart/exec/concepts.hpp>
 #include <gart/math/arith.hpp>
