@@ -50,14 +50,6 @@ double mean(std::vector<double> const& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-// Standard error of the mean of a - b; of at least two.
-double mean_error(std::vector<double> const& a, std::vector<double> const& b) {
-  double const middle = mean(a) - mean(b), n = static_cast<double>(a.size());
-  double squares = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) squares += (a[i] - b[i] - middle) * (a[i] - b[i] - middle);
-  return std::sqrt(squares / (n - 1) / n);
-}
-
 class degree_selection final : public session {
  public:
   degree_selection(row_request const& request, train_options const& options, dataset const& data,
@@ -143,7 +135,7 @@ class degree_selection final : public session {
       return;
     }
     band_trial result{band, start.step, mean(trial_->psnr_with), mean(psnr), 0, gain_wanted_};
-    result.error = mean_error(trial_->psnr_with, psnr);
+    result.error = gain_error(trial_->psnr_with, psnr);
     result.forecast = forecast_gain(result.gain(), first_step(band), inner_->steps_done(), options_.iterations);
     trials_.push_back(result);
     settled_ = result.kept() || band == 1;
@@ -232,6 +224,16 @@ trial_plan plan_trials(row_request const& request, train_options const& options,
                " views held out goes; measured from step " + std::to_string(plan.begin);
   }
   return plan;
+}
+
+double gain_error(std::vector<double> const& with, std::vector<double> const& without) {
+  double const gain = mean(with) - mean(without), n = static_cast<double>(with.size());
+  double squares = 0;
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    double const off = with[i] - without[i] - gain;
+    squares += off * off;
+  }
+  return std::sqrt(squares / (n - 1) / n);
 }
 
 double forecast_gain(double gain, int first_step, int now, int iterations) {

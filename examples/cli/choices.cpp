@@ -98,7 +98,7 @@ std::string in_words(gart::band_trial const& t) {
   return "SH band " + std::to_string(t.band) + ": " + fixed(t.with, 3) + " dB on the views held out, " +
          fixed(t.without, 3) + " dB without it: a gain of " + fixed(t.gain(), 3) + " dB, give or take " +
          fixed(t.error, 3) + ", by the end at most " + fixed(t.forecast, 3) + " dB: " +
-         (!t.kept()                     ? "goes"
+         (!t.kept()                    ? "goes"
           : t.forecast < t.gain_wanted ? "the views differ too much to tell, and it stays"
                                        : "stays");
 }

@@ -140,6 +140,9 @@ TEST_CASE("a scene without view dependence ends in 14 floats a Gaussian, one wit
 }
 
 TEST_CASE("a band goes where its gain is too small and the views agree on it to 0.05 dB or to what was wanted") {
+  // Gains of 1, 2 and 6: a mean of 3, squares about it of 14.
+  CHECK(gart::gain_error({11, 22, 36}, {10, 20, 30}) == doctest::Approx(std::sqrt(14.0 / 2 / 3)));
+  CHECK(gart::gain_error({11, 21}, {10, 20}) == 0);
   gart::band_trial t{1, 300, 20.0, 20.1, -0.2, 0.02};
   t.error = 0.05;
   CHECK_FALSE(t.kept());

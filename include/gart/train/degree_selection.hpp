@@ -50,6 +50,8 @@ struct trial_plan {
 // are there to hold some out of, or where the row is not compiled for every lower degree.
 trial_plan plan_trials(row_request const& request, train_options const& options, std::size_t train_views);
 
+// Standard error of the mean gain, from the PSNR of each view held out, of at least two.
+double gain_error(std::vector<double> const& with, std::vector<double> const& without);
 double forecast_gain(double gain, int first_step, int now, int iterations);
 
 // What make_session returns where plan_trials finds something to measure.
