@@ -62,7 +62,7 @@ GART_BENCH("backward/tiles/primitive/4", backward<by_tiles<4>, gart::primitive_s
 GART_BENCH("backward/tiles/primitive/8", backward<by_tiles<8>, gart::primitive_strategy, 8>)
 GART_BENCH("backward/tiles/primitive/16", backward<by_tiles<16>, gart::primitive_strategy, 16>)
 #if defined(GART_BENCH_CUDA)
-GART_BENCH("backward/tiles/warp/8", backward<by_tiles<8>, gart::warp_strategy, 8>)
+GART_BENCH("backward/tiles/lane/8", backward<by_tiles<8>, gart::lane_strategy, 8>)
 #endif
 GART_BENCH("backward/tiles/deterministic/8", backward<by_tiles<8>, gart::deterministic_strategy, 8>)
 GART_BENCH("prepare/bvh/primitive/8", prepare<by_bvh, gart::primitive_strategy, 8>)

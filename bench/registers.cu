@@ -11,8 +11,8 @@ template <int ShDegree, class Response, class Entry>
 using forward_kernel = walk_tile_warps<Response, 8, composite<ShDegree, record_lt<Entry, 8>>>;
 
 template <int ShDegree, class Response, class Entry, gather_sums Sums = gather_sums::atomic>
-using backward_kernel =
-    gather_kernel<ShDegree, Response, terms<color, geometry>, Entry, 8, Sums, slot_validity::recomputed, cuda_exec>;
+using backward_kernel = matrix_gather<
+    gather_kernel<ShDegree, Response, terms<color, geometry>, Entry, 8, Sums, slot_validity::recomputed, cuda_exec>>;
 
 }  // namespace
 

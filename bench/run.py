@@ -171,7 +171,8 @@ class Bench(Trainings):
             if said:
                 row["said"] = said
             if result == "failed":
-                row["output"] = done.stdout[-3000:] + done.stderr[-1000:]
+                errors = re.findall(r"^.* ERROR: .*\n(?:.+\n)*", done.stdout, re.MULTILINE)
+                row["output"] = "".join(errors)[:3000] + done.stdout[-1000:] + done.stderr[-1000:]
                 self.fail(name)
             self.say(f"{name}: {result}, {row['seconds']} s")
             runs.append(row)

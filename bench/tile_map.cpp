@@ -1,4 +1,4 @@
-// From boxes to the list of primitives of every tile: by tile size, in the order that the tracer reads or the gather.
+// From boxes to the list of primitives of every tile: by tile size, in the order that the tracer reads, or in none.
 #include "support/frame.hpp"
 
 #include <gart/tiles/tile_map.hpp>
@@ -18,7 +18,7 @@ void tile_map(benchmark::State& state, E& exec) {
     if constexpr (ByDepth)
       map.build(exec, grid, prints, by_depth);
     else
-      map.build(exec, grid, prints, gart::cover_order<E::device, TileSize>{});
+      map.build(exec, grid, prints, gart::number_order{});
   });
   state.counters["pairs"] = static_cast<double>(prints.pairs());
 }
@@ -28,4 +28,4 @@ void tile_map(benchmark::State& state, E& exec) {
 GART_BENCH("tile_map/4/depth", tile_map<4, true>)
 GART_BENCH("tile_map/8/depth", tile_map<8, true>)
 GART_BENCH("tile_map/16/depth", tile_map<16, true>)
-GART_BENCH("tile_map/8/cover", tile_map<8, false>)
+GART_BENCH("tile_map/8/number", tile_map<8, false>)

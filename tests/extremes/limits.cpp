@@ -66,7 +66,7 @@ TEST_CASE_TEMPLATE("sums past 2^32 and pairs past 2^31", E, GART_TEST_POLICIES) 
   auto const before = exec.memory.current;
   gart::tile_map<E, 8> map(exec);
   try {
-    map.build(exec, {view.width, view.height}, prints, gart::cover_order<E::device, 8>{});
+    map.build(exec, {view.width, view.height}, prints, gart::number_order{});
     FAIL("a map of 2.7e9 pairs was built");
   } catch (gart::out_of_memory const& e) {
     CHECK(e.asked == prints.pairs() * 16);

@@ -60,7 +60,7 @@ std::vector<outcome> run_all(E& exec, gart::gaussian_model const& model, gart::c
   std::type_identity<bvh> const by_bvh;
   add(gart::primitive_strategy{}, by_tiles), add(gart::cleared_strategy{}, by_tiles);
   add(gart::deterministic_strategy{}, by_tiles);
-  if constexpr (E::device) add(gart::warp_strategy{}, by_tiles);
+  if constexpr (E::device) add(gart::lane_strategy{}, by_tiles);
   add(gart::hybrid_strategy{}, by_tiles), add(gart::pixel_strategy{}, by_tiles);
   add(gart::primitive_strategy{}, by_bvh), add(gart::hybrid_strategy{}, by_bvh), add(gart::pixel_strategy{}, by_bvh);
 #if defined(GART_WITH_EMBREE)

@@ -47,6 +47,16 @@ struct cast_rays {
   GART_KERNEL void operator()(gart::index_t i) const { out[i] = ray_of(view, i); }
 };
 
+struct take_reciprocals {
+  gart::span<float> values;  // in fours
+  GART_KERNEL void operator()(gart::index_t i) const {
+    float four[4];
+    for (int k = 0; k < 4; ++k) four[k] = values[4 * i + k];
+    gart::reciprocals(four);
+    for (int k = 0; k < 4; ++k) values[4 * i + k] = four[k];
+  }
+};
+
 bool same(float a, float b) { return gart::float_to_bits(a) == gart::float_to_bits(b) || (a != a && b != b); }
 
 }  // namespace
@@ -102,6 +112,27 @@ TEST_CASE_TEMPLATE("the same rays on every policy, whatever the lens", E, GART_T
     }
     CHECK(other == 0);
   }
+}
+
+TEST_CASE_TEMPLATE("reciprocals of several numbers at once are correctly rounded", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  constexpr int fours = 1 << 19;
+  std::vector<float> values;
+  for (int i = 0; i < fours; ++i) {
+    bool const any = i % 8 == 0;  // of some fours any bits at all, of the others usual numbers
+    for (int k = 0; k < 4; ++k) {
+      gart::u32 const bits = static_cast<gart::u32>(random());
+      values.push_back(gart::bits_to_float(any ? bits : (bits & 0x807fffffu) | (1 + (bits >> 8) % 252) << 23));
+    }
+  }
+  E exec;
+  gart::buffer<float, E> on(exec, values);
+  gart::parallel_for(exec, "reciprocals", gart::index_t{fours}, take_reciprocals{on});
+  auto const got = on.to_host();
+  long other = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) other += !same(got[i], 1.0f / values[i]);
+  CHECK(other == 0);
 }
 
 #endif

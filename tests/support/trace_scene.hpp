@@ -148,7 +148,7 @@ inline std::vector<std::string> strategies_for(tracer_kind kind, int degree) {
   if (kind == tracer_kind::embree) return {"pixel"};
   if (kind == tracer_kind::tiles)
     return degree == 3
-               ? std::vector<std::string>{"pixel", "hybrid", "primitive", "deterministic", "cleared"}
+               ? std::vector<std::string>{"pixel", "hybrid", "primitive", "deterministic", "cleared", "lane"}
                : std::vector<std::string>{"primitive"};
   return degree == 3 ? std::vector<std::string>{"pixel", "hybrid", "primitive"} : std::vector<std::string>{"pixel"};
 }
@@ -179,6 +179,8 @@ gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model,
         return by(gart::deterministic_strategy{}, std::type_identity<tiles>{});
       if (kind == tracer_kind::tiles && strategy == "cleared")
         return by(gart::cleared_strategy{}, std::type_identity<tiles>{});
+      if (kind == tracer_kind::tiles && strategy == "lane")
+        return by(gart::lane_strategy{}, std::type_identity<tiles>{});
     }
 #if defined(GART_WITH_EMBREE)
     if constexpr (!E::device)

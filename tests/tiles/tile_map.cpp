@@ -44,7 +44,7 @@ struct pass {
     check_boxes(model, view, near, ranges, depths);
     check_places(exec, ranges);
     gart::tile_grid<Size> const grid{view.width, view.height};
-    check_cover_order(exec, grid, ranges);
+    check_number_order(exec, grid, ranges);
     check_depth_order(exec, model, view, near, ranges);
   }
 
@@ -98,11 +98,9 @@ struct pass {
     CHECK(primitives == expected);
   }
 
-  void check_cover_order(E& exec, gart::tile_grid<Size> const& grid, std::vector<gart::lt_range> const& ranges) {
-    map.build(exec, grid, prints, gart::cover_order<E::device, Size>{});
-    check_pairs(exec, grid, ranges, [&](u32 t, u32 i) -> u32 {
-      return E::device ? (gart::intersect(ranges[i].box, grid.tile(t)).area() - 1) * 8 / (Size * Size) : 0;
-    });
+  void check_number_order(E& exec, gart::tile_grid<Size> const& grid, std::vector<gart::lt_range> const& ranges) {
+    map.build(exec, grid, prints, gart::number_order{});
+    check_pairs(exec, grid, ranges, [](u32, u32 i) { return i; });
   }
 
   // No pixel of a pair hits nearer than the pair's key says, nor nearer than the keys before it in its list.

@@ -8,10 +8,10 @@
 // Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, 36 bytes a Gaussian, 8
 // a (primitive, tile) pair and the LT buffer: 4 or 16 bytes for each pixel of each box.
 
+#include <gart/backward/matrix_gather.hpp>
 #include <gart/backward/packet_gather.hpp>
 #include <gart/backward/scatter.hpp>
 #include <gart/backward/strategies.hpp>
-#include <gart/backward/warp_gather.hpp>
 #include <gart/render/forward.hpp>
 #include <gart/tiles/tile_map.hpp>
 
@@ -81,11 +81,10 @@ class backward {
       }
       if (byte_budget && prints_->slots() * sizeof(entry) > byte_budget) return false;
       if (prints_->slots() >= slot_cell::none) return false;
-      // On a device sorted by cover also where the tracer has lists sorted by depth: lanes in step are worth the sort.
-      if constexpr (!E::device && requires { tracer.map(); }) {
+      if constexpr (requires { tracer.map(); }) {
         lists_ = tracer.map();
       } else {
-        map_.build(exec, grid_, *prints_, cover_order<E::device, TileSize>{});
+        map_.build(exec, grid_, *prints_, number_order{});
         lists_ = map_.view();
       }
       slots_.resize(prints_->slots());
@@ -182,36 +181,33 @@ class backward {
   void gather_terms(E& exec, span<ray_gaussian const> gaussians_in_frame, camera const& view, int active_degree,
                     span<float const> image, span<float const> image_gradient, gaussians<E>& gradients) {
     constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
-    using kernel_type =
-        gather_kernel<ShDegree, Response, typename Strategy::gather, entry, TileSize, sums, validity, E>;
-    kernel_type const kernel{view,
-                             grid_,
-                             lists_,
-                             prints_->ranges().data(),
-                             slots_.data(),
-                             gaussians_in_frame.data(),
-                             active_degree,
-                             image.data(),
-                             image_gradient.data(),
-                             gradients.sh.data(),
-                             moments_.data(),
-                             prints_->pair_offsets().data(),
-                             rows_.data(),
-                             last_.data(),
-                             near_};
-#if !defined(__CUDACC__)
-    if constexpr (!E::device) {
-      parallel_for(exec, "backward/gather", tile_range{grid_.count(), 1}, packet_gather<kernel_type>{kernel});
-      return;
-    }
-#endif
+    using by_lane = gather_kernel<ShDegree, Response, typename Strategy::gather, entry, TileSize, sums, validity, E>;
+    auto const gather = [&]<class Kernel>(index_t lanes, std::type_identity<Kernel>) {
+      parallel_for(exec, "backward/gather", tile_range{grid_.count(), lanes},
+                   Kernel{view,
+                          grid_,
+                          lists_,
+                          prints_->ranges().data(),
+                          slots_.data(),
+                          gaussians_in_frame.data(),
+                          active_degree,
+                          image.data(),
+                          image_gradient.data(),
+                          gradients.sh.data(),
+                          moments_.data(),
+                          prints_->pair_offsets().data(),
+                          rows_.data(),
+                          last_.data(),
+                          near_});
+    };
 #if defined(__CUDACC__)
-    if constexpr (E::device && requires { Strategy::by_warp; }) {
-      parallel_for(exec, "backward/gather", tile_range{grid_.count(), 64}, warp_gather<kernel_type>{kernel});
-      return;
-    }
+    if constexpr (matrix_gather<by_lane>::fits && !requires { Strategy::lane_by_lane; })
+      gather(matrix_gather<by_lane>::block_size, std::type_identity<matrix_gather<by_lane>>{});
+    else
+      gather(64, std::type_identity<by_lane>{});
+#else
+    gather(1, std::type_identity<packet_gather<by_lane>>{});
 #endif
-    parallel_for(exec, "backward/gather", tile_range{grid_.count(), 64}, kernel);
   }
 
   buffer<float, E> moments_;

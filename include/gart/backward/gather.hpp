@@ -76,7 +76,10 @@ struct gather_kernel {
     if (count == 0) return;
     pixel_box const area = grid.tile(tile);
     scratch& s = team.scratch();
-    team.for_each(area.area(), [&](index_t p) { load_pixel(s.pixels[p], area, p); });
+    team.for_each(area.area(), [&](index_t p) {
+      u32 const x = area.x0 + p % area.width(), y = area.y0 + p / area.width();
+      load_pixel(s.pixels[p], {static_cast<int>(x), static_cast<int>(y)});
+    });
     team.barrier();
     team.for_each(count, [&](index_t k) { gather(s, area, map.primitives[first + k]); });
     team.barrier();
@@ -85,20 +88,46 @@ struct gather_kernel {
   // What a primitive's walk of a tile has summed goes to the Gaussian, or to its row.
   GART_HD GART_INLINE void finish(pixel_box const& box, pixel_box const& area, u32 id, float const (&sh_sum)[sh_stride],
                                   float const (&moment_sum)[moment_stride]) const {
-    if constexpr (Sums == gather_sums::atomic) {
-      if constexpr (Terms::color)
-        E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id, sh_sum,
-                          3 * sh_coefficients(active_degree));
-      if constexpr (Terms::geometry)
-        E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, moment_sum, moment_count);
-    } else {
-      store_row(box, area, id, sh_sum, moment_sum);
-    }
+    if constexpr (Terms::color) add_color_sums(box, area, id, 0, sh_sum);
+    if constexpr (Terms::geometry) add_moment_sums(box, area, id, moment_sum);
   }
 
  protected:
-  GART_HD void load_pixel(pixel_data& out, pixel_box const& area, index_t p) const {
-    pixel const at{static_cast<int>(area.x0 + p % area.width()), static_cast<int>(area.y0 + p / area.width())};
+  // Floats [first, first + N) of the colour's.
+  template <int N>
+  GART_HD GART_INLINE void add_color_sums(pixel_box const& box, pixel_box const& area, u32 id, int first,
+                                          float const (&sums)[N]) const {
+    int const active = 3 * sh_coefficients(active_degree) - first;
+    if constexpr (Sums == gather_sums::atomic) {
+      E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id + first, sums, active);
+    } else if constexpr (N % 4 == 0 || N == sh_stride) {
+      quad* const out = row_of(box, area, id) + first / 4;
+      GART_UNROLL
+      for (int q = 0; q < (N + 3) / 4; ++q) {
+        quad four{};
+        GART_UNROLL
+        for (int i = 0; i < 4; ++i) four.v[i] = 4 * q + i < N && 4 * q + i < active ? sums[4 * q + i] : 0.0f;
+        out[q] = four;
+      }
+    } else {
+      float* const out = reinterpret_cast<float*>(row_of(box, area, id)) + first;
+      GART_UNROLL
+      for (int i = 0; i < N; ++i) out[i] = i < active ? sums[i] : 0.0f;
+    }
+  }
+  GART_HD GART_INLINE void add_moment_sums(pixel_box const& box, pixel_box const& area, u32 id,
+                                           float const (&sums)[moment_stride]) const {
+    if constexpr (Sums == gather_sums::atomic) {
+      E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, sums, moment_count);
+    } else {
+      quad* const out = row_of(box, area, id) + pair_row<ShDegree>::sh_quads;
+      GART_UNROLL
+      for (int q = 0; q < moment_stride / 4; ++q)
+        out[q] = {{sums[4 * q], sums[4 * q + 1], sums[4 * q + 2], sums[4 * q + 3]}};
+    }
+  }
+
+  GART_HD void load_pixel(pixel_data& out, pixel const& at) const {
     std::size_t const a = 3 * (static_cast<std::size_t>(at.y) * view.width + at.x);
     vec3 const d = pixel_ray(view, at).direction;
     vec3 const c(color[a], color[a + 1], color[a + 2]);
@@ -118,12 +147,12 @@ struct gather_kernel {
 
   GART_HD void gather(scratch const& s, pixel_box const& area, u32 id) const {
     lt_range const range = ranges[id];
-    pixel_box const cell = intersect(range.box, area);
-    u32 const first = static_cast<u32>(range.offset) + tile_offset(range.box, cell);
-    Entry const* slot = slots + first;
     float sh_sum[sh_stride] = {};
     float moment_sum[moment_stride] = {};
     lane_data const data(*this, id);
+    pixel_box const cell = intersect(range.box, area);
+    u32 const first = static_cast<u32>(range.offset) + tile_offset(range.box, cell);
+    Entry const* slot = slots + first;
     u32 const width = cell.width(), last = cell.area() - 1;
     u32 const skip = area.width() - width;
     u32 p = (cell.y0 - area.y0) * area.width() + (cell.x0 - area.x0);
@@ -133,7 +162,13 @@ struct gather_kernel {
       Entry const entry = next;
       next = after;
       after = slot[k + 2 < last ? k + 2 : last];
-      visit(s.pixels[p], entry, first + k, data, sh_sum, moment_sum);
+      pixel_data const& at = s.pixels[p];
+      response r[1];
+      responses_at(r, data, [&](int) -> pixel_data const& { return at; });
+      if (holds(at, entry, first + k, r[0], data)) {
+        if constexpr (Terms::color) add_color(at, entry, sh_sum);
+        if constexpr (Terms::geometry) add_moments(at, entry, r[0], data, true, moment_sum);
+      }
       ++p;
       if (++column == width) column = 0, p += skip;
     }
@@ -150,79 +185,62 @@ struct gather_kernel {
   };
   using lane_data = std::conditional_t<Terms::geometry || recomputed, record_data, no_data>;
 
-  // The slot of that number: added if it is a hit.
-  GART_HD GART_INLINE void visit(pixel_data const& at, Entry const& entry, u32 number, lane_data const& data,
-                                 float (&sh_sum)[sh_stride], float (&moment_sum)[moment_stride]) const {
-    if constexpr (recomputed) {
-      quad const d = at.direction_total;
-      response const r = evaluate<Response>(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
-      bool const reached = !before(at.last.v[0], float_to_bits(at.last.v[1]), r.t, number);
-      if (!is_hit(data.gaussian, r, near) || !reached) return;
-    } else if (!entry.written()) {
-      return;
-    }
-    add(at, entry, data, sh_sum, moment_sum);
+  // What the Gaussian has of the rays of N pixels at once.
+  template <int N, class F>
+  GART_HD GART_INLINE void responses_at(response (&out)[N], lane_data const& data, F&& pixel_of) const {
+    if constexpr (std::is_same_v<lane_data, record_data>)
+      evaluate_all<Response>(out, [&](int i) {
+        quad const d = pixel_of(i).direction_total;
+        return approach_to(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
+      });
+  }
+  // Whether the slot of that number is a hit.
+  GART_HD GART_INLINE bool holds(pixel_data const& at, Entry const& entry, u32 number, response const& r,
+                                 lane_data const& data) const {
+    if constexpr (recomputed)
+      return is_hit(data.gaussian, r, near) & !before(at.last.v[0], float_to_bits(at.last.v[1]), r.t, number);
+    else
+      return entry.written();
   }
 
-  // One hit: its pixel, its record.
-  GART_HD GART_INLINE void add(pixel_data const& at, Entry const& entry, lane_data const& data,
-                               float (&sh_sum)[sh_stride], float (&moment_sum)[moment_stride]) const {
+  // One hit: its pixel, its slot.
+  GART_HD GART_INLINE void add_color(pixel_data const& at, Entry const& entry, float (&sh_sum)[sh_stride]) const {
     quad const g = at.gradient;
-    vec3 const dl(g.v[0], g.v[1], g.v[2]);
-    if constexpr (Terms::color) {
-      sh_basis<ShDegree> basis;
-      if constexpr (ShDegree == 0) basis = sh_basis<ShDegree>(vec3(0.0f));
+    sh_basis<ShDegree> basis;
+    if constexpr (ShDegree == 0) basis = sh_basis<ShDegree>(vec3(0.0f));
+    GART_UNROLL
+    for (int q = 0; q < pixel_data::basis_quads; ++q) {
+      quad const four = at.basis[q];
       GART_UNROLL
-      for (int q = 0; q < pixel_data::basis_quads; ++q) {
-        quad const four = at.basis[q];
-        GART_UNROLL
-        for (int i = 0; i < 4; ++i)
-          if (4 * q + i < bands) basis.y[4 * q + i] = four.v[i];
-      }
-      float const w = entry.weight();
-      vec3 const cg(entry.clamped(0) ? 0.0f : w * dl.x, entry.clamped(1) ? 0.0f : w * dl.y,
-                    entry.clamped(2) ? 0.0f : w * dl.z);
-      GART_UNROLL
-      for (int b = 0; b < bands; ++b) {
-        sh_sum[3 * b] += basis.y[b] * cg.x;
-        sh_sum[3 * b + 1] += basis.y[b] * cg.y;
-        sh_sum[3 * b + 2] += basis.y[b] * cg.z;
-      }
+      for (int i = 0; i < 4; ++i)
+        if (4 * q + i < bands) basis.y[4 * q + i] = four.v[i];
     }
-    if constexpr (Terms::geometry) {
-      quad const d = at.direction_total;
-      response const r = evaluate<Response>(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
-      float const alpha = hit_alpha<Response>(data.gaussian, r.d2);
-      vec3 const opaque = entry.color();
-      float const opaque_g = opaque.x * dl.x + opaque.y * dl.y + opaque.z * dl.z;
-      moments const m = hit_moments<Response>(data.gaussian, r, alpha_gradient(opaque_g, d.v[3], alpha));
-      GART_UNROLL
-      for (int i = 0; i < moment_count; ++i) moment_sum[i] += m.v[i];
+    float const w = entry.weight();
+    vec3 const cg(entry.clamped(0) ? 0.0f : w * g.v[0], entry.clamped(1) ? 0.0f : w * g.v[1],
+                  entry.clamped(2) ? 0.0f : w * g.v[2]);
+    GART_UNROLL
+    for (int b = 0; b < bands; ++b) {
+      sh_sum[3 * b] += basis.y[b] * cg.x;
+      sh_sum[3 * b + 1] += basis.y[b] * cg.y;
+      sh_sum[3 * b + 2] += basis.y[b] * cg.z;
     }
   }
+  GART_HD GART_INLINE void add_moments(pixel_data const& at, Entry const& entry, response const& r,
+                                       lane_data const& data, bool hit, float (&moment_sum)[moment_stride]) const {
+    quad const g = at.gradient;
+    vec3 const opaque = entry.color();
+    float const opaque_g = opaque.x * g.v[0] + opaque.y * g.v[1] + opaque.z * g.v[2];
+    float const alpha = hit_alpha<Response>(data.gaussian, r.d2);
+    moments const m =
+        hit_moments<Response>(data.gaussian, r, alpha_gradient(opaque_g, at.direction_total.v[3], alpha), hit);
+    GART_UNROLL
+    for (int i = 0; i < moment_count; ++i) moment_sum[i] += m.v[i];
+  }
 
-  GART_HD void store_row(pixel_box const& box, pixel_box const& area, u32 id, float const (&sh_sum)[sh_stride],
-                         float const (&moment_sum)[moment_stride]) const {
-    using row = pair_row<ShDegree>;
+  GART_HD GART_INLINE quad* row_of(pixel_box const& box, pixel_box const& area, u32 id) const {
     pixel_box const tiles = tiles_of<Size>(box);
     u64 const pair = pair_offsets[id] + (area.y0 / Size - tiles.y0) * tiles.width() + (area.x0 / Size - tiles.x0);
-    quad* const out = rows + pair * row::quads;
-    if constexpr (Terms::color) {
-      int const active = 3 * sh_coefficients(active_degree);
-      GART_UNROLL
-      for (int q = 0; q < row::sh_quads; ++q) {
-        quad four{};
-        GART_UNROLL
-        for (int i = 0; i < 4; ++i) four.v[i] = 4 * q + i < sh_stride && 4 * q + i < active ? sh_sum[4 * q + i] : 0.0f;
-        out[q] = four;
-      }
-    }
-    if constexpr (Terms::geometry) {
-      GART_UNROLL
-      for (int q = 0; q < moment_stride / 4; ++q)
-        out[row::sh_quads + q] = {
-            {moment_sum[4 * q], moment_sum[4 * q + 1], moment_sum[4 * q + 2], moment_sum[4 * q + 3]}};
-    }
+    return rows + pair * pair_row<ShDegree>::quads;
   }
 };
 

@@ -140,9 +140,9 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
       if constexpr (Terms::geometry) {
         lanes const alpha = hit_alpha<Response>(g, r.d2);
         moments_of<lanes> const m =
-            hit_moments<Response>(g, r, alpha_gradient(dot(e.opaque, at.gradient), at.total, alpha));
+            hit_moments<Response>(g, r, alpha_gradient(dot(e.opaque, at.gradient), at.total, alpha), hit);
 #pragma GCC unroll 16
-        for (int k = 0; k < moment_count; ++k) moment_sum[k] += select(hit, m.v[k], 0.0f);
+        for (int k = 0; k < moment_count; ++k) moment_sum[k] += m.v[k];
       }
       if constexpr (Terms::color) {
         alignas(lanes) float cg[3][lane_count];

@@ -66,11 +66,11 @@ struct cleared_strategy : primitive_strategy {
   static constexpr slot_validity validity = slot_validity::cleared;
 };
 
-// The primitive strategy with a warp a primitive (backward/warp_gather.hpp): what a lane a primitive is measured
-// against, on a device.
-struct warp_strategy : primitive_strategy {
-  static constexpr char const* name = "warp";
-  static constexpr bool by_warp = true;
+// The primitive strategy without matrix units (backward/matrix_gather.hpp): what these are tested and measured against,
+// on a device.
+struct lane_strategy : primitive_strategy {
+  static constexpr char const* name = "lane";
+  static constexpr bool lane_by_lane = true;
 };
 
 }  // namespace gart

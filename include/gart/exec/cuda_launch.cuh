@@ -5,9 +5,14 @@
 // min_blocks` (blocks a multiprocessor, default 1).
 
 #include <gart/exec/cuda.hpp>
+#include <gart/exec/kept_address.hpp>
 #include <gart/exec/stage.hpp>
 
 #include <cuda_runtime.h>
+
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
+#error "gart needs a GPU of compute capability 8.0 or later: set CMAKE_CUDA_ARCHITECTURES to 80 or more"
+#endif
 
 namespace gart {
 
@@ -43,16 +48,6 @@ class cuda_team {
  private:
   Scratch& scratch_;
 };
-
-// A block's shared memory by an address that the compiler keeps: it would work out the block's window again at each use.
-template <class T>
-__device__ GART_INLINE T& kept_address(void* shared) {
-  u32 address = static_cast<u32>(__cvta_generic_to_shared(shared));
-  asm volatile("" : "+r"(address));
-  void* const kept = __cvta_shared_to_generic(address);
-  __builtin_assume(__isShared(kept));
-  return *static_cast<T*>(kept);
-}
 
 template <class K>
 __global__ void __launch_bounds__(block_size_of<K>(), min_blocks_of<K>()) run_index_kernel(index_t n, K const kernel) {

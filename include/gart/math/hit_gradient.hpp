@@ -32,7 +32,7 @@ using moments = moments_of<float>;
 // dL/dalpha of a hit: V.g and C.g.
 template <class F>
 GART_HD GART_INLINE F alpha_gradient(F opaque_g, F color_g, F alpha) {
-  return (opaque_g - color_g) / (F(1.0f) - alpha);
+  return (opaque_g - color_g) * fast_reciprocal(F(1.0f) - alpha);
 }
 
 // The front-to-back walk of a ray's gradient.
@@ -53,13 +53,22 @@ struct ray_gradient {
   }
 };
 
+// What a hit adds to the moments; zeros where `hit` is false, whatever the rest is then.
+template <class Response = generalized_gaussian<>, class F, class Mask>
+GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, response_of<F> const& r, F alpha_gradient,
+                                              Mask hit) {
+  F const raw = unclamped_alpha<Response>(gaussian, r.d2), zero = 0.0f;
+  F const a = select(both(hit, raw < F(alpha_max)), raw * alpha_gradient, zero);
+  F const b = select(hit, a * Response::slope(r.d2), zero);
+  vec3_of<F> const offset = orthogonal_offset(r);
+  vec3_of<F> const p = {select(hit, offset.x, zero), select(hit, offset.y, zero), select(hit, offset.z, zero)};
+  vec3_of<F> const bp = {b * p.x, b * p.y, b * p.z};
+  return {{a, bp.x, bp.y, bp.z, bp.x * p.x, bp.y * p.y, bp.z * p.z, bp.y * p.z, bp.x * p.z, bp.x * p.y, 0.0f, 0.0f}};
+}
+
 template <class Response = generalized_gaussian<>, class F>
 GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, response_of<F> const& r, F alpha_gradient) {
-  F const raw = unclamped_alpha<Response>(gaussian, r.d2);
-  F const a = select(raw < F(alpha_max), raw * alpha_gradient, F(0.0f));
-  F const b = a * Response::slope(r.d2);
-  vec3_of<F> const p = orthogonal_offset(r), bp = {b * p.x, b * p.y, b * p.z};
-  return {{a, bp.x, bp.y, bp.z, bp.x * p.x, bp.y * p.y, bp.z * p.z, bp.y * p.z, bp.x * p.z, bp.x * p.y, 0.0f, 0.0f}};
+  return hit_moments<Response>(gaussian, r, alpha_gradient, F(0.0f) <= F(0.0f));
 }
 
 struct geometry_gradient {

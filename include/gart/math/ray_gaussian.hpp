@@ -123,24 +123,56 @@ GART_HD GART_INLINE float gaussian_origin(ray_gaussian::row const& m, ray const&
   return fma(m.x, r.origin.x, fma(m.y, r.origin.y, fma(m.z, r.origin.z, m.o)));
 }
 
-template <class Response = generalized_gaussian<>, class Ray>
-GART_HD GART_INLINE auto evaluate(ray_gaussian const& g, Ray const& r) {
-  using F = std::remove_cvref_t<decltype(r.direction.x)>;
+// A ray in the Gaussian's own space, before the division.
+template <class F>
+struct approach_of {
   vec3_of<F> o, d;
+  F od, dd;
+};
+using approach = approach_of<float>;
+
+template <class Ray>
+GART_HD GART_INLINE auto approach_to(ray_gaussian const& g, Ray const& r) {
+  using F = std::remove_cvref_t<decltype(r.direction.x)>;
+  approach_of<F> a;
   GART_UNROLL
   for (int k = 0; k < 3; ++k) {
-    o[k] = gaussian_origin(g.m[k], r);
-    d[k] = fma(F(g.m[k].x), r.direction.x, fma(F(g.m[k].y), r.direction.y, mul(F(g.m[k].z), r.direction.z)));
+    a.o[k] = gaussian_origin(g.m[k], r);
+    a.d[k] = fma(F(g.m[k].x), r.direction.x, fma(F(g.m[k].y), r.direction.y, mul(F(g.m[k].z), r.direction.z)));
   }
-  F const od = fma(o.x, d.x, fma(o.y, d.y, mul(o.z, d.z)));
-  F const dd = fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)));
+  a.od = fma(a.o.x, a.d.x, fma(a.o.y, a.d.y, mul(a.o.z, a.d.z)));
+  a.dd = fma(a.d.x, a.d.x, fma(a.d.y, a.d.y, mul(a.d.z, a.d.z)));
+  return a;
+}
+
+// inverse: 1 / a.dd
+template <class F>
+GART_HD GART_INLINE response_of<F> response_of_approach(approach_of<F> const& a, F inverse) {
   response_of<F> out;
-  out.d = d;
-  out.inverse = Response::reciprocal(dd);
-  out.t = mul(-od, out.inverse);
-  out.p = {fma(out.t, d.x, o.x), fma(out.t, d.y, o.y), fma(out.t, d.z, o.z)};
+  out.d = a.d;
+  out.inverse = inverse;
+  out.t = mul(-a.od, out.inverse);
+  out.p = {fma(out.t, a.d.x, a.o.x), fma(out.t, a.d.y, a.o.y), fma(out.t, a.d.z, a.o.z)};
   out.d2 = fma(out.p.x, out.p.x, fma(out.p.y, out.p.y, mul(out.p.z, out.p.z)));
   return out;
+}
+
+template <class Response = generalized_gaussian<>, class Ray>
+GART_HD GART_INLINE auto evaluate(ray_gaussian const& g, Ray const& r) {
+  auto const a = approach_to(g, r);
+  return response_of_approach(a, Response::reciprocal(a.dd));
+}
+
+// N at once, one beside the other: the steps of each wait for each other. `of(i)` is the i-th approach.
+template <class Response, int N, class F>
+GART_HD GART_INLINE void evaluate_all(response (&out)[N], F&& of) {
+  approach a[N];
+  float inverse[N];
+  GART_UNROLL
+  for (int i = 0; i < N; ++i) a[i] = of(i), inverse[i] = a[i].dd;
+  Response::reciprocals(inverse);
+  GART_UNROLL
+  for (int i = 0; i < N; ++i) out[i] = response_of_approach(a[i], inverse[i]);
 }
 
 // p is orthogonal to d_g, but the rounding of t leaves a part along it. It does not show in d2, where it enters

@@ -84,6 +84,13 @@ struct generalized_gaussian {
     else
       return gart::reciprocal(a);
   }
+  template <int N>
+  GART_HD GART_INLINE static void reciprocals(float (&a)[N]) {
+    if constexpr (fast)
+      for (float& x : a) x = fast_reciprocal(x);
+    else
+      gart::reciprocals(a);
+  }
 
  private:
   static constexpr double exact_scale = [] {

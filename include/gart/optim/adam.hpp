@@ -113,9 +113,17 @@ struct adam_kernel {
   }
 
 #if !defined(__CUDACC__)
-  // Elements a lane each, whatever their columns; where one is not finite, one by one. Lanes of Gaussians that were not
-  // seen keep what they had.
+  // Rows that were seen and follow each other together.
   void update_rows(adam_group const& group, index_t row, index_t rows_here) const {
+    if constexpr (!SeenOnly) return update_elements(group, row, rows_here);
+    for (index_t from = 0, to; from < rows_here; from = to + 1) {
+      for (to = from; to < rows_here && seen(row + to);) ++to;
+      if (to > from) update_elements(group, row + from, to - from);
+    }
+  }
+
+  // Elements a lane each, whatever their columns; where one is not finite, one by one.
+  void update_elements(adam_group const& group, index_t row, index_t rows_here) const {
     constexpr index_t most = 48;  // columns of a group
     float rates[most + lane_count], trained[most + lane_count];
     for (index_t k = 0; k < group.stride + lane_count; ++k) {
@@ -123,8 +131,6 @@ struct adam_kernel {
       rates[k] = column < group.head ? group.rate_head : group.rate_rest;
       trained[k] = column < group.active ? 1.0f : 0.0f;
     }
-    float shown[rows_per_tile + lane_count];
-    for (index_t r = 0; SeenOnly && r < rows_here; ++r) shown[r] = seen(row + r) ? 1.0f : 0.0f;
     auto const read = [](float const* p) {
       lanes out;
       std::memcpy(&out, p, sizeof out);
@@ -133,40 +139,26 @@ struct adam_kernel {
     auto const write = [](float* p, lanes x) { std::memcpy(p, &x, sizeof x); };
     std::size_t const base = std::size_t{row} * group.stride;
     index_t const count = rows_here * group.stride;
-    index_t e = 0, column = 0, at = 0;  // the element, and its column and row
+    index_t e = 0, column = 0;
     for (; e + lane_count <= count; e += lane_count) {
       std::size_t const i = base + e;
-      lane_mask wanted = read(trained + column) > lanes(0.0f);
-      index_t const first_column = column;
-      if (SeenOnly && column + lane_count <= group.stride) {
-        if (shown[at] == 0) wanted = lanes_of(0);
-      } else if constexpr (SeenOnly) {
-        lanes of_rows;
-        for (index_t k = 0, c = column, r = at; k < lane_count; ++k) {
-          of_rows.v[k] = shown[r];
-          if (++c == group.stride) c = 0, ++r;
-        }
-        wanted &= of_rows > lanes(0.0f);
-      }
-      for (column += lane_count; column >= group.stride; column -= group.stride) ++at;
-      if (SeenOnly && !any(wanted)) continue;
+      lane_mask const wanted = read(trained + column) > lanes(0.0f);
       lanes const g = read(group.gradient + i);
       adam_element<lanes> const from{read(group.parameter + i), read(group.first + i), read(group.second + i)};
-      auto const to = rule.moved(from, g, read(rates + first_column));
+      auto const to = rule.moved(from, g, read(rates + column));
       lanes const infinity(__builtin_huge_valf());
       lane_mask const finite =
           (magnitude(g) < infinity) & (magnitude(to.second) < infinity) & (magnitude(to.parameter) < infinity);
       if (any(wanted & ~finite)) {
-        for (index_t k = 0; k < lane_count; ++k)
-          if (!SeenOnly || seen(row + (e + k) / group.stride)) update(group, i + k, (first_column + k) % group.stride);
+        for (index_t k = 0; k < lane_count; ++k) update(group, i + k, (column + k) % group.stride);
       } else {
         write(group.parameter + i, select(wanted, to.parameter, from.parameter));
         write(group.first + i, select(wanted, to.first, from.first));
         write(group.second + i, select(wanted, to.second, from.second));
       }
+      column = (column + lane_count) % group.stride;
     }
-    for (; e < count; ++e)
-      if (!SeenOnly || shown[e / group.stride] > 0) update(group, base + e, e % group.stride);
+    for (; e < count; ++e) update(group, base + e, e % group.stride);
   }
 #endif
 };

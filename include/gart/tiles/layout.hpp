@@ -6,6 +6,8 @@
 
 #include <gart/tiles/grid.hpp>
 
+#include <cstring>
+
 namespace gart {
 
 // A primitive's box and where its slots begin, one 16-byte word.
@@ -38,10 +40,18 @@ struct alignas(16) slot_cell {
     width = cell.width();
     x = cell.x0, y = cell.y0, x1 = cell.x1, y1 = cell.y1;
   }
-  // Boxes hold every hit; memory stays safe regardless.
+  // From memory as one word, where fields would be read one after another.
+  GART_HD GART_INLINE static slot_cell read(slot_cell const& from) {
+    quad const word = reinterpret_cast<quad const&>(from);
+    slot_cell out;
+    std::memcpy(&out, &word, sizeof out);
+    return out;
+  }
+  // Boxes hold every hit; memory stays safe regardless. Without a branch: lanes have not to wait for one another.
   GART_HD GART_INLINE u32 place_of(int px, int py) const {
-    if (px < x || px >= x1 || py < y || py >= y1) return none;
-    return first + static_cast<u32>(py - y) * width + static_cast<u32>(px - x);
+    u32 const column = static_cast<u32>(px) - x, row = static_cast<u32>(py) - y;
+    bool const inside = (column < width) & (row < static_cast<u32>(y1 - y));
+    return inside ? first + row * width + column : none;
   }
 };
 

@@ -73,19 +73,14 @@ class depth_order {
   int shift_ = 0;
 };
 
-// On a device by how much of the tile a box covers, in eight classes, so that lanes that walk the boxes in step have
-// walks of like length; on a host not at all.
-template <bool Device, int Size>
-struct cover_order {
-  static constexpr int bits = Device ? 3 : 0;
-  int take(int) const { return bits; }
+// By the primitives' numbers, in which the pairs come.
+struct number_order {
+  int take(int) const { return 0; }
   int shift() const { return 0; }
 
   struct primitive {};
   GART_HD primitive of(index_t) const { return {}; }
-  GART_HD u32 key(primitive, pixel_box const& cell, u32 /*tile*/) const {
-    return ((cell.area() - 1) << bits) / tile_grid<Size>::pixels;
-  }
+  GART_HD u32 key(primitive, pixel_box const& /*cell*/, u32 /*tile*/) const { return 0; }
 };
 
 }  // namespace gart

@@ -9,6 +9,7 @@
 // Memory: 24 bytes for each of 210 hits a lane. Device only.
 
 #include <gart/core/types.hpp>
+#include <gart/exec/kept_address.hpp>
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
 
@@ -45,14 +46,13 @@ class lane_queue {
 
  public:
   struct scratch {  // of a warp
-    float t[window][lanes], alpha[window][lanes], red[window][lanes], green[window][lanes], blue[window][lanes];
-    u32 key[window][lanes];
+    float words[6][window][lanes];
   };
   static constexpr std::size_t floats_aside = std::size_t{6} * runs * run;  // of a lane
 
   // aside: of the warp's lanes, on a boundary of 8 bytes.
   __device__ GART_INLINE lane_queue(scratch& s, float* aside, int lane, KeyOrder before)
-      : s_(s), aside_(reinterpret_cast<pair*>(aside) + 3 * runs * run * lane), lane_(lane), before_(before) {
+      : own_(&detail::kept_address<float>(&s.words[0][0][lane])), aside_(reinterpret_cast<pair*>(aside) + 3 * runs * run * lane), before_(before) {
     clear();
   }
 
@@ -65,6 +65,7 @@ class lane_queue {
   }
 
   __device__ GART_INLINE bool full() const { return count_ == window; }
+  __device__ GART_INLINE int room() const { return window - count_; }
   __device__ GART_INLINE bool lost() const { return lost_t_ < infinity; }
   __device__ GART_INLINE float lost_t() const { return lost_t_; }  // infinity: none
 
@@ -77,18 +78,12 @@ class lane_queue {
 
   // Needs room, where there can be.
   __device__ GART_INLINE void add(waiting_hit const& h) {
-    if (lost() && !nearer(h.t, h.key, lost_t_, lost_key_)) return;
-    if (full()) {
-      int const farthest = slot_of(window - 1);
-      float const t = s_.t[farthest][lane_];
-      u32 const key = s_.key[farthest][lane_];
-      bool const fits = nearer(h.t, h.key, t, key);
-      lost_t_ = fits ? t : h.t, lost_key_ = fits ? key : h.key;
-      if (!fits) return;
-      order_ &= (u64{1} << (4 * (window - 1))) - 1;
-      give_back(farthest);
+    int slot = free_slot();
+    if (lost() | full()) {
+      if (!has_place(h)) return;
+      slot = free_slot();
     }
-    put(h);
+    put(h, slot);
   }
 
   // Passes on hits with t * cosine < depth until f(hit) is false.
@@ -96,18 +91,24 @@ class lane_queue {
   __device__ GART_INLINE void pass_on(float depth, float cosine, F&& f) {
     while (true) {
       int const slot = slot_of(0);
-      float t = count_ > 0 ? s_.t[slot][lane_] : infinity;
-      bool const from_run =
-          next_t_ < t || (next_t_ == t && t < infinity && before_(key_of(next_record()), s_.key[slot][lane_]));
+      float t = count_ > 0 ? word(time, slot) : infinity;
+      bool from_run = false;
+      if ((next_t_ < infinity) & (next_t_ <= t))
+        from_run = next_t_ < t || before_(key_of(next_record()), key_at(slot));
       t = from_run ? next_t_ : t;
-      if (t == infinity || !(t * cosine < depth)) return;
-      if (t >= lost_t_ && !nearer(t, from_run ? key_of(next_record()) : s_.key[slot][lane_], lost_t_, lost_key_))
-        return;
+      if ((t == infinity) | !(t * cosine < depth)) return;
+      if (t >= lost_t_ && !nearer(t, from_run ? key_of(next_record()) : key_at(slot), lost_t_, lost_key_)) return;
       if (!f(from_run ? take_of_run() : take_first())) return;
     }
   }
 
  private:
+  enum field { time, opacity, red, green, blue, key_bits };
+
+  // Of the hit in a slot of the window.
+  __device__ GART_INLINE float& word(field f, int slot) const { return own_[(f * window + slot) * lanes]; }
+  __device__ GART_INLINE u32 key_at(int slot) const { return float_to_bits(word(key_bits, slot)); }
+
   __device__ GART_INLINE bool nearer(float t, u32 key, float other_t, u32 other) const {
     return t != other_t ? t < other_t : before_(key, other);
   }
@@ -115,26 +116,42 @@ class lane_queue {
   // The slot of the window's hit that is k-th in order.
   __device__ GART_INLINE int slot_of(int k) const { return static_cast<int>(order_ >> (4 * k)) & 15; }
 
-  __device__ GART_INLINE void put(waiting_hit const& h) {
-    int const slot = __ffs(static_cast<int>(free_)) - 1;
+  // Where some hit was lost or the window is full: whether there is a place for this one, nearer than what was lost or
+  // will be for it.
+  __device__ GART_INLINE bool has_place(waiting_hit const& h) {
+    if (lost() && !nearer(h.t, h.key, lost_t_, lost_key_)) return false;
+    if (!full()) return true;
+    int const farthest = slot_of(window - 1);
+    float const t = word(time, farthest);
+    u32 const key = key_at(farthest);
+    bool const fits = nearer(h.t, h.key, t, key);
+    lost_t_ = fits ? t : h.t, lost_key_ = fits ? key : h.key;
+    if (!fits) return false;
+    order_ &= (u64{1} << (4 * (window - 1))) - 1;
+    give_back(farthest);
+    return true;
+  }
+
+  __device__ GART_INLINE int free_slot() const { return __ffs(static_cast<int>(free_)) - 1; }
+
+  __device__ GART_INLINE void put(waiting_hit const& h, int slot) {
     free_ &= free_ - 1;
-    s_.t[slot][lane_] = h.t, s_.alpha[slot][lane_] = h.alpha;
-    s_.red[slot][lane_] = h.shown.x, s_.green[slot][lane_] = h.shown.y, s_.blue[slot][lane_] = h.shown.z;
-    s_.key[slot][lane_] = h.key;
+    word(time, slot) = h.t, word(opacity, slot) = h.alpha;
+    word(red, slot) = h.shown.x, word(green, slot) = h.shown.y, word(blue, slot) = h.shown.z;
+    word(key_bits, slot) = bits_to_float(h.key);
     int bits = 4 * count_++;
     for (; bits > 0; bits -= 4) {  // from the back, where most belong
       int const other = slot_of(bits / 4 - 1);
-      if (!nearer(h.t, h.key, s_.t[other][lane_], s_.key[other][lane_])) break;
+      float const t = word(time, other);
+      if (t < h.t || (t == h.t && !before_(h.key, key_at(other)))) break;
     }
     u64 const low = (u64{1} << bits) - 1;
     order_ = (order_ & low) | u64(slot) << bits | (order_ & ~low) << 4;
   }
 
   __device__ GART_INLINE waiting_hit at(int slot) const {
-    return {s_.t[slot][lane_],
-            s_.alpha[slot][lane_],
-            {s_.red[slot][lane_], s_.green[slot][lane_], s_.blue[slot][lane_]},
-            s_.key[slot][lane_]};
+    return {word(time, slot), word(opacity, slot), {word(red, slot), word(green, slot), word(blue, slot)},
+            key_at(slot)};
   }
 
   __device__ GART_INLINE void give_back(int slot) { free_ |= 1u << slot, --count_; }
@@ -162,7 +179,7 @@ class lane_queue {
   __device__ GART_INLINE void put_aside(int to) {
     int const count = count_ - 1;
     u64 rest = order_ >> 4;
-    float const first = s_.t[rest & 15][lane_];
+    float const first = word(time, static_cast<int>(rest) & 15);
     pair* out = record(to, run - count);
     for (int k = 0; k < count; ++k, rest >>= 4, out += 3) {
       int const slot = static_cast<int>(rest) & 15;
@@ -202,9 +219,8 @@ class lane_queue {
         next_run_ = k;
   }
 
-  scratch& s_;
+  float* own_;   // the lane's words of the window
   pair* aside_;  // the lane's own, [runs][run][3]: t and key, alpha and what is shown
-  int lane_;
   KeyOrder before_;
   u64 order_, left_;
   u32 free_;

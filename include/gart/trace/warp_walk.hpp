@@ -222,21 +222,31 @@ class walk_tile_warps {
     // The candidates of a group, all rays. False when no ray needs more: all have ended, or have lost a nearer hit.
     __device__ GART_INLINE bool evaluate(candidate const (&from)[group], int first, int count) {
       float t[group], d2[group];
-      u32 found = 0;
+      u32 found = 0, tied = 0;
+      response both[2];
       GART_UNROLL
-      for (int c = 0; c < group; ++c) {  // one beside the other: the arithmetic of each waits for itself
-        response const r = gart::evaluate<Response>(from[c].gaussian, ray_);
+      for (int c = 0; c < group; ++c) {
+        if (c % 2 == 0)
+          evaluate_all<Response>(both, [&](int k) { return approach_to(from[c + k].gaussian, ray_); });
+        response const& r = both[c % 2];
         t[c] = r.t, d2[c] = r.d2;
-        bool const exists = first + c < count;
-        if (exists && is_hit(from[c].gaussian, r, last_t_)) found |= 1u << c;
-        if (exists && r.t == last_t_ && follows_last(from[c].gaussian, r, first + c)) found |= 1u << c;
+        bool const is_new = is_hit(from[c].gaussian, r, last_t_), exists = first + c < count;
+        found |= (exists & is_new ? 1u : 0u) << c;
+        tied |= (exists & (r.t == last_t_) ? 1u : 0u) << c;
       }
+      if (tied && last_key_ != nothing) {
+        GART_UNROLL
+        for (int c = 0; c < group; ++c)
+          if ((tied >> c & 1) && follows_last(from[c].gaussian, t[c], d2[c], first + c)) found |= 1u << c;
+      }
+      if (!alive_) found = 0;
+      bool const crowded = __any_sync(everyone, __popc(found) > pending_.room());
       bool tried = false;
       GART_NO_UNROLL
-      for (int c = 0; c < group; ++c) {
+      for (u32 left = __reduce_or_sync(everyone, found); left; left &= left - 1) {
+        int const c = __ffs(static_cast<int>(left)) - 1;
         bool const hit = alive_ && (found >> c & 1);
-        if (!__any_sync(everyone, hit)) continue;
-        if (__any_sync(everyone, hit && pending_.full())) {
+        if (crowded && __any_sync(everyone, hit && pending_.full())) {
           if (!tried) {
             tried = true;
             float const depth = s_.depth[first + c];
@@ -261,13 +271,13 @@ class walk_tile_warps {
     }
 
     // A hit at the distance of the last one passed on.
-    __device__ bool follows_last(ray_gaussian const& g, response const& r, int number) const {
-      return r.d2 <= g.cutoff && r.t > k_.scene.near && last_key_ != nothing && before_(last_key_, key_of(number));
+    __device__ bool follows_last(ray_gaussian const& g, float t, float d2, int number) const {
+      return d2 <= g.cutoff && t > k_.scene.near && before_(last_key_, key_of(number));
     }
 
     __device__ GART_INLINE u32 key_of(int number) const {
       if constexpr (P::records_hits)
-        return s_.cell[number].place_of(at_.x, at_.y);
+        return slot_cell::read(s_.cell[number]).place_of(at_.x, at_.y);
       else
         return s_.entry[number];
     }

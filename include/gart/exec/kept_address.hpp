@@ -1,0 +1,23 @@
+#pragma once
+// Shared memory by an address that the compiler keeps, where it would work it out again at each use: a block's window,
+// a lane's place in an array. Device only.
+
+#include <gart/core/macros.hpp>
+#include <gart/core/types.hpp>
+
+#if defined(__CUDACC__)
+
+namespace gart::detail {
+
+template <class T>
+__device__ GART_INLINE T& kept_address(void* shared) {
+  u32 address = static_cast<u32>(__cvta_generic_to_shared(shared));
+  asm volatile("" : "+r"(address));
+  void* const kept = __cvta_shared_to_generic(address);
+  __builtin_assume(__isShared(kept));
+  return *static_cast<T*>(kept);
+}
+
+}  // namespace gart::detail
+
+#endif
