@@ -5,8 +5,9 @@
 //   run()      gathers and scatters what the strategy says, then turns the moments of each Gaussian into the gradients
 //              of its mean, log-scale, quaternion and opacity. Overwrites `gradients`.
 //
-// Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, 36 bytes a Gaussian, 8
-// a (primitive, tile) pair and the LT buffer: 4 or 16 bytes for each pixel of each box.
+// Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, the LT buffer, 4 or
+// 16 bytes for each pixel of each box, and where the tracer has none to lend, footprints of 36 bytes a Gaussian and
+// lists of 8 a (primitive, tile) pair.
 
 #include <gart/backward/matrix_gather.hpp>
 #include <gart/backward/packet_gather.hpp>

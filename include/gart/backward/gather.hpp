@@ -2,7 +2,8 @@
 // The backward pass by primitive: a team takes a tile, its lanes take the primitives of the tile's list in turn. A lane
 // walks the pixels that the primitive's box and the tile share, reads what the forward pass recorded there, sums the
 // gradient in registers and adds it to the Gaussian once. Rays and their SH bases are computed once a tile, into
-// scratch.
+// scratch. This is the plain form, for tiles of any size: what backward/packet_gather.hpp on a host and
+// backward/matrix_gather.hpp on a device compute in theirs.
 //
 // Whether a slot is a hit is told by the slot itself (backward/lt_slot.hpp); its t, offset and alpha are evaluated
 // again by the function the forward pass used, so they are the same bits.

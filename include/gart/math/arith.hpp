@@ -73,7 +73,7 @@ GART_HD GART_INLINE void reciprocals(float (&a)[N]) {
   bool usual = true;
   GART_UNROLL
   for (int i = 0; i < N; ++i) {
-    usual &= (float_to_bits(a[i]) + 0x01800000u & 0x7f800000u) > 0x01ffffffu;
+    usual &= ((float_to_bits(a[i]) + 0x01800000u) & 0x7f800000u) > 0x01ffffffu;  // 2^-126 to 2^126
     float estimate;
     asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(estimate) : "f"(a[i]));
     out[i] = __fmaf_rn(estimate, -__fmaf_rn(a[i], estimate, -1.0f), estimate);

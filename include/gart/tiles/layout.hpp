@@ -44,7 +44,7 @@ struct alignas(16) slot_cell {
   GART_HD GART_INLINE static slot_cell read(slot_cell const& from) {
     quad const word = reinterpret_cast<quad const&>(from);
     slot_cell out;
-    std::memcpy(&out, &word, sizeof out);
+    std::memcpy(static_cast<void*>(&out), &word, sizeof out);
     return out;
   }
   // Boxes hold every hit; memory stays safe regardless. Without a branch: lanes have not to wait for one another.
