@@ -60,35 +60,6 @@ GART_HD GART_INLINE float reciprocal(float a) {
 #endif
 }
 
-GART_HD GART_INLINE float bits_to_float(u32 bits);
-GART_HD GART_INLINE u32 float_to_bits(float f);
-
-// Of several numbers at once, the same bits. A device's correctly rounded reciprocal is an estimate and a Newton step,
-// and a branch where the number or its reciprocal is not normal, at which everything around it waits. Here the steps are
-// taken for all of them, and one branch is left.
-template <int N>
-GART_HD GART_INLINE void reciprocals(float (&a)[N]) {
-#if defined(__CUDA_ARCH__)
-  float out[N];
-  bool usual = true;
-  GART_UNROLL
-  for (int i = 0; i < N; ++i) {
-    usual &= ((float_to_bits(a[i]) + 0x01800000u) & 0x7f800000u) > 0x01ffffffu;  // 2^-126 to 2^126
-    float estimate;
-    asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(estimate) : "f"(a[i]));
-    out[i] = __fmaf_rn(estimate, -__fmaf_rn(a[i], estimate, -1.0f), estimate);
-  }
-  if (!usual) {
-    GART_UNROLL
-    for (int i = 0; i < N; ++i) out[i] = reciprocal(a[i]);
-  }
-  GART_UNROLL
-  for (int i = 0; i < N; ++i) a[i] = out[i];
-#else
-  for (float& x : a) x = reciprocal(x);
-#endif
-}
-
 GART_HD GART_INLINE float square_root(float a) {
 #if defined(__CUDA_ARCH__)
   return __fsqrt_rn(a);
@@ -114,6 +85,32 @@ GART_HD GART_INLINE u32 float_to_bits(float f) {
   u32 bits;
   std::memcpy(&bits, &f, sizeof bits);
   return bits;
+#endif
+}
+
+// Reciprocals of several numbers, the bits of reciprocal(). A device's is an estimate and a Newton step, and a branch
+// where the number or its reciprocal is not normal, for which everything around it waits. Here the steps are taken for
+// all of them, and one branch is left.
+template <int N>
+GART_HD GART_INLINE void reciprocals(float (&a)[N]) {
+#if defined(__CUDA_ARCH__)
+  float out[N];
+  bool usual = true;
+  GART_UNROLL
+  for (int i = 0; i < N; ++i) {
+    usual &= ((float_to_bits(a[i]) + 0x01800000u) & 0x7f800000u) > 0x01ffffffu;  // 2^-126 to 2^126
+    float estimate;
+    asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(estimate) : "f"(a[i]));
+    out[i] = __fmaf_rn(estimate, -__fmaf_rn(a[i], estimate, -1.0f), estimate);
+  }
+  if (!usual) {
+    GART_UNROLL
+    for (int i = 0; i < N; ++i) out[i] = reciprocal(a[i]);
+  }
+  GART_UNROLL
+  for (int i = 0; i < N; ++i) a[i] = out[i];
+#else
+  for (float& x : a) x = reciprocal(x);
 #endif
 }
 

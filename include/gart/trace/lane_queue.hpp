@@ -52,7 +52,9 @@ class lane_queue {
 
   // aside: of the warp's lanes, on a boundary of 8 bytes.
   __device__ GART_INLINE lane_queue(scratch& s, float* aside, int lane, KeyOrder before)
-      : own_(&detail::kept_address<float>(&s.words[0][0][lane])), aside_(reinterpret_cast<pair*>(aside) + 3 * runs * run * lane), before_(before) {
+      : own_(&detail::kept_address<float>(&s.words[0][0][lane])),
+        aside_(reinterpret_cast<pair*>(aside) + 3 * runs * run * lane),
+        before_(before) {
     clear();
   }
 
