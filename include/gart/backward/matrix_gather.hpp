@@ -7,8 +7,8 @@
 // neighbouring slots and add to neighbouring floats.
 //
 // A warp takes the rows of the tile that any of its primitives has, so a tile's list is put in order of rows first, 256
-// of it at a time. Sums are of the terms of gather_kernel (backward/gather.hpp) in another order, the same in every
-// run. Device only.
+// of it at a time. A pair's sums are of the terms of gather_kernel (backward/gather.hpp) in another order, the same in
+// every run. Device only.
 
 #include <gart/backward/gather.hpp>
 #include <gart/math/matrix_unit.hpp>
@@ -206,7 +206,7 @@ struct matrix_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     __syncwarp();
   }
 
-  // Of lanes' votes, whether any of those of primitive n is one.
+  // Whether any of the four lanes of primitive n voted for it.
   __device__ GART_INLINE static bool wants(u32 votes, u32 n) { return (votes >> 4 * n & 15u) != 0; }
   // Rows of sums alone are found by it.
   __device__ GART_INLINE pixel_box box_of(u32 id) const { return ordered ? this->ranges[id].box : pixel_box{}; }
