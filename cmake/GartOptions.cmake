@@ -37,13 +37,15 @@ add_library(gart_private_flags INTERFACE)
 target_compile_options(gart_private_flags INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-Wno-restrict>)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-  if(GART_NATIVE)
+  if(NOT DEFINED GART_ARCH_FLAG AND GART_NATIVE)
     set(GART_ARCH_FLAG -march=native)
-  else()
+  elseif(NOT DEFINED GART_ARCH_FLAG)
     set(GART_ARCH_FLAG -march=x86-64-v3)
   endif()
-  target_compile_options(gart_private_flags INTERFACE $<$<COMPILE_LANGUAGE:CXX>:${GART_ARCH_FLAG}>
-                                                      $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=${GART_ARCH_FLAG}>)
+  if(GART_ARCH_FLAG)
+    target_compile_options(gart_private_flags INTERFACE $<$<COMPILE_LANGUAGE:CXX>:${GART_ARCH_FLAG}>
+                                                        $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=${GART_ARCH_FLAG}>)
+  endif()
 endif()
 # Processors from Skylake to Cascade Lake decode branches that cross 32 bytes slowly.
 include(CheckCXXCompilerFlag)

@@ -1,0 +1,127 @@
+"""Links programs whose objects and whose libgart_cpu.a were compiled for different instruction sets, and holds what they
+compute to what each part computes alone, bit for bit.
+
+How many lanes the host policies have, and whether a fused multiply-add is one rounding, follows from -march. A program
+and the library share each inline function and template of one name: where the name does not tell the two apart, one
+runs the other's, and its images are black, or it crashes.
+
+A program trains with the templates of the README (every strategy, SH 0 to 3) beside every row of make_renderer and
+make_session. By default: the library that was built here, and one for another instruction set; consumers for none,
+x86-64-v3 and native at -O0, and at -O2 those that are no library's; the linker finding the library first, and last.
+GART_TEST_ALL_INSTRUCTION_SETS=1 takes every pair of {none, x86-64-v3, native} at both levels. One thread, because then
+the sums have one order.
+"""
+import argparse
+import concurrent.futures
+import os
+import pathlib
+import platform
+import re
+import subprocess
+import sys
+import tempfile
+
+parser = argparse.ArgumentParser()
+parser.add_argument("--cmake", required=True)
+parser.add_argument("--source", type=pathlib.Path, required=True)
+parser.add_argument("--build", type=pathlib.Path, required=True)
+parser.add_argument("--generator", required=True)
+parser.add_argument("--cxx", required=True)
+parser.add_argument("--jobs", default="1")
+parser.add_argument("--march", default="", help="what the build's own library was compiled with")
+parser.add_argument("--sanitize", action="store_true")
+a = parser.parse_args()
+project = pathlib.Path(__file__).resolve().parent / "instruction_sets"
+every = os.environ.get("GART_TEST_ALL_INSTRUCTION_SETS", "0") != "0"
+
+features = set(re.search(r"^flags\s*:(.*)$", pathlib.Path("/proc/cpuinfo").read_text(), re.M)[1].split()) \
+    if platform.machine() == "x86_64" else set()
+if not {"avx2", "fma", "bmi2"} <= features:
+    print("this machine has one instruction set only")
+    sys.exit(77)
+
+
+def run(*command, env=None):
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, env=env)
+    if done.returncode:
+        sys.exit(f"{' '.join(map(str, command))}\nexit code {done.returncode}\n{done.stdout}\n{done.stderr}")
+
+
+def values(program):
+    """What a program says: {what: (sum, hash)}; or how it ended."""
+    try:
+        done = subprocess.run([program], capture_output=True, text=True, timeout=300,
+                              env={**os.environ, "OMP_NUM_THREADS": "1"})
+    except subprocess.TimeoutExpired:
+        return "did not end within 300 s"
+    if done.returncode:
+        return f"exit code {done.returncode} {done.stderr[-2000:]}"
+    lines = [line.rsplit(" ", 2) for line in done.stdout.splitlines()]
+    return {what: (float(total), bits) for what, total, bits in lines}
+
+
+with tempfile.TemporaryDirectory() as temporary:
+    folder = pathlib.Path(temporary)
+    own = (a.march.removeprefix("-march=") or "none")
+    libraries = [own] + [s for s in ("x86-64-v3", "native", "none") if s != own][:2 if every else 1]
+    consumers = ["none", "x86-64-v3", "native"]
+
+    run(a.cmake, "--install", a.build, "--prefix", folder / own)
+    for library in libraries[1:]:
+        binary = folder / f"build_{library}"
+        run(a.cmake, "-S", a.source, "-B", binary, "-G", a.generator, f"-DCMAKE_CXX_COMPILER={a.cxx}",
+            "-DCMAKE_BUILD_TYPE=Release", f"-DGART_ARCH_FLAG={'' if library == 'none' else '-march=' + library}",
+            "-DGART_CUDA=OFF", "-DGART_EMBREE=OFF", "-DGART_BUILD_PROGRAM=OFF", "-DGART_BUILD_EXAMPLES=OFF",
+            "-DGART_BUILD_TESTS=OFF", f"-DGART_SANITIZE={'ON' if a.sanitize else 'OFF'}")
+        run(a.cmake, "--build", binary, "--parallel", a.jobs)
+        run(a.cmake, "--install", binary, "--prefix", folder / library)
+    archives = {}
+    for library in libraries:
+        archives[library] = folder / "archives" / library
+        archives[library].parent.mkdir(exist_ok=True)
+        archives[library].symlink_to(next((folder / library).rglob("libgart_cpu.a")).parent)
+
+    binary = folder / "programs"
+    run(a.cmake, "-S", project, "-B", binary, "-G", a.generator, f"-DCMAKE_PREFIX_PATH={folder / own}",
+        f"-DCMAKE_CXX_COMPILER={a.cxx}", f"-DCONSUMERS={';'.join(consumers)}", "-DLEVELS=0;2",
+        f"-DLIBRARIES={';'.join(str(path) for path in archives.values())}",
+        f"-DCMAKE_CXX_FLAGS={'-fsanitize=address,undefined -fno-sanitize-recover=undefined' if a.sanitize else ''}")
+    objects = [f"{c}_O{level}" for c in consumers for level in (0, 2) if every or level == 0 or c not in libraries]
+    programs = [f"templates_alone_{o}" for o in objects] + [f"library_alone_{l}" for l in libraries]
+    both = [(l, o, f"both_{l}_{o}_{order}") for l in libraries for o in objects
+            for order in ("library_first", "objects_first")]
+    programs += [name for _, _, name in both]
+    run(a.cmake, "--build", binary, "--parallel", a.jobs, "--target", *programs)
+    with concurrent.futures.ThreadPoolExecutor(int(a.jobs)) as pool:
+        said = dict(zip(programs, pool.map(lambda name: values(binary / name), programs)))
+
+failures = []
+first = None
+for name in [p for p in programs if "_alone_" in p]:
+    if not isinstance(said[name], dict):
+        sys.exit(f"{name}: {said[name]}")
+    # Instruction sets differ in roundings, and strategies and policies too.
+    for what, (total, _) in said[name].items():
+        if not total > 0:
+            failures.append(f"{name}: {what} is {total}")
+for kind in ("templates_alone_", "library_alone_"):
+    alone = [name for name in programs if name.startswith(kind)]
+    for name in alone[1:]:
+        for what, (total, _) in said[alone[0]].items():
+            if not abs(said[name][what][0] - total) <= 1e-3 * total:
+                failures.append(f"{what}: {total} in {alone[0]}, {said[name][what][0]} in {name}")
+for library, consumer, name in both:
+    expected = {**said[f"templates_alone_{consumer}"], **said[f"library_alone_{library}"]}
+    got = said[name]
+    if not isinstance(got, dict):
+        failures.append(f"{name}: {got}")
+        continue
+    wrong = [what for what in expected if got.get(what) != expected[what]]
+    if wrong or len(got) != len(expected):
+        what = wrong[0] if wrong else "count"
+        failures.append(f"{name}: {len(wrong)} of {len(expected)} values differ, the first {what}: "
+                        f"{got.get(what)} instead of {expected.get(what)}")
+print("\n".join(failures) or
+      f"{len(both)} programs of libraries for {', '.join(libraries)} and objects for {', '.join(consumers)}: "
+      f"{len(said[both[0][2]])} values each are those of the parts alone")
+sys.exit(1 if failures else 0)

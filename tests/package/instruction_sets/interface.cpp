@@ -1,0 +1,33 @@
+// What the library computes: every row behind make_renderer and make_session.
+#include "scene.hpp"
+
+#include <gart/train/session.hpp>
+
+void use_interface() {
+  gart::dataset const data = some_capture();
+  for (gart::row_info const& row : gart::compiled_rows()) {
+    gart::row_request request;
+    request.backend = row.backend, request.tracer = row.tracer, request.backward = row.backward;
+    request.sh_degree = row.sh_degree;
+    std::string const name = "library/" + row.backend + "/" + row.tracer + "/" + row.backward + "/SH" +
+                             std::to_string(row.sh_degree) + "/";
+    gart::gaussian_model const start = some_model(row.sh_degree);
+
+    auto const renderer = gart::make_renderer(request);
+    renderer->set_model(start);
+    gart::camera const& view = data.train[1].view;
+    gart::rendered const seen = renderer->render(view, {});
+    tell(name + "image", seen.color.data);
+    tell(name + "depth", seen.depth.data);
+    renderer->differentiate(view, {}, seen.color);
+    tell(name + "gradients", renderer->gradients());
+
+    gart::train_options const options = some_options(row.sh_degree);
+    auto const training = gart::make_session(request, options, data, &start);
+    std::vector<float> losses;
+    while (training->steps_done() < options.iterations) losses.push_back(training->step().loss);
+    tell(name + "losses", losses);
+    tell(name + "model", training->model());
+    tell(name + "trained image", training->render(view, gart::vec3(1.0f)).color.data);
+  }
+}

@@ -1,0 +1,61 @@
+// What the templates compute where they are instantiated, as the README shows it: every strategy, SH degrees 0 to 3.
+#include "scene.hpp"
+
+#include <gart/gart.hpp>
+
+namespace {
+
+template <class E, class Tracer, class Strategy, int Degree>
+void train() {
+  E exec;
+  gart::dataset const data = some_capture();
+  gart::train_options const options = some_options(Degree);
+  gart::trainer<E, gart::scene_traits<Degree>, Tracer, Strategy> run(exec, options, data, some_model(Degree));
+  std::string const name = std::string("template/") + E::name + "/" + Tracer::name + "/" + Strategy::name + "/SH" +
+                           std::to_string(Degree) + "/";
+  gart::camera const& view = data.train[1].view;
+  tell(name + "image", run.render(view, gart::vec3(0.0f)).color.data);
+  std::vector<float> losses;
+  run.step([&](gart::loss_input<E> const& in) {  // a loss of one's own: the mean of the image
+    for (std::size_t i = 0; i < in.image.size(); ++i) in.gradient[i] = 1.0f / static_cast<float>(in.image.size());
+    in.value[0] = in.value[1] = 1;
+  });
+  tell(name + "gradients", run.gradients().to_host());
+  while (run.steps_done() < options.iterations) losses.push_back(run.step().loss);
+  tell(name + "losses", losses);
+  tell(name + "model", run.model());
+  tell(name + "trained image", run.render(view, gart::vec3(1.0f)).color.data);
+}
+
+template <class E, class Tracer, int Degree>
+void every_strategy() {
+  train<E, Tracer, gart::pixel_strategy, Degree>();
+  train<E, Tracer, gart::hybrid_strategy, Degree>();
+  train<E, Tracer, gart::primitive_strategy, Degree>();
+}
+
+}  // namespace
+
+void use_templates() {
+  using tiles = gart::tile_tracer<gart::openmp_exec>;
+  every_strategy<gart::openmp_exec, tiles, 0>();
+  every_strategy<gart::openmp_exec, tiles, 1>();
+  every_strategy<gart::openmp_exec, tiles, 2>();
+  every_strategy<gart::openmp_exec, tiles, 3>();
+  every_strategy<gart::serial_exec, gart::bvh_tracer<gart::serial_exec>, 1>();
+
+  // Functions that are no templates.
+  gart::camera view = some_capture().train[0].view;
+  std::vector<float> directions;
+  for (int k = 0; k < view.width; ++k) {
+    gart::vec3 const d = gart::ray_direction(view, 1.3f * static_cast<float>(k), 0.7f * static_cast<float>(k));
+    directions.insert(directions.end(), {d.x, d.y, d.z});
+  }
+  tell("template/ray_direction", directions);
+  gart::exposure exposure;
+  for (int k = 0; k < gart::exposure::floats; ++k) exposure.m[k] += 0.013f * static_cast<float>(k);
+  gart::image_float image(8, 8, 3);
+  for (std::size_t k = 0; k < image.data.size(); ++k) image.data[k] = 0.0051f * static_cast<float>(k);
+  apply(exposure, image);
+  tell("template/exposure", image.data);
+}
