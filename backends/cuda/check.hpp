@@ -2,12 +2,13 @@
 // The CUDA runtime's error codes as gart's errors.
 
 #include <gart/core/error.hpp>
+#include <gart/core/isa.hpp>
 
 #include <cuda_runtime.h>
 
 #include <string>
 
-namespace gart::detail {
+namespace gart::inline GART_ISA::detail {
 
 inline std::string describe(cudaError_t code) {
   return std::string(cudaGetErrorString(code)) + " (" + cudaGetErrorName(code) + ")";
@@ -21,4 +22,4 @@ inline void check_cuda(cudaError_t code, char const* what) {
               "; if a kernel before it failed, GART_CUDA_SYNC=1 in the environment names that kernel");
 }
 
-}  // namespace gart::detail
+}  // namespace gart::inline GART_ISA::detail

@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <map>
 #include <set>
+#include <string>
 #include <thread>
 #include <tuple>
 
@@ -19,7 +20,12 @@ namespace gart_cli {
 namespace {
 
 void print_devices() {
-  std::printf("cpu        %u threads\n", std::thread::hardware_concurrency());
+  std::set<std::string> compiled_for;
+  for (auto const& r : gart::compiled_rows())
+    if (!r.instruction_set.empty()) compiled_for.insert(r.instruction_set);
+  std::printf("cpu        %u threads, rows compiled for", std::thread::hardware_concurrency());
+  for (auto const& one : compiled_for) std::printf(" %s", one.c_str());
+  std::puts("");
 #if defined(GART_WITH_CUDA)
   std::string reason;
   auto const devices = gart::cuda_devices(&reason);

@@ -98,6 +98,7 @@ TEST_CASE("info names the version and the rows") {
   auto const info = here.gart("info");
   CHECK(info.code == 0);
   CHECK(has(info.out, "gart       "));
+  CHECK(has(info.out, std::string("compiled for ") + gart::instruction_set));
   CHECK(has(info.out, "serial   bvh     pixel"));
   CHECK(has(info.out, "openmp   bvh     pixel"));
   CHECK(has(info.out, "auto means "));

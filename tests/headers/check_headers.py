@@ -1,5 +1,6 @@
 """Compiles every public header alone, included twice: .hpp by the host compiler; by nvcc, where there is one, each .cuh
-and all .hpp together. First it shows that a header that is not self-contained, and one without `#pragma once`, is seen.
+and all .hpp together. First it shows that a header that is not self-contained, one without `#pragma once`, and one that
+opens the namespace GART_ISA with no such macro, is seen.
 """
 import argparse
 import concurrent.futures
@@ -18,6 +19,8 @@ def failure(command, include, names, folder):
     """What the compiler says of a file that includes `names` twice; empty when it compiles."""
     with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".cc") as source:
         source.write("".join(f"#include <{name}>\n" for name in names) * 2)
+        if any("GART_ISA" in (include / name).read_text() for name in names):
+            source.write("#if !defined(GART_ISA)\n#error GART_ISA is a macro of gart/core/isa.hpp: include it\n#endif\n")
         source.flush()
         done = subprocess.run([*command, f"-I{include}", source.name], capture_output=True, text=True)
     what = names[0] if len(names) == 1 else "all headers together"
@@ -29,10 +32,11 @@ def self_check(host, folder):
         "good.hpp": ("#pragma once\n#include <cstddef>\ninline std::size_t good() { return 0; }\n", True),
         "alone.hpp": ("#pragma once\ninline std::size_t alone() { return 0; }\n", False),
         "twice.hpp": ("struct twice {};\n", False),
+        "name.hpp": ("#pragma once\nnamespace gart::inline GART_ISA {}\n", False),
     }
     for name, (text, compiles) in headers.items():
         (pathlib.Path(folder) / name).write_text(text)
-        if (failure(host, folder, [name], folder) == "") != compiles:
+        if (failure(host, pathlib.Path(folder), [name], folder) == "") != compiles:
             sys.exit(f"the check itself is broken: {name} should {'' if compiles else 'not '}compile")
 
 

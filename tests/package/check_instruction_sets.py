@@ -7,9 +7,13 @@ runs the other's, and its images are black, or it crashes.
 
 A program trains with the templates of the README (every strategy, SH 0 to 3) beside every row of make_renderer and
 make_session. By default: the library that was built here, and one for another instruction set; consumers for none,
-x86-64-v3 and native at -O0, and at -O2 those that are no library's; the linker finding the library first, and last.
+x86-64-v3 and native at -O0, and at -O2 those that are no library's, and nvcc's host code, where there is an nvcc; the
+linker finding the library first, and last.
 GART_TEST_ALL_INSTRUCTION_SETS=1 takes every pair of {none, x86-64-v3, native} at both levels. One thread, because then
 the sums have one order.
+
+Values are compared where a program happens to have them. So the objects for none and for native at -O0, which inlines
+nothing, are also searched for symbols that both have: none may have come out with a fused multiply-add, or with lanes.
 """
 import argparse
 import concurrent.futures
@@ -29,6 +33,7 @@ parser.add_argument("--generator", required=True)
 parser.add_argument("--cxx", required=True)
 parser.add_argument("--jobs", default="1")
 parser.add_argument("--march", default="", help="what the build's own library was compiled with")
+parser.add_argument("--nvcc")
 parser.add_argument("--sanitize", action="store_true")
 a = parser.parse_args()
 project = pathlib.Path(__file__).resolve().parent / "instruction_sets"
@@ -60,11 +65,29 @@ def values(program):
     return {what: (float(total), bits) for what, total, bits in lines}
 
 
+def shared_code(one, other):
+    """Functions that a linker takes of one object or of the other, in whose code the instruction set shows."""
+    def symbols(path):
+        told = subprocess.run(["nm", "--defined-only", path], capture_output=True, text=True, check=True).stdout
+        return {name for _, kind, name in (line.split(maxsplit=2) for line in told.splitlines()) if kind in "WVu"}
+
+    shared, found, name = symbols(one) & symbols(other), set(), None
+    if not shared:
+        sys.exit(f"{one} and {other} share nothing: they should share standard templates at least")
+    told = subprocess.run(["objdump", "-d", "--no-show-raw-insn", other], capture_output=True, text=True, check=True).stdout
+    for line in told.splitlines():
+        if head := re.match(r"[0-9a-f]+ <(.*)>:$", line):
+            name = head[1]
+        elif name in shared and re.search(r"\tvfn?m(add|sub)|%zmm|%k[0-7]", line):
+            found.add(name)
+    return sorted(found)
+
+
 with tempfile.TemporaryDirectory() as temporary:
     folder = pathlib.Path(temporary)
     own = (a.march.removeprefix("-march=") or "none")
     libraries = [own] + [s for s in ("x86-64-v3", "native", "none") if s != own][:2 if every else 1]
-    consumers = ["none", "x86-64-v3", "native"]
+    consumers = ["none", "x86-64-v3", "native"] + (["nvcc"] if a.nvcc else [])
 
     run(a.cmake, "--install", a.build, "--prefix", folder / own)
     for library in libraries[1:]:
@@ -84,19 +107,21 @@ with tempfile.TemporaryDirectory() as temporary:
     binary = folder / "programs"
     run(a.cmake, "-S", project, "-B", binary, "-G", a.generator, f"-DCMAKE_PREFIX_PATH={folder / own}",
         f"-DCMAKE_CXX_COMPILER={a.cxx}", f"-DCONSUMERS={';'.join(consumers)}", "-DLEVELS=0;2",
-        f"-DLIBRARIES={';'.join(str(path) for path in archives.values())}",
+        f"-DLIBRARIES={';'.join(str(path) for path in archives.values())}", f"-DCMAKE_CUDA_COMPILER={a.nvcc or ''}",
         f"-DCMAKE_CXX_FLAGS={'-fsanitize=address,undefined -fno-sanitize-recover=undefined' if a.sanitize else ''}")
-    objects = [f"{c}_O{level}" for c in consumers for level in (0, 2) if every or level == 0 or c not in libraries]
+    objects = [f"{c}_O{level}" for c in consumers for level in (0, 2)
+               if (c != "nvcc" if level == 0 else every or c not in libraries)]
     programs = [f"templates_alone_{o}" for o in objects] + [f"library_alone_{l}" for l in libraries]
     both = [(l, o, f"both_{l}_{o}_{order}") for l in libraries for o in objects
             for order in ("library_first", "objects_first")]
     programs += [name for _, _, name in both]
     run(a.cmake, "--build", binary, "--parallel", a.jobs, "--target", *programs)
+    in_objects = {o: binary / "CMakeFiles" / f"templates_{o}_O0.dir" / "templates.cpp.o" for o in ("none", "native")}
+    failures = [f"{name}: two instruction sets have code of this name, and it differs"
+                for name in shared_code(in_objects["none"], in_objects["native"])]
     with concurrent.futures.ThreadPoolExecutor(int(a.jobs)) as pool:
         said = dict(zip(programs, pool.map(lambda name: values(binary / name), programs)))
 
-failures = []
-first = None
 for name in [p for p in programs if "_alone_" in p]:
     if not isinstance(said[name], dict):
         sys.exit(f"{name}: {said[name]}")
@@ -107,7 +132,8 @@ for name in [p for p in programs if "_alone_" in p]:
 for kind in ("templates_alone_", "library_alone_"):
     alone = [name for name in programs if name.startswith(kind)]
     for name in alone[1:]:
-        for what, (total, _) in said[alone[0]].items():
+        for what in said[alone[0]].keys() & said[name].keys():
+            total = said[alone[0]][what][0]
             if not abs(said[name][what][0] - total) <= 1e-3 * total:
                 failures.append(f"{what}: {total} in {alone[0]}, {said[name][what][0]} in {name}")
 for library, consumer, name in both:

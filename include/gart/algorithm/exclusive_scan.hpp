@@ -22,6 +22,14 @@ class cuda_exec;
 template <class T>
 concept scan_sum = std::same_as<T, u32> || std::same_as<T, u64>;
 
+// Compiled into gart::cuda.
+template <scan_sum T>
+void exclusive_scan(cuda_exec& exec, span<u32 const> in, span<T> out, span<std::type_identity_t<T>> total = {});
+
+}  // namespace gart
+
+namespace gart::inline GART_ISA {
+
 namespace detail {
 
 inline void require_size(char const* algorithm, char const* field, std::size_t size, std::size_t needed) {
@@ -64,8 +72,4 @@ void exclusive_scan(E& exec, span<u32 const> in, span<T> out, span<std::type_ide
   if (!total.empty()) total[0] = sums[blocks - 1];
 }
 
-// Compiled into gart::cuda.
-template <scan_sum T>
-void exclusive_scan(cuda_exec& exec, span<u32 const> in, span<T> out, span<std::type_identity_t<T>> total = {});
-
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

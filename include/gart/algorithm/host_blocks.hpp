@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cstddef>
 
-namespace gart::detail {
+namespace gart::inline GART_ISA::detail {
 
 inline std::size_t host_blocks(serial_exec&, std::size_t) { return 1; }
 inline std::size_t host_blocks(openmp_exec& exec, std::size_t n) {
@@ -32,4 +32,4 @@ void for_blocks(openmp_exec& exec, std::size_t blocks, F const& f) {
   for (std::size_t b = 0; b < blocks; ++b) f(b);
 }
 
-}  // namespace gart::detail
+}  // namespace gart::inline GART_ISA::detail

@@ -18,6 +18,14 @@ enum class reduction { sum, min, max };
 template <class T>
 concept reducible = std::same_as<T, float> || std::same_as<T, double> || std::same_as<T, u32> || std::same_as<T, u64>;
 
+// Compiled into gart::cuda.
+template <reducible T>
+void reduce(cuda_exec& exec, span<std::type_identity_t<T> const> in, span<T> out, reduction op = reduction::sum);
+
+}  // namespace gart
+
+namespace gart::inline GART_ISA {
+
 namespace detail {
 
 template <class T>
@@ -88,8 +96,4 @@ void reduce(E& exec, span<std::type_identity_t<T> const> in, span<T> out, reduct
   }
 }
 
-// Compiled into gart::cuda.
-template <reducible T>
-void reduce(cuda_exec& exec, span<std::type_identity_t<T> const> in, span<T> out, reduction op = reduction::sum);
-
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -12,6 +12,14 @@
 
 namespace gart {
 
+// Compiled into gart::cuda.
+void segmented_reduce(cuda_exec& exec, span<float const> rows, u32 columns, span<u32 const> offsets, span<float> sums);
+void segmented_reduce(cuda_exec& exec, span<float const> rows, u32 columns, span<u64 const> offsets, span<float> sums);
+
+}  // namespace gart
+
+namespace gart::inline GART_ISA {
+
 namespace detail {
 
 template <class O>
@@ -56,8 +64,4 @@ void segmented_reduce(E& exec, span<float const> rows, u32 columns, span<u64 con
   detail::segmented_reduce(exec, rows, columns, offsets, sums);
 }
 
-// Compiled into gart::cuda.
-void segmented_reduce(cuda_exec& exec, span<float const> rows, u32 columns, span<u32 const> offsets, span<float> sums);
-void segmented_reduce(cuda_exec& exec, span<float const> rows, u32 columns, span<u64 const> offsets, span<float> sums);
-
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

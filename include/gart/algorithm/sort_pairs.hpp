@@ -19,6 +19,14 @@ namespace gart {
 template <class K>
 concept sort_key = std::same_as<K, u32> || std::same_as<K, u64>;
 
+// Compiled into gart::cuda.
+template <sort_key K>
+void sort_pairs(cuda_exec& exec, span<K> keys, span<u32> values, int key_bits);
+
+}  // namespace gart
+
+namespace gart::inline GART_ISA {
+
 namespace detail {
 
 inline void require_sort(std::size_t keys, std::size_t values, int key_bits, int most_bits) {
@@ -83,8 +91,4 @@ void sort_pairs(E& exec, span<K> keys, span<u32> values, int key_bits) {
   }
 }
 
-// Compiled into gart::cuda.
-template <sort_key K>
-void sort_pairs(cuda_exec& exec, span<K> keys, span<u32> values, int key_bits);
-
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

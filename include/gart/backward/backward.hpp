@@ -18,7 +18,7 @@
 
 #include <string>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 namespace backward_kernels {
 
@@ -223,4 +223,4 @@ class backward {
   float near_ = 0;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

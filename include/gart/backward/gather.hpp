@@ -17,7 +17,7 @@
 #include <gart/scene/gaussians.hpp>
 #include <gart/tiles/tile_map.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // Where a lane's sums go: added to the Gaussian atomically, or kept as one row a (primitive, tile) pair, in
 // primitive-major order, for sum_pairs to add up in that order: the same bits in every run.
@@ -274,4 +274,4 @@ struct sum_pairs {
   }
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -21,7 +21,7 @@
 #include <gart/math/glm.hpp>
 #include <gart/math/sh.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 namespace detail {
 
@@ -128,4 +128,4 @@ struct alignas(8) lt_shared_entry : weight_entry {
   }
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

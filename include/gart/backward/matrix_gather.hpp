@@ -13,7 +13,7 @@
 #include <gart/backward/gather.hpp>
 #include <gart/math/matrix_unit.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 #if defined(__CUDACC__)
 
@@ -214,4 +214,4 @@ struct matrix_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
 
 #endif
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -7,7 +7,7 @@
 
 #if !defined(__CUDACC__)
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <class Gather>
 struct packet_gather;
@@ -181,6 +181,6 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
   static lanes dot(vec3_of<lanes> const& a, vec3_of<lanes> const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
 
 #endif

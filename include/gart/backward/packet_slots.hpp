@@ -9,7 +9,7 @@
 
 #if !defined(__CUDACC__)
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // What the slots of a packet hold.
 struct packet_entries {
@@ -116,6 +116,6 @@ class packet_slots {
   std::ptrdiff_t first_;  // of the packet's first pixel: before the cell where that pixel lies outside of it
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
 
 #endif

@@ -7,7 +7,7 @@
 #include <gart/render/record.hpp>
 #include <gart/tiles/layout.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <class Entry, int Size>
 struct record_lt {
@@ -43,4 +43,4 @@ struct record_lt {
 #endif
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -11,7 +11,7 @@
 #include <gart/scene/gaussians.hpp>
 #include <gart/trace/ray_program.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <int ShDegree, class Response, class Terms, execution E>
 struct scatter_program {
@@ -80,4 +80,4 @@ struct scatter_program {
   GART_HD void end(index_t, state const&) const {}
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -5,7 +5,7 @@
 #include <gart/backward/record_lt.hpp>
 #include <gart/backward/terms.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // Nothing recorded; every ray is traced again and scatters.
 struct pixel_strategy {
@@ -73,4 +73,4 @@ struct lane_strategy : primitive_strategy {
   static constexpr bool lane_by_lane = true;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

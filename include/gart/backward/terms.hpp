@@ -2,9 +2,11 @@
 // The two parts of a hit's gradient, and which of them a pass computes: colour (3 K floats of SH) and geometry (10
 // moments).
 
+#include <gart/core/isa.hpp>
+
 #include <type_traits>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct color {};
 struct geometry {};
@@ -16,4 +18,4 @@ struct terms {
   static constexpr bool any = color || geometry;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -8,7 +8,7 @@
 #include <gart/core/span.hpp>
 #include <gart/exec/concepts.hpp>
 
-namespace gart::bvh_kernels {
+namespace gart::inline GART_ISA::bvh_kernels {
 
 // Both children's boxes lie in their parent.
 struct alignas(16) binary_node {
@@ -169,4 +169,4 @@ struct fit {
   }
 };
 
-}  // namespace gart::bvh_kernels
+}  // namespace gart::inline GART_ISA::bvh_kernels

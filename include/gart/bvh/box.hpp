@@ -9,6 +9,10 @@ struct box {
   vec3 lo, hi;
 };
 
+}  // namespace gart
+
+namespace gart::inline GART_ISA {
+
 inline constexpr float infinity = 3.402823466e38f;  // a finite one: no rounding or product makes it a NaN
 
 // Holds nothing, is the identity of join, and is missed by every ray.
@@ -45,4 +49,4 @@ GART_HD GART_INLINE box ellipsoid_box(gaussian_parameters const& g, vec3d const&
   return {center - half - pad, center + half + pad};
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -10,7 +10,7 @@
 #include <gart/bvh/binary_tree.hpp>
 #include <gart/exec/buffer.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct bvh_view {
   bvh_node const* nodes = nullptr;
@@ -52,6 +52,6 @@ class bvh {
   index_t count_ = 0;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
 
 #include <gart/bvh/bvh_impl.hpp>

@@ -3,7 +3,7 @@
 
 #include <gart/bvh/binary_tree.hpp>
 
-namespace gart::bvh_kernels {
+namespace gart::inline GART_ISA::bvh_kernels {
 
 // Up to the root, then down again with the node's share of the children: no thread waits for another.
 struct choose_wide {
@@ -100,4 +100,4 @@ struct collapse {
   }
 };
 
-}  // namespace gart::bvh_kernels
+}  // namespace gart::inline GART_ISA::bvh_kernels

@@ -3,7 +3,7 @@
 
 #include <gart/bvh/box.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 inline constexpr int morton_bits = 63;
 
@@ -30,4 +30,4 @@ GART_HD GART_INLINE u64 morton_code(vec3 const& p, box const& bounds) {
   return code;
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

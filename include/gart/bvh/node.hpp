@@ -12,7 +12,7 @@
 
 #include <bit>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 inline constexpr int bvh_width = 8;  // children of a node, at most
 
@@ -94,4 +94,4 @@ GART_HD GART_INLINE u32 plane_above(bvh_axis const& a, float hi) {
   return q < 255.0f ? static_cast<u32>(q) : 255;
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -9,7 +9,7 @@
 #include <gart/bvh/bvh.hpp>
 #include <gart/bvh/cross.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 GART_HD GART_INLINE int lowest_bit(u32 bits) {
 #if defined(__CUDA_ARCH__)
@@ -95,4 +95,4 @@ GART_HD GART_INLINE void walk(bvh_view const& tree, Ray const& r, Visitor& visit
   }
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -3,6 +3,8 @@
 // GART_HD marks a function both may call; GART_INLINE forces inlining, so that what decides a hit is compiled into
 // every kernel from one source.
 
+#include <gart/core/isa.hpp>
+
 #if defined(__CUDACC__)
 #define GART_HD __host__ __device__
 #define GART_INLINE __forceinline__

@@ -3,6 +3,7 @@
 // A policy is used by one thread at a time; what it runs may use many.
 
 #include <gart/core/error.hpp>
+#include <gart/core/isa.hpp>
 #include <gart/exec/concepts.hpp>
 
 #include <chrono>
@@ -14,7 +15,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 class host_memory {
  public:
@@ -92,4 +93,4 @@ class host_memory {
   std::size_t workspace_bytes_ = 0;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

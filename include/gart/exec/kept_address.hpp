@@ -7,7 +7,7 @@
 
 #if defined(__CUDACC__)
 
-namespace gart::detail {
+namespace gart::inline GART_ISA::detail {
 
 template <class T>
 __device__ GART_INLINE T& kept_address(void* shared) {
@@ -18,6 +18,6 @@ __device__ GART_INLINE T& kept_address(void* shared) {
   return *static_cast<T*>(kept);
 }
 
-}  // namespace gart::detail
+}  // namespace gart::inline GART_ISA::detail
 
 #endif

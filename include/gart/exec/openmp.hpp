@@ -8,7 +8,7 @@
 #include <omp.h>
 #endif
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 class openmp_exec : public host_memory {
  public:
@@ -52,4 +52,4 @@ class openmp_exec : public host_memory {
   int threads_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

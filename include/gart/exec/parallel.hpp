@@ -15,7 +15,7 @@
 #include <algorithm>
 #include <memory>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <class Scratch>
 class host_team {
@@ -79,4 +79,4 @@ void parallel_for(openmp_exec& exec, char const* label, tile_range range, K cons
   }
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -3,7 +3,7 @@
 
 #include <gart/exec/host_memory.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 class serial_exec : public host_memory {
  public:
@@ -26,4 +26,4 @@ class serial_exec : public host_memory {
   static void fence() {}
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -16,7 +16,7 @@ struct exposure {
   static constexpr int floats = 12;
   float m[floats] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  // [3][4]: a row of M, then its offset
 
-  GART_HD float channel(int c, float r, float g, float b) const {
+  GART_HD GART_INLINE float channel(int c, float r, float g, float b) const {
     return fma(m[4 * c], r, fma(m[4 * c + 1], g, fma(m[4 * c + 2], b, m[4 * c + 3])));
   }
 };
@@ -27,6 +27,10 @@ struct exposure_state {
   std::vector<u32> visits;                  // [views] steps taken; a view without any has no exposure
 };
 
+}  // namespace gart
+
+namespace gart::inline GART_ISA {
+
 inline void apply(exposure const& e, image_float& image) {
   for (std::size_t p = 0; p + 3 <= image.data.size(); p += 3) {
     float const r = image.data[p], g = image.data[p + 1], b = image.data[p + 2];
@@ -34,4 +38,4 @@ inline void apply(exposure const& e, image_float& image) {
   }
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

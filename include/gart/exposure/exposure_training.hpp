@@ -16,7 +16,7 @@
 #include <gart/math/arith.hpp>
 #include <gart/optim/adam.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 namespace detail {
 
@@ -142,4 +142,4 @@ class exposure_training {
   buffer<u32, E> ends_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -20,7 +20,7 @@
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // The truth in the policy's memory, 8 bits a channel, row-major.
 struct truth_view {
@@ -323,4 +323,4 @@ class image_loss {
   buffer<float, E> planes_, partials_, sums_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 namespace detail {
 
@@ -137,4 +137,4 @@ inline double ssim(image_float const& render, image_float const& truth) {
   return sum / (static_cast<double>(plane) * channels);
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -5,7 +5,7 @@
 
 #include <gart/core/macros.hpp>
 
-namespace gart::ssim_window {
+namespace gart::inline GART_ISA::ssim_window {
 
 inline constexpr int radius = 5;
 inline constexpr int taps = 2 * radius + 1;
@@ -18,4 +18,4 @@ GART_HD constexpr double weight(int k) {
   return half[k <= radius ? k : 2 * radius - k];
 }
 
-}  // namespace gart::ssim_window
+}  // namespace gart::inline GART_ISA::ssim_window

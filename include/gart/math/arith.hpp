@@ -14,7 +14,7 @@
 #include <cmath>
 #include <cstring>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 GART_HD GART_INLINE float mul(float a, float b) {
 #if defined(__CUDA_ARCH__)
@@ -36,7 +36,7 @@ GART_HD GART_INLINE float add(float a, float b) {
 GART_HD GART_INLINE float fma(float a, float b, float c) {
 #if defined(__CUDA_ARCH__)
   return __fmaf_rn(a, b, c);
-#elif defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+#elif defined(GART_FUSED)
   return __builtin_fmaf(a, b, c);
 #else
   return a * b + c;
@@ -170,4 +170,4 @@ GART_HD GART_INLINE float logarithm(float x) {
   return fma(e, 0.693359375f, add(f, y));
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

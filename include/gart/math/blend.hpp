@@ -4,7 +4,7 @@
 #include <gart/core/macros.hpp>
 #include <gart/math/glm.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // Adds a hit of colour c to a ray, or to one a lane; returns its weight T alpha.
 template <class F>
@@ -23,4 +23,4 @@ GART_HD GART_INLINE vec3_of<F> opaque_color(vec3_of<F> const& c, vec3_of<F> cons
   return {color.x + transmittance * c.x, color.y + transmittance * c.y, color.z + transmittance * c.z};
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -9,7 +9,7 @@
 #include <gart/math/arith.hpp>
 #include <gart/math/lanes.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // 2^n 2^f, n the nearest integer to x / ln 2, 2^f by a cubic that is least in relative error on [-1/2, 1/2].
 template <class F>
@@ -39,4 +39,4 @@ GART_HD GART_INLINE F fast_reciprocal(F a) {
 #endif
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

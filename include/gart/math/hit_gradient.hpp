@@ -17,7 +17,7 @@
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/math/sh.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy, and two of padding (16-byte words).
 inline constexpr int moment_count = 10;
@@ -110,4 +110,4 @@ GART_HD GART_INLINE vec3 color_gradient_of(vec3 unclamped, vec3 g, float weight)
           shows(unclamped.z) ? weight * g.z : 0.0f};
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -1,6 +1,7 @@
 #pragma once
 // Several floats at a time, one a lane, for the host policies: the formulas of math/ are templates over the number, and
-// give a lane the bits they give a float. As many lanes as the machine's widest registers hold: 16, 8 or 4.
+// give a lane the bits they give a float. As many lanes as the widest registers of the instruction set that is compiled
+// for hold: 16, 8 or 4 (core/isa.hpp has the one with 16).
 //
 // A comparison gives a lane_mask, one bit a lane where the machine has such registers, else all bits of a lane set or
 // none; select takes the place of ?:. The vectors are the compiler's (GCC, Clang); intrinsics stand only where the
@@ -15,11 +16,8 @@
 #if defined(__x86_64__)
 #include <immintrin.h>
 #endif
-#if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512VL__)
-#define GART_LANES_AVX512 1
-#endif
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 #if defined(GART_LANES_AVX512)
 inline constexpr int lane_count = 16;
@@ -274,7 +272,7 @@ GART_INLINE lanes reciprocal(lanes a) { return lanes(1.0f) / a; }
 GART_INLINE lanes fma(lanes a, lanes b, lanes c) {
 #if defined(GART_LANES_AVX512)
   return (lanes::vector)_mm512_fmadd_ps((__m512)a.v, (__m512)b.v, (__m512)c.v);
-#elif defined(__AVX2__) && defined(__FMA__)
+#elif defined(__AVX2__) && defined(GART_FUSED)
   return (lanes::vector)_mm256_fmadd_ps((__m256)a.v, (__m256)b.v, (__m256)c.v);
 #else
   lanes r;
@@ -297,6 +295,6 @@ GART_INLINE lanes scale_by_power(lanes x, lanes biased) {
 }
 GART_INLINE lanes exponential(lanes x) { return exponential_of(x); }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
 
 #endif

@@ -13,7 +13,7 @@
 
 #if defined(__CUDACC__)
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // A lane's N elements of a matrix.
 template <int N>
@@ -50,6 +50,6 @@ __device__ GART_INLINE void multiply_add(float (&d)[4], matrix_part<4> const& a,
   add(a.low, b.high), add(a.high, b.low), add(a.high, b.high);
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
 
 #endif

@@ -4,7 +4,7 @@
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct quaternion {
   float w = 1, x = 0, y = 0, z = 0;
@@ -38,4 +38,4 @@ GART_HD GART_INLINE quaternion pull_back(quaternion const& q, vec3 body) {
           s * (q.w * body.y + q.z * body.x - q.x * body.z), s * (q.w * body.z + q.x * body.y - q.y * body.x)};
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -17,7 +17,7 @@
 
 #include <type_traits>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 inline constexpr float alpha_max = 0.99f;
 
@@ -201,4 +201,4 @@ GART_HD GART_INLINE F hit_alpha(ray_gaussian const& g, F d2) {
   return select(a < F(alpha_max), a, F(alpha_max));
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -10,7 +10,7 @@
 
 #include <gart/math/ray_gaussian.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 class rectangle_depth {
  public:
@@ -55,4 +55,4 @@ class rectangle_depth {
   float loss_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

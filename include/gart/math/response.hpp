@@ -21,7 +21,7 @@
 
 #include <gart/math/fast_arith.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 enum class arithmetic { exact, fast };
 
@@ -119,4 +119,4 @@ struct generalized_gaussian {
   }
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

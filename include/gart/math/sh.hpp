@@ -9,7 +9,7 @@
 #include <gart/math/glm.hpp>
 #include <gart/math/lanes.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // Of one direction, or of one a lane.
 template <int Degree, class F = float>
@@ -99,4 +99,4 @@ GART_HD GART_INLINE vec3_of<F> clamped_color(vec3_of<F> const& c) {
   return {select(shows(c.x), c.x, zero), select(shows(c.y), c.y, zero), select(shows(c.z), c.z, zero)};
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

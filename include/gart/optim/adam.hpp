@@ -18,7 +18,7 @@
 #include <cmath>
 #include <cstring>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // Adam's moments, of the parameters' shape.
 template <execution E>
@@ -199,4 +199,4 @@ void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optim
     launch(detail::adam_kernel<E, false>{});
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

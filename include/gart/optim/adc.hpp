@@ -26,7 +26,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 namespace detail {
 
@@ -288,4 +288,4 @@ class adaptive_density {
   buffer<u64, E> offset_, totals_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

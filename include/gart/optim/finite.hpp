@@ -20,7 +20,7 @@
 #include <string>
 #include <vector>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 namespace detail {
 
@@ -129,4 +129,4 @@ class finite_check {
   buffer<u64, E> counts_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -27,7 +27,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct relocated_shape {
   double opacity, scale_factor;
@@ -312,4 +312,4 @@ class mcmc {
   buffer<u64, E> before_, dead_before_, totals_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -9,7 +9,7 @@
 
 #include <cmath>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // What a number is drawn for: draws for different purposes are independent.
 enum class random_use : u32 { relocation = 1, growth, noise, split, user = 0x10000 };
@@ -66,4 +66,4 @@ GART_HD inline random_normals normals(random_words const& words) {
   return out;
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

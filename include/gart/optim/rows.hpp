@@ -6,7 +6,7 @@
 #include <gart/exec/concepts.hpp>
 #include <gart/scene/gaussians.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // mean, log_scale and quaternion: what places and shapes a Gaussian, and comes first in a row.
 inline constexpr index_t geometry_columns = 10;
@@ -58,4 +58,4 @@ struct density_change {
   bool any() const { return relocated || added || removed; }
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

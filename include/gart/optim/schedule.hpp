@@ -1,12 +1,13 @@
 #pragma once
 // What changes with the step: the rate of the means and the SH degree in use. Steps count from 0, before the step runs.
 
+#include <gart/core/isa.hpp>
 #include <gart/optim/options.hpp>
 
 #include <algorithm>
 #include <cmath>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // from * (to / from)^(step / steps): log-linear, `to` at and after `steps`. Both must be positive; where one is not,
 // the rate stays at `from`.
@@ -30,4 +31,4 @@ inline int sh_degree_at(int step, int degree, int every, int steps) {
   return degree <= 0 ? 0 : std::min(degree, step / sh_interval(degree, every, steps));
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

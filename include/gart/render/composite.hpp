@@ -11,7 +11,7 @@
 #include <gart/render/record.hpp>
 #include <gart/scene/gaussians.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // Where a ray's list ends; before every hit where it has none. Places stand for ids: those of the hits of a pixel have
 // the order of their Gaussians.
@@ -98,4 +98,4 @@ struct composite {
   }
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

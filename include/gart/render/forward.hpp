@@ -14,7 +14,7 @@
 #include <gart/scene/parameters.hpp>
 #include <gart/trace/ray_program.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 namespace render_kernels {
 
@@ -65,4 +65,4 @@ void forward(E& exec, Tracer& tracer, gaussians_view<float const> scene, camera 
   tracer.trace(exec, "forward", order.launch_size(), program);
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -6,7 +6,7 @@
 
 #if !defined(__CUDACC__)
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <int ShDegree, class Record>
 struct packet_composite {
@@ -88,6 +88,6 @@ packet_composite<ShDegree, Record> packets_of(composite<ShDegree, Record> const&
   return {program};
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
 
 #endif

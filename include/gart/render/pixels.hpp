@@ -6,7 +6,7 @@
 #include <gart/scene/camera.hpp>
 #include <gart/trace/packet_block.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct pixel {
   int x, y;
@@ -47,4 +47,4 @@ inline vec3_of<lanes> pixel_directions(camera const& c, packet_block const& bloc
 }
 #endif
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -10,7 +10,7 @@
 #include <gart/trace/hit.hpp>
 #include <gart/trace/packet_cell.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // Nothing: the backward pass traces again.
 struct record_none {
@@ -28,4 +28,4 @@ struct record_none {
 #endif
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -34,18 +34,27 @@ struct camera {
   vec3d position{0.0};  // the centre in the world, in double: everything else is relative to it
 };
 
-// The image point, in units of the focal length about the principal point, of the slopes x = X/Z and y = Y/Z.
-GART_HD inline void distort(distortion const& lens, double x, double y, double& u, double& v) {
-  double const r2 = x * x + y * y, radial = 1 + r2 * (lens.k1 + r2 * lens.k2);
-  u = x * radial + 2 * lens.p1 * x * y + lens.p2 * (r2 + 2 * x * x);
-  v = y * radial + 2 * lens.p2 * x * y + lens.p1 * (r2 + 2 * y * y);
-}
+struct named_camera {
+  std::string name;
+  camera view;
+};
 
 // What is wrong with a camera, and what to correct; null where nothing is.
 struct camera_fault {
   char const* what = nullptr;
   char const* remedy = nullptr;
 };
+
+}  // namespace gart
+
+namespace gart::inline GART_ISA {
+
+// The image point, in units of the focal length about the principal point, of the slopes x = X/Z and y = Y/Z.
+GART_HD inline void distort(distortion const& lens, double x, double y, double& u, double& v) {
+  double const r2 = x * x + y * y, radial = 1 + r2 * (lens.k1 + r2 * lens.k2);
+  u = x * radial + 2 * lens.p1 * x * y + lens.p2 * (r2 + 2 * x * x);
+  v = y * radial + 2 * lens.p2 * x * y + lens.p1 * (r2 + 2 * y * y);
+}
 
 inline camera_fault fault_of(camera const& c) {
   auto const finite = [](auto const&... v) { return (is_finite(static_cast<float>(v)) && ...); };
@@ -127,9 +136,4 @@ inline camera resized(camera c, int width, int height) {
   return c;
 }
 
-struct named_camera {
-  std::string name;
-  camera view;
-};
-
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -5,7 +5,7 @@
 
 #include <gart/math/response.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // Response: how a Gaussian falls from its centre, and in which arithmetic (math/response.hpp).
 template <int ShDegree = 3, class Response = generalized_gaussian<>>
@@ -15,4 +15,4 @@ struct scene_traits {
   using response = Response;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -7,7 +7,7 @@
 #include <gart/math/footprint.hpp>
 #include <gart/scene/camera.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 class camera_footprint {
  public:
@@ -91,4 +91,4 @@ class camera_footprint {
   footprint_view view_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -10,7 +10,7 @@
 #include <gart/tiles/camera_footprint.hpp>
 #include <gart/tiles/layout.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 namespace tile_kernels {
 
@@ -90,4 +90,4 @@ class footprints {
   u64 slots_ = 0, pairs_ = 0;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -3,7 +3,7 @@
 
 #include <gart/math/footprint.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <int Size>
 struct tile_grid {
@@ -37,4 +37,4 @@ GART_HD constexpr pixel_box intersect(pixel_box const& a, pixel_box const& b) {
   return {a.x0 > b.x0 ? a.x0 : b.x0, a.y0 > b.y0 ? a.y0 : b.y0, a.x1 < b.x1 ? a.x1 : b.x1, a.y1 < b.y1 ? a.y1 : b.y1};
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -8,7 +8,7 @@
 
 #include <cstring>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // A primitive's box and where its slots begin, one 16-byte word.
 struct alignas(16) lt_range {
@@ -70,4 +70,4 @@ GART_HD constexpr u64 lt_index(lt_range const& range, u32 x, u32 y) {
   return range.offset + tile_offset(range.box, cell) + pixel_offset(cell, x, y);
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -12,7 +12,7 @@
 #include <gart/scene/camera.hpp>
 #include <gart/tiles/grid.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct lens_shift {
   float u = 0, v = 0;
@@ -45,4 +45,4 @@ struct lens_shifts {
   }
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

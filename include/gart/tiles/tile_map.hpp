@@ -10,7 +10,7 @@
 #include <gart/tiles/footprints.hpp>
 #include <gart/tiles/tile_order.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct tile_map_view {
   span<u32 const> primitives;     // all lists, tile after tile
@@ -170,4 +170,4 @@ class tile_map {
   int order_bits_ = 0, depth_shift_ = 0;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -9,7 +9,7 @@
 #include <gart/tiles/grid.hpp>
 #include <gart/tiles/lens_shifts.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // A depth (not negative) as an integer of the same order, `shift` low bits dropped; and the depth it stands for, which
 // is not larger.
@@ -83,4 +83,4 @@ struct number_order {
   GART_HD u32 key(primitive, pixel_box const& /*cell*/, u32 /*tile*/) const { return 0; }
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -9,7 +9,7 @@
 #include <gart/scene/parameters.hpp>
 #include <gart/trace/window_visitor.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 namespace trace_kernels {
 
@@ -81,4 +81,4 @@ class bvh_tracer {
   int age_ = 0;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

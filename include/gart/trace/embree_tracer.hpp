@@ -34,6 +34,10 @@ class embree_scene {
   std::unique_ptr<handles> handles_;
 };
 
+}  // namespace gart
+
+namespace gart::inline GART_ISA {
+
 namespace trace_kernels {
 
 template <class Response, int Capacity, ray_program P>
@@ -89,4 +93,4 @@ class embree_tracer {
   traced_scene scene_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

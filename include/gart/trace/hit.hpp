@@ -4,7 +4,7 @@
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct hit {
   float t = 0;      // distance along the unit ray of the point of largest response
@@ -18,4 +18,4 @@ GART_HD constexpr bool before(float t_a, u32 id_a, float t_b, u32 id_b) {
   return t_a < t_b || (t_a == t_b && id_a < id_b);
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -7,7 +7,7 @@
 #include <gart/math/glm.hpp>
 #include <gart/trace/hit.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <int Capacity>
 class hit_window {
@@ -55,4 +55,4 @@ class hit_window {
   int count_ = 0;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -15,7 +15,7 @@
 
 #if defined(__CUDACC__)
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct waiting_hit {
   float t, alpha;
@@ -232,6 +232,6 @@ class lane_queue {
   u32 lost_key_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
 
 #endif

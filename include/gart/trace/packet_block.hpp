@@ -5,7 +5,7 @@
 
 #if !defined(__CUDACC__)
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // The pixels of a packet: 4 wide, as high as there are lanes for.
 struct packet_block {
@@ -27,6 +27,6 @@ struct packet_block {
   }
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
 
 #endif

@@ -8,7 +8,7 @@
 
 #if !defined(__CUDACC__)
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct packet_cell {
   static constexpr int most = 16;  // side of a tile
@@ -36,6 +36,6 @@ struct packet_cell {
   }
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
 
 #endif

@@ -22,7 +22,7 @@
 
 #if !defined(__CUDACC__)
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // Window: what a ray traced alone keeps (tile_tracer). A packet keeps 32 times that in rows: what runs over is traced
 // again from the start, not resumed.
@@ -221,6 +221,6 @@ class packet_walk {
   hits found_[batch];
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
 
 #endif

@@ -5,7 +5,7 @@
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct pending_hit {
   float t;
@@ -61,4 +61,4 @@ class pending_hits {
   u32 head_ = 0, count_ = 0;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

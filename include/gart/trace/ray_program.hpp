@@ -11,7 +11,7 @@
 #include <concepts>
 #include <type_traits>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <class P>
 concept ray_program = std::is_trivially_copyable_v<P> && requires(P const& p, index_t i, hit h, typename P::state& s) {
@@ -29,4 +29,4 @@ struct traced_scene {
   float near = 0;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

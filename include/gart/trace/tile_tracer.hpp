@@ -21,7 +21,7 @@
 #include <gart/trace/ray_program.hpp>
 #include <gart/trace/warp_walk.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 namespace trace_kernels {
 
@@ -211,4 +211,4 @@ class tile_tracer {
   vec3 forward_{0, 0, 1};
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

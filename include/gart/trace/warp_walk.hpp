@@ -27,7 +27,7 @@
 
 #include <utility>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <class Response, int Size, class P>
 class walk_tile_warps {
@@ -317,6 +317,6 @@ class walk_tile_warps {
   };
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
 
 #endif

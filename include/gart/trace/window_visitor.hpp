@@ -5,7 +5,7 @@
 #include <gart/trace/hit_window.hpp>
 #include <gart/trace/ray_program.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <int Capacity, class Ray, class Response = generalized_gaussian<>>
 struct window_visitor {
@@ -54,4 +54,4 @@ GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& progr
   program.end(i, state);
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -11,7 +11,7 @@
 #include <gart/train/rows.hpp>
 #include <gart/train/trainer.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <execution E, class Traits, class Tracer, class Strategy>
 row_info row_of() {
@@ -22,6 +22,7 @@ row_info row_of() {
   if constexpr (requires { record::entry::name; }) row.lt_format = record::entry::name;
   row.tile_size = tile_size_of<Tracer>;
   row.window = Tracer::window;
+  if constexpr (!E::device) row.instruction_set = instruction_set;
   return row;
 }
 
@@ -125,4 +126,4 @@ void register_rows(int rank, bool (*available)(std::string*) = always_available)
   register_row_of<E, scene_traits<3>, Tracer, Strategy>(rank, available);
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

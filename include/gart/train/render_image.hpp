@@ -4,7 +4,7 @@
 #include <gart/render/forward.hpp>
 #include <gart/train/session.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <int ShDegree, execution E, class Tracer>
 rendered render_image(E& exec, Tracer& tracer, frame_records<E>& records, gaussians_view<float const> scene,
@@ -26,4 +26,4 @@ rendered render_image(E& exec, Tracer& tracer, frame_records<E>& records, gaussi
   return out;
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -28,7 +28,7 @@
 
 #include <optional>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 // What a loss sees: the rendered image and its view, in the policy's memory. It writes dL/d image and, into
 // value[0..1], the loss and the mean squared error.
@@ -121,6 +121,6 @@ class trainer {
   std::size_t lt_bytes_ = 0;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
 
 #include <gart/train/trainer_impl.hpp>

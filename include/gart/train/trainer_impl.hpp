@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <execution E, class Traits, class Tracer, class Strategy>
 trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& options, dataset const& data,
@@ -189,4 +189,4 @@ void trainer<E, Traits, Tracer, Strategy>::set_state(training_state const& s) {
   mcmc_.set_growth(growth_);
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -8,7 +8,7 @@
 
 #include <vector>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 template <execution E>
 class training_images {
@@ -35,4 +35,4 @@ class training_images {
   std::vector<buffer<u8, E>> pixels_, masks_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

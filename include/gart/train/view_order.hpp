@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 class view_order {
  public:
@@ -41,4 +41,4 @@ class view_order {
   int epoch_ = -1;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -1,0 +1,49 @@
+#pragma once
+// GART_ISA: the inline namespace of everything whose layout, bits or code follow from the instruction set that a host
+// translation unit is compiled for. The number of lanes (math/lanes.hpp) and whether a*b + c is one rounding
+// (math/arith.hpp) follow from -march; nvcc's host compiler has no lanes. Objects of one program may differ in these: an
+// inline function, a template or a type of one name would be shared among them, and run or laid out as one of them has
+// it. With the instruction set in the name they are as many as there are.
+//
+//   namespace gart::inline GART_ISA {   // formulas, kernels, host policies, tracers, trainers
+//   namespace gart {                    // what the compiled libraries define and take, and link by
+//
+// In the second lie sessions, renderers, data sets, cameras, models, options, errors, files and cuda_exec: their layout
+// is the same everywhere, and an inline function there that needs fma or lanes is forced inline. tests/package links
+// objects and libraries of different instruction sets.
+
+#if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512VL__) && defined(__FMA__) && defined(__BMI2__)
+#define GART_LANES_AVX512 1
+#endif
+
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+#define GART_FUSED 1
+#endif
+
+#if defined(__CUDACC__) && defined(GART_FUSED)
+#define GART_ISA isa_nvcc_fma
+#elif defined(__CUDACC__)
+#define GART_ISA isa_nvcc
+#elif defined(GART_LANES_AVX512)
+#define GART_ISA isa_avx512
+#elif defined(__AVX2__) && defined(GART_FUSED)
+#define GART_ISA isa_avx2_fma
+#elif defined(__AVX2__)
+#define GART_ISA isa_avx2
+#elif defined(GART_FUSED)
+#define GART_ISA isa_fma
+#else
+#define GART_ISA isa_base
+#endif
+
+#define GART_TEXT_OF(...) #__VA_ARGS__
+#define GART_TEXT(macro) GART_TEXT_OF(macro)
+
+namespace gart::inline GART_ISA {
+
+inline constexpr char const* instruction_set = GART_TEXT(GART_ISA) + sizeof "isa";  // "avx2_fma"
+
+}  // namespace gart::inline GART_ISA
+
+#undef GART_TEXT
+#undef GART_TEXT_OF
