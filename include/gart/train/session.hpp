@@ -41,7 +41,7 @@ struct row_info {
   std::string arithmetic = "exact";
   std::string lt_format = "none";
   int tile_size = 8, window = 0;
-  std::string instruction_set;  // that a host row was compiled for (core/isa.hpp); empty on a device
+  std::string instruction_set = "";  // that a host row was compiled for (core/isa.hpp); empty on a device
 };
 
 // A request with every "auto" decided; unsupported, naming the rows, where there is none.
