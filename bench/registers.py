@@ -27,8 +27,10 @@ with tempfile.TemporaryDirectory() as folder:
                           capture_output=True, text=True)
 if done.returncode != 0:
     sys.exit(f"{a.nvcc}: {done.stdout}{done.stderr}")
+# Without the namespace of the instruction set (core/isa.hpp).
 names = re.findall(r"Compiling entry function '(\S+)'", done.stderr)
-plain = subprocess.run(["c++filt"], input="\n".join(names), capture_output=True, text=True, check=True).stdout.split("\n")
+plain = subprocess.run(["c++filt"], input="\n".join(names), capture_output=True, text=True, check=True).stdout
+plain = re.sub(r"isa_\w+::", "", plain).split("\n")
 figures = re.findall(r"(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads\n.*?Used (\d+) registers",
                      done.stderr)
 if not names or len(figures) != len(names):

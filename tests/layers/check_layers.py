@@ -2,7 +2,8 @@
 
 What it asks for: every folder has a line in layers.txt; a header includes only folders its line names; nothing in
 include/gart includes a backend; GLM is included in math/glm.hpp alone; x.hpp, which must be safe for any host compiler,
-includes no .cuh; what is included is there.
+includes no .cuh; what is included is there; a header that opens namespace gart, outside of the instruction set's, has a
+line in interface.txt.
 """
 import pathlib
 import re
@@ -29,8 +30,13 @@ def read_layers(path):
     return layers
 
 
-def violations(root, layers):
-    found = []
+def opens_gart(path):
+    return path.exists() and re.search(r"^namespace gart(::\w+)* \{", path.read_text(), re.M) is not None
+
+
+def violations(root, layers, interface):
+    found = [f"{root / 'include' / 'gart' / name}: is in cmake/interface.txt, and does not open namespace gart"
+             for name in sorted(interface) if not opens_gart(root / "include" / "gart" / name)]
     headers = root / "include" / "gart"
     for path in sorted([*headers.rglob("*"), *(root / "backends").rglob("*")]):
         if path.suffix not in SUFFIXES:
@@ -41,6 +47,9 @@ def violations(root, layers):
         if folder not in layers:
             found.append(f"{path}: folder {folder} has no line in cmake/layers.txt")
             continue
+        if inside and str(relative) not in interface and opens_gart(path):
+            found.append(f"{path}: lies in namespace gart: open gart::inline GART_ISA (core/isa.hpp), or give it a line in "
+                         "cmake/interface.txt where compiled libraries define or take what is in it")
         for number, line in enumerate(path.read_text().splitlines(), 1):
             match = INCLUDE.match(line)
             if not match:
@@ -73,14 +82,19 @@ def self_check(layers):
         "include/gart/exec/f.cuh": "#include <gart/core/nowhere.hpp>\n",
         "include/gart/attic/g.hpp": "\n",
         "backends/cpu/d.hpp": "#include <gart/train/b.hpp>\n",
+        "include/gart/math/h.hpp": "namespace gart::inline GART_ISA::detail {}\n",
+        "include/gart/math/i.hpp": "namespace gart::detail {}\n",
+        "include/gart/math/j.hpp": "namespace gart {}\n",
     }
-    expected = {"core/a.hpp:1", "train/b.hpp:2", "math/c.hpp:1", "exec/e.hpp:1", "exec/f.cuh:1", "attic/g.hpp"}
+    expected = {"core/a.hpp:1", "train/b.hpp:2", "math/c.hpp:1", "exec/e.hpp:1", "exec/f.cuh:1", "attic/g.hpp",
+                "math/h.hpp", "math/i.hpp"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for name, text in wrong.items():
             (root / name).parent.mkdir(parents=True, exist_ok=True)
             (root / name).write_text(text)
-        seen = {v.removeprefix(f"{root}/include/gart/").split(": ")[0] for v in violations(root, layers)}
+        found = violations(root, layers, {"math/h.hpp", "math/j.hpp"})
+        seen = {v.removeprefix(f"{root}/include/gart/").split(": ")[0] for v in found}
     if seen != expected:
         sys.exit(f"the check itself is broken: of a tree with violations at {sorted(expected)} it saw {sorted(seen)}")
 
@@ -88,6 +102,7 @@ def self_check(layers):
 root = pathlib.Path(sys.argv[1])
 layers = read_layers(root / "cmake" / "layers.txt")
 self_check(layers)
-found = violations(root, layers)
-print("\n".join(found) or "includes follow cmake/layers.txt")
+lines = (root / "cmake" / "interface.txt").read_text().splitlines()
+found = violations(root, layers, {line for line in lines if line and not line.startswith("#")})
+print("\n".join(found) or "includes follow cmake/layers.txt, namespaces cmake/interface.txt")
 sys.exit(1 if found else 0)

@@ -74,8 +74,8 @@ def shared_code(one, other):
     shared, found, name = symbols(one) & symbols(other), set(), None
     if not shared:
         sys.exit(f"{one} and {other} share nothing: they should share standard templates at least")
-    told = subprocess.run(["objdump", "-d", "--no-show-raw-insn", other], capture_output=True, text=True, check=True).stdout
-    for line in told.splitlines():
+    told = subprocess.run(["objdump", "-d", "--no-show-raw-insn", other], capture_output=True, text=True, check=True)
+    for line in told.stdout.splitlines():
         if head := re.match(r"[0-9a-f]+ <(.*)>:$", line):
             name = head[1]
         elif name in shared and re.search(r"\tvfn?m(add|sub)|%zmm|%k[0-7]", line):
