@@ -60,7 +60,7 @@ GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, resp
   F const raw = unclamped_alpha<Response>(gaussian, r.d2), zero = 0.0f;
   F const a = select(both(hit, raw < F(alpha_max)), raw * alpha_gradient, zero);
   F const b = select(hit, a * Response::slope(r.d2), zero);
-  vec3_of<F> const offset = orthogonal_offset(r);
+  vec3_of<F> const offset = offset_of(r);
   vec3_of<F> const p = {select(hit, offset.x, zero), select(hit, offset.y, zero), select(hit, offset.z, zero)};
   vec3_of<F> const bp = {b * p.x, b * p.y, b * p.z};
   return {{a, bp.x, bp.y, bp.z, bp.x * p.x, bp.y * p.y, bp.z * p.z, bp.y * p.z, bp.x * p.z, bp.x * p.y, 0.0f, 0.0f}};
