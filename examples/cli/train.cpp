@@ -235,13 +235,17 @@ class training_run {
                share);
   }
 
+  scores score(some_views const& views, keep_view const& keep = {}) {
+    return evaluate(
+        views, eval_background_, session_->exposures(),
+        [this](gart::camera const& c) { return session_->render(c, eval_background_); }, keep);
+  }
+
   scores test(int step, keep_view const& keep = {}) {
     stopwatch const testing;
-    scores const result = evaluate(
-        data_.test, eval_background_, session_->exposures(),
-        [this](gart::camera const& c) { return session_->render(c, eval_background_); }, keep);
+    scores const result = score(all_of(data_.test), keep);
     if (!result.views.empty()) {
-      course_.test.push_back({step, result.psnr, result.ssim});
+      course_.test.push_back({step, result.psnr, result.ssim, course_.seconds});
       say_.note("step " + with_commas(step) + ": test PSNR " + fixed(result.psnr, 2) + " dB, SSIM " +
                 fixed(result.ssim, 4));
     }
@@ -292,18 +296,20 @@ class training_run {
       say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
                  static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
     });
+    say_.state("testing on training views", 1);
+    stopwatch const training_views;
+    scores const training = score(evenly_spread(data_.train, data_.test.size()));
+    test_seconds_ += training_views.seconds();
     write_json(a_.history_file(), course_.to_json());
     save_seconds_ += writing.seconds() - (test_seconds_ - tests_before);
-    nlohmann::json const metrics = metrics_of(result);
+    nlohmann::json const metrics = metrics_of(result, training);
     write_json(a_.out / "metrics.json", metrics);
     gart::write_file(a_.out / "report.html", report_page(metrics, read_json(a_.config_file()), course_, shown));
     if (a_.quiet) return;
     say_.clear();
     std::printf("trained %s steps in %s, %s Gaussians\n", with_commas(a_.iterations).c_str(),
                 as_duration(course_.seconds).c_str(), with_commas(gaussians_).c_str());
-    if (!result.views.empty()) {
-      std::printf("test PSNR %.2f dB, SSIM %.4f over %zu views\n", result.psnr, result.ssim, result.views.size());
-    }
+    if (!result.views.empty()) std::fputs(in_words(result, training, data_.train.size()).c_str(), stdout);
     std::printf("model   %s\nreport  %s\n", a_.model_file().string().c_str(),
                 (a_.out / "report.html").string().c_str());
   }
@@ -317,12 +323,13 @@ class training_run {
     return size;
   }
 
-  nlohmann::json metrics_of(scores const& result) {
-    nlohmann::json m = to_json(result);
+  nlohmann::json metrics_of(scores const& result, scores const& training) {
+    nlohmann::json m = to_json(result, training, data_.train.size());
     fs::path const named = fs::absolute(a_.dataset).lexically_normal();
     m["scene"] = (named.has_filename() ? named : named.parent_path()).filename().string();
     m["format"] = data_.format, m["split"] = data_.split, m["resize_filter"] = data_.resize_filter;
-    m["train_views"] = data_.train.size(), m["image_size"] = image_size(), m["notes"] = data_.notes;
+    m["psnr_over_seconds"] = course_.psnr_over_seconds();
+    m["image_size"] = image_size(), m["notes"] = data_.notes;
     m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
     m["exposure"] = a_.exposure == "on";
     m["iterations"] = a_.iterations, m["gaussians"] = gaussians_, m["sh_degree"] = session_->row().sh_degree;
