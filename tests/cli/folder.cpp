@@ -94,7 +94,7 @@ TEST_CASE("one program at a time writes to a folder") {
       "$gart train capture --out run --iterations 100000000 --backend serial --densify none 2>first.txt &\n"
       "first=$!\n"
       "for i in $(seq 600); do grep -q it/s first.txt && break; sleep 0.1; done\n"
-      "$gart train capture --out run 2>second.txt\n"
+      "$gart train capture --out run --iterations 2 2>second.txt\n"
       "echo $? >>second.txt\n"
       "kill -TERM $first\n"
       "wait $first\n");
