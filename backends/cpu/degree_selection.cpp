@@ -97,6 +97,8 @@ class degree_selection final : public session {
     trials_ = s.trials;
     settled_ = (!trials_.empty() && (trials_.back().kept() || trials_.back().band == 1)) ||
                (s.step >= plan_.begin && s.scene.sh_degree == 0);
+    // The schedule of a run that was lengthened may ask for less than is stored: a band that was trained stays.
+    start_degree_ = std::max(start_degree_, s.scene.sh_degree);
     hold_out(!settled_);
     open(s);
   }

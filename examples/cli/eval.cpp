@@ -11,6 +11,9 @@
 
 #include <cstdio>
 #include <memory>
+#include <set>
+#include <string>
+#include <vector>
 
 namespace gart_cli {
 
@@ -19,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct eval_arguments {
-  fs::path model, dataset, out, renders, exposures;
+  fs::path model, dataset, out, renders, pairs, exposures;
   row_options row;
   std::string background = "auto";
   int downscale = 1, test_every = 8;
@@ -27,12 +30,27 @@ struct eval_arguments {
   bool quiet = false;
 };
 
+// A program that scores a folder against another takes all that is in them.
+void refuse_other_images(fs::path const& pairs, std::vector<gart::dataset_view> const& views) {
+  std::set<std::string> ours;
+  for (auto const& v : views) ours.insert(v.name + ".png");
+  for (char const* side : {"render", "truth"}) {
+    for (auto const& file : fs::directory_iterator(pairs / side)) {
+      if (ours.count(file.path().filename().string()) == 0)
+        throw gart::io_error(file.path().string(), "is no test view of this capture, and would be scored with them",
+                             "remove it, or name another folder");
+    }
+  }
+}
+
 int run_eval(eval_arguments const& a) {
   use_threads(a.row.threads);
   model_file file = load_model(a.model);
   auto const renderer = gart::make_renderer(row_request_for(file, a.model, a.row.request));
   prepare_file(a.out);
   if (!a.renders.empty()) prepare_folder(a.renders);
+  for (char const* side : {"render", "truth"})
+    if (!a.pairs.empty()) prepare_folder(a.pairs / side);
   gart::dataset_options load;
   load.downscale = a.downscale;
   load.test_every = a.test_every;
@@ -41,6 +59,7 @@ int run_eval(eval_arguments const& a) {
     throw gart::io_error(a.dataset.string(), "has no test views (" + data.split + ")",
                          "--test-every 8 keeps each 8th view");
   }
+  if (!a.pairs.empty()) refuse_other_images(a.pairs, data.test);
   std::string const background = a.background != "auto" ? a.background : background_for(gart::inspect(data)).value;
   gart::render_options options = file.render;
   options.background = background_color(background);
@@ -51,20 +70,26 @@ int run_eval(eval_arguments const& a) {
       a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures);
 
   progress say(a.quiet);
+  auto const draw = [&](gart::camera const& view) { return renderer->render(view, options); };
   scores const result = evaluate(
-      data.test, options.background, exposures,
-      [&](gart::camera const& view) { return renderer->render(view, options); },
+      all_of(data.test), options.background, exposures, draw,
       [&](std::size_t i, view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
         if (!a.renders.empty()) {
           gart::write_png(a.renders / (s.name + ".png"), gart::to_8bit(render));
           gart::write_png(a.renders / (s.name + "_truth.png"), gart::to_8bit(truth));
         }
+        if (!a.pairs.empty()) {
+          gart::write_png(a.pairs / "render" / (s.name + ".png"), gart::to_8bit(render));
+          gart::write_png(a.pairs / "truth" / (s.name + ".png"), gart::to_8bit(truth));
+        }
         say.state("scored " + std::to_string(i + 1) + "/" + std::to_string(data.test.size()) + "  " + s.name + " " +
                       fixed(s.psnr, 2) + " dB",
                   static_cast<double>(i + 1) / static_cast<double>(data.test.size()));
       });
+  say.state("scoring training views", 1);
+  scores const training = evaluate(evenly_spread(data.train, data.test.size()), options.background, exposures, draw);
   auto const row = renderer->row();
-  nlohmann::json metrics = to_json(result);
+  nlohmann::json metrics = to_json(result, training, data.train.size());
   metrics["format"] = data.format, metrics["split"] = data.split, metrics["resize_filter"] = data.resize_filter;
   metrics["background"] = background, metrics["notes"] = data.notes;
   metrics["gaussians"] = file.model.size(), metrics["sh_degree"] = file.model.sh_degree;
@@ -75,8 +100,8 @@ int run_eval(eval_arguments const& a) {
   write_json(a.out, metrics);
   say.clear();
   if (!a.quiet) {
-    std::printf("test PSNR %.2f dB, SSIM %.4f over %zu views (%s; %s background)\n", result.psnr, result.ssim,
-                result.views.size(), data.split.c_str(), background.c_str());
+    std::printf("%s%s; %s background\n", in_words(result, training, data.train.size()).c_str(), data.split.c_str(),
+                background.c_str());
   }
   return 0;
 }
@@ -90,6 +115,11 @@ void add_eval(CLI::App& app, command& selected) {
   eval->add_option("DATASET", a->dataset, "The capture, as gart train reads it")->type_name("")->required();
   eval->add_option("--out", a->out, "Where the scores go")->type_name("METRICS.json")->required();
   eval->add_option("--renders", a->renders, "Also keep NAME.png and NAME_truth.png of each view here")
+      ->type_name("DIR");
+  eval->add_option(
+          "--pairs", a->pairs,
+          "Also keep DIR/render/NAME.png and DIR/truth/NAME.png of each\nview, for LPIPS and what else compares "
+          "two folders")
       ->type_name("DIR");
   add_exposures(*eval, a->exposures);
   eval->add_option("--background", a->background, "white or black; auto: as gart train chooses")
@@ -109,7 +139,10 @@ void add_eval(CLI::App& app, command& selected) {
   add_row_options(*eval, a->row);
   eval->footer(
       "\nWrites METRICS.json: psnr (dB) and ssim, their means over the test views and each view's, and how they were "
-      "taken.\n"
+      "taken.\npsnr_affine_colour is a diagnostic, no score: PSNR after the affine colour that brings each render "
+      "nearest to its\nphotograph. training_scores are those of training views, evenly spread, as many as there are "
+      "test "
+      "views at most.\n"
       "\nExamples:\n"
       "  gart eval run/model.ply lego --out metrics.json\n"
       "  gart eval other.ply garden --downscale 4 --out scores.json --renders images");

@@ -3,6 +3,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include <charconv>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -56,6 +58,18 @@ inline CLI::Validator between(double low, double high) {
           return s;
         };
         return "'" + text + "' is not a number from " + show(low) + " to " + show(high);
+      },
+      "");
+}
+
+// Of 64 bits, in decimal digits: as a double it could lose some.
+inline CLI::Validator whole_number() {
+  return CLI::Validator(
+      [](std::string& text) {
+        std::uint64_t value = 0;
+        auto const [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+        if (code == std::errc() && end == text.data() + text.size()) return std::string();
+        return "'" + text + "' is not a whole number from 0 to " + std::to_string(~std::uint64_t{0});
       },
       "");
 }

@@ -25,11 +25,31 @@ nlohmann::json history::to_json() const {
   nlohmann::json all = {{"seconds", seconds},
                         {"train_columns", {"step", "seconds", "loss", "psnr", "gaussians"}},
                         {"train", nlohmann::json::array()},
-                        {"test_columns", {"step", "psnr", "ssim"}},
+                        {"test_columns", {"step", "psnr", "ssim", "seconds"}},
                         {"test", nlohmann::json::array()}};
   for (auto const& p : train) all["train"].push_back({p.step, p.seconds, p.loss, p.psnr, p.gaussians});
-  for (auto const& p : test) all["test"].push_back({p.step, p.psnr, p.ssim});
+  for (auto const& p : test) all["test"].push_back({p.step, p.psnr, p.ssim, p.seconds});
   return all;
+}
+
+nlohmann::json history::psnr_over_seconds() const {
+  nlohmann::json all = {{"test_columns", {"seconds", "step", "psnr", "ssim"}},
+                        {"test", nlohmann::json::array()},
+                        {"train_columns", {"seconds", "step", "psnr"}},
+                        {"train", nlohmann::json::array()}};
+  for (auto const& p : test) all["test"].push_back({p.seconds, p.step, p.psnr, p.ssim});
+  for (auto const& p : train) all["train"].push_back({p.seconds, p.step, p.psnr});
+  return all;
+}
+
+double history::seconds_at(int step) const {
+  int from = 0;
+  double since = 0;
+  for (auto const& p : train) {
+    if (p.step >= step) return since + (p.seconds - since) * (step - from) / std::max(1, p.step - from);
+    from = p.step, since = p.seconds;
+  }
+  return since;
 }
 
 void history::restore(std::filesystem::path const& file, int step) {
@@ -52,7 +72,8 @@ void history::restore(std::filesystem::path const& file, int step) {
     if (usable(row, 5) && row[1] >= 0.0 && row[4] >= 0.0) train.push_back({row[0], row[1], row[2], row[3], row[4]});
   }
   for (auto const& row : rows("test")) {
-    if (usable(row, 3)) test.push_back({row[0], row[1], row[2]});
+    if (usable(row, 3)) test.push_back({row[0], row[1], row[2], seconds_at(row[0])});
+    if (usable(row, 4) && row[3] >= 0.0) test.push_back({row[0], row[1], row[2], row[3]});
   }
   seconds = train.empty() ? 0 : train.back().seconds;
 }

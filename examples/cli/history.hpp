@@ -19,7 +19,7 @@ class history {
   };
   struct test_point {
     int step = 0;
-    double psnr = 0, ssim = 0;
+    double psnr = 0, ssim = 0, seconds = 0;  // of training until then
   };
   std::vector<train_point> train;
   std::vector<test_point> test;
@@ -30,11 +30,16 @@ class history {
   // Ends the mean that is being formed, so that nothing is lost by stopping here.
   void close_point();
   nlohmann::json to_json() const;
+  // The points of PSNR over training seconds: "test" and "train", each a list of rows by its "..._columns".
+  nlohmann::json psnr_over_seconds() const;
   // What the file holds of the steps up to `step`: a checkpoint may be older than the history beside it. io_error for a
   // file that is no history.
   void restore(std::filesystem::path const& file, int step);
 
  private:
+  // Of training when a step was done, by the curve; for files that have no seconds at their tests.
+  double seconds_at(int step) const;
+
   int spacing_, pending_ = 0;
   train_point sum_;
 };

@@ -1,8 +1,9 @@
 #pragma once
-// Ctrl-C and SIGTERM as a wish that is asked for between steps, so that a run ends with its files whole. A second one
-// ends the program at once, but not within a second of the first: one wish may come twice, from a terminal to all of
-// its programs and from the one that waits for this. After a wish the handler stays, for the second may come while the
-// program takes its leave.
+// Ctrl-C, SIGTERM and SIGHUP as a wish that is asked for between steps, so that a run ends with its files whole. A
+// second one ends the program at once, but not within a second of the first: one wish may come twice, from a terminal
+// to all of its programs and from the one that waits for this. After a wish the handler stays, for the second may come
+// while the program takes its leave. A hang-up that the program was started to outlive (nohup) stays so. While the
+// guard stands a pipe whose reader is gone is no reason to die: where a terminal goes, so may what reads the progress.
 
 #include <csignal>
 #include <ctime>
@@ -26,13 +27,18 @@ class interrupt_guard {
         std::raise(signal);
       }
     };
-    sigaction(SIGINT, &action, &old_int_);
-    sigaction(SIGTERM, &action, &old_term_);
+    for (watched& w : signals_) {
+      sigaction(w.number, nullptr, &w.before);
+      bool const outlived = w.number == SIGHUP && w.before.sa_handler == SIG_IGN;
+      if (!outlived) sigaction(w.number, &action, nullptr);
+    }
+    action.sa_handler = SIG_IGN;
+    sigaction(SIGPIPE, &action, &pipe_before_);
   }
   ~interrupt_guard() {
+    sigaction(SIGPIPE, &pipe_before_, nullptr);
     if (wanted_) return;
-    sigaction(SIGINT, &old_int_, nullptr);
-    sigaction(SIGTERM, &old_term_, nullptr);
+    for (watched const& w : signals_) sigaction(w.number, &w.before, nullptr);
   }
   interrupt_guard(interrupt_guard const&) = delete;
   interrupt_guard& operator=(interrupt_guard const&) = delete;
@@ -42,7 +48,12 @@ class interrupt_guard {
  private:
   static inline std::sig_atomic_t volatile wanted_ = 0;
   static inline long volatile first_ = 0;  // when, in tenths of a second
-  struct sigaction old_int_ = {}, old_term_ = {};
+  struct watched {
+    int number;
+    struct sigaction before = {};
+  };
+  watched signals_[3] = {{SIGINT}, {SIGTERM}, {SIGHUP}};
+  struct sigaction pipe_before_ = {};
 };
 
 }  // namespace gart_cli

@@ -7,11 +7,28 @@
 
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <memory>
 #include <new>
 #include <string>
 
 namespace {
+
+// What CLI11 met on the line and could not place. It reports what is missing first, and not these.
+std::string not_understood(CLI::App const& app) {
+  std::string words;
+  for (std::string const& word : app.remaining(true))
+    if (word.size() > 1 && word[0] == '-') words += (words.empty() ? "" : " ") + word;
+  return words.empty() ? words : "not understood: " + words + "; ";
+}
+
+// Output that did not reach its end is no success.
+int flushed(int code) {
+  std::cout.flush();
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) return code;
+  std::fprintf(stderr, "gart: error: standard output cannot be written (free some space, or name another place)\n");
+  return code == 0 ? gart_cli::exit_failed : code;
+}
 
 int fail(std::string const& what, int code) {
   std::fprintf(stderr, "gart: error: %s\n", what.c_str());
@@ -31,7 +48,8 @@ int main(int argc, char** argv) {
       "  gart synth --out capture                 a small capture to try things on\n"
       "  gart train capture --out run             train on it; run/report.html shows how it went\n"
       "  gart train --help                        every option of a command\n"
-      "\nExit codes: 0 done, 1 failed, 2 the command line is wrong, 130 stopped by Ctrl-C or SIGTERM (train: saved, "
+      "\nExit codes: 0 done, 1 failed, 2 the command line is wrong, 130 stopped by Ctrl-C, SIGTERM or SIGHUP (train: "
+      "saved, "
       "resumable).");
   command selected;
   add_train(app, selected);
@@ -45,17 +63,18 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (CLI::ParseError const& e) {
-    if (e.get_exit_code() == 0) return app.exit(e);
+    if (e.get_exit_code() == 0) return flushed(app.exit(e));
     std::string topic = "gart";
     for (CLI::App const* sub : app.get_subcommands()) topic += " " + sub->get_name();
-    return fail(std::string(e.what()) + " (see " + topic + " --help)", exit_usage);
+    std::string const odd = dynamic_cast<CLI::RequiredError const*>(&e) ? not_understood(app) : std::string();
+    return fail(odd + e.what() + " (see " + topic + " --help)", exit_usage);
   }
   if (!selected) {
     std::fputs(app.help().c_str(), stderr);
     return exit_usage;
   }
   try {
-    return selected();
+    return flushed(selected());
   } catch (usage_error const& e) {
     return fail(e.what(), exit_usage);
   } catch (std::bad_alloc const&) {

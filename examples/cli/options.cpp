@@ -18,29 +18,40 @@ nlohmann::json recorded_options::values() const {
   return all;
 }
 
-void recorded_options::continue_from(nlohmann::json const& saved, std::filesystem::path const& file) {
+nlohmann::json recorded_options::continue_from(nlohmann::json const& saved, std::filesystem::path const& file,
+                                               std::vector<std::string> const& may_rise) {
+  nlohmann::json raised = nlohmann::json::object();
   for (auto const& e : entries_) {
     if (!saved.contains(e.name)) {
       throw gart::io_error(file.string(), "has no option \"" + e.name + "\"", "start anew without --resume");
     }
     nlohmann::json const given = e.get(), &value = saved[e.name];
     bool const named = e.option->count() > 0;
+    auto const take = [&e](nlohmann::json const& from) {
+      e.option->clear();
+      e.option->add_result(from.is_string() ? from.get<std::string>() : from.dump());
+      e.option->run_callback();
+    };
     try {
       if (value.is_structured() || value.is_null()) throw CLI::ConversionError("it is not one value");
-      e.option->clear();
-      e.option->add_result(value.is_string() ? value.get<std::string>() : value.dump());
-      e.option->run_callback();
+      take(value);
     } catch (CLI::Error const& wrong) {
       throw gart::io_error(file.string(), "option \"" + e.name + "\" is not valid: " + wrong.what(),
                            "correct it, or start anew without --resume");
     }
-    if (named && given != e.get()) {
+    if (!named || given == e.get()) continue;
+    bool const rises = std::find(may_rise.begin(), may_rise.end(), e.name) != may_rise.end();
+    if (rises && given > e.get()) {
+      raised[e.name] = e.get();
+      take(given);
+    } else {
       throw usage_error("--" + e.name + " " + given.dump() + ": the run to be resumed has " + e.get().dump() + " in " +
-                        file.string() +
+                        file.string() + (rises ? ", and it can only be raised" : "") +
                         " (leave the option out to continue that run, or start another from its "
                         "Gaussians with --start MODEL.ply and another --out)");
     }
   }
+  return raised;
 }
 
 CLI::Validator backend_names() { return one_of({"auto", "serial", "openmp", "cuda"}); }

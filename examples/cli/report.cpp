@@ -90,21 +90,50 @@ std::string figures(json const& m) {
   return html + "</section>";
 }
 
+std::string comparison(json const& m) {
+  if (!m.contains("training_scores") || !std::isfinite(number_of(m, "psnr"))) return "";
+  std::string html =
+      "<h2>Scores</h2><div class=\"box\"><table><tr><th>Views</th><th class=\"n\">PSNR, dB</th><th "
+      "class=\"n\">SSIM</th><th class=\"n\">PSNR after affine colour, dB</th></tr>";
+  auto const row = [&](std::string const& name, json const& s) {
+    html += "<tr><td>" + name + "</td><td class=\"n\">" + fixed(number_of(s, "psnr"), 2) + "</td><td class=\"n\">" +
+            fixed(number_of(s, "ssim"), 4) + "</td><td class=\"n\">" + fixed(number_of(s, "psnr_affine_colour"), 2) +
+            "</td></tr>";
+  };
+  row("Test, " + count_of(m, "test_views"), m);
+  json const& training = m["training_scores"];
+  row("Training, " + count_of(training, "scored_views") + " of " + count_of(m, "train_views") + ", evenly spread",
+      training);
+  return html +
+         "</table></div><p class=\"soft\">The last column is a diagnostic, no score: PSNR after the affine map of "
+         "colours that brings each render nearest to its own photograph, which tells how much of the error is one of "
+         "exposure and white balance.</p>";
+}
+
 std::string curves(history const& course, double iterations) {
   chart loss{"Training loss", "", "iterations", {{"", {}, false}}, true, iterations, false};
   chart psnr{"PSNR", "dB", "iterations", {{"training view", {}, false}, {"test", {}, true}}, false, iterations, false};
   chart ssim{"Test SSIM", "", "iterations", {{"", {}, true}}, false, iterations, false};
   chart count{"Gaussians", "", "iterations", {{"", {}, false}}, false, iterations, true};
+  chart timed{"PSNR over training time",
+              "dB",
+              "seconds",
+              {{"training view", {}, false}, {"test", {}, true}},
+              false,
+              course.seconds,
+              false};
   for (auto const& p : course.train) {
+    timed.series[0].points.emplace_back(p.seconds, p.psnr);
     loss.series[0].points.emplace_back(p.step, p.loss);
     psnr.series[0].points.emplace_back(p.step, p.psnr);
     count.series[0].points.emplace_back(p.step, p.gaussians);
   }
   for (auto const& p : course.test) {
+    timed.series[1].points.emplace_back(p.seconds, p.psnr);
     psnr.series[1].points.emplace_back(p.step, p.psnr);
     ssim.series[0].points.emplace_back(p.step, p.ssim);
   }
-  std::string const plots = to_svg(psnr) + to_svg(loss) + to_svg(count) + to_svg(ssim);
+  std::string const plots = to_svg(psnr) + to_svg(timed) + to_svg(loss) + to_svg(count) + to_svg(ssim);
   return plots.empty() ? "" : "<h2>Course of the training</h2><section class=\"charts\">" + plots + "</section>";
 }
 
@@ -135,11 +164,12 @@ std::string pictures(json const& m, std::vector<report_view> const& views) {
   }
   html +=
       "<details><summary>Scores of every test view</summary><div class=\"columns\">"
-      "<table><tr><th>View</th><th class=\"n\">PSNR, dB</th><th class=\"n\">SSIM</th><th class=\"n\">Render, "
-      "ms</th></tr>";
+      "<table><tr><th>View</th><th class=\"n\">PSNR, dB</th><th class=\"n\">SSIM</th><th "
+      "class=\"n\">affine, dB</th><th class=\"n\">Render, ms</th></tr>";
   for (auto const& v : m["views"]) {
     html += "<tr><td class=\"v\">" + text_of(v, "name") + "</td><td class=\"n\">" + fixed(number_of(v, "psnr"), 2) +
             "</td><td class=\"n\">" + fixed(number_of(v, "ssim"), 4) + "</td><td class=\"n\">" +
+            fixed(number_of(v, "psnr_affine_colour"), 2) + "</td><td class=\"n\">" +
             fixed(number_of(v, "milliseconds"), 1) + "</td></tr>";
   }
   return html + "</table></div></details>";
@@ -285,6 +315,7 @@ std::string report_page(json const& metrics, json const& config, history const& 
           " backend, the " + text_of(metrics, "tracer") + " tracer and the " + text_of(metrics, "backward") +
           " backward pass.</p></header>";
   page += figures(metrics);
+  page += comparison(metrics);
   page += curves(course, number_of(metrics, "iterations"));
   page += pictures(metrics, views);
   page += costs(metrics);

@@ -72,6 +72,7 @@ void add_synth(CLI::App& app, command& selected) {
           "Another seed places other leaves and draws other noise; the\nsame seed gives the same files, for any "
           "number of threads")
       ->type_name("N")
+      ->check(whole_number())
       ->capture_default_str();
   synth->add_flag("--quiet", *quiet, "Print nothing but errors");
   synth->footer(

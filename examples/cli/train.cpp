@@ -7,6 +7,7 @@
 #include "process_memory.hpp"
 #include "progress.hpp"
 #include "report.hpp"
+#include "run_folder.hpp"
 #include "train_arguments.hpp"
 
 #include <gart/io/exposure_file.hpp>
@@ -80,6 +81,7 @@ class training_run {
   void prepare() {
     use_threads(a_.threads);
     stopwatch const loading;
+    if (fs::is_directory(a_.out)) enter();
     if (a_.resume) continue_run(a_);
     if (a_.dataset.empty()) throw usage_error("DATASET is missing (see gart train --help)");
     row_ = gart::resolve(row_request_of(a_));  // what is not there is known before images are read
@@ -95,6 +97,11 @@ class training_run {
     }
     eval_background_ = background_color(a_.background);
     if (!a_.start.empty()) {
+      std::error_code not_there;
+      if (!a_.resume && fs::equivalent(a_.start, a_.model_file(), not_there)) {
+        throw usage_error("--start " + a_.start +
+                          ": is the model in --out, which the run replaces (choose another --out)");
+      }
       model_file const file = load_model(a_.start);
       if (file.kernel_degree != a_.kernel_degree) {
         throw usage_error("--start " + a_.start + ": is of kernel degree " + std::to_string(file.kernel_degree) +
@@ -108,18 +115,11 @@ class training_run {
       }
     }
     prepare_folder(a_.out);
+    enter();
     prepare_folder(a_.out / "renders");
     session_ =
         gart::make_session(row_request_of(a_), train_options_of(a_), data_, a_.start.empty() ? nullptr : &start_);
-    if (a_.resume) {
-      check_same_dataset(a_, data_);
-      chosen_ = chosen_before(read_json(a_.config_file()), chosen_);
-      session_->load(a_.checkpoint_file());
-      if (fs::exists(a_.history_file())) course_.restore(a_.history_file(), session_->steps_done());
-    } else {
-      begin_anew();
-    }
-    if (a_.resume) say_.note("resuming after step " + with_commas(session_->steps_done()));
+    a_.resume ? go_on() : begin_anew();
     trials_ = session_->trials().size();
     say_choices();
     say_.note(row_.backend + " backend, " + row_.tracer + " tracer, " + row_.backward + " backward pass");
@@ -132,6 +132,13 @@ class training_run {
       auto const text = [&](char const* key) { return choice.value(key, std::string()); };
       say_.note("  " + text("option") + " " + text("value") + ": " + text("why"));
     }
+  }
+
+  // The folder is this run's from here on.
+  void enter() {
+    if (lock_) return;
+    lock_.emplace(a_.out);
+    if (!a_.resume) refuse_foreign_files(a_.out);
   }
 
   void load() {
@@ -158,12 +165,30 @@ class training_run {
   // The first checkpoint is written before the first step: what cannot be saved is then known before it costs anything.
   // An earlier run's results go, lest they be taken for this one's.
   void begin_anew() {
-    for (char const* old : {"checkpoint.gart", "history.json", "metrics.json", "report.html", "exposures.json"})
-      fs::remove(a_.out / old);
+    remove_run(a_.out);
     nlohmann::json config = config_of(a_, data_);
     config["chosen"] = chosen_;
     write_json(a_.config_file(), config);
     session_->save(a_.checkpoint_file());
+  }
+
+  void go_on() {
+    check_same_dataset(a_, data_);
+    nlohmann::json config = read_json(a_.config_file());
+    chosen_ = chosen_before(config, chosen_);
+    session_->load(a_.checkpoint_file());
+    int const step = session_->steps_done();
+    if (fs::exists(a_.history_file())) course_.restore(a_.history_file(), step);
+    say_.note("resuming after step " + with_commas(step));
+    if (a_.iterations_before > 0) {
+      say_.note("of " + with_commas(a_.iterations) + " iterations instead of " + with_commas(a_.iterations_before) +
+                ": rates, degrees and densification follow the new length from here on");
+      remove_results(a_.out);
+      config["options"]["iterations"] = a_.iterations;
+      config["iterations_raised"].push_back({{"step", step}, {"from", a_.iterations_before}, {"to", a_.iterations}});
+      write_json(a_.config_file(), config);
+    }
+    raised_ = config.value("iterations_raised", nlohmann::json::array());
   }
 
   // True when all steps are done, false when it was asked to stop.
@@ -235,13 +260,17 @@ class training_run {
                share);
   }
 
+  scores score(some_views const& views, keep_view const& keep = {}) {
+    return evaluate(
+        views, eval_background_, session_->exposures(),
+        [this](gart::camera const& c) { return session_->render(c, eval_background_); }, keep);
+  }
+
   scores test(int step, keep_view const& keep = {}) {
     stopwatch const testing;
-    scores const result = evaluate(
-        data_.test, eval_background_, session_->exposures(),
-        [this](gart::camera const& c) { return session_->render(c, eval_background_); }, keep);
+    scores const result = score(all_of(data_.test), keep);
     if (!result.views.empty()) {
-      course_.test.push_back({step, result.psnr, result.ssim});
+      course_.test.push_back({step, result.psnr, result.ssim, course_.seconds});
       say_.note("step " + with_commas(step) + ": test PSNR " + fixed(result.psnr, 2) + " dB, SSIM " +
                 fixed(result.ssim, 4));
     }
@@ -255,13 +284,18 @@ class training_run {
     write_json(a_.history_file(), course_.to_json());
   }
 
+  // The model first: where the disk is full, the smaller and more precious one is there.
   void save() {
-    save_checkpoint();
     gart::gaussian_model const model = session_->model();
     gaussians_ = model.size();
     gart::write_splat_ply(a_.model_file(), model, traits());
     if (auto const exposures = session_->exposures(); !exposures.empty())
       gart::write_exposures(a_.out / "exposures.json", exposures);
+    try {
+      save_checkpoint();
+    } catch (gart::io_error const& e) {
+      throw gart::error(std::string(e.what()) + "; the model is whole: " + a_.model_file().string());
+    }
   }
 
   // Only what is not as everywhere goes into the header, so that an ordinary model is byte for byte an ordinary file.
@@ -281,6 +315,7 @@ class training_run {
   }
 
   void conclude() {
+    remove_results(a_.out);
     std::vector<report_view> shown;
     stopwatch const writing;
     double const tests_before = test_seconds_;
@@ -292,18 +327,20 @@ class training_run {
       say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
                  static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
     });
+    say_.state("testing on training views", 1);
+    stopwatch const training_views;
+    scores const training = score(evenly_spread(data_.train, data_.test.size()));
+    test_seconds_ += training_views.seconds();
     write_json(a_.history_file(), course_.to_json());
     save_seconds_ += writing.seconds() - (test_seconds_ - tests_before);
-    nlohmann::json const metrics = metrics_of(result);
+    nlohmann::json const metrics = metrics_of(result, training);
     write_json(a_.out / "metrics.json", metrics);
     gart::write_file(a_.out / "report.html", report_page(metrics, read_json(a_.config_file()), course_, shown));
     if (a_.quiet) return;
     say_.clear();
     std::printf("trained %s steps in %s, %s Gaussians\n", with_commas(a_.iterations).c_str(),
                 as_duration(course_.seconds).c_str(), with_commas(gaussians_).c_str());
-    if (!result.views.empty()) {
-      std::printf("test PSNR %.2f dB, SSIM %.4f over %zu views\n", result.psnr, result.ssim, result.views.size());
-    }
+    if (!result.views.empty()) std::fputs(in_words(result, training, data_.train.size()).c_str(), stdout);
     std::printf("model   %s\nreport  %s\n", a_.model_file().string().c_str(),
                 (a_.out / "report.html").string().c_str());
   }
@@ -317,15 +354,17 @@ class training_run {
     return size;
   }
 
-  nlohmann::json metrics_of(scores const& result) {
-    nlohmann::json m = to_json(result);
+  nlohmann::json metrics_of(scores const& result, scores const& training) {
+    nlohmann::json m = to_json(result, training, data_.train.size());
     fs::path const named = fs::absolute(a_.dataset).lexically_normal();
     m["scene"] = (named.has_filename() ? named : named.parent_path()).filename().string();
     m["format"] = data_.format, m["split"] = data_.split, m["resize_filter"] = data_.resize_filter;
-    m["train_views"] = data_.train.size(), m["image_size"] = image_size(), m["notes"] = data_.notes;
+    m["psnr_over_seconds"] = course_.psnr_over_seconds();
+    m["image_size"] = image_size(), m["notes"] = data_.notes;
     m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
     m["exposure"] = a_.exposure == "on";
-    m["iterations"] = a_.iterations, m["gaussians"] = gaussians_, m["sh_degree"] = session_->row().sh_degree;
+    m["iterations"] = a_.iterations, m["iterations_raised"] = raised_;
+    m["gaussians"] = gaussians_, m["sh_degree"] = session_->row().sh_degree;
     m["floats_per_gaussian"] = 11 + 3 * gart::sh_coefficients(session_->row().sh_degree);
     m["chosen"] = chosen_, m["sh_trials"] = trials_of(session_->trials());
     m["model_bytes"] = fs::file_size(a_.model_file()), m["checkpoint_bytes"] = fs::file_size(a_.checkpoint_file());
@@ -351,12 +390,13 @@ class training_run {
   }
 
   train_arguments& a_;
+  std::optional<run_lock> lock_;
   progress say_;
   history course_;
   gart::row_info row_;
   bool fell_back_ = false;
   gart::dataset data_;
-  nlohmann::json chosen_;
+  nlohmann::json chosen_, raised_ = nlohmann::json::array();
   std::size_t trials_ = 0;  // that have been told of
   gart::gaussian_model start_;
   gart::vec3 eval_background_{0.0f};
@@ -383,7 +423,8 @@ void add_train(CLI::App& app, command& selected) {
       "  metrics.json      the same in figures\n"
       "  renders/          each test view: NAME.png, and NAME_truth.png beside it\n"
       "  checkpoint.gart   all that the next step depends on; with config.json and history.json what --resume needs\n"
-      "A run that was in DIR before is replaced. Ctrl-C or SIGTERM finishes the step, saves, and exits with 130.\n"
+      "A run that was in DIR before is replaced, all of it; files of these names that no run left there are not.\n"
+      "Ctrl-C, SIGTERM or SIGHUP finishes the step, saves, and exits with 130.\n"
       "\nExamples:\n"
       "  gart train lego --out run --downscale 4 --iterations 2000 --max-gaussians 20000\n"
       "  gart train --resume --out run");

@@ -24,9 +24,13 @@ void add_arguments(CLI::App& train, train_arguments& a) {
 
   std::string group = "Training";
   auto const in_group = [&group](CLI::Option* option) { return option->group(group); };
-  in_group(r.add(train, "--iterations", a.iterations, "N", "Steps, one training view each"))->check(between(1, 1e9));
+  in_group(
+      r.add(train, "--iterations", a.iterations, "N",
+            "Steps, one training view each. With --resume it may be\nraised: rates, degrees and densification then "
+            "follow the new\nlength, so rates that had fallen rise again"))
+      ->check(between(1, 1e9));
   in_group(r.add(train, "--max-gaussians", a.max_gaussians, "N", "Gaussians at most; memory and time grow with them"))
-      ->check(between(1, 2147483647.0));
+      ->check(between(1, static_cast<double>(gart::most_gaussians)));
   in_group(
       r.add(train, "--densify", a.densify, "NAME",
             "How Gaussians are added: mcmc (grows to --max-gaussians),\nadc (clones and splits by gradient) or none"))
@@ -62,7 +66,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(one_of({"all", "seen"}));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
   in_group(r.add(train, "--seed", a.seed, "N",
-                 "Seed of everything random; on the serial backend the same\nseed gives the same bits"));
+                 "Seed of everything random; on the serial backend the same\nseed gives the same bits"))
+      ->check(whole_number());
 
   in_group(r.add(train, "--kernel-degree", a.kernel_degree, "N",
                  "How Gaussians fall from their centres, exp(-4.5 (r / 3)^N):\n2, or the generalised 1, 3, 4, 5, 8 of "
@@ -167,7 +172,8 @@ void continue_run(train_arguments& a) {
   if (!config.is_object() || !config.contains("options") || !config["options"].is_object()) {
     throw gart::io_error(a.config_file().string(), "has no \"options\"", "start anew without --resume");
   }
-  a.recorded.continue_from(config["options"], a.config_file());
+  auto const raised = a.recorded.continue_from(config["options"], a.config_file(), {"iterations"});
+  if (raised.contains("iterations")) a.iterations_before = raised["iterations"];
   if (a.dataset.empty()) {
     if (!config.contains("dataset") || !config["dataset"].is_string()) {
       throw gart::io_error(a.config_file().string(), "has no \"dataset\"", "name the dataset on the command line");

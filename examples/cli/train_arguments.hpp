@@ -17,6 +17,7 @@ struct train_arguments {
   std::filesystem::path dataset, out;
   bool resume = false, quiet = false, check_finite = false;
   int threads = 0, stop_at = 0;
+  int iterations_before = 0;  // of the run that is resumed, where the command line raises them; else 0
   float checkpoint_minutes = 10;
 
   // What follows decides the result and is recorded.

@@ -11,6 +11,7 @@
 #include <gart/io/dataset.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
+#include <gart/loss/affine_color.hpp>
 #include <gart/loss/metrics.hpp>
 #include <gart/reference/reference.hpp>
 #include <gart/render/forward.hpp>

@@ -3,6 +3,7 @@
 #include <support/policies.hpp>
 
 #include <algorithm>
+#include <limits>
 #include <random>
 
 namespace {
@@ -24,12 +25,16 @@ struct fill_window {
   int stride;
   hit* kept;  // [streams][Capacity]
   u32* sizes;
+  float* far;  // [streams][stride + 1], before the first hit and after each
   GART_KERNEL void operator()(gart::index_t i) const {
     gart::hit_window<Capacity> w;
     w.clear();
+    float* const reach = far + static_cast<std::size_t>(i) * (stride + 1);
+    reach[0] = w.far();
     for (u32 k = 0; k < lengths[i]; ++k) {
       hit const h = stream[static_cast<std::size_t>(i) * stride + k];
       if (w.wants(h.t, h.id)) w.insert(h);
+      reach[k + 1] = w.far();
     }
     sizes[i] = static_cast<u32>(w.size());
     for (int k = 0; k < Capacity; ++k)
@@ -56,11 +61,14 @@ void check_window(E& exec, std::mt19937_64& random) {
   }
   gart::buffer<hit, E> in(exec, stream), kept(exec, streams * Capacity);
   gart::buffer<u32, E> in_lengths(exec, lengths), sizes(exec, streams);
-  gart::parallel_for(exec, "windows", streams,
-                     fill_window<Capacity>{in.data(), in_lengths.data(), longest, kept.data(), sizes.data()});
+  gart::buffer<float, E> far(exec, std::size_t{streams} * (longest + 1));
+  gart::parallel_for(
+      exec, "windows", streams,
+      fill_window<Capacity>{in.data(), in_lengths.data(), longest, kept.data(), sizes.data(), far.data()});
   auto const out = kept.to_host();
   auto const counts = sizes.to_host();
-  long wrong = 0;
+  auto const reach = far.to_host();
+  long wrong = 0, wrong_far = 0;
   for (u32 i = 0; i < streams; ++i) {
     auto const begin = stream.begin() + i * longest;
     std::vector<hit> expected(begin, begin + lengths[i]);
@@ -68,8 +76,17 @@ void check_window(E& exec, std::mt19937_64& random) {
     if (expected.size() > Capacity) expected.resize(Capacity);
     auto const kept_begin = out.begin() + i * Capacity;
     wrong += !same({kept_begin, kept_begin + std::min<u32>(counts[i], Capacity)}, expected);
+    // What lies beyond the Capacity-th nearest so far cannot enter; before there are so many, anything can.
+    std::vector<float> nearest;
+    for (u32 k = 0; k <= lengths[i]; ++k) {
+      if (k > 0) nearest.insert(std::upper_bound(nearest.begin(), nearest.end(), begin[k - 1].t), begin[k - 1].t);
+      float const limit =
+          nearest.size() < Capacity ? std::numeric_limits<float>::max() : nearest[std::size_t{Capacity} - 1];
+      wrong_far += reach[i * (longest + 1) + k] != limit;
+    }
   }
   CHECK(wrong == 0);
+  CHECK(wrong_far == 0);
 }
 
 // Ray i is rays[i]; its hits go to list[i][most], up to `wanted` of them.

@@ -103,6 +103,11 @@ TEST_CASE("a checkpoint that is damaged is refused and kept") {
   fails(here.gart("train --resume --out run"), {"checkpoint.gart"});
   CHECK(text_of(here / "run/checkpoint.gart").size() == whole.size() / 2);
   gart::write_file(here / "run/checkpoint.gart", whole);
+  std::string flipped = whole;
+  flipped[flipped.size() / 2] ^= 1;
+  gart::write_file(here / "run/checkpoint.gart", flipped);
+  fails(here.gart("train --resume --out run"), {"checkpoint.gart", "checksum"});
+  gart::write_file(here / "run/checkpoint.gart", whole);
   auto const history = text_of(here / "run/history.json");
   gart::write_file(here / "run/history.json", "[]");
   fails(here.gart("train --resume --out run"), {"history.json", "\"train\""});

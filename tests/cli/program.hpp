@@ -54,8 +54,9 @@ class folder {
     int const status = std::system(command.c_str());
     return outcome_of(status);
   }
-  // Interrupts the program as Ctrl-C does, once `sign` stands in what it has said; waits at most two minutes for that.
-  outcome gart_interrupted_at(std::string const& sign, std::string const& arguments) const {
+  // Interrupts the program as Ctrl-C does, or by another signal, once `sign` stands in what it has said; waits at most
+  // two minutes for that.
+  outcome gart_interrupted_at(std::string const& sign, std::string const& arguments, int signal = SIGINT) const {
     std::string const command =
         "cd '" + path_.string() + "' && exec '" GART_PROGRAM "' " + arguments + " >stdout.txt 2>stderr.txt";
     pid_t const child = fork();
@@ -71,7 +72,7 @@ class folder {
     }
     // One wish, told by the terminal and by all who wait, while the program saves and takes its leave.
     for (int told = 0; told < 20; ++told) {
-      kill(child, SIGINT);
+      kill(child, signal);
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
       if (waitpid(child, &status, WNOHANG) == child) return outcome_of(status);
     }

@@ -150,11 +150,16 @@ TEST_CASE("an option that is given is not chosen, and --no-auto stores every ban
   CHECK(here.json("run/metrics.json")["background"] == "white");
 }
 
-TEST_CASE("SIGINT ends the run after a step, saved, and says how to go on") {
+TEST_CASE("SIGINT, SIGTERM or SIGHUP ends the run after a step, saved, and says how to go on") {
   folder const here;
   write_capture(here / "capture");
+  int signal = 0;
+  SUBCASE("SIGINT") { signal = SIGINT; }
+  SUBCASE("SIGTERM") { signal = SIGTERM; }
+  SUBCASE("SIGHUP") { signal = SIGHUP; }
   auto const run = here.gart_interrupted_at(
-      " it/s", "train capture --out run --iterations 100000000 --backend serial --max-gaussians 60 --densify none");
+      " it/s", "train capture --out run --iterations 100000000 --backend serial --max-gaussians 60 --densify none",
+      signal);
   CHECK(run.code == 130);
   CHECK(has(run.err, "gart train --resume --out run"));
   CHECK(gart::read_splat_ply(here / "run/model.ply").size() == 40);
@@ -169,9 +174,11 @@ TEST_CASE("resuming refuses what contradicts the run, and a run that is not ther
   write_capture(here / "other", 5);
   REQUIRE(here.gart("train capture --out run --iterations 20 --stop-at 5" + small).code == 130);
   auto const before = text_of(here / "run/checkpoint.gart");
-  auto const longer = here.gart("train --resume --out run --iterations 40");
-  CHECK(longer.code == 2);
-  CHECK_MESSAGE(has(longer.err, "--iterations 40: the run to be resumed has 20"), longer.err);
+  auto const shorter = here.gart("train --resume --out run --iterations 10");
+  CHECK(shorter.code == 2);
+  CHECK_MESSAGE(has(shorter.err, "--iterations 10: the run to be resumed has 20"), shorter.err);
+  CHECK(has(shorter.err, "can only be raised"));
+  CHECK(here.gart("train --resume --out run --seed 2").code == 2);
   auto const same = here.gart("train other --resume --out run");
   CHECK(same.code == 2);
   CHECK_MESSAGE(has(same.err, "has 5 train_views"), same.err);

@@ -74,6 +74,11 @@ TEST_CASE("wrong command lines exit with 2, say what is wrong, and make nothing"
            line{"train x --out made --t-min -1", "--t-min"},
            line{"train x --out made --alpha-min nan", "--alpha-min"},
            line{"train x --out made --speed 9", "--speed"},
+           line{"train x --out made --seed -3", "--seed: '-3' is not a whole number from 0 to 18446744073709551615"},
+           line{"train x --out made --max-gaussians 268435457", "is not a number from 1 to 268435456"},
+           line{"train x --speed 9", "not understood: --speed; --out is required"},
+           line{"eval --renders made model.ply x --otu made", "not understood: --otu; --out is required"},
+           line{"synth --out made --seed -3", "--seed: '-3' is not a whole number"},
            line{"render model.ply --out made", "CAMERAS"},
            line{"render model.ply x --out made --background red", "black, white"},
            line{"eval model.ply x", "--out"},
@@ -91,6 +96,18 @@ TEST_CASE("wrong command lines exit with 2, say what is wrong, and make nothing"
   auto const bare = here.gart("");
   CHECK(bare.code == 2);
   CHECK(has(bare.err, "train"));
+}
+
+TEST_CASE("output that cannot be written is a failure") {
+  folder const here;
+  if (!fs::exists("/dev/full")) return;
+  for (std::string const command : {"info", "--help", "train --help", "--version"}) {
+    CAPTURE(command);
+    std::string const line = "'" GART_PROGRAM "' " + command + " >/dev/full 2>'" + (here / "said").string() + "'";
+    int const status = std::system(line.c_str());
+    CHECK(WEXITSTATUS(status) == 1);
+    CHECK(has(text_of(here / "said"), "standard output cannot be written"));
+  }
 }
 
 TEST_CASE("info names the version and the rows") {

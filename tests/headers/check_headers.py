@@ -1,6 +1,6 @@
 """Compiles every public header alone, included twice: .hpp by the host compiler; by nvcc, where there is one, each .cuh
-and all .hpp together. First it shows that a header that is not self-contained, one without `#pragma once`, and one that
-opens the namespace GART_ISA with no such macro, is seen.
+and all .hpp together; and the options as a user names some of them. First it shows that a header that is not
+self-contained, one without `#pragma once`, and one that opens the namespace GART_ISA with no such macro, is seen.
 """
 import argparse
 import concurrent.futures
@@ -15,6 +15,15 @@ CUDA = ["-std=c++20", "--expt-relaxed-constexpr", "-diag-suppress=20012", "-arch
         "-x", "cu"]
 
 
+# Members that are not named have initialisers of their own, or -Wextra warns in every program that does this.
+OPTIONS = """#include <gart/gart.hpp>
+gart::dataset_options const loading{.downscale = 4};
+gart::train_options const training{.iterations = 2000};
+gart::render_options const rendering{.near = 0.1f};
+gart::row_request const request{.backend = "openmp"};
+"""
+
+
 def failure(command, include, names, folder):
     """What the compiler says of a file that includes `names` twice; empty when it compiles."""
     with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".cc") as source:
@@ -25,6 +34,13 @@ def failure(command, include, names, folder):
         done = subprocess.run([*command, f"-I{include}", source.name], capture_output=True, text=True)
     what = names[0] if len(names) == 1 else "all headers together"
     return f"{what}: does not compile with {command[0]}\n{done.stdout}{done.stderr}" if done.returncode else ""
+
+
+def options_failure(command, include, folder):
+    source = pathlib.Path(folder) / "options.cc"
+    source.write_text(OPTIONS)
+    done = subprocess.run([*command, f"-I{include}", str(source)], capture_output=True, text=True)
+    return f"options as a user names some of them:\n{done.stderr}" if done.returncode else ""
 
 
 def self_check(host, folder):
@@ -61,6 +77,7 @@ with tempfile.TemporaryDirectory() as folder:
             units = [[name] for name in headers if name.endswith(".cuh")]
             jobs += [pool.submit(failure, [a.nvcc, *CUDA], include, unit, folder) for unit in [plain, *units]]
         jobs += [pool.submit(failure, host, include, [name], folder) for name in plain]
+        jobs.append(pool.submit(options_failure, host, include, folder))
     failures = [message for job in jobs if (message := job.result())]
 
 print("\n".join(failures) or f"{len(headers if a.nvcc else plain)} headers compile" +

@@ -73,7 +73,7 @@ class exposure_field {
     // The normal equations, the constant first; weights relative to the largest, so that none underflows alone.
     std::vector<std::array<double, size>> rows;
     std::vector<double> weights;
-    double weight_sum = 0, spread = 0, nearest = HUGE_VAL;
+    double spread = 0, nearest = HUGE_VAL;
     for (auto const& v : views_) {
       rows.push_back(row_of(v, view));
       weights.push_back(distance2(rows.back()) + 1e-4);
@@ -82,7 +82,7 @@ class exposure_field {
     for (double& w : weights) {
       double const square = w, ratio = nearest / square;
       w = ratio * ratio * ratio;
-      weight_sum += w, spread += w * square;
+      spread += w * square;
     }
     matrix a{};
     std::array<std::array<double, exposure::floats>, size> right{};

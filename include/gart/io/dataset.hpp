@@ -50,7 +50,7 @@ struct dataset_options {
   int test_every = 8;       // 0: no test views; ignored where the files have their own split
   bool load_images = true;  // false: cameras alone, for which photos may all be absent if the files state sizes
   // Called from the loading threads, one at a time.
-  std::function<void(std::size_t done, std::size_t total)> progress;
+  std::function<void(std::size_t done, std::size_t total)> progress = {};
 };
 
 dataset load_dataset(std::filesystem::path const& path, dataset_options const& options = {});

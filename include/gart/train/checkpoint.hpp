@@ -1,9 +1,14 @@
 #pragma once
-// The file format of checkpoints: "gart checkpoint 1\n", then named arrays (name length, name, bytes, data; little
-// endian), the last one named "end". Written whole or not at all. Errors: io_error naming the file and the array that
-// is missing, truncated or of another size.
+// The file format of checkpoints: "gart checkpoint 2\n", then named arrays, the last one named "end", and nothing after
+// it. An array is, little endian:
+//   u64 length of the name, the name, u32 version of what the array holds, u64 bytes, the bytes, u32 checksum
+// with CRC-32C (io/crc32c.hpp) over all of the array before it, so that one flipped bit is found. Files of the format
+// "gart checkpoint 1\n", whose arrays have neither version nor checksum, are read too. Written whole or not at all.
+// Errors: io_error naming the file and the array that is missing, truncated, damaged, of another size, or of a version
+// that is newer than the reader.
 
 #include <gart/core/span.hpp>
+#include <gart/core/types.hpp>
 
 #include <filesystem>
 #include <map>
@@ -12,25 +17,30 @@
 
 namespace gart {
 
+struct checkpoint_array {
+  u32 version = 1;
+  std::vector<char> bytes;
+};
+
 class checkpoint_writer {
  public:
   template <class T>
-  void add(std::string const& name, std::vector<T> const& values) {
+  void add(std::string const& name, std::vector<T> const& values, u32 version = 1) {
     auto const* bytes = reinterpret_cast<char const*>(values.data());
-    arrays_[name].assign(bytes, bytes + values.size() * sizeof(T));
+    arrays_[name] = {version, {bytes, bytes + values.size() * sizeof(T)}};
   }
   void write(std::filesystem::path const& path) const;
 
  private:
-  std::map<std::string, std::vector<char>> arrays_;
+  std::map<std::string, checkpoint_array> arrays_;
 };
 
 class checkpoint_reader {
  public:
   explicit checkpoint_reader(std::filesystem::path const& path);
   template <class T>
-  std::vector<T> get(std::string const& name) const {
-    std::vector<char> const& bytes = find(name, sizeof(T));
+  std::vector<T> get(std::string const& name, u32 newest_version = 1) const {
+    std::vector<char> const& bytes = find(name, sizeof(T), newest_version);
     auto const* values = reinterpret_cast<T const*>(bytes.data());
     return {values, values + bytes.size() / sizeof(T)};
   }
@@ -38,9 +48,9 @@ class checkpoint_reader {
   [[noreturn]] void fail(std::string const& what) const;
 
  private:
-  std::vector<char> const& find(std::string const& name, std::size_t element) const;
+  std::vector<char> const& find(std::string const& name, std::size_t element, u32 newest_version) const;
   std::filesystem::path path_;
-  std::map<std::string, std::vector<char>> arrays_;
+  std::map<std::string, checkpoint_array> arrays_;
 };
 
 }  // namespace gart

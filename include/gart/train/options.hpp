@@ -23,7 +23,7 @@ struct train_options {
   // Held-out gain in PSNR, dB, that a band of spherical harmonics must buy to be stored (train/degree_selection.hpp);
   // 0: every band up to sh_degree is, without a measurement.
   float sh_gain = 0;
-  std::vector<std::size_t> held_out;  // training views, by index, that are not trained on
+  std::vector<std::size_t> held_out = {};  // training views, by index, that are not trained on
   background_kind background = background_kind::black;
   // Of the first Gaussians; the scale is times the distance to the neighbours. 0: what suits the start
   // (train/choose.hpp).
@@ -36,11 +36,11 @@ struct train_options {
   // first (optim/finite.hpp).
   bool check_finite = false;
   u64 seed = 1;
-  render_options render;  // its background is set from `background`
-  learning_rates rates;
-  adam_options adam;
-  mcmc_options mcmc;
-  adc_options adc;
+  render_options render = {};  // its background is set from `background`
+  learning_rates rates = {};
+  adam_options adam = {};
+  mcmc_options mcmc = {};
+  adc_options adc = {};
 };
 
 }  // namespace gart
