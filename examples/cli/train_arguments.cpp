@@ -74,6 +74,11 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "3DGRT"))
       ->check(kernel_degree_names());
 
+  in_group(r.add_flag(
+      train, "--antialias", a.antialias,
+      "Each pixel sees the Gaussians through a filter of its own\nwidth: for models that are shown smaller or from "
+      "farther away\nthan they were trained. The model says so to who renders it"));
+
   group = "Capture";
   in_group(r.add(train, "--exposure", a.exposure, "NAME",
                  "on: learn the exposure and white balance of each photograph;\ntest views get theirs from the "
@@ -218,6 +223,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.render.alpha_min = a.alpha_min;
   o.render.transmittance_min = a.t_min;
   o.render.max_hits = a.max_hits;
+  o.render.antialias = a.antialias ? gart::usual_antialias : 0;
   o.render.rebuild_every = a.rebuild_every;
   return o;
 }

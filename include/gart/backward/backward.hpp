@@ -13,6 +13,7 @@
 #include <gart/backward/packet_gather.hpp>
 #include <gart/backward/scatter.hpp>
 #include <gart/backward/strategies.hpp>
+#include <gart/render/antialiased.hpp>
 #include <gart/render/forward.hpp>
 #include <gart/tiles/tile_map.hpp>
 
@@ -22,16 +23,20 @@ namespace gart::inline GART_ISA {
 
 namespace backward_kernels {
 
+// Filter: no_filter, or the pixel_filter that the records were made through; `scene` is the stored one.
+struct no_filter {};
+
+template <class Filter>
 struct finish {
   gaussians_view<float const> scene;
   span<ray_gaussian const> records;
   span<float const> moments;
   gaussians_view<float> gradients;
+  Filter filter;
   GART_KERNEL void operator()(index_t i) const {
     ray_gaussian const g = records[i];
     geometry_gradient out{vec3(0.0f), vec3(0.0f), {0, 0, 0, 0}, 0};
-    if (g.cutoff >= 0)
-      out = from_moments(moments.data() + std::size_t{moment_stride} * i, load_parameters(scene, i), g);
+    if (g.cutoff >= 0) out = gradient_of(moments.data() + std::size_t{moment_stride} * i, load_parameters(scene, i), g);
     for (int k = 0; k < 3; ++k) {
       gradients.mean[std::size_t{3} * i + k] = out.mean[k];
       gradients.log_scale[std::size_t{3} * i + k] = out.log_scale[k];
@@ -39,6 +44,18 @@ struct finish {
     float* q = gradients.quaternion + std::size_t{4} * i;
     q[0] = out.rotation.w, q[1] = out.rotation.x, q[2] = out.rotation.y, q[3] = out.rotation.z;
     gradients.opacity[i] = out.opacity;
+  }
+
+ private:
+  GART_HD GART_INLINE geometry_gradient gradient_of(float const* m, gaussian_parameters const& p,
+                                                    ray_gaussian const& g) const {
+    if constexpr (std::is_same_v<Filter, no_filter>) {
+      return from_moments(m, p, g);
+    } else {
+      vec3 const mean = filter.from_camera(p);
+      filter_at const at = filter.at(mean);
+      return pull_back_widened(from_moments(m, widened(p, mean, at.sigma), g), m[0], p, mean, at);
+    }
   }
 };
 
@@ -116,7 +133,8 @@ class backward {
   }
 
   // `color` and `color_gradient` are [H][W][3]; `gaussians_in_frame` and the tracer stand as the forward pass used
-  // them.
+  // them. `scene` is the stored one, also where these were made from what a filter shows of it
+  // (render/antialiased.hpp).
   template <int ShDegree, class Tracer>
   void run(E& exec, Tracer& tracer, gaussians_view<float const> scene, span<ray_gaussian const> gaussians_in_frame,
            camera const& view, render_options const& options, int active_degree, span<float const> color,
@@ -151,8 +169,14 @@ class backward {
                                                                                        moments_.data()};
       tracer.trace(exec, "backward/scatter", order.launch_size(), program);
     }
-    parallel_for(exec, "backward/finish", scene.count,
-                 backward_kernels::finish{scene, gaussians_in_frame, moments_, gradients.view()});
+    auto const finish = [&]<class Filter>(Filter const& filter) {
+      parallel_for(exec, "backward/finish", scene.count,
+                   backward_kernels::finish<Filter>{scene, gaussians_in_frame, moments_, gradients.view(), filter});
+    };
+    if (options.antialias > 0)
+      finish(pixel_filter(view, options.antialias));
+    else
+      finish(backward_kernels::no_filter{});
   }
 
   std::size_t lt_bytes() const { return records ? slots_.size() * sizeof(entry) : 0; }

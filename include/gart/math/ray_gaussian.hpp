@@ -74,15 +74,19 @@ GART_HD GART_INLINE vec3 relative_mean(vec3 const& mean, vec3d const& frame) {
           static_cast<float>(mean.z - frame.z)};
 }
 
+// False where the parameters are not finite or make no ellipsoid in float.
+GART_HD GART_INLINE bool is_gaussian(gaussian_parameters const& g) {
+  return is_finite(g.mean.x) && is_finite(g.mean.y) && is_finite(g.mean.z) && is_finite(g.opacity) &&
+         is_finite(norm2(g.rotation)) && norm2(g.rotation) > quaternion_norm2_min && g.log_scale.x > -40.0f &&
+         g.log_scale.x < 40.0f && g.log_scale.y > -40.0f && g.log_scale.y < 40.0f && g.log_scale.z > -40.0f &&
+         g.log_scale.z < 40.0f;
+}
+
 // Largest |p|^2 of a hit; negative where the Gaussian is never hit (too weak, or its parameters are not finite).
 template <class Response = generalized_gaussian<>>
 GART_HD GART_INLINE float hit_cutoff(gaussian_parameters const& g, float alpha_min) {
   float const sigma = sigmoid(g.opacity);
-  bool const valid = is_finite(g.mean.x) && is_finite(g.mean.y) && is_finite(g.mean.z) && is_finite(g.opacity) &&
-                     is_finite(norm2(g.rotation)) && norm2(g.rotation) > quaternion_norm2_min &&
-                     g.log_scale.x > -40.0f && g.log_scale.x < 40.0f && g.log_scale.y > -40.0f &&
-                     g.log_scale.y < 40.0f && g.log_scale.z > -40.0f && g.log_scale.z < 40.0f;
-  if (!valid || !(sigma >= alpha_min)) return -1.0f;
+  if (!is_gaussian(g) || !(sigma >= alpha_min)) return -1.0f;
   return Response::cutoff(divide(sigma, alpha_min));
 }
 

@@ -103,6 +103,7 @@ class trainer {
   dataset const& data_;
   gaussians<E> scene_, gradients_;
   optimizer_state<E> state_;
+  antialiased<E> filter_;
   frame_records<E> records_;
   Tracer tracer_;
   backward<E, Strategy, tile_size_of<Tracer>> backward_;

@@ -18,6 +18,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       scene_(exec, start),
       gradients_(exec, static_cast<index_t>(start.size()), sh_degree),
       state_(exec, static_cast<index_t>(start.size()), sh_degree),
+      filter_(exec),
       records_(exec),
       tracer_(exec),
       backward_(exec),
@@ -59,13 +60,13 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
   color_.resize(floats), color_gradient_.resize(floats);
 
-  records_.template prepare<typename Traits::response>(exec_, constant, view.view.position, render.alpha_min);
+  auto const seen = filter_.of(exec_, constant, view.view, render.antialias);
+  records_.template prepare<typename Traits::response>(exec_, seen, view.view.position, render.alpha_min);
   configure(tracer_, render);
-  tracer_.prepare(exec_, constant, records_.view(), view.view, render.alpha_min, render.near);
+  tracer_.prepare(exec_, seen, records_.view(), view.view, render.alpha_min, render.near);
   // With less memory where the LT buffer would pass its budget or the numbers of its slots, and then with none.
   auto const with = [&](auto& pass) {
-    if (!pass.prepare(exec_, tracer_, constant, view.view, render.alpha_min, render.near, options_.lt_budget))
-      return false;
+    if (!pass.prepare(exec_, tracer_, seen, view.view, render.alpha_min, render.near, options_.lt_budget)) return false;
     differentiate(pass, loss, index, render, rates, degree);
     lt_bytes_ = pass.lt_bytes();
     return true;
