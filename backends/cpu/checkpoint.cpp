@@ -126,6 +126,7 @@ void write_checkpoint(std::filesystem::path const& path, training_state const& s
   out.add("sh_degree", std::vector<int>{state.scene.sh_degree});
   out.add("growth", std::vector<float>{state.growth});
   out.add("seed", std::vector<u64>{state.seed});
+  out.add("error_growth/error_sum", state.error_sum);
   out.add("adc/gradient_sum", state.gradient_sum), out.add("adc/touched", state.touched);
   out.add("sh_trials", state.trials);
   if (exposure_state const& e = state.exposures; !e.value.empty()) {
@@ -164,6 +165,7 @@ training_state state_of(checkpoint_reader const& in) {
   if (s.first.size() != s.scene.size() || s.second.size() != s.scene.size())
     in.fail("its moments differ in number from its Gaussians");
   s.step = step[0], s.growth = growth[0], s.seed = seed[0];
+  if (in.has("error_growth/error_sum")) s.error_sum = in.get<float>("error_growth/error_sum");
   s.gradient_sum = in.get<float>("adc/gradient_sum"), s.touched = in.get<u32>("adc/touched");
   if (s.gradient_sum.size() != s.touched.size()) in.fail("its arrays adc/* differ in length");
   if (in.has("exposure")) {

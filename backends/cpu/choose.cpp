@@ -179,13 +179,13 @@ chosen<bool> choose_exposure(capture_traits const& t) {
 chosen<starting_points> choose_start(dataset const& data, train_options const& options) {
   starting_points start;
   start.random = data.points.size() == 0;
-  bool const sparse = start.random && options.densify == densify_kind::mcmc;
+  bool const sparse = start.random && (options.densify == densify_kind::error || options.densify == densify_kind::mcmc);
   std::size_t const points = start.random ? options.random_points : data.points.size();
   start.count = static_cast<index_t>(std::min<std::size_t>(points, options.max_gaussians));
   start.opacity = options.initial_opacity != 0 ? options.initial_opacity : sparse ? 0.5f : 0.1f;
   start.scale = options.initial_scale != 0 ? options.initial_scale : sparse ? 0.1f : 1.0f;
   return {start, !start.random ? "the capture's points lie on surfaces"
-                 : sparse      ? "random points are mostly in empty space, and MCMC moves them"
+                 : sparse      ? "random points are mostly in empty space, and the dead move"
                                : "random points"};
 }
 

@@ -91,7 +91,8 @@ std::vector<float> neighbor_distance2(std::vector<float> const& position) {
   return out;
 }
 
-gaussian_model model_from_points(point_cloud const& points, int sh_degree, float o, float scale) {
+gaussian_model model_from_points(point_cloud const& points, int sh_degree, float o, float scale,
+                                 float least_distance) {
   constexpr float sh_constant = 0.28209479177387814f;
   if (!(o > 0 && o < 1)) throw invalid_argument("the initial opacity must lie between 0 and 1");
   if (!(scale > 0)) throw invalid_argument("the initial scale must be positive");
@@ -101,7 +102,7 @@ gaussian_model model_from_points(point_cloud const& points, int sh_degree, float
   m.mean = points.position;
   std::size_t const stride = m.size() ? m.sh.size() / m.size() : 0;
   for (std::size_t i = 0; i < m.size(); ++i) {
-    float const s = std::log(std::sqrt(std::max(d2[i], 1e-7f)) * scale);
+    float const s = std::log(std::sqrt(std::max(d2[i], least_distance * least_distance)) * scale);
     for (int a = 0; a < 3; ++a) m.log_scale[3 * i + a] = s;
     m.quaternion[4 * i] = 1;
     m.opacity[i] = std::log(o / (1 - o));
@@ -143,7 +144,7 @@ gaussian_model initial_model(dataset const& data, train_options const& options) 
     points.position.resize(std::size_t{3} * options.max_gaussians);
     points.color.resize(std::size_t{3} * options.max_gaussians);
   }
-  return model_from_points(points, options.sh_degree, start.opacity, start.scale);
+  return model_from_points(points, options.sh_degree, start.opacity, start.scale, 1e-4f * data.extent);
 }
 
 }  // namespace gart

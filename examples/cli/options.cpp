@@ -136,13 +136,14 @@ model_file load_model(std::filesystem::path const& path) {
     float const parsed = std::strtof(found->second.c_str(), &end);
     if (end == found->second.c_str() || !(parsed >= 0 && parsed < most)) {
       throw gart::io_error(path.string(), std::string("comment gart ") + key + " is '" + found->second + "'",
-                           "a number from 0 to " + std::to_string(static_cast<int>(most)) +
+                           "a number from 0" + (most < 1e9f ? " to " + std::to_string(static_cast<int>(most)) : "") +
                                " belongs there; remove the comment for the default");
     }
     value = parsed;
   };
   number("alpha_min", file.render.alpha_min);
   number("t_min", file.render.transmittance_min);
+  number("near", file.render.near, 3e38f);
   if (auto const found = traits.find("antialias"); found != traits.end() && found->second.empty())
     file.render.antialias = gart::usual_antialias;  // another program's, which does not say how wide
   else

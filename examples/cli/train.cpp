@@ -309,6 +309,7 @@ class training_run {
     };
     put("alpha_min", a_.alpha_min, a_.defaults.render.alpha_min);
     put("t_min", a_.t_min, a_.defaults.render.transmittance_min);
+    put("near", a_.defaults.near * data_.extent, a_.defaults.render.near);
     if (row_.kernel_degree != 2) result["kernel_degree"] = std::to_string(row_.kernel_degree);
     if (a_.max_hits != 0) result["max_hits"] = std::to_string(a_.max_hits);
     put("antialias", train_options_of(a_).render.antialias, a_.defaults.render.antialias);

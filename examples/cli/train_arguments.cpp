@@ -33,8 +33,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(between(1, static_cast<double>(gart::most_gaussians)));
   in_group(
       r.add(train, "--densify", a.densify, "NAME",
-            "How Gaussians are added: mcmc (grows to --max-gaussians),\nadc (clones and splits by gradient) or none"))
-      ->check(one_of({"mcmc", "adc", "none"}));
+            "How Gaussians are added: error (those split through which\nthe image's error is seen, up to --max-gaussians), mcmc\n(copies by opacity, random steps), adc (clones and splits by\ngradient) or none"))
+      ->check(one_of({"error", "mcmc", "adc", "none"}));
   in_group(r.add_flag(train, "--auto,!--no-auto", a.automatic,
                       "Model only what the scene requires: measure on held-out\ntraining views which bands of "
                       "spherical harmonics pay, and\nstore no others. --no-auto stores all and holds no view out.\n"
@@ -203,7 +203,8 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.iterations = a.iterations;
   o.max_gaussians = a.max_gaussians;
   o.random_points = std::min(a.points, a.max_gaussians);
-  o.densify = a.densify == "mcmc"  ? gart::densify_kind::mcmc
+  o.densify = a.densify == "error"  ? gart::densify_kind::error
+              : a.densify == "mcmc" ? gart::densify_kind::mcmc
               : a.densify == "adc" ? gart::densify_kind::adc
                                    : gart::densify_kind::none;
   o.initial_opacity = a.initial_opacity;

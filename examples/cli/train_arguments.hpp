@@ -21,7 +21,7 @@ struct train_arguments {
   float checkpoint_minutes = 10;
 
   // What follows decides the result and is recorded.
-  std::string backend = "auto", tracer = "auto", backward = "auto", densify = "mcmc", background = "auto", start;
+  std::string backend = "auto", tracer = "auto", backward = "auto", densify = "error", background = "auto", start;
   std::string arithmetic = "exact", lt_format = "auto";
   std::string preset = "exact";
   gart::train_options defaults;

@@ -68,8 +68,11 @@ TEST_CASE("the rate of the means decays exponentially") {
   CHECK(exponential_decay(1e-2f, 1e-4f, 100, 100) == doctest::Approx(1e-4));
   CHECK(exponential_decay(1e-2f, 1e-4f, 1000, 100) == doctest::Approx(1e-4));
   CHECK(exponential_decay(1e-2f, 0, 50, 100) == 1e-2f);
-  CHECK(rates_at({}, 3.0f, 0, 10).mean == doctest::Approx(3 * 1.6e-4));
+  CHECK(rates_at({}, 3.0f, 0, 10).mean == doctest::Approx(3 * learning_rates{}.mean));
   CHECK(rates_at({}, 3.0f, 5, 10).opacity == learning_rates{}.opacity);
+  CHECK(rates_at({}, 3.0f, 75, 100).opacity == doctest::Approx(learning_rates{}.opacity * std::sqrt(0.1)));
+  CHECK(rates_at({}, 3.0f, 100, 100).sh_rest == doctest::Approx(0.1 * learning_rates{}.sh_rest));
+  CHECK(rates_at({}, 3.0f, 100, 100).mean == doctest::Approx(3 * learning_rates{}.mean_final));
 }
 
 TEST_CASE("the SH degree rises every so many steps, sooner in short runs") {

@@ -122,10 +122,15 @@ traced<E> render_scene(E& exec, gart::gaussian_model const& model, gart::camera 
   });
 }
 
+// An error a pixel, [H][W], and what of it the backward pass attributes to each Gaussian.
+struct attributed_error {
+  std::vector<float> of_pixels, of_gaussians;
+};
+
 template <int Degree, class Strategy, class Tracer, class E>
 gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                                   gart::render_options const& options, int active_degree,
-                                  std::vector<float> const& color_gradient) {
+                                  std::vector<float> const& color_gradient, attributed_error* error = nullptr) {
   Tracer tracer(exec);
   gart::gaussians<E> scene(exec, model);
   gart::gaussians<E> gradients(exec, scene.size(), model.sh_degree);
@@ -141,8 +146,15 @@ gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, ga
   if (!pass.prepare(exec, tracer, seen, view, options.alpha_min, options.near)) throw pass.no_room();
   gart::forward<Degree>(exec, tracer, constant, view, options, active_degree, pass.targets(color.data()),
                         pass.record());
+  gart::buffer<float, E> pixel_error(exec, error ? error->of_pixels : std::vector<float>{});
   pass.template run<Degree>(exec, tracer, constant, records.view(), view, options, active_degree, color, gradient,
-                            gradients);
+                            gradients, pixel_error);
+  if (error) {
+    std::vector<float> moments(pass.moments().size());
+    exec.copy_out(moments.data(), pass.moments().data(), moments.size() * sizeof(float));
+    for (std::size_t i = 0; i < model.size(); ++i)
+      error->of_gaussians.push_back(moments[gart::moment_stride * i + gart::error_place]);
+  }
   return gradients.to_host();
 }
 
@@ -160,12 +172,13 @@ inline std::vector<std::string> strategies_for(tracer_kind kind, int degree) {
 template <class E>
 gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                                      gart::render_options const& options, int active_degree, tracer_kind kind,
-                                     std::string const& strategy, std::vector<float> const& color_gradient) {
+                                     std::string const& strategy, std::vector<float> const& color_gradient,
+                                     attributed_error* error = nullptr) {
   using bvh = gart::bvh_tracer<E>;
   using tiles = gart::tile_tracer<E>;
   return detail::with_degree(model.sh_degree, [&](auto degree) -> gart::gaussian_model {
     auto const by = [&]<class Strategy, class Tracer>(Strategy, std::type_identity<Tracer>) {
-      return gradients_by<degree, Strategy, Tracer>(exec, model, view, options, active_degree, color_gradient);
+      return gradients_by<degree, Strategy, Tracer>(exec, model, view, options, active_degree, color_gradient, error);
     };
     if (kind == tracer_kind::bvh && strategy == "pixel") return by(gart::pixel_strategy{}, std::type_identity<bvh>{});
     if (kind == tracer_kind::tiles && strategy == "primitive")

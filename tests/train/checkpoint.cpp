@@ -47,6 +47,7 @@ training_state some_state(std::mt19937_64& random) {
       for (float& v : *values) v = normal(random);
   }
   s.step = 1234, s.growth = 1.25f, s.seed = 77;
+  s.error_sum = {7, 8, 9};
   s.gradient_sum = {1, 2, 3}, s.touched = {4, 5, 6};
   s.exposures.value.assign(12, 0.5f), s.exposures.first.assign(12, 0.1f), s.exposures.second.assign(12, 0.2f);
   s.exposures.visits = {9};
@@ -65,6 +66,7 @@ void check_same(training_state const& a, training_state const& b) {
   CHECK(a.step == b.step);
   CHECK(a.growth == b.growth);
   CHECK(a.seed == b.seed);
+  CHECK(a.error_sum == b.error_sum);
   CHECK(a.gradient_sum == b.gradient_sum);
   CHECK(a.touched == b.touched);
   CHECK(a.exposures.value == b.exposures.value);

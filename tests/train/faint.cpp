@@ -23,7 +23,8 @@ gart::gaussian_model densified(E& exec, gart::densify_kind densify, float alpha_
   options.iterations = 60;
   options.max_gaussians = static_cast<gart::index_t>(start.size());
   options.densify = densify;
-  options.mcmc.from = options.adc.from = 0, options.mcmc.every = options.adc.every = 1;
+  options.error.from = options.mcmc.from = options.adc.from = 0;
+  options.error.every = options.mcmc.every = options.adc.every = 1;
   options.adc.gradient = 1e30f;
   options.sh_degree = 1;
   options.render.alpha_min = alpha_min;
@@ -48,6 +49,17 @@ TEST_CASE_TEMPLATE("what alpha_min hides is relocated by MCMC", E, GART_TEST_POL
   CHECK(kept.size() == 150);
   CHECK(faint_ones(kept) == 50);
   auto const moved = densified(exec, gart::densify_kind::mcmc, 0.05f);
+  CHECK(moved.size() == 150);
+  CHECK(faint_ones(moved) == 0);
+}
+
+TEST_CASE_TEMPLATE("what alpha_min hides gives its row to a half", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  E exec;
+  auto const kept = densified(exec, gart::densify_kind::error, 1.0f / 255);
+  CHECK(kept.size() == 150);
+  CHECK(faint_ones(kept) == 50);
+  auto const moved = densified(exec, gart::densify_kind::error, 0.05f);
   CHECK(moved.size() == 150);
   CHECK(faint_ones(moved) == 0);
 }

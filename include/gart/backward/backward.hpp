@@ -3,7 +3,8 @@
 //   prepare()  before the forward pass: footprints, tile map and LT buffer, where the strategy records
 //   record(), targets()  what the forward pass is given
 //   run()      gathers and scatters what the strategy says, then turns the moments of each Gaussian into the gradients
-//              of its mean, log-scale, quaternion and opacity. Overwrites `gradients`.
+//              of its mean, log-scale, quaternion and opacity. Overwrites `gradients`. Given an error a pixel, [H][W],
+//              it also attributes that to the Gaussians: the sum over a Gaussian's hits of weight times error.
 //
 // Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, the LT buffer, 4 or
 // 16 bytes for each pixel of each box, and where the tracer has none to lend, footprints of 36 bytes a Gaussian and
@@ -138,7 +139,7 @@ class backward {
   template <int ShDegree, class Tracer>
   void run(E& exec, Tracer& tracer, gaussians_view<float const> scene, span<ray_gaussian const> gaussians_in_frame,
            camera const& view, render_options const& options, int active_degree, span<float const> color,
-           span<float const> color_gradient, gaussians<E>& gradients) {
+           span<float const> color_gradient, gaussians<E>& gradients, span<float const> error = {}) {
     using response = typename Tracer::response_type;
     stage_scope stage(exec, "backward");
     moments_.resize(std::size_t{moment_stride} * scene.count);
@@ -147,7 +148,8 @@ class backward {
     if constexpr (!ordered) gradients.sh.zero();
     if constexpr (records) {
       if constexpr (ordered) rows_.resize(prints_->pairs() * pair_row<ShDegree>::quads);
-      gather_terms<ShDegree, response>(exec, gaussians_in_frame, view, active_degree, color, color_gradient, gradients);
+      gather_terms<ShDegree, response>(exec, gaussians_in_frame, view, active_degree, color, color_gradient, error,
+                                       gradients);
       if constexpr (ordered)
         parallel_for(
             exec, "backward/sum", scene.count * pair_row<ShDegree>::quads,
@@ -165,6 +167,7 @@ class backward {
                                                                                        gaussians_in_frame.data(),
                                                                                        color.data(),
                                                                                        color_gradient.data(),
+                                                                                       error.data(),
                                                                                        gradients.sh.data(),
                                                                                        moments_.data()};
       tracer.trace(exec, "backward/scatter", order.launch_size(), program);
@@ -178,6 +181,10 @@ class backward {
     else
       finish(backward_kernels::no_filter{});
   }
+
+  // Of the last run(), [N][moment_stride]: at error_place the error that is seen through each Gaussian, where run() was
+  // given the pixels' errors.
+  span<float const> moments() const { return moments_; }
 
   std::size_t lt_bytes() const { return records ? slots_.size() * sizeof(entry) : 0; }
 
@@ -204,7 +211,8 @@ class backward {
 
   template <int ShDegree, class Response>
   void gather_terms(E& exec, span<ray_gaussian const> gaussians_in_frame, camera const& view, int active_degree,
-                    span<float const> image, span<float const> image_gradient, gaussians<E>& gradients) {
+                    span<float const> image, span<float const> image_gradient, span<float const> error,
+                    gaussians<E>& gradients) {
     constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
     using by_lane = gather_kernel<ShDegree, Response, typename Strategy::gather, entry, TileSize, sums, validity, E>;
     auto const gather = [&]<class Kernel>(index_t lanes, std::type_identity<Kernel>) {
@@ -218,6 +226,7 @@ class backward {
                           active_degree,
                           image.data(),
                           image_gradient.data(),
+                          error.data(),
                           gradients.sh.data(),
                           moments_.data(),
                           prints_->pair_offsets().data(),

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct affine_color {
   std::array<std::array<double, 3>, 3> matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  // [to][from]
@@ -121,4 +121,4 @@ inline double psnr_affine_color(image_float const& render, image_float const& tr
   return sums[0] > 0 ? -10 * std::log10(sums[0] / sums[1]) : std::numeric_limits<double>::infinity();
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

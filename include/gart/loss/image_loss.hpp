@@ -29,6 +29,16 @@ struct truth_view {
   u8 const* mask = nullptr;    // [H][W], or null; where it is 0 the image counts as equal to the truth: no loss,
                                // no gradient, and the means still divide by all pixels
   vec3 background{0.0f};
+
+  GART_HD bool counts(index_t pixel) const { return !mask || mask[pixel] != 0; }
+  GART_HD vec3 color(index_t pixel) const {
+    u8 const* const t = pixels + std::size_t{pixel} * channels;
+    float const alpha = channels == 4 ? static_cast<float>(t[3]) * (1.0f / 255.0f) : 1.0f;
+    vec3 out;
+    for (int c = 0; c < 3; ++c)
+      out[c] = fma(static_cast<float>(t[c]) * (1.0f / 255.0f), alpha, background[c] * (1.0f - alpha));
+    return out;
+  }
 };
 
 namespace detail {
@@ -47,14 +57,12 @@ struct difference_kernel {
   float* difference;     // x - y
 
   GART_HD void operator()(index_t pixel) const {
-    u8 const* const t = truth.pixels + std::size_t{pixel} * truth.channels;
-    bool const used = !truth.mask || truth.mask[pixel] != 0;
-    float const alpha = truth.channels == 4 ? static_cast<float>(t[3]) * (1.0f / 255.0f) : 1.0f;
+    bool const counts = truth.counts(pixel);
+    vec3 const y = truth.color(pixel);
     for (int c = 0; c < 3; ++c) {
-      float const y = fma(static_cast<float>(t[c]) * (1.0f / 255.0f), alpha, truth.background[c] * (1.0f - alpha));
       std::size_t const at = c * size.pixels() + pixel;
-      centred_truth[at] = y - 0.5f;
-      difference[at] = used ? image[std::size_t{pixel} * 3 + c] - y : 0.0f;
+      centred_truth[at] = y[c] - 0.5f;
+      difference[at] = counts ? image[std::size_t{pixel} * 3 + c] - y[c] : 0.0f;
     }
   }
 };

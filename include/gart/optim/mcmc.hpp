@@ -7,12 +7,13 @@
 //   o' = 1 - (1 - o)^(1/N),  scale' = scale * o / sum_{j=1..N} C(N, j) (-1)^(j-1) o'^j / sqrt(j),
 // which keeps the integral of the composited opacity across a line through the centre. (The paper's double sum, with
 // sum_i C(i-1, j-1) = C(N, j).) For a generalised Gaussian of degree n (math/response.hpp) it is the n-th root of j.
-// Their moments are cleared. A first moment fills up in 10 steps and a second one in 1,000, so that a cleared pair
-// steps up to 6.5 times its rate for a hundred steps. While the count grows, a tenth of all Gaussians is at it: in a
-// short run that finds them better places, in a long one it keeps them from settling. Long runs therefore keep the
-// second moments of the geometry, and copies take their source's (options.settle_from): lego at a quarter loses 1.5 dB
-// by it in 2,000 steps, tandt_train wins 0.14 in 30,000 (bench/results/mcmc_moments.json). Those of opacity and colour
-// are cleared in any run: kept they leave Gaussians fainter, and steps take half again the time.
+// Moments as in gsplat: growth leaves its sources' and gives copies none; relocation clears its sources' and leaves the
+// moved ones theirs. A first moment fills up in 10 steps and a second one in 1,000, so a cleared pair steps up to 6.5
+// times its rate for a hundred steps: were growth to clear its sources', the best Gaussians of a scene would be at it
+// all the time, and those that the next views do not show would follow the penalties alone (docs/training.md).
+//
+// Noise and the penalty on size are stated in the extent of the scene, so that a capture in other units trains to the
+// same result.
 //
 // Weights are 32-bit fixed point and their sums 64-bit integers, so the draws are exact for any count and have the same
 // bits on every policy. A Gaussian whose opacity or geometry is not finite counts as dead. Where none is alive nothing
@@ -48,8 +49,6 @@ GART_HD inline relocated_shape relocation(double o, u32 copies, int kernel_degre
 
 namespace detail {
 
-GART_HD inline float sigmoid(float x) { return 1.0f / (1.0f + expf(-x)); }
-
 struct mcmc_weight_kernel {
   gaussians_view<float const> model;
   float dead_opacity;
@@ -58,8 +57,7 @@ struct mcmc_weight_kernel {
 
   GART_HD void operator()(index_t i) const {
     float const o = sigmoid(model.opacity[i]);
-    bool alive = o > dead_opacity && is_finite(model.opacity[i]);
-    for (index_t c = 0; c < geometry_columns; ++c) alive = alive && is_finite(row_element(model, i, c));
+    bool const alive = is_alive(model, i, dead_opacity);
     dead[i] = !alive;
     u32 const fixed = static_cast<u32>(static_cast<double>(o < 1 ? o : 1.0f) * 4294967295.0 * alive);
     weight[i] = alive && fixed == 0 ? 1u : fixed;
@@ -125,16 +123,12 @@ struct mcmc_copy_body {
   gaussians_view<float> model, first, second;
   u32 const* source;
   u32 const* target;
-  index_t settled;  // columns that keep their second moment
+  bool grows;  // else it relocates
 
   GART_HD void operator()(index_t draw, index_t column) const {
-    index_t const from = source[draw], to = target[draw];
+    index_t const from = source[draw], to = target[draw], cleared = grows ? to : from;
     row_element(model, to, column) = row_element(model, from, column);
-    row_element(first, to, column) = row_element(first, from, column) = 0;
-    if (column < settled)
-      row_element(second, to, column) = row_element(second, from, column);
-    else
-      row_element(second, to, column) = row_element(second, from, column) = 0;
+    row_element(first, cleared, column) = row_element(second, cleared, column) = 0;
   }
 };
 
@@ -198,11 +192,13 @@ inline float growth_for(mcmc_options const& options, index_t count, index_t max_
 template <execution E>
 class mcmc {
  public:
-  mcmc(E& exec, mcmc_options const& options, index_t max_gaussians, int iterations, u64 seed)
+  // `extent` is the scene's, in world units.
+  mcmc(E& exec, mcmc_options const& options, index_t max_gaussians, int iterations, float extent, u64 seed)
       : exec_(&exec),
         options_(options),
         max_gaussians_(max_gaussians),
         iterations_(iterations),
+        extent_(extent),
         seed_(seed),
         weight_(exec),
         dead_(exec),
@@ -214,13 +210,14 @@ class mcmc {
 
   void set_growth(float growth) { options_.growth = growth; }
 
-  // Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale); before the optimizer's step.
+  // Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale) / extent; before the optimizer's
+  // step.
   void add_penalties(gaussians<E> const& model, gaussians<E>& gradient) {
     if (model.size() == 0) return;
     float const n = static_cast<float>(model.size());
     parallel_for(*exec_, "mcmc_penalties", model.size(),
                  detail::mcmc_penalty_kernel{model.view(), gradient.view(), options_.opacity_penalty / n,
-                                             options_.scale_penalty / (3 * n)});
+                                             options_.scale_penalty / (3 * n * extent_)});
   }
 
   bool due(int step) const {
@@ -268,13 +265,13 @@ class mcmc {
     return change;
   }
 
-  // mean += noise * mean_rate * sigmoid(-100 (opacity - dead_opacity)) * covariance * normal.
+  // mean += noise * mean_rate / extent^2 * sigmoid(-100 (opacity - dead_opacity)) * covariance * normal.
   void add_noise(gaussians<E>& model, int step, float mean_rate) {
     if (options_.noise == 0) return;
     parallel_for(*exec_, "mcmc_noise", model.size(),
                  detail::mcmc_noise_kernel{model.view(),
                                            {seed_, static_cast<u32>(step), random_use::noise},
-                                           options_.noise * mean_rate,
+                                           options_.noise * mean_rate / (extent_ * extent_),
                                            options_.dead_opacity});
   }
 
@@ -300,13 +297,14 @@ class mcmc {
     for_each_element(
         *exec_, "mcmc_copy", draws, model.sh_degree(),
         detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(), target_.data(),
-                               iterations_ >= options_.settle_from ? geometry_columns : 0});
+                               random.use == random_use::growth});
   }
 
   E* exec_;
   mcmc_options options_;
   index_t max_gaussians_;
   int iterations_;
+  float extent_;
   u64 seed_;
   buffer<u32, E> weight_, dead_, target_, source_;
   buffer<u64, E> before_, dead_before_, totals_;

@@ -1,19 +1,22 @@
 #pragma once
-// The options of the optimizer and of the two ways to densify, with the defaults of the literature (3DGS, 3DGS-MCMC,
-// gsplat).
+// The options of the optimizer and of the three ways to densify. Where the defaults are not those of the literature
+// (3DGS, 3DGS-MCMC, gsplat), docs/training.md has what was measured.
 
 #include <algorithm>
 
 namespace gart {
 
 struct learning_rates {
-  float mean = 1.6e-4f;        // times the scene's extent; decays exponentially to mean_final over the run
-  float mean_final = 1.6e-6f;
+  float mean = 0.8e-4f;        // times the scene's extent; decays exponentially to mean_final over the run
+  float mean_final = 0.8e-6f;
   float log_scale = 5e-3f;
   float quaternion = 1e-3f;
-  float opacity = 5e-2f;
+  float opacity = 2.5e-2f;
   float sh_dc = 2.5e-3f;
   float sh_rest = 2.5e-3f / 20;
+  // All rates but those of the means and exposures stay as they are for a share of the run, then decay exponentially
+  // to `settled` of it.
+  float settled = 0.1f, settle_from = 0.5f;
   float exposure = 0.05f, exposure_final = 0.005f;  // a visit of the view; decays like the means'
 };
 
@@ -30,11 +33,18 @@ struct mcmc_options {
   int from = 500, every = 100;
   float until = 5.0f / 6;           // share of the run
   float growth = 1.05f;             // a step of growth, up to max_gaussians; more in runs too short for it (growth_for)
-  int settle_from = 15000;          // runs of so many steps keep the geometry's second moments (mcmc.hpp)
   float dead_opacity = 0.005f;      // a trainer raises it to least_opacity
-  float noise = 5e5f;               // times the learning rate of the means
-  float opacity_penalty = 0.01f, scale_penalty = 0.01f;
+  float noise = 1e6f;               // times the rate of the means, and the covariance in units of the extent
+  float opacity_penalty = 0.01f, scale_penalty = 0.014f;  // the scale in units of the extent
   int kernel_degree = 2;            // of the Gaussians that are relocated; a trainer sets its own
+};
+
+struct error_growth_options {
+  int from = 500, every = 100;
+  float fill = 0.5f;                // share of the run at which the count has reached its budget
+  float until = 5.0f / 6;           // share of the run after which the dead stay where they are
+  float dead_opacity = 0.005f;      // a trainer raises it to least_opacity
+  float opacity_penalty = 0.003f;   // times the mean opacity
 };
 
 struct adc_options {

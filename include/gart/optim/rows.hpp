@@ -4,6 +4,7 @@
 // device.
 
 #include <gart/exec/concepts.hpp>
+#include <gart/math/ray_gaussian.hpp>
 #include <gart/scene/gaussians.hpp>
 
 namespace gart::inline GART_ISA {
@@ -21,6 +22,13 @@ GART_HD GART_INLINE T& row_element(gaussians_view<T> const& g, index_t row, inde
   if (column < 6) return g.log_scale[r * 3 + (column - 3)];
   if (column < 10) return g.quaternion[r * 4 + (column - 6)];
   return g.opacity[r];
+}
+
+// Whether a Gaussian is of use: its opacity above the least, and it and the geometry finite.
+GART_HD inline bool is_alive(gaussians_view<float const> const& g, index_t row, float least_opacity) {
+  bool alive = is_finite(g.opacity[row]) && sigmoid(g.opacity[row]) > least_opacity;
+  for (index_t c = 0; c < geometry_columns; ++c) alive = alive && is_finite(row_element(g, row, c));
+  return alive;
 }
 
 namespace detail {

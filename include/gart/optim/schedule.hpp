@@ -1,5 +1,5 @@
 #pragma once
-// What changes with the step: the rate of the means and the SH degree in use. Steps count from 0, before the step runs.
+// What changes with the step: the learning rates and the SH degree in use. Steps count from 0, before the step runs.
 
 #include <gart/core/isa.hpp>
 #include <gart/optim/options.hpp>
@@ -21,6 +21,9 @@ inline float exponential_decay(float from, float to, int step, int steps) {
 inline learning_rates rates_at(learning_rates rates, float extent, int step, int steps) {
   rates.mean = exponential_decay(rates.mean, rates.mean_final, step, steps) * extent;
   rates.exposure = exponential_decay(rates.exposure, rates.exposure_final, step, steps);
+  int const from = static_cast<int>(rates.settle_from * static_cast<float>(steps));
+  float const share = exponential_decay(1.0f, rates.settled, step - from, steps - from);
+  for (float* rate : {&rates.log_scale, &rates.quaternion, &rates.opacity, &rates.sh_dc, &rates.sh_rest}) *rate *= share;
   return rates;
 }
 

@@ -13,7 +13,7 @@
 #include <gart/exec/stage.hpp>
 #include <gart/scene/pixel_filter.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 namespace render_kernels {
 
@@ -50,4 +50,4 @@ class antialiased {
   buffer<float, E> log_scale_, opacity_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

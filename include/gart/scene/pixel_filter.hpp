@@ -11,7 +11,7 @@
 #include <gart/scene/parameters.hpp>
 #include <gart/scene/seen_slopes.hpp>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 class pixel_filter {
  public:
@@ -124,4 +124,4 @@ GART_HD GART_INLINE gaussian_parameters filtered(gaussian_parameters const& g, p
   return widened(g, mean, filter.sigma_at(mean));
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 struct seen_slopes {
   double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
@@ -34,4 +34,4 @@ inline seen_slopes slopes_seen(camera const& c) {
   return out;
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

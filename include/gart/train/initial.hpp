@@ -1,6 +1,6 @@
 #pragma once
 // Where training starts: a model from points (log-scale = ln sqrt(max(mean squared distance to the 3 nearest
-// neighbours, 1e-7)), identity rotation, colour in the constant band), or from points at random in a box.
+// neighbours, least_distance^2)), identity rotation, colour in the constant band), or from points at random in a box.
 
 #include <gart/io/dataset.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -9,7 +9,8 @@
 namespace gart {
 
 // `scale` is times the distance to the neighbours.
-gaussian_model model_from_points(point_cloud const& points, int sh_degree, float opacity, float scale);
+gaussian_model model_from_points(point_cloud const& points, int sh_degree, float opacity, float scale,
+                                 float least_distance = 3.1622777e-4f);
 point_cloud random_points(vec3d lo, vec3d hi, index_t count, u64 seed);
 
 // The dataset's points, or random ones in its bounds; at most options.max_gaussians (a random subset beyond).

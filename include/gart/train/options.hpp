@@ -10,14 +10,14 @@
 
 namespace gart {
 
-enum class densify_kind { none, mcmc, adc };
+enum class densify_kind { none, error, mcmc, adc };
 enum class background_kind { black, white, random };
 
 struct train_options {
   int iterations = 30000;
   index_t max_gaussians = 1'000'000;
   index_t random_points = 100'000;  // where the capture has no points
-  densify_kind densify = densify_kind::mcmc;
+  densify_kind densify = densify_kind::error;
   int sh_degree = 3;
   int sh_every = 1000;  // a degree more after so many steps (or iterations / (3 * degrees) in shorter runs)
   // Held-out gain in PSNR, dB, that a band of spherical harmonics must buy to be stored (train/degree_selection.hpp);
@@ -36,9 +36,11 @@ struct train_options {
   // first (optim/finite.hpp).
   bool check_finite = false;
   u64 seed = 1;
-  render_options render = {};  // its background is set from `background`
+  float near = 0.002f;  // hits lie at t > near, times the scene's extent
+  render_options render = {};  // its background is set from `background`, its near from `near`
   learning_rates rates = {};
   adam_options adam = {};
+  error_growth_options error = {};
   mcmc_options mcmc = {};
   adc_options adc = {};
 };

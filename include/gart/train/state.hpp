@@ -36,6 +36,7 @@ struct training_state {
   int step = 0;                         // steps done
   float growth = 1;                     // of MCMC, a densification
   u64 seed = 1;
+  std::vector<float> error_sum;     // growth by error's statistic since it last densified: [N], or empty
   std::vector<float> gradient_sum;  // adaptive density's statistic since it last densified: [N], or empty
   std::vector<u32> touched;
   exposure_state exposures;

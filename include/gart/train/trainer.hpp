@@ -12,9 +12,11 @@
 
 #include <gart/backward/backward.hpp>
 #include <gart/exposure/exposure_training.hpp>
+#include <gart/loss/error_map.hpp>
 #include <gart/loss/image_loss.hpp>
 #include <gart/optim/adam.hpp>
 #include <gart/optim/adc.hpp>
+#include <gart/optim/error_growth.hpp>
 #include <gart/optim/finite.hpp>
 #include <gart/optim/mcmc.hpp>
 #include <gart/optim/schedule.hpp>
@@ -84,13 +86,19 @@ class trainer {
   template <class Pass, class Loss>
   void differentiate(Pass& pass, Loss&& loss, std::size_t view, render_options const& render,
                      learning_rates const& rates, int degree);
-  void update(dataset_view const& view, learning_rates const& rates, int degree);
+  void update(dataset_view const& view, learning_rates const& rates, int degree, span<float const> moments);
+  bool grows_by_error() const { return options_.densify == densify_kind::error; }
   vec3 background_of(int step) const;
   static mcmc_options mcmc_options_of(train_options const& options) {
     mcmc_options m = options.mcmc;
     m.kernel_degree = Traits::response::degree;
     m.dead_opacity = least_opacity(m.dead_opacity, options.render.alpha_min);
     return m;
+  }
+  static error_growth_options error_options_of(train_options const& options) {
+    error_growth_options e = options.error;
+    e.dead_opacity = least_opacity(e.dead_opacity, options.render.alpha_min);
+    return e;
   }
   static adc_options adc_options_of(train_options const& options) {
     adc_options a = options.adc;
@@ -112,6 +120,8 @@ class trainer {
   image_loss<E> loss_;
   training_images<E> images_;
   view_order order_;
+  error_growth<E> error_;
+  buffer<float, E> error_map_;  // of the step's image, where densification asks for it
   mcmc<E> mcmc_;
   adaptive_density<E> adc_;
   buffer<float, E> color_, color_gradient_, value_;

@@ -27,7 +27,9 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       loss_(exec),
       images_(data),
       order_(data.train.size(), options.held_out, options.seed),
-      mcmc_(exec, mcmc_options_of(options), options.max_gaussians, options.iterations, options.seed),
+      error_(exec, error_options_of(options), options.max_gaussians, options.iterations, options.seed),
+      error_map_(exec),
+      mcmc_(exec, mcmc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
       adc_(exec, adc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
       color_(exec),
       color_gradient_(exec),
@@ -35,6 +37,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
   if (options.check_finite) finite_.emplace(exec);
+  options_.render.near = options.near * data.extent;
   if (options.exposure) exposures_.emplace(exec, data.train.size());
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
@@ -64,11 +67,12 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   records_.template prepare<typename Traits::response>(exec_, seen, view.view.position, render.alpha_min);
   configure(tracer_, render);
   tracer_.prepare(exec_, seen, records_.view(), view.view, render.alpha_min, render.near);
+  span<float const> moments;
   // With less memory where the LT buffer would pass its budget or the numbers of its slots, and then with none.
   auto const with = [&](auto& pass) {
     if (!pass.prepare(exec_, tracer_, seen, view.view, render.alpha_min, render.near, options_.lt_budget)) return false;
     differentiate(pass, loss, index, render, rates, degree);
-    lt_bytes_ = pass.lt_bytes();
+    moments = pass.moments(), lt_bytes_ = pass.lt_bytes();
     return true;
   };
   char const* used = Strategy::name;
@@ -80,7 +84,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
     }
   }
   ++step_;
-  update(view, rates, degree);
+  update(view, rates, degree, moments);
 
   step_report report;
   if (finite_) report.skipped = (*finite_)(scene_, state_, "step " + std::to_string(step_) + ", view " + view.name);
@@ -105,23 +109,27 @@ void trainer<E, Traits, Tracer, Strategy>::differentiate(Pass& pass, Loss&& loss
   {
     stage_scope stage(exec_, "loss");
     span<float const> const image = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
-    loss(loss_input<E>{exec_, view, images_.get(exec_, index, render.background), view.view.width, view.view.height,
-                       image, color_gradient_, value_});
+    truth_view const truth = images_.get(exec_, index, render.background);
+    loss(loss_input<E>{exec_, view, truth, view.view.width, view.view.height, image, color_gradient_, value_});
+    if (grows_by_error()) error_map(exec_, image, truth, error_map_);
     if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }
   pass.template run<sh_degree>(exec_, tracer_, constant, records_.view(), view.view, render, degree, color_,
-                               color_gradient_, gradients_);
+                               color_gradient_, gradients_, error_map_);
 }
 
 // The optimizer's step and what grows, moves and prunes the Gaussians.
 template <execution E, class Traits, class Tracer, class Strategy>
-void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, learning_rates const& rates, int degree) {
+void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, learning_rates const& rates, int degree,
+                                                  span<float const> moments) {
   bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
+  if (grows_by_error()) error_.accumulate(scene_, moments, gradients_);
   if (use_mcmc) mcmc_.add_penalties(scene_, gradients_);
   if (use_adc) adc_.accumulate(scene_, gradients_, view.view);
   adam_step(exec_, scene_, gradients_, state_, rates, step_, degree, finite_ ? finite_->skipped() : span<u64>{},
             options_.adam);
   density_change change;
+  if (grows_by_error()) change = error_.after_step(scene_, state_, step_);
   if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean);
   if (use_adc) change = adc_.after_step(scene_, state_, step_);
   if (change.added || change.removed) gradients_.resize_keep(scene_.size());
@@ -168,6 +176,7 @@ training_state trainer<E, Traits, Tracer, Strategy>::state() const {
   s.scene = scene_.to_host(), s.first = state_.first.to_host(), s.second = state_.second.to_host();
   s.step = step_, s.growth = growth_, s.seed = options_.seed;
   if (exposures_) s.exposures = exposures_->state();
+  s.error_sum = error_.error_sum.to_host();
   s.gradient_sum = adc_.gradient_sum.to_host(), s.touched = adc_.touched.to_host();
   return s;
 }
@@ -177,6 +186,7 @@ void trainer<E, Traits, Tracer, Strategy>::set_state(training_state const& s) {
   if (s.scene.sh_degree != sh_degree) throw invalid_argument("trainer: the state has another SH degree");
   scene_.assign(s.scene), state_.first.assign(s.first), state_.second.assign(s.second);
   gradients_ = gaussians<E>(exec_, scene_.size(), sh_degree);
+  error_.error_sum.assign(s.error_sum);
   adc_.gradient_sum.assign(s.gradient_sum), adc_.touched.assign(s.touched);
   if (exposures_) {
     if (s.exposures.visits.size() != data_.train.size())

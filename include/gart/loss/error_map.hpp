@@ -1,0 +1,33 @@
+#pragma once
+// The error of each pixel of an image, the mean over its channels of |image - truth|: what growth by error
+// (optim/error_growth.hpp) attributes to the Gaussians. image: [H][W][3]; error: [H][W], resized; 0 where a mask
+// excludes the pixel. One launch, 20 bytes a pixel.
+
+#include <gart/loss/image_loss.hpp>
+
+namespace gart::inline GART_ISA {
+
+namespace detail {
+
+struct error_map_kernel {
+  float const* image;
+  truth_view truth;
+  float* error;
+  GART_HD void operator()(index_t pixel) const {
+    vec3 const y = truth.color(pixel);
+    float sum = 0;
+    for (int c = 0; c < 3; ++c) sum += fabsf(image[std::size_t{3} * pixel + c] - y[c]);
+    error[pixel] = truth.counts(pixel) ? sum * (1.0f / 3.0f) : 0.0f;
+  }
+};
+
+}  // namespace detail
+
+template <execution E>
+void error_map(E& exec, span<float const> image, truth_view const& truth, buffer<float, E>& error) {
+  error.resize(image.size() / 3);
+  parallel_for(exec, "error_map", static_cast<index_t>(error.size()),
+               detail::error_map_kernel{image.data(), truth, error.data()});
+}
+
+}  // namespace gart::inline GART_ISA

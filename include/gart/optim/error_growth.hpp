@@ -1,0 +1,229 @@
+#pragma once
+// Densification by error: where the image is wrong, the Gaussians that are seen there split.
+//
+// The statistic. A hit of weight w shows its Gaussian with that share of the pixel; the backward pass sums w times the
+// pixel's error over a Gaussian's hits (backward::moments), for any camera, since no projection is in it. The sums of
+// all steps since the last densification are its share of the total error. Not the mean over the views that saw it:
+// that prefers what few views see, veils before single cameras.
+//
+// A densification draws Gaussians without replacement, in proportion to their share (Efraimidis and Spirakis 2006: the
+// least of -ln(u) / weight, u uniform), and splits each along its long axis (long_axis_split.hpp). As many are drawn as
+// there are dead Gaussians, whose rows the second halves take, and as the count is to grow. It grows on a square-root
+// curve, early, to the budget at the share `fill` of the run, and at most doubles at a time. First halves keep Adam's
+// moments, second ones start with none. After `fill` only the dead are replaced, after `until` nothing moves.
+//
+// A small penalty on the mean opacity, paid by all Gaussians, takes those that no view needs; they fade until they are
+// dead. A Gaussian whose opacity or geometry is not finite counts as dead. Where no error is attributed, or none is
+// alive, nothing is moved.
+//
+// It has no state but the statistic, [N] floats, which a checkpoint must hold: what is drawn depends on it, the seed and
+// the step. Equal weights give the same draws on every policy but for the last bits of a logarithm. Cost: one small
+// launch a step; a densification is a sort of N pairs, two scans and one host read.
+
+#include <gart/algorithm/exclusive_scan.hpp>
+#include <gart/algorithm/sort_pairs.hpp>
+#include <gart/math/hit_gradient.hpp>
+#include <gart/optim/adam.hpp>
+#include <gart/optim/long_axis_split.hpp>
+#include <gart/optim/options.hpp>
+#include <gart/optim/random.hpp>
+#include <gart/optim/rows.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace gart::inline GART_ISA {
+
+namespace detail {
+
+struct error_sum_kernel {
+  float const* moments;
+  float* sum;
+  GART_HD void operator()(index_t i) const { sum[i] += moments[std::size_t{moment_stride} * i + error_place]; }
+};
+
+struct error_penalty_kernel {
+  float const* opacity;
+  float* gradient;
+  float share;
+  GART_HD void operator()(index_t i) const {
+    float const o = sigmoid(opacity[i]);
+    gradient[i] += share * o * (1.0f - o);
+  }
+};
+
+// Keys whose order is that of the draws; what cannot be drawn comes last.
+struct error_key_kernel {
+  gaussians_view<float const> model;
+  float const* sum;
+  float dead_opacity;
+  random_source random;
+  u32* dead;
+  u32* drawable;
+  u32* key;
+  u32* id;
+  GART_HD void operator()(index_t i) const {
+    bool const lives = is_alive(model, i, dead_opacity);
+    float const weight = sum[i];
+    bool const fits = lives && weight > 0 && is_finite(weight);
+    float const u = (static_cast<float>(random.words(i).v[0] >> 8) + 0.5f) * 0x1p-24f;
+    dead[i] = !lives, drawable[i] = fits;
+    key[i] = fits ? float_to_bits(-logf(u) / weight) : 0xffffffffu;
+    id[i] = i;
+  }
+};
+
+struct error_target_kernel {
+  u32 const* dead;
+  u64 const* place;
+  u32* target;
+  GART_HD void operator()(index_t i) const {
+    if (dead[i]) target[place[i]] = i;
+  }
+};
+
+// Draw j takes the j-th dead row, and past those the rows that are new.
+struct error_rows {
+  u32 const* source;
+  u32 const* dead;
+  index_t dead_count, first_new;
+  GART_HD index_t from(index_t draw) const { return source[draw]; }
+  GART_HD index_t to(index_t draw) const { return draw < dead_count ? dead[draw] : first_new + (draw - dead_count); }
+};
+
+struct error_copy_body {
+  gaussians_view<float> model, first, second;
+  error_rows rows;
+  GART_HD void operator()(index_t draw, index_t column) const {
+    index_t const from = rows.from(draw), to = rows.to(draw);
+    row_element(model, to, column) = row_element(model, from, column);
+    row_element(first, to, column) = row_element(second, to, column) = 0;
+  }
+};
+
+struct error_split_kernel {
+  gaussians_view<float> model;
+  error_rows rows;
+  float least_opacity;
+  GART_HD void operator()(index_t draw) const {
+    std::size_t const pair[2] = {rows.from(draw), rows.to(draw)};
+    float const* const q = model.quaternion + 4 * pair[0];
+    float const* const m = model.mean + 3 * pair[0];
+    float const* const s = model.log_scale + 3 * pair[0];
+    vec3 const mean(m[0], m[1], m[2]);
+    split_half const half =
+        split_long_axis(vec3(s[0], s[1], s[2]), {q[0], q[1], q[2], q[3]}, sigmoid(model.opacity[pair[0]]));
+    float const opacity = half.opacity > least_opacity ? half.opacity : least_opacity;
+    for (int side = 0; side < 2; ++side) {
+      vec3 const center = side ? mean - half.offset : mean + half.offset;
+      for (int k = 0; k < 3; ++k) {
+        model.mean[3 * pair[side] + k] = center[k];
+        model.log_scale[3 * pair[side] + k] = half.log_scale[k];
+      }
+      model.opacity[pair[side]] = logf(opacity / (1.0f - opacity));
+    }
+  }
+};
+
+}  // namespace detail
+
+// Steps count from 1.
+template <execution E>
+class error_growth {
+ public:
+  // The error seen through each Gaussian since the last densification, [N]: what a checkpoint must hold.
+  buffer<float, E> error_sum;
+
+  error_growth(E& exec, error_growth_options const& options, index_t max_gaussians, int iterations, u64 seed)
+      : error_sum(exec), exec_(&exec), options_(options), max_gaussians_(max_gaussians), iterations_(iterations),
+        seed_(seed), dead_(exec), drawable_(exec), key_(exec), id_(exec), target_(exec), place_(exec),
+        totals_(exec, 2) {}
+
+  // Every step, with the moments that the step's backward pass left ([N][moment_stride]), before the optimizer's step:
+  // adds to the statistic, and to `gradient` that of the penalty.
+  void accumulate(gaussians<E> const& model, span<float const> moments, gaussians<E>& gradient) {
+    index_t const n = model.size();
+    if (n == 0) return;
+    if (error_sum.size() != n) clear_statistic(n);
+    parallel_for(*exec_, "error_sum", n, detail::error_sum_kernel{moments.data(), error_sum.data()});
+    if (options_.opacity_penalty > 0)
+      parallel_for(*exec_, "error_penalty", n,
+                   detail::error_penalty_kernel{model.opacity.data(), gradient.opacity.data(),
+                                                options_.opacity_penalty / static_cast<float>(n)});
+  }
+
+  // From the next step on the schedules are those of a run of so many steps.
+  void set_iterations(int iterations) { iterations_ = iterations; }
+
+  bool due(int step) const {
+    return options_.every > 0 && step > options_.from && step < options_.until * static_cast<float>(iterations_) &&
+           step % options_.every == 0;
+  }
+
+  // The count that a run is to have after a step.
+  index_t budget_at(int step) const {
+    double const filled = static_cast<double>(options_.fill) * iterations_ - options_.from;
+    double const share = filled > 0 ? std::clamp((step - options_.from) / filled, 0.0, 1.0) : 1.0;
+    return static_cast<index_t>(std::sqrt(share) * max_gaussians_);
+  }
+
+  // After the optimizer's step.
+  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step) {
+    return due(step) ? densify(model, state, step) : density_change{};
+  }
+
+  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step) {
+    stage_scope stage(*exec_, "densify");
+    density_change change;
+    index_t const n = model.size();
+    if (n == 0) return change;
+    if (error_sum.size() != n) clear_statistic(n);
+    dead_.resize(n), drawable_.resize(n), key_.resize(n), id_.resize(n), place_.resize(n);
+    parallel_for(*exec_, "error_keys", n,
+                 detail::error_key_kernel{std::as_const(model).view(), error_sum.data(), options_.dead_opacity,
+                                          {seed_, static_cast<u32>(step), random_use::growth}, dead_.data(),
+                                          drawable_.data(), key_.data(), id_.data()});
+    exclusive_scan(*exec_, span<u32 const>(drawable_), place_.view(), totals_.view().subspan(0, 1));
+    exclusive_scan(*exec_, span<u32 const>(dead_), place_.view(), totals_.view().subspan(1, 1));
+    u64 totals[2];
+    exec_->copy_out(totals, totals_.data(), sizeof totals);
+    index_t const drawable = static_cast<index_t>(totals[0]), dead = static_cast<index_t>(totals[1]);
+
+    change.relocated = std::min(dead, drawable);
+    index_t const goal = std::min(budget_at(step), max_gaussians_);
+    change.added = std::min(goal > n ? goal - n : 0, drawable - change.relocated);
+    if (change.any()) {
+      sort_pairs(*exec_, key_.view(), id_.view(), 32);
+      target_.resize(dead);
+      if (dead)
+        parallel_for(*exec_, "error_targets", n,
+                     detail::error_target_kernel{dead_.data(), place_.data(), target_.data()});
+      index_t const draws = change.relocated + change.added;
+      model.resize_keep(n + change.added);
+      state.first.resize_keep(n + change.added), state.second.resize_keep(n + change.added);
+      detail::error_rows const rows{id_.data(), target_.data(), change.relocated, n};
+      for_each_element(*exec_, "error_copy", draws, model.sh_degree(),
+                       detail::error_copy_body{model.view(), state.first.view(), state.second.view(), rows});
+      parallel_for(*exec_, "error_split", draws,
+                   detail::error_split_kernel{model.view(), rows, 1.01f * options_.dead_opacity});
+    }
+    clear_statistic(model.size());
+    return change;
+  }
+
+ private:
+  void clear_statistic(index_t n) {
+    error_sum.resize(n);
+    error_sum.zero();
+  }
+
+  E* exec_;
+  error_growth_options options_;
+  index_t max_gaussians_;
+  int iterations_;
+  u64 seed_;
+  buffer<u32, E> dead_, drawable_, key_, id_, target_;
+  buffer<u64, E> place_, totals_;
+};
+
+}  // namespace gart::inline GART_ISA

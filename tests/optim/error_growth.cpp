@@ -1,0 +1,227 @@
+// Densification by error, and the split along the long axis.
+#include <support/policies.hpp>
+
+#include <gart/optim/error_growth.hpp>
+
+#include "models.hpp"
+
+#include <algorithm>
+#include <set>
+
+using namespace gart;
+using gart_test::logit;
+using gart_test::sigmoid;
+
+namespace {
+
+template <class E>
+struct training {
+  E exec;
+  gaussians<E> model;
+  optimizer_state<E> state;
+
+  explicit training(gaussian_model const& m)
+      : model(exec, m), state(exec, static_cast<index_t>(m.size()), m.sh_degree) {
+    gaussian_model ones = m;
+    for (auto* v : {&ones.mean, &ones.log_scale, &ones.quaternion, &ones.opacity, &ones.sh})
+      std::fill(v->begin(), v->end(), 1.0f);
+    state.first.assign(ones), state.second.assign(ones);
+  }
+  error_growth<E> densifier(index_t most, std::vector<float> const& error, u64 seed = 1) {
+    error_growth<E> out(exec, {}, most, 2000, seed);
+    out.error_sum.assign(error);
+    return out;
+  }
+};
+
+// Each row's second colour coefficient is its number: halves carry their source's.
+gaussian_model tagged(index_t n, std::mt19937_64& random) {
+  gaussian_model m = gart_test::random_model(n, 1, random);
+  for (index_t i = 0; i < n; ++i) m.sh[std::size_t{12} * i + 1] = static_cast<float>(i);
+  return m;
+}
+index_t tag_of(gaussian_model const& m, index_t i) { return static_cast<index_t>(m.sh[std::size_t{12} * i + 1]); }
+
+}  // namespace
+
+TEST_CASE("halves end where the whole ended, and are as thick in their middles as it was there") {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  for (int i = 0; i < 200; ++i) {
+    vec3 const log_scale(3 * uniform(random), 3 * uniform(random), 3 * uniform(random));
+    quaternion const q{uniform(random), uniform(random), uniform(random), uniform(random)};
+    split_half const half = split_long_axis(log_scale, q, 0.5f);
+    double const norm = std::sqrt(double{q.w} * q.w + double{q.x} * q.x + double{q.y} * q.y + double{q.z} * q.z);
+    if (norm < 1e-2) continue;
+    // The offset in the body's axes, by q^-1 v q.
+    double const w = q.w / norm, u[3] = {-q.x / norm, -q.y / norm, -q.z / norm};
+    double const v[3] = {half.offset.x, half.offset.y, half.offset.z};
+    double const t[3] = {2 * (u[1] * v[2] - u[2] * v[1]), 2 * (u[2] * v[0] - u[0] * v[2]),
+                         2 * (u[0] * v[1] - u[1] * v[0])};
+    double const body[3] = {v[0] + w * t[0] + u[1] * t[2] - u[2] * t[1], v[1] + w * t[1] + u[2] * t[0] - u[0] * t[2],
+                            v[2] + w * t[2] + u[0] * t[1] - u[1] * t[0]};
+    int longest = 0;
+    for (int k = 1; k < 3; ++k)
+      if (log_scale[k] > log_scale[longest]) longest = k;
+    double const reach = 3 * std::exp(double{log_scale[longest]});
+    double worst = 0;  // the largest |p|^2 of the half's surface at 3 standard deviations, in the old one's
+    for (int k = 0; k < 3; ++k) {
+      if (k != longest) CHECK(std::abs(body[k]) < 1e-5 * reach);
+      CHECK(half.log_scale[k] < log_scale[k]);
+    }
+    for (double a = 0; a <= 3.1416; a += 0.01) {
+      double const along = std::abs(body[longest]) + std::cos(a) * 3 * std::exp(double{half.log_scale[longest]});
+      int const other = (longest + 1) % 3;
+      double const across = std::sin(a) * 3 * std::exp(double{half.log_scale[other]} - log_scale[other]);
+      worst = std::max(worst, along * along / (reach * reach) * 9 + across * across);
+    }
+    CHECK(std::abs(body[longest]) + 3 * std::exp(double{half.log_scale[longest]}) ==
+          doctest::Approx(reach).epsilon(1e-4));
+    CHECK(worst < 9 * 1.06 * 1.06 * 1.001);
+    double const q3 = std::abs(body[longest]) / reach;
+    for (int k = 0; k < 3; ++k)
+      if (k != longest)
+        CHECK(std::exp(double{half.log_scale[k]} - log_scale[k]) == doctest::Approx(std::sqrt(1 - q3 * q3)).epsilon(1e-4));
+    CHECK(half.opacity == doctest::Approx(0.3));
+  }
+}
+
+TEST_CASE_TEMPLATE("the dead give their rows to halves of those that the error is seen through", E,
+                   GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  index_t const n = 2000, most = 2300;
+  gaussian_model start = tagged(n, random);
+  std::vector<float> error(n);
+  std::set<index_t> dead, blind;
+  for (index_t i = 0; i < n; ++i) {
+    error[i] = 0.1f + static_cast<float>(random() % 100);
+    if (random() % 8 == 0) start.opacity[i] = -6, dead.insert(i);
+    if (random() % 4 == 0) error[i] = 0, blind.insert(i);
+  }
+  start.opacity[3] = NAN, start.mean[3 * 4] = INFINITY, start.log_scale[3 * 5 + 1] = NAN;
+  for (index_t i : {3, 4, 5}) dead.insert(i);
+  error[6] = INFINITY, blind.insert(6);
+
+  training<E> t(start);
+  auto densifier = t.densifier(most, error);
+  density_change const change = densifier.densify(t.model, t.state, 1500);  // the count is full by then
+  CHECK(change.relocated == dead.size());
+  CHECK(change.added == most - n);
+  gaussian_model got = t.model.to_host(), first = t.state.first.to_host(), second = t.state.second.to_host();
+  REQUIRE(got.size() == most);
+  REQUIRE(first.size() == most);
+
+  std::set<index_t> split;
+  for (index_t i = 0; i < most; ++i) {
+    bool const taken = i >= n || dead.count(i);
+    REQUIRE(gart_test::all_zero(gart_test::row(first, i)) == taken);
+    REQUIRE(gart_test::all_zero(gart_test::row(second, i)) == taken);
+    if (!taken) {
+      REQUIRE(tag_of(got, i) == i);
+      continue;
+    }
+    index_t const source = tag_of(got, i);
+    REQUIRE(source < n);
+    CHECK(!dead.count(source));
+    CHECK(!blind.count(source));
+    CHECK(split.insert(source).second);  // once each
+    double middle = 0, scale = 0;
+    for (int k = 0; k < 3; ++k) {
+      CHECK(got.log_scale[3 * i + k] == got.log_scale[3 * source + k]);
+      double const m = 0.5 * (double{got.mean[3 * i + k]} + got.mean[3 * source + k]) - start.mean[3 * source + k];
+      middle += m * m, scale = std::max(scale, std::exp(double{start.log_scale[3 * source + k]}));
+    }
+    CHECK(std::sqrt(middle) < 1e-5 * (1 + scale));
+    CHECK(sigmoid(got.opacity[i]) ==
+          doctest::Approx(std::max(0.6 * sigmoid(start.opacity[source]), 1.01 * 0.005)).epsilon(1e-4));
+    CHECK(got.opacity[i] == got.opacity[source]);
+  }
+  for (index_t i = 0; i < n; ++i)
+    if (!dead.count(i) && !split.count(i)) REQUIRE(gart_test::row(got, i) == gart_test::row(start, i));
+  for (float const e : densifier.error_sum.to_host()) REQUIRE(e == 0);
+  CHECK(densifier.error_sum.size() == most);
+}
+
+TEST_CASE_TEMPLATE("sources are drawn in proportion to the error seen through them", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  index_t const n = 40000, drawn = 800;
+  gaussian_model const start = tagged(n, random);
+  std::vector<float> error(n);
+  for (index_t i = 0; i < n; ++i) error[i] = static_cast<float>(1 + i % 4);
+  training<E> t(start);
+  auto densifier = t.densifier(n + drawn, error, gart_test::seed());
+  REQUIRE(densifier.densify(t.model, t.state, 1500).added == drawn);
+  gaussian_model const got = t.model.to_host();
+  double count[4] = {}, chi_square = 0;
+  for (index_t i = n; i < n + drawn; ++i) ++count[tag_of(got, i) % 4];
+  for (int k = 0; k < 4; ++k) {
+    double const expected = drawn * (1 + k) / 10.0, d = count[k] - expected;
+    chi_square += d * d / expected;
+  }
+  CHECK(chi_square < 25);  // of three degrees of freedom: one run in 60,000
+}
+
+TEST_CASE_TEMPLATE("the count follows its curve and at most doubles", E, GART_TEST_POLICIES) {
+  std::mt19937_64 random(gart_test::seed());
+  E exec;
+  error_growth<E> const plan(exec, {}, 10000, 2000, 1);
+  CHECK(!plan.due(500));
+  CHECK(plan.due(600));
+  CHECK(!plan.due(601));
+  CHECK(!plan.due(1700));
+  CHECK(plan.budget_at(500) == 0);
+  CHECK(plan.budget_at(625) == 5000);
+  CHECK(plan.budget_at(1000) == 10000);
+  CHECK(plan.budget_at(1600) == 10000);
+
+  training<E> t(tagged(300, random));
+  auto densifier = t.densifier(10000, std::vector<float>(300, 1.0f));
+  CHECK(densifier.densify(t.model, t.state, 700).added == 300);
+  REQUIRE(t.model.size() == 600);
+  CHECK(!densifier.densify(t.model, t.state, 800).any());  // no error has been seen since
+}
+
+TEST_CASE_TEMPLATE("nothing to draw from", E, GART_TEST_POLICIES) {
+  std::mt19937_64 random(1);
+  for (float const opacity : {-200.0f, NAN, INFINITY}) {
+    gaussian_model start = tagged(100, random);
+    std::fill(start.opacity.begin(), start.opacity.end(), opacity);
+    training<E> t(start);
+    auto densifier = t.densifier(200, std::vector<float>(100, 1.0f));
+    CHECK(!densifier.densify(t.model, t.state, 600).any());
+    CHECK(t.model.size() == 100);
+  }
+  gaussian_model none;
+  none.resize(0, 0);
+  training<E> t(none);
+  auto densifier = t.densifier(200, {});
+  CHECK(!densifier.after_step(t.model, t.state, 600).any());
+  densifier.accumulate(t.model, {}, t.model);
+}
+
+TEST_CASE_TEMPLATE("the statistic adds up steps, and the penalty is that of the mean opacity", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  index_t const n = 50;
+  gaussian_model const m = gart_test::random_model(n, 0, random), g = gart_test::random_model(n, 0, random);
+  training<E> t(m);
+  gaussians<E> gradient(t.exec, g);
+  std::vector<float> moments(std::size_t{moment_stride} * n);
+  gart_test::fill(moments, random, 0, 1);
+  buffer<float, E> const on_policy(t.exec, moments);
+  error_growth<E> densifier(t.exec, {}, n, 1000, 1);
+  for (int i = 0; i < 3; ++i) densifier.accumulate(t.model, on_policy, gradient);
+  auto const sum = densifier.error_sum.to_host();
+  gaussian_model const got = gradient.to_host();
+  double const h = 1e-5;
+  for (index_t i = 0; i < n; ++i) {
+    CHECK(sum[i] == doctest::Approx(3 * moments[std::size_t{moment_stride} * i + error_place]));
+    double const o = m.opacity[i];
+    CHECK(std::abs(got.opacity[i] - double{g.opacity[i]} -
+                   3 * 0.003 * (sigmoid(o + h) - sigmoid(o - h)) / (2 * h) / n) < 1e-6);
+  }
+  CHECK(got.mean == g.mean);
+}
