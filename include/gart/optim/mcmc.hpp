@@ -213,6 +213,7 @@ class mcmc {
         totals_(exec, 2) {}
 
   void set_growth(float growth) { options_.growth = growth; }
+  void set_iterations(int iterations) { iterations_ = iterations; }
 
   // Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale); before the optimizer's step.
   void add_penalties(gaussians<E> const& model, gaussians<E>& gradient) {
