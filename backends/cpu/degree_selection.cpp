@@ -40,6 +40,9 @@ bool lower_rows(row_request request) {
   }
 }
 
+int trial_steps(int iterations) { return std::max(fewest_steps, iterations / 50); }
+bool long_enough(trial_plan const& plan, int iterations) { return iterations >= 4 * plan.steps * plan.degree; }
+
 struct running_trial {
   training_state start;                // where the branches parted
   std::optional<training_state> with;  // where the branch with the band ended
@@ -59,6 +62,7 @@ class degree_selection final : public session {
         data_(data),
         plan_(plan),
         gain_wanted_(options.sh_gain),
+        every_(options.sh_every),
         interval_(sh_interval(plan.degree, options.sh_every, options.iterations)),
         start_degree_(std::min(degree_in_use(start), plan.degree)),
         never_trained_(options.held_out) {
@@ -78,6 +82,14 @@ class degree_selection final : public session {
     if (inner_->steps_done() == trial_->start.step + plan_.steps) end_branch();
     report.step = steps_done();
     return report;
+  }
+  // Both branches of a trial keep to the schedules that it began with.
+  void set_iterations(int iterations) override {
+    if (trial_) return;
+    options_.iterations = iterations;
+    options_.sh_every = interval_ = sh_interval(plan_.degree, every_, iterations);
+    plan_.begin = iterations / 2, plan_.steps = trial_steps(iterations);
+    inner_->set_iterations(iterations);
   }
   int steps_done() const override { return trial_ ? trial_->start.step : inner_->steps_done(); }
   gaussian_model model() const override { return trial_ ? trial_->start.scene : inner_->model(); }
@@ -118,11 +130,16 @@ class degree_selection final : public session {
   // Gives the next step the row it needs, or starts a trial.
   void arrange() {
     int const step = inner_->steps_done();
-    if (step >= plan_.begin) {
+    int const degree = stored_degree(step);
+    if (trials_.empty() && degree > inner_->row().sh_degree) {
+      open(with_sh_degree(inner_->state(), degree));
+    } else if (step >= plan_.begin && !long_enough(plan_, options_.iterations)) {
+      settled_ = true;  // every band stays
+      hold_out(false);
+      open(inner_->state());
+    } else if (step >= plan_.begin) {
       trial_.emplace();
       trial_->start = inner_->state();
-    } else if (int const degree = stored_degree(step); degree != inner_->row().sh_degree) {
-      open(with_sh_degree(inner_->state(), degree));
     }
   }
 
@@ -190,7 +207,7 @@ class degree_selection final : public session {
   dataset const& data_;
   trial_plan plan_;
   double gain_wanted_;
-  int interval_, start_degree_;
+  int every_, interval_, start_degree_;
   std::vector<std::size_t> never_trained_;
   bool settled_ = false;
   std::unique_ptr<session> inner_;
@@ -206,7 +223,7 @@ trial_plan plan_trials(row_request const& request, train_options const& options,
   trial_plan plan;
   plan.degree = request.sh_degree;
   plan.begin = options.iterations / 2;
-  plan.steps = std::max(fewest_steps, options.iterations / 50);
+  plan.steps = trial_steps(options.iterations);
   std::size_t const views = std::clamp(train_views / 20, least_held_out, most_held_out);
   if (plan.degree == 0) {
     plan.why = "there is no band to measure";
@@ -214,7 +231,7 @@ trial_plan plan_trials(row_request const& request, train_options const& options,
     plan.why = "no gain is asked of a band";
   } else if (train_views < fewest_views) {
     plan.why = std::to_string(train_views) + " training views are too few to hold some out and measure";
-  } else if (options.iterations < 4 * plan.steps * plan.degree) {
+  } else if (!long_enough(plan, options.iterations)) {
     plan.why = "a run under " + std::to_string(4 * plan.steps * plan.degree) + " steps is too short to measure";
   } else if (!lower_rows(request)) {
     plan.why = "lower degrees are not compiled for this row";

@@ -18,6 +18,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -57,7 +58,7 @@ struct recent_steps {
 
 class training_run {
  public:
-  explicit training_run(train_arguments& a) : a_(a), say_(a.quiet), course_(a.iterations) {}
+  explicit training_run(train_arguments& a) : a_(a), say_(a.quiet), course_(course_of(a)) {}
 
   int run() {
     prepare();
@@ -85,7 +86,7 @@ class training_run {
     if (a_.resume) continue_run(a_);
     if (a_.dataset.empty()) throw usage_error("DATASET is missing (see gart train --help)");
     row_ = gart::resolve(row_request_of(a_));  // what is not there is known before images are read
-    course_ = history(a_.iterations);
+    course_ = course_of(a_);
     load();
     chosen_ = choose(a_, data_);
     row_ = gart::resolve(row_request_of(a_));
@@ -178,17 +179,21 @@ class training_run {
     chosen_ = chosen_before(config, chosen_);
     session_->load(a_.checkpoint_file());
     int const step = session_->steps_done();
-    if (fs::exists(a_.history_file())) course_.restore(a_.history_file(), step);
+    // It tells how much of a time budget is used.
+    if (a_.time_budget > 0 || fs::exists(a_.history_file())) course_.restore(a_.history_file(), step);
     say_.note("resuming after step " + with_commas(step));
-    if (a_.iterations_before > 0) {
-      say_.note("of " + with_commas(a_.iterations) + " iterations instead of " + with_commas(a_.iterations_before) +
+    auto const now = a_.recorded.values();
+    for (auto const& [name, before] : a_.raised.items()) {
+      say_.note("--" + name + " " + now[name].dump() + " instead of " + before.dump() +
                 ": rates, degrees and densification follow the new length from here on");
+      config["options"][name] = now[name];
+      config["raised"].push_back({{"option", name}, {"step", step}, {"from", before}, {"to", now[name]}});
+    }
+    if (!a_.raised.empty()) {
       remove_results(a_.out);
-      config["options"]["iterations"] = a_.iterations;
-      config["iterations_raised"].push_back({{"step", step}, {"from", a_.iterations_before}, {"to", a_.iterations}});
       write_json(a_.config_file(), config);
     }
-    raised_ = config.value("iterations_raised", nlohmann::json::array());
+    raised_ = config.value("raised", nlohmann::json::array());
   }
 
   // True when all steps are done, false when it was asked to stop.
@@ -196,8 +201,12 @@ class training_run {
     recent_steps recent;
     stopwatch since_start;
     double last_checkpoint = 0;
-    while (session_->steps_done() < a_.iterations) {
-      int const before = session_->steps_done();
+    for (;;) {
+      int const before = session_->steps_done(), length = a_.length(before, course_.seconds);
+      if (before >= length) return true;
+      // The first steps load images and are no measure of the others.
+      session_->set_iterations(before < 100 ? a_.iterations : length);
+      double const done_before = progress_at(before);
       if (interrupt.wanted() || (a_.stop_at > 0 && before >= a_.stop_at)) return false;
       session_->profile().enable(before % profile_every == profile_every - 1);
       stopwatch const step;
@@ -222,8 +231,13 @@ class training_run {
       say_new_trials();
       recent.add(report, seconds);
       show(report, recent);
+      double const done = progress_at(report.step);
+      auto const passes = [&](int parts) { return std::floor(done * parts) > std::floor(done_before * parts); };
+      bool const by_time = a_.time_budget > 0;
+      if (by_time && passes(200)) course_.close_point();
       int const between = a_.steps_between_tests();
-      if (!report.trial && between > 0 && report.step % between == 0 && report.step < a_.iterations) test(report.step);
+      bool const due = by_time && a_.eval_every < 0 ? passes(5) : between > 0 && report.step % between == 0;
+      if (!report.trial && due && report.step < a_.length(report.step, course_.seconds)) test(report.step);
       if (a_.checkpoint_minutes > 0 && since_start.seconds() - last_checkpoint > 60 * a_.checkpoint_minutes) {
         stopwatch const saving;
         save_checkpoint();
@@ -231,8 +245,13 @@ class training_run {
         last_checkpoint = since_start.seconds();
       }
     }
-    return true;
   }
+
+  // Of a run that ends at a time, a point for each two hundredth of it, whatever the number of steps.
+  static history course_of(train_arguments const& a) {
+    return history(a.time_budget > 0 ? std::numeric_limits<int>::max() : a.iterations);
+  }
+  double progress_at(int step) const { return a_.progress(step, course_.seconds); }
 
   gart::step_report checked_step() {
     try {
@@ -249,13 +268,14 @@ class training_run {
   }
 
   void show(gart::step_report const& report, recent_steps const& recent) {
-    double const share = static_cast<double>(report.step) / a_.iterations;
+    double const share = progress_at(report.step);
     if (!say_.due(share)) return;
     double const rate = recent.seconds > 0 ? 1 / recent.seconds : 0;
-    say_.state(with_commas(report.step) + "/" + with_commas(a_.iterations) + "  " + fixed(rate, rate < 10 ? 2 : 0) +
-                   " it/s  loss " + fixed(recent.loss, 4) + "  PSNR " + fixed(recent.psnr, 2) + " dB  " +
-                   with_commas(report.gaussians) + " Gaussians  " +
-                   as_duration((a_.iterations - report.step) * recent.seconds) + " left" +
+    double const left = (a_.iterations - report.step) * recent.seconds;
+    say_.state(with_commas(report.step) + (a_.time_budget > 0 ? "" : "/" + with_commas(a_.iterations)) + "  " +
+                   fixed(rate, rate < 10 ? 2 : 0) + " it/s  loss " + fixed(recent.loss, 4) + "  PSNR " +
+                   fixed(recent.psnr, 2) + " dB  " + with_commas(report.gaussians) + " Gaussians  " +
+                   as_duration(a_.time_budget > 0 ? std::min(left, a_.time_budget - course_.seconds) : left) + " left" +
                    (report.trial ? ", a band on trial" : ""),
                share);
   }
@@ -321,8 +341,9 @@ class training_run {
     std::vector<report_view> shown;
     stopwatch const writing;
     double const tests_before = test_seconds_;
-    scores const result = test(a_.iterations, [&](std::size_t i, view_score const& s, gart::image_float const& render,
-                                                  gart::image_float const& truth) {
+    scores const result = test(session_->steps_done(), [&](std::size_t i, view_score const& s,
+                                                           gart::image_float const& render,
+                                                           gart::image_float const& truth) {
       gart::write_png(a_.out / "renders" / (s.name + ".png"), gart::to_8bit(render));
       gart::write_png(a_.out / "renders" / (s.name + "_truth.png"), gart::to_8bit(truth));
       if (in_report(i, data_.test.size())) shown.push_back(make_report_view(s.name, s.psnr, s.ssim, render, truth));
@@ -340,7 +361,7 @@ class training_run {
     gart::write_file(a_.out / "report.html", report_page(metrics, read_json(a_.config_file()), course_, shown));
     if (a_.quiet) return;
     say_.clear();
-    std::printf("trained %s steps in %s, %s Gaussians\n", with_commas(a_.iterations).c_str(),
+    std::printf("trained %s steps in %s, %s Gaussians\n", with_commas(session_->steps_done()).c_str(),
                 as_duration(course_.seconds).c_str(), with_commas(gaussians_).c_str());
     if (!result.views.empty()) std::fputs(in_words(result, training, data_.train.size()).c_str(), stdout);
     std::printf("model   %s\nreport  %s\n", a_.model_file().string().c_str(),
@@ -365,7 +386,7 @@ class training_run {
     m["image_size"] = image_size(), m["notes"] = data_.notes;
     m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
     m["exposure"] = a_.exposure == "on";
-    m["iterations"] = a_.iterations, m["iterations_raised"] = raised_;
+    m["iterations"] = session_->steps_done(), m["time_budget"] = a_.time_budget, m["raised"] = raised_;
     m["gaussians"] = gaussians_, m["sh_degree"] = session_->row().sh_degree;
     m["floats_per_gaussian"] = 11 + 3 * gart::sh_coefficients(session_->row().sh_degree);
     m["chosen"] = chosen_, m["sh_trials"] = trials_of(session_->trials());
@@ -377,7 +398,7 @@ class training_run {
     m["finite_steps"] = finite_steps_;
     if (a_.check_finite) m["skipped_updates"] = skipped_updates_;
     m["seconds"] = course_.seconds;
-    m["iterations_per_second"] = course_.seconds > 0 ? a_.iterations / course_.seconds : 0;
+    m["iterations_per_second"] = course_.seconds > 0 ? session_->steps_done() / course_.seconds : 0;
     m["wall_seconds"] = {
         {"loading", load_seconds_}, {"training", step_seconds_}, {"testing", test_seconds_}, {"saving", save_seconds_}};
     m["stages_ms"] = nlohmann::json::object();

@@ -31,6 +31,11 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(between(1, 1e9));
   in_group(r.add(train, "--max-gaussians", a.max_gaussians, "N", "Gaussians at most; memory and time grow with them"))
       ->check(between(1, static_cast<double>(gart::most_gaussians)));
+  in_group(r.add(train, "--time-budget", a.time_budget, "S",
+                 "Seconds of training after which the run ends, where\n--iterations do not end it before, 0: no limit. "
+                 "Rates, degrees\nand densification go by the larger of both shares. Such a run\ndepends on the "
+                 "machine and its load, whatever the seed. It may\nbe raised as --iterations may"))
+      ->check(between(0, 1e9));
   in_group(
       r.add(train, "--densify", a.densify, "NAME",
             "How Gaussians are added: error (those split through which\nthe image's error is seen, up to --max-gaussians), mcmc\n(copies by opacity, random steps), adc (clones and splits by\ngradient) or none"))
@@ -177,8 +182,7 @@ void continue_run(train_arguments& a) {
   if (!config.is_object() || !config.contains("options") || !config["options"].is_object()) {
     throw gart::io_error(a.config_file().string(), "has no \"options\"", "start anew without --resume");
   }
-  auto const raised = a.recorded.continue_from(config["options"], a.config_file(), {"iterations"});
-  if (raised.contains("iterations")) a.iterations_before = raised["iterations"];
+  a.raised = a.recorded.continue_from(config["options"], a.config_file(), {"iterations", "time-budget"});
   if (a.dataset.empty()) {
     if (!config.contains("dataset") || !config["dataset"].is_string()) {
       throw gart::io_error(a.config_file().string(), "has no \"dataset\"", "name the dataset on the command line");

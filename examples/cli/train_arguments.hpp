@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <filesystem>
 #include <string>
 
@@ -17,7 +18,7 @@ struct train_arguments {
   std::filesystem::path dataset, out;
   bool resume = false, quiet = false, check_finite = false;
   int threads = 0, stop_at = 0;
-  int iterations_before = 0;  // of the run that is resumed, where the command line raises them; else 0
+  nlohmann::json raised = nlohmann::json::object();  // options raised by a resuming command line: what they were
   float checkpoint_minutes = 10;
 
   // What follows decides the result and is recorded.
@@ -26,6 +27,7 @@ struct train_arguments {
   std::string preset = "exact";
   gart::train_options defaults;
   int iterations = defaults.iterations;
+  double time_budget = 0;  // seconds of training; 0: none
   gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
   int kernel_degree = 2, tile_size = 0, window = 0;
   bool automatic = false;
@@ -47,6 +49,17 @@ struct train_arguments {
   std::filesystem::path checkpoint_file() const { return out / "checkpoint.gart"; }
   std::filesystem::path history_file() const { return out / "history.json"; }
   std::filesystem::path model_file() const { return out / "model.ply"; }
+  // The share of the run that is done.
+  double progress(int step, double seconds) const {
+    double const by_steps = static_cast<double>(step) / iterations;
+    return std::min(1.0, time_budget > 0 ? std::max(by_steps, seconds / time_budget) : by_steps);
+  }
+  // The length that schedules go by: so many steps that `step` of them are the progress. A run is over where it has
+  // come to it.
+  int length(int step, double seconds) const {
+    double const by_steps = static_cast<double>(step) / iterations, share = progress(step, seconds);
+    return share > by_steps ? std::max(1, static_cast<int>(step / share)) : iterations;
+  }
   int steps_between_tests() const { return eval_every >= 0 ? eval_every : std::max(1, iterations / 5); }
 };
 

@@ -128,14 +128,54 @@ TEST_CASE("a run that was over goes on where iterations are raised, and says tha
   auto const longer = here.gart("train --resume --out run --iterations 25 --stop-at 20");
   CHECK(longer.code == 130);
   CHECK_MESSAGE(has(longer.err, "resuming after step 10\n"), longer.err);
-  CHECK_MESSAGE(has(longer.err, "of 25 iterations instead of 10: rates, degrees and densification follow"), longer.err);
+  CHECK_MESSAGE(has(longer.err, "--iterations 25 instead of 10: rates, degrees and densification follow"), longer.err);
   for (char const* name : {"metrics.json", "report.html", "renders/test_v0.png"})
     CHECK_FALSE(fs::exists(here / ("run/" + std::string(name))));
   REQUIRE(here.gart("train --resume --out run --quiet").code == 0);
   auto const metrics = here.json("run/metrics.json"), config = here.json("run/config.json");
   CHECK(metrics["iterations"] == 25);
   CHECK(config["options"]["iterations"] == 25);
-  REQUIRE(metrics["iterations_raised"].size() == 1);
-  CHECK(metrics["iterations_raised"][0] == nlohmann::json({{"step", 10}, {"from", 10}, {"to", 25}}));
+  REQUIRE(metrics["raised"].size() == 1);
+  CHECK(metrics["raised"][0] == nlohmann::json({{"option", "iterations"}, {"step", 10}, {"from", 10}, {"to", 25}}));
   CHECK(here.json("run/history.json")["train"].back()[0] == 25);
+}
+
+TEST_CASE("a time budget ends the run, with its tests spread over the time, and goes on over a stop") {
+  folder const here;
+  write_capture(here / "capture");
+  std::string const run = "train capture --iterations 100000000 --time-budget 2 --backend serial --max-gaussians 60";
+  REQUIRE(here.gart(run + " --out run --quiet --stop-at 20").code == 130);
+  CHECK(here.json("run/config.json")["options"]["time-budget"] == 2);
+  auto const resumed = here.gart("train --resume --out run");
+  REQUIRE_MESSAGE(resumed.code == 0, resumed.err);
+  CHECK_FALSE(has(resumed.err, "/100,000,000"));
+  auto const metrics = here.json("run/metrics.json");
+  CHECK(metrics["time_budget"] == 2);
+  double const seconds = metrics["seconds"];
+  CHECK(seconds > 1.8);  // a last step that would not fit is left out
+  int const steps = metrics["iterations"];
+  CHECK(steps > 20);
+  CHECK(steps < 100000000);
+  auto const& tests = metrics["psnr_over_seconds"]["test"];
+  REQUIRE(tests.size() >= 2);  // five where no step takes a fifth of the time
+  CHECK(tests.size() <= 5);
+  CHECK(tests[0][0].get<double>() >= 0.4);
+  CHECK(tests.back()[1] == steps);
+  CHECK(metrics["psnr_over_seconds"]["train"].size() <= 203);
+
+  auto const on = here.gart("train --resume --out run --time-budget 3");
+  REQUIRE_MESSAGE(on.code == 0, on.err);
+  CHECK(has(on.err, "--time-budget 3.0 instead of 2.0"));
+  CHECK(here.json("run/metrics.json")["seconds"].get<double>() > 2.7);
+  CHECK(here.json("run/metrics.json")["iterations"].get<int>() > steps);
+  CHECK(here.json("run/metrics.json")["raised"][0]["step"] == steps);
+}
+
+TEST_CASE("a time budget that steps do not come to changes no bit") {
+  folder const here;
+  write_capture(here / "capture");
+  REQUIRE(here.gart("train capture --out with --iterations 150 --time-budget 100000" + small).code == 0);
+  REQUIRE(here.gart("train capture --out without --iterations 150" + small).code == 0);
+  CHECK(text_of(here / "with/model.ply") == text_of(here / "without/model.ply"));
+  CHECK(here.json("with/metrics.json")["iterations"] == 150);
 }

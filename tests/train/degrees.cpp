@@ -87,6 +87,32 @@ struct scratch_file {
 
 }  // namespace
 
+TEST_CASE("a length that is set moves the trials as one that was known") {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  fixture f = make(seed, 0.5f);
+  auto const known = session_of(f);
+  f.options.iterations = 6 * iterations;
+  auto const told = session_of(f);
+  told->set_iterations(iterations);
+  while (known->steps_done() < iterations) known->step(), told->step();
+  REQUIRE_FALSE(known->trials().empty());
+  REQUIRE(told->trials().size() == known->trials().size());
+  for (std::size_t i = 0; i < known->trials().size(); ++i) {
+    CHECK(told->trials()[i].step == known->trials()[i].step);
+    CHECK(told->trials()[i].forecast == known->trials()[i].forecast);
+  }
+  CHECK(same_bits(known->model(), told->model()));
+
+  // One that leaves no room to measure stores every band, and trains on every view.
+  auto const brief = session_of(f);
+  for (int i = 0; i < 100; ++i) brief->step();
+  brief->set_iterations(150);
+  while (brief->steps_done() < 150) CHECK_FALSE(brief->step().trial);
+  CHECK(brief->trials().empty());
+  CHECK(brief->row().sh_degree == 3);
+}
+
 TEST_CASE("a band has no floats before it is used, and its coming changes no bit of the training") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);

@@ -183,6 +183,8 @@ class adaptive_density {
         iterations_(iterations), extent_(extent), seed_(seed), copies_(exec), grows_(exec), origin_(exec),
         offset_(exec), totals_(exec, 2) {}
 
+  void set_iterations(int iterations) { iterations_ = iterations; }
+
   // Every step, with the gradient of the step's view.
   void accumulate(gaussians<E> const& model, gaussians<E> const& gradient, camera const& view) {
     if (touched.size() != model.size()) clear_statistic(model.size());

@@ -209,6 +209,7 @@ class mcmc {
         totals_(exec, 2) {}
 
   void set_growth(float growth) { options_.growth = growth; }
+  void set_iterations(int iterations) { iterations_ = iterations; }
 
   // Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale) / extent; before the optimizer's
   // step.

@@ -33,6 +33,7 @@ class compiled_session final : public session {
       : trainer_(exec_, options, data, start) {}
   step_report step() override { return trainer_.step(); }
   int steps_done() const override { return trainer_.steps_done(); }
+  void set_iterations(int iterations) override { trainer_.set_iterations(iterations); }
   gaussian_model model() const override { return trainer_.model(); }
   rendered render(camera const& view, vec3 background) override { return trainer_.render(view, background); }
   void save(std::filesystem::path const& path) const override { trainer_.save(path); }

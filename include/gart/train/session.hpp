@@ -89,6 +89,10 @@ class session {
   virtual ~session() = default;
   virtual step_report step() = 0;
   virtual int steps_done() const = 0;
+  // The length of the run that rates, degrees and densification go by from the next step on, in place of
+  // options.iterations: for a run that ends at a time, whose number of steps is not known beforehand. No part of the
+  // state: whoever resumes sets it again.
+  virtual void set_iterations(int iterations) = 0;
   virtual gaussian_model model() const = 0;
   virtual rendered render(camera const& view, vec3 background) = 0;
   // Everything the next step depends on: parameters, Adam's moments, step, random state. Written atomically; resuming

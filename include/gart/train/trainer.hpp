@@ -59,6 +59,7 @@ class trainer {
   step_report step(Loss&& loss);
 
   int steps_done() const { return step_; }
+  void set_iterations(int iterations);  // as session has it
   gaussian_model model() const { return scene_.to_host(); }
   rendered render(camera const& view, vec3 background);
   training_state state() const;
@@ -127,6 +128,7 @@ class trainer {
   buffer<float, E> color_, color_gradient_, value_;
   std::optional<exposure_training<E>> exposures_;  // where options.exposure asks for them
   std::optional<finite_check<E>> finite_;          // where options.check_finite asks for it
+  index_t started_with_ = 0;                       // Gaussians
   int step_ = 0;
   float growth_ = 1;
   std::size_t lt_bytes_ = 0;

@@ -33,13 +33,23 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       adc_(exec, adc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
       color_(exec),
       color_gradient_(exec),
-      value_(exec, 2) {
+      value_(exec, 2),
+      started_with_(static_cast<index_t>(start.size())) {
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
   if (options.check_finite) finite_.emplace(exec);
   options_.render.near = options.near * data.extent;
   if (options.exposure) exposures_.emplace(exec, data.train.size());
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
+  mcmc_.set_growth(growth_);
+}
+
+template <execution E, class Traits, class Tracer, class Strategy>
+void trainer<E, Traits, Tracer, Strategy>::set_iterations(int iterations) {
+  if (iterations == options_.iterations) return;
+  options_.iterations = iterations;
+  mcmc_.set_iterations(iterations), adc_.set_iterations(iterations);
+  growth_ = growth_for(options_.mcmc, started_with_, options_.max_gaussians, iterations);
   mcmc_.set_growth(growth_);
 }
 
