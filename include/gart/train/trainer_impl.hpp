@@ -48,7 +48,7 @@ template <execution E, class Traits, class Tracer, class Strategy>
 void trainer<E, Traits, Tracer, Strategy>::set_iterations(int iterations) {
   if (iterations == options_.iterations) return;
   options_.iterations = iterations;
-  mcmc_.set_iterations(iterations), adc_.set_iterations(iterations);
+  error_.set_iterations(iterations), mcmc_.set_iterations(iterations), adc_.set_iterations(iterations);
   growth_ = growth_for(options_.mcmc, started_with_, options_.max_gaussians, iterations);
   mcmc_.set_growth(growth_);
 }
