@@ -298,6 +298,7 @@ void write_splat_ply(std::filesystem::path const& path, gaussian_model const& mo
     }
     text += "comment gart " + key + " " + value + "\n";
   }
+  if (traits.count("antialias")) text += "comment SplatRenderMode: mip\n";
   text += "element vertex " + std::to_string(n) + "\n";
   for (std::string const& name : splat_columns(model.sh_degree, true)) text += "property float " + name + "\n";
   text += "end_header\n";

@@ -29,12 +29,13 @@ void parse_header(ply_file& file) {
   std::string_view rest = all, line;
   char const* const again = "the file is damaged: export it again";
   if (!next_line(rest, line) || line != "ply") file.refuse("does not begin with 'ply'", "name a PLY file");
-  bool has_format = false;
+  bool has_format = false, filtered = false;
   while (next_line(rest, line)) {
     std::string_view const whole = line;
     std::string_view const key = next_word(line);
     if (key == "end_header") {
       if (!has_format) file.refuse("the header has no format line", again);
+      if (filtered) file.head.traits.try_emplace("antialias", "");
       file.head.size = all.size() - rest.size();
       return;
     }
@@ -51,7 +52,10 @@ void parse_header(ply_file& file) {
         file.refuse("the format '" + std::string(kind.substr(0, 40)) + "' is not one of PLY's", "export it again");
       has_format = true;
     } else if (key == "comment") {
-      if (next_word(line) != "gart") continue;
+      std::string_view const whose = next_word(line);
+      if (whose == "SplatRenderMode:") filtered = next_word(line) == "mip";
+      if (whose == "antialiased") filtered = next_word(line) == "1";
+      if (whose != "gart") continue;
       std::string const name(next_word(line));
       while (!line.empty() && line.front() == ' ') line.remove_prefix(1);
       if (!name.empty()) file.head.traits[name] = std::string(line);

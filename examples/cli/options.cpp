@@ -118,19 +118,24 @@ model_file load_model(std::filesystem::path const& path) {
     }
     file.kernel_degree = std::atoi(kernel->second.c_str());
   }
-  auto const number = [&](char const* key, float& value) {
+  auto const number = [&](char const* key, float& value, float most = 1) {
     auto const found = traits.find(key);
     if (found == traits.end()) return;
     char* end = nullptr;
     float const parsed = std::strtof(found->second.c_str(), &end);
-    if (end == found->second.c_str() || !(parsed >= 0 && parsed < 1)) {
+    if (end == found->second.c_str() || !(parsed >= 0 && parsed < most)) {
       throw gart::io_error(path.string(), std::string("comment gart ") + key + " is '" + found->second + "'",
-                           "a number from 0 to 1 belongs there; remove the comment for the default");
+                           "a number from 0 to " + std::to_string(static_cast<int>(most)) +
+                               " belongs there; remove the comment for the default");
     }
     value = parsed;
   };
   number("alpha_min", file.render.alpha_min);
   number("t_min", file.render.transmittance_min);
+  if (auto const found = traits.find("antialias"); found != traits.end() && found->second.empty())
+    file.render.antialias = gart::usual_antialias;  // another program's, which does not say how wide
+  else
+    number("antialias", file.render.antialias, 100);
   if (auto const found = traits.find("max_hits"); found != traits.end()) {
     char* end = nullptr;
     unsigned long const parsed = std::strtoul(found->second.c_str(), &end, 10);
@@ -155,11 +160,8 @@ gart::row_request row_request_for(model_file const& file, std::filesystem::path 
 }
 
 nlohmann::json approximations_of(gart::render_options const& render, gart::row_info const& row) {
-  return {{"alpha_min", render.alpha_min},
-          {"t_min", render.transmittance_min},
-          {"max_hits", render.max_hits},
-          {"arithmetic", row.arithmetic},
-          {"lt_format", row.lt_format}};
+  return {{"alpha_min", render.alpha_min}, {"t_min", render.transmittance_min}, {"max_hits", render.max_hits},
+          {"antialias", render.antialias}, {"arithmetic", row.arithmetic},      {"lt_format", row.lt_format}};
 }
 
 }  // namespace gart_cli

@@ -2,6 +2,7 @@
 #include "options.hpp"
 #include "output.hpp"
 #include "progress.hpp"
+#include "samples.hpp"
 
 #include <gart/io/dataset.hpp>
 #include <gart/io/exposure_file.hpp>
@@ -24,7 +25,7 @@ struct render_arguments {
   fs::path model, cameras, out, json, exposures;
   row_options row;
   std::string background = "black";
-  int downscale = 1;
+  int downscale = 1, samples = 1;
   float alpha_min = -1, t_min = -1;
   int max_hits = -1;
   bool depth = false, quiet = false;
@@ -78,11 +79,9 @@ int run_render(render_arguments const& a) {
 
   progress say(a.quiet);
   auto const row = renderer->row();
-  nlohmann::json timings = {{"backend", row.backend},
-                            {"tracer", row.tracer},
-                            {"gaussians", file.model.size()},
-                            {"approximations", approximations_of(options, row)},
-                            {"views", nlohmann::json::array()}};
+  nlohmann::json timings = {{"backend", row.backend},         {"tracer", row.tracer},
+                            {"gaussians", file.model.size()}, {"approximations", approximations_of(options, row)},
+                            {"samples", a.samples},           {"views", nlohmann::json::array()}};
   renderer->profile().enable(!a.json.empty());
   double total = 0;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -90,7 +89,7 @@ int run_render(render_arguments const& a) {
     if (a.downscale > 1)
       view = gart::resized(view, std::max(1, view.width / a.downscale), std::max(1, view.height / a.downscale));
     auto const start = std::chrono::steady_clock::now();
-    gart::rendered image = renderer->render(view, options);
+    gart::rendered image = render_samples(*renderer, view, options, a.samples);
     if (!exposures.empty()) apply(exposures.at(view), image.color);
     double const ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     total += ms;
@@ -141,6 +140,12 @@ void add_render(CLI::App& app, command& selected) {
       ->capture_default_str()
       ->check(one_of({"black", "white"}));
   render->add_option("--downscale", a->downscale, "Shrink images by this whole factor")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 64));
+  render
+      ->add_option("--samples", a->samples,
+                   "Rays a pixel each way, N x N in all: the mean over the pixel\nitself, in N x N times the time")
       ->type_name("N")
       ->capture_default_str()
       ->check(between(1, 64));

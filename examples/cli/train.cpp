@@ -277,6 +277,7 @@ class training_run {
     put("t_min", a_.t_min, a_.defaults.render.transmittance_min);
     if (row_.kernel_degree != 2) result["kernel_degree"] = std::to_string(row_.kernel_degree);
     if (a_.max_hits != 0) result["max_hits"] = std::to_string(a_.max_hits);
+    put("antialias", train_options_of(a_).render.antialias, a_.defaults.render.antialias);
     return result;
   }
 

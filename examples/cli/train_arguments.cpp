@@ -5,6 +5,7 @@
 #include "presets.hpp"
 
 #include <gart/core/version.hpp>
+#include <gart/train/try.hpp>
 
 namespace gart_cli {
 
@@ -30,7 +31,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(
       r.add(train, "--densify", a.densify, "NAME",
             "How Gaussians are added: mcmc (grows to --max-gaussians),\nadc (clones and splits by gradient) or none"))
-      ->check(one_of({"mcmc", "adc", "none"}));
+      ->check(one_of({"mcmc", "adc", "error", "none"}));
   in_group(r.add_flag(train, "--auto,!--no-auto", a.automatic,
                       "Model only what the scene requires: measure on held-out\ntraining views which bands of "
                       "spherical harmonics pay, and\nstore no others. --no-auto stores all and holds no view out.\n"
@@ -68,6 +69,11 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "How Gaussians fall from their centres, exp(-4.5 (r / 3)^N):\n2, or the generalised 1, 3, 4, 5, 8 of "
                  "3DGRT"))
       ->check(kernel_degree_names());
+
+  in_group(r.add_flag(
+      train, "--antialias", a.antialias,
+      "Each pixel sees the Gaussians through a filter of its own\nwidth: for models that are shown smaller or from "
+      "farther away\nthan they were trained. The model says so to who renders it"));
 
   group = "Capture";
   in_group(r.add(train, "--exposure", a.exposure, "NAME",
@@ -194,6 +200,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.random_points = std::min(a.points, a.max_gaussians);
   o.densify = a.densify == "mcmc"  ? gart::densify_kind::mcmc
               : a.densify == "adc" ? gart::densify_kind::adc
+              : a.densify == "error" ? gart::densify_kind::error
                                    : gart::densify_kind::none;
   o.initial_opacity = a.initial_opacity;
   o.initial_scale = a.initial_scale;
@@ -212,6 +219,8 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.render.alpha_min = a.alpha_min;
   o.render.transmittance_min = a.t_min;
   o.render.max_hits = a.max_hits;
+  o.render.near = gart::tried("near", o.render.near);
+  o.render.antialias = a.antialias ? gart::usual_antialias : 0;
   o.render.rebuild_every = a.rebuild_every;
   return o;
 }

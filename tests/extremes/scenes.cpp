@@ -22,6 +22,14 @@ void rotate(shape& s, number_source& random, double norm) {
   for (double& q : s.quaternion) q *= norm / std::sqrt(squares);
 }
 
+void turn_z_to(shape& s, vec3d const& axis, number_source& random) {
+  double const turn = random.uniform(-3, 3);
+  // (1 + z.axis, z x axis), times a rotation about z.
+  double const w = 1 + axis.z, x = -axis.y, y = axis.x, c = std::cos(turn), d = std::sin(turn);
+  double const q[4] = {w * c, x * c + y * d, y * c - x * d, w * d};
+  std::copy_n(q, 4, s.quaternion);
+}
+
 void append(gart::gaussian_model& m, number_source& random, shape const& s) {
   for (int a = 0; a < 3; ++a) {
     m.mean.push_back(static_cast<float>(s.mean[a]));
@@ -67,15 +75,6 @@ vec3d through_image(number_source& random) {
   gart::camera const c = ordinary_camera();
   return unit({(random.uniform(0, c.width) - double{c.cx}) / double{c.fx},
                (random.uniform(0, c.height) - double{c.cy}) / double{c.fy}, 1});
-}
-
-// The rotation that takes z to `axis`, then turned about it.
-void turn_z_to(shape& s, vec3d const& axis, number_source& random) {
-  double const turn = random.uniform(-3, 3);
-  // (1 + z.axis, z x axis), times a rotation about z.
-  double const w = 1 + axis.z, x = -axis.y, y = axis.x, c = std::cos(turn), d = std::sin(turn);
-  double const q[4] = {w * c, x * c + y * d, y * c - x * d, w * d};
-  std::copy_n(q, 4, s.quaternion);
 }
 
 // |p| of a ray along the unit vector d that passes the Gaussian's centre at `off`.

@@ -48,6 +48,8 @@ struct shape {
 void append(gart::gaussian_model& m, number_source& random, shape const& s);
 // A random rotation of the given norm.
 void rotate(shape& s, number_source& random, double norm = 1);
+// The rotation that takes z to the unit vector `axis`, after a random one about z.
+void turn_z_to(shape& s, gart::vec3d const& axis, number_source& random);
 
 // A camera at the origin that looks along z; `focal` in pixels.
 gart::camera looking_along_z(int width, int height, float focal);

@@ -31,9 +31,11 @@ outcome run_one(E& exec, gart::gaussian_model const& model, gart::camera const& 
   gart::buffer<float, E> gradient(exec, color_gradient);
   gart::buffer<gart::u32, E> hits(exec, pixels);
   auto const constant = std::as_const(scene).view();
-  records.prepare(exec, constant, view.position, options.alpha_min);
-  tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
-  if (!pass.prepare(exec, tracer, constant, view, options.alpha_min, options.near)) throw pass.no_room();
+  gart::antialiased<E> filter(exec);
+  auto const seen = filter.of(exec, constant, view, options.antialias);
+  records.prepare(exec, seen, view.position, options.alpha_min);
+  tracer.prepare(exec, seen, records.view(), view, options.alpha_min, options.near);
+  if (!pass.prepare(exec, tracer, seen, view, options.alpha_min, options.near)) throw pass.no_room();
   gart::image_targets targets = pass.targets(color.data());
   targets.transmittance = transmittance.data(), targets.depth = depth.data(), targets.hits = hits.data();
   gart::forward<1>(exec, tracer, constant, view, options, 1, targets, pass.record());

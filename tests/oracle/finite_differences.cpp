@@ -121,6 +121,17 @@ TEST_CASE("gradients agree with central differences for needles") {
   }
 }
 
+TEST_CASE("gradients agree with central differences through the filter of the pixels") {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  for (float aspect : {2.0f, 30.0f}) {
+    CAPTURE(aspect);
+    auto s = oracle::smooth_scene(seed, 1, aspect);
+    s.options.antialias = 0.7f;
+    check(s);
+  }
+}
+
 TEST_CASE("bands above the active degree get no gradient and change nothing") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);

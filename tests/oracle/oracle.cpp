@@ -17,9 +17,9 @@ using Eigen::Vector3d;
 
 double const alpha_max = 0.99;
 
-// Direction (x, y, z) of the pixel's ray before the lens, by fixed-point iteration on the forward model.
-Vector3d camera_direction(gart::camera const& c, int i, int j) {
-  double const xd = (i + 0.5 - double(c.cx)) / double(c.fx), yd = (j + 0.5 - double(c.cy)) / double(c.fy);
+// Direction (x, y, z) of the ray through an image point before the lens, by fixed-point iteration on the forward model.
+Vector3d camera_direction(gart::camera const& c, double u, double v) {
+  double const xd = (u - double(c.cx)) / double(c.fx), yd = (v - double(c.cy)) / double(c.fy);
   double const k1 = c.lens.k1, k2 = c.lens.k2, p1 = c.lens.p1, p2 = c.lens.p2;
   double x = xd, y = yd;
   for (int step = 0; step < 2000; ++step) {
@@ -36,7 +36,7 @@ Vector3d world_direction(gart::camera const& c, int i, int j) {
   Matrix3d r;
   for (int column = 0; column < 3; ++column)
     for (int row = 0; row < 3; ++row) r(row, column) = c.rotation[column][row];
-  return (r * camera_direction(c, i, j)).normalized();
+  return (r * camera_direction(c, i + 0.5, j + 0.5)).normalized();
 }
 
 // The real spherical harmonics up to degree 3 in the order and signs of splat files.
@@ -71,23 +71,103 @@ Eigen::Matrix<S, 3, 3> rotation_of(S w, S x, S y, S z) {
   return r;
 }
 
+// What the filter of a camera's pixels makes of a Gaussian.
+class pixels_filter {
+ public:
+  pixels_filter(gart::camera const& c, double pixels) : c_(c), pixels_(pixels) {
+    for (int k = 0; pixels > 0 && k <= 64; ++k) {
+      double const u = k / 64.0 * c.width, v = k / 64.0 * c.height;
+      for (Vector3d const& p : {camera_direction(c, u, 0), camera_direction(c, u, c.height), camera_direction(c, 0, v),
+                                camera_direction(c, c.width, v)})
+        lo_ = lo_.cwiseMin(p), hi_ = hi_.cwiseMax(p);
+    }
+  }
+
+  // By covariances: every s^2 grows by that of the filter, and sigma falls by the area that the plane across the view
+  // sees. `scale` and `sigma` are changed in place; `to_mean` is the mean as the camera has it.
+  template <class S>
+  void widen(Eigen::Matrix<S, 3, 1> const& to_mean, Eigen::Matrix<S, 3, 3> const& r, Eigen::Matrix<S, 3, 1>& scale,
+             S& sigma) const {
+    using std::sqrt;
+    if (!(pixels_ > 0)) return;
+    S const angle = angle_at(to_mean);
+    S distance2(0.0);
+    for (int a = 0; a < 3; ++a) distance2 += S(to_mean[a] * to_mean[a]);
+    S const variance = pixels_ * pixels_ * angle * distance2;
+    S before(0.0), after(0.0);  // d^T C^-1 d, times |mean|^2
+    for (int k = 0; k < 3; ++k) {
+      S along(0.0);
+      for (int a = 0; a < 3; ++a) along += S(r(a, k) * to_mean[a]);
+      S const square = scale[k] * scale[k], wide = square + variance;
+      before += S(along * along / square), after += S(along * along / wide);
+    }
+    S area = before / after;
+    for (int k = 0; k < 3; ++k) {
+      S const square = scale[k] * scale[k], wide = square + variance;
+      area *= S(square / wide), scale[k] = sqrt(wide);
+    }
+    sigma *= S(sqrt(area));
+  }
+
+ private:
+  // The solid angle of a pixel towards `p`: of the parallelogram by which the unit direction moves with the image
+  // point.
+  template <class S>
+  S angle_at(Eigen::Matrix<S, 3, 1> const& p) const {
+    using std::sqrt;
+    Eigen::Matrix<S, 3, 1> q;
+    for (int axis = 0; axis < 3; ++axis) {
+      q[axis] = S(0.0);
+      for (int k = 0; k < 3; ++k) q[axis] += S(p[k] * double(c_.rotation[axis][k]));
+    }
+    S const x = inside(q[0], q[2], lo_[0], hi_[0]), y = inside(q[1], q[2], lo_[1], hi_[1]);
+    S const squares = 1.0 + x * x + y * y, length = sqrt(squares);
+    S const n[3] = {S(x / length), S(y / length), S(1.0 / length)};
+    S by_x[3], by_y[3];
+    for (int k = 0; k < 3; ++k) {
+      by_x[k] = S(S((k == 0 ? 1.0 : 0.0) - n[k] * n[0]) / length);
+      by_y[k] = S(S((k == 1 ? 1.0 : 0.0) - n[k] * n[1]) / length);
+    }
+    S cross2(0.0);
+    for (int k = 0; k < 3; ++k) {
+      S const side = by_x[(k + 1) % 3] * by_y[(k + 2) % 3] - by_x[(k + 2) % 3] * by_y[(k + 1) % 3];
+      cross2 += S(side * side);
+    }
+    double const k1 = c_.lens.k1, k2 = c_.lens.k2, p1 = c_.lens.p1, p2 = c_.lens.p2;
+    S const r2 = x * x + y * y, radial = 1.0 + k1 * r2 + k2 * r2 * r2, slope = 2 * k1 + 4 * k2 * r2;
+    S const uu = radial + slope * x * x + 2 * p1 * y + 6 * p2 * x, uv = slope * x * y + 2 * p1 * x + 2 * p2 * y;
+    S const vv = radial + slope * y * y + 6 * p1 * y + 2 * p2 * x;
+    return sqrt(cross2) / (double(c_.fx) * double(c_.fy) * (uu * vv - uv * uv));
+  }
+  template <class S>
+  static S inside(S const& side, S const& z, double lo, double hi) {
+    if (!(z > 0.0)) return S(side < 0.0 ? lo : hi);
+    S const slope = side / z;
+    return slope < lo ? S(lo) : slope > hi ? S(hi) : slope;
+  }
+
+  gart::camera const& c_;
+  double pixels_;
+  Vector3d lo_ = Vector3d::Constant(1e300), hi_ = Vector3d::Constant(-1e300);
+};
+
 struct prepared {
   Vector3d from_mean;  // o - mean
   Matrix3d to_unit;    // S^-1 R^T
   double sigma;
 };
 
-std::vector<prepared> prepare(parameters const& m, Vector3d const& origin) {
+std::vector<prepared> prepare(parameters const& m, Vector3d const& origin, pixels_filter const& filter) {
   using std::sqrt;
   std::vector<prepared> out(m.size());
   for (std::size_t i = 0; i < m.size(); ++i) {
     double const* q = &m.quaternion[4 * i];
     Matrix3d const r = rotation_of(q[0], q[1], q[2], q[3]);
-    Vector3d const inverse_scale =
-        Vector3d(-m.log_scale[3 * i], -m.log_scale[3 * i + 1], -m.log_scale[3 * i + 2]).array().exp();
+    Vector3d scale = Vector3d(m.log_scale[3 * i], m.log_scale[3 * i + 1], m.log_scale[3 * i + 2]).array().exp();
     out[i].from_mean = origin - Vector3d(m.mean[3 * i], m.mean[3 * i + 1], m.mean[3 * i + 2]);
-    out[i].to_unit = inverse_scale.asDiagonal() * r.transpose();
     out[i].sigma = 1 / (1 + std::exp(-m.opacity[i]));
+    filter.widen<double>(-out[i].from_mean, r, scale, out[i].sigma);
+    out[i].to_unit = scale.cwiseInverse().asDiagonal() * r.transpose();
   }
   return out;
 }
@@ -251,7 +331,8 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
 // the definition.
 using dual = Eigen::AutoDiffScalar<Eigen::Matrix<double, 11, 1>>;
 
-dual response_of(parameters const& m, std::size_t i, Vector3d const& origin, Vector3d const& d) {
+dual response_of(parameters const& m, std::size_t i, Vector3d const& origin, Vector3d const& d,
+                 pixels_filter const& filter) {
   using Vector = Eigen::Matrix<dual, 3, 1>;
   Vector mean, scale;
   for (int a = 0; a < 3; ++a) {
@@ -260,7 +341,10 @@ dual response_of(parameters const& m, std::size_t i, Vector3d const& origin, Vec
   }
   double const* q = &m.quaternion[4 * i];
   auto const r = rotation_of<dual>(dual(q[0], 11, 6), dual(q[1], 11, 7), dual(q[2], 11, 8), dual(q[3], 11, 9));
-  Vector o_g, d_g;
+  dual sigma = 1.0 / (1.0 + exp(dual(-dual(m.opacity[i], 11, 10))));
+  Vector to_mean, o_g, d_g;
+  for (int a = 0; a < 3; ++a) to_mean[a] = mean[a] - origin[a];
+  filter.widen<dual>(to_mean, r, scale, sigma);
   for (int a = 0; a < 3; ++a) {
     o_g[a] = dual(0.0), d_g[a] = dual(0.0);
     for (int b = 0; b < 3; ++b) {
@@ -276,7 +360,6 @@ dual response_of(parameters const& m, std::size_t i, Vector3d const& origin, Vec
     dual const p = o_g[a] + t * d_g[a];
     pp += dual(p * p);
   }
-  dual const sigma = 1.0 / (1.0 + exp(dual(-dual(m.opacity[i], 11, 10))));
   // |p|^n as a power of |p|^2; at its centre the response has no slope, or for degree 1 none that has a direction.
   if (pp.value() == 0) return sigma;
   return sigma * exp(dual(-4.5 * pow(dual(pp / 9.0), 0.5 * m.kernel_degree)));
@@ -306,7 +389,7 @@ direction ray_through(gart::camera const& c, int i, int j) {
 
 picture render(parameters const& m, gart::camera const& c, gart::render_options const& options, int active_degree) {
   check_degree(m, active_degree);
-  auto const gaussians = prepare(m, origin_of(c));
+  auto const gaussians = prepare(m, origin_of(c), pixels_filter(c, options.antialias));
   picture out{c.width, c.height, std::vector<pixel>(std::size_t(c.width) * c.height)};
   for (int j = 0; j < c.height; ++j)
     for (int i = 0; i < c.width; ++i) {
@@ -334,7 +417,8 @@ parameters gradients(parameters const& m, gart::camera const& c, gart::render_op
                     active = std::size_t(active_degree + 1) * (active_degree + 1);
 
   Vector3d const origin = origin_of(c);
-  auto const gaussians = prepare(m, origin);
+  pixels_filter const filter(c, options.antialias);
+  auto const gaussians = prepare(m, origin, filter);
   for (std::size_t at = 0; at < pixels; ++at) {
     Vector3d const by_color(color_gradient[3 * at], color_gradient[3 * at + 1], color_gradient[3 * at + 2]);
     double const by_transmittance = transmittance_gradient.empty() ? 0.0 : transmittance_gradient[at];
@@ -353,7 +437,7 @@ parameters gradients(parameters const& m, gart::camera const& c, gart::render_op
             g.sh[3 * (all * i + k) + channel] += by_color[channel] * weight * y[k];
       if (s.h.clamps & 8) continue;
       double const by_alpha = s.transmittance * (by_color.dot(s.color - s.behind) - by_transmittance * s.clear_behind);
-      auto const slope = (by_alpha * response_of(m, i, origin, d).derivatives()).eval();
+      auto const slope = (by_alpha * response_of(m, i, origin, d, filter).derivatives()).eval();
       for (int a = 0; a < 3; ++a) g.mean[3 * i + a] += slope[a], g.log_scale[3 * i + a] += slope[3 + a];
       for (int a = 0; a < 4; ++a) g.quaternion[4 * i + a] += slope[6 + a];
       g.opacity[i] += slope[10];

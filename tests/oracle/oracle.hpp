@@ -9,6 +9,10 @@
 //   >= alpha_min and t > near, colour = sum_i T_i alpha_i c_i + T background, T_(i+1) = T_i (1 - alpha_i), in the order
 //   (t, id), until T < transmittance_min, or until max_hits hits where that is not 0.
 //
+// With options.antialias, f pixels, a Gaussian is widened before all that: r = f sqrt(w) |mean - o|, w the solid angle
+// of a pixel towards its mean; s'^2 = s^2 + r^2; sigma' = sigma sqrt(prod s^2 e^T C^-1 e / (prod s'^2 e^T C'^-1 e)) for
+// C = R S^2 R^T and e = mean - o.
+//
 // Every decision is also asked how far it is from going the other way in float: see pixel.
 
 #include <gart/render/options.hpp>

@@ -181,6 +181,24 @@ std::vector<scene> scenes(std::uint64_t seed) {
     all.push_back(s);
   }
   {
+    // From a tenth of a pixel to several, some needles and pancakes; beside the image and behind the camera too.
+    auto const through_pixels = [&](std::string name, int degree, float antialias) {
+      builder b(rng, degree);
+      for (int i = 0; i < 160; ++i) {
+        vec3 axes = b.axes(0.01f, 0.3f);
+        if (i % 4 == 0) axes[i / 4 % 3] *= 0.03f;
+        b.add(b.inside(i % 8 == 7 ? 4.0f : 1.0f), axes, rng.uniform(-1.0f, 5.0f));
+      }
+      scene s{name, b.model, look_at(rng, {0, 0, 0}, 3.0f, 37, 23, 0.9f), options_of(rng), degree};
+      s.options.antialias = antialias;
+      return s;
+    };
+    all.push_back(through_pixels("antialiased", 3, 0.3f));
+    all.push_back(through_pixels("antialiased, a filter of two pixels", 1, 2.0f));
+    all.push_back(through_pixels("antialiased through an OPENCV lens", 3, 0.5f));
+    all.back().view.lens = {-0.12f, 0.03f, 0.004f, -0.003f};
+  }
+  {
     builder b(rng, 0);
     all.push_back({"nothing", b.model, look_at(rng, {0, 0, 0}, 2.0f, 5, 3, 1.0f), options_of(rng), 0});
     b.add({0, 0, 0}, {0.5f, 0.3f, 0.2f}, 1.0f);

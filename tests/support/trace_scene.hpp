@@ -103,8 +103,10 @@ traced<E> render_by(E& exec, Tracer& tracer, gart::gaussian_model const& model, 
   gart::buffer<float, E> color(exec, 3 * pixels), transmittance(exec, pixels), depth(exec, pixels);
   gart::buffer<gart::u32, E> hits(exec, pixels);
   auto const constant = std::as_const(scene).view();
-  records.template prepare<typename Tracer::response_type>(exec, constant, view.position, options.alpha_min);
-  tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
+  gart::antialiased<E> filter(exec);
+  auto const seen = filter.of(exec, constant, view, options.antialias);
+  records.template prepare<typename Tracer::response_type>(exec, seen, view.position, options.alpha_min);
+  tracer.prepare(exec, seen, records.view(), view, options.alpha_min, options.near);
   gart::forward<Degree>(exec, tracer, constant, view, options, active_degree,
                         {color.data(), transmittance.data(), depth.data(), hits.data()}, gart::record_none{});
   return {color.to_host(), transmittance.to_host(), depth.to_host(), hits.to_host()};
@@ -132,9 +134,11 @@ gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, ga
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
   gart::buffer<float, E> color(exec, 3 * pixels), gradient(exec, color_gradient);
   auto const constant = std::as_const(scene).view();
-  records.template prepare<typename Tracer::response_type>(exec, constant, view.position, options.alpha_min);
-  tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
-  if (!pass.prepare(exec, tracer, constant, view, options.alpha_min, options.near)) throw pass.no_room();
+  gart::antialiased<E> filter(exec);
+  auto const seen = filter.of(exec, constant, view, options.antialias);
+  records.template prepare<typename Tracer::response_type>(exec, seen, view.position, options.alpha_min);
+  tracer.prepare(exec, seen, records.view(), view, options.alpha_min, options.near);
+  if (!pass.prepare(exec, tracer, seen, view, options.alpha_min, options.near)) throw pass.no_room();
   gart::forward<Degree>(exec, tracer, constant, view, options, active_degree, pass.targets(color.data()),
                         pass.record());
   pass.template run<Degree>(exec, tracer, constant, records.view(), view, options, active_degree, color, gradient,
@@ -201,8 +205,10 @@ std::vector<std::vector<gart::hit>> hit_lists(E& exec, gart::gaussian_model cons
     gart::buffer<gart::u32, E> counts(exec, pixels), starts(exec);
     gart::buffer<gart::hit, E> list(exec);
     auto const constant = std::as_const(scene).view();
-    records.template prepare<Response>(exec, constant, view.position, options.alpha_min);
-    tracer.prepare(exec, constant, records.view(), view, options.alpha_min, options.near);
+    gart::antialiased<E> filter(exec);
+    auto const seen = filter.of(exec, constant, view, options.antialias);
+    records.template prepare<Response>(exec, seen, view.position, options.alpha_min);
+    tracer.prepare(exec, seen, records.view(), view, options.alpha_min, options.near);
     gart::pixel_order const order{view.width, view.height};
     list_program program{view, order, options.transmittance_min, options.max_hits, counts.data(), nullptr, nullptr};
     tracer.trace(exec, "count", order.launch_size(), program);

@@ -13,6 +13,7 @@
 #include <gart/backward/packet_gather.hpp>
 #include <gart/backward/scatter.hpp>
 #include <gart/backward/strategies.hpp>
+#include <gart/render/antialiased.hpp>
 #include <gart/render/forward.hpp>
 #include <gart/tiles/tile_map.hpp>
 
@@ -22,16 +23,30 @@ namespace gart {
 
 namespace backward_kernels {
 
+// Filter: no_filter, or the pixel_filter that the records were made through; `scene` is the stored one.
+struct no_filter {};
+
+template <class Filter>
 struct finish {
   gaussians_view<float const> scene;
   span<ray_gaussian const> records;
   span<float const> moments;
   gaussians_view<float> gradients;
+  Filter filter;
+  bool add = false;
   GART_KERNEL void operator()(index_t i) const {
     ray_gaussian const g = records[i];
     geometry_gradient out{vec3(0.0f), vec3(0.0f), {0, 0, 0, 0}, 0};
-    if (g.cutoff >= 0)
-      out = from_moments(moments.data() + std::size_t{moment_stride} * i, load_parameters(scene, i), g);
+    if (g.cutoff >= 0) out = gradient_of(moments.data() + std::size_t{moment_stride} * i, load_parameters(scene, i), g);
+    if (add) {
+      for (int k = 0; k < 3; ++k) {
+        out.mean[k] += gradients.mean[std::size_t{3} * i + k];
+        out.log_scale[k] += gradients.log_scale[std::size_t{3} * i + k];
+      }
+      float const* q = gradients.quaternion + std::size_t{4} * i;
+      out.rotation.w += q[0], out.rotation.x += q[1], out.rotation.y += q[2], out.rotation.z += q[3];
+      out.opacity += gradients.opacity[i];
+    }
     for (int k = 0; k < 3; ++k) {
       gradients.mean[std::size_t{3} * i + k] = out.mean[k];
       gradients.log_scale[std::size_t{3} * i + k] = out.log_scale[k];
@@ -39,6 +54,20 @@ struct finish {
     float* q = gradients.quaternion + std::size_t{4} * i;
     q[0] = out.rotation.w, q[1] = out.rotation.x, q[2] = out.rotation.y, q[3] = out.rotation.z;
     gradients.opacity[i] = out.opacity;
+  }
+
+ private:
+  GART_HD GART_INLINE geometry_gradient gradient_of(float const* m, gaussian_parameters const& p,
+                                                    ray_gaussian const& g) const {
+    if constexpr (std::is_same_v<Filter, no_filter>) {
+      return from_moments(m, p, g);
+    } else {
+      vec3 const mean = filter.from_camera(p);
+      filter_at const at = filter.at(mean);
+      gaussian_parameters w = widened(p, mean, at.sigma);
+      if (filter.plain) w.opacity = p.opacity;
+      return pull_back_widened(from_moments(m, w, g), m[0], p, mean, at, filter.plain);
+    }
   }
 };
 
@@ -116,20 +145,23 @@ class backward {
   }
 
   // `color` and `color_gradient` are [H][W][3]; `gaussians_in_frame` and the tracer stand as the forward pass used
-  // them.
+  // them. `scene` is the stored one, also where these were made from what a filter shows of it
+  // (render/antialiased.hpp).
   template <int ShDegree, class Tracer>
   void run(E& exec, Tracer& tracer, gaussians_view<float const> scene, span<ray_gaussian const> gaussians_in_frame,
            camera const& view, render_options const& options, int active_degree, span<float const> color,
-           span<float const> color_gradient, gaussians<E>& gradients) {
+           span<float const> color_gradient, gaussians<E>& gradients, span<float const> error = {}, bool add = false) {
     using response = typename Tracer::response_type;
     stage_scope stage(exec, "backward");
     moments_.resize(std::size_t{moment_stride} * scene.count);
     // The ordered sums write every Gaussian themselves.
     if constexpr (!ordered || Strategy::scatter::any) moments_.zero();
-    if constexpr (!ordered) gradients.sh.zero();
+    if constexpr (!ordered)
+      if (!add) gradients.sh.zero();
     if constexpr (records) {
       if constexpr (ordered) rows_.resize(prints_->pairs() * pair_row<ShDegree>::quads);
-      gather_terms<ShDegree, response>(exec, gaussians_in_frame, view, active_degree, color, color_gradient, gradients);
+      gather_terms<ShDegree, response>(exec, gaussians_in_frame, view, active_degree, color, color_gradient, error,
+                                       gradients);
       if constexpr (ordered)
         parallel_for(
             exec, "backward/sum", scene.count * pair_row<ShDegree>::quads,
@@ -147,13 +179,23 @@ class backward {
                                                                                        gaussians_in_frame.data(),
                                                                                        color.data(),
                                                                                        color_gradient.data(),
+                                                                                       error.data(),
                                                                                        gradients.sh.data(),
                                                                                        moments_.data()};
       tracer.trace(exec, "backward/scatter", order.launch_size(), program);
     }
-    parallel_for(exec, "backward/finish", scene.count,
-                 backward_kernels::finish{scene, gaussians_in_frame, moments_, gradients.view()});
+    auto const finish = [&]<class Filter>(Filter const& filter) {
+      parallel_for(exec, "backward/finish", scene.count,
+                   backward_kernels::finish<Filter>{scene, gaussians_in_frame, moments_, gradients.view(), filter, add});
+    };
+    if (options.antialias > 0)
+      finish(pixel_filter(view, options.antialias));
+    else
+      finish(backward_kernels::no_filter{});
   }
+
+  // Of the last run(): [N][moment_stride].
+  span<float const> moments() const { return moments_; }
 
   std::size_t lt_bytes() const { return records ? slots_.size() * sizeof(entry) : 0; }
 
@@ -180,7 +222,8 @@ class backward {
 
   template <int ShDegree, class Response>
   void gather_terms(E& exec, span<ray_gaussian const> gaussians_in_frame, camera const& view, int active_degree,
-                    span<float const> image, span<float const> image_gradient, gaussians<E>& gradients) {
+                    span<float const> image, span<float const> image_gradient, span<float const> error,
+                    gaussians<E>& gradients) {
     constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
     using by_lane = gather_kernel<ShDegree, Response, typename Strategy::gather, entry, TileSize, sums, validity, E>;
     auto const gather = [&]<class Kernel>(index_t lanes, std::type_identity<Kernel>) {
@@ -194,6 +237,7 @@ class backward {
                           active_degree,
                           image.data(),
                           image_gradient.data(),
+                          error.data(),
                           gradients.sh.data(),
                           moments_.data(),
                           prints_->pair_offsets().data(),

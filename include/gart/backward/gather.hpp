@@ -63,6 +63,7 @@ struct gather_kernel {
   int active_degree = ShDegree;
   float const* color = nullptr;           // [H][W][3]
   float const* color_gradient = nullptr;  // [H][W][3]
+  float const* error = nullptr;           // [H][W], or null: none is attributed
   float* sh_gradient = nullptr;           // atomic: [N][K][3]
   float* moments_out = nullptr;           // atomic: [N][moment_stride]
   u64 const* pair_offsets = nullptr;      // ordered: first row of each primitive
@@ -134,7 +135,7 @@ struct gather_kernel {
     vec3 const c(color[a], color[a + 1], color[a + 2]);
     vec3 const g(color_gradient[a], color_gradient[a + 1], color_gradient[a + 2]);
     out.direction_total = {{d.x, d.y, d.z, c.x * g.x + c.y * g.y + c.z * g.z}};
-    out.gradient = {{g.x, g.y, g.z, 0}};
+    out.gradient = {{g.x, g.y, g.z, error ? error[a / 3] : 0.0f}};
     if constexpr (recomputed) {
       last_hit const end = last[a / 3];
       out.last = {{end.t, bits_to_float(end.place), 0, 0}};
@@ -235,7 +236,8 @@ struct gather_kernel {
     moments const m =
         hit_moments<Response>(data.gaussian, r, alpha_gradient(opaque_g, at.direction_total.v[3], alpha), hit);
     GART_UNROLL
-    for (int i = 0; i < moment_count; ++i) moment_sum[i] += m.v[i];
+    for (int i = 0; i < error_place; ++i) moment_sum[i] += m.v[i];
+    moment_sum[error_place] += hit ? entry.weight() * g.v[3] : 0.0f;
   }
 
   GART_HD GART_INLINE quad* row_of(pixel_box const& box, pixel_box const& area, u32 id) const {

@@ -24,7 +24,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
   struct packet_data {
     int x, y;  // in the tile
     vec3_of<lanes> direction, gradient;
-    lanes total, last_t;  // colour . gradient; the ray's last hit
+    lanes total, error, last_t;  // colour . gradient; of the pixel; the ray's last hit
     lane_words last_place;
     lanes bands_of[lane_count][band_groups];  // the SH basis, a pixel after another
   };
@@ -69,7 +69,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
         total += inside ? gather.color[3 * a + k] * g : 0.0f;
         out.gradient[k].v[l] = g;
       }
-      out.total.v[l] = total;
+      out.total.v[l] = total, out.error.v[l] = inside && gather.error ? gather.error[a] : 0.0f;
       last_hit const end = recomputed && inside ? gather.last[a] : last_hit{};
       out.last_t.v[l] = end.t, out.last_place[l] = end.place;
     }
@@ -142,7 +142,8 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
         moments_of<lanes> const m =
             hit_moments<Response>(g, r, alpha_gradient(dot(e.opaque, at.gradient), at.total, alpha), hit);
 #pragma GCC unroll 16
-        for (int k = 0; k < moment_count; ++k) moment_sum[k] += m.v[k];
+        for (int k = 0; k < error_place; ++k) moment_sum[k] += m.v[k];
+        moment_sum[error_place] += select(hit, e.weight * at.error, 0.0f);
       }
       if constexpr (Terms::color) {
         alignas(lanes) float cg[3][lane_count];

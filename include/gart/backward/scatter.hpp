@@ -21,6 +21,7 @@ struct scatter_program {
     vec3 direction;
     sh_basis<ShDegree> basis;
     ray_gradient gradient;
+    float error;
     u32 left;  // hits until the cap; from 0, no cap, it counts down past it
   };
 
@@ -33,6 +34,7 @@ struct scatter_program {
   ray_gaussian const* records = nullptr;
   float const* color = nullptr;           // [H][W][3], as the forward pass left it, background in it
   float const* color_gradient = nullptr;  // [H][W][3]
+  float const* error = nullptr;           // [H][W], or null
   float* sh_gradient = nullptr;           // [N][K][3]
   float* moments_out = nullptr;           // [N][moment_stride]
 
@@ -46,6 +48,7 @@ struct scatter_program {
     float const* c = color + 3 * order.address(at);
     float const* g = color_gradient + 3 * order.address(at);
     s.gradient.g = {g[0], g[1], g[2]};
+    s.error = error ? error[order.address(at)] : 0.0f;
     s.left = max_hits;
     s.gradient.color_g = c[0] * g[0] + c[1] * g[1] + c[2] * g[2];
     return s;
@@ -72,7 +75,8 @@ struct scatter_program {
     }
     if constexpr (Terms::geometry) {
       ray_gaussian const g = records[h.id];
-      moments const m = hit_moments<Response>(g, evaluate<Response>(g, primary_ray{s.direction}), alpha_gradient);
+      moments m = hit_moments<Response>(g, evaluate<Response>(g, primary_ray{s.direction}), alpha_gradient);
+      m.v[error_place] = weight * s.error;
       E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * h.id, m.v, moment_count);
     }
     return s.gradient.transmittance >= transmittance_min && --s.left != 0;

@@ -59,6 +59,25 @@ struct difference_kernel {
   }
 };
 
+struct error_map_kernel {
+  float const* image;
+  truth_view truth;
+  float* error;
+  int mode;
+  GART_HD void operator()(index_t pixel) const {
+    u8 const* const t = truth.pixels + std::size_t{pixel} * truth.channels;
+    bool const used = !truth.mask || truth.mask[pixel] != 0;
+    float const alpha = truth.channels == 4 ? static_cast<float>(t[3]) * (1.0f / 255.0f) : 1.0f;
+    float sum = 0;
+    for (int c = 0; c < 3; ++c) {
+      float const y = fma(static_cast<float>(t[c]) * (1.0f / 255.0f), alpha, truth.background[c] * (1.0f - alpha));
+      float const d = image[std::size_t{3} * pixel + c] - y;
+      sum += mode == 1 ? d * d : fabsf(d);
+    }
+    error[pixel] = used ? sum * (1.0f / 3.0f) : 0.0f;
+  }
+};
+
 // Tiles of one channel, with a halo of the window's radius. A lane of a device takes one pixel at a time; a host's
 // takes 16, which its compiler puts in vector registers, and its tiles are large: long runs of memory, little halo.
 template <execution E>

@@ -19,8 +19,11 @@
 
 namespace gart {
 
-// The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy, and two of padding (16-byte words).
-inline constexpr int moment_count = 10;
+// The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy; then the error that is seen through the Gaussian,
+// the sum over its hits of w times the pixel's error, by which densification finds where more are needed; and one of
+// padding (16-byte words).
+inline constexpr int moment_count = 11;
+inline constexpr int error_place = 10;
 inline constexpr int moment_stride = 12;
 
 template <class F>
@@ -60,7 +63,7 @@ GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, resp
   F const raw = unclamped_alpha<Response>(gaussian, r.d2), zero = 0.0f;
   F const a = select(both(hit, raw < F(alpha_max)), raw * alpha_gradient, zero);
   F const b = select(hit, a * Response::slope(r.d2), zero);
-  vec3_of<F> const offset = orthogonal_offset(r);
+  vec3_of<F> const offset = offset_of(r);
   vec3_of<F> const p = {select(hit, offset.x, zero), select(hit, offset.y, zero), select(hit, offset.z, zero)};
   vec3_of<F> const bp = {b * p.x, b * p.y, b * p.z};
   return {{a, bp.x, bp.y, bp.z, bp.x * p.x, bp.y * p.y, bp.z * p.z, bp.y * p.z, bp.x * p.z, bp.x * p.y, 0.0f, 0.0f}};

@@ -6,6 +6,12 @@
 // hits where sigma * rho >= alpha_min, that is where |p|^2 is at most the cutoff, 2 ln(sigma / alpha_min) for a
 // Gaussian, and t > near.
 //
+// The offset is not computed from t. A rounding of t moves the point along the ray by 6e-8 of |o_g|, the distance over
+// the thinnest axis, which may be 1e8 and more. With c = o_g x d_g, which is the same from any point of the ray,
+//   |p|^2 = |c|^2 / |d_g|^2,   p = d_g x c / |d_g|^2,
+// and each product of c is off by a rounding of the distance over the axes that it is of: in the world the point stays
+// within a few roundings of the distance, however thin the Gaussian, as the ray itself does.
+//
 // Everything is relative to a frame, a point of the world held in double (the camera's centre for primary rays): mu is
 // subtracted from it in double, so that scenes far from the origin lose nothing. This file is the only place that
 // decides what is a hit, at which t and with which alpha; its arithmetic is fixed (arith.hpp).
@@ -68,15 +74,19 @@ GART_HD GART_INLINE vec3 relative_mean(vec3 const& mean, vec3d const& frame) {
           static_cast<float>(mean.z - frame.z)};
 }
 
+// False where the parameters are not finite or make no ellipsoid in float.
+GART_HD GART_INLINE bool is_gaussian(gaussian_parameters const& g) {
+  return is_finite(g.mean.x) && is_finite(g.mean.y) && is_finite(g.mean.z) && is_finite(g.opacity) &&
+         is_finite(norm2(g.rotation)) && norm2(g.rotation) > quaternion_norm2_min && g.log_scale.x > -40.0f &&
+         g.log_scale.x < 40.0f && g.log_scale.y > -40.0f && g.log_scale.y < 40.0f && g.log_scale.z > -40.0f &&
+         g.log_scale.z < 40.0f;
+}
+
 // Largest |p|^2 of a hit; negative where the Gaussian is never hit (too weak, or its parameters are not finite).
 template <class Response = generalized_gaussian<>>
 GART_HD GART_INLINE float hit_cutoff(gaussian_parameters const& g, float alpha_min) {
   float const sigma = sigmoid(g.opacity);
-  bool const valid = is_finite(g.mean.x) && is_finite(g.mean.y) && is_finite(g.mean.z) && is_finite(g.opacity) &&
-                     is_finite(norm2(g.rotation)) && norm2(g.rotation) > quaternion_norm2_min &&
-                     g.log_scale.x > -40.0f && g.log_scale.x < 40.0f && g.log_scale.y > -40.0f &&
-                     g.log_scale.y < 40.0f && g.log_scale.z > -40.0f && g.log_scale.z < 40.0f;
-  if (!valid || !(sigma >= alpha_min)) return -1.0f;
+  if (!is_gaussian(g) || !(sigma >= alpha_min)) return -1.0f;
   return Response::cutoff(divide(sigma, alpha_min));
 }
 
@@ -95,12 +105,15 @@ GART_HD GART_INLINE ray_gaussian prepare(gaussian_parameters const& g, vec3d con
   }
   mat3 const rotation = to_matrix(g.rotation);
   vec3 const to_frame = -relative_mean(g.mean, frame);
+  float largest = 0;  // that o_g.d_g may be
   for (int k = 0; k < 3; ++k) {
     float const inverse = exponential(-g.log_scale[k]);
     vec3 const axis = rotation[k];
     float const along = fma(axis.x, to_frame.x, fma(axis.y, to_frame.y, mul(axis.z, to_frame.z)));
     out.m[k] = {mul(axis.x, inverse), mul(axis.y, inverse), mul(axis.z, inverse), mul(along, inverse)};
+    largest = fma(fabsf(out.m[k].o), mul(2.0f, inverse), largest);  // |d| is 1 but for rounding
   }
+  if (!is_finite(largest)) out.cutoff = -1;  // t would not be
   return out;
 }
 
@@ -109,9 +122,8 @@ template <class F>
 struct response_of {
   F t;           // distance of the largest response along the ray
   F d2;          // |p|^2 there
-  vec3_of<F> p;  // offset from the centre, in standard deviations along the Gaussian's axes
+  vec3_of<F> c;  // o_g x d_g / |d_g|^2
   vec3_of<F> d;  // d_g
-  F inverse;     // 1 / |d_g|^2
 };
 using response = response_of<float>;
 
@@ -123,11 +135,16 @@ GART_HD GART_INLINE float gaussian_origin(ray_gaussian::row const& m, ray const&
   return fma(m.x, r.origin.x, fma(m.y, r.origin.y, fma(m.z, r.origin.z, m.o)));
 }
 
+template <class F>
+GART_HD GART_INLINE vec3_of<F> cross_product(vec3_of<F> const& a, vec3_of<F> const& b) {
+  return {fma(a.y, b.z, -mul(a.z, b.y)), fma(a.z, b.x, -mul(a.x, b.z)), fma(a.x, b.y, -mul(a.y, b.x))};
+}
+
 // A ray in the Gaussian's own space, before the division.
 template <class F>
 struct approach_of {
-  vec3_of<F> o, d;
-  F od, dd;
+  vec3_of<F> c, d;
+  F od, cc, dd;
 };
 using approach = approach_of<float>;
 
@@ -135,12 +152,17 @@ template <class Ray>
 GART_HD GART_INLINE auto approach_to(ray_gaussian const& g, Ray const& r) {
   using F = std::remove_cvref_t<decltype(r.direction.x)>;
   approach_of<F> a;
+  vec3_of<F> o;
   GART_UNROLL
   for (int k = 0; k < 3; ++k) {
-    a.o[k] = gaussian_origin(g.m[k], r);
+    o[k] = gaussian_origin(g.m[k], r);
     a.d[k] = fma(F(g.m[k].x), r.direction.x, fma(F(g.m[k].y), r.direction.y, mul(F(g.m[k].z), r.direction.z)));
   }
-  a.od = fma(a.o.x, a.d.x, fma(a.o.y, a.d.y, mul(a.o.z, a.d.z)));
+  a.c = cross_product(o, a.d);
+  a.od = fma(o.x, a.d.x, fma(o.y, a.d.y, mul(o.z, a.d.z)));
+  a.cc = fma(a.c.x, a.c.x, fma(a.c.y, a.c.y, mul(a.c.z, a.c.z)));
+  // No hit where o_g.d_g is infinite; for primary rays prepare sees to that.
+  if constexpr (std::is_same_v<Ray, ray>) a.cc = fma(0.0f, a.od, a.cc);
   a.dd = fma(a.d.x, a.d.x, fma(a.d.y, a.d.y, mul(a.d.z, a.d.z)));
   return a;
 }
@@ -149,11 +171,10 @@ GART_HD GART_INLINE auto approach_to(ray_gaussian const& g, Ray const& r) {
 template <class F>
 GART_HD GART_INLINE response_of<F> response_of_approach(approach_of<F> const& a, F inverse) {
   response_of<F> out;
+  out.c = {mul(a.c.x, inverse), mul(a.c.y, inverse), mul(a.c.z, inverse)};
   out.d = a.d;
-  out.inverse = inverse;
-  out.t = mul(-a.od, out.inverse);
-  out.p = {fma(out.t, a.d.x, a.o.x), fma(out.t, a.d.y, a.o.y), fma(out.t, a.d.z, a.o.z)};
-  out.d2 = fma(out.p.x, out.p.x, fma(out.p.y, out.p.y, mul(out.p.z, out.p.z)));
+  out.t = mul(-a.od, inverse);
+  out.d2 = mul(a.cc, inverse);
   return out;
 }
 
@@ -175,12 +196,11 @@ GART_HD GART_INLINE void evaluate_all(response (&out)[N], F&& of) {
   for (int i = 0; i < N; ++i) out[i] = response_of_approach(a[i], inverse[i]);
 }
 
-// p is orthogonal to d_g, but the rounding of t leaves a part along it. It does not show in d2, where it enters
-// squared; in the gradients of mean and rotation the thin axis of a pancake magnifies it. One step takes it out.
+// p, in standard deviations along the Gaussian's axes. Along the thin axis of a pancake it is all but zero, and M
+// magnifies it in the gradients of mean and rotation: the product has its digits, o_g + t d_g has none.
 template <class F>
-GART_HD GART_INLINE vec3_of<F> orthogonal_offset(response_of<F> const& r) {
-  F const along = -(r.p.x * r.d.x + r.p.y * r.d.y + r.p.z * r.d.z) * r.inverse;
-  return {r.p.x + along * r.d.x, r.p.y + along * r.d.y, r.p.z + along * r.d.z};
+GART_HD GART_INLINE vec3_of<F> offset_of(response_of<F> const& r) {
+  return cross_product(r.d, r.c);
 }
 
 // NaN compares false: what cannot be evaluated is no hit.

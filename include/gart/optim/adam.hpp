@@ -80,6 +80,7 @@ struct adam_kernel {
   index_t group_tiles, rows;
   adam_rule rule;  // the rates carry 1 / (1 - b1^t)
   u64* skipped;
+  float size_share = 0;
 
   template <class Team>
   GART_HD void operator()(Team const& team) const {
@@ -103,7 +104,13 @@ struct adam_kernel {
 
   GART_HD void update(adam_group const& group, std::size_t i, index_t column) const {
     if (column >= group.active) return;
-    float const g = group.gradient[i], rate = column < group.head ? group.rate_head : group.rate_rest;
+    float const g = group.gradient[i];
+    float rate = column < group.head ? group.rate_head : group.rate_rest;
+    if (size_share > 0 && group.parameter == groups[1].parameter) {
+      float const* const s = groups[2].parameter + i / 3 * 3;
+      float const lo = fminf(s[0], fminf(s[1], s[2])), hi = fmaxf(s[0], fmaxf(s[1], s[2]));
+      rate = size_share * expf(s[0] + s[1] + s[2] - lo - hi);
+    }
     auto const to = rule.moved<float>({group.parameter[i], group.first[i], group.second[i]}, g, rate);
     if (!is_finite(g) || !is_finite(to.second) || !is_finite(to.parameter)) {
       if (skipped) E::atomic_add(skipped, u64{1});
@@ -191,6 +198,7 @@ void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optim
     k.group_tiles = p.count / k.rows_per_tile + (p.count % k.rows_per_tile != 0);
     k.rule = adam_rule(options, step);
     k.skipped = skipped.data();
+    k.size_share = rate(rates.size_share);
     parallel_for(exec, "adam", tile_range{5 * k.group_tiles, 256}, k);
   };
   if (options.seen_only)

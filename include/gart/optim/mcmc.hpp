@@ -24,6 +24,7 @@
 #include <gart/optim/random.hpp>
 #include <gart/optim/rows.hpp>
 
+#include <gart/train/try.hpp>
 #include <algorithm>
 #include <cmath>
 
@@ -126,10 +127,19 @@ struct mcmc_copy_body {
   u32 const* source;
   u32 const* target;
   index_t settled;  // columns that keep their second moment
+  int mode;
 
   GART_HD void operator()(index_t draw, index_t column) const {
     index_t const from = source[draw], to = target[draw];
     row_element(model, to, column) = row_element(model, from, column);
+    if (mode == 1) {
+      row_element(first, to, column) = row_element(second, to, column) = 0;
+      return;
+    }
+    if (mode == 2) {
+      row_element(first, from, column) = row_element(second, from, column) = 0;
+      return;
+    }
     row_element(first, to, column) = row_element(first, from, column) = 0;
     if (column < settled)
       row_element(second, to, column) = row_element(second, from, column);
@@ -166,6 +176,20 @@ struct mcmc_noise_kernel {
       finite = finite && is_finite(moved[c]);
     }
     for (int c = 0; c < 3 && finite; ++c) model.mean[std::size_t{3} * i + c] = moved[c];
+  }
+};
+
+struct seen_penalty_kernel {
+  gaussians_view<float const> model;
+  gaussians_view<float> gradient;
+  float opacity_share, scale_share;
+  int seen;
+  GART_HD void operator()(index_t i) const {
+    std::size_t const c0 = 3 * std::size_t{i};
+    if (seen && gradient.mean[c0] == 0 && gradient.mean[c0 + 1] == 0 && gradient.mean[c0 + 2] == 0) return;
+    float const o = sigmoid(model.opacity[i]);
+    gradient.opacity[i] += opacity_share * o * (1.0f - o);
+    for (std::size_t c = c0; c < c0 + 3; ++c) gradient.log_scale[c] += scale_share * expf(model.log_scale[c]);
   }
 };
 
@@ -218,6 +242,12 @@ class mcmc {
   void add_penalties(gaussians<E> const& model, gaussians<E>& gradient) {
     if (model.size() == 0) return;
     float const n = static_cast<float>(model.size());
+    if (tried("mm", 0) != 0) {
+      parallel_for(*exec_, "penalties", model.size(),
+                   detail::seen_penalty_kernel{model.view(), gradient.view(), options_.opacity_penalty * tried("op", 1) / n,
+                                               options_.scale_penalty * tried("sp", 1) / (3 * n), static_cast<int>(tried("seen", 1))});
+      return;
+    }
     parallel_for(*exec_, "mcmc_penalties", model.size(),
                  detail::mcmc_penalty_kernel{model.view(), gradient.view(), options_.opacity_penalty / n,
                                              options_.scale_penalty / (3 * n)});
@@ -300,7 +330,8 @@ class mcmc {
     for_each_element(
         *exec_, "mcmc_copy", draws, model.sh_degree(),
         detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(), target_.data(),
-                               iterations_ >= options_.settle_from ? geometry_columns : 0});
+                               iterations_ >= options_.settle_from ? geometry_columns : 0,
+                               tried("mm", 0) == 0 ? 0 : random.use == random_use::growth ? 1 : 2});
   }
 
   E* exec_;

@@ -9,6 +9,7 @@ namespace gart {
 struct learning_rates {
   float mean = 1.6e-4f;        // times the scene's extent; decays exponentially to mean_final over the run
   float mean_final = 1.6e-6f;
+  float size_share = 0;
   float log_scale = 5e-3f;
   float quaternion = 1e-3f;
   float opacity = 5e-2f;

@@ -8,6 +8,8 @@
 //   a hit where alpha >= alpha_min and t > near,
 //   colour = sum_i T_i alpha_i c_i + T background, T_(i+1) = T_i (1 - alpha_i), hits in the order (t, id), until
 //   T < transmittance_min (the hit that crosses counts) or max_hits of them.
+// With options.antialias, the standard deviation of the pixels' filter, a Gaussian is first widened as in
+// math/widened.hpp, by the definition there.
 // Backwards, with g = dL/dcolour and B_i what is seen behind hit i with T = 1,
 //   dL/dalpha_i = T_i g.(c_i - B_i),
 // and a clamp that holds (alpha at 0.99, a colour at 0) passes nothing. Gaussians that the renderer culls (parameters

@@ -4,6 +4,7 @@
 //   frame_records<E> records(exec);
 //   bvh_tracer<E> tracer(exec);
 //   records.prepare(exec, scene, view.position, options.alpha_min);
+//   (for options.antialias with what an antialiased<E> shows of the scene, render/antialiased.hpp, here and below)
 //   tracer.prepare(exec, scene, records.view(), view, options.alpha_min, options.near);
 //   forward<3>(exec, tracer, scene, view, options, 3, targets, record_none{});
 //

@@ -16,9 +16,13 @@ struct render_options {
   float transmittance_min = 1e-4f;  // a ray ends after the hit that brings T below this
   float near = 0.01f;               // hits lie at t > near, world units along the ray
   u32 max_hits = 0;                 // a ray ends after so many hits composited; 0: no cap
+  float antialias = 0;  // standard deviation of the pixels' filter, in pixels (scene/pixel_filter.hpp); 0: none
   int rebuild_every = 1;            // the BVH tracer builds its tree every so many views, else refits it: exact
   vec3 background{0.0f};
 };
+
+// The filter of models that are antialiased: that of a square pixel's own width, near enough.
+inline constexpr float usual_antialias = 0.3f;
 
 // Below this exp has no digits left, and a hit's alpha would be 0.
 inline constexpr float least_alpha_min = 1e-30f;
@@ -32,6 +36,7 @@ inline void require_options(render_options const& o) {
   if (!(o.transmittance_min >= 0 && o.transmittance_min < 1))
     refuse("transmittance_min must be at least 0 and less than 1", o.transmittance_min);
   if (!(o.near > 0 && is_finite(o.near))) refuse("near must be positive and finite", o.near);
+  if (!(o.antialias >= 0 && o.antialias <= 100)) refuse("antialias must lie between 0 and 100 pixels", o.antialias);
   for (int k = 0; k < 3; ++k)
     if (!is_finite(o.background[k])) refuse("the background must be finite", o.background[k]);
 }

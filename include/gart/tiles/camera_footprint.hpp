@@ -5,7 +5,7 @@
 // curved edge can bulge between samples.
 
 #include <gart/math/footprint.hpp>
-#include <gart/scene/camera.hpp>
+#include <gart/scene/seen_slopes.hpp>
 
 namespace gart {
 
@@ -19,28 +19,12 @@ class camera_footprint {
     mat3d world_to_camera(1.0);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) world_to_camera[i][j] = c.rotation[j][i];
-    detail::interval u, w;
-    double least_cosine = 1;
-    constexpr int steps = 64;
-    // A loop: unrolled, a lens would take the registers of cameras without one.
-    GART_NO_UNROLL
-    for (int k = 0; k <= steps; ++k) {
-      double const s = static_cast<double>(k) / steps;
-      double const border[4][2] = {
-          {s * c.width, 0}, {s * c.width, 1.0 * c.height}, {0, s * c.height}, {1.0 * c.width, s * c.height}};
-      for (auto const& b : border) {
-        vec2 p(static_cast<float>((b[0] - c.cx) / c.fx), static_cast<float>((b[1] - c.cy) / c.fy));
-        if (c.lens.any()) p = undistort(c.lens, p);
-        u.add(p.x), w.add(p.y);
-        double const cosine = 1 / std::sqrt(1.0 + double{p.x} * p.x + double{p.y} * p.y);
-        least_cosine = cosine < least_cosine ? cosine : least_cosine;
-      }
-    }
+    seen_slopes const seen = slopes_seen(c);
     // The border between samples may bulge a little further.
     double const margin = c.lens.any() ? 0.02 : 0.0;
-    double const mu = margin * (u.hi - u.lo), mw = margin * (w.hi - w.lo);
-    u_ = {u.lo - mu, u.hi + mu}, w_ = {w.lo - mw, w.hi + mw};
-    view_ = {world_to_camera, fx_, fy_, cx_, cy_, c.width, c.height, near * least_cosine * (1 - margin)};
+    double const mu = margin * (seen.x1 - seen.x0), mw = margin * (seen.y1 - seen.y0);
+    u_ = {seen.x0 - mu, seen.x1 + mu}, w_ = {seen.y0 - mw, seen.y1 + mw};
+    view_ = {world_to_camera, fx_, fy_, cx_, cy_, c.width, c.height, near * seen.least_cosine * (1 - margin)};
   }
 
   template <class Response = generalized_gaussian<>>

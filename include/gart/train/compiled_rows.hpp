@@ -58,7 +58,8 @@ class compiled_renderer final : public renderer {
   static constexpr int sh_degree = Traits::sh_degree;
 
   compiled_renderer()
-      : records_(exec_),
+      : filter_(exec_),
+        records_(exec_),
         tracer_(exec_),
         pass_(exec_),
         scene_(exec_, 0, sh_degree),
@@ -80,10 +81,11 @@ class compiled_renderer final : public renderer {
     gradients_.resize_keep(scene_.size());
     auto const scene = std::as_const(scene_).view();
     stage_scope stage(exec_, "gradients");
-    records_.template prepare<typename Traits::response>(exec_, scene, view.position, options.alpha_min);
+    auto const seen = filter_.of(exec_, scene, view, options.antialias);
+    records_.template prepare<typename Traits::response>(exec_, seen, view.position, options.alpha_min);
     configure(tracer_, options);
-    tracer_.prepare(exec_, scene, records_.view(), view, options.alpha_min, options.near);
-    if (!pass_.prepare(exec_, tracer_, scene, view, options.alpha_min, options.near)) throw pass_.no_room();
+    tracer_.prepare(exec_, seen, records_.view(), view, options.alpha_min, options.near);
+    if (!pass_.prepare(exec_, tracer_, seen, view, options.alpha_min, options.near)) throw pass_.no_room();
     forward<sh_degree>(exec_, tracer_, scene, view, options, sh_degree, pass_.targets(color_.data()), pass_.record());
     pass_.template run<sh_degree>(exec_, tracer_, scene, records_.view(), view, options, sh_degree, color_,
                                   color_gradient_, gradients_);
@@ -99,6 +101,7 @@ class compiled_renderer final : public renderer {
 
  private:
   E exec_;
+  antialiased<E> filter_;
   frame_records<E> records_;
   Tracer tracer_;
   backward<E, Strategy, tile_size_of<Tracer>> pass_;

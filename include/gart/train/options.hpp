@@ -10,7 +10,7 @@
 
 namespace gart {
 
-enum class densify_kind { none, mcmc, adc };
+enum class densify_kind { none, mcmc, adc, error };
 enum class background_kind { black, white, random };
 
 struct train_options {

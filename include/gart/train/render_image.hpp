@@ -1,6 +1,7 @@
 #pragma once
 // One image to host memory, with everything a pixel can tell.
 
+#include <gart/render/antialiased.hpp>
 #include <gart/render/forward.hpp>
 #include <gart/train/session.hpp>
 
@@ -12,9 +13,11 @@ rendered render_image(E& exec, Tracer& tracer, frame_records<E>& records, gaussi
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
   buffer<float, E> color(exec, 3 * pixels), transmittance(exec, pixels), depth(exec, pixels);
   buffer<u32, E> hits(exec, pixels);
-  records.template prepare<typename Tracer::response_type>(exec, scene, view.position, options.alpha_min);
+  antialiased<E> filter(exec);
+  auto const seen = filter.of(exec, scene, view, options.antialias);
+  records.template prepare<typename Tracer::response_type>(exec, seen, view.position, options.alpha_min);
   configure(tracer, options);
-  tracer.prepare(exec, scene, records.view(), view, options.alpha_min, options.near);
+  tracer.prepare(exec, seen, records.view(), view, options.alpha_min, options.near);
   forward<ShDegree>(exec, tracer, scene, view, options, ShDegree,
                     {color.data(), transmittance.data(), depth.data(), hits.data()}, record_none{});
   rendered out;

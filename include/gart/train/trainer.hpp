@@ -15,6 +15,7 @@
 #include <gart/loss/image_loss.hpp>
 #include <gart/optim/adam.hpp>
 #include <gart/optim/adc.hpp>
+#include <gart/optim/error_growth.hpp>
 #include <gart/optim/finite.hpp>
 #include <gart/optim/mcmc.hpp>
 #include <gart/optim/schedule.hpp>
@@ -82,10 +83,24 @@ class trainer {
   using last_strategy = typename fallback_of<fallback_strategy>::type;
 
   template <class Pass, class Loss>
-  void differentiate(Pass& pass, Loss&& loss, std::size_t view, render_options const& render,
+  void differentiate(Pass& pass, Loss&& loss, std::size_t view, camera const& seen, render_options const& render,
                      learning_rates const& rates, int degree);
-  void update(dataset_view const& view, learning_rates const& rates, int degree);
+  void update(camera const& view, learning_rates const& rates, int degree, span<float const> moments);
   vec3 background_of(int step) const;
+  int period(int s) const {
+    float const p = static_cast<float>(s) / static_cast<float>(options_.iterations);
+    return p >= tried("mu20", 2) ? 20 : p >= tried("mu5", 2) ? 5 : p >= tried("mu2", 2) ? 2 : 1;
+  }
+  bool use_error() const { return options_.densify == densify_kind::error; }
+  int p_level() const {
+    float const p = static_cast<float>(step_) / static_cast<float>(options_.iterations);
+    return p < tried("res8", 0) ? 8 : p < tried("res4", 0) ? 4 : p < tried("res2", 0) ? 2 : 1;
+  }
+  static camera resized_by(camera c, int factor) {
+    float const f = static_cast<float>(factor);
+    c.width /= factor, c.height /= factor, c.fx /= f, c.fy /= f, c.cx /= f, c.cy /= f;
+    return c;
+  }
   static mcmc_options mcmc_options_of(train_options const& options) {
     mcmc_options m = options.mcmc;
     m.kernel_degree = Traits::response::degree;
@@ -103,6 +118,7 @@ class trainer {
   dataset const& data_;
   gaussians<E> scene_, gradients_;
   optimizer_state<E> state_;
+  antialiased<E> filter_;
   frame_records<E> records_;
   Tracer tracer_;
   backward<E, Strategy, tile_size_of<Tracer>> backward_;
@@ -113,6 +129,9 @@ class trainer {
   view_order order_;
   mcmc<E> mcmc_;
   adaptive_density<E> adc_;
+  error_growth<E> error_;
+  buffer<float, E> error_map_;
+  span<float const> moments_;
   buffer<float, E> color_, color_gradient_, value_;
   std::optional<exposure_training<E>> exposures_;  // where options.exposure asks for them
   std::optional<finite_check<E>> finite_;          // where options.check_finite asks for it

@@ -18,6 +18,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       scene_(exec, start),
       gradients_(exec, static_cast<index_t>(start.size()), sh_degree),
       state_(exec, static_cast<index_t>(start.size()), sh_degree),
+      filter_(exec),
       records_(exec),
       tracer_(exec),
       backward_(exec),
@@ -28,6 +29,8 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       order_(data.train.size(), options.held_out, options.seed),
       mcmc_(exec, mcmc_options_of(options), options.max_gaussians, options.iterations, options.seed),
       adc_(exec, adc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
+      error_(exec, options.max_gaussians, options.iterations, data.extent, options.seed),
+      error_map_(exec),
       color_(exec),
       color_gradient_(exec),
       value_(exec, 2) {
@@ -37,6 +40,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
   if (options.exposure) exposures_.emplace(exec, data.train.size());
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
+  error_.set_start(static_cast<index_t>(start.size()));
 }
 
 template <execution E, class Traits, class Tracer, class Strategy>
@@ -52,21 +56,35 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   std::size_t const index = order_.at(step_);
   dataset_view const& view = data_.train[index];
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
-  learning_rates const rates = rates_at(options_.rates, data_.extent, step_, options_.iterations);
+  learning_rates rates = rates_at(options_.rates, data_.extent, step_, options_.iterations);
+  {
+    float const p = static_cast<float>(step_) / static_cast<float>(options_.iterations), from = tried("anneal_from", 0);
+    float const share = p <= from ? 0.0f : (p - from) / (1 - from);
+    auto const anneal = [&](char const* key, float& rate, float scale) { rate *= scale * std::pow(tried(key, tried("anneal", 1)), share); };
+    anneal("a_scale", rates.log_scale, tried("r_scale", 1)), anneal("a_quat", rates.quaternion, tried("r_quat", 1)), anneal("a_op", rates.opacity, tried("r_op", 1));
+    anneal("a_sh", rates.sh_dc, tried("r_sh", 1)), anneal("a_sh", rates.sh_rest, tried("r_sh", 1) * tried("r_rest", 1));
+    rates.mean *= tried("r_mean", 1);
+    rates.size_share = tried("r_size", 0) * rates.mean / (data_.extent * 1.6e-4f);
+  }
+  camera seen = view.view;
+  int const level = p_level();
+  if (level > 1) seen = resized_by(view.view, level);
   render_options render = options_.render;
   render.background = background_of(step_);
   auto const constant = std::as_const(scene_).view();
-  std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
+  std::size_t const floats = std::size_t{3} * seen.width * seen.height;
   color_.resize(floats), color_gradient_.resize(floats);
 
-  records_.template prepare<typename Traits::response>(exec_, constant, view.view.position, render.alpha_min);
+  auto const filtered = filter_.of(exec_, constant, seen, render.antialias);
+  records_.template prepare<typename Traits::response>(exec_, filtered, seen.position, render.alpha_min);
   configure(tracer_, render);
-  tracer_.prepare(exec_, constant, records_.view(), view.view, render.alpha_min, render.near);
+  tracer_.prepare(exec_, filtered, records_.view(), seen, render.alpha_min, render.near);
   // With less memory where the LT buffer would pass its budget or the numbers of its slots, and then with none.
   auto const with = [&](auto& pass) {
-    if (!pass.prepare(exec_, tracer_, constant, view.view, render.alpha_min, render.near, options_.lt_budget))
+    if (!pass.prepare(exec_, tracer_, filtered, seen, render.alpha_min, render.near, options_.lt_budget))
       return false;
-    differentiate(pass, loss, index, render, rates, degree);
+    differentiate(pass, loss, index, seen, render, rates, degree);
+    moments_ = pass.moments();
     lt_bytes_ = pass.lt_bytes();
     return true;
   };
@@ -79,7 +97,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
     }
   }
   ++step_;
-  update(view, rates, degree);
+  update(seen, rates, degree, moments_);
 
   step_report report;
   if (finite_) report.skipped = (*finite_)(scene_, state_, "step " + std::to_string(step_) + ", view " + view.name);
@@ -96,33 +114,43 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
 template <execution E, class Traits, class Tracer, class Strategy>
 template <class Pass, class Loss>
 void trainer<E, Traits, Tracer, Strategy>::differentiate(Pass& pass, Loss&& loss, std::size_t index,
-                                                         render_options const& render, learning_rates const& rates,
+                                                         camera const& seen, render_options const& render, learning_rates const& rates,
                                                          int degree) {
   dataset_view const& view = data_.train[index];
   auto const constant = std::as_const(scene_).view();
-  forward<sh_degree>(exec_, tracer_, constant, view.view, render, degree, pass.targets(color_.data()), pass.record());
+  forward<sh_degree>(exec_, tracer_, constant, seen, render, degree, pass.targets(color_.data()), pass.record());
   {
     stage_scope stage(exec_, "loss");
     span<float const> const image = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
-    loss(loss_input<E>{exec_, view, images_.get(exec_, index, render.background), view.view.width, view.view.height,
-                       image, color_gradient_, value_});
+    truth_view const truth = images_.get(exec_, index, render.background, p_level());
+    loss(loss_input<E>{exec_, view, truth, seen.width, seen.height, image, color_gradient_, value_});
+    if (use_error()) {
+      error_map_.resize(image.size() / 3);
+      parallel_for(exec_, "error_map", static_cast<index_t>(image.size() / 3),
+                   detail::error_map_kernel{image.data(), truth, error_map_.data(), static_cast<int>(tried("err", 0))});
+    }
     if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }
-  pass.template run<sh_degree>(exec_, tracer_, constant, records_.view(), view.view, render, degree, color_,
-                               color_gradient_, gradients_);
+  pass.template run<sh_degree>(exec_, tracer_, constant, records_.view(), seen, render, degree, color_,
+                               color_gradient_, gradients_, use_error() ? span<float const>(error_map_) : span<float const>{},
+                               step_ % period(step_) != 0);
 }
 
 // The optimizer's step and what grows, moves and prunes the Gaussians.
 template <execution E, class Traits, class Tracer, class Strategy>
-void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, learning_rates const& rates, int degree) {
+void trainer<E, Traits, Tracer, Strategy>::update(camera const& view, learning_rates const& rates, int degree,
+                                                  span<float const> moments) {
   bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
+  if (step_ % period(step_ - 1) != 0) return;
   if (use_mcmc) mcmc_.add_penalties(scene_, gradients_);
-  if (use_adc) adc_.accumulate(scene_, gradients_, view.view);
+  if (use_adc) adc_.accumulate(scene_, gradients_, view);
+  if (use_error()) error_.accumulate(gradients_, moments), error_.penalties(scene_, gradients_);
   adam_step(exec_, scene_, gradients_, state_, rates, step_, degree, finite_ ? finite_->skipped() : span<u64>{},
             options_.adam);
   density_change change;
   if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean);
   if (use_adc) change = adc_.after_step(scene_, state_, step_);
+  if (use_error()) change = error_.after_step(scene_, state_, step_, rates.mean);
   if (change.added || change.removed) gradients_.resize_keep(scene_.size());
 }
 
