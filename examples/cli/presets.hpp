@@ -12,14 +12,13 @@ namespace gart_cli {
 struct preset {
   std::string name;
   gart::render_options render;
-  std::string cost;  // as measured, against exact
 };
 
 // exact first: the library's defaults.
 std::vector<preset> const& presets();
 std::vector<std::string> preset_names();
 preset const& preset_named(std::string const& name);
-// For --help: a line a preset, with what it sets and what it costs.
+// For --help: a line a preset, with what it sets.
 std::string presets_help();
 
 }  // namespace gart_cli

@@ -53,11 +53,11 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--points", a.points, "N", "Gaussians placed at random where the capture has no points"))
       ->check(between(1, 2147483647.0));
   in_group(r.add(train, "--init-opacity", a.initial_opacity, "A",
-                 "Opacity of the first Gaussians, below 1; 0: 0.5 for random\npoints with mcmc, else 0.1"))
+                 "Opacity of the first Gaussians, below 1; 0: 0.5 for random\npoints with error or mcmc, else 0.1"))
       ->check(between(0, 0.99));
   in_group(r.add(train, "--init-scale", a.initial_scale, "X",
                  "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 for random points "
-                 "with\nmcmc, else 1"))
+                 "with\nerror or mcmc, else 1"))
       ->check(between(0, 100));
   in_group(
       r.add(train, "--mcmc-noise", a.mcmc_noise, "X", "Strength of the random steps of mcmc over the usual; 0: none"))
