@@ -189,6 +189,25 @@ void check_same(number_source& random, gart::gaussian_model const& model, std::v
 
 }  // namespace
 
+TEST_CASE_TEMPLATE("every extreme through the filter of its pixels: finite, and one image by every tracer", E,
+                   GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  for (prepared_extreme const& p : prepared()) {
+    oracle::scene const& s = p.e.scene;
+    CAPTURE(s.name);
+    gart::render_options options = s.options;
+    options.antialias = gart::usual_antialias;
+    std::vector<outcome> const all = run_all(exec, s.model, s.view, options, p.color_gradient);
+    for (outcome const& o : all) {
+      CAPTURE(o.way);
+      check_finite(o);
+      check_same_image(o, all.front());
+    }
+  }
+}
+
 // Prints what docs/accuracy.md quotes: GART_TEST_SEED=1 test_extremes --test-case=*budget*
 TEST_CASE_TEMPLATE("error budget: every extreme by every tracer and strategy", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();

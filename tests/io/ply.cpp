@@ -102,6 +102,33 @@ TEST_CASE("gart's traits travel as comments, and others are ignored") {
   CHECK(back == gart::ply_traits{{"alpha_min", "0.0039215689 exactly"}, {"kernel_degree", "2"}});
 }
 
+TEST_CASE("an antialiased model is marked as other programs mark theirs, and theirs are read") {
+  std::mt19937_64 random(1);
+  scratch_folder const folder;
+  fs::path const path = folder.path / "model.ply";
+  gart::write_splat_ply(path, random_model(2, 0, random), {{"antialias", "0.3"}});
+  std::string const text = text_of(path), mark = "comment SplatRenderMode: mip\n", own = "comment gart antialias 0.3\n";
+  REQUIRE(text.find(own) != std::string::npos);
+  REQUIRE(text.find(mark) != std::string::npos);
+  auto const antialias_in = [&](std::string const& comments) {
+    std::string other = text;
+    other.erase(other.find(own), own.size()), other.erase(other.find(mark), mark.size());
+    other.insert(other.find("element vertex"), comments);
+    gart::write_file(path, other);
+    gart::ply_traits traits;
+    gart::read_splat_ply(path, &traits);
+    return traits.count("antialias") ? "is '" + traits["antialias"] + "'" : "none";
+  };
+  CHECK(antialias_in(own + mark) == "is '0.3'");
+  CHECK(antialias_in(mark + own) == "is '0.3'");
+  CHECK(antialias_in(mark) == "is ''");
+  CHECK(antialias_in("comment antialiased 1\n") == "is ''");
+  CHECK(antialias_in("comment antialiased 0\n") == "none");
+  CHECK(antialias_in("comment SplatRenderMode: default\n") == "none");
+  CHECK(antialias_in("comment an antialiased 1\n") == "none");
+  CHECK(antialias_in("") == "none");
+}
+
 TEST_CASE("any order, encoding and type, with properties, lists and elements that are not ours") {
   CAPTURE(seed());
   std::mt19937_64 random(seed());

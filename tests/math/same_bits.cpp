@@ -1,7 +1,7 @@
 // What decides a hit gives the same bits on every policy: kernels against the same functions called here.
 #include <gart/exec/buffer.hpp>
 #include <gart/math/ray_gaussian.hpp>
-#include <gart/scene/camera.hpp>
+#include <gart/scene/pixel_filter.hpp>
 #include <support/policies.hpp>
 
 #include <random>
@@ -19,20 +19,29 @@ struct sample {
 
 struct outcome {
   float exponential, logarithm, sigma, cutoff, t, d2, alpha;
+  gart::gaussian_parameters filtered;
 };
 
-GART_HD outcome outcome_of(sample const& s) {
+GART_HD outcome outcome_of(sample const& s, gart::pixel_filter const& filter) {
   gart::ray_gaussian const g = gart::prepare(s.gaussian, gart::vec3d(0.0), 1.0f / 255);
   gart::response const r = gart::evaluate(g, gart::primary_ray{s.direction});
   float const x = s.gaussian.log_scale.x;
   float const e = gart::exponential(x);
-  return {e, gart::logarithm(e), g.sigma, g.cutoff, r.t, r.d2, gart::hit_alpha(g, r.d2)};
+  return {e,
+          gart::logarithm(e),
+          g.sigma,
+          g.cutoff,
+          r.t,
+          r.d2,
+          gart::hit_alpha(g, r.d2),
+          gart::filtered(s.gaussian, filter)};
 }
 
 struct evaluate_samples {
+  gart::pixel_filter filter;
   gart::span<sample const> samples;
   gart::span<outcome> out;
-  GART_KERNEL void operator()(gart::index_t i) const { out[i] = outcome_of(samples[i]); }
+  GART_KERNEL void operator()(gart::index_t i) const { out[i] = outcome_of(samples[i], filter); }
 };
 
 GART_HD gart::vec3 ray_of(gart::camera const& view, gart::index_t i) {
@@ -74,17 +83,23 @@ TEST_CASE_TEMPLATE("the same bits on every policy", E, GART_TEST_POLICIES) {
     gart::vec3 const d(0.3f * n(random), 0.3f * n(random), 1.0f);
     s.direction = d / std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
   }
+  gart::camera view;
+  view.width = 640, view.height = 480, view.fx = view.fy = 500, view.cx = 320, view.cy = 240;
+  view.lens = {0.05f, 0.01f, 0.001f, -0.002f};
+  gart::pixel_filter const filter(view, 0.3f);
   E exec;
   gart::buffer<sample, E> in(exec, samples);
   gart::buffer<outcome, E> out(exec, samples.size());
-  gart::parallel_for(exec, "evaluate", static_cast<gart::index_t>(samples.size()), evaluate_samples{in, out});
+  gart::parallel_for(exec, "evaluate", static_cast<gart::index_t>(samples.size()), evaluate_samples{filter, in, out});
   auto const got = out.to_host();
-  long other[7] = {};
+  long other[11] = {};
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    outcome const e = outcome_of(samples[i]), g = got[i];
+    outcome const e = outcome_of(samples[i], filter), g = got[i];
     other[0] += !same(e.exponential, g.exponential), other[1] += !same(e.logarithm, g.logarithm);
     other[2] += !same(e.sigma, g.sigma), other[3] += !same(e.cutoff, g.cutoff), other[4] += !same(e.t, g.t);
     other[5] += !same(e.d2, g.d2), other[6] += !same(e.alpha, g.alpha);
+    for (int k = 0; k < 3; ++k) other[7 + k] += !same(e.filtered.log_scale[k], g.filtered.log_scale[k]);
+    other[10] += !same(e.filtered.opacity, g.filtered.opacity);
   }
   for (long count : other) CHECK(count == 0);
 }

@@ -1,0 +1,152 @@
+// What a pixel shows of one Gaussian through its filter, against the integral over the pixel in double; and what a
+// filter must leave alone.
+#include <support/policies.hpp>
+#include <support/trace_scene.hpp>
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+using namespace gart_test;
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr double filter_pixels = gart::usual_antialias;
+
+// In camera axes; axes in pixels at the mean's depth.
+struct blob {
+  Vector3d mean;
+  Matrix3d to_unit;  // S^-1 R^T
+  double sigma;
+
+  double alpha(double x, double y) const {
+    Vector3d const d = Vector3d(x, y, 1).normalized(), o_g = -(to_unit * mean), d_g = to_unit * d;
+    double const t = -o_g.dot(d_g) / d_g.squaredNorm();
+    return sigma * std::exp(-0.5 * (o_g + t * d_g).squaredNorm());
+  }
+};
+
+// The mean of alpha about pixel (i, j), weighted as a filter weighs: a sum that is exact to far below the tolerance,
+// its steps being half of the narrowest that it sums. The filter is round: on the image, or seen from the camera, where
+// it takes the pixel's solid angle. These are one in the middle of an image; to its sides a square pixel is a long
+// diamond of directions.
+enum class round { on_image, from_camera };
+double integral(blob const& b, gart::camera const& c, int i, int j, round where) {
+  double const step = 0.05, reach = 4.5 * filter_pixels;
+  double sum = 0, weights = 0;
+  for (double v = -reach; v <= reach; v += step)
+    for (double u = -reach; u <= reach; u += step) {
+      double const weight = std::exp(-0.5 * (u * u + v * v) / (filter_pixels * filter_pixels));
+      weights += weight;
+      double const x = (i + 0.5 - c.cx) / c.fx, y = (j + 0.5 - c.cy) / c.fy;
+      if (where == round::on_image) {
+        sum += weight * b.alpha(x + u / c.fx, y + v / c.fy);
+        continue;
+      }
+      Vector3d const middle(x, y, 1), n = middle.normalized(), side = n.unitOrthogonal();
+      double const angle = std::pow(middle.norm(), -1.5) / std::sqrt(double{c.fx} * c.fy);
+      Vector3d const d = n + angle * (u * side + v * n.cross(side));
+      sum += weight * b.alpha(d.x() / d.z(), d.y() / d.z());
+    }
+  return sum / weights;
+}
+
+struct errors {
+  double with = 0, on_image = 0, without = 0;
+};
+
+// `half_view`: slope of the image's corner.
+template <class E>
+errors worst_errors(E& exec, double half_view, int trials) {
+  std::mt19937_64 random(seed());
+  auto const uniform = [&](double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(random); };
+  std::normal_distribution<double> normal;
+  gart::camera c;
+  c.width = c.height = 48;
+  c.fx = c.fy = static_cast<float>(24 * std::sqrt(2.0) / half_view);
+  c.cx = 23.7f, c.cy = 24.4f;
+  gart::render_options options;
+  options.alpha_min = 1e-4f;
+  errors worst;
+  for (int trial = 0; trial < trials; ++trial) {
+    double const depth = std::exp(uniform(-1, 3)), pixel = depth / c.fx;
+    Vector3d const mean((uniform(3, 45) - c.cx) * pixel, (uniform(3, 45) - c.cy) * pixel, depth);
+    Eigen::Quaterniond const q(normal(random), normal(random), normal(random), normal(random));
+    Vector3d scale;
+    for (int k = 0; k < 3; ++k) scale[k] = pixel * std::exp(uniform(std::log(0.1), std::log(3.0)));
+    double const sigma = uniform(0.3, 0.95);
+    gart::gaussian_model m;
+    m.resize(1, 0);
+    for (std::size_t k = 0; k < 3; ++k) {
+      m.mean[k] = static_cast<float>(mean[static_cast<int>(k)]);
+      m.log_scale[k] = static_cast<float>(std::log(scale[static_cast<int>(k)]));
+    }
+    m.quaternion = {static_cast<float>(q.w()), static_cast<float>(q.x()), static_cast<float>(q.y()),
+                    static_cast<float>(q.z())};
+    m.opacity = {static_cast<float>(std::log(sigma / (1 - sigma)))};
+    blob const b{mean, scale.cwiseInverse().asDiagonal() * q.normalized().toRotationMatrix().transpose(), sigma};
+    int const x = static_cast<int>(mean.x() / pixel + c.cx), y = static_cast<int>(mean.y() / pixel + c.cy);
+    for (bool const filtered : {true, false}) {
+      options.antialias = filtered ? static_cast<float>(filter_pixels) : 0;
+      auto const got = render_scene(exec, m, c, options, 0, tracer_kind::tiles);
+      for (int j = std::max(0, y - 3); j < std::min(c.height, y + 4); ++j)
+        for (int i = std::max(0, x - 3); i < std::min(c.width, x + 4); ++i) {
+          double const alpha = 1 - got.transmittance[static_cast<std::size_t>(j * c.width + i)];
+          double const on_image = std::abs(alpha - integral(b, c, i, j, round::on_image));
+          if (!filtered) {
+            worst.without = std::max(worst.without, on_image);
+            continue;
+          }
+          worst.on_image = std::max(worst.on_image, on_image);
+          worst.with = std::max(worst.with, std::abs(alpha - integral(b, c, i, j, round::from_camera)));
+        }
+    }
+  }
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("a Gaussian of 0.1 to 3 pixels shows in each pixel what the pixel's filter sees of it", E,
+                   GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  // Wide views: a Gaussian some pixels long reaches where pixels are smaller than at its mean, whose filter it has.
+  struct {
+    double half_view, from_camera, on_image;
+  } const views[] = {{0.1, 0.005, 0.005}, {0.6, 0.01, 0.02}, {1.0, 0.02, 0.05}};
+  for (auto const& [half_view, from_camera, on_image] : views) {
+    CAPTURE(half_view);
+    errors const worst = worst_errors(exec, half_view, 40);
+    MESSAGE(std::string(E::name) << ", corner at slope " << half_view << ": " << worst.with << ", on the image "
+                                 << worst.on_image << "; without a filter " << worst.without);
+    CHECK(worst.with < from_camera);
+    CHECK(worst.on_image < on_image);
+    CHECK(worst.without > 0.1);
+  }
+}
+
+TEST_CASE_TEMPLATE("without a filter a scene is seen as it is stored", E, GART_TEST_POLICIES) {
+  E exec;
+  gart::gaussian_model model;
+  model.resize(3, 1);
+  gart::gaussians<E> const scene(exec, model);
+  gart::antialiased<E> filter(exec);
+  gart::camera view;
+  view.width = view.height = 8, view.fx = view.fy = 8, view.cx = view.cy = 4;
+  auto const before = exec.memory.current;
+  auto const stored = scene.view(), seen = filter.of(exec, stored, view, 0);
+  CHECK(seen.log_scale == stored.log_scale);
+  CHECK(seen.opacity == stored.opacity);
+  CHECK(exec.memory.current == before);
+  auto const filtered = filter.of(exec, stored, view, 0.3f);
+  CHECK(filtered.log_scale != stored.log_scale);
+  CHECK(filtered.mean == stored.mean);
+  CHECK(filtered.sh == stored.sh);
+}
