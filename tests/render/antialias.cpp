@@ -35,8 +35,8 @@ struct blob {
 // its steps being half of the narrowest that it sums. The filter is round: on the image, or seen from the camera, where
 // it takes the pixel's solid angle. These are one in the middle of an image; to its sides a square pixel is a long
 // diamond of directions.
-enum class round { on_image, from_camera };
-double integral(blob const& b, gart::camera const& c, int i, int j, round where) {
+enum class roundness { on_image, from_camera };
+double integral(blob const& b, gart::camera const& c, int i, int j, roundness where) {
   double const step = 0.05, reach = 4.5 * filter_pixels;
   double sum = 0, weights = 0;
   for (double v = -reach; v <= reach; v += step)
@@ -44,7 +44,7 @@ double integral(blob const& b, gart::camera const& c, int i, int j, round where)
       double const weight = std::exp(-0.5 * (u * u + v * v) / (filter_pixels * filter_pixels));
       weights += weight;
       double const x = (i + 0.5 - c.cx) / c.fx, y = (j + 0.5 - c.cy) / c.fy;
-      if (where == round::on_image) {
+      if (where == roundness::on_image) {
         sum += weight * b.alpha(x + u / c.fx, y + v / c.fy);
         continue;
       }
@@ -97,13 +97,13 @@ errors worst_errors(E& exec, double half_view, int trials) {
       for (int j = std::max(0, y - 3); j < std::min(c.height, y + 4); ++j)
         for (int i = std::max(0, x - 3); i < std::min(c.width, x + 4); ++i) {
           double const alpha = 1 - got.transmittance[static_cast<std::size_t>(j * c.width + i)];
-          double const on_image = std::abs(alpha - integral(b, c, i, j, round::on_image));
+          double const on_image = std::abs(alpha - integral(b, c, i, j, roundness::on_image));
           if (!filtered) {
             worst.without = std::max(worst.without, on_image);
             continue;
           }
           worst.on_image = std::max(worst.on_image, on_image);
-          worst.with = std::max(worst.with, std::abs(alpha - integral(b, c, i, j, round::from_camera)));
+          worst.with = std::max(worst.with, std::abs(alpha - integral(b, c, i, j, roundness::from_camera)));
         }
     }
   }
