@@ -24,7 +24,17 @@ struct prepared_extreme {
   double decided = 0;
 };
 
-// With a gradient of zero where rounding may take another branch, for there the derivative of either side is right.
+// Where rounding alone may move a pixel's gradient too far to compare. One pixel may carry much of a group: so where
+// another branch may be taken (there the derivative of either side is right), where an undecided order counts more than
+// a group may be off by, and where a response is off by more than three times that, bounded from above: a needle all
+// but along the ray.
+bool too_rounded(oracle::pixel const& pixel, double tolerance) {
+  return pixel.edge || pixel.kink || pixel.slope_rounding > std::min(1e-3, tolerance) ||
+         std::any_of(pixel.list.begin(), pixel.list.end(),
+                     [&](oracle::hit const& h) { return h.alpha_slack > 3 * tolerance; });
+}
+
+// With a gradient of zero there.
 std::vector<prepared_extreme> const& prepared() {
   static std::vector<prepared_extreme> const all = [] {
     std::vector<prepared_extreme> out;
@@ -35,8 +45,7 @@ std::vector<prepared_extreme> const& prepared() {
       oracle::scene const& s = p.e.scene;
       p.picture = oracle::render(parameters, s.view, s.options, s.active_degree);
       for (auto const& pixel : p.picture.pixels) {
-        // One pixel may carry much of a group: no undecided order is to move it by more than the group may be off.
-        bool const aside = pixel.edge || pixel.kink || pixel.slope_rounding > std::min(1e-3, p.e.tolerance);
+        bool const aside = too_rounded(pixel, p.e.tolerance);
         p.decided += !aside / static_cast<double>(p.picture.pixels.size());
         // Where nothing is decided the gradient is still taken: it must be finite.
         for (int c = 0; c < 3; ++c)

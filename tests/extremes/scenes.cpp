@@ -217,7 +217,7 @@ std::vector<extreme> extremes(std::uint64_t seed) {
     all.push_back({s});
     // A thousand times its size away, through a long lens: a rounding of the ray is 2e-4 of the size, and a tenth of
     // that of the smallest axes. On up to half of the rays it leaves the order of some two hits open.
-    m = cloud(random, 60);
+    m = cloud(random, 50);
     for (std::size_t i = 0; i < m.size(); ++i) {
       for (int a = 0; a < 3; ++a) m.mean[3 * i + a] *= 1e4f;
       m.mean[3 * i + 2] += 1e7f;
@@ -303,7 +303,7 @@ std::vector<extreme> extremes(std::uint64_t seed) {
       append(m, random, s);
     }
     brighten(m);
-    oracle::scene scene = scene_of("3,000 on one centre", m, looking_along_z(3, 3, 40));
+    oracle::scene scene = scene_of("3,000 on one centre", m, looking_along_z(5, 5, 60));
     scene.options.alpha_min = 1e-6f;
     all.push_back({scene, 1e-3, 0.2});  // as above; where many others tie within rounding, nothing is decided
   }
