@@ -1,6 +1,9 @@
 """Installs gart, moves the prefix away from where it was installed, and builds and runs from there: a project of g++ alone
 that is allowed no package which only gart itself needs, with no nvcc on the path; every numbered example; the program; and
 one kernel compiled by nvcc where there is one. A component that is not there has to be refused by name.
+
+Then gart as part of another project, by add_subdirectory and by FetchContent, and the headers alone, on a machine that has
+none of the packages which only the libraries need.
 """
 import argparse
 import os
@@ -113,4 +116,43 @@ with tempfile.TemporaryDirectory() as temporary:
     if a.nvcc:
         binary = build(here / "downstream" / "nvcc", f"-DCMAKE_CUDA_COMPILER={a.nvcc}", env=environment)
         run(binary / "use_nvcc")
+
+    # As part of another project: its build type stays, gart's install rules and programs stay out.
+    part = here / "downstream" / "subproject"
+
+    def build_part(name, *options):
+        binary = folder / name
+        run(a.cmake, "-S", part, "-B", binary, "-G", a.generator, f"-DCMAKE_CXX_COMPILER={a.cxx}",
+            f"-DGART={a.source}", "-DGART_CUDA=OFF", *options, env=bare)
+        run(a.cmake, "--build", binary, "--parallel", a.jobs, "--target", "use_headers", env=bare)
+        expect(run(binary / "use_headers"), f"version {a.version}")
+        return binary
+
+    added = build_part("added")
+    cache = (added / "CMakeCache.txt").read_text()
+    expect(cache, "CMAKE_BUILD_TYPE:STRING=\n", "GART_INSTALL:BOOL=OFF", "GART_BUILD_TESTS:BOOL=OFF")
+    run(a.cmake, "--build", added, "--parallel", a.jobs, "--target", "use_io", env=bare)
+    run(added / "use_io", folder / "grey.png")
+    run(a.cmake, "--install", added, "--prefix", folder / "parent", env=bare)
+    installed = sorted(str(p.relative_to(folder / "parent")) for p in (folder / "parent").rglob("*") if p.is_file())
+    if installed != ["bin/use_headers"]:
+        sys.exit(f"a parent's install should hold what is its own, bin/use_headers, and holds {installed}")
+
+    codecs = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in ("PNG", "TurboJPEG", "nlohmann_json")]
+    headers_alone = [*codecs, *never, "-DGART_BUILD_BACKENDS=OFF"]
+    build_part("fetched", "-DFETCH=ON", "-DCMAKE_BUILD_TYPE=Debug", *headers_alone)
+
+    # The headers alone, configured, installed and found; and what is said where the libraries' packages are missing.
+    alone = folder / "alone"
+    top = (a.cmake, "-S", a.source, "-G", a.generator, f"-DCMAKE_CXX_COMPILER={a.cxx}")
+    run(*top, "-B", alone, *headers_alone, env=bare)
+    expect((alone / "CMakeCache.txt").read_text(), "CMAKE_BUILD_TYPE:STRING=Release\n", "GART_INSTALL:BOOL=ON")
+    run(a.cmake, "--install", alone, "--prefix", folder / "headers", env=bare)
+    told = configure(here / "downstream" / "missing", f"-DCMAKE_PREFIX_PATH={folder / 'headers'}",
+                     f"-Dgart_DIR={next((folder / 'headers').rglob('gartConfig.cmake')).parent}", fails=True)
+    expect(" ".join(told.split()), "it has: headers.")
+    told = run(*top, "-B", folder / "no_codecs", "-DGART_CUDA=OFF", *codecs, env=bare, fails=True)
+    expect(" ".join(told.split()), "libpng-dev", "libturbojpeg0-dev", "nlohmann-json3-dev", "-DGART_BUILD_BACKENDS=OFF")
+    told = run(*top, "-B", folder / "no_libraries", "-DGART_BUILD_BACKENDS=OFF", "-DGART_BUILD_TESTS=ON", env=bare, fails=True)
+    expect(" ".join(told.split()), "GART_BUILD_TESTS is ON and needs the libraries")
 print("installed, moved, and used: host" + "".join(f", {c}" for c in a.component) + (", nvcc" if a.nvcc else ""))
