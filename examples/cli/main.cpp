@@ -1,7 +1,7 @@
 // The `gart` program: trains, renders and scores scenes of ray-traced 3D Gaussians from the command line.
 
 #include "commands.hpp"
-#include "fields.hpp"
+#include "field_names.hpp"
 #include "help.hpp"
 
 #include <gart/core/version.hpp>

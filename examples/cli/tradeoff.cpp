@@ -1,5 +1,5 @@
 #include "commands.hpp"
-#include "fields.hpp"
+#include "field_names.hpp"
 #include "options.hpp"
 #include "output.hpp"
 #include "processor_time.hpp"

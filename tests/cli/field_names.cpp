@@ -2,7 +2,7 @@
 
 #include "program.hpp"
 
-#include <fields.hpp>
+#include <field_names.hpp>
 
 #include <support/policies.hpp>
 

@@ -1,4 +1,4 @@
-#include "fields.hpp"
+#include "field_names.hpp"
 
 #include <gart/io/dataset.hpp>
 #include <gart/render/options.hpp>
