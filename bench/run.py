@@ -15,6 +15,8 @@ What (comma-separated; default tests and paper):
   paper       strategies, memory and stages
   tradeoff    `gart tradeoff` on the first scene and on every --model: what each approximation costs and buys
   presets     `gart train` with each --preset on every --capture: what they cost in quality
+  rules       `gart train` with each rule of docs/training.md changed alone, --seeds of each (3): a file
+              rules_NAME.json a capture, written after each rule
   auto        `gart train --auto` against --no-auto on every --capture: scores, seconds, bytes, what was chosen and
               measured; a file auto_NAME.json each
   curves      a short training of every --capture by each strategy, same seed: the loss curves against each other and
@@ -49,7 +51,7 @@ import time
 from common import Failure, commit_of, first_match, last_line, machine, run
 from training import LONG_PARTS, Trainings
 
-TRAININGS = ("presets", "auto", "curves", "long")
+TRAININGS = ("presets", "rules", "auto", "curves", "long")
 PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff") + TRAININGS
 SKIPPED = 77
 
@@ -352,7 +354,7 @@ def arguments():
                         help="tradeoff, and traits, which takes the first: a trained model and its capture or camera "
                              "JSON; may be repeated")
     parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("NAME", "DATASET"),
-                        help="presets, auto, curves and long: a capture to train on; may be repeated")
+                        help="presets, rules, auto, curves and long: a capture to train on; may be repeated")
     parser.add_argument("--train", default="",
                         help="the same: options of gart train, in one string; --iterations, where it is not among "
                              "them, is 1000 for curves and 30000 for the others")

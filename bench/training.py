@@ -1,4 +1,4 @@
-"""The parts of bench/run.py that train captures: presets, auto, curves and long.
+"""The parts of bench/run.py that train captures: presets, rules, auto, curves and long.
 
 Each --capture NAME DIR is trained by `gart train`; what is reported is read from the metrics.json, history.json and
 model.ply that it leaves. Steps and Gaussians are those of --train, else the part's own.
@@ -16,13 +16,31 @@ from common import last_line, run
 PRESETS = ("exact", "balanced", "fast")
 FULL_STEPS = 30000
 # Gaussians at most, for captures that are known, where --train does not say.
-GAUSSIANS = {"lego": 300000, "tandt_train": 1000000, "fox": 500000, "many_cameras": 500000}
+GAUSSIANS = {"lego": 300000, "bonsai": 1000000, "tandt_train": 1000000, "fox": 500000, "many_cameras": 500000}
 
 CURVE_STEPS, CURVE_WINDOW, CURVE_POINTS = 1000, 50, 100
 # Strategy and number of the run; the two of `primitive` are the noise from run to run.
 CURVE_RUNS = (("primitive", 1), ("primitive", 2), ("pixel", 1), ("hybrid", 1), ("deterministic", 1),
               ("deterministic", 2))
 LONG_PARTS = ("finite", "seeds", "deterministic")
+
+# Rules of training (docs/training.md): what each line changes of the defaults, by `gart train`.
+RULES = (("all", []),
+         ("drawn later: full at three quarters", ["--set", "error.fill=0.75"]),
+         ("full at a quarter of the run", ["--set", "error.fill=0.25"]),
+         ("no penalty on opacity", ["--set", "error.opacity_penalty=0"]),
+         ("penalty x 3", ["--set", "error.opacity_penalty=0.009"]),
+         ("rates of means x 2", ["--set", "rates.mean=1.6e-4,rates.mean_final=1.6e-6"]),
+         ("rate of opacity x 2", ["--set", "rates.opacity=0.05"]),
+         ("nothing settles", ["--set", "rates.settled=1"]),
+         ("rates of a long run in any", ["--set", "rates.long_run=1"]),
+         ("start 0.5, 0.1", ["--init-opacity", "0.5", "--init-scale", "0.1"]),
+         ("antialias", ["--antialias"]),
+         ("mcmc", ["--densify", "mcmc"]),
+         ("mcmc, no noise", ["--densify", "mcmc", "--set", "mcmc.noise=0"]),
+         ("mcmc, no penalties", ["--densify", "mcmc", "--mcmc-penalty", "0"]),
+         ("adc", ["--densify", "adc"]),
+         ("adc, no resets", ["--densify", "adc", "--set", "adc.opacity_reset_every=0"]))
 
 
 def digest(data):
@@ -113,6 +131,25 @@ class Trainings:
                     runs.append({"preset": preset, **{key: metrics[key] for key in kept}})
                     self.say(f"{name}, {preset}: {metrics['psnr']:.2f} dB, {metrics['seconds']:.0f} s")
             self.write("presets_" + name, runs, scene=name, train=options)
+
+    def rules(self):
+        kept = ("psnr", "ssim", "psnr_affine_colour", "seconds", "gaussians", "iterations", "peak_bytes", "exposure")
+        for name, capture in self.a.capture:
+            runs, options = [], self.train_options(name)
+            for rule, change in RULES:
+                rows = []
+                for seed in range(1, (self.a.seeds or 3) + 1):
+                    folder, metrics, _ = self.train(f"{name}, {rule}, seed {seed}", capture, options, "--no-auto",
+                                                    "--seed", str(seed), *change)
+                    if folder:
+                        rows.append({"rule": rule, "change": change, "seed": seed,
+                                     "training_psnr": metrics["training_scores"]["psnr"],
+                                     **{key: metrics[key] for key in kept}})
+                runs += rows
+                scores = spread([r["psnr"] for r in rows])
+                if scores:
+                    self.say(f"{name}, {rule}: {scores['mean']:.2f} dB of {len(rows)} seeds")
+                self.write("rules_" + name, runs, scene=name, train=options)
 
     def auto(self):
         kept = ("psnr", "ssim", "test_views", "seconds", "gaussians", "sh_degree", "floats_per_gaussian", "model_bytes",

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr char remedy[] = "take the exposures.json that was written beside the model";
+constexpr char remedy[] = "take the exposures.json that gart train wrote beside the model";
 
 // `count` finite numbers of a view's field.
 template <class T>

@@ -3,6 +3,7 @@
 #include "commands.hpp"
 #include "output.hpp"
 #include "presets.hpp"
+#include "train_fields.hpp"
 
 #include <gart/core/version.hpp>
 
@@ -69,6 +70,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "all: each step moves every Gaussian; seen: only those that\nits view shows, as sparse Adam does; for "
                  "views that show a\nsmall part of a large scene"))
       ->check(one_of({"all", "seen"}));
+  in_group(r.add(train, "--set", a.set, "NAME=VALUE,...",
+                 "Rules by name, for measuring them: error.fill=0.25,\nrates.opacity=0.05 and so on (docs/training.md); a name that\nthere is not lists those there are"));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
   in_group(r.add(train, "--seed", a.seed, "N",
                  "Seed of everything random; on the serial backend the same\nseed gives the same bits"))
@@ -230,6 +233,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.render.max_hits = a.max_hits;
   o.render.antialias = a.antialias ? gart::usual_antialias : 0;
   o.render.rebuild_every = a.rebuild_every;
+  set_fields(o, a.set);
   return o;
 }
 

@@ -35,7 +35,7 @@ struct train_arguments {
   float sh_gain = 0.02f;
   int downscale = 1, test_every = 8, eval_every = -1;
   float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
-  std::string exposure = "auto", adam = "all";
+  std::string exposure = "auto", adam = "all", set;
   float mcmc_noise = 1, mcmc_penalty = 1;
   float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;
   gart::u32 max_hits = defaults.render.max_hits;

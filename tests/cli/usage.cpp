@@ -98,6 +98,23 @@ TEST_CASE("wrong command lines exit with 2, say what is wrong, and make nothing"
   CHECK(has(bare.err, "train"));
 }
 
+TEST_CASE("rules are set by name, kept, and refused where there are none") {
+  folder const here;
+  write_capture(here / "capture");
+  std::string const run = "train capture --backend serial --iterations 2 --max-gaussians 20 --quiet --out ";
+  REQUIRE(here.gart(run + "plain").code == 0);
+  auto const set = here.gart(run + "set --set rates.mean=0,rates.mean_final=0,rates.log_scale=0");
+  CHECK_MESSAGE(set.code == 0, set.err);
+  CHECK(here.json("set/config.json")["options"]["set"] == "rates.mean=0,rates.mean_final=0,rates.log_scale=0");
+  CHECK(text_of(here / "set/model.ply") != text_of(here / "plain/model.ply"));
+  auto const unknown = here.gart(run + "none --set rates.speed=1");
+  CHECK(unknown.code == 2);
+  CHECK_MESSAGE(has(unknown.err, "--set rates.speed=1: no such field; there are near, "), unknown.err);
+  auto const text = here.gart(run + "none --set near=far");
+  CHECK(text.code == 2);
+  CHECK_MESSAGE(has(text.err, "a finite number belongs after near="), text.err);
+}
+
 TEST_CASE("output that cannot be written is a failure") {
   folder const here;
   if (!fs::exists("/dev/full")) return;

@@ -35,12 +35,13 @@ std::vector<prepared_extreme> const& prepared() {
       oracle::scene const& s = p.e.scene;
       p.picture = oracle::render(parameters, s.view, s.options, s.active_degree);
       for (auto const& pixel : p.picture.pixels) {
-        bool const aside = pixel.edge || pixel.kink || pixel.slope_rounding > 1e-3;
+        // One pixel may carry much of a group: no undecided order is to move it by more than the group may be off.
+        bool const aside = pixel.edge || pixel.kink || pixel.slope_rounding > std::min(1e-3, p.e.tolerance);
         p.decided += !aside / static_cast<double>(p.picture.pixels.size());
         // Where nothing is decided the gradient is still taken: it must be finite.
         for (int c = 0; c < 3; ++c)
-          p.color_gradient.push_back(aside && p.e.tolerance != undecided ? 0.0f
-                                                                         : static_cast<float>(random.uniform(-1, 1)));
+          p.color_gradient.push_back(
+              aside && p.e.tolerance != undecided ? 0.0f : static_cast<float>(random.uniform(p.e.least, 1)));
       }
       if (p.e.tolerance != undecided)
         p.gradients = oracle::gradients(parameters, s.view, s.options, s.active_degree,
@@ -88,8 +89,10 @@ image_errors errors_of(outcome const& got, oracle::picture const& picture) {
     double const transmittance = std::abs(got.transmittance[i] - p.transmittance);
     double color = 0;
     for (int c = 0; c < 3; ++c) color = std::max(color, std::abs(got.color[3 * i + c] - p.color[c]));
-    double const error = p.edge ? color : std::max(color, transmittance);
-    worst.beyond_rounding = std::max(worst.beyond_rounding, error / (1e-5 + 2 * p.rounding));
+    worst.beyond_rounding = std::max(worst.beyond_rounding, color / (1e-5 + 2 * p.rounding));
+    // A hit of the colour behind it hardly shows in the colour, whatever its alpha: T has its own rounding.
+    if (!p.edge)
+      worst.beyond_rounding = std::max(worst.beyond_rounding, transmittance / (1e-5 + 2 * p.transmittance_rounding));
     if (p.edge || p.rounding > 1e-5) continue;
     worst.color = std::max(worst.color, color), worst.transmittance = std::max(worst.transmittance, transmittance);
   }

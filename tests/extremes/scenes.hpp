@@ -22,6 +22,8 @@ struct extreme {
   double tolerance = 1e-4;
   // Least share of pixels that rounding leaves decided, so that the comparison cannot come to nothing.
   double decided = 0.9;
+  // dL/d colour is random, from here to 1.
+  double least = -1;
 };
 
 // Random numbers whose bits do not depend on the standard library.

@@ -68,11 +68,19 @@ TEST_CASE("the rate of the means decays exponentially") {
   CHECK(exponential_decay(1e-2f, 1e-4f, 100, 100) == doctest::Approx(1e-4));
   CHECK(exponential_decay(1e-2f, 1e-4f, 1000, 100) == doctest::Approx(1e-4));
   CHECK(exponential_decay(1e-2f, 0, 50, 100) == 1e-2f);
-  CHECK(rates_at({}, 3.0f, 0, 10).mean == doctest::Approx(3 * learning_rates{}.mean));
-  CHECK(rates_at({}, 3.0f, 5, 10).opacity == learning_rates{}.opacity);
-  CHECK(rates_at({}, 3.0f, 75, 100).opacity == doctest::Approx(learning_rates{}.opacity * std::sqrt(0.1)));
-  CHECK(rates_at({}, 3.0f, 100, 100).sh_rest == doctest::Approx(0.1 * learning_rates{}.sh_rest));
-  CHECK(rates_at({}, 3.0f, 100, 100).mean == doctest::Approx(3 * learning_rates{}.mean_final));
+  learning_rates const usual;
+  CHECK(rates_at(usual, 3.0f, 0, 20000).mean == doctest::Approx(3 * usual.mean));
+  CHECK(rates_at(usual, 3.0f, 20000, 20000).mean == doctest::Approx(3 * usual.mean_final));
+  CHECK(rates_at(usual, 3.0f, 10000, 20000).opacity == usual.opacity);
+  CHECK(rates_at(usual, 3.0f, 15000, 20000).opacity == doctest::Approx(usual.opacity * std::sqrt(0.1)));
+  CHECK(rates_at(usual, 3.0f, 20000, 20000).sh_rest == doctest::Approx(0.1 * usual.sh_rest));
+  // A quarter of a long run: twice as fast, and settled by the fourth root.
+  int const quarter = usual.long_run / 4;
+  CHECK(rates_at(usual, 3.0f, 0, quarter).mean == doctest::Approx(6 * usual.mean));
+  CHECK(rates_at(usual, 3.0f, 0, quarter).sh_dc == usual.sh_dc);
+  CHECK(rates_at(usual, 3.0f, quarter, quarter).log_scale ==
+        doctest::Approx(2 * usual.log_scale * std::pow(0.1, 0.25)).epsilon(1e-3));
+  CHECK(rates_at(usual, 3.0f, 0, 10).opacity == doctest::Approx(4 * usual.opacity));
 }
 
 TEST_CASE("the SH degree rises every so many steps, sooner in short runs") {

@@ -291,7 +291,7 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
   out.transmittance = transmittance;
   Vector3d behind = background;
   double clear_behind = 1;
-  double alpha_rounding = 0, slope_squared = 0;  // sums of squares: the hits' roundings are independent
+  double alpha_rounding = 0, clear_rounding = 0, slope_squared = 0;  // sums of squares: roundings are independent
   for (std::size_t i = steps.size(); i-- > 0;) {
     step& s = steps[i];
     s.behind = behind, s.clear_behind = clear_behind;
@@ -303,12 +303,16 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
     else
       alpha_rounding += contrast * contrast * s.h.alpha_slack * s.h.alpha_slack;
     if (!s.h.counted) continue;
+    bool const held = (s.h.clamps & 8u) != 0 && !s.h.at_clamp;
+    double const cleared = held ? 0 : weight * s.h.alpha_slack * clear_behind;
+    clear_rounding += cleared * cleared;
     behind = s.h.alpha * s.color + (1 - s.h.alpha) * behind;
     clear_behind *= 1 - s.h.alpha;
     out.depth += weight * s.h.t;
     ++out.hits;
   }
   out.rounding += std::sqrt(alpha_rounding);
+  out.transmittance_rounding = std::sqrt(clear_rounding);
   for (int c = 0; c < 3; ++c) out.color[c] = behind[c];
 
   double widest = 0, exchanged_squared = 0;

@@ -53,6 +53,7 @@ struct pixel {
   std::uint32_t hits = 0;
   std::vector<hit> list;  // in order, up to the end of the ray, with the marginal misses in between
   double rounding = 0;    // what float rounding, each undecided order and each undecided hit may do to a colour channel
+  double transmittance_rounding = 0;  // what float rounding may do to the transmittance where no hit is undecided
   double slope_rounding = 0;  // what the undecided orders may do to the gradient of the pixel, relative to its norm
   bool edge = false;          // undecided: a hit, the end of the ray, or which hit that is
   bool kink = false;          // some alpha is within rounding of 0.99, or some colour of 0: the derivative may jump

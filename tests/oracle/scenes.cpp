@@ -32,7 +32,8 @@ struct builder {
 
   builder(random& r, int sh_degree) : rng(r) { model.sh_degree = sh_degree; }
 
-  // A random rotation with a norm far from 1, and random colours, some of them clamped.
+  // A random rotation with a norm far from 1, and random colours, some of them clamped. Of degree 0 none lies within
+  // rounding of the clamp: it would do so for every ray, and all that see it would be undecided.
   void add(vec3 mean, vec3 scale, float logit) {
     float q[4], squares = 0;
     do {
@@ -48,7 +49,11 @@ struct builder {
   void add_color() {
     int const coefficients = gart::sh_coefficients(model.sh_degree);
     for (int k = 0; k < coefficients; ++k)
-      for (int c = 0; c < 3; ++c) model.sh.push_back(rng.normal() * (k == 0 ? 1.2f : 0.25f));
+      for (int c = 0; c < 3; ++c) {
+        float x = rng.normal() * (k == 0 ? 1.2f : 0.25f);
+        while (coefficients == 1 && std::abs(0.5f + 0.2820948f * x) < 1e-4f) x = rng.normal() * 1.2f;
+        model.sh.push_back(x);
+      }
   }
   // The last Gaussian's geometry once more, with its own opacity and colours.
   void repeat(float logit) {

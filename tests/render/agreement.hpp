@@ -17,8 +17,9 @@ namespace gart_test {
 
 inline double const image_tolerance = 1e-5;
 
-// Rounding alone may move this pixel by the tolerance: an undecided hit or order, or an ill-conditioned one.
-inline bool within_rounding(oracle::pixel const& p) { return p.rounding > image_tolerance; }
+// In units of the tolerance, what a pixel may be off by that rounding alone moves by this: an undecided hit or order,
+// or an ill-conditioned one.
+inline double allowed(double rounding) { return rounding > image_tolerance ? 1 + 2 * rounding / image_tolerance : 1; }
 
 // The largest errors of a picture, over what rounding explains: every pixel is checked, and beyond the tolerance by no
 // more than rounding allows, in few pixels only (aside).
@@ -38,20 +39,21 @@ image_errors image_error(traced<E> const& got, oracle::picture const& picture) {
   image_errors error;
   for (std::size_t i = 0; i < pixels; ++i) {
     auto const& p = picture.pixels[i];
-    double const allowed = within_rounding(p) ? 1 + 2 * p.rounding / image_tolerance : 1;
     double difference = 0;
     for (int c = 0; c < 3; ++c) {
       REQUIRE(std::isfinite(got.color[3 * i + c]));
       difference = std::max(difference, std::abs(got.color[3 * i + c] - p.color[c]));
     }
     error.aside += difference > image_tolerance;
-    error.color = std::max(error.color, difference / allowed);
+    error.color = std::max(error.color, difference / allowed(p.rounding));
     if (p.edge) continue;
 
     double farthest = 1;
     for (auto const& h : p.list) farthest = std::max(farthest, std::abs(h.t) + h.t_slack / image_tolerance);
-    error.transmittance = std::max(error.transmittance, std::abs(got.transmittance[i] - p.transmittance) / allowed);
-    error.depth = std::max(error.depth, std::abs(got.depth[i] - p.depth) / (farthest * allowed));
+    // A hit of the colour behind it hardly shows in the colour, whatever its alpha: T has its own rounding.
+    error.transmittance = std::max(
+        error.transmittance, std::abs(got.transmittance[i] - p.transmittance) / allowed(p.transmittance_rounding));
+    error.depth = std::max(error.depth, std::abs(got.depth[i] - p.depth) / (farthest * allowed(p.rounding)));
     REQUIRE(got.hits[i] == p.hits);
   }
   return error;
@@ -114,6 +116,11 @@ inline double relative_error(std::vector<float> const& got, std::vector<double> 
   return error == 0 ? 0 : std::sqrt(error / norm);
 }
 
+// What the undecided orders of a pixel's hits may do to its gradient, where it is compared. One swap does all of it or
+// nothing, and one pixel may carry much of a group: no more than gradients may be off by. Among hundreds of hits it is
+// a sum over as many swaps that may be, of which few are.
+inline double order_tolerance(oracle::pixel const& p) { return p.list.size() < 200 ? 1e-4 : 1e-3; }
+
 // A random linear function of the image, and its gradient by the oracle. Zero where rounding may take another branch:
 // there the gradient of either side is right.
 struct weighted_image {
@@ -127,7 +134,7 @@ inline weighted_image weighted(oracle::scene const& s, oracle::parameters const&
   std::uniform_real_distribution<float> uniform(-1.0f, 1.0f);
   weighted_image w;
   for (auto const& pixel : picture.pixels) {
-    bool const aside = pixel.edge || pixel.kink || pixel.slope_rounding > 1e-3;
+    bool const aside = pixel.edge || pixel.kink || pixel.slope_rounding > order_tolerance(pixel);
     w.aside += aside;
     for (int c = 0; c < 3; ++c) w.color_gradient.push_back(aside ? 0.0f : uniform(engine));
   }

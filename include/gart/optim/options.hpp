@@ -17,6 +17,10 @@ struct learning_rates {
   // All rates but those of the means and exposures stay as they are for a share of the run, then decay exponentially
   // to `settled` of it.
   float settled = 0.1f, settle_from = 0.5f;
+  // The rates are those of a run of at least so many steps. A shorter one has less time to go as far: its rates of
+  // mean, scale and opacity are sqrt(long_run / steps) times as large, at most four times, and it settles by less,
+  // settled^(steps / long_run).
+  int long_run = 15000;
   float exposure = 0.05f, exposure_final = 0.005f;  // a visit of the view; decays like the means'
 };
 

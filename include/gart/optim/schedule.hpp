@@ -19,10 +19,14 @@ inline float exponential_decay(float from, float to, int step, int steps) {
 
 // The rates of one step; `extent` is the scene's.
 inline learning_rates rates_at(learning_rates rates, float extent, int step, int steps) {
+  double const length = static_cast<double>(std::max(steps, 1)) / std::max(rates.long_run, 1);
+  float const haste = static_cast<float>(std::clamp(1 / std::sqrt(length), 1.0, 4.0));
+  for (float* rate : {&rates.mean, &rates.mean_final, &rates.log_scale, &rates.opacity}) *rate *= haste;
   rates.mean = exponential_decay(rates.mean, rates.mean_final, step, steps) * extent;
   rates.exposure = exponential_decay(rates.exposure, rates.exposure_final, step, steps);
   int const from = static_cast<int>(rates.settle_from * static_cast<float>(steps));
-  float const share = exponential_decay(1.0f, rates.settled, step - from, steps - from);
+  float const settled = static_cast<float>(std::pow(static_cast<double>(rates.settled), std::min(1.0, length)));
+  float const share = exponential_decay(1.0f, settled, step - from, steps - from);
   for (float* rate : {&rates.log_scale, &rates.quaternion, &rates.opacity, &rates.sh_dc, &rates.sh_rest}) *rate *= share;
   return rates;
 }

@@ -1,0 +1,86 @@
+#include "train_fields.hpp"
+
+#include "commands.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+#include <sstream>
+#include <type_traits>
+#include <vector>
+
+namespace gart_cli {
+
+namespace {
+
+using options = gart::train_options;
+
+struct field {
+  char const* name;
+  std::function<void(options&, double)> set;
+};
+
+// `of` gives the member of some options.
+template <class F>
+field named(char const* name, F of) {
+  return {name, [of](options& o, double value) {
+            auto& member = of(o);
+            member = static_cast<std::remove_reference_t<decltype(member)>>(value);
+          }};
+}
+
+std::vector<field> const& fields() {
+  static std::vector<field> const all{
+      named("near", [](options& o) -> float& { return o.near; }),
+      named("ssim_weight", [](options& o) -> float& { return o.ssim_weight; }),
+      named("sh_every", [](options& o) -> int& { return o.sh_every; }),
+      named("rates.mean", [](options& o) -> float& { return o.rates.mean; }),
+      named("rates.mean_final", [](options& o) -> float& { return o.rates.mean_final; }),
+      named("rates.log_scale", [](options& o) -> float& { return o.rates.log_scale; }),
+      named("rates.quaternion", [](options& o) -> float& { return o.rates.quaternion; }),
+      named("rates.opacity", [](options& o) -> float& { return o.rates.opacity; }),
+      named("rates.sh_dc", [](options& o) -> float& { return o.rates.sh_dc; }),
+      named("rates.sh_rest", [](options& o) -> float& { return o.rates.sh_rest; }),
+      named("rates.settled", [](options& o) -> float& { return o.rates.settled; }),
+      named("rates.settle_from", [](options& o) -> float& { return o.rates.settle_from; }),
+      named("rates.long_run", [](options& o) -> int& { return o.rates.long_run; }),
+      named("error.from", [](options& o) -> int& { return o.error.from; }),
+      named("error.every", [](options& o) -> int& { return o.error.every; }),
+      named("error.fill", [](options& o) -> float& { return o.error.fill; }),
+      named("error.until", [](options& o) -> float& { return o.error.until; }),
+      named("error.dead_opacity", [](options& o) -> float& { return o.error.dead_opacity; }),
+      named("error.opacity_penalty", [](options& o) -> float& { return o.error.opacity_penalty; }),
+      named("mcmc.growth", [](options& o) -> float& { return o.mcmc.growth; }),
+      named("mcmc.noise", [](options& o) -> float& { return o.mcmc.noise; }),
+      named("mcmc.opacity_penalty", [](options& o) -> float& { return o.mcmc.opacity_penalty; }),
+      named("mcmc.scale_penalty", [](options& o) -> float& { return o.mcmc.scale_penalty; }),
+      named("adc.gradient", [](options& o) -> float& { return o.adc.gradient; }),
+      named("adc.until", [](options& o) -> float& { return o.adc.until; }),
+      named("adc.opacity_reset_every", [](options& o) -> int& { return o.adc.opacity_reset_every; }),
+  };
+  return all;
+}
+
+}  // namespace
+
+void set_fields(options& o, std::string const& settings) {
+  std::istringstream list(settings);
+  for (std::string one; std::getline(list, one, ',');) {
+    std::size_t const equals = one.find('=');
+    std::string const name = one.substr(0, equals), value = equals == std::string::npos ? "" : one.substr(equals + 1);
+    auto const found = std::find_if(fields().begin(), fields().end(), [&](field const& f) { return f.name == name; });
+    if (found == fields().end()) {
+      std::string names;
+      for (field const& f : fields()) names += std::string(names.empty() ? "" : ", ") + f.name;
+      throw usage_error("--set " + one + ": no such field; there are " + names);
+    }
+    char* end = nullptr;
+    double const number = std::strtod(value.c_str(), &end);
+    if (value.empty() || *end != '\0' || !std::isfinite(number))
+      throw usage_error("--set " + one + ": a finite number belongs after " + name + "=");
+    found->set(o, number);
+  }
+}
+
+}  // namespace gart_cli

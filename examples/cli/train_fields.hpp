@@ -1,0 +1,15 @@
+#pragma once
+// Fields of train_options by name, for `gart train --set NAME=VALUE,...`: the rules of docs/training.md, which have no
+// option of their own.
+
+#include <gart/train/options.hpp>
+
+#include <string>
+
+namespace gart_cli {
+
+// "error.fill=0.25,rates.opacity=0.05". usage_error for a name that there is not, with those there are, and for a value
+// that is no finite number.
+void set_fields(gart::train_options& options, std::string const& settings);
+
+}  // namespace gart_cli
