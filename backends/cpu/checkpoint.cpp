@@ -93,7 +93,7 @@ checkpoint_reader::checkpoint_reader(std::filesystem::path const& path) : path_(
 }
 
 void checkpoint_reader::fail(std::string const& what) const {
-  throw io_error(path_.string(), what, "start again without --resume, or give the folder of a run that was saved");
+  throw io_error(path_.string(), what, "take a checkpoint that was saved whole, or start anew");
 }
 
 std::vector<char> const& checkpoint_reader::find(std::string const& name, std::size_t element,
@@ -191,7 +191,7 @@ training_state read_checkpoint(std::filesystem::path const& path, int sh_degree)
   training_state s = state_of(in);
   if (s.scene.sh_degree != sh_degree) {
     in.fail("is of SH degree " + std::to_string(s.scene.sh_degree) + ", this run of " + std::to_string(sh_degree) +
-            ": give --sh-degree " + std::to_string(s.scene.sh_degree));
+            ": take row_request.sh_degree = " + std::to_string(s.scene.sh_degree));
   }
   return s;
 }

@@ -94,8 +94,8 @@ std::vector<float> neighbor_distance2(std::vector<float> const& position) {
 gaussian_model model_from_points(point_cloud const& points, int sh_degree, float o, float scale,
                                  float least_distance) {
   constexpr float sh_constant = 0.28209479177387814f;
-  if (!(o > 0 && o < 1)) throw invalid_argument("the initial opacity must lie between 0 and 1");
-  if (!(scale > 0)) throw invalid_argument("the initial scale must be positive");
+  if (!(o > 0 && o < 1)) throw invalid_argument("train_options.initial_opacity must lie between 0 and 1");
+  if (!(scale > 0)) throw invalid_argument("train_options.initial_scale must be positive");
   gaussian_model m;
   m.resize(points.size(), sh_degree);
   std::vector<float> const d2 = neighbor_distance2(points.position);
@@ -126,7 +126,7 @@ point_cloud random_points(vec3d lo, vec3d hi, index_t count, u64 seed) {
 }
 
 gaussian_model initial_model(dataset const& data, train_options const& options) {
-  if (options.max_gaussians == 0) throw invalid_argument("--max-gaussians must be at least 1");
+  if (options.max_gaussians == 0) throw invalid_argument("train_options.max_gaussians must be at least 1");
   starting_points const start = choose_start(data, options).value;
   point_cloud points =
       start.random ? random_points(data.bounds_min, data.bounds_max, start.count, options.seed) : data.points;

@@ -89,7 +89,8 @@ compiled_row const& find(row_request const& request) {
   }
   if (best) return *best;
   if (!unavailable.empty())
-    throw unsupported("backend " + unavailable + ": " + reason + "; use --backend openmp, which needs no device");
+    throw unsupported("backend " + unavailable + ": " + reason +
+                      "; use row_request.backend = openmp, which needs no device");
   throw unsupported("no compiled row for " + as_text(request) + "; there are (backend / tracer / backward): " +
                     list_rows() +
                     ". A program compiles rows of its own with GART_REGISTER_ROWS: gart/train/compiled_rows.hpp, shown "

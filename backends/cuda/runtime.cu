@@ -91,7 +91,7 @@ cuda_exec::cuda_exec(int device_index) : device_index_(device_index) {
   if (devices.empty())
     throw unsupported("no CUDA device: " + reason + "; install an NVIDIA driver of CUDA " +
                       std::to_string(CUDART_VERSION / 1000) +
-                      " or later, make a GPU visible (CUDA_VISIBLE_DEVICES), or use --backend openmp");
+                      " or later, make a GPU visible (CUDA_VISIBLE_DEVICES), or use row_request.backend = openmp");
   if (device_index < 0 || device_index >= static_cast<int>(devices.size()))
     throw invalid_argument("CUDA device " + std::to_string(device_index) + " does not exist; there are " +
                            std::to_string(devices.size()) + ", counted from 0");
@@ -148,7 +148,8 @@ void* cuda_exec::allocate(std::size_t bytes) {
     std::size_t free_bytes = 0, total_bytes = 0;
     cudaMemGetInfo(&free_bytes, &total_bytes);
     throw out_of_memory("CUDA device", bytes, free_bytes,
-                        "lower --max-gaussians, raise --downscale, or use --backward hybrid");
+                        "lower train_options.max_gaussians, raise dataset_options.downscale, or use "
+                        "row_request.backward = hybrid");
   }
   check_cuda(code, "allocating memory");
   memory.allocated(bytes);

@@ -104,7 +104,7 @@ image8 three_channels(image8 image) {
 camera downscaled(camera c, int factor, std::string const& where) {
   int const width = c.width / factor, height = c.height / factor;
   if (width < 1 || height < 1) {
-    throw invalid_argument("downscale " + std::to_string(factor) + " leaves nothing of " + where);
+    throw invalid_argument("dataset_options.downscale = " + std::to_string(factor) + " leaves nothing of " + where);
   }
   c.width = width * factor, c.height = height * factor;
   return resized(c, width, height);
@@ -294,8 +294,8 @@ std::vector<dataset_view> load_views(capture& c, dataset_options const& options,
 }
 
 dataset load(fs::path const& path, dataset_options const& options) {
-  if (options.downscale < 1) throw invalid_argument("downscale must be at least 1");
-  if (options.test_every < 0) throw invalid_argument("test_every must be 0 (no test views) or more");
+  if (options.downscale < 1) throw invalid_argument("dataset_options.downscale must be at least 1");
+  if (options.test_every < 0) throw invalid_argument("dataset_options.test_every must be 0 (no test views) or more");
   capture c = read_capture(path);
   drop_frames_without_photo(c, options.load_images);
   dataset data;

@@ -36,11 +36,11 @@ void write_png(std::filesystem::path const& path, image8 const& image) {
 }
 
 image8 box_downscale(image8 const& image, int factor) {
-  if (factor < 1) throw invalid_argument("downscale must be at least 1");
+  if (factor < 1) throw invalid_argument("box_downscale: factor must be at least 1");
   if (factor == 1) return image;
   int const width = image.width / factor, height = image.height / factor, channels = image.channels;
   if (width < 1 || height < 1) {
-    throw invalid_argument("downscale " + std::to_string(factor) + " leaves nothing of an image of " +
+    throw invalid_argument("box_downscale: factor " + std::to_string(factor) + " leaves nothing of an image of " +
                            std::to_string(image.width) + " x " + std::to_string(image.height));
   }
   bool const alpha = channels == 4;

@@ -1,6 +1,7 @@
 // The `gart` program: trains, renders and scores scenes of ray-traced 3D Gaussians from the command line.
 
 #include "commands.hpp"
+#include "field_names.hpp"
 #include "help.hpp"
 
 #include <gart/core/version.hpp>
@@ -80,6 +81,6 @@ int main(int argc, char** argv) {
   } catch (std::bad_alloc const&) {
     return fail("out of host memory (lower --max-gaussians, or raise --downscale)", exit_failed);
   } catch (std::exception const& e) {
-    return fail(e.what(), exit_failed);
+    return fail(in_options(e.what()), exit_failed);
   }
 }

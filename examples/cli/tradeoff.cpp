@@ -1,4 +1,5 @@
 #include "commands.hpp"
+#include "field_names.hpp"
 #include "options.hpp"
 #include "output.hpp"
 #include "processor_time.hpp"
@@ -75,7 +76,7 @@ class tradeoff_run {
       try {
         gart::resolve(settings_[i].use.row);
       } catch (gart::unsupported const& e) {
-        result["absent"].push_back({{"name", settings_[i].name()}, {"why", e.what()}});
+        result["absent"].push_back({{"name", settings_[i].name()}, {"why", in_options(e.what())}});
         continue;
       }
       result["settings"].push_back(measure(settings_[i]));

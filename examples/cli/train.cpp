@@ -177,7 +177,11 @@ class training_run {
     check_same_dataset(a_, data_);
     nlohmann::json config = read_json(a_.config_file());
     chosen_ = chosen_before(config, chosen_);
-    session_->load(a_.checkpoint_file());
+    try {
+      session_->load(a_.checkpoint_file());
+    } catch (gart::io_error const& e) {
+      throw gart::error(std::string(e.what()) + "; without --resume the run starts anew, --out names another");
+    }
     int const step = session_->steps_done();
     // It tells how much of a time budget is used.
     if (a_.time_budget > 0 || fs::exists(a_.history_file())) course_.restore(a_.history_file(), step);

@@ -211,7 +211,7 @@ TEST_CASE_TEMPLATE("memory that cannot be had is refused with the bytes asked", 
   } catch (out_of_memory const& e) {
     CHECK(e.asked == asked);
     CHECK(e.available > 0);
-    CHECK(std::string(e.what()).find("--max-gaussians") != std::string::npos);
+    CHECK(std::string(e.what()).find("train_options.max_gaussians") != std::string::npos);
   }
   CHECK(exec.memory.current == 0);
   buffer<u32, E> after(exec, numbers(10));

@@ -17,7 +17,7 @@ class limited_exec : public gart::serial_exec {
   void* allocate(std::size_t bytes) {
     std::size_t const used = static_cast<std::size_t>(memory.current);
     if (used + bytes > most)
-      throw gart::out_of_memory("limited", bytes, most - used, "lower --max-gaussians or raise --downscale");
+      throw gart::out_of_memory("limited", bytes, most - used, "lower train_options.max_gaussians");
     return gart::serial_exec::allocate(bytes);
   }
 };

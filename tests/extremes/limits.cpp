@@ -71,7 +71,7 @@ TEST_CASE_TEMPLATE("sums past 2^32 and pairs past 2^31", E, GART_TEST_POLICIES) 
   } catch (gart::out_of_memory const& e) {
     CHECK(e.asked == prints.pairs() * 16);
     CHECK(holds(e.what(), std::to_string(prints.pairs())));
-    CHECK(holds(e.what(), "--max-gaussians"));
+    CHECK(holds(e.what(), "train_options.max_gaussians"));
   }
   CHECK(exec.memory.current == before);
 
@@ -106,7 +106,7 @@ TEST_CASE_TEMPLATE("more Gaussians than indices", E, GART_TEST_POLICIES) {
   E exec;
   gart::gaussians<E> scene(exec, 0, 0);
   CHECK(holds(error_of([&] { scene.resize_keep(gart::most_gaussians + 1); }), "268435456"));
-  CHECK(holds(error_of([&] { scene.resize_keep((std::size_t{1} << 32) + 5); }), "--max-gaussians"));
+  CHECK(holds(error_of([&] { scene.resize_keep((std::size_t{1} << 32) + 5); }), "train_options.max_gaussians"));
   CHECK(exec.memory.current == 0);
 }
 

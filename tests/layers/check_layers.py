@@ -3,7 +3,8 @@
 What it asks for: every folder has a line in layers.txt; a header includes only folders its line names; nothing in
 include/gart includes a backend; GLM is included in math/glm.hpp alone; x.hpp, which must be safe for any host compiler,
 includes no .cuh; what is included is there; a header that opens namespace gart, outside of the instruction set's, has a
-line in interface.txt.
+line in interface.txt. The library speaks of fields, not of a program's options: no "--option" in its strings and comments,
+and each field that a string names as `struct.field` has an option in the program's table.
 """
 import pathlib
 import re
@@ -11,6 +12,10 @@ import sys
 import tempfile
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
+STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
+OPTION = re.compile(r"""^"--|(?<![^\s(`"'])--[a-z"]""")
+FIELD = re.compile(r"\b(?:train_options|render_options|dataset_options|row_request)\.[a-z_]+")
+FIELD_TABLE = "examples/cli/field_names.cpp"
 SUFFIXES = {".hpp", ".cuh", ".cpp", ".cu", ".h"}
 
 
@@ -34,10 +39,27 @@ def opens_gart(path):
     return path.exists() and re.search(r"^namespace gart(::\w+)* \{", path.read_text(), re.M) is not None
 
 
+def fields_of(table):
+    """What the program has an option for: its lines GART_CLI_FIELD(struct, field)."""
+    return {f"{struct}.{field}" for struct, field in re.findall(r"GART_CLI_FIELD\((\w+), (\w+)\),", table)}
+
+
+def wrong_words(line, fields):
+    """What is wrong in a line's strings and comment."""
+    strings = STRING.findall(line)
+    comment = STRING.sub("", line).partition("//")[2]
+    if any(OPTION.search(text) for text in [comment, *strings]):
+        yield "names an option of a program; name the field, as core/error.hpp says"
+    for field in (f for s in strings for f in FIELD.findall(s)):
+        if field not in fields:
+            yield f"{field} has no line in {FIELD_TABLE}, and the program's user would read it"
+
+
 def violations(root, layers, interface):
     found = [f"{root / 'include' / 'gart' / name}: is in cmake/interface.txt, and does not open namespace gart"
              for name in sorted(interface) if not opens_gart(root / "include" / "gart" / name)]
     headers = root / "include" / "gart"
+    fields = fields_of((root / FIELD_TABLE).read_text())
     for path in sorted([*headers.rglob("*"), *(root / "backends").rglob("*")]):
         if path.suffix not in SUFFIXES:
             continue
@@ -51,6 +73,7 @@ def violations(root, layers, interface):
             found.append(f"{path}: lies in namespace gart: open gart::inline GART_ISA (core/isa.hpp), or give it a line in "
                          "cmake/interface.txt where compiled libraries define or take what is in it")
         for number, line in enumerate(path.read_text().splitlines(), 1):
+            found += [f"{path}:{number}: {wrong}" for wrong in wrong_words(line, fields)]
             match = INCLUDE.match(line)
             if not match:
                 continue
@@ -85,9 +108,12 @@ def self_check(layers):
         "include/gart/math/h.hpp": "namespace gart::inline GART_ISA::detail {}\n",
         "include/gart/math/i.hpp": "namespace gart::detail {}\n",
         "include/gart/math/j.hpp": "namespace gart {}\n",
+        "include/gart/math/k.hpp": 'f("lower " "--points");\n// (--points)\n--points;  // of "a--b"\n',
+        "include/gart/math/l.hpp": 'f("raise train_options.points or train_options.seed");\n',
+        FIELD_TABLE: '{GART_CLI_FIELD(train_options, points), "--points"},\n',
     }
     expected = {"core/a.hpp:1", "train/b.hpp:2", "math/c.hpp:1", "exec/e.hpp:1", "exec/f.cuh:1", "attic/g.hpp",
-                "math/h.hpp", "math/i.hpp"}
+                "math/h.hpp", "math/i.hpp", "math/k.hpp:1", "math/k.hpp:2", "math/l.hpp:1"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for name, text in wrong.items():
@@ -104,5 +130,5 @@ layers = read_layers(root / "cmake" / "layers.txt")
 self_check(layers)
 lines = (root / "cmake" / "interface.txt").read_text().splitlines()
 found = violations(root, layers, {line for line in lines if line and not line.startswith("#")})
-print("\n".join(found) or "includes follow cmake/layers.txt, namespaces cmake/interface.txt")
+print("\n".join(found) or "includes follow cmake/layers.txt, namespaces cmake/interface.txt, messages name fields")
 sys.exit(1 if found else 0)

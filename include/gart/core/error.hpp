@@ -1,6 +1,8 @@
 #pragma once
 // The errors gart throws. Each message says what was wrong, where, and what to do about it; the types let a program
-// react without reading the text.
+// react without reading the text. A setting is named by its field, `struct.field`, with ` = value` after it where the
+// remedy is a value: "raise dataset_options.downscale", "use row_request.backend = openmp". A program whose settings
+// have other names replaces these in what it shows (examples/cli/field_names.hpp).
 
 #include <cstddef>
 #include <stdexcept>
@@ -30,7 +32,7 @@ struct invalid_argument : error {
   using error::error;
 };
 
-// Memory that could not be had. `advice` names the options that lower the need. 0 free bytes: not a matter of what is
+// Memory that could not be had. `advice` names the fields that lower the need. 0 free bytes: not a matter of what is
 // free.
 struct out_of_memory : error {
   out_of_memory(std::string const& where, std::size_t asked_bytes, std::size_t free_bytes, std::string const& advice)

@@ -30,7 +30,9 @@ class host_memory {
 
   void* allocate(std::size_t bytes) {
     void* p = ::operator new(bytes, alignment_of(bytes), std::nothrow);
-    if (!p) throw out_of_memory("host", bytes, free_bytes(), "lower --max-gaussians or raise --downscale");
+    if (!p)
+      throw out_of_memory("host", bytes, free_bytes(),
+                          "lower train_options.max_gaussians or raise dataset_options.downscale");
 #if defined(MADV_HUGEPAGE)
     // A hint: without it what reads slots all over a buffer waits for the addresses of its pages too.
     if (bytes >= large) madvise(p, bytes, MADV_HUGEPAGE);

@@ -119,9 +119,9 @@ class finite_check {
     std::string const remedy =
         moment == 0
             ? "Adam leaves updates out that are not finite: look at this Gaussian in what the run started or was "
-              "resumed from, and train with --densify none, which tells whether densification made it"
+              "resumed from, and train with train_options.densify = none, which tells whether densification made it"
             : "moments begin with zero and Adam writes finite ones alone: look at the checkpoint that the run was "
-              "resumed from, and train with --densify none, which tells whether densification made it";
+              "resumed from, and train with train_options.densify = none, which tells whether densification made it";
     throw not_finite(where + ": " + numbers + std::to_string(gaussian) + place + " (" + remedy + ")", name, gaussian);
   }
 

@@ -29,16 +29,17 @@ inline constexpr float least_alpha_min = 1e-30f;
 
 inline void require_options(render_options const& o) {
   auto const refuse = [](char const* what, float value) {
-    throw invalid_argument("render options: " + std::string(what) + ", not " + std::to_string(value));
+    throw invalid_argument(std::string(what) + ", not " + std::to_string(value));
   };
   if (!(o.alpha_min >= least_alpha_min && o.alpha_min < 1))
-    refuse("alpha_min must lie between 1e-30 and 1", o.alpha_min);
+    refuse("render_options.alpha_min must lie between 1e-30 and 1", o.alpha_min);
   if (!(o.transmittance_min >= 0 && o.transmittance_min < 1))
-    refuse("transmittance_min must be at least 0 and less than 1", o.transmittance_min);
-  if (!(o.near > 0 && is_finite(o.near))) refuse("near must be positive and finite", o.near);
-  if (!(o.antialias >= 0 && o.antialias <= 100)) refuse("antialias must lie between 0 and 100 pixels", o.antialias);
+    refuse("render_options.transmittance_min must be at least 0 and less than 1", o.transmittance_min);
+  if (!(o.near > 0 && is_finite(o.near))) refuse("render_options.near must be positive and finite", o.near);
+  if (!(o.antialias >= 0 && o.antialias <= 100))
+    refuse("render_options.antialias must lie between 0 and 100 pixels", o.antialias);
   for (int k = 0; k < 3; ++k)
-    if (!is_finite(o.background[k])) refuse("the background must be finite", o.background[k]);
+    if (!is_finite(o.background[k])) refuse("render_options.background must be finite", o.background[k]);
 }
 
 }  // namespace gart

@@ -61,7 +61,8 @@ inline camera_fault fault_of(camera const& c) {
   if (c.width < 1 || c.height < 1) return {"the image size is not positive", "correct the width and height"};
   // Boxes count pixels in 16 bits, launches in 32, padded to blocks of 8 x 4.
   if (c.width > 65535 || c.height > 65535 || (u64(c.width) + 7) / 8 * 8 * ((u64(c.height) + 3) / 4 * 4) > 0xffffffffu)
-    return {"the image is larger than 65535 pixels a side or 2^32 in all", "render it in parts, or raise --downscale"};
+    return {"the image is larger than 65535 pixels a side or 2^32 in all",
+            "render it in parts, or raise dataset_options.downscale"};
   if (!(c.fx > 0 && c.fy > 0 && finite(c.fx, c.fy)))
     return {"the focal length is not a positive number", "correct fx and fy"};
   if (!finite(c.cx, c.cy)) return {"the principal point is not finite", "correct cx and cy"};

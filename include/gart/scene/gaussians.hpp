@@ -24,7 +24,7 @@ inline constexpr std::size_t most_gaussians = std::size_t{1} << 28;
 inline void require_count(std::size_t n) {
   if (n > most_gaussians)
     throw invalid_argument(std::to_string(n) + " Gaussians are more than the " + std::to_string(most_gaussians) +
-                           " that a scene can hold: lower --max-gaussians");
+                           " that a scene can hold: lower train_options.max_gaussians");
 }
 
 GART_HD constexpr int sh_coefficients(int degree) { return (degree + 1) * (degree + 1); }

@@ -1,6 +1,6 @@
 #pragma once
-// The filter of a camera's pixels (--antialias): a Gaussian whose standard deviation at a point is so many pixels, as
-// far as a pixel reaches there,
+// The filter of a camera's pixels (render_options.antialias): a Gaussian whose standard deviation at a point is so many
+// pixels, as far as a pixel reaches there,
 //   r = pixels x angle of a pixel x distance,   angle = the square root of a pixel's solid angle,
 // which for slopes x, y through a lens of Jacobian J (scene/camera.hpp; 1 without one) is
 //   angle^2 = (1 + x^2 + y^2)^-3/2 / (fx fy det J).

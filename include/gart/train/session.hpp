@@ -21,7 +21,7 @@
 
 namespace gart {
 
-// Names as on the command line. "auto" and 0: the best there is on this machine.
+// "auto" and 0: the best there is on this machine.
 struct row_request {
   std::string backend = "auto";   // auto serial openmp cuda
   std::string tracer = "auto";    // auto bvh embree tiles

@@ -1,0 +1,21 @@
+#pragma once
+// The library's errors name settings by their fields (core/error.hpp), the program's user knows options: the one table
+// between them.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace gart_cli {
+
+struct field_name {
+  std::string_view field;   // "train_options.max_gaussians"
+  std::string_view option;  // "--max-gaussians"
+};
+
+std::vector<field_name> const& field_names();
+
+// A message of the library as the program shows it: each field as its option, `field = value` as `--option value`.
+std::string in_options(std::string_view message);
+
+}  // namespace gart_cli

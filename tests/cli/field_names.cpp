@@ -1,0 +1,54 @@
+// The library's errors name fields; the program shows its options instead.
+
+#include "program.hpp"
+
+#include <field_names.hpp>
+
+#include <support/policies.hpp>
+
+using namespace cli_test;
+
+TEST_CASE("a message names options where the library names fields") {
+  using gart_cli::in_options;
+  CHECK(in_options("lower train_options.max_gaussians, raise dataset_options.downscale, or use row_request.backward = "
+                   "hybrid") == "lower --max-gaussians, raise --downscale, or use --backward hybrid");
+  CHECK(in_options("(row_request.tracer = tiles or bvh)") == "(--tracer tiles or bvh)");
+  CHECK(in_options("render_options.transmittance_min") == "--t-min");
+  // A field at the end of a sentence, and a value that is not this field's.
+  CHECK(in_options("raise dataset_options.downscale. = 3") == "raise --downscale. = 3");
+  // What only looks like a field, in a path for one, stays.
+  for (std::string const text : {"", "...", "my_train_options.seed", "train_options.seeds", "train_options.seed.png",
+                                 "train_options", "a = b"}) {
+    CAPTURE(text);
+    CHECK(in_options(text) == text);
+  }
+}
+
+TEST_CASE("every option that a field is shown as is one of train") {
+  folder const here;
+  std::string const help = here.gart("train --help").out;
+  for (auto const& [field, option] : gart_cli::field_names()) {
+    CAPTURE(field);
+    if (option.substr(0, 2) == "--") CHECK_MESSAGE(has(help, "  " + std::string(option)), option);
+  }
+}
+
+TEST_CASE("the user of the program reads of options") {
+  folder const here;
+  gart::write_splat_ply(here / "model.ply", one_gaussian());
+  gart::write_file(here / "large.json",
+                   R"([{"name": "a", "width": 70000, "height": 4, "fx": 4, "fy": 4, "cx": 2, "cy": 2,
+                        "c2w": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}])");
+  auto const large = here.gart("render model.ply large.json --out made --backend serial --quiet");
+  CHECK(large.code == 1);
+  CHECK_MESSAGE(has(large.err, "or raise --downscale)"), large.err);
+  CHECK_FALSE(has(large.err, "_options."));
+
+  write_capture(here / "capture");
+  std::string const run = "train capture --out run --iterations 2 --backend serial --quiet --max-gaussians 60";
+  REQUIRE(here.gart(run).code == 0);
+  gart::write_file(here / "run/checkpoint.gart", "cut");
+  auto const resumed = here.gart("train --resume --out run");
+  CHECK(resumed.code == 1);
+  CHECK_MESSAGE(has(resumed.err, "without --resume the run starts anew"), resumed.err);
+}
