@@ -317,15 +317,30 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
 
   double widest = 0, exchanged_squared = 0;
   for (step const& s : steps) widest = std::max(widest, s.h.t_slack);
-  for (std::size_t i = 0; i < steps.size(); ++i)
-    for (std::size_t j = i + 1; j < steps.size() && steps[j].h.t - steps[i].h.t <= steps[i].h.t_slack + widest; ++j) {
-      step const &a = steps[i], &b = steps[j];
-      if (!tied(a.h, b.h)) continue;
-      double const contrast = a.transmittance * (a.color - b.color).cwiseAbs().maxCoeff();
-      double const exchanged = contrast * a.h.alpha * b.h.alpha;
-      out.rounding += exchanged;
-      exchanged_squared += 2 * exchanged * exchanged;
-    }
+  // What a hit's own gradient may lose or gain by trading places with others. Those of one geometry (equal in every bit
+  // of t) trade together, the rest each on its own.
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    step const& a = steps[i];
+    Vector3d together = Vector3d::Zero();
+    double last_t = a.h.t;
+    auto const trade = [&](step const& b, double transmittance) {
+      if (!tied(a.h, b.h)) return 0.0;
+      Vector3d const exchanged = (a.color - b.color) * (transmittance * a.h.alpha * b.h.alpha);
+      if (b.h.t != last_t) {
+        double const all = together.cwiseAbs().maxCoeff();
+        exchanged_squared += all * all;
+        together.setZero(), last_t = b.h.t;
+      }
+      together += exchanged;
+      return exchanged.cwiseAbs().maxCoeff();
+    };
+    for (std::size_t j = i; j-- > 0 && a.h.t - steps[j].h.t <= a.h.t_slack + widest;)
+      trade(steps[j], steps[j].transmittance);
+    for (std::size_t j = i + 1; j < steps.size() && steps[j].h.t - a.h.t <= a.h.t_slack + widest; ++j)
+      out.rounding += trade(steps[j], a.transmittance);
+    double const all = together.cwiseAbs().maxCoeff();
+    exchanged_squared += all * all;
+  }
   out.slope_rounding = exchanged_squared > 0 ? std::sqrt(exchanged_squared / slope_squared) : 0;
   steps.erase(std::remove_if(steps.begin(), steps.end(), [](step const& s) { return !s.h.counted; }), steps.end());
   return steps;
