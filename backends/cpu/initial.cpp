@@ -91,8 +91,7 @@ std::vector<float> neighbor_distance2(std::vector<float> const& position) {
   return out;
 }
 
-gaussian_model model_from_points(point_cloud const& points, int sh_degree, float o, float scale,
-                                 float least_distance) {
+gaussian_model model_from_points(point_cloud const& points, int sh_degree, float o, float scale, float least_distance) {
   constexpr float sh_constant = 0.28209479177387814f;
   if (!(o > 0 && o < 1)) throw invalid_argument("train_options.initial_opacity must lie between 0 and 1");
   if (!(scale > 0)) throw invalid_argument("train_options.initial_scale must be positive");

@@ -43,8 +43,7 @@ std::string peculiarities(row_info const& r) {
 std::string list_rows() {
   std::vector<std::pair<std::string, std::set<int>>> kinds;
   for (auto const& r : rows()) {
-    std::string const kind =
-        r.row.backend + " / " + r.row.tracer + " / " + r.row.backward + peculiarities(r.row);
+    std::string const kind = r.row.backend + " / " + r.row.tracer + " / " + r.row.backward + peculiarities(r.row);
     auto const same = std::find_if(kinds.begin(), kinds.end(), [&](auto const& k) { return k.first == kind; });
     (same == kinds.end() ? kinds.emplace_back(kind, std::set<int>{}) : *same).second.insert(r.row.sh_degree);
   }
@@ -91,8 +90,8 @@ compiled_row const& find(row_request const& request) {
   if (!unavailable.empty())
     throw unsupported("backend " + unavailable + ": " + reason +
                       "; use row_request.backend = openmp, which needs no device");
-  throw unsupported("no compiled row for " + as_text(request) + "; there are (backend / tracer / backward): " +
-                    list_rows() +
+  throw unsupported("no compiled row for " + as_text(request) +
+                    "; there are (backend / tracer / backward): " + list_rows() +
                     ". A program compiles rows of its own with GART_REGISTER_ROWS: gart/train/compiled_rows.hpp, shown "
                     "by examples/5_own_row");
 }

@@ -98,8 +98,9 @@ void embree_scene::build(span<box const> boxes) {
     throw error("Embree failed to build over " + std::to_string(boxes.size()) + " boxes (error " +
                 std::to_string(static_cast<int>(code)) + ")");
   if (handles_->source.beyond)
-    throw unsupported("a Gaussian reaches 1.8e18 units from the camera, where Embree's coordinates end: take another "
-                      "tracer (row_request.tracer = tiles or bvh), or remove it");
+    throw unsupported(
+        "a Gaussian reaches 1.8e18 units from the camera, where Embree's coordinates end: take another "
+        "tracer (row_request.tracer = tiles or bvh), or remove it");
 }
 
 void embree_scene::intersect(vec3 origin, vec3 direction, float near, float far, leaf_function leaf,

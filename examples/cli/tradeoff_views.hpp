@@ -31,7 +31,7 @@ struct view_choice {
 struct view_set {
   std::vector<tradeoff_view> views;
   std::string background = "black";  // what suits the photographs
-  float extent = 1;    // of the scene: what Adam's steps of the means are measured in
+  float extent = 1;                  // of the scene: what Adam's steps of the means are measured in
 };
 view_set load_views(std::filesystem::path const& cameras, view_choice const& choice);
 

@@ -345,15 +345,16 @@ class training_run {
     std::vector<report_view> shown;
     stopwatch const writing;
     double const tests_before = test_seconds_;
-    scores const result = test(session_->steps_done(), [&](std::size_t i, view_score const& s,
-                                                           gart::image_float const& render,
-                                                           gart::image_float const& truth) {
-      gart::write_png(a_.out / "renders" / (s.name + ".png"), gart::to_8bit(render));
-      gart::write_png(a_.out / "renders" / (s.name + "_truth.png"), gart::to_8bit(truth));
-      if (in_report(i, data_.test.size())) shown.push_back(make_report_view(s.name, s.psnr, s.ssim, render, truth));
-      say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
-                 static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
-    });
+    scores const result =
+        test(session_->steps_done(),
+             [&](std::size_t i, view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
+               gart::write_png(a_.out / "renders" / (s.name + ".png"), gart::to_8bit(render));
+               gart::write_png(a_.out / "renders" / (s.name + "_truth.png"), gart::to_8bit(truth));
+               if (in_report(i, data_.test.size()))
+                 shown.push_back(make_report_view(s.name, s.psnr, s.ssim, render, truth));
+               say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
+                          static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
+             });
     say_.state("testing on training views", 1);
     stopwatch const training_views;
     scores const training = score(evenly_spread(data_.train, data_.test.size()));

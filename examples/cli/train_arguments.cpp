@@ -39,7 +39,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(between(0, 1e9));
   in_group(
       r.add(train, "--densify", a.densify, "NAME",
-            "How Gaussians are added: error (those split through which\nthe image's error is seen, up to --max-gaussians), mcmc\n(copies by opacity, random steps), adc (clones and splits by\ngradient) or none"))
+            "How Gaussians are added: error (those split through which\nthe image's error is seen, up to "
+            "--max-gaussians), mcmc\n(copies by opacity, random steps), adc (clones and splits by\ngradient) or none"))
       ->check(one_of({"error", "mcmc", "adc", "none"}));
   in_group(r.add_flag(train, "--auto,!--no-auto", a.automatic,
                       "Model only what the scene requires: measure on held-out\ntraining views which bands of "
@@ -71,7 +72,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "views that show a\nsmall part of a large scene"))
       ->check(one_of({"all", "seen"}));
   in_group(r.add(train, "--set", a.set, "NAME=VALUE,...",
-                 "Rules by name, for measuring them: error.fill=0.25,\nrates.opacity=0.05 and so on (docs/training.md); a name that\nthere is not lists those there are"));
+                 "Rules by name, for measuring them: error.fill=0.25,\nrates.opacity=0.05 and so on "
+                 "(docs/training.md); a name that\nthere is not lists those there are"));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
   in_group(r.add(train, "--seed", a.seed, "N",
                  "Seed of everything random; on the serial backend the same\nseed gives the same bits"))
@@ -212,8 +214,8 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.random_points = std::min(a.points, a.max_gaussians);
   o.densify = a.densify == "error"  ? gart::densify_kind::error
               : a.densify == "mcmc" ? gart::densify_kind::mcmc
-              : a.densify == "adc" ? gart::densify_kind::adc
-                                   : gart::densify_kind::none;
+              : a.densify == "adc"  ? gart::densify_kind::adc
+                                    : gart::densify_kind::none;
   o.initial_opacity = a.initial_opacity;
   o.initial_scale = a.initial_scale;
   o.exposure = a.exposure == "on";

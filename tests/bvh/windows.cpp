@@ -27,7 +27,7 @@ struct fill_window {
   u32* sizes;
   float* far;  // [streams][stride + 1], before the first hit and after each
   GART_KERNEL void operator()(gart::index_t i) const {
-    gart::hit_window<Capacity> w;
+    gart::k_buffer<Capacity> w;
     w.clear();
     float* const reach = far + static_cast<std::size_t>(i) * (stride + 1);
     reach[0] = w.far();

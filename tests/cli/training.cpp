@@ -103,8 +103,8 @@ TEST_CASE("what a capture asks for is said with its reasons, measured, kept, and
   for (auto const& t : metrics["sh_trials"]) {
     CHECK(t["band"] == expected);
     CHECK(t["gain"].get<double>() == doctest::Approx(t["psnr_with"].get<double>() - t["psnr_without"].get<double>()));
-    CHECK(t["kept"].get<bool>() == (t["forecast"].get<double>() >= t["gain_wanted"].get<double>() ||
-                                    t["gain_error"].get<double>() > 0.05));
+    CHECK(t["kept"].get<bool>() ==
+          (t["forecast"].get<double>() >= t["gain_wanted"].get<double>() || t["gain_error"].get<double>() > 0.05));
     if (!t["kept"].get<bool>()) --expected;
   }
   CHECK(metrics["sh_degree"] == expected);

@@ -59,8 +59,8 @@ TEST_CASE_TEMPLATE("sums past 2^32 and pairs past 2^31", E, GART_TEST_POLICIES) 
   prints.measure(exec, scene.view(), view, 1.0f / 255, 0.01f);
   CHECK(prints.pairs() == u64{40} * 8192 * 8191);
   CHECK(prints.slots() == u64{40} * 65535 * 65528);
-  gart::buffer<gart::lt_range, E> ranges(exec, 40);
-  exec.copy(ranges.data(), prints.ranges().data(), 40 * sizeof(gart::lt_range));
+  gart::buffer<gart::footprint_slots, E> ranges(exec, 40);
+  exec.copy(ranges.data(), prints.ranges().data(), 40 * sizeof(gart::footprint_slots));
   CHECK(ranges.to_host()[39].offset == u64{39} * 65535 * 65528);
 
   auto const before = exec.memory.current;

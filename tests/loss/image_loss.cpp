@@ -75,7 +75,7 @@ TEST_CASE_TEMPLATE("loss and gradient are those of the definition", E, GART_TEST
     double noise;
     float weight;
   } const cases[] = {{37, 21, 3, false, 0.5, 0.2f}, {33, 17, 4, false, 0.02, 0.2f}, {32, 16, 3, true, 0.3, 0.5f},
-                     {5, 40, 4, true, 0.3, 1.0f},   {1, 1, 3, false, 0.5, 0.2f},     {110, 7, 3, false, 0.2, 0.0f}};
+                     {5, 40, 4, true, 0.3, 1.0f},   {1, 1, 3, false, 0.5, 0.2f},    {110, 7, 3, false, 0.2, 0.0f}};
   for (auto const& c : cases) {
     CAPTURE(c.width);
     CAPTURE(c.height);

@@ -28,7 +28,8 @@ struct training {
   adaptive_density<E> density;
 
   explicit training(gaussian_model const& m, index_t most = 1000, adc_options const& options = {})
-      : model(exec, m), state(exec, static_cast<index_t>(m.size()), m.sh_degree),
+      : model(exec, m),
+        state(exec, static_cast<index_t>(m.size()), m.sh_degree),
         density(exec, options, most, 30000, 1.0f, 5) {
     gaussian_model ones = m;
     for (auto* v : {&ones.mean, &ones.log_scale, &ones.quaternion, &ones.opacity, &ones.sh})
@@ -134,8 +135,7 @@ TEST_CASE_TEMPLATE("keep, clone, split and prune", E, GART_TEST_POLICIES) {
   CHECK(gart_test::row(got, 2) == gart_test::row(m, 1));
   CHECK(gart_test::row(got, 5) == gart_test::row(m, 6));
   for (index_t i = 3; i < 5; ++i) {
-    for (int c = 0; c < 3; ++c)
-      CHECK(got.log_scale[3 * i + c] == doctest::Approx(m.log_scale[6 + c] - std::log(1.6)));
+    for (int c = 0; c < 3; ++c) CHECK(got.log_scale[3 * i + c] == doctest::Approx(m.log_scale[6 + c] - std::log(1.6)));
     CHECK(got.opacity[i] == m.opacity[2]);
     CHECK(got.mean[3 * i] != m.mean[6]);
   }

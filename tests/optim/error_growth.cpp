@@ -82,7 +82,8 @@ TEST_CASE("halves end where the whole ended, and are as thick in their middles a
     double const q3 = std::abs(body[longest]) / reach;
     for (int k = 0; k < 3; ++k)
       if (k != longest)
-        CHECK(std::exp(double{half.log_scale[k]} - log_scale[k]) == doctest::Approx(std::sqrt(1 - q3 * q3)).epsilon(1e-4));
+        CHECK(std::exp(double{half.log_scale[k]} - log_scale[k]) ==
+              doctest::Approx(std::sqrt(1 - q3 * q3)).epsilon(1e-4));
     CHECK(half.opacity == doctest::Approx(0.3));
   }
 }

@@ -164,8 +164,12 @@ TEST_CASE_TEMPLATE("more than 2^24 Gaussians can be drawn from", E, GART_TEST_PO
   copies.zero();
   exclusive_scan(exec, span<u32 const>(weight), before.view(), total.view());
   parallel_for(exec, "draw", draws,
-               detail::mcmc_draw_kernel<E>{before.data(), total.data(), static_cast<index_t>(n),
-                                           {5, 1, random_use::user}, source.data(), copies.data()});
+               detail::mcmc_draw_kernel<E>{before.data(),
+                                           total.data(),
+                                           static_cast<index_t>(n),
+                                           {5, 1, random_use::user},
+                                           source.data(),
+                                           copies.data()});
   int high_odd = 0, high_even = 0;
   random_source const random{5, 1, random_use::user};
   auto const drawn = source.to_host();

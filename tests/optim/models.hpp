@@ -29,8 +29,9 @@ inline double logit(double p) { return std::log(p / (1 - p)); }
 
 // Row i as floats in the order of rows.hpp.
 inline std::vector<float> row(gart::gaussian_model& m, gart::index_t i) {
-  gart::gaussians_view<float> const v{m.mean.data(), m.log_scale.data(), m.quaternion.data(), m.opacity.data(),
-                                      m.sh.data(),   static_cast<gart::index_t>(m.size()), m.sh_degree};
+  gart::gaussians_view<float> const v{m.mean.data(),    m.log_scale.data(), m.quaternion.data(),
+                                      m.opacity.data(), m.sh.data(),        static_cast<gart::index_t>(m.size()),
+                                      m.sh_degree};
   std::vector<float> out;
   for (gart::index_t c = 0; c < gart::row_width(m.sh_degree); ++c) out.push_back(gart::row_element(v, i, c));
   return out;

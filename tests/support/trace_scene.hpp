@@ -163,9 +163,8 @@ gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, ga
 inline std::vector<std::string> strategies_for(tracer_kind kind, int degree) {
   if (kind == tracer_kind::embree) return {"pixel"};
   if (kind == tracer_kind::tiles)
-    return degree == 3
-               ? std::vector<std::string>{"pixel", "hybrid", "primitive", "deterministic", "cleared", "lane"}
-               : std::vector<std::string>{"primitive"};
+    return degree == 3 ? std::vector<std::string>{"pixel", "hybrid", "primitive", "deterministic", "cleared", "lane"}
+                       : std::vector<std::string>{"primitive"};
   return degree == 3 ? std::vector<std::string>{"pixel", "hybrid", "primitive"} : std::vector<std::string>{"pixel"};
 }
 

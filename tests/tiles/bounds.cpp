@@ -107,11 +107,16 @@ TEST_CASE("no hit outside its box or nearer than its depth, and boxes are tight"
   struct {
     placement where;
     double ratio, missed;
-  } const limits[] = {{placement::ordinary, 1.1, 1},          {placement::across_near_plane, 1.6, 200},
-                      {placement::around_camera, 1.6, 1300},  {placement::behind, 3, 170},
-                      {placement::pancake, 1.9, 300},         {placement::sub_pixel, 1.6, 0.1},
-                      {placement::whole_screen, 1.1, 1},      {placement::far_away, 1.25, 1},
-                      {placement::far_from_origin, 1.1, 1},   {placement::tiny_near, 1.6, 500},
+  } const limits[] = {{placement::ordinary, 1.1, 1},
+                      {placement::across_near_plane, 1.6, 200},
+                      {placement::around_camera, 1.6, 1300},
+                      {placement::behind, 3, 170},
+                      {placement::pancake, 1.9, 300},
+                      {placement::sub_pixel, 1.6, 0.1},
+                      {placement::whole_screen, 1.1, 1},
+                      {placement::far_away, 1.25, 1},
+                      {placement::far_from_origin, 1.1, 1},
+                      {placement::tiny_near, 1.6, 500},
                       {placement::lens, 1.4, 60}};
   for (int k = 0; k < static_cast<int>(placement::count); ++k) {
     placement const where = static_cast<placement>(k);

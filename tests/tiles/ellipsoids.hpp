@@ -30,10 +30,20 @@ enum class placement {
 };
 
 inline char const* name_of(placement p) {
-  constexpr char const* names[] = {"ordinary",     "across the near plane", "around the camera", "behind",
-                                   "needle",       "pancake",               "near tip",          "sub-pixel",
-                                   "whole screen", "far away",              "any scale",         "far from the origin",
-                                   "tiny near",    "distorted lens"};
+  constexpr char const* names[] = {"ordinary",
+                                   "across the near plane",
+                                   "around the camera",
+                                   "behind",
+                                   "needle",
+                                   "pancake",
+                                   "near tip",
+                                   "sub-pixel",
+                                   "whole screen",
+                                   "far away",
+                                   "any scale",
+                                   "far from the origin",
+                                   "tiny near",
+                                   "distorted lens"};
   return names[static_cast<int>(p)];
 }
 
@@ -119,8 +129,12 @@ class ellipsoid_source {
         align(g, c, along, true);
         return placed(g, c, at, {tip.z * log_uniform(1e-3, 0.1), tip.z * log_uniform(1e-3, 0.1), scale});
       }
-      case placement::sub_pixel: scale = z * log_uniform(1e-7, 3e-3); break;
-      case placement::whole_screen: scale = z * log_uniform(1, 100); break;
+      case placement::sub_pixel:
+        scale = z * log_uniform(1e-7, 3e-3);
+        break;
+      case placement::whole_screen:
+        scale = z * log_uniform(1, 100);
+        break;
       case placement::far_away:
         z = log_uniform(1e3, 1e5);
         scale = z * log_uniform(1e-6, 1);
@@ -130,7 +144,9 @@ class ellipsoid_source {
         scale = 1;
         aspect = {log_uniform(2e-9, 2.2e4), log_uniform(2e-9, 2.2e4), log_uniform(2e-9, 2.2e4)};
         break;
-      default: scale = z * log_uniform(0.01, 0.2); break;
+      default:
+        scale = z * log_uniform(0.01, 0.2);
+        break;
     }
     // Somewhere in the image or a little beside it.
     at = {(uniform(-0.2, 1.2) * c.width - c.cx) / c.fx * z, (uniform(-0.2, 1.2) * c.height - c.cy) / c.fy * z, z};

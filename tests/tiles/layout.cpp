@@ -18,7 +18,7 @@ void check_addresses(std::mt19937_64& random, int trials) {
     CAPTURE(Size);
     CAPTURE(grid.width);
     CAPTURE(grid.height);
-    std::vector<gart::lt_range> ranges(1 + below(20));
+    std::vector<gart::footprint_slots> ranges(1 + below(20));
     u64 slots = 0;
     for (auto& r : ranges) {
       int const x0 = below(grid.width + 1), y0 = below(grid.height + 1);
@@ -77,7 +77,7 @@ TEST_CASE("addresses of (primitive, tile, pixel) are one to one and in order") {
 }
 
 TEST_CASE("addresses keep 64 bits") {
-  gart::lt_range const range{u64{5} << 32, {0, 0, 65535, 65535}};
+  gart::footprint_slots const range{u64{5} << 32, {0, 0, 65535, 65535}};
   CHECK(gart::lt_index<8>(range, 65534, 65534) == (u64{5} << 32) + u64{65535} * 65535 - 1);
 }
 

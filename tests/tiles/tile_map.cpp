@@ -51,7 +51,7 @@ struct pass {
  private:
   // A device may contract the double arithmetic and so move a bound that lies on a pixel's edge.
   static void check_boxes(gart::gaussian_model const& model, gart::camera const& view, float near,
-                          std::vector<gart::lt_range> const& ranges, std::vector<float> const& depths) {
+                          std::vector<gart::footprint_slots> const& ranges, std::vector<float> const& depths) {
     gart::camera_footprint const project(view, near);
     u32 const n = static_cast<u32>(model.size());
     gart::gaussians_view<float const> const all{model.mean.data(),    model.log_scale.data(), model.quaternion.data(),
@@ -65,7 +65,7 @@ struct pass {
     CHECK(other <= (E::device ? model.size() / 200 : 0));
   }
 
-  void check_places(E& exec, std::vector<gart::lt_range> const& ranges) const {
+  void check_places(E& exec, std::vector<gart::footprint_slots> const& ranges) const {
     auto const pair_offsets = host_copy(exec, prints.pair_offsets());
     u64 slots = 0, pairs = 0;
     long wrong = 0;
@@ -81,7 +81,7 @@ struct pass {
 
   // Whether the map holds each overlapping pair once, tile after tile, sorted by `key` of a primitive and its cell.
   template <class Key>
-  void check_pairs(E& exec, gart::tile_grid<Size> const& grid, std::vector<gart::lt_range> const& ranges,
+  void check_pairs(E& exec, gart::tile_grid<Size> const& grid, std::vector<gart::footprint_slots> const& ranges,
                    Key const& key) const {
     auto const offsets = host_copy(exec, map.view().offsets);
     auto const primitives = host_copy(exec, map.view().primitives);
@@ -98,14 +98,15 @@ struct pass {
     CHECK(primitives == expected);
   }
 
-  void check_number_order(E& exec, gart::tile_grid<Size> const& grid, std::vector<gart::lt_range> const& ranges) {
+  void check_number_order(E& exec, gart::tile_grid<Size> const& grid,
+                          std::vector<gart::footprint_slots> const& ranges) {
     map.build(exec, grid, prints, gart::number_order{});
     check_pairs(exec, grid, ranges, [](u32, u32 i) { return i; });
   }
 
   // No pixel of a pair hits nearer than the pair's key says, nor nearer than the keys before it in its list.
   void check_depth_order(E& exec, gart::gaussian_model const& model, gart::camera const& view, float near,
-                         std::vector<gart::lt_range> const& ranges) {
+                         std::vector<gart::footprint_slots> const& ranges) {
     gart::tile_grid<Size> const grid{view.width, view.height};
     u32 const n = static_cast<u32>(model.size());
     gart::gaussians_view<float const> const all{model.mean.data(),    model.log_scale.data(), model.quaternion.data(),

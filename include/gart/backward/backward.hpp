@@ -99,7 +99,7 @@ class backward {
         prints_ = &own_prints_;
       }
       if (byte_budget && prints_->slots() * sizeof(entry) > byte_budget) return false;
-      if (prints_->slots() >= slot_cell::none) return false;
+      if (prints_->slots() >= tile_slots::none) return false;
       if constexpr (requires { tracer.map(); }) {
         lists_ = tracer.map();
       } else {
@@ -147,12 +147,12 @@ class backward {
     if constexpr (!ordered || Strategy::scatter::any) moments_.zero();
     if constexpr (!ordered) gradients.sh.zero();
     if constexpr (records) {
-      if constexpr (ordered) rows_.resize(prints_->pairs() * pair_row<ShDegree>::quads);
+      if constexpr (ordered) rows_.resize(prints_->pairs() * pair_gradient<ShDegree>::quads);
       gather_terms<ShDegree, response>(exec, gaussians_in_frame, view, active_degree, color, color_gradient, error,
                                        gradients);
       if constexpr (ordered)
         parallel_for(
-            exec, "backward/sum", scene.count * pair_row<ShDegree>::quads,
+            exec, "backward/sum", scene.count * pair_gradient<ShDegree>::quads,
             sum_pairs<ShDegree, typename Strategy::gather>{prints_->pair_offsets(), prints_->pairs(), rows_.data(),
                                                            gradients.sh.data(), moments_.data()});
     }
@@ -217,22 +217,9 @@ class backward {
     using by_lane = gather_kernel<ShDegree, Response, typename Strategy::gather, entry, TileSize, sums, validity, E>;
     auto const gather = [&]<class Kernel>(index_t lanes, std::type_identity<Kernel>) {
       parallel_for(exec, "backward/gather", tile_range{grid_.count(), lanes},
-                   Kernel{view,
-                          grid_,
-                          lists_,
-                          prints_->ranges().data(),
-                          slots_.data(),
-                          gaussians_in_frame.data(),
-                          active_degree,
-                          image.data(),
-                          image_gradient.data(),
-                          error.data(),
-                          gradients.sh.data(),
-                          moments_.data(),
-                          prints_->pair_offsets().data(),
-                          rows_.data(),
-                          last_.data(),
-                          near_});
+                   Kernel{view, grid_, lists_, prints_->ranges().data(), slots_.data(), gaussians_in_frame.data(),
+                          active_degree, image.data(), image_gradient.data(), error.data(), gradients.sh.data(),
+                          moments_.data(), prints_->pair_offsets().data(), rows_.data(), last_.data(), near_});
     };
 #if defined(__CUDACC__)
     if constexpr (matrix_gather<by_lane>::fits && !requires { Strategy::lane_by_lane; })

@@ -25,7 +25,7 @@ enum class gather_sums { atomic, ordered };
 
 // A row of the ordered sums: SH gradient, padded to quads, then moments.
 template <int ShDegree>
-struct pair_row {
+struct pair_gradient {
   static constexpr int sh_quads = (3 * sh_basis<ShDegree>::size + 3) / 4;
   static constexpr int quads = sh_quads + moment_stride / 4;
 };
@@ -57,7 +57,7 @@ struct gather_kernel {
   camera view;
   grid_type grid;
   tile_map_view map;
-  lt_range const* ranges = nullptr;
+  footprint_slots const* ranges = nullptr;
   Entry const* slots = nullptr;
   ray_gaussian const* records = nullptr;
   int active_degree = ShDegree;
@@ -67,7 +67,7 @@ struct gather_kernel {
   float* sh_gradient = nullptr;           // atomic: [N][K][3]
   float* moments_out = nullptr;           // atomic: [N][moment_stride]
   u64 const* pair_offsets = nullptr;      // ordered: first row of each primitive
-  quad* rows = nullptr;                   // ordered: [pairs][pair_row::quads]
+  quad* rows = nullptr;                   // ordered: [pairs][pair_gradient::quads]
   last_hit const* last = nullptr;         // recomputed: [H][W]
   float near = 0;
 
@@ -122,7 +122,7 @@ struct gather_kernel {
     if constexpr (Sums == gather_sums::atomic) {
       E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, sums, moment_count);
     } else {
-      quad* const out = row_of(box, area, id) + pair_row<ShDegree>::sh_quads;
+      quad* const out = row_of(box, area, id) + pair_gradient<ShDegree>::sh_quads;
       GART_UNROLL
       for (int q = 0; q < moment_stride / 4; ++q)
         out[q] = {{sums[4 * q], sums[4 * q + 1], sums[4 * q + 2], sums[4 * q + 3]}};
@@ -148,7 +148,7 @@ struct gather_kernel {
   }
 
   GART_HD void gather(scratch const& s, pixel_box const& area, u32 id) const {
-    lt_range const range = ranges[id];
+    footprint_slots const range = ranges[id];
     float sh_sum[sh_stride] = {};
     float moment_sum[moment_stride] = {};
     lane_data const data(*this, id);
@@ -243,14 +243,14 @@ struct gather_kernel {
   GART_HD GART_INLINE quad* row_of(pixel_box const& box, pixel_box const& area, u32 id) const {
     pixel_box const tiles = tiles_of<Size>(box);
     u64 const pair = pair_offsets[id] + (area.y0 / Size - tiles.y0) * tiles.width() + (area.x0 / Size - tiles.x0);
-    return rows + pair * pair_row<ShDegree>::quads;
+    return rows + pair * pair_gradient<ShDegree>::quads;
   }
 };
 
 // The ordered sums: quad q of primitive i over its rows, in order. One index a quad, quads of a primitive together.
 template <int ShDegree, class Terms>
 struct sum_pairs {
-  using row = pair_row<ShDegree>;
+  using row = pair_gradient<ShDegree>;
   span<u64 const> pair_offsets;
   u64 pairs;
   quad const* rows;

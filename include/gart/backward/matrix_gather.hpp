@@ -38,7 +38,7 @@ struct matrix_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     typename base::pixel_data pixels[Size * Size];
     matrix_part<4>::words high[Size][lanes], low[Size][lanes];  // Y of a row of pixels, as the lanes want it
     float sums[warps][8][52];  // of colour, a row a primitive; 52: what a warp writes at once lies in 32 banks
-    slot_cell cells[share];
+    tile_slots cells[share];
     u32 ids[share];
     u32 count[Size * Size];
   };
@@ -85,12 +85,12 @@ struct matrix_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     team.for_each(Size * Size, [&](index_t c) { s.count[c] = 0; });
     team.barrier();
     u32 id[2], at[2], place[2];
-    slot_cell cell[2];
+    tile_slots cell[2];
     GART_UNROLL
     for (int i = 0; i < 2; ++i) {
       u32 const k = threadIdx.x + i * block_size;
       if (k >= listed) continue;
-      id[i] = list[k], cell[i] = slot_cell(this->ranges[id[i]], area);
+      id[i] = list[k], cell[i] = tile_slots(this->ranges[id[i]], area);
       at[i] = (cell[i].y - area.y0) * Size + cell[i].y1 - 1 - area.y0;
       place[i] = atomicAdd(&s.count[at[i]], 1u);
     }
@@ -119,7 +119,7 @@ struct matrix_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
   __device__ GART_INLINE void gather(scratch& s, pixel_box const& area, u32 k, u32 listed) const {
     u32 const lane = threadIdx.x % lanes, column = lane % 4, number = k + lane / 4;
     bool const exists = number < listed;
-    slot_cell const cell = slot_cell::read(s.cells[exists ? number : k]);
+    tile_slots const cell = tile_slots::read(s.cells[exists ? number : k]);
     u32 const id = s.ids[exists ? number : k];
     typename base::lane_data const data(*this, id);
     float moment_sum[moment_stride] = {};

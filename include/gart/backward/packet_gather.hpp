@@ -84,7 +84,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
   // What will be read and added to for a Gaussian: its slots lie anywhere in the buffer. Inlined: to a compiler a call
   // that does nothing but fetch does nothing.
   GART_INLINE void expect(pixel_box const& area, u32 id) const {
-    lt_range const range = gather.ranges[id];
+    footprint_slots const range = gather.ranges[id];
     pixel_box const cell = intersect(range.box, area);
     char const* const slots = reinterpret_cast<char const*>(gather.slots + range.offset + tile_offset(range.box, cell));
     for (std::size_t byte = 0; byte < cell.area() * sizeof(Entry); byte += 64) prefetch_to_l2(slots + byte);
@@ -99,7 +99,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
   }
 
   void sum(scratch const& s, pixel_box const& area, u32 id) const {
-    lt_range const range = gather.ranges[id];
+    footprint_slots const range = gather.ranges[id];
     packet_cell const cell(id, range, area);
     ray_gaussian const& g = gather.records[id];
     lanes sh_sum[2][3][band_groups];  // of even and of odd lanes: additions to one sum wait for each other

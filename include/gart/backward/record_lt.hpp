@@ -12,20 +12,20 @@ namespace gart::inline GART_ISA {
 template <class Entry, int Size>
 struct record_lt {
   using entry = Entry;
-  lt_range const* ranges = nullptr;
+  footprint_slots const* ranges = nullptr;
   Entry* slots = nullptr;
 
   static constexpr bool any = true;
   // The number of the hit's slot. Boxes hold every hit; memory stays safe regardless.
   GART_HD GART_INLINE u32 place_of(u32 id, pixel at) const {
-    lt_range const range = ranges[id];
+    footprint_slots const range = ranges[id];
     pixel_box const& b = range.box;
     u32 const x = static_cast<u32>(at.x), y = static_cast<u32>(at.y);
-    if (x < b.x0 || x >= b.x1 || y < b.y0 || y >= b.y1) return slot_cell::none;
+    if (x < b.x0 || x >= b.x1 || y < b.y0 || y >= b.y1) return tile_slots::none;
     return static_cast<u32>(lt_index<Size>(range, x, y));
   }
   GART_HD GART_INLINE void operator()(u32 place, vec3 const& opaque, float weight, vec3 const& unclamped) const {
-    if (place != slot_cell::none) slots[place] = Entry::of(opaque, weight, unclamped);
+    if (place != tile_slots::none) slots[place] = Entry::of(opaque, weight, unclamped);
   }
 
 #if !defined(__CUDACC__)

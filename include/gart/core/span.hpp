@@ -18,14 +18,10 @@ class span {
   constexpr span() = default;
   GART_HD constexpr span(T* data, std::size_t size) : data_(data), size_(size) {}
   template <class U>
-    requires std::is_same_v<U const, T>
-  GART_HD constexpr span(span<U> other) : data_(other.data()), size_(other.size()) {}
-  span(std::vector<value_type>& v)
-    requires(!std::is_const_v<T>)
-      : data_(v.data()), size_(v.size()) {}
-  span(std::vector<value_type> const& v)
-    requires(std::is_const_v<T>)
-      : data_(v.data()), size_(v.size()) {}
+  requires std::is_same_v<U const, T> GART_HD constexpr span(span<U> other)
+      : data_(other.data()), size_(other.size()) {}
+  span(std::vector<value_type>& v) requires(!std::is_const_v<T>) : data_(v.data()), size_(v.size()) {}
+  span(std::vector<value_type> const& v) requires(std::is_const_v<T>) : data_(v.data()), size_(v.size()) {}
 
   GART_HD constexpr T* data() const { return data_; }
   GART_HD constexpr std::size_t size() const { return size_; }

@@ -56,10 +56,14 @@ template <class E>
 concept host_execution = execution<E> && !E::device;
 
 template <class K>
-concept tile_kernel = std::is_trivially_copyable_v<K> && requires { typename K::scratch; };
+concept tile_kernel = std::is_trivially_copyable_v<K> && requires {
+  typename K::scratch;
+};
 
 template <class K>
-concept index_kernel = std::is_trivially_copyable_v<K> && !tile_kernel<K> && requires(K const& k, index_t i) { k(i); };
+concept index_kernel = std::is_trivially_copyable_v<K> && !tile_kernel<K> && requires(K const& k, index_t i) {
+  k(i);
+};
 
 // `tiles` teams; each has at most `lanes` lanes on a device (a hint, a multiple of 32; see cuda_launch.cuh for the most
 // that a kernel accepts) and one on a host.

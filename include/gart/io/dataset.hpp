@@ -20,10 +20,10 @@
 namespace gart {
 
 struct dataset_view {
-  std::string name;      // unique in the dataset, fit for a file name: renders/NAME.png
-  camera view;           // for the image as it is held (after dataset_options.downscale)
-  image8 image;          // 3 channels, or 4 with straight alpha
-  image8 mask;           // 1 channel, 0 = ignore; empty where there is none
+  std::string name;  // unique in the dataset, fit for a file name: renders/NAME.png
+  camera view;       // for the image as it is held (after dataset_options.downscale)
+  image8 image;      // 3 channels, or 4 with straight alpha
+  image8 mask;       // 1 channel, 0 = ignore; empty where there is none
 };
 
 struct point_cloud {
@@ -33,14 +33,14 @@ struct point_cloud {
 };
 
 struct dataset {
-  std::string format;               // "COLMAP", "Blender", "nerfstudio"
-  std::string split;                // how train and test were told apart, in words
-  std::string resize_filter;        // "none", or "box (1/4)"
+  std::string format;         // "COLMAP", "Blender", "nerfstudio"
+  std::string split;          // how train and test were told apart, in words
+  std::string resize_filter;  // "none", or "box (1/4)"
   std::vector<dataset_view> train, test;
-  point_cloud points;               // empty: start at random
-  std::vector<std::string> notes;   // one line each: what was skipped, scaled or assumed
-  float extent = 1;                 // 1.1 x the largest distance of a training camera from their mean
-  bool alpha = false;               // images carry alpha: composited over the background chosen
+  point_cloud points;              // empty: start at random
+  std::vector<std::string> notes;  // one line each: what was skipped, scaled or assumed
+  float extent = 1;                // 1.1 x the largest distance of a training camera from their mean
+  bool alpha = false;              // images carry alpha: composited over the background chosen
   // Random starting points lie in this box; Blender's [-1.3, 1.3]^3, else around the cameras.
   vec3d bounds_min{-1.3}, bounds_max{1.3};
 };

@@ -10,10 +10,10 @@
 
 namespace gart {
 
-image8 read_image(std::filesystem::path const& path);                 // 1, 3 or 4 channels, as the file has
+image8 read_image(std::filesystem::path const& path);                    // 1, 3 or 4 channels, as the file has
 void write_png(std::filesystem::path const& path, image8 const& image);  // to a temporary name, then renamed
-std::vector<u8> encode_png(image8 const& image);                      // 1, 3 or 4 channels
-std::vector<u8> encode_jpeg(image8 const& image, int quality = 90);   // 1 or 3: JPEG has no alpha
+std::vector<u8> encode_png(image8 const& image);                         // 1, 3 or 4 channels
+std::vector<u8> encode_jpeg(image8 const& image, int quality = 90);      // 1 or 3: JPEG has no alpha
 
 // Mean over blocks of factor x factor pixels; a partial last block is dropped. Alpha weights the colours.
 image8 box_downscale(image8 const& image, int factor);

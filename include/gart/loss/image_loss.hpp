@@ -156,8 +156,8 @@ struct ssim_kernel {
   tiles grid;
   float const* centred_truth;
   float const* difference;
-  float* partials;     // [3 partials][3][H][W]
-  float* tile_loss;    // [tiles], divided by the count of values
+  float* partials;   // [3 partials][3][H][W]
+  float* tile_loss;  // [tiles], divided by the count of values
   float* tile_square;
   float weight;
 
@@ -183,8 +183,7 @@ struct ssim_kernel {
       float sums[4][tiles::block];
       tiles::template convolve<4>(&s.rows[0][row * tiles::width + column], tiles::rows_size, tiles::width, sums);
       float out[3][tiles::block];
-      float const* const d =
-          &s.halo[1][(row + ssim_window::radius) * tiles::halo_pitch + column + ssim_window::radius];
+      float const* const d = &s.halo[1][(row + ssim_window::radius) * tiles::halo_pitch + column + ssim_window::radius];
       for (int v = 0; v < tiles::block; ++v) {
         float const difference_mean = sums[1][v], centred = sums[0][v] + difference_mean;
         float const mean = centred + 0.5f, truth_mean = sums[0][v] + 0.5f;
@@ -263,9 +262,8 @@ struct loss_gradient_kernel {
     for (int p = 0; p < 3; ++p) {
       float const* const from = partials + p * 3 * pixels;
       float* const to = s.halo[p];
-      grid.each_halo_cell(team, at, [=](std::ptrdiff_t cell, std::ptrdiff_t i, bool inside) {
-        to[cell] = inside ? from[i] : 0.0f;
-      });
+      grid.each_halo_cell(
+          team, at, [=](std::ptrdiff_t cell, std::ptrdiff_t i, bool inside) { to[cell] = inside ? from[i] : 0.0f; });
     }
     team.barrier();
     tiles::template convolve_rows<3>(team, &s.halo[0][0], &s.rows[0][0]);

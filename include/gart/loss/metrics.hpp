@@ -125,8 +125,8 @@ inline double ssim(image_float const& render, image_float const& truth) {
             s[p] += ssim_window::weight(k) * along[p * plane + static_cast<std::size_t>(at) * w + x];
         }
         double const luminance = (2 * s[0] * s[1] + ssim_window::c1) / (s[0] * s[0] + s[1] * s[1] + ssim_window::c1);
-        double const structure = (2 * (s[4] - s[0] * s[1]) + ssim_window::c2) /
-                                 (s[2] - s[0] * s[0] + s[3] - s[1] * s[1] + ssim_window::c2);
+        double const structure =
+            (2 * (s[4] - s[0] * s[1]) + ssim_window::c2) / (s[2] - s[0] * s[0] + s[3] - s[1] * s[1] + ssim_window::c2);
         row += luminance * structure;
       }
       rows[y] += row;

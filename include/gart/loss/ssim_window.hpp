@@ -13,7 +13,7 @@ inline constexpr double c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;
 
 // Weight of tap k: exp(-(k - 5)^2 / (2 * 1.5^2)), normalised to the sum 1.
 GART_HD constexpr double weight(int k) {
-  constexpr double half[6] = {0.00102838008447911,  0.007598758135239185, 0.03600077212843083,
+  constexpr double half[6] = {0.00102838008447911, 0.007598758135239185, 0.03600077212843083,
                               0.10936068950970002, 0.2130055377112537,   0.26601172486179436};
   return half[k <= radius ? k : 2 * radius - k];
 }

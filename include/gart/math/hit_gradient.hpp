@@ -19,9 +19,9 @@
 
 namespace gart::inline GART_ISA {
 
-// The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy; then the error that is seen through the Gaussian,
-// the sum over its hits of w times the pixel's error, by which densification finds where more are needed; and one of
-// padding (16-byte words).
+// The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy; then the error that is seen through the
+// Gaussian, the sum over its hits of w times the pixel's error, by which densification finds where more are needed; and
+// one of padding (16-byte words).
 inline constexpr int moment_count = 11;
 inline constexpr int error_place = 10;
 inline constexpr int moment_stride = 12;

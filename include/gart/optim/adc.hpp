@@ -58,8 +58,8 @@ struct adc_rule {
   float const* sum;
   u32 const* touched;
   float gradient, prune_opacity;
-  float split_scale;   // larger ones split
-  float prune_scale;   // larger ones go
+  float split_scale;  // larger ones split
+  float prune_scale;  // larger ones go
 
   GART_HD float statistic(index_t i) const { return touched[i] ? sum[i] / static_cast<float>(touched[i]) : 0.0f; }
   GART_HD float largest_scale(index_t i) const {
@@ -179,9 +179,19 @@ class adaptive_density {
 
   // `extent` is the scene's, in world units.
   adaptive_density(E& exec, adc_options const& options, index_t max_gaussians, int iterations, float extent, u64 seed)
-      : gradient_sum(exec), touched(exec), exec_(&exec), options_(options), max_gaussians_(max_gaussians),
-        iterations_(iterations), extent_(extent), seed_(seed), copies_(exec), grows_(exec), origin_(exec),
-        offset_(exec), totals_(exec, 2) {}
+      : gradient_sum(exec),
+        touched(exec),
+        exec_(&exec),
+        options_(options),
+        max_gaussians_(max_gaussians),
+        iterations_(iterations),
+        extent_(extent),
+        seed_(seed),
+        copies_(exec),
+        grows_(exec),
+        origin_(exec),
+        offset_(exec),
+        totals_(exec, 2) {}
 
   void set_iterations(int iterations) { iterations_ = iterations; }
 
@@ -189,11 +199,10 @@ class adaptive_density {
   void accumulate(gaussians<E> const& model, gaussians<E> const& gradient, camera const& view) {
     if (touched.size() != model.size()) clear_statistic(model.size());
     parallel_for(*exec_, "adc_accumulate", model.size(),
-                 detail::adc_accumulate_kernel{model.view(), gradient.view(), view.rotation[0], view.rotation[1],
-                                               view.rotation[2], vec3(view.position),
-                                               0.5f * static_cast<float>(view.width) / view.fx,
-                                               0.5f * static_cast<float>(view.height) / view.fy,
-                                               gradient_sum.data(), touched.data()});
+                 detail::adc_accumulate_kernel{
+                     model.view(), gradient.view(), view.rotation[0], view.rotation[1], view.rotation[2],
+                     vec3(view.position), 0.5f * static_cast<float>(view.width) / view.fx,
+                     0.5f * static_cast<float>(view.height) / view.fy, gradient_sum.data(), touched.data()});
   }
 
   bool due(int step) const {
@@ -217,8 +226,12 @@ class adaptive_density {
     if (touched.size() != n) clear_statistic(n);
 
     bool const was_reset = options_.opacity_reset_every > 0 && step > options_.opacity_reset_every;
-    detail::adc_rule const rule{std::as_const(model).view(), gradient_sum.data(), touched.data(), options_.gradient,
-                                options_.prune_opacity, options_.dense * extent_,
+    detail::adc_rule const rule{std::as_const(model).view(),
+                                gradient_sum.data(),
+                                touched.data(),
+                                options_.gradient,
+                                options_.prune_opacity,
+                                options_.dense * extent_,
                                 was_reset ? options_.prune_scale * extent_ : INFINITY};
     copies_.resize(n), grows_.resize(n), offset_.resize(n);
     parallel_for(*exec_, "adc_plan", n, detail::adc_plan_kernel{rule, copies_.data(), grows_.data()});
@@ -232,8 +245,7 @@ class adaptive_density {
     if (total > max_gaussians_ && growing > 0) {
       u64 const room = max_gaussians_ > kept ? max_gaussians_ - kept : 0;
       origin_.resize(n);
-      parallel_for(*exec_, "adc_keys", n,
-                   detail::adc_key_kernel{rule, copies_.data(), grows_.data(), origin_.data()});
+      parallel_for(*exec_, "adc_keys", n, detail::adc_key_kernel{rule, copies_.data(), grows_.data(), origin_.data()});
       sort_pairs(*exec_, grows_.view(), origin_.view(), 32);
       parallel_for(*exec_, "adc_demote", static_cast<index_t>(growing - room),
                    detail::adc_demote_kernel{origin_.data(), copies_.data(), static_cast<index_t>(room)});
@@ -249,9 +261,9 @@ class adaptive_density {
       parallel_for(*exec_, "adc_place", n,
                    detail::adc_place_kernel{rule, copies_.data(), offset_.data(), origin_.data()});
       gather(model, next, false), gather(state.first, next, true), gather(state.second, next, true);
-      parallel_for(*exec_, "adc_split", next,
-                   detail::adc_split_kernel{model.view(), origin_.data(),
-                                            {seed_, static_cast<u32>(step), random_use::split}});
+      parallel_for(
+          *exec_, "adc_split", next,
+          detail::adc_split_kernel{model.view(), origin_.data(), {seed_, static_cast<u32>(step), random_use::split}});
     }
     clear_statistic(model.size());
     return change;

@@ -16,8 +16,8 @@
 // dead. A Gaussian whose opacity or geometry is not finite counts as dead. Where no error is attributed, or none is
 // alive, nothing is moved.
 //
-// It has no state but the statistic, [N] floats, which a checkpoint must hold: what is drawn depends on it, the seed and
-// the step. Equal weights give the same draws on every policy but for the last bits of a logarithm. Cost: one small
+// It has no state but the statistic, [N] floats, which a checkpoint must hold: what is drawn depends on it, the seed
+// and the step. Equal weights give the same draws on every policy but for the last bits of a logarithm. Cost: one small
 // launch a step; a densification is a sort of N pairs, two scans and one host read.
 
 #include <gart/algorithm/exclusive_scan.hpp>
@@ -135,8 +135,18 @@ class error_growth {
   buffer<float, E> error_sum;
 
   error_growth(E& exec, error_growth_options const& options, index_t max_gaussians, int iterations, u64 seed)
-      : error_sum(exec), exec_(&exec), options_(options), max_gaussians_(max_gaussians), iterations_(iterations),
-        seed_(seed), dead_(exec), drawable_(exec), key_(exec), id_(exec), target_(exec), place_(exec),
+      : error_sum(exec),
+        exec_(&exec),
+        options_(options),
+        max_gaussians_(max_gaussians),
+        iterations_(iterations),
+        seed_(seed),
+        dead_(exec),
+        drawable_(exec),
+        key_(exec),
+        id_(exec),
+        target_(exec),
+        place_(exec),
         totals_(exec, 2) {}
 
   // Every step, with the moments that the step's backward pass left ([N][moment_stride]), before the optimizer's step:
@@ -180,9 +190,14 @@ class error_growth {
     if (error_sum.size() != n) clear_statistic(n);
     dead_.resize(n), drawable_.resize(n), key_.resize(n), id_.resize(n), place_.resize(n);
     parallel_for(*exec_, "error_keys", n,
-                 detail::error_key_kernel{std::as_const(model).view(), error_sum.data(), options_.dead_opacity,
-                                          {seed_, static_cast<u32>(step), random_use::growth}, dead_.data(),
-                                          drawable_.data(), key_.data(), id_.data()});
+                 detail::error_key_kernel{std::as_const(model).view(),
+                                          error_sum.data(),
+                                          options_.dead_opacity,
+                                          {seed_, static_cast<u32>(step), random_use::growth},
+                                          dead_.data(),
+                                          drawable_.data(),
+                                          key_.data(),
+                                          id_.data()});
     exclusive_scan(*exec_, span<u32 const>(drawable_), place_.view(), totals_.view().subspan(0, 1));
     exclusive_scan(*exec_, span<u32 const>(dead_), place_.view(), totals_.view().subspan(1, 1));
     u64 totals[2];

@@ -1,8 +1,8 @@
 #pragma once
 // One Gaussian becomes two along its longest axis (Deng et al., Efficient Density Control for 3D Gaussian Splatting,
 // 2024): the halves end where it ended and are as thick in their middles as it was there, so the silhouette stays. With
-// q = 0.45 and s the longest standard deviation, their centres lie at +-q 3 s, where the cross-section at three standard
-// deviations is sqrt(1 - q^2) of the middle one; they are 1 - q times as long, q 3 s + (1 - q) 3 s = 3 s, and
+// q = 0.45 and s the longest standard deviation, their centres lie at +-q 3 s, where the cross-section at three
+// standard deviations is sqrt(1 - q^2) of the middle one; they are 1 - q times as long, q 3 s + (1 - q) 3 s = 3 s, and
 // sqrt(1 - q^2) times as thick. Between middle and end they reach up to 6% further out. Opacity falls to 0.6 of what it
 // was: where a half is needed it rises again, and where not it fades, which keeps a growing model from learning its
 // training views by heart.
@@ -22,7 +22,9 @@ struct split_half {
 inline constexpr float split_share = 0.45f, split_opacity = 0.6f;
 
 GART_HD inline split_half split_long_axis(vec3 const& log_scale, quaternion const& rotation, float opacity) {
-  int const axis = log_scale.x >= log_scale.y ? (log_scale.x >= log_scale.z ? 0 : 2) : log_scale.y >= log_scale.z ? 1 : 2;
+  int const axis = log_scale.x >= log_scale.y   ? (log_scale.x >= log_scale.z ? 0 : 2)
+                   : log_scale.y >= log_scale.z ? 1
+                                                : 2;
   float const thickness = sqrtf(1.0f - split_share * split_share);
   split_half out{vec3(0.0f), log_scale, split_opacity * opacity};
   for (int k = 0; k < 3; ++k) out.log_scale[k] += logf(k == axis ? 1.0f - split_share : thickness);

@@ -295,10 +295,9 @@ class mcmc {
                  detail::mcmc_draw_kernel<E>{before_.data(), totals_.data(), n, random, source_.data(), copies.data()});
     parallel_for(*exec_, "mcmc_share", n,
                  detail::mcmc_share_kernel{model.view(), copies.data(), options_.dead_opacity, options_.kernel_degree});
-    for_each_element(
-        *exec_, "mcmc_copy", draws, model.sh_degree(),
-        detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(), target_.data(),
-                               random.use == random_use::growth});
+    for_each_element(*exec_, "mcmc_copy", draws, model.sh_degree(),
+                     detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(),
+                                            target_.data(), random.use == random_use::growth});
   }
 
   E* exec_;

@@ -7,7 +7,7 @@
 namespace gart {
 
 struct learning_rates {
-  float mean = 0.8e-4f;        // times the scene's extent; decays exponentially to mean_final over the run
+  float mean = 0.8e-4f;  // times the scene's extent; decays exponentially to mean_final over the run
   float mean_final = 0.8e-6f;
   float log_scale = 5e-3f;
   float quaternion = 1e-3f;
@@ -35,29 +35,29 @@ inline float least_opacity(float usual, float alpha_min) { return std::max(usual
 
 struct mcmc_options {
   int from = 500, every = 100;
-  float until = 5.0f / 6;           // share of the run
-  float growth = 1.05f;             // a step of growth, up to max_gaussians; more in runs too short for it (growth_for)
-  float dead_opacity = 0.005f;      // a trainer raises it to least_opacity
-  float noise = 1e6f;               // times the rate of the means, and the covariance in units of the extent
+  float until = 5.0f / 6;       // share of the run
+  float growth = 1.05f;         // a step of growth, up to max_gaussians; more in runs too short for it (growth_for)
+  float dead_opacity = 0.005f;  // a trainer raises it to least_opacity
+  float noise = 1e6f;           // times the rate of the means, and the covariance in units of the extent
   float opacity_penalty = 0.01f, scale_penalty = 0.014f;  // the scale in units of the extent
-  int kernel_degree = 2;            // of the Gaussians that are relocated; a trainer sets its own
+  int kernel_degree = 2;                                  // of the Gaussians that are relocated; a trainer sets its own
 };
 
 struct error_growth_options {
   int from = 500, every = 100;
-  float fill = 0.5f;                // share of the run at which the count has reached its budget
-  float until = 5.0f / 6;           // share of the run after which the dead stay where they are
-  float dead_opacity = 0.005f;      // a trainer raises it to least_opacity
-  float opacity_penalty = 0.003f;   // times the mean opacity
+  float fill = 0.5f;               // share of the run at which the count has reached its budget
+  float until = 5.0f / 6;          // share of the run after which the dead stay where they are
+  float dead_opacity = 0.005f;     // a trainer raises it to least_opacity
+  float opacity_penalty = 0.003f;  // times the mean opacity
 };
 
 struct adc_options {
   int from = 500, every = 100, opacity_reset_every = 3000;
   float until = 0.5f;
-  float gradient = 2e-4f;           // mean length of the mean's gradient in the image that makes a Gaussian grow
-  float dense = 0.01f;              // times the extent: larger ones split, smaller ones are cloned
-  float prune_opacity = 0.005f;     // a trainer raises it to least_opacity
-  float prune_scale = 0.1f;         // times the extent, after the first opacity reset
+  float gradient = 2e-4f;        // mean length of the mean's gradient in the image that makes a Gaussian grow
+  float dense = 0.01f;           // times the extent: larger ones split, smaller ones are cloned
+  float prune_opacity = 0.005f;  // a trainer raises it to least_opacity
+  float prune_scale = 0.1f;      // times the extent, after the first opacity reset
 };
 
 }  // namespace gart

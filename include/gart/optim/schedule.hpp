@@ -27,7 +27,8 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
   int const from = static_cast<int>(rates.settle_from * static_cast<float>(steps));
   float const settled = static_cast<float>(std::pow(static_cast<double>(rates.settled), std::min(1.0, length)));
   float const share = exponential_decay(1.0f, settled, step - from, steps - from);
-  for (float* rate : {&rates.log_scale, &rates.quaternion, &rates.opacity, &rates.sh_dc, &rates.sh_rest}) *rate *= share;
+  for (float* rate : {&rates.log_scale, &rates.quaternion, &rates.opacity, &rates.sh_dc, &rates.sh_rest})
+    *rate *= share;
   return rates;
 }
 

@@ -20,7 +20,7 @@ struct basic_image {
   bool empty() const { return data.empty(); }
 };
 
-using image8 = basic_image<u8>;       // as files hold it: 8 bits, 0..255
+using image8 = basic_image<u8>;          // as files hold it: 8 bits, 0..255
 using image_float = basic_image<float>;  // [0, 1]
 
 }  // namespace gart

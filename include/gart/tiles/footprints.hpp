@@ -20,7 +20,7 @@ struct measure {
   camera_footprint view;
   vec3d frame;
   float alpha_min;
-  span<lt_range> ranges;
+  span<footprint_slots> ranges;
   span<float> depths;
   span<u32> areas, tiles;
   GART_KERNEL void operator()(index_t i) const {
@@ -34,7 +34,7 @@ struct measure {
 
 struct place {
   span<u64 const> offsets;
-  span<lt_range> ranges;
+  span<footprint_slots> ranges;
   GART_KERNEL void operator()(index_t i) const { ranges[i].offset = offsets[i]; }
 };
 
@@ -78,12 +78,12 @@ class footprints {
 
   u64 slots() const { return slots_; }  // sum of box areas
   u64 pairs() const { return pairs_; }  // (primitive, tile) overlaps
-  span<lt_range const> ranges() const { return ranges_; }
+  span<footprint_slots const> ranges() const { return ranges_; }
   span<float const> depths() const { return depths_; }
   span<u64 const> pair_offsets() const { return pair_offsets_; }
 
  private:
-  buffer<lt_range, E> ranges_;
+  buffer<footprint_slots, E> ranges_;
   buffer<float, E> depths_;
   buffer<u32, E> areas_, tiles_;
   buffer<u64, E> area_offsets_, pair_offsets_, totals_;

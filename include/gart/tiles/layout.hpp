@@ -11,7 +11,7 @@
 namespace gart::inline GART_ISA {
 
 // A primitive's box and where its slots begin, one 16-byte word.
-struct alignas(16) lt_range {
+struct alignas(16) footprint_slots {
   u64 offset = 0;
   pixel_box box;
 };
@@ -27,23 +27,23 @@ GART_HD constexpr u32 pixel_offset(pixel_box const& cell, u32 x, u32 y) {
 
 // The cell of a primitive and a tile, one 16-byte word, by which many pixels find their slots. Slots are counted in 32
 // bits.
-struct alignas(16) slot_cell {
+struct alignas(16) tile_slots {
   u32 first = 0;  // slot of the cell's first pixel
   u32 width = 0;
   u16 x = 0, y = 0, x1 = 0, y1 = 0;
   static constexpr u32 none = 0xffffffffu;
 
-  slot_cell() = default;
-  GART_HD GART_INLINE slot_cell(lt_range const& range, pixel_box const& tile) {
+  tile_slots() = default;
+  GART_HD GART_INLINE tile_slots(footprint_slots const& range, pixel_box const& tile) {
     pixel_box const cell = intersect(range.box, tile);
     first = static_cast<u32>(range.offset) + tile_offset(range.box, cell);
     width = cell.width();
     x = cell.x0, y = cell.y0, x1 = cell.x1, y1 = cell.y1;
   }
   // From memory as one word, where fields would be read one after another.
-  GART_HD GART_INLINE static slot_cell read(slot_cell const& from) {
+  GART_HD GART_INLINE static tile_slots read(tile_slots const& from) {
     quad const word = reinterpret_cast<quad const&>(from);
-    slot_cell out;
+    tile_slots out;
     std::memcpy(static_cast<void*>(&out), &word, sizeof out);
     return out;
   }
@@ -65,7 +65,7 @@ GART_HD constexpr pixel_box cell_of(pixel_box const& box, u32 x, u32 y) {
 }
 
 template <int Size>
-GART_HD constexpr u64 lt_index(lt_range const& range, u32 x, u32 y) {
+GART_HD constexpr u64 lt_index(footprint_slots const& range, u32 x, u32 y) {
   pixel_box const cell = cell_of<Size>(range.box, x, y);
   return range.offset + tile_offset(range.box, cell) + pixel_offset(cell, x, y);
 }

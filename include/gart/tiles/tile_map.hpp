@@ -47,7 +47,7 @@ struct emit_pairs {
   };
 
   tile_grid<Size> grid;
-  span<lt_range const> ranges;
+  span<footprint_slots const> ranges;
   span<u64 const> offsets;
   u64 pairs;
   Order order;
@@ -126,8 +126,7 @@ struct rank_tiles {
 template <execution E, int Size>
 class tile_map {
  public:
-  explicit tile_map(E& exec)
-      : keys_(exec), primitives_(exec), offsets_(exec), ranks_(exec), longest_first_(exec) {}
+  explicit tile_map(E& exec) : keys_(exec), primitives_(exec), offsets_(exec), ranks_(exec), longest_first_(exec) {}
 
   template <class Order>
   void build(E& exec, tile_grid<Size> const& grid, footprints<E, Size> const& prints, Order order) {

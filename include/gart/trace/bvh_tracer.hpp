@@ -7,7 +7,7 @@
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/scene/parameters.hpp>
-#include <gart/trace/window_visitor.hpp>
+#include <gart/trace/k_buffer_visitor.hpp>
 
 namespace gart::inline GART_ISA {
 

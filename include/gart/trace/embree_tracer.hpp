@@ -6,7 +6,7 @@
 #include <gart/bvh/box.hpp>
 #include <gart/scene/parameters.hpp>
 #include <gart/trace/bvh_tracer.hpp>
-#include <gart/trace/window_visitor.hpp>
+#include <gart/trace/k_buffer_visitor.hpp>
 
 #include <memory>
 

@@ -35,7 +35,7 @@ class packet_walk {
   void enter(pixel_box const& area) { area_ = area, loaded_ = ~u32{0}; }
 
   // False where more hits waited than there is room for; nothing then counts.
-  bool operator()(P const& program, traced_scene const& scene, tile_map_view const& map, lt_range const* ranges,
+  bool operator()(P const& program, traced_scene const& scene, tile_map_view const& map, footprint_slots const* ranges,
                   vec3 const& forward, u32 tile, packet_block block) {
     auto state = program.begin(block);
     vec3_of<lanes> const& d = state.directions;
@@ -89,7 +89,7 @@ class packet_walk {
   };
 
   // The tile's candidates from `first` on, once for all packets of a tile that has no more of them.
-  int load(traced_scene const& scene, tile_map_view const& map, lt_range const* ranges, u32 first, u32 end) {
+  int load(traced_scene const& scene, tile_map_view const& map, footprint_slots const* ranges, u32 first, u32 end) {
     u32 const n = end - first < most ? end - first : most;
     if (loaded_ == first) return static_cast<int>(n);
     u32 const* const list = map.primitives.data() + first;

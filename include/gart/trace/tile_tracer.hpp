@@ -16,8 +16,8 @@
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/tiles/tile_map.hpp>
+#include <gart/trace/hit_ring.hpp>
 #include <gart/trace/packet_walk.hpp>
-#include <gart/trace/pending_hits.hpp>
 #include <gart/trace/ray_program.hpp>
 #include <gart/trace/warp_walk.hpp>
 
@@ -59,7 +59,7 @@ struct walk_tiles {
     };
     float last_t = scene.near;
     u32 last_id = 0xffffffffu;
-    pending_hits<Capacity> pending;
+    hit_ring<Capacity> pending;
     auto const pass_on = [&]() {
       pending_hit const h = pending.pop();
       last_t = h.t, last_id = list[h.place];
@@ -109,7 +109,7 @@ struct walk_tile_packets {
   using packets = decltype(packets_of(std::declval<P const&>()));
   using scratch = packet_walk<Response, Window, Size, packets>;
   walk_tiles<Response, Window, Size, P> rays;
-  lt_range const* ranges;
+  footprint_slots const* ranges;
 
   template <class Team>
   void operator()(Team const& team) const {

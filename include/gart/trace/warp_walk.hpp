@@ -3,10 +3,10 @@
 // walk_tiles (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that all rays of the warp meet a
 // candidate together. So candidates that miss the block are left out by one vote, the others come through shared
 // memory, read ahead while the ones before are evaluated, and what a hit shows is computed as it is found, where its
-// Gaussian is the same for all lanes. A ray's pending hits are in a queue (trace/lane_queue.hpp). Hits are passed on
-// when the window of some ray's queue is full: many rays then have some to pass on, and do it together. Where a queue
-// loses a hit the ray passes on what lies before it, and walks the list again, strictly after its last hit. The queues
-// take 5 KB of device memory for each ray that the device holds at a time: 298 MB on 132 multiprocessors.
+// Gaussian is the same for all lanes. A ray's pending hits are in a queue (trace/warp_hit_queue.hpp). Hits are passed
+// on when the window of some ray's queue is full: many rays then have some to pass on, and do it together. Where a
+// queue loses a hit the ray passes on what lies before it, and walks the list again, strictly after its last hit. The
+// queues take 5 KB of device memory for each ray that the device holds at a time: 298 MB on 132 multiprocessors.
 //
 // Beside what every ray program offers, one for warps offers
 //   order                        the pixels (render/pixels.hpp)
@@ -18,8 +18,8 @@
 
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/tiles/tile_map.hpp>
-#include <gart/trace/lane_queue.hpp>
 #include <gart/trace/ray_program.hpp>
+#include <gart/trace/warp_hit_queue.hpp>
 
 #if defined(__CUDACC__)
 
@@ -41,12 +41,12 @@ class walk_tile_warps {
   static constexpr int block_size = warps * lanes, min_blocks = 7;
   static constexpr u32 tile_parts = tile_blocks;
   using key_order = std::conditional_t<P::records_hits, place_order, entry_order>;
-  using queue = lane_queue<key_order>;
+  using queue = warp_hit_queue<key_order>;
   static constexpr std::size_t aside_floats = queue::floats_aside * block_size;  // of a team's rays
 
   tile_grid<Size> grid;
   tile_map_view map;
-  lt_range const* ranges;
+  footprint_slots const* ranges;
   traced_scene scene;
   vec3 forward;  // the camera's axis
   P program;
@@ -69,7 +69,7 @@ class walk_tile_warps {
   struct warp_scratch {
     candidate ahead[2][group];
     // Of the candidates that 32 entries of the list leave.
-    slot_cell cell[P::records_hits ? lanes : 1];
+    tile_slots cell[P::records_hits ? lanes : 1];
     u32 id[lanes], entry[lanes];
     float depth[lanes];
     typename queue::scratch pending;
@@ -159,7 +159,7 @@ class walk_tile_warps {
    private:
     // Keeps, of 32 entries, those whose boxes overlap the block; how many.
     __device__ GART_INLINE int leave_out(bool exists, u32 entry, u32 id, float depth) {
-      lt_range range;
+      footprint_slots range;
       if (exists) range = k_.ranges[id];
       pixel_box const& b = range.box;
       bool const wanted = exists && b.x0 < corner_.x + block_width && b.x1 > corner_.x &&
@@ -168,7 +168,7 @@ class walk_tile_warps {
       if (wanted) {
         int const to = __popc(all & ((1u << lane_) - 1));
         s_.id[to] = id, s_.entry[to] = entry, s_.depth[to] = depth;
-        if constexpr (P::records_hits) s_.cell[to] = slot_cell(range, area_);
+        if constexpr (P::records_hits) s_.cell[to] = tile_slots(range, area_);
       }
       __syncwarp();
       return __popc(all);
@@ -226,8 +226,7 @@ class walk_tile_warps {
       response two[2];
       GART_UNROLL
       for (int c = 0; c < group; ++c) {
-        if (c % 2 == 0)
-          evaluate_all<Response>(two, [&](int k) { return approach_to(from[c + k].gaussian, ray_); });
+        if (c % 2 == 0) evaluate_all<Response>(two, [&](int k) { return approach_to(from[c + k].gaussian, ray_); });
         response const& r = two[c % 2];
         t[c] = r.t, d2[c] = r.d2;
         bool const is_new = is_hit(from[c].gaussian, r, last_t_), exists = first + c < count;
@@ -277,7 +276,7 @@ class walk_tile_warps {
 
     __device__ GART_INLINE u32 key_of(int number) const {
       if constexpr (P::records_hits)
-        return slot_cell::read(s_.cell[number]).place_of(at_.x, at_.y);
+        return tile_slots::read(s_.cell[number]).place_of(at_.x, at_.y);
       else
         return s_.entry[number];
     }

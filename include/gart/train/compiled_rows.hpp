@@ -114,8 +114,7 @@ class compiled_renderer final : public renderer {
 template <execution E, class Traits, class Tracer, class Strategy>
 void register_row_of(int rank, bool (*available)(std::string*) = always_available) {
   register_row(
-      {row_of<E, Traits, Tracer, Strategy>(),
-       rank, available,
+      {row_of<E, Traits, Tracer, Strategy>(), rank, available,
        []() -> std::unique_ptr<renderer> { return std::make_unique<compiled_renderer<E, Traits, Tracer, Strategy>>(); },
        [](train_options const& options, dataset const& data, gaussian_model const& start) -> std::unique_ptr<session> {
          return std::make_unique<compiled_session<E, Traits, Tracer, Strategy>>(options, data, start);

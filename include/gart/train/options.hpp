@@ -36,7 +36,7 @@ struct train_options {
   // first (optim/finite.hpp).
   bool check_finite = false;
   u64 seed = 1;
-  float near = 0.002f;  // hits lie at t > near, times the scene's extent
+  float near = 0.002f;         // hits lie at t > near, times the scene's extent
   render_options render = {};  // its background is set from `background`, its near from `near`
   learning_rates rates = {};
   adam_options adam = {};

@@ -66,7 +66,7 @@ class trainer {
   void set_state(training_state const& state);
   void save(std::filesystem::path const& path) const { write_checkpoint(path, state()); }
   void load(std::filesystem::path const& path) { set_state(read_checkpoint(path, sh_degree)); }
-  exposure_field exposures() const;  // of the views that were trained on; empty where none are learned
+  exposure_field exposures() const;                   // of the views that were trained on; empty where none are learned
   std::size_t lt_bytes() const { return lt_bytes_; }  // of the last step
   gaussians<E>& scene() { return scene_; }
   gaussians<E> const& gradients() const { return gradients_; }

@@ -9,8 +9,8 @@ void use_interface() {
     gart::row_request request;
     request.backend = row.backend, request.tracer = row.tracer, request.backward = row.backward;
     request.sh_degree = row.sh_degree;
-    std::string const name = "library/" + row.backend + "/" + row.tracer + "/" + row.backward + "/SH" +
-                             std::to_string(row.sh_degree) + "/";
+    std::string const name =
+        "library/" + row.backend + "/" + row.tracer + "/" + row.backward + "/SH" + std::to_string(row.sh_degree) + "/";
     gart::gaussian_model const start = some_model(row.sh_degree);
 
     auto const renderer = gart::make_renderer(request);

@@ -15,7 +15,7 @@ struct pending_hit {
 
 // Capacity: a power of two.
 template <int Capacity>
-class pending_hits {
+class hit_ring {
   static_assert((Capacity & (Capacity - 1)) == 0);
 
  public:

@@ -10,7 +10,7 @@
 namespace gart::inline GART_ISA {
 
 template <int Capacity>
-class hit_window {
+class k_buffer {
  public:
   static constexpr int capacity = Capacity;
 

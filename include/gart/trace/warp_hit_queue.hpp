@@ -33,7 +33,7 @@ struct entry_order {
 };
 
 template <class KeyOrder>
-class lane_queue {
+class warp_hit_queue {
   static constexpr int lanes = 32;
   static constexpr int window = 16;  // as many as `order_` has room for
   static constexpr int run = window - 1, runs = 14;
@@ -51,7 +51,7 @@ class lane_queue {
   static constexpr std::size_t floats_aside = std::size_t{6} * runs * run;  // of a lane
 
   // aside: of the warp's lanes, on a boundary of 8 bytes.
-  __device__ GART_INLINE lane_queue(scratch& s, float* aside, int lane, KeyOrder before)
+  __device__ GART_INLINE warp_hit_queue(scratch& s, float* aside, int lane, KeyOrder before)
       : own_(&detail::kept_address<float>(&s.words[0][0][lane])),
         aside_(reinterpret_cast<pair*>(aside) + 3 * runs * run * lane),
         before_(before) {
@@ -95,8 +95,7 @@ class lane_queue {
       int const slot = slot_of(0);
       float t = count_ > 0 ? word(time, slot) : infinity;
       bool from_run = false;
-      if ((next_t_ < infinity) & (next_t_ <= t))
-        from_run = next_t_ < t || before_(key_of(next_record()), key_at(slot));
+      if ((next_t_ < infinity) & (next_t_ <= t)) from_run = next_t_ < t || before_(key_of(next_record()), key_at(slot));
       t = from_run ? next_t_ : t;
       if ((t == infinity) | !(t * cosine < depth)) return;
       if (t >= lost_t_ && !nearer(t, from_run ? key_of(next_record()) : key_at(slot), lost_t_, lost_key_)) return;
@@ -152,8 +151,8 @@ class lane_queue {
   }
 
   __device__ GART_INLINE waiting_hit at(int slot) const {
-    return {word(time, slot), word(opacity, slot), {word(red, slot), word(green, slot), word(blue, slot)},
-            key_at(slot)};
+    return {
+        word(time, slot), word(opacity, slot), {word(red, slot), word(green, slot), word(blue, slot)}, key_at(slot)};
   }
 
   __device__ GART_INLINE void give_back(int slot) { free_ |= 1u << slot, --count_; }

@@ -2,21 +2,21 @@
 // Turns candidates into a window of hits: shared by every traverser that proposes Gaussians one at a time and in no
 // particular order.
 
-#include <gart/trace/hit_window.hpp>
+#include <gart/trace/k_buffer.hpp>
 #include <gart/trace/ray_program.hpp>
 
 namespace gart::inline GART_ISA {
 
 template <int Capacity, class Ray, class Response = generalized_gaussian<>>
-struct window_visitor {
+struct k_buffer_visitor {
   traced_scene scene;
   Ray ray;
   // The last hit passed on: only hits strictly after it are taken. At first (near, largest id): t > near.
   float last_t;
   u32 last_id = 0xffffffffu;
-  hit_window<Capacity> window;
+  k_buffer<Capacity> window;
 
-  GART_HD GART_INLINE window_visitor(traced_scene const& s, Ray const& r) : scene(s), ray(r), last_t(s.near) {}
+  GART_HD GART_INLINE k_buffer_visitor(traced_scene const& s, Ray const& r) : scene(s), ray(r), last_t(s.near) {}
 
   GART_HD GART_INLINE float near() const { return last_t; }
   GART_HD GART_INLINE float far() const { return window.far(); }
@@ -34,7 +34,7 @@ template <int Capacity, class Response = generalized_gaussian<>, ray_program P, 
 GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& program, index_t i, Gather const& gather) {
   auto state = program.begin(i);
   auto const r = program.ray_of(i, state);
-  window_visitor<Capacity, std::remove_const_t<decltype(r)>, Response> visitor(scene, r);
+  k_buffer_visitor<Capacity, std::remove_const_t<decltype(r)>, Response> visitor(scene, r);
   bool more = true;
   while (more) {
     visitor.window.clear();
