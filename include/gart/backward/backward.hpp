@@ -222,7 +222,7 @@ class backward {
                           moments_.data(), prints_->pair_offsets().data(), rows_.data(), last_.data(), near_});
     };
 #if defined(__CUDACC__)
-    if constexpr (matrix_gather<by_lane>::fits && !requires { Strategy::lane_by_lane; })
+    if constexpr (matrix_gather<by_lane>::fits && !Strategy::lane_by_lane)
       gather(matrix_gather<by_lane>::block_size, std::type_identity<matrix_gather<by_lane>>{});
     else
       gather(64, std::type_identity<by_lane>{});

@@ -10,7 +10,18 @@
 #include <gart/trace/hit.hpp>
 #include <gart/trace/packet_cell.hpp>
 
+#include <concepts>
+#include <type_traits>
+
 namespace gart::inline GART_ISA {
+
+template <class R>
+concept hit_record = std::is_trivially_copyable_v<R> &&
+    requires(R const& r, u32 id, pixel at, vec3 const& color, float weight) {
+  { R::any } -> std::convertible_to<bool>;      // whether anything is left
+  { r.place_of(id, at) } -> std::same_as<u32>;  // where the hit of Gaussian `id` at that pixel belongs
+  r(u32{}, color, weight, color);               // place, colour were it opaque, weight, its colour before the clamp
+};
 
 // Nothing: the backward pass traces again.
 struct record_none {

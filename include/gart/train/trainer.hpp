@@ -77,8 +77,7 @@ class trainer {
     using type = S;
   };
   template <class S>
-  requires requires { typename S::fallback; }
-  struct fallback_of<S> {
+  requires(!std::is_void_v<typename S::fallback>) struct fallback_of<S> {
     using type = typename S::fallback;
   };
   using fallback_strategy = typename fallback_of<Strategy>::type;
