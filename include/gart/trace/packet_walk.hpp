@@ -5,20 +5,12 @@
 // with some of the rays, in an order that sorts the hits of each ray by (t, id). Where rays meet two Gaussians in
 // opposite orders no one place suits all hits of a candidate, and it takes two rows.
 //
-// A packet program is the ray program for packets:
-// - begin(block): the state of a block's rays; says `directions` and which lanes are `inside`
-// - expect(state, cell): a note on a Gaussian that may be hit; what its hits will write may be fetched
-// - fetch(id): a Gaussian was hit; what shade will read may be fetched
-// - shade(state, id): what it shows each ray, of type `shaded`
-// - on_hit(state, lanes, t, alpha, shaded, note): composites its hits with the rays of a mask; the rays that go on
-// - end(state)
-//
 // A packet that has more hits waiting than there are rows for says so, and its rays are traced one by one.
 
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/tiles/tile_map.hpp>
-#include <gart/trace/packet_cell.hpp>
-#include <gart/trace/ray_program.hpp>
+#include <gart/trace/packet_program.hpp>
+#include <gart/trace/tracer.hpp>
 
 #if !defined(__CUDACC__)
 
@@ -26,10 +18,11 @@ namespace gart::inline GART_ISA {
 
 // Window: what a ray traced alone keeps (tile_tracer). A packet keeps 32 times that in rows: what runs over is traced
 // again from the start, not resumed.
-template <class Response, int Window, int Size, class P>
+template <class Response, int Window, int Size, packet_program P>
 class packet_walk {
  public:
-  static_assert(Size % packet_block::width == 0 && Size % packet_block::height == 0 && Size <= packet_cell::most);
+  static_assert(Size % packet_block::width == 0 && Size % packet_block::height == 0 &&
+                Size <= packet_cell::largest_tile);
 
   // To be called before the first packet of a tile, whose pixels are `area`.
   void enter(pixel_box const& area) { area_ = area, loaded_ = ~u32{0}; }
@@ -96,7 +89,7 @@ class packet_walk {
     for (u32 k = 0; k < n; ++k) {
       if (k + ahead < n) prefetch(&ranges[list[k + ahead]]);
       prefetch(&scene.gaussians[list[k]]);
-      cells_[k] = packet_cell(list[k], ranges[list[k]], area_);
+      cells_[k] = typename P::cell(list[k], ranges[list[k]], area_);
     }
     loaded_ = first;
     return static_cast<int>(n);
@@ -109,7 +102,7 @@ class packet_walk {
                         int n) {
     int count = 0;
     for (int i = 0; i < n; ++i) {
-      packet_cell const& cell = cells_[near_[i]];
+      typename P::cell const& cell = cells_[near_[i]];
       ray_gaussian const& g = scene.gaussians[cell.id];
       response_of<lanes> const r = evaluate<Response>(g, primary_ray_of<lanes>{d});
       hits& h = found_[count];  // alpha: |p|^2 for now
@@ -215,7 +208,7 @@ class packet_walk {
   row pool_[rows + 1];
 
   pixel_box area_;
-  packet_cell cells_[most];  // of the tile's list, from entry loaded_ of the map on
+  typename P::cell cells_[most];  // of the tile's list, from entry loaded_ of the map on
   u32 loaded_;
   u16 near_[batch];  // those of a batch whose boxes the packet overlaps
   hits found_[batch];

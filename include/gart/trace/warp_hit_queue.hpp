@@ -20,7 +20,7 @@ namespace gart::inline GART_ISA {
 struct waiting_hit {
   float t, alpha;
   vec3 shown;
-  u32 key;  // a hit's place where hits are recorded (tiles/layout.hpp), else its Gaussian's entry in the list
+  u32 key;  // a hit's place where hits have places (trace/warp_program.hpp), else its Gaussian's entry in the list
 };
 
 // Order of hits at one t: places of a pixel's hits have the order of their ids; entries are asked for them.
@@ -48,7 +48,7 @@ class warp_hit_queue {
   struct scratch {  // of a warp
     float words[6][window][lanes];
   };
-  static constexpr std::size_t floats_aside = std::size_t{6} * runs * run;  // of a lane
+  static constexpr std::size_t spill_floats_a_lane = std::size_t{6} * runs * run;  // of a lane
 
   // aside: of the warp's lanes, on a boundary of 8 bytes.
   __device__ GART_INLINE warp_hit_queue(scratch& s, float* aside, int lane, KeyOrder before)

@@ -7,31 +7,21 @@
 // on when the window of some ray's queue is full: many rays then have some to pass on, and do it together. Where a
 // queue loses a hit the ray passes on what lies before it, and walks the list again, strictly after its last hit. The
 // queues take 5 KB of device memory for each ray that the device holds at a time: 298 MB on 132 multiprocessors.
-//
-// Beside what every ray program offers, one for warps offers
-//   order                        the pixels (render/pixels.hpp)
-//   row_floats, row_floats_read  what it reads of a Gaussian to shade a hit, and how much of that is to be read (the
-//                                rest is zero); rows_from, where the rows of all Gaussians begin
-//   shade(state, row)            what a hit shows
-//   records_hits                 whether hits have places in the LT buffer (tiles/layout.hpp)
-//   add(state, t, alpha, shown, place)  composites a hit; false ends the ray
 
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/tiles/tile_map.hpp>
-#include <gart/trace/ray_program.hpp>
+#include <gart/trace/tracer.hpp>
 #include <gart/trace/warp_hit_queue.hpp>
+#include <gart/trace/warp_program.hpp>
 
 #if defined(__CUDACC__)
 
 #include <cuda_pipeline.h>
 
-#include <utility>
-
 namespace gart::inline GART_ISA {
 
-template <class Response, int Size, class P>
+template <class Response, int Size, warp_program P>
 class walk_tile_warps {
-  using pixel = decltype(std::declval<P const&>().at(index_t{}));
   static constexpr int lanes = 32, warps = 2;
   static constexpr int block_width = 8, block_height = 4;
   static constexpr int tile_blocks = Size * Size / lanes;
@@ -40,9 +30,9 @@ class walk_tile_warps {
  public:
   static constexpr int block_size = warps * lanes, min_blocks = 7;
   static constexpr u32 tile_parts = tile_blocks;
-  using key_order = std::conditional_t<P::records_hits, place_order, entry_order>;
+  using key_order = std::conditional_t<P::places_hits, place_order, entry_order>;
   using queue = warp_hit_queue<key_order>;
-  static constexpr std::size_t aside_floats = queue::floats_aside * block_size;  // of a team's rays
+  static constexpr std::size_t spill_floats = queue::spill_floats_a_lane * block_size;  // of a team's rays
 
   tile_grid<Size> grid;
   tile_map_view map;
@@ -50,8 +40,8 @@ class walk_tile_warps {
   traced_scene scene;
   vec3 forward;  // the camera's axis
   P program;
-  u32* next = nullptr;         // part of a tile that is to be taken next, zero at first
-  float* put_aside = nullptr;  // [teams][aside_floats]
+  u32* next = nullptr;       // part of a tile that is to be taken next, zero at first
+  float* spilled = nullptr;  // [teams][spill_floats]
 
  private:
   static constexpr int group = 4;  // candidates read ahead at once
@@ -69,7 +59,7 @@ class walk_tile_warps {
   struct warp_scratch {
     candidate ahead[2][group];
     // Of the candidates that 32 entries of the list leave.
-    tile_slots cell[P::records_hits ? lanes : 1];
+    typename P::cell cell[P::places_hits ? lanes : 1];
     u32 id[lanes], entry[lanes];
     float depth[lanes];
     typename queue::scratch pending;
@@ -86,7 +76,7 @@ class walk_tile_warps {
   __device__ void operator()(Team const& team) const {
     int const warp = static_cast<int>(threadIdx.x) / lanes;
     warp_scratch& s = team.scratch().warp[warp];
-    float* const memory = put_aside + team.tile() * aside_floats + warp * (aside_floats / warps);
+    float* const memory = spilled + team.tile() * spill_floats + warp * (spill_floats / warps);
     u32 const parts = grid.count() * tile_parts;
     while (true) {
       u32 part = 0;
@@ -168,7 +158,7 @@ class walk_tile_warps {
       if (wanted) {
         int const to = __popc(all & ((1u << lane_) - 1));
         s_.id[to] = id, s_.entry[to] = entry, s_.depth[to] = depth;
-        if constexpr (P::records_hits) s_.cell[to] = tile_slots(range, area_);
+        if constexpr (P::places_hits) s_.cell[to] = typename P::cell(range, area_);
       }
       __syncwarp();
       return __popc(all);
@@ -275,8 +265,8 @@ class walk_tile_warps {
     }
 
     __device__ GART_INLINE u32 key_of(int number) const {
-      if constexpr (P::records_hits)
-        return tile_slots::read(s_.cell[number]).place_of(at_.x, at_.y);
+      if constexpr (P::places_hits)
+        return P::cell::read(s_.cell[number]).place_of(at_.x, at_.y);
       else
         return s_.entry[number];
     }
@@ -286,12 +276,12 @@ class walk_tile_warps {
       if (!alive_) return;
       pending_.pass_on(depth, cosine_, [this](waiting_hit const& h) {
         last_t_ = h.t, last_key_ = h.key;
-        return alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::records_hits ? h.key : 0);
+        return alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::places_hits ? h.key : 0);
       });
     }
 
     __device__ GART_INLINE static key_order order_of(walk_tile_warps const& k) {
-      if constexpr (P::records_hits)
+      if constexpr (P::places_hits)
         return {};
       else
         return {k.map.primitives.data()};
