@@ -83,7 +83,7 @@ class backward_pass {
   // The forward pass, with what the strategy records; `targets.last` is the pass's own. The colour is read again by
   // differentiate().
   void render(Frame& frame, image_targets targets) {
-    require(frame, prepared, "backward_pass.render needs backward_pass.prepare, after the frame's");
+    require(frame, prepared, "backward_pass.render: call backward_pass.prepare first, after frame.prepare");
     record_type record{};
     if constexpr (records) {
       record = {prints_->ranges().data(), slots_.data()};
@@ -116,14 +116,13 @@ class backward_pass {
   enum standing { nothing, prepared, rendered };
 
   void require(Frame const& frame, standing least, char const* what) const {
-    if (stands_at_ < least || frame_ != &frame || preparation_ != frame.preparation())
-      throw invalid_argument(std::string(what) + " (of this view)");
+    if (stands_at_ < least || frame_ != &frame || preparation_ != frame.preparation()) throw invalid_argument(what);
   }
 
   void run(Frame& frame, span<float const> color_gradient, gaussians<execution_type>& gradients,
            span<float const> error) {
     using response = typename Frame::response;
-    require(frame, rendered, "differentiate needs backward_pass.render, after the frame's preparation");
+    require(frame, rendered, "differentiate: call backward_pass.render first, after frame.prepare");
     execution_type& exec = frame.exec();
     gaussians_view<float const> const scene = frame.scene();
     camera const& view = frame.view();

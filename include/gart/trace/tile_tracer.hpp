@@ -28,8 +28,8 @@ namespace trace_kernels {
 template <class Response, int Capacity, int Size, pixel_program P>
 struct walk_tiles {
   static constexpr int block_size = 64, min_blocks = 8;
-  // Candidates between two looks at what has become certain: rays of a warp then pass on several hits at a time
-  // together.
+  // Candidates between two looks at what has become certain: the rays of a warp then pass on several hits at a time
+  // together, with less divergence.
   static constexpr u32 stride = 8;
   tile_grid<Size> grid;
   tile_map_view map;
@@ -70,7 +70,7 @@ struct walk_tiles {
       pending_hit limit{3.402823466e38f, end, 0};
       u32 resume = end;
       u32 next_id = list[first];
-      ray_gaussian next = scene.gaussians[next_id];  // read one ahead: the work between hides the way from memory
+      ray_gaussian next = scene.gaussians[next_id];  // read one ahead, to hide the latency
       for (u32 k = first; k < end; ++k) {
         u32 const id = next_id;
         ray_gaussian const g = next;
