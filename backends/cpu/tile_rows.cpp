@@ -1,7 +1,7 @@
 // The OpenMP policy with tile lists.
 #include <gart/exec/parallel.hpp>
+#include <gart/runtime/compiled_rows.hpp>
 #include <gart/trace/tile_tracer.hpp>
-#include <gart/train/compiled_rows.hpp>
 
 namespace {
 using tracer = gart::tile_tracer<gart::openmp_exec>;

@@ -1,7 +1,7 @@
 // The CUDA policy with gart's own BVH.
 #include <gart/exec/cuda_launch.cuh>
+#include <gart/runtime/compiled_rows.hpp>
 #include <gart/trace/bvh_tracer.hpp>
-#include <gart/train/compiled_rows.hpp>
 
 namespace {
 using tracer = gart::bvh_tracer<gart::cuda_exec>;

@@ -1,7 +1,7 @@
 // The OpenMP policy with Embree.
 #include <gart/exec/parallel.hpp>
+#include <gart/runtime/compiled_rows.hpp>
 #include <gart/trace/embree_tracer.hpp>
-#include <gart/train/compiled_rows.hpp>
 
 namespace {
 using tracer = gart::embree_tracer<gart::openmp_exec>;

@@ -2,8 +2,8 @@
 // Which variants there are, for any policy: tile lists, the primitive strategy, SH degree 3. They lie below 0 in rank,
 // so that only what asks for one gets it.
 
+#include <gart/runtime/compiled_rows.hpp>
 #include <gart/trace/tile_tracer.hpp>
-#include <gart/train/compiled_rows.hpp>
 
 namespace gart {
 

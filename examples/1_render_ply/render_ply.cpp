@@ -2,7 +2,7 @@
 #include <gart/core/error.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <algorithm>
 #include <cstdio>

@@ -4,8 +4,8 @@
 #include <gart/backward/strategies.hpp>
 #include <gart/exec/parallel.hpp>
 #include <gart/io/ply.hpp>
+#include <gart/runtime/initial.hpp>
 #include <gart/trace/bvh_tracer.hpp>
-#include <gart/train/initial.hpp>
 #include <gart/train/trainer.hpp>
 
 #include <cmath>

@@ -2,8 +2,8 @@
 // SH degree 1, on OpenMP. Trains a scene of them and renders it: own_row DATASET MODEL.ply [ITERATIONS]
 #include <gart/exec/parallel.hpp>
 #include <gart/io/ply.hpp>
+#include <gart/runtime/compiled_rows.hpp>
 #include <gart/trace/tile_tracer.hpp>
-#include <gart/train/compiled_rows.hpp>
 
 #include <cstdio>
 #include <cstdlib>

@@ -3,7 +3,7 @@
 
 #include "fuzz/support.hpp"
 
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <memory>
 

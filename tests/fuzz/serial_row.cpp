@@ -1,8 +1,8 @@
 // The one row that checkpoint.cpp asks for: all of gart::cpu, instrumented, would take minutes to compile.
 
 #include <gart/exec/parallel.hpp>
+#include <gart/runtime/compiled_rows.hpp>
 #include <gart/trace/bvh_tracer.hpp>
-#include <gart/train/compiled_rows.hpp>
 
 using serial_tracer = gart::bvh_tracer<gart::serial_exec>;
 

@@ -95,7 +95,7 @@ with tempfile.TemporaryDirectory() as temporary:
         binary = build(here / "downstream" / component)
         expect(run(binary / f"use_{component}"), component)
     told = configure(here / "downstream" / "missing", fails=True)
-    expect(" ".join(told.split()), "has no component optix, telepathy", "it has: headers, io, cpu")
+    expect(" ".join(told.split()), "has no component optix, telepathy", "it has: headers, io, runtime, reference, cpu")
 
     examples = {path.name: build(path) for path in sorted((a.source / "examples").glob("[0-9]_*"))}
     image = folder / "image.png"

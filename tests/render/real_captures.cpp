@@ -5,7 +5,7 @@
 #include <render/expected.hpp>
 
 #include <gart/io/dataset.hpp>
-#include <gart/train/initial.hpp>
+#include <gart/runtime/initial.hpp>
 
 #include <filesystem>
 #include <set>

@@ -1,8 +1,8 @@
 // What is chosen for a capture, from captures made by hand.
 #include <support/policies.hpp>
 
-#include <gart/train/choose.hpp>
-#include <gart/train/degree_selection.hpp>
+#include <gart/runtime/choose.hpp>
+#include <gart/runtime/degree_selection.hpp>
 
 #include <algorithm>
 

@@ -2,8 +2,8 @@
 // nothing depends on where a run was interrupted.
 #include <support/policies.hpp>
 
-#include <gart/train/degree_selection.hpp>
-#include <gart/train/session.hpp>
+#include <gart/runtime/degree_selection.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 // The errors gart throws. Each message says what was wrong, where, and what to do about it; the types let a program
 // react without reading the text. A setting is named by its field, `struct.field`, with ` = value` after it where the
 // remedy is a value: "raise dataset_options.downscale", "use row_request.backend = openmp". A program whose settings
-// have other names replaces these in what it shows (examples/cli/field_names.hpp).
+// have other names replaces these in what it shows (program/field_names.hpp).
 
 #include <cstddef>
 #include <stdexcept>

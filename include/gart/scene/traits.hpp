@@ -1,6 +1,6 @@
 #pragma once
 // What a scene requires, at compile time. Kernels choose code by it, so that what a scene does not need has no
-// registers, no fields and no bytes. The rows that gart's libraries compile are listed by `gart info`; train/rows.hpp
+// registers, no fields and no bytes. The rows that gart's libraries compile are listed by `gart info`; runtime/rows.hpp
 // is how a program compiles its own (examples/5_own_row).
 
 #include <gart/math/response.hpp>

@@ -20,13 +20,13 @@ struct train_options {
   densify_kind densify = densify_kind::error;
   int sh_degree = 3;
   int sh_every = 1000;  // a degree more after so many steps (or iterations / (3 * degrees) in shorter runs)
-  // Held-out gain in PSNR, dB, that a band of spherical harmonics must buy to be stored (train/degree_selection.hpp);
+  // Held-out gain in PSNR, dB, that a band of spherical harmonics must buy to be stored (runtime/degree_selection.hpp);
   // 0: every band up to sh_degree is, without a measurement.
   float sh_gain = 0;
   std::vector<std::size_t> held_out = {};  // training views, by index, that are not trained on
   background_kind background = background_kind::black;
   // Of the first Gaussians; the scale is times the distance to the neighbours. 0: what suits the start
-  // (train/choose.hpp).
+  // (runtime/choose.hpp).
   float initial_opacity = 0;
   float initial_scale = 0;
   float ssim_weight = 0.2f;

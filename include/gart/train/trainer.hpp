@@ -21,10 +21,11 @@
 #include <gart/optim/mcmc.hpp>
 #include <gart/optim/schedule.hpp>
 #include <gart/render/forward.hpp>
+#include <gart/render/render_image.hpp>
 #include <gart/scene/traits.hpp>
-#include <gart/train/render_image.hpp>
-#include <gart/train/session.hpp>
+#include <gart/train/options.hpp>
 #include <gart/train/state.hpp>
+#include <gart/train/step_report.hpp>
 #include <gart/train/training_images.hpp>
 #include <gart/train/view_order.hpp>
 

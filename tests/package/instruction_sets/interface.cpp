@@ -1,7 +1,7 @@
 // What the library computes: every row behind make_renderer and make_session.
 #include "scene.hpp"
 
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 void use_interface() {
   gart::dataset const data = some_capture();

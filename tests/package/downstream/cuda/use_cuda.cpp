@@ -1,6 +1,6 @@
 // gart::cuda from g++: its rows are there, and a machine without a device says why.
 #include <gart/exec/cuda.hpp>
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <cstdio>
 

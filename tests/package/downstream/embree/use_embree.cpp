@@ -1,5 +1,5 @@
 // gart::embree: its rows are there.
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <cstdio>
 

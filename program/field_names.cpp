@@ -2,8 +2,8 @@
 
 #include <gart/io/dataset.hpp>
 #include <gart/render/options.hpp>
+#include <gart/runtime/session.hpp>
 #include <gart/train/options.hpp>
-#include <gart/train/session.hpp>
 
 namespace gart_cli {
 

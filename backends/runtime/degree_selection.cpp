@@ -1,7 +1,7 @@
 #include <gart/core/error.hpp>
 #include <gart/loss/metrics.hpp>
 #include <gart/optim/schedule.hpp>
-#include <gart/train/degree_selection.hpp>
+#include <gart/runtime/degree_selection.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -31,7 +31,7 @@
 // bits on the serial policy. Cost: the trials, a second state in host memory while they run, a new session at each
 // change of degree. Errors: as make_session.
 
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <string>
 #include <vector>

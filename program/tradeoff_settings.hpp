@@ -1,7 +1,7 @@
 #pragma once
 // The table of `gart tradeoff`: every knob that buys speed with accuracy, each turned alone, and a few together.
 
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <string>
 #include <vector>

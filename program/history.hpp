@@ -2,7 +2,7 @@
 // The course of a training run, for the curves of its report: a few hundred points whatever the number of steps, kept
 // in history.json beside the checkpoint so that a resumed run has the whole curve.
 
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <nlohmann/json.hpp>
 

@@ -2,7 +2,7 @@
 #include "progress.hpp"
 
 #include <gart/core/version.hpp>
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #if defined(GART_WITH_CUDA)
 #include <gart/exec/cuda.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 // A view with many rays a pixel: the mean over a pixel's square, which one ray through its middle only estimates.
 
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 namespace gart_cli {
 

@@ -4,7 +4,7 @@
 
 #include <gart/exposure/exposure_field.hpp>
 #include <gart/io/dataset.hpp>
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <nlohmann/json.hpp>
 

@@ -3,7 +3,7 @@
 
 #include <gart/render/antialiased.hpp>
 #include <gart/render/forward.hpp>
-#include <gart/train/session.hpp>
+#include <gart/render/rendered.hpp>
 
 namespace gart::inline GART_ISA {
 

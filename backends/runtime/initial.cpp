@@ -1,7 +1,7 @@
 #include <gart/core/error.hpp>
 #include <gart/optim/random.hpp>
-#include <gart/train/choose.hpp>
-#include <gart/train/initial.hpp>
+#include <gart/runtime/choose.hpp>
+#include <gart/runtime/initial.hpp>
 
 #include <algorithm>
 #include <array>

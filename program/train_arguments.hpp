@@ -3,8 +3,8 @@
 
 #include "options.hpp"
 
+#include <gart/runtime/session.hpp>
 #include <gart/train/options.hpp>
-#include <gart/train/session.hpp>
 
 #include <nlohmann/json.hpp>
 

@@ -1,8 +1,8 @@
 // Which rows there are, and which one a request means.
 #include <gart/core/error.hpp>
-#include <gart/train/degree_selection.hpp>
-#include <gart/train/initial.hpp>
-#include <gart/train/rows.hpp>
+#include <gart/runtime/degree_selection.hpp>
+#include <gart/runtime/initial.hpp>
+#include <gart/runtime/rows.hpp>
 
 #include <algorithm>
 #include <set>
@@ -90,10 +90,10 @@ compiled_row const& find(row_request const& request) {
   if (!unavailable.empty())
     throw unsupported("backend " + unavailable + ": " + reason +
                       "; use row_request.backend = openmp, which needs no device");
-  throw unsupported("no compiled row for " + as_text(request) +
-                    "; there are (backend / tracer / backward): " + list_rows() +
-                    ". A program compiles rows of its own with GART_REGISTER_ROWS: gart/train/compiled_rows.hpp, shown "
-                    "by examples/5_own_row");
+  throw unsupported(
+      "no compiled row for " + as_text(request) + "; there are (backend / tracer / backward): " + list_rows() +
+      ". A program compiles rows of its own with GART_REGISTER_ROWS: gart/runtime/compiled_rows.hpp, shown "
+      "by examples/5_own_row");
 }
 
 }  // namespace

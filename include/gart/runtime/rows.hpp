@@ -2,7 +2,7 @@
 // The table of compiled rows behind make_session and make_renderer. A library that compiles rows registers them when it
 // is loaded (GART_REGISTER_ROWS); a program that instantiates its own may do the same (examples/5_own_row).
 
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <memory>
 #include <string>

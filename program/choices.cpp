@@ -2,7 +2,7 @@
 
 #include "progress.hpp"
 
-#include <gart/train/degree_selection.hpp>
+#include <gart/runtime/degree_selection.hpp>
 
 #include <cstdio>
 

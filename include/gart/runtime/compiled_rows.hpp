@@ -8,7 +8,7 @@
 //                                            gart::tile_tracer<gart::openmp_exec, 8, response>,
 //                                            gart::primitive_strategy>(-1))
 
-#include <gart/train/rows.hpp>
+#include <gart/runtime/rows.hpp>
 #include <gart/train/trainer.hpp>
 
 namespace gart::inline GART_ISA {

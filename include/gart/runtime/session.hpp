@@ -8,9 +8,11 @@
 #include <gart/exec/profile.hpp>
 #include <gart/exposure/exposure_field.hpp>
 #include <gart/io/dataset.hpp>
+#include <gart/render/rendered.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/train/options.hpp>
 #include <gart/train/state.hpp>
+#include <gart/train/step_report.hpp>
 
 #include <filesystem>
 #include <functional>
@@ -48,13 +50,6 @@ struct row_info {
 row_info resolve(row_request const& request);
 std::vector<row_info> compiled_rows();
 
-struct rendered {
-  image_float color;          // background composited
-  image_float transmittance;  // 1 channel
-  image_float depth;          // 1 channel: sum of weight * t
-  basic_image<u32> hits;      // 1 channel: hits composited
-};
-
 class renderer {
  public:
   virtual ~renderer() = default;
@@ -72,17 +67,6 @@ class renderer {
 };
 
 std::unique_ptr<renderer> make_renderer(row_request const& request);
-
-struct step_report {
-  int step = 0;  // steps done, this one included
-  float loss = 0;
-  float psnr = 0;  // of this step's training view
-  index_t gaussians = 0;
-  std::string view;
-  std::string backward;  // the strategy of this step: not the one asked for where its LT buffer would pass the budget
-  u64 skipped = 0;       // with check_finite: numbers that Adam left as they were, their updates not being finite
-  bool trial = false;    // a step of a trial (train/degree_selection.hpp): `step` stands still until it is decided
-};
 
 class session {
  public:
@@ -114,7 +98,7 @@ class session {
 
 // The dataset must outlive the session. `start` seeds the Gaussians where given, else the dataset's points or random
 // ones. With options.sh_gain the session measures which bands of spherical harmonics to store, and its row and degree
-// change in its course (train/degree_selection.hpp).
+// change in its course (runtime/degree_selection.hpp).
 std::unique_ptr<session> make_session(row_request const& request, train_options const& options, dataset const& data,
                                       gaussian_model const* start = nullptr);
 

@@ -1,5 +1,5 @@
 #include <gart/exposure/exposure_field.hpp>
-#include <gart/train/choose.hpp>
+#include <gart/runtime/choose.hpp>
 
 #include <algorithm>
 #include <array>

@@ -3,7 +3,7 @@
 
 #include "help.hpp"
 
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <nlohmann/json.hpp>
 

@@ -4,7 +4,7 @@
 
 #include "train_arguments.hpp"
 
-#include <gart/train/choose.hpp>
+#include <gart/runtime/choose.hpp>
 
 #include <nlohmann/json.hpp>
 

@@ -1,7 +1,7 @@
 #pragma once
 // What a capture asks for, told from its cameras and pixels before training starts: `gart train` and `gart eval` take
 // it where an option does not say otherwise. Each choice comes with its reason in words. What cannot be told before,
-// which bands of spherical harmonics pay, is measured (train/degree_selection.hpp).
+// which bands of spherical harmonics pay, is measured (runtime/degree_selection.hpp).
 //
 // inspect() reads every pixel's alpha, and of at most 64 training images, evenly spread, the outermost pixels: O(bytes
 // of the images). A border is plain where 95% of those pixels lie within 12 of 255 of their median in every channel:
