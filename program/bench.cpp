@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 struct bench_arguments {
   fs::path model, cameras, json;
-  row_options row;
+  configuration_options configuration;
   std::string backward = "auto", lt_format = "auto";
   int views = 4, warmups = 5, repeats = 20;
   bool quiet = false;
@@ -48,16 +48,16 @@ gart::dataset noise_capture(gart::named_camera const& camera) {
 }
 
 int run_bench(bench_arguments const& a) {
-  use_threads(a.row.threads);
+  use_threads(a.configuration.threads);
   model_file const file = load_model(a.model);
   auto cameras = gart::load_cameras(a.cameras);
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   if (static_cast<int>(cameras.size()) > a.views) cameras.resize(static_cast<std::size_t>(a.views));
   if (!a.json.empty()) prepare_file(a.json);
 
-  auto wanted = a.row.request;
+  auto wanted = a.configuration.request;
   wanted.backward = a.backward, wanted.lt_format = a.lt_format;
-  auto const request = row_request_for(file, a.model, wanted);
+  auto const request = configuration_request_for(file, a.model, wanted);
   gart::train_options options;
   options.densify = gart::densify_kind::none;
   options.iterations = 1;  // the full SH degree from the first step
@@ -69,12 +69,12 @@ int run_bench(bench_arguments const& a) {
   std::map<std::string, double> stages;
   double wall = 0, processor = 0, hits = 0, lt_bytes = 0;
   std::size_t peak = 0;
-  gart::row_info row;
+  gart::configuration_info configuration;
   progress say(a.quiet);
   for (std::size_t v = 0; v < cameras.size(); ++v) {
     gart::dataset const data = noise_capture(cameras[v]);
     auto const session = gart::make_session(request, options, data, &file.model);
-    row = session->row();
+    configuration = session->configuration();
     std::map<std::string, std::vector<double>> samples;
     std::vector<double> walls, processors;
     for (int i = -a.warmups; i < a.repeats; ++i) {
@@ -104,15 +104,15 @@ int run_bench(bench_arguments const& a) {
               static_cast<double>(v + 1) / static_cast<double>(cameras.size()));
   }
   say.clear();
-  nlohmann::json result = {{"backend", row.backend},
-                           {"tracer", row.tracer},
-                           {"backward", row.backward},
-                           {"sh_degree", row.sh_degree},
-                           {"kernel_degree", row.kernel_degree},
-                           {"arithmetic", row.arithmetic},
-                           {"lt_format", row.lt_format},
-                           {"tile_size", row.tile_size},
-                           {"window", row.window},
+  nlohmann::json result = {{"backend", configuration.backend},
+                           {"tracer", configuration.tracer},
+                           {"backward", configuration.backward},
+                           {"sh_degree", configuration.sh_degree},
+                           {"kernel_degree", configuration.kernel_degree},
+                           {"arithmetic", configuration.arithmetic},
+                           {"lt_format", configuration.lt_format},
+                           {"tile_size", configuration.tile_size},
+                           {"window", configuration.window},
                            {"gaussians", file.model.size()},
                            {"width", cameras[0].view.width},
                            {"height", cameras[0].view.height},
@@ -126,8 +126,8 @@ int run_bench(bench_arguments const& a) {
                            {"lt_bytes", lt_bytes},
                            {"peak_bytes", peak}};
   if (!a.json.empty()) write_json(a.json, result);
-  std::printf("%s, %s, %s: %zu Gaussians, %d x %d, medians of %d, mean over %zu views\n", row.backend.c_str(),
-              row.tracer.c_str(), row.backward.c_str(), file.model.size(), cameras[0].view.width,
+  std::printf("%s, %s, %s: %zu Gaussians, %d x %d, medians of %d, mean over %zu views\n", configuration.backend.c_str(),
+              configuration.tracer.c_str(), configuration.backward.c_str(), file.model.size(), cameras[0].view.width,
               cameras[0].view.height, a.repeats, cameras.size());
   std::printf("  %-24s %10.3f ms\n  %-24s %10.3f ms\n", "whole step", wall, "of the processor", processor);
   for (auto const& [label, ms] : stages) std::printf("  %-24s %10.3f ms\n", label.c_str(), ms);
@@ -164,7 +164,7 @@ void add_bench(CLI::App& app, command& selected) {
       ->check(between(1, 1000));
   bench->add_option("--json", a->json, "Write the figures to this file")->type_name("FILE");
   bench->add_flag("--quiet", a->quiet, "No progress line");
-  add_row_options(*bench, a->row);
+  add_configuration_options(*bench, a->configuration);
   bench->add_option("--lt-format", a->lt_format, "What the forward pass leaves of a hit: float4, half or shared")
       ->type_name("NAME")
       ->capture_default_str()

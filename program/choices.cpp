@@ -59,7 +59,7 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
     say("--init-scale", short_number(start.value.scale), a.initial_scale != 0 ? by_option : start.why);
   }
   gart::train_options const options = train_options_of(a);
-  auto const plan = gart::plan_trials(row_request_of(a), options, data.train.size());
+  auto const plan = gart::plan_trials(configuration_request_of(a), options, data.train.size());
   bool const measured = !plan.held_out.empty();
   say("--sh-degree", (measured ? "at most " : "") + std::to_string(options.sh_degree),
       a.sh_degree != "auto" ? by_option

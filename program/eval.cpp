@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 struct eval_arguments {
   fs::path model, dataset, out, renders, pairs, exposures;
-  row_options row;
+  configuration_options configuration;
   std::string background = "auto";
   int downscale = 1, test_every = 8;
   int max_hits = -1;
@@ -44,9 +44,9 @@ void refuse_other_images(fs::path const& pairs, std::vector<gart::dataset_view> 
 }
 
 int run_eval(eval_arguments const& a) {
-  use_threads(a.row.threads);
+  use_threads(a.configuration.threads);
   model_file file = load_model(a.model);
-  auto const renderer = gart::make_renderer(row_request_for(file, a.model, a.row.request));
+  auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request));
   prepare_file(a.out);
   if (!a.renders.empty()) prepare_folder(a.renders);
   for (char const* side : {"render", "truth"})
@@ -88,14 +88,14 @@ int run_eval(eval_arguments const& a) {
       });
   say.state("scoring training views", 1);
   scores const training = evaluate(evenly_spread(data.train, data.test.size()), options.background, exposures, draw);
-  auto const row = renderer->row();
+  auto const configuration = renderer->configuration();
   nlohmann::json metrics = to_json(result, training, data.train.size());
   metrics["format"] = data.format, metrics["split"] = data.split, metrics["resize_filter"] = data.resize_filter;
   metrics["background"] = background, metrics["notes"] = data.notes;
   metrics["gaussians"] = file.model.size(), metrics["sh_degree"] = file.model.sh_degree;
   metrics["kernel_degree"] = file.kernel_degree;
-  metrics["backend"] = row.backend, metrics["tracer"] = row.tracer;
-  metrics["approximations"] = approximations_of(options, row);
+  metrics["backend"] = configuration.backend, metrics["tracer"] = configuration.tracer;
+  metrics["approximations"] = approximations_of(options, configuration);
   metrics["peak_bytes"] = renderer->peak_bytes();
   write_json(a.out, metrics);
   say.clear();
@@ -136,7 +136,7 @@ void add_eval(CLI::App& app, command& selected) {
       ->check(between(1, 1e6));
   add_max_hits(*eval, a->max_hits);
   eval->add_flag("--quiet", a->quiet, "Say nothing but errors");
-  add_row_options(*eval, a->row);
+  add_configuration_options(*eval, a->configuration);
   eval->footer(
       "\nWrites METRICS.json: psnr (dB) and ssim, their means over the test views and each view's, and how they were "
       "taken.\npsnr_affine_colour is a diagnostic, no score: PSNR after the affine colour that brings each render "

@@ -21,9 +21,9 @@ namespace {
 
 void print_devices() {
   std::set<std::string> compiled_for;
-  for (auto const& r : gart::compiled_rows())
+  for (auto const& r : gart::compiled_configurations())
     if (!r.instruction_set.empty()) compiled_for.insert(r.instruction_set);
-  std::printf("cpu        %u threads, rows compiled for", std::thread::hardware_concurrency());
+  std::printf("cpu        %u threads, configurations compiled for", std::thread::hardware_concurrency());
   for (auto const& one : compiled_for) std::printf(" %s", one.c_str());
   std::puts("");
 #if defined(GART_WITH_CUDA)
@@ -47,15 +47,15 @@ void print_devices() {
 int run_info() {
   std::printf("gart       %s\n", gart::version);
   print_devices();
-  // Rows that differ only in the degree of the spherical harmonics share a line.
+  // Configurations that differ only in the degree of the spherical harmonics share a line.
   std::map<std::tuple<std::string, std::string, std::string, int, std::string, std::string, int, int>, std::set<int>>
-      rows;
-  for (auto const& r : gart::compiled_rows()) {
-    rows[{r.backend, r.tracer, r.backward, r.kernel_degree, r.arithmetic, r.lt_format, r.tile_size, r.window}].insert(
-        r.sh_degree);
+      configurations;
+  for (auto const& r : gart::compiled_configurations()) {
+    configurations[{r.backend, r.tracer, r.backward, r.kernel_degree, r.arithmetic, r.lt_format, r.tile_size, r.window}]
+        .insert(r.sh_degree);
   }
   std::puts("\nbackend  tracer  backward       kernel  arithmetic  LT format  tile  window  SH degrees");
-  for (auto const& [names, degrees] : rows) {
+  for (auto const& [names, degrees] : configurations) {
     auto const& [backend, tracer, backward, kernel_degree, arithmetic, lt_format, tile_size, window] = names;
     std::printf("%-8s %-7s %-14s %-7d %-11s %-10s %-5d %-7d", backend.c_str(), tracer.c_str(), backward.c_str(),
                 kernel_degree, arithmetic.c_str(), lt_format.c_str(), tile_size, window);
@@ -72,9 +72,8 @@ int run_info() {
 void add_info(CLI::App& app, command& selected) {
   CLI::App* info = app.add_subcommand("info", "Say what this build and this machine can do.");
   info->footer(
-      "\nPrints the version, the devices found, and the rows that were compiled: which backend, tracer and backward "
-      "pass\n"
-      "go together, for which degrees of spherical harmonics. Writes nothing.\n"
+      "\nPrints the version, the devices found, and the configurations that were compiled: which backend, tracer and\n"
+      "backward pass go together, for which degrees of spherical harmonics. Writes nothing.\n"
       "\nExamples:\n"
       "  gart info\n"
       "  gart info | grep cuda");

@@ -67,7 +67,7 @@ void add_threads(CLI::App& app, int& threads) {
       ->check(between(0, 4096));
 }
 
-void add_row_options(CLI::App& app, row_options& options) {
+void add_configuration_options(CLI::App& app, configuration_options& options) {
   app.add_option("--backend", options.request.backend,
                  "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is")
       ->type_name("NAME")
@@ -79,7 +79,7 @@ void add_row_options(CLI::App& app, row_options& options) {
       ->capture_default_str()
       ->check(tracer_names());
   add_threads(app, options.threads);
-  std::string const group = "Traits that trade (gart info lists the rows that have them)";
+  std::string const group = "Traits that trade (gart info lists the configurations that have them)";
   app.add_option("--arithmetic", options.request.arithmetic, "exact, or fast: shorter exponentials and reciprocals")
       ->type_name("NAME")
       ->capture_default_str()
@@ -160,7 +160,8 @@ model_file load_model(std::filesystem::path const& path) {
   return file;
 }
 
-gart::row_request row_request_for(model_file const& file, std::filesystem::path const& path, gart::row_request wanted) {
+gart::configuration_request configuration_request_for(model_file const& file, std::filesystem::path const& path,
+                                                      gart::configuration_request wanted) {
   wanted.sh_degree = file.model.sh_degree;
   wanted.kernel_degree = file.kernel_degree;
   try {
@@ -171,9 +172,13 @@ gart::row_request row_request_for(model_file const& file, std::filesystem::path 
   return wanted;
 }
 
-nlohmann::json approximations_of(gart::render_options const& render, gart::row_info const& row) {
-  return {{"alpha_min", render.alpha_min}, {"t_min", render.transmittance_min}, {"max_hits", render.max_hits},
-          {"antialias", render.antialias}, {"arithmetic", row.arithmetic},      {"lt_format", row.lt_format}};
+nlohmann::json approximations_of(gart::render_options const& render, gart::configuration_info const& configuration) {
+  return {{"alpha_min", render.alpha_min},
+          {"t_min", render.transmittance_min},
+          {"max_hits", render.max_hits},
+          {"antialias", render.antialias},
+          {"arithmetic", configuration.arithmetic},
+          {"lt_format", configuration.lt_format}};
 }
 
 }  // namespace gart_cli

@@ -48,12 +48,12 @@ class recorded_options {
 
 // --backend --tracer --threads, as every command that traces rays has them, and the traits that trade one thing for
 // another: --arithmetic --tile-size --window.
-struct row_options {
-  gart::row_request request;
+struct configuration_options {
+  gart::configuration_request request;
   int threads = 0;
 };
 void add_threads(CLI::App& app, int& threads);
-void add_row_options(CLI::App& app, row_options& options);
+void add_configuration_options(CLI::App& app, configuration_options& options);
 void use_threads(int threads);
 // --max-hits of a model to be rendered: negative where the model says.
 void add_max_hits(CLI::App& app, int& max_hits);
@@ -76,10 +76,11 @@ struct model_file {
 };
 // io_error for what is no splat file, or one whose traits say what cannot be.
 model_file load_model(std::filesystem::path const& path);
-// The row for a model; unsupported, naming its file, where there is none of its degrees.
-gart::row_request row_request_for(model_file const& file, std::filesystem::path const& path, gart::row_request wanted);
+// The configuration for a model; unsupported, naming its file, where there is none of its degrees.
+gart::configuration_request configuration_request_for(model_file const& file, std::filesystem::path const& path,
+                                                      gart::configuration_request wanted);
 inline constexpr gart::u32 max_hits_most = 1'000'000'000;
 // What a run left out or computed shorter, as every report tells it.
-nlohmann::json approximations_of(gart::render_options const& render, gart::row_info const& row);
+nlohmann::json approximations_of(gart::render_options const& render, gart::configuration_info const& configuration);
 
 }  // namespace gart_cli

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 struct render_arguments {
   fs::path model, cameras, out, json, exposures;
-  row_options row;
+  configuration_options configuration;
   std::string background = "black";
   int downscale = 1, samples = 1;
   float alpha_min = -1, t_min = -1;
@@ -59,14 +59,14 @@ depth_picture picture_depth(gart::rendered const& r) {
 }
 
 int run_render(render_arguments const& a) {
-  use_threads(a.row.threads);
+  use_threads(a.configuration.threads);
   model_file file = load_model(a.model);
   auto cameras = gart::load_cameras(a.cameras);
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   prepare_folder(a.out);
   if (!a.json.empty()) prepare_file(a.json);
 
-  auto const renderer = gart::make_renderer(row_request_for(file, a.model, a.row.request));
+  auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request));
   renderer->set_model(file.model);
   gart::render_options options = file.render;
   options.background = background_color(a.background);
@@ -78,10 +78,13 @@ int run_render(render_arguments const& a) {
       a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures);
 
   progress say(a.quiet);
-  auto const row = renderer->row();
-  nlohmann::json timings = {{"backend", row.backend},         {"tracer", row.tracer},
-                            {"gaussians", file.model.size()}, {"approximations", approximations_of(options, row)},
-                            {"samples", a.samples},           {"views", nlohmann::json::array()}};
+  auto const configuration = renderer->configuration();
+  nlohmann::json timings = {{"backend", configuration.backend},
+                            {"tracer", configuration.tracer},
+                            {"gaussians", file.model.size()},
+                            {"approximations", approximations_of(options, configuration)},
+                            {"samples", a.samples},
+                            {"views", nlohmann::json::array()}};
   renderer->profile().enable(!a.json.empty());
   double total = 0;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -115,7 +118,8 @@ int run_render(render_arguments const& a) {
   say.clear();
   if (!a.quiet) {
     std::printf("%zu views in %s, %.1f ms each (%s, %s)\n", cameras.size(), a.out.string().c_str(),
-                total / static_cast<double>(cameras.size()), row.backend.c_str(), row.tracer.c_str());
+                total / static_cast<double>(cameras.size()), configuration.backend.c_str(),
+                configuration.tracer.c_str());
   }
   return 0;
 }
@@ -163,7 +167,7 @@ void add_render(CLI::App& app, command& selected) {
   render->add_flag("--depth", a->depth, "Also the depth of each view, nearest white, as NAME_depth.png");
   render->add_option("--json", a->json, "Write timings of each view and stage in milliseconds")->type_name("FILE");
   render->add_flag("--quiet", a->quiet, "Say nothing but errors");
-  add_row_options(*render, a->row);
+  add_configuration_options(*render, a->configuration);
   render->footer(
       "\nWrites DIR/NAME.png for each camera, NAME as the dataset or file has it. The first view pays for the start.\n"
       "\nExamples:\n"

@@ -25,7 +25,7 @@ using nlohmann::json;
 
 struct tradeoff_arguments {
   fs::path model, cameras, out;
-  row_options row;
+  configuration_options configuration;
   std::string backward = "auto", background = "auto", clock = "wall";
   std::vector<std::string> settings;
   view_choice views;
@@ -74,7 +74,7 @@ class tradeoff_run {
           "measuring " + std::to_string(i + 1) + "/" + std::to_string(settings_.size()) + "  " + settings_[i].name(),
           static_cast<double>(i) / static_cast<double>(settings_.size()));
       try {
-        gart::resolve(settings_[i].use.row);
+        gart::resolve(settings_[i].use.configuration);
       } catch (gart::unsupported const& e) {
         result["absent"].push_back({{"name", settings_[i].name()}, {"why", in_options(e.what())}});
         continue;
@@ -96,14 +96,15 @@ class tradeoff_run {
 
  private:
   void prepare() {
-    use_threads(a_.row.threads);
+    use_threads(a_.configuration.threads);
     file_ = load_model(a_.model);
     configuration exact;
-    gart::row_request wanted = a_.row.request;
+    gart::configuration_request wanted = a_.configuration.request;
     wanted.backward = a_.backward;
-    exact.row = row_request_for(file_, a_.model, wanted);
-    gart::row_info const row = gart::resolve(exact.row);
-    exact.row.backend = row.backend, exact.row.tracer = row.tracer, exact.row.backward = row.backward;
+    exact.configuration = configuration_request_for(file_, a_.model, wanted);
+    gart::configuration_info const configuration = gart::resolve(exact.configuration);
+    exact.configuration.backend = configuration.backend, exact.configuration.tracer = configuration.tracer,
+    exact.configuration.backward = configuration.backward;
     exact.render = file_.render;
     settings_ = selected_settings(settings_of(exact), a_.settings);
 
@@ -116,7 +117,7 @@ class tradeoff_run {
     reference_ = settings_.front().use.render;
     reference_.transmittance_min = 0, reference_.max_hits = 0;
     if (a_.reference_alpha_min > 0) reference_.alpha_min = a_.reference_alpha_min;
-    auto const renderer = gart::make_renderer(settings_.front().use.row);
+    auto const renderer = gart::make_renderer(settings_.front().use.configuration);
     renderer->set_model(file_.model);
     float const ssim_weight = gart::train_options().ssim_weight;
     for (std::size_t i = 0; i < set_.views.size(); ++i) {
@@ -143,7 +144,7 @@ class tradeoff_run {
             {"gaussians", file_.model.size()},
             {"sh_degree", file_.model.sh_degree},
             {"kernel_degree", file_.kernel_degree},
-            {"backend", exact.row.backend},
+            {"backend", exact.configuration.backend},
             {"width", first.view.width},
             {"height", first.view.height},
             {"views", names},
@@ -156,8 +157,8 @@ class tradeoff_run {
   }
 
   json measure(setting const& s) {
-    gart::gaussian_model const model = gart::with_sh_degree(file_.model, s.use.row.sh_degree);
-    auto const renderer = gart::make_renderer(s.use.row);
+    gart::gaussian_model const model = gart::with_sh_degree(file_.model, s.use.configuration.sh_degree);
+    auto const renderer = gart::make_renderer(s.use.configuration);
     renderer->set_model(model);
     error_sums errors;
     std::map<std::string, double> stages;
@@ -175,7 +176,7 @@ class tradeoff_run {
       gart::image_float const image = renderer->render(view, s.use.render).color;
       errors.add_image(v, s.use.shrink == 1 ? image : enlarged(image, v.view.width, v.view.height));
     }
-    return entry(s, renderer->row(), errors, stages, lt_bytes, renderer->peak_bytes());
+    return entry(s, renderer->configuration(), errors, stages, lt_bytes, renderer->peak_bytes());
   }
 
   static constexpr char const* processor = "processor";
@@ -219,7 +220,7 @@ class tradeoff_run {
     return gart::resized(view, std::max(1, view.width / by), std::max(1, view.height / by));
   }
 
-  json entry(setting const& s, gart::row_info const& row, error_sums const& errors,
+  json entry(setting const& s, gart::configuration_info const& configuration, error_sums const& errors,
              std::map<std::string, double> const& stages, double lt_bytes, std::size_t peak_bytes) const {
     auto const of = [&](char const* label) { return stages.count(label) ? stages.at(label) : 0.0; };
     auto const groups = errors.gradients();
@@ -230,13 +231,13 @@ class tradeoff_run {
     double const total = of("gradients"), forward = of("forward"), backward = of("backward");
     return {{"name", s.name()},
             {"knob", s.knob},
-            {"tracer", row.tracer},
-            {"backward", row.backward},
-            {"sh_degree", row.sh_degree},
-            {"kernel_degree", row.kernel_degree},
-            {"tile_size", row.tile_size},
-            {"window", row.window},
-            {"approximations", approximations_of(s.use.render, row)},
+            {"tracer", configuration.tracer},
+            {"backward", configuration.backward},
+            {"sh_degree", configuration.sh_degree},
+            {"kernel_degree", configuration.kernel_degree},
+            {"tile_size", configuration.tile_size},
+            {"window", configuration.window},
+            {"approximations", approximations_of(s.use.render, configuration)},
             {"rebuild_every", s.use.render.rebuild_every},
             {"shrink", s.use.shrink},
             {"image", {{"max", errors.image_max()}, {"rms", errors.image_rms()}, {"psnr", errors.psnr()}}},
@@ -329,7 +330,7 @@ void add_tradeoff(CLI::App& app, command& selected) {
       ->capture_default_str()
       ->check(one_of({"wall", "processor"}));
   tradeoff->add_flag("--quiet", a->quiet, "Say nothing but errors");
-  add_row_options(*tradeoff, a->row);
+  add_configuration_options(*tradeoff, a->configuration);
   tradeoff->footer(
       "\nThe reference traces in double, ends no ray early and evaluates every band of colour. Each setting turns one\n"
       "knob of the model as it was trained (exact), or a few. Errors: the largest and the root mean square of the\n"

@@ -65,34 +65,38 @@ std::vector<setting> settings_of(configuration const& exact) {
   t.sweep(
       "max_hits", [](c& x) -> gart::u32& { return x.render.max_hits; }, std::vector<gart::u32>{64, 32, 16, 8});
   std::vector<int> degrees;
-  for (int d = exact.row.sh_degree - 1; d >= 0; --d) degrees.push_back(d);
+  for (int d = exact.configuration.sh_degree - 1; d >= 0; --d) degrees.push_back(d);
   t.sweep(
-      "sh_degree", [](c& x) -> int& { return x.row.sh_degree; }, degrees);
+      "sh_degree", [](c& x) -> int& { return x.configuration.sh_degree; }, degrees);
   t.sweep(
-      "kernel_degree", [](c& x) -> int& { return x.row.kernel_degree; }, std::vector<int>{1, 2, 3, 4, 5, 8});
+      "kernel_degree", [](c& x) -> int& { return x.configuration.kernel_degree; }, std::vector<int>{1, 2, 3, 4, 5, 8});
   t.sweep(
-      "arithmetic", [](c& x) -> std::string& { return x.row.arithmetic; }, std::vector<std::string>{"fast"});
+      "arithmetic", [](c& x) -> std::string& { return x.configuration.arithmetic; }, std::vector<std::string>{"fast"});
   t.sweep(
-      "lt_format", [](c& x) -> std::string& { return x.row.lt_format; }, std::vector<std::string>{"half", "shared"});
+      "lt_format", [](c& x) -> std::string& { return x.configuration.lt_format; },
+      std::vector<std::string>{"half", "shared"});
   t.sweep(
-      "tile_size", [](c& x) -> int& { return x.row.tile_size; }, std::vector<int>{4, 16});
+      "tile_size", [](c& x) -> int& { return x.configuration.tile_size; }, std::vector<int>{4, 16});
   t.sweep(
-      "window", [](c& x) -> int& { return x.row.window; }, std::vector<int>{16, 64});
+      "window", [](c& x) -> int& { return x.configuration.window; }, std::vector<int>{16, 64});
   t.sweep(
-      "backward", [](c& x) -> std::string& { return x.row.backward; },
+      "backward", [](c& x) -> std::string& { return x.configuration.backward; },
       std::vector<std::string>{"pixel", "hybrid", "primitive", "cleared", "deterministic"});
   t.sweep(
-      "tracer", [](c& x) -> std::string& { return x.row.tracer; }, std::vector<std::string>{"tiles", "bvh", "embree"});
+      "tracer", [](c& x) -> std::string& { return x.configuration.tracer; },
+      std::vector<std::string>{"tiles", "bvh", "embree"});
   for (int const every : {4, 16}) {
-    t.add("rebuild_every", std::to_string(every), [&](c& x) { x.row.tracer = "bvh", x.render.rebuild_every = every; });
+    t.add("rebuild_every", std::to_string(every),
+          [&](c& x) { x.configuration.tracer = "bvh", x.render.rebuild_every = every; });
   }
   for (int const shrink : {2, 4}) {
     t.add("resolution", "1/" + std::to_string(shrink), [&](c& x) { x.shrink = shrink; });
   }
   t.add("together", "alpha_min=0.02+t_min=0.01",
         [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f; });
-  t.add("together", "alpha_min=0.01+t_min=0.03+arithmetic=fast",
-        [](c& x) { x.render.alpha_min = 0.01f, x.render.transmittance_min = 0.03f, x.row.arithmetic = "fast"; });
+  t.add("together", "alpha_min=0.01+t_min=0.03+arithmetic=fast", [](c& x) {
+    x.render.alpha_min = 0.01f, x.render.transmittance_min = 0.03f, x.configuration.arithmetic = "fast";
+  });
   t.add("together", "alpha_min=0.02+t_min=0.01+resolution=1/2",
         [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f, x.shrink = 2; });
   return t.take();

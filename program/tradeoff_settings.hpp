@@ -10,7 +10,7 @@ namespace gart_cli {
 
 // All that decides how a view is traced.
 struct configuration {
-  gart::row_request row;
+  gart::configuration_request configuration;
   gart::render_options render;
   int shrink = 1;  // traced at 1 / shrink of the width and the height, shown at full size
 };

@@ -85,11 +85,11 @@ class training_run {
     if (fs::is_directory(a_.out)) enter();
     if (a_.resume) continue_run(a_);
     if (a_.dataset.empty()) throw usage_error("DATASET is missing (see gart train --help)");
-    row_ = gart::resolve(row_request_of(a_));  // what is not there is known before images are read
+    row_ = gart::resolve(configuration_request_of(a_));  // what is not there is known before images are read
     course_ = course_of(a_);
     load();
     chosen_ = choose(a_, data_);
-    row_ = gart::resolve(row_request_of(a_));
+    row_ = gart::resolve(configuration_request_of(a_));
     a_.backend = row_.backend, a_.tracer = row_.tracer, a_.backward = row_.backward;
     a_.lt_format = row_.lt_format, a_.tile_size = row_.tile_size, a_.window = row_.window;
     for (auto& choice : chosen_) {
@@ -118,8 +118,8 @@ class training_run {
     prepare_folder(a_.out);
     enter();
     prepare_folder(a_.out / "renders");
-    session_ =
-        gart::make_session(row_request_of(a_), train_options_of(a_), data_, a_.start.empty() ? nullptr : &start_);
+    session_ = gart::make_session(configuration_request_of(a_), train_options_of(a_), data_,
+                                  a_.start.empty() ? nullptr : &start_);
     a_.resume ? go_on() : begin_anew();
     trials_ = session_->trials().size();
     say_choices();
@@ -392,8 +392,8 @@ class training_run {
     m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
     m["exposure"] = a_.exposure == "on";
     m["iterations"] = session_->steps_done(), m["time_budget"] = a_.time_budget, m["raised"] = raised_;
-    m["gaussians"] = gaussians_, m["sh_degree"] = session_->row().sh_degree;
-    m["floats_per_gaussian"] = 11 + 3 * gart::sh_coefficients(session_->row().sh_degree);
+    m["gaussians"] = gaussians_, m["sh_degree"] = session_->configuration().sh_degree;
+    m["floats_per_gaussian"] = 11 + 3 * gart::sh_coefficients(session_->configuration().sh_degree);
     m["chosen"] = chosen_, m["sh_trials"] = trials_of(session_->trials());
     m["model_bytes"] = fs::file_size(a_.model_file()), m["checkpoint_bytes"] = fs::file_size(a_.checkpoint_file());
     m["backend"] = row_.backend, m["tracer"] = row_.tracer, m["backward"] = row_.backward;
@@ -421,7 +421,7 @@ class training_run {
   std::optional<run_lock> lock_;
   progress say_;
   history course_;
-  gart::row_info row_;
+  gart::configuration_info row_;
   bool fell_back_ = false;
   gart::dataset data_;
   nlohmann::json chosen_, raised_ = nlohmann::json::array();

@@ -202,7 +202,7 @@ int most_sh_degree(train_arguments const& a) {
 }
 }  // namespace
 
-gart::row_request row_request_of(train_arguments const& a) {
+gart::configuration_request configuration_request_of(train_arguments const& a) {
   return {a.backend,    a.tracer,    a.backward,  most_sh_degree(a), a.kernel_degree,
           a.arithmetic, a.lt_format, a.tile_size, a.window};
 }

@@ -70,7 +70,7 @@ void fill_in(CLI::App const& train, train_arguments& a);
 inline constexpr int measured_from = 5000;
 // Takes the options of the run in `out`, and its dataset where none was named. io_error where there is no such run.
 void continue_run(train_arguments& a);
-gart::row_request row_request_of(train_arguments const& a);
+gart::configuration_request configuration_request_of(train_arguments const& a);
 // `background` is a colour's name or "random".
 gart::train_options train_options_of(train_arguments const& a);
 // With "auto" replaced by what it came to, so that a resumed run cannot come to anything else.

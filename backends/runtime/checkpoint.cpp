@@ -191,7 +191,7 @@ training_state read_checkpoint(std::filesystem::path const& path, int sh_degree)
   training_state s = state_of(in);
   if (s.scene.sh_degree != sh_degree) {
     in.fail("is of SH degree " + std::to_string(s.scene.sh_degree) + ", this run of " + std::to_string(sh_degree) +
-            ": take row_request.sh_degree = " + std::to_string(s.scene.sh_degree));
+            ": take configuration_request.sh_degree = " + std::to_string(s.scene.sh_degree));
   }
   return s;
 }

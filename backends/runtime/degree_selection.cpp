@@ -31,7 +31,7 @@ int degree_in_use(gaussian_model const& m) {
   return degree;
 }
 
-bool lower_rows(row_request request) {
+bool lower_configurations(configuration_request request) {
   try {
     while (request.sh_degree-- > 0) resolve(request);
     return true;
@@ -55,7 +55,7 @@ double mean(std::vector<double> const& values) {
 
 class degree_selection final : public session {
  public:
-  degree_selection(row_request const& request, train_options const& options, dataset const& data,
+  degree_selection(configuration_request const& request, train_options const& options, dataset const& data,
                    gaussian_model const& start, trial_plan const& plan)
       : request_(request),
         options_(options),
@@ -67,7 +67,7 @@ class degree_selection final : public session {
         start_degree_(std::min(degree_in_use(start), plan.degree)),
         never_trained_(options.held_out) {
     options_.sh_gain = 0;
-    options_.sh_every = interval_;  // a row of a lower degree keeps to the schedule of all
+    options_.sh_every = interval_;  // a configuration of a lower degree keeps to the schedule of all
     hold_out(true);
     open(with_sh_degree(start, stored_degree(0)));
   }
@@ -119,7 +119,7 @@ class degree_selection final : public session {
   profiler& profile() override { return profile_; }
   std::size_t peak_bytes() const override { return std::max(peak_bytes_, inner_->peak_bytes()); }
   std::size_t lt_bytes() const override { return inner_->lt_bytes(); }
-  row_info row() const override { return inner_->row(); }
+  configuration_info configuration() const override { return inner_->configuration(); }
 
  private:
   int first_step(int band) const { return band * interval_; }
@@ -127,11 +127,11 @@ class degree_selection final : public session {
     return std::max(start_degree_, sh_degree_at(step, plan_.degree, interval_, options_.iterations));
   }
 
-  // Gives the next step the row it needs, or starts a trial.
+  // Gives the next step the configuration it needs, or starts a trial.
   void arrange() {
     int const step = inner_->steps_done();
     int const degree = stored_degree(step);
-    if (trials_.empty() && degree > inner_->row().sh_degree) {
+    if (trials_.empty() && degree > inner_->configuration().sh_degree) {
       open(with_sh_degree(inner_->state(), degree));
     } else if (step >= plan_.begin && !long_enough(plan_, options_.iterations)) {
       settled_ = true;  // every band stays
@@ -202,7 +202,7 @@ class degree_selection final : public session {
     inner_.reset();
   }
 
-  row_request request_;
+  configuration_request request_;
   train_options options_;
   dataset const& data_;
   trial_plan plan_;
@@ -219,7 +219,7 @@ class degree_selection final : public session {
 
 }  // namespace
 
-trial_plan plan_trials(row_request const& request, train_options const& options, std::size_t train_views) {
+trial_plan plan_trials(configuration_request const& request, train_options const& options, std::size_t train_views) {
   trial_plan plan;
   plan.degree = request.sh_degree;
   plan.begin = options.iterations / 2;
@@ -233,8 +233,8 @@ trial_plan plan_trials(row_request const& request, train_options const& options,
     plan.why = std::to_string(train_views) + " training views are too few to hold some out and measure";
   } else if (!long_enough(plan, options.iterations)) {
     plan.why = "a run under " + std::to_string(4 * plan.steps * plan.degree) + " steps is too short to measure";
-  } else if (!lower_rows(request)) {
-    plan.why = "lower degrees are not compiled for this row";
+  } else if (!lower_configurations(request)) {
+    plan.why = "lower degrees are not compiled for this configuration";
   } else {
     for (std::size_t i = 0; i < views; ++i) plan.held_out.push_back((2 * i + 1) * train_views / (2 * views));
     char gain[32];
@@ -259,7 +259,7 @@ double forecast_gain(double gain, int first_step, int now, int iterations) {
   return gain * (iterations - first_step) / (now - first_step);
 }
 
-std::unique_ptr<session> make_degree_selection(row_request const& request, train_options const& options,
+std::unique_ptr<session> make_degree_selection(configuration_request const& request, train_options const& options,
                                                dataset const& data, gaussian_model const& start,
                                                trial_plan const& plan) {
   return std::make_unique<degree_selection>(request, options, data, start, plan);

@@ -129,7 +129,7 @@ TEST_CASE("training starts from the capture's points, or from random ones as MCM
 }
 
 TEST_CASE("bands are measured where views and steps allow, on views evenly spread, within a quarter of the run") {
-  gart::row_request request{"serial"};
+  gart::configuration_request request{"serial"};
   gart::train_options options;
   options.sh_gain = 0.02f;
   auto const plan = gart::plan_trials(request, options, 100);

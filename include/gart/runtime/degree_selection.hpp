@@ -1,7 +1,7 @@
 #pragma once
 // Which bands of spherical harmonics a scene pays for, measured while it trains. Bands that buy nothing are not stored:
-// the run ends in the row of a lower degree, whose parameters, gradients, Adam's moments, checkpoint and PLY have no
-// floats for them (11 + 3 (degree + 1)^2 a Gaussian: 14, 23, 38 or 59).
+// the run ends in the configuration of a lower degree, whose parameters, gradients, Adam's moments, checkpoint and PLY
+// have no floats for them (11 + 3 (degree + 1)^2 a Gaussian: 14, 23, 38 or 59).
 //
 // The course. Storage follows the schedule of degrees (optim/schedule.hpp): a band gets memory at the step it is first
 // used in, which changes no bit of the training. A few training views, evenly spread, are held out. From half the run
@@ -47,15 +47,15 @@ struct trial_plan {
 };
 
 // Nothing is measured where the trials would take more than a quarter of the run, where fewer than 20 training views
-// are there to hold some out of, or where the row is not compiled for every lower degree.
-trial_plan plan_trials(row_request const& request, train_options const& options, std::size_t train_views);
+// are there to hold some out of, or where the configuration is not compiled for every lower degree.
+trial_plan plan_trials(configuration_request const& request, train_options const& options, std::size_t train_views);
 
 // Standard error of the mean gain, from the PSNR of each view held out, of at least two.
 double gain_error(std::vector<double> const& with, std::vector<double> const& without);
 double forecast_gain(double gain, int first_step, int now, int iterations);
 
 // What make_session returns where plan_trials finds something to measure.
-std::unique_ptr<session> make_degree_selection(row_request const& request, train_options const& options,
+std::unique_ptr<session> make_degree_selection(configuration_request const& request, train_options const& options,
                                                dataset const& data, gaussian_model const& start,
                                                trial_plan const& plan);
 

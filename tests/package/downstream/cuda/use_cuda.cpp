@@ -1,4 +1,4 @@
-// gart::cuda from g++: its rows are there, and a machine without a device says why.
+// gart::cuda from g++: its configurations are there, and a machine without a device says why.
 #include <gart/exec/cuda.hpp>
 #include <gart/runtime/session.hpp>
 
@@ -7,8 +7,8 @@
 int main() {
   std::string reason;
   std::size_t const devices = gart::cuda_devices(&reason).size();
-  for (gart::row_info const& row : gart::compiled_rows())
-    if (row.backend == "cuda") {
+  for (gart::configuration_info const& configuration : gart::compiled_configurations())
+    if (configuration.backend == "cuda") {
       std::printf("cuda: %zu devices %s\n", devices, reason.c_str());
       return devices > 0 || !reason.empty() ? 0 : 1;
     }

@@ -1,29 +1,29 @@
 #pragma once
-// Turns templates into rows: sessions and renderers of a policy, traits, a tracer and a strategy. Include where the
-// kernels of the policy can be compiled, and call from GART_REGISTER_ROWS register_rows, for every SH degree, or
-// register_row_of for one row:
+// Turns templates into configurations: sessions and renderers of a policy, traits, a tracer and a strategy. Include
+// where the kernels of the policy can be compiled, and call from GART_REGISTER_CONFIGURATIONS register_configurations,
+// for every SH degree, or register_configuration_of for one configuration:
 //   using response = gart::generalized_gaussian<4>;
-//   GART_REGISTER_ROWS(my_rows,
-//                      gart::register_row_of<gart::openmp_exec, gart::scene_traits<3, response>,
-//                                            gart::tile_tracer<gart::openmp_exec, 8, response>,
-//                                            gart::primitive_strategy>(-1))
+//   GART_REGISTER_CONFIGURATIONS(my_configurations,
+//                                gart::register_configuration_of<gart::openmp_exec, gart::scene_traits<3, response>,
+//                                                                gart::tile_tracer<gart::openmp_exec, 8, response>,
+//                                                                gart::primitive_strategy>(-1))
 
-#include <gart/runtime/rows.hpp>
+#include <gart/runtime/registry.hpp>
 #include <gart/train/trainer.hpp>
 
 namespace gart::inline GART_ISA {
 
 template <execution E, class Traits, class Tracer, class Strategy>
-row_info row_of() {
+configuration_info configuration_of() {
   using response = typename Traits::response;
-  row_info row{E::name, Tracer::name, Strategy::name, Traits::sh_degree, response::degree};
-  row.arithmetic = response::fast ? "fast" : "exact";
+  configuration_info configuration{E::name, Tracer::name, Strategy::name, Traits::sh_degree, response::degree};
+  configuration.arithmetic = response::fast ? "fast" : "exact";
   using record = typename Strategy::template record<tile_size_of<Tracer>>;
-  if constexpr (requires { record::entry::name; }) row.lt_format = record::entry::name;
-  row.tile_size = tile_size_of<Tracer>;
-  row.window = Tracer::window;
-  if constexpr (!E::device) row.instruction_set = instruction_set;
-  return row;
+  if constexpr (requires { record::entry::name; }) configuration.lt_format = record::entry::name;
+  configuration.tile_size = tile_size_of<Tracer>;
+  configuration.window = Tracer::window;
+  if constexpr (!E::device) configuration.instruction_set = instruction_set;
+  return configuration;
 }
 
 template <execution E, class Traits, class Tracer, class Strategy>
@@ -47,7 +47,7 @@ class compiled_session final : public session {
   }
   std::size_t peak_bytes() const override { return exec_.memory.peak; }
   std::size_t lt_bytes() const override { return trainer_.lt_bytes(); }
-  row_info row() const override { return row_of<E, Traits, Tracer, Strategy>(); }
+  configuration_info configuration() const override { return configuration_of<E, Traits, Tracer, Strategy>(); }
 
  private:
   E exec_;
@@ -99,7 +99,7 @@ class compiled_renderer final : public renderer {
   }
   std::size_t peak_bytes() const override { return exec_.memory.peak; }
   std::size_t lt_bytes() const override { return pass_.lt_bytes(); }
-  row_info row() const override { return row_of<E, Traits, Tracer, Strategy>(); }
+  configuration_info configuration() const override { return configuration_of<E, Traits, Tracer, Strategy>(); }
 
  private:
   E exec_;
@@ -112,9 +112,9 @@ class compiled_renderer final : public renderer {
 };
 
 template <execution E, class Traits, class Tracer, class Strategy>
-void register_row_of(int rank, bool (*available)(std::string*) = always_available) {
-  register_row(
-      {row_of<E, Traits, Tracer, Strategy>(), rank, available,
+void register_configuration_of(int rank, bool (*available)(std::string*) = always_available) {
+  register_configuration(
+      {configuration_of<E, Traits, Tracer, Strategy>(), rank, available,
        []() -> std::unique_ptr<renderer> { return std::make_unique<compiled_renderer<E, Traits, Tracer, Strategy>>(); },
        [](train_options const& options, dataset const& data, gaussian_model const& start) -> std::unique_ptr<session> {
          return std::make_unique<compiled_session<E, Traits, Tracer, Strategy>>(options, data, start);
@@ -122,11 +122,11 @@ void register_row_of(int rank, bool (*available)(std::string*) = always_availabl
 }
 
 template <execution E, class Tracer, class Strategy>
-void register_rows(int rank, bool (*available)(std::string*) = always_available) {
-  register_row_of<E, scene_traits<0>, Tracer, Strategy>(rank, available);
-  register_row_of<E, scene_traits<1>, Tracer, Strategy>(rank, available);
-  register_row_of<E, scene_traits<2>, Tracer, Strategy>(rank, available);
-  register_row_of<E, scene_traits<3>, Tracer, Strategy>(rank, available);
+void register_configurations(int rank, bool (*available)(std::string*) = always_available) {
+  register_configuration_of<E, scene_traits<0>, Tracer, Strategy>(rank, available);
+  register_configuration_of<E, scene_traits<1>, Tracer, Strategy>(rank, available);
+  register_configuration_of<E, scene_traits<2>, Tracer, Strategy>(rank, available);
+  register_configuration_of<E, scene_traits<3>, Tracer, Strategy>(rank, available);
 }
 
 }  // namespace gart::inline GART_ISA

@@ -2,7 +2,7 @@
 // Which variants there are, for any policy: tile lists, the primitive strategy, SH degree 3. They lie below 0 in rank,
 // so that only what asks for one gets it.
 
-#include <gart/runtime/compiled_rows.hpp>
+#include <gart/runtime/compiled_configurations.hpp>
 #include <gart/trace/tile_tracer.hpp>
 
 namespace gart {
@@ -10,7 +10,8 @@ namespace gart {
 template <execution E, class Response, int TileSize = 8, int Window = 32, class Strategy = primitive_strategy>
 void register_variant(bool (*available)(std::string*)) {
   constexpr int rank = E::device ? -1 : -2;
-  register_row_of<E, scene_traits<3, Response>, tile_tracer<E, TileSize, Response, Window>, Strategy>(rank, available);
+  register_configuration_of<E, scene_traits<3, Response>, tile_tracer<E, TileSize, Response, Window>, Strategy>(
+      rank, available);
 }
 
 // Other responses: the kernel degrees besides 2, and fast arithmetic.
