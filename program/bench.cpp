@@ -49,7 +49,7 @@ gart::dataset noise_capture(gart::named_camera const& camera) {
 
 int run_bench(bench_arguments const& a) {
   use_threads(a.configuration.threads);
-  model_file const file = load_model(a.model);
+  gart::model_file const file = gart::load_model(a.model);
   auto cameras = gart::load_cameras(a.cameras);
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   if (static_cast<int>(cameras.size()) > a.views) cameras.resize(static_cast<std::size_t>(a.views));

@@ -1,9 +1,9 @@
 #include "choices.hpp"
 #include "commands.hpp"
-#include "evaluate.hpp"
 #include "options.hpp"
 #include "output.hpp"
 #include "progress.hpp"
+#include "scores.hpp"
 
 #include <gart/io/dataset.hpp>
 #include <gart/io/exposure_file.hpp>
@@ -45,7 +45,7 @@ void refuse_other_images(fs::path const& pairs, std::vector<gart::dataset_view> 
 
 int run_eval(eval_arguments const& a) {
   use_threads(a.configuration.threads);
-  model_file file = load_model(a.model);
+  gart::model_file file = gart::load_model(a.model);
   auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request));
   prepare_file(a.out);
   if (!a.renders.empty()) prepare_folder(a.renders);
@@ -71,9 +71,9 @@ int run_eval(eval_arguments const& a) {
 
   progress say(a.quiet);
   auto const draw = [&](gart::camera const& view) { return renderer->render(view, options); };
-  scores const result = evaluate(
-      all_of(data.test), options.background, exposures, draw,
-      [&](std::size_t i, view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
+  gart::scores const result = gart::evaluate(
+      gart::all_of(data.test), options.background, exposures, draw,
+      [&](std::size_t i, gart::view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
         if (!a.renders.empty()) {
           gart::write_png(a.renders / (s.name + ".png"), gart::to_8bit(render));
           gart::write_png(a.renders / (s.name + "_truth.png"), gart::to_8bit(truth));
@@ -87,7 +87,8 @@ int run_eval(eval_arguments const& a) {
                   static_cast<double>(i + 1) / static_cast<double>(data.test.size()));
       });
   say.state("scoring training views", 1);
-  scores const training = evaluate(evenly_spread(data.train, data.test.size()), options.background, exposures, draw);
+  gart::scores const training =
+      gart::evaluate(gart::evenly_spread(data.train, data.test.size()), options.background, exposures, draw);
   auto const configuration = renderer->configuration();
   nlohmann::json metrics = to_json(result, training, data.train.size());
   metrics["format"] = data.format, metrics["split"] = data.split, metrics["resize_filter"] = data.resize_filter;

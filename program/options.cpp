@@ -2,8 +2,6 @@
 
 #include "commands.hpp"
 
-#include <gart/io/ply.hpp>
-
 #include <algorithm>
 #include <cstdlib>
 #if defined(_OPENMP)
@@ -101,7 +99,7 @@ void add_max_hits(CLI::App& app, int& max_hits) {
   app.add_option("--max-hits", max_hits,
                  "Hits after which a ray ends, 0: no cap\n(default: what the model says, else 0)")
       ->type_name("N")
-      ->check(between(0, max_hits_most));
+      ->check(between(0, gart::max_hits_most));
 }
 
 void add_exposures(CLI::App& app, std::filesystem::path& file) {
@@ -118,49 +116,7 @@ void use_threads([[maybe_unused]] int threads) {
 
 gart::vec3 background_color(std::string const& name) { return gart::vec3(name == "white" ? 1.0f : 0.0f); }
 
-model_file load_model(std::filesystem::path const& path) {
-  gart::ply_traits traits;
-  model_file file;
-  file.model = gart::read_splat_ply(path, &traits);
-  if (auto const kernel = traits.find("kernel_degree"); kernel != traits.end()) {
-    if (kernel_degree_names().operator()(kernel->second) != "") {
-      throw gart::io_error(path.string(), "comment gart kernel_degree is '" + kernel->second + "'",
-                           "1, 2, 3, 4, 5 or 8 belongs there; remove the comment for Gaussians (2)");
-    }
-    file.kernel_degree = std::atoi(kernel->second.c_str());
-  }
-  auto const number = [&](char const* key, float& value, float most = 1) {
-    auto const found = traits.find(key);
-    if (found == traits.end()) return;
-    char* end = nullptr;
-    float const parsed = std::strtof(found->second.c_str(), &end);
-    if (end == found->second.c_str() || !(parsed >= 0 && parsed < most)) {
-      throw gart::io_error(path.string(), std::string("comment gart ") + key + " is '" + found->second + "'",
-                           "a number from 0" + (most < 1e9f ? " to " + std::to_string(static_cast<int>(most)) : "") +
-                               " belongs there; remove the comment for the default");
-    }
-    value = parsed;
-  };
-  number("alpha_min", file.render.alpha_min);
-  number("t_min", file.render.transmittance_min);
-  number("near", file.render.near, 3e38f);
-  if (auto const found = traits.find("antialias"); found != traits.end() && found->second.empty())
-    file.render.antialias = gart::usual_antialias;  // another program's, which does not say how wide
-  else
-    number("antialias", file.render.antialias, 100);
-  if (auto const found = traits.find("max_hits"); found != traits.end()) {
-    char* end = nullptr;
-    unsigned long const parsed = std::strtoul(found->second.c_str(), &end, 10);
-    if (end == found->second.c_str() || *end != '\0' || found->second[0] == '-' || parsed > max_hits_most) {
-      throw gart::io_error(path.string(), "comment gart max_hits is '" + found->second + "'",
-                           "a whole number belongs there, 0 for no cap; remove the comment for none");
-    }
-    file.render.max_hits = static_cast<gart::u32>(parsed);
-  }
-  return file;
-}
-
-gart::configuration_request configuration_request_for(model_file const& file, std::filesystem::path const& path,
+gart::configuration_request configuration_request_for(gart::model_file const& file, std::filesystem::path const& path,
                                                       gart::configuration_request wanted) {
   wanted.sh_degree = file.model.sh_degree;
   wanted.kernel_degree = file.kernel_degree;

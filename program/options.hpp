@@ -3,6 +3,7 @@
 
 #include "help.hpp"
 
+#include <gart/runtime/model_file.hpp>
 #include <gart/runtime/session.hpp>
 
 #include <nlohmann/json.hpp>
@@ -68,18 +69,9 @@ CLI::Validator lt_format_names();
 
 gart::vec3 background_color(std::string const& name);
 
-// Of a model's file, where the command line does not say otherwise: what it was trained with.
-struct model_file {
-  gart::gaussian_model model;
-  gart::render_options render;
-  int kernel_degree = 2;
-};
-// io_error for what is no splat file, or one whose traits say what cannot be.
-model_file load_model(std::filesystem::path const& path);
 // The configuration for a model; unsupported, naming its file, where there is none of its degrees.
-gart::configuration_request configuration_request_for(model_file const& file, std::filesystem::path const& path,
+gart::configuration_request configuration_request_for(gart::model_file const& file, std::filesystem::path const& path,
                                                       gart::configuration_request wanted);
-inline constexpr gart::u32 max_hits_most = 1'000'000'000;
 // What a run left out or computed shorter, as every report tells it.
 nlohmann::json approximations_of(gart::render_options const& render, gart::configuration_info const& configuration);
 

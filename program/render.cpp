@@ -60,7 +60,7 @@ depth_picture picture_depth(gart::rendered const& r) {
 
 int run_render(render_arguments const& a) {
   use_threads(a.configuration.threads);
-  model_file file = load_model(a.model);
+  gart::model_file file = gart::load_model(a.model);
   auto cameras = gart::load_cameras(a.cameras);
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   prepare_folder(a.out);

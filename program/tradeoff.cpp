@@ -97,7 +97,7 @@ class tradeoff_run {
  private:
   void prepare() {
     use_threads(a_.configuration.threads);
-    file_ = load_model(a_.model);
+    file_ = gart::load_model(a_.model);
     configuration exact;
     gart::configuration_request wanted = a_.configuration.request;
     wanted.backward = a_.backward;
@@ -255,7 +255,7 @@ class tradeoff_run {
 
   tradeoff_arguments const& a_;
   progress say_;
-  model_file file_;
+  gart::model_file file_;
   std::vector<setting> settings_;
   view_set set_;
   std::string background_;

@@ -1,10 +1,10 @@
 #include "tradeoff_settings.hpp"
 
 #include "commands.hpp"
-#include "presets.hpp"
 
 #include <algorithm>
 #include <cstdio>
+#include <gart/runtime/presets.hpp>
 
 namespace gart_cli {
 
@@ -50,11 +50,10 @@ class table {
 std::vector<setting> settings_of(configuration const& exact) {
   using c = configuration;
   table t(exact);
-  for (preset const& p : presets()) {
+  for (gart::preset const& p : gart::presets()) {
     if (p.name == "exact") continue;
-    t.add("preset", p.name, [&](c& x) {
-      x.render.alpha_min = p.render.alpha_min, x.render.transmittance_min = p.render.transmittance_min;
-    });
+    t.add("preset", p.name,
+          [&](c& x) { x.render.alpha_min = p.alpha_min, x.render.transmittance_min = p.transmittance_min; });
   }
   t.sweep(
       "alpha_min", [](c& x) -> float& { return x.render.alpha_min; },

@@ -128,7 +128,7 @@ void set_color_gradient(tradeoff_view& v, gart::image_float const& image, gart::
   for (std::size_t const p : v.pixels) std::copy_n(&whole.data[3 * p], 3, &v.color_gradient.data[3 * p]);
 }
 
-void trace_reference(tradeoff_view& v, model_file const& file, gart::render_options const& options) {
+void trace_reference(tradeoff_view& v, gart::model_file const& file, gart::render_options const& options) {
   std::vector<double> gradient;
   for (std::size_t const p : v.pixels)
     for (int c = 0; c < 3; ++c) gradient.push_back(v.color_gradient.data[3 * p + c]);

@@ -38,7 +38,7 @@ view_set load_views(std::filesystem::path const& cameras, view_choice const& cho
 // Sets color_gradient: of the training loss of `image`, which shows all of the view, against the photograph; without
 // one, random numbers.
 void set_color_gradient(tradeoff_view& view, gart::image_float const& image, gart::vec3 background, float ssim_weight);
-void trace_reference(tradeoff_view& view, model_file const& file, gart::render_options const& options);
+void trace_reference(tradeoff_view& view, gart::model_file const& file, gart::render_options const& options);
 
 // An image over another, in pixels of the larger: bilinear between pixel centres, held at the borders.
 gart::image_float enlarged(gart::image_float const& image, int width, int height);

@@ -1,6 +1,5 @@
 #include "choices.hpp"
 #include "commands.hpp"
-#include "evaluate.hpp"
 #include "history.hpp"
 #include "interrupt.hpp"
 #include "output.hpp"
@@ -8,6 +7,7 @@
 #include "progress.hpp"
 #include "report.hpp"
 #include "run_folder.hpp"
+#include "scores.hpp"
 #include "train_arguments.hpp"
 
 #include <gart/io/exposure_file.hpp>
@@ -103,7 +103,7 @@ class training_run {
         throw usage_error("--start " + a_.start +
                           ": is the model in --out, which the run replaces (choose another --out)");
       }
-      model_file const file = load_model(a_.start);
+      gart::model_file const file = gart::load_model(a_.start);
       if (file.kernel_degree != a_.kernel_degree) {
         throw usage_error("--start " + a_.start + ": is of kernel degree " + std::to_string(file.kernel_degree) +
                           ", the run of " + std::to_string(a_.kernel_degree) + " (give --kernel-degree " +
@@ -284,15 +284,15 @@ class training_run {
                share);
   }
 
-  scores score(some_views const& views, keep_view const& keep = {}) {
-    return evaluate(
+  gart::scores score(gart::some_views const& views, gart::keep_view const& keep = {}) {
+    return gart::evaluate(
         views, eval_background_, session_->exposures(),
         [this](gart::camera const& c) { return session_->render(c, eval_background_); }, keep);
   }
 
-  scores test(int step, keep_view const& keep = {}) {
+  gart::scores test(int step, gart::keep_view const& keep = {}) {
     stopwatch const testing;
-    scores const result = score(all_of(data_.test), keep);
+    gart::scores const result = score(gart::all_of(data_.test), keep);
     if (!result.views.empty()) {
       course_.test.push_back({step, result.psnr, result.ssim, course_.seconds});
       say_.note("step " + with_commas(step) + ": test PSNR " + fixed(result.psnr, 2) + " dB, SSIM " +
@@ -310,9 +310,9 @@ class training_run {
 
   // The model first: where the disk is full, the smaller and more precious one is there.
   void save() {
-    gart::gaussian_model const model = session_->model();
-    gaussians_ = model.size();
-    gart::write_splat_ply(a_.model_file(), model, traits());
+    gart::model_file const file{session_->model(), traced_with(), row_.kernel_degree};
+    gaussians_ = file.model.size();
+    gart::save_model(a_.model_file(), file);
     if (auto const exposures = session_->exposures(); !exposures.empty())
       gart::write_exposures(a_.out / "exposures.json", exposures);
     try {
@@ -322,22 +322,12 @@ class training_run {
     }
   }
 
-  // Only what is not as everywhere goes into the header, so that an ordinary model is byte for byte an ordinary file.
-  gart::ply_traits traits() const {
-    gart::ply_traits result;
-    char text[32];
-    auto const put = [&](char const* key, float value, float usual) {
-      if (value == usual) return;
-      std::snprintf(text, sizeof text, "%.9g", value);
-      result[key] = text;
-    };
-    put("alpha_min", a_.alpha_min, a_.defaults.render.alpha_min);
-    put("t_min", a_.t_min, a_.defaults.render.transmittance_min);
-    put("near", a_.defaults.near * data_.extent, a_.defaults.render.near);
-    if (row_.kernel_degree != 2) result["kernel_degree"] = std::to_string(row_.kernel_degree);
-    if (a_.max_hits != 0) result["max_hits"] = std::to_string(a_.max_hits);
-    put("antialias", train_options_of(a_).render.antialias, a_.defaults.render.antialias);
-    return result;
+  // What the model was traced with.
+  gart::render_options traced_with() const {
+    gart::train_options const options = train_options_of(a_);
+    gart::render_options render = options.render;
+    render.near = options.near * data_.extent;
+    return render;
   }
 
   void conclude() {
@@ -345,19 +335,18 @@ class training_run {
     std::vector<report_view> shown;
     stopwatch const writing;
     double const tests_before = test_seconds_;
-    scores const result =
-        test(session_->steps_done(),
-             [&](std::size_t i, view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
-               gart::write_png(a_.out / "renders" / (s.name + ".png"), gart::to_8bit(render));
-               gart::write_png(a_.out / "renders" / (s.name + "_truth.png"), gart::to_8bit(truth));
-               if (in_report(i, data_.test.size()))
-                 shown.push_back(make_report_view(s.name, s.psnr, s.ssim, render, truth));
-               say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
-                          static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
-             });
+    gart::scores const result = test(
+        session_->steps_done(),
+        [&](std::size_t i, gart::view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
+          gart::write_png(a_.out / "renders" / (s.name + ".png"), gart::to_8bit(render));
+          gart::write_png(a_.out / "renders" / (s.name + "_truth.png"), gart::to_8bit(truth));
+          if (in_report(i, data_.test.size())) shown.push_back(make_report_view(s.name, s.psnr, s.ssim, render, truth));
+          say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
+                     static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
+        });
     say_.state("testing on training views", 1);
     stopwatch const training_views;
-    scores const training = score(evenly_spread(data_.train, data_.test.size()));
+    gart::scores const training = score(gart::evenly_spread(data_.train, data_.test.size()));
     test_seconds_ += training_views.seconds();
     write_json(a_.history_file(), course_.to_json());
     save_seconds_ += writing.seconds() - (test_seconds_ - tests_before);
@@ -382,7 +371,7 @@ class training_run {
     return size;
   }
 
-  nlohmann::json metrics_of(scores const& result, scores const& training) {
+  nlohmann::json metrics_of(gart::scores const& result, gart::scores const& training) {
     nlohmann::json m = to_json(result, training, data_.train.size());
     fs::path const named = fs::absolute(a_.dataset).lexically_normal();
     m["scene"] = (named.has_filename() ? named : named.parent_path()).filename().string();

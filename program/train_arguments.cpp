@@ -2,14 +2,31 @@
 
 #include "commands.hpp"
 #include "output.hpp"
-#include "presets.hpp"
 #include "train_fields.hpp"
 
 #include <gart/core/version.hpp>
+#include <gart/runtime/presets.hpp>
+
+#include <cstdio>
 
 namespace gart_cli {
 
 namespace fs = std::filesystem;
+
+namespace {
+// A line a preset, with what it sets.
+std::string presets_help() {
+  std::string text =
+      "What is left out for speed; options given besides win. What\nit costs in quality: gart tradeoff, and "
+      "docs/tradeoffs.md";
+  for (gart::preset const& p : gart::presets()) {
+    char knobs[80];
+    std::snprintf(knobs, sizeof knobs, ": --alpha-min %.4g --t-min %.4g", p.alpha_min, p.transmittance_min);
+    text += "\n" + p.name + knobs;
+  }
+  return text;
+}
+}  // namespace
 
 void add_arguments(CLI::App& train, train_arguments& a) {
   auto& r = a.recorded;
@@ -127,14 +144,14 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(train.get_option("--threads"));
 
   group = "Accuracy";
-  in_group(r.add(train, "--preset", a.preset, "NAME", presets_help()))->check(one_of(preset_names()));
+  in_group(r.add(train, "--preset", a.preset, "NAME", presets_help()))->check(one_of(gart::preset_names()));
   in_group(r.add(train, "--alpha-min", a.alpha_min, "A",
                  "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as others have it"))
       ->check(between(1e-6, 0.99));
   in_group(r.add(train, "--t-min", a.t_min, "T", "Transmittance below which a ray ends, 0 to 1"))
       ->check(between(0, 0.99));
   in_group(r.add(train, "--max-hits", a.max_hits, "N", "Hits after which a ray ends, 0: no cap"))
-      ->check(between(0, max_hits_most));
+      ->check(between(0, gart::max_hits_most));
 
   in_group(r.add(train, "--arithmetic", a.arithmetic, "NAME", "exact, or fast: shorter exponentials and reciprocals"))
       ->check(arithmetic_names());
@@ -167,12 +184,12 @@ void add_arguments(CLI::App& train, train_arguments& a) {
 }
 
 void fill_in(CLI::App const& train, train_arguments& a) {
-  preset const& chosen = preset_named(a.preset);
+  gart::preset const& chosen = gart::preset_named(a.preset);
   auto const set = [&](char const* option, auto& value, auto const& by_preset) {
     if (train.get_option(option)->count() == 0) value = by_preset;
   };
-  set("--alpha-min", a.alpha_min, chosen.render.alpha_min);
-  set("--t-min", a.t_min, chosen.render.transmittance_min);
+  set("--alpha-min", a.alpha_min, chosen.alpha_min);
+  set("--t-min", a.t_min, chosen.transmittance_min);
   set("--auto", a.automatic, a.iterations >= measured_from);
 }
 
