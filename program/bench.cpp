@@ -48,15 +48,14 @@ gart::dataset noise_capture(gart::named_camera const& camera) {
 }
 
 int run_bench(bench_arguments const& a) {
-  use_threads(a.configuration.threads);
   gart::model_file const file = gart::load_model(a.model);
   auto cameras = gart::load_cameras(a.cameras);
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   if (static_cast<int>(cameras.size()) > a.views) cameras.resize(static_cast<std::size_t>(a.views));
   if (!a.json.empty()) prepare_file(a.json);
 
-  auto wanted = a.configuration.request;
-  wanted.backward = a.backward, wanted.lt_format = a.lt_format;
+  auto wanted = a.configuration.request();
+  wanted.backward = a.backward, wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
   auto const request = configuration_request_for(file, a.model, wanted);
   gart::train_options options;
   options.densify = gart::densify_kind::none;
@@ -104,13 +103,13 @@ int run_bench(bench_arguments const& a) {
               static_cast<double>(v + 1) / static_cast<double>(cameras.size()));
   }
   say.clear();
-  nlohmann::json result = {{"backend", configuration.backend},
-                           {"tracer", configuration.tracer},
+  nlohmann::json result = {{"backend", gart::to_string(configuration.backend)},
+                           {"tracer", gart::to_string(configuration.tracer)},
                            {"backward", configuration.backward},
                            {"sh_degree", configuration.sh_degree},
                            {"kernel_degree", configuration.kernel_degree},
-                           {"arithmetic", configuration.arithmetic},
-                           {"lt_format", configuration.lt_format},
+                           {"arithmetic", gart::to_string(configuration.arithmetic)},
+                           {"lt_format", gart::to_string(configuration.lt_format)},
                            {"tile_size", configuration.tile_size},
                            {"window", configuration.window},
                            {"gaussians", file.model.size()},
@@ -126,9 +125,10 @@ int run_bench(bench_arguments const& a) {
                            {"lt_bytes", lt_bytes},
                            {"peak_bytes", peak}};
   if (!a.json.empty()) write_json(a.json, result);
-  std::printf("%s, %s, %s: %zu Gaussians, %d x %d, medians of %d, mean over %zu views\n", configuration.backend.c_str(),
-              configuration.tracer.c_str(), configuration.backward.c_str(), file.model.size(), cameras[0].view.width,
-              cameras[0].view.height, a.repeats, cameras.size());
+  std::printf("%s, %s, %s: %zu Gaussians, %d x %d, medians of %d, mean over %zu views\n",
+              gart::to_string(configuration.backend), gart::to_string(configuration.tracer),
+              configuration.backward.c_str(), file.model.size(), cameras[0].view.width, cameras[0].view.height,
+              a.repeats, cameras.size());
   std::printf("  %-24s %10.3f ms\n  %-24s %10.3f ms\n", "whole step", wall, "of the processor", processor);
   for (auto const& [label, ms] : stages) std::printf("  %-24s %10.3f ms\n", label.c_str(), ms);
   std::printf("  %-24s %10.1f\n  %-24s %10s\n  %-24s %10s\n", "hits a ray", hits, "LT buffer",
@@ -149,7 +149,7 @@ void add_bench(CLI::App& app, command& selected) {
                    "cleared (primitive\nwith its LT buffer cleared)")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(one_of({"auto", "pixel", "hybrid", "primitive", "deterministic", "cleared"}));
+      ->check(strategy_names());
   bench->add_option("--views", a->views, "The first so many cameras")
       ->type_name("N")
       ->capture_default_str()
@@ -168,7 +168,7 @@ void add_bench(CLI::App& app, command& selected) {
   bench->add_option("--lt-format", a->lt_format, "What the forward pass leaves of a hit: float4, half or shared")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(lt_format_names())
+      ->check(name_of_a<gart::lt_format_kind>())
       ->group(bench->get_option("--arithmetic")->get_group());
   bench->footer(
       "\nStages nest: \"backward\" is everything between the image's gradient and the parameters', \"backward/...\" "

@@ -22,7 +22,7 @@ std::string short_number(float value) {
 
 gart::chosen<std::string> background_for(gart::capture_traits const& traits) {
   auto const choice = gart::choose_background(traits);
-  return {choice.value == gart::background_kind::white ? "white" : "black", choice.why};
+  return {gart::to_string(choice.value), choice.why};
 }
 
 nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
@@ -42,7 +42,8 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
       : traits.plain_border ? "the images' borders are plain"
                             : "the images' borders show it");
   settle("--background", a.background, background_for(traits));
-  settle("--tracer", a.tracer, gart::choose_tracer(traits));
+  auto const tracer = gart::choose_tracer(traits);
+  settle("--tracer", a.tracer, {gart::to_string(tracer.value), tracer.why});
   settle("--backward", a.backward, gart::choose_backward(traits));
   auto const exposure = gart::choose_exposure(traits);
   settle("--exposure", a.exposure, {exposure.value ? "on" : "off", exposure.why});
@@ -59,9 +60,10 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
     say("--init-scale", short_number(start.value.scale), a.initial_scale != 0 ? by_option : start.why);
   }
   gart::train_options const options = train_options_of(a);
-  auto const plan = gart::plan_trials(configuration_request_of(a), options, data.train.size());
+  gart::configuration_request const wanted = configuration_request_of(a);
+  auto const plan = gart::plan_trials(wanted, options, data.train.size());
   bool const measured = !plan.held_out.empty();
-  say("--sh-degree", (measured ? "at most " : "") + std::to_string(options.sh_degree),
+  say("--sh-degree", (measured ? "at most " : "") + std::to_string(wanted.sh_degree),
       a.sh_degree != "auto" ? by_option
       : !a.automatic        ? "every band; --auto measures which pay"
                             : plan.why);

@@ -44,9 +44,8 @@ void refuse_other_images(fs::path const& pairs, std::vector<gart::dataset_view> 
 }
 
 int run_eval(eval_arguments const& a) {
-  use_threads(a.configuration.threads);
   gart::model_file file = gart::load_model(a.model);
-  auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request));
+  auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
   prepare_file(a.out);
   if (!a.renders.empty()) prepare_folder(a.renders);
   for (char const* side : {"render", "truth"})
@@ -95,7 +94,8 @@ int run_eval(eval_arguments const& a) {
   metrics["background"] = background, metrics["notes"] = data.notes;
   metrics["gaussians"] = file.model.size(), metrics["sh_degree"] = file.model.sh_degree;
   metrics["kernel_degree"] = file.kernel_degree;
-  metrics["backend"] = configuration.backend, metrics["tracer"] = configuration.tracer;
+  metrics["backend"] = gart::to_string(configuration.backend),
+  metrics["tracer"] = gart::to_string(configuration.tracer);
   metrics["approximations"] = approximations_of(options, configuration);
   metrics["peak_bytes"] = renderer->peak_bytes();
   write_json(a.out, metrics);

@@ -51,7 +51,8 @@ int run_info() {
   std::map<std::tuple<std::string, std::string, std::string, int, std::string, std::string, int, int>, std::set<int>>
       configurations;
   for (auto const& r : gart::compiled_configurations()) {
-    configurations[{r.backend, r.tracer, r.backward, r.kernel_degree, r.arithmetic, r.lt_format, r.tile_size, r.window}]
+    configurations[{to_string(r.backend), to_string(r.tracer), r.backward, r.kernel_degree, to_string(r.arithmetic),
+                    to_string(r.lt_format), r.tile_size, r.window}]
         .insert(r.sh_degree);
   }
   std::puts("\nbackend  tracer  backward       kernel  arithmetic  LT format  tile  window  SH degrees");
@@ -63,7 +64,8 @@ int run_info() {
     std::puts("");
   }
   auto const best = gart::resolve({});
-  std::printf("\nauto means %s, %s, %s here.\n", best.backend.c_str(), best.tracer.c_str(), best.backward.c_str());
+  std::printf("\nauto means %s, %s, %s here.\n", to_string(best.backend), to_string(best.tracer),
+              best.backward.c_str());
   return 0;
 }
 

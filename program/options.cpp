@@ -4,9 +4,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#if defined(_OPENMP)
-#include <omp.h>
-#endif
 
 namespace gart_cli {
 
@@ -52,11 +49,22 @@ nlohmann::json recorded_options::continue_from(nlohmann::json const& saved, std:
   return raised;
 }
 
-CLI::Validator backend_names() { return one_of({"auto", "serial", "openmp", "cuda"}); }
-CLI::Validator tracer_names() { return one_of({"auto", "bvh", "embree", "tiles"}); }
-CLI::Validator arithmetic_names() { return one_of({"exact", "fast"}); }
-CLI::Validator lt_format_names() { return one_of({"auto", "float4", "half", "shared"}); }
-CLI::Validator kernel_degree_names() { return one_of({"1", "2", "3", "4", "5", "8"}); }
+CLI::Validator strategy_names() { return one_of({"auto", "pixel", "hybrid", "primitive", "deterministic", "cleared"}); }
+
+CLI::Validator kernel_degree_names() {
+  std::vector<std::string> names;
+  for (int const degree : gart::kernel_degrees) names.push_back(std::to_string(degree));
+  return one_of(names);
+}
+
+gart::configuration_request configuration_options::request() const {
+  gart::configuration_request wanted;
+  wanted.backend = gart::from_string<gart::backend_kind>(backend);
+  wanted.tracer = gart::from_string<gart::tracer_kind>(tracer);
+  wanted.arithmetic = gart::from_string<gart::arithmetic_kind>(arithmetic);
+  wanted.tile_size = tile_size, wanted.window = window, wanted.threads = threads;
+  return wanted;
+}
 
 void add_threads(CLI::App& app, int& threads) {
   app.add_option("--threads", threads, "Threads of the openmp backend, 0: all cores")
@@ -66,29 +74,29 @@ void add_threads(CLI::App& app, int& threads) {
 }
 
 void add_configuration_options(CLI::App& app, configuration_options& options) {
-  app.add_option("--backend", options.request.backend,
+  app.add_option("--backend", options.backend,
                  "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(backend_names());
-  app.add_option("--tracer", options.request.tracer,
+      ->check(name_of_a<gart::backend_kind>());
+  app.add_option("--tracer", options.tracer,
                  "What finds the hits: tiles, bvh, or embree (CPU);\nthe images are the same")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(tracer_names());
+      ->check(name_of_a<gart::tracer_kind>());
   add_threads(app, options.threads);
   std::string const group = "Traits that trade (gart info lists the configurations that have them)";
-  app.add_option("--arithmetic", options.request.arithmetic, "exact, or fast: shorter exponentials and reciprocals")
+  app.add_option("--arithmetic", options.arithmetic, "exact, or fast: shorter exponentials and reciprocals")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(arithmetic_names())
+      ->check(name_of_a<gart::arithmetic_kind>())
       ->group(group);
-  app.add_option("--tile-size", options.request.tile_size, "Pixels a side of a tile, 0: what suits")
+  app.add_option("--tile-size", options.tile_size, "Pixels a side of a tile, 0: what suits")
       ->type_name("N")
       ->capture_default_str()
       ->check(between(0, 64))
       ->group(group);
-  app.add_option("--window", options.request.window, "Hits a ray keeps in order at a time, 0: what suits")
+  app.add_option("--window", options.window, "Hits a ray keeps in order at a time, 0: what suits")
       ->type_name("N")
       ->capture_default_str()
       ->check(between(0, 1024))
@@ -108,12 +116,6 @@ void add_exposures(CLI::App& app, std::filesystem::path& file) {
       ->type_name("FILE");
 }
 
-void use_threads([[maybe_unused]] int threads) {
-#if defined(_OPENMP)
-  if (threads > 0) omp_set_num_threads(threads);
-#endif
-}
-
 gart::vec3 background_color(std::string const& name) { return gart::vec3(name == "white" ? 1.0f : 0.0f); }
 
 gart::configuration_request configuration_request_for(gart::model_file const& file, std::filesystem::path const& path,
@@ -128,13 +130,14 @@ gart::configuration_request configuration_request_for(gart::model_file const& fi
   return wanted;
 }
 
-nlohmann::json approximations_of(gart::render_options const& render, gart::configuration_info const& configuration) {
+nlohmann::json approximations_of(gart::approximation_options const& render,
+                                 gart::configuration_info const& configuration) {
   return {{"alpha_min", render.alpha_min},
           {"t_min", render.transmittance_min},
           {"max_hits", render.max_hits},
           {"antialias", render.antialias},
-          {"arithmetic", configuration.arithmetic},
-          {"lt_format", configuration.lt_format}};
+          {"arithmetic", gart::to_string(configuration.arithmetic)},
+          {"lt_format", gart::to_string(configuration.lt_format)}};
 }
 
 }  // namespace gart_cli

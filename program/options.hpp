@@ -4,6 +4,7 @@
 #include "help.hpp"
 
 #include <gart/runtime/model_file.hpp>
+#include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
 
 #include <nlohmann/json.hpp>
@@ -50,22 +51,25 @@ class recorded_options {
 // --backend --tracer --threads, as every command that traces rays has them, and the traits that trade one thing for
 // another: --arithmetic --tile-size --window.
 struct configuration_options {
-  gart::configuration_request request;
-  int threads = 0;
+  std::string backend = "auto", tracer = "auto", arithmetic = "exact";
+  int tile_size = 0, window = 0, threads = 0;
+
+  gart::configuration_request request() const;
 };
 void add_threads(CLI::App& app, int& threads);
 void add_configuration_options(CLI::App& app, configuration_options& options);
-void use_threads(int threads);
 // --max-hits of a model to be rendered: negative where the model says.
 void add_max_hits(CLI::App& app, int& max_hits);
 // --exposures of a model that was trained with them.
 void add_exposures(CLI::App& app, std::filesystem::path& file);
 
-CLI::Validator backend_names();
-CLI::Validator tracer_names();
-CLI::Validator arithmetic_names();
+// One of an enumeration's names.
+template <gart::named E>
+CLI::Validator name_of_a() {
+  return one_of(gart::list_of_names<E>());
+}
+CLI::Validator strategy_names();
 CLI::Validator kernel_degree_names();
-CLI::Validator lt_format_names();
 
 gart::vec3 background_color(std::string const& name);
 
@@ -73,6 +77,7 @@ gart::vec3 background_color(std::string const& name);
 gart::configuration_request configuration_request_for(gart::model_file const& file, std::filesystem::path const& path,
                                                       gart::configuration_request wanted);
 // What a run left out or computed shorter, as every report tells it.
-nlohmann::json approximations_of(gart::render_options const& render, gart::configuration_info const& configuration);
+nlohmann::json approximations_of(gart::approximation_options const& render,
+                                 gart::configuration_info const& configuration);
 
 }  // namespace gart_cli

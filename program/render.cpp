@@ -59,14 +59,13 @@ depth_picture picture_depth(gart::rendered const& r) {
 }
 
 int run_render(render_arguments const& a) {
-  use_threads(a.configuration.threads);
   gart::model_file file = gart::load_model(a.model);
   auto cameras = gart::load_cameras(a.cameras);
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   prepare_folder(a.out);
   if (!a.json.empty()) prepare_file(a.json);
 
-  auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request));
+  auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
   renderer->set_model(file.model);
   gart::render_options options = file.render;
   options.background = background_color(a.background);
@@ -79,8 +78,8 @@ int run_render(render_arguments const& a) {
 
   progress say(a.quiet);
   auto const configuration = renderer->configuration();
-  nlohmann::json timings = {{"backend", configuration.backend},
-                            {"tracer", configuration.tracer},
+  nlohmann::json timings = {{"backend", gart::to_string(configuration.backend)},
+                            {"tracer", gart::to_string(configuration.tracer)},
                             {"gaussians", file.model.size()},
                             {"approximations", approximations_of(options, configuration)},
                             {"samples", a.samples},
@@ -118,8 +117,8 @@ int run_render(render_arguments const& a) {
   say.clear();
   if (!a.quiet) {
     std::printf("%zu views in %s, %.1f ms each (%s, %s)\n", cameras.size(), a.out.string().c_str(),
-                total / static_cast<double>(cameras.size()), configuration.backend.c_str(),
-                configuration.tracer.c_str());
+                total / static_cast<double>(cameras.size()), gart::to_string(configuration.backend),
+                gart::to_string(configuration.tracer));
   }
   return 0;
 }

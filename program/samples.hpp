@@ -1,7 +1,7 @@
 #pragma once
 // A view with many rays a pixel: the mean over a pixel's square, which one ray through its middle only estimates.
 
-#include <gart/runtime/session.hpp>
+#include <gart/runtime/renderer.hpp>
 
 namespace gart_cli {
 

@@ -15,6 +15,9 @@
 #include <cstdio>
 #include <memory>
 #include <random>
+#if defined(_OPENMP)
+#include <omp.h>
+#endif
 
 namespace gart_cli {
 
@@ -96,10 +99,12 @@ class tradeoff_run {
 
  private:
   void prepare() {
-    use_threads(a_.configuration.threads);
+#if defined(_OPENMP)
+    if (a_.configuration.threads > 0) omp_set_num_threads(a_.configuration.threads);  // the reference's
+#endif
     file_ = gart::load_model(a_.model);
     configuration exact;
-    gart::configuration_request wanted = a_.configuration.request;
+    gart::configuration_request wanted = a_.configuration.request();
     wanted.backward = a_.backward;
     exact.configuration = configuration_request_for(file_, a_.model, wanted);
     gart::configuration_info const configuration = gart::resolve(exact.configuration);
@@ -144,7 +149,7 @@ class tradeoff_run {
             {"gaussians", file_.model.size()},
             {"sh_degree", file_.model.sh_degree},
             {"kernel_degree", file_.kernel_degree},
-            {"backend", exact.configuration.backend},
+            {"backend", gart::to_string(exact.configuration.backend)},
             {"width", first.view.width},
             {"height", first.view.height},
             {"views", names},
@@ -231,7 +236,7 @@ class tradeoff_run {
     double const total = of("gradients"), forward = of("forward"), backward = of("backward");
     return {{"name", s.name()},
             {"knob", s.knob},
-            {"tracer", configuration.tracer},
+            {"tracer", gart::to_string(configuration.tracer)},
             {"backward", configuration.backward},
             {"sh_degree", configuration.sh_degree},
             {"kernel_degree", configuration.kernel_degree},
@@ -314,7 +319,7 @@ void add_tradeoff(CLI::App& app, command& selected) {
                    "deterministic or cleared")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(one_of({"auto", "pixel", "hybrid", "primitive", "deterministic", "cleared"}));
+      ->check(strategy_names());
   tradeoff
       ->add_option("--reference-alpha-min", a->reference_alpha_min,
                    "Opacity below which the reference sees no hit, 0: the\nmodel's own, with which it was trained; "

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <gart/runtime/presets.hpp>
+#include <iterator>
 
 namespace gart_cli {
 
@@ -34,6 +35,8 @@ class table {
       if (member(probe) == v) continue;
       if constexpr (std::is_arithmetic_v<Value>)
         add(knob, short_number(v), [&](configuration& c) { member(c) = v; });
+      else if constexpr (gart::named<Value>)
+        add(knob, gart::to_string(v), [&](configuration& c) { member(c) = v; });
       else
         add(knob, v, [&](configuration& c) { member(c) = v; });
     }
@@ -68,12 +71,14 @@ std::vector<setting> settings_of(configuration const& exact) {
   t.sweep(
       "sh_degree", [](c& x) -> int& { return x.configuration.sh_degree; }, degrees);
   t.sweep(
-      "kernel_degree", [](c& x) -> int& { return x.configuration.kernel_degree; }, std::vector<int>{1, 2, 3, 4, 5, 8});
+      "kernel_degree", [](c& x) -> int& { return x.configuration.kernel_degree; },
+      std::vector<int>(std::begin(gart::kernel_degrees), std::end(gart::kernel_degrees)));
   t.sweep(
-      "arithmetic", [](c& x) -> std::string& { return x.configuration.arithmetic; }, std::vector<std::string>{"fast"});
+      "arithmetic", [](c & x) -> auto& { return x.configuration.arithmetic; },
+      std::vector{gart::arithmetic_kind::fast});
   t.sweep(
-      "lt_format", [](c& x) -> std::string& { return x.configuration.lt_format; },
-      std::vector<std::string>{"half", "shared"});
+      "lt_format", [](c & x) -> auto& { return x.configuration.lt_format; },
+      std::vector{gart::lt_format_kind::half, gart::lt_format_kind::shared});
   t.sweep(
       "tile_size", [](c& x) -> int& { return x.configuration.tile_size; }, std::vector<int>{4, 16});
   t.sweep(
@@ -82,11 +87,11 @@ std::vector<setting> settings_of(configuration const& exact) {
       "backward", [](c& x) -> std::string& { return x.configuration.backward; },
       std::vector<std::string>{"pixel", "hybrid", "primitive", "cleared", "deterministic"});
   t.sweep(
-      "tracer", [](c& x) -> std::string& { return x.configuration.tracer; },
-      std::vector<std::string>{"tiles", "bvh", "embree"});
+      "tracer", [](c & x) -> auto& { return x.configuration.tracer; },
+      std::vector{gart::tracer_kind::tiles, gart::tracer_kind::bvh, gart::tracer_kind::embree});
   for (int const every : {4, 16}) {
     t.add("rebuild_every", std::to_string(every),
-          [&](c& x) { x.configuration.tracer = "bvh", x.render.rebuild_every = every; });
+          [&](c& x) { x.configuration.tracer = gart::tracer_kind::bvh, x.render.rebuild_every = every; });
   }
   for (int const shrink : {2, 4}) {
     t.add("resolution", "1/" + std::to_string(shrink), [&](c& x) { x.shrink = shrink; });
@@ -94,7 +99,8 @@ std::vector<setting> settings_of(configuration const& exact) {
   t.add("together", "alpha_min=0.02+t_min=0.01",
         [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f; });
   t.add("together", "alpha_min=0.01+t_min=0.03+arithmetic=fast", [](c& x) {
-    x.render.alpha_min = 0.01f, x.render.transmittance_min = 0.03f, x.configuration.arithmetic = "fast";
+    x.render.alpha_min = 0.01f, x.render.transmittance_min = 0.03f,
+    x.configuration.arithmetic = gart::arithmetic_kind::fast;
   });
   t.add("together", "alpha_min=0.02+t_min=0.01+resolution=1/2",
         [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f, x.shrink = 2; });

@@ -5,6 +5,7 @@
 #include "train_fields.hpp"
 
 #include <gart/core/version.hpp>
+#include <gart/runtime/choose.hpp>
 #include <gart/runtime/presets.hpp>
 
 #include <cstdio>
@@ -58,12 +59,13 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       r.add(train, "--densify", a.densify, "NAME",
             "How Gaussians are added: error (those split through which\nthe image's error is seen, up to "
             "--max-gaussians), mcmc\n(copies by opacity, random steps), adc (clones and splits by\ngradient) or none"))
-      ->check(one_of({"error", "mcmc", "adc", "none"}));
+      ->check(name_of_a<gart::densify_kind>());
   in_group(r.add_flag(train, "--auto,!--no-auto", a.automatic,
                       "Model only what the scene requires: measure on held-out\ntraining views which bands of "
                       "spherical harmonics pay, and\nstore no others. --no-auto stores all and holds no view out.\n"
                       "Where neither is given: --auto from " +
-                          std::to_string(measured_from) + " steps on; shorter\nruns would miss the views held out"));
+                          std::to_string(gart::measured_from) +
+                          " steps on; shorter\nruns would miss the views held out"));
   in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3",
                  "Degree of the spherical harmonics of colour; auto: 3, or\nwhat --auto measures"))
       ->check(one_of({"auto", "0", "1", "2", "3"}));
@@ -124,14 +126,14 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   group = "Machine";
   in_group(r.add(train, "--backend", a.backend, "NAME",
                  "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is"))
-      ->check(backend_names());
+      ->check(name_of_a<gart::backend_kind>());
   in_group(r.add(train, "--tracer", a.tracer, "NAME",
                  "What finds the hits: tiles, bvh, or embree (CPU);\nthe images are the same"))
-      ->check(tracer_names());
+      ->check(name_of_a<gart::tracer_kind>());
   in_group(r.add(train, "--backward", a.backward, "NAME",
                  "How gradients are summed: primitive (one sum a Gaussian and\ntile), hybrid (a quarter of the "
                  "memory), pixel, or\ndeterministic (the same bits in every run); auto: the fastest"))
-      ->check(one_of({"auto", "pixel", "hybrid", "primitive", "deterministic"}));
+      ->check(strategy_names());
   in_group(r.add(train, "--lt-budget", a.lt_budget_gb, "GB",
                  "Memory for what the forward pass records; a step that\nneeds more is done by hybrid, which needs a "
                  "quarter, and where\nthat is too much by pixel, which needs none. 0: no limit"))
@@ -154,11 +156,11 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(between(0, gart::max_hits_most));
 
   in_group(r.add(train, "--arithmetic", a.arithmetic, "NAME", "exact, or fast: shorter exponentials and reciprocals"))
-      ->check(arithmetic_names());
+      ->check(name_of_a<gart::arithmetic_kind>());
   in_group(r.add(train, "--lt-format", a.lt_format, "NAME",
                  "What the forward pass leaves of a hit for primitive: float4,\nhalf or shared (half the memory, less "
                  "exact gradients)"))
-      ->check(lt_format_names());
+      ->check(name_of_a<gart::lt_format_kind>());
   in_group(r.add(train, "--tile-size", a.tile_size, "N", "Pixels a side of a tile, 0: what suits"))
       ->check(between(0, 64));
   in_group(r.add(train, "--window", a.window, "N", "Hits a ray keeps in order at a time, 0: what suits"))
@@ -190,7 +192,7 @@ void fill_in(CLI::App const& train, train_arguments& a) {
   };
   set("--alpha-min", a.alpha_min, chosen.alpha_min);
   set("--t-min", a.t_min, chosen.transmittance_min);
-  set("--auto", a.automatic, a.iterations >= measured_from);
+  set("--auto", a.automatic, a.iterations >= gart::measured_from);
 }
 
 void continue_run(train_arguments& a) {
@@ -213,15 +215,17 @@ void continue_run(train_arguments& a) {
   }
 }
 
-namespace {
-int most_sh_degree(train_arguments const& a) {
-  return a.sh_degree == "auto" ? a.defaults.sh_degree : std::stoi(a.sh_degree);
-}
-}  // namespace
-
 gart::configuration_request configuration_request_of(train_arguments const& a) {
-  return {a.backend,    a.tracer,    a.backward,  most_sh_degree(a), a.kernel_degree,
-          a.arithmetic, a.lt_format, a.tile_size, a.window};
+  gart::configuration_request wanted;
+  wanted.backend = gart::from_string<gart::backend_kind>(a.backend);
+  wanted.tracer = gart::from_string<gart::tracer_kind>(a.tracer);
+  wanted.backward = a.backward;
+  wanted.sh_degree = a.sh_degree == "auto" ? wanted.sh_degree : std::stoi(a.sh_degree);
+  wanted.kernel_degree = a.kernel_degree;
+  wanted.arithmetic = gart::from_string<gart::arithmetic_kind>(a.arithmetic);
+  wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
+  wanted.tile_size = a.tile_size, wanted.window = a.window, wanted.threads = a.threads;
+  return wanted;
 }
 
 gart::train_options train_options_of(train_arguments const& a) {
@@ -229,10 +233,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.iterations = a.iterations;
   o.max_gaussians = a.max_gaussians;
   o.random_points = std::min(a.points, a.max_gaussians);
-  o.densify = a.densify == "error"  ? gart::densify_kind::error
-              : a.densify == "mcmc" ? gart::densify_kind::mcmc
-              : a.densify == "adc"  ? gart::densify_kind::adc
-                                    : gart::densify_kind::none;
+  o.densify = gart::from_string<gart::densify_kind>(a.densify);
   o.initial_opacity = a.initial_opacity;
   o.initial_scale = a.initial_scale;
   o.exposure = a.exposure == "on";
@@ -240,18 +241,17 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.mcmc.opacity_penalty *= a.mcmc_penalty, o.mcmc.scale_penalty *= a.mcmc_penalty;
   o.adam.seen_only = a.adam == "seen";
   o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
-  o.sh_degree = most_sh_degree(a);
   o.sh_gain = a.automatic && a.sh_degree == "auto" ? a.sh_gain : 0;
-  o.background = a.background == "white"    ? gart::background_kind::white
-                 : a.background == "random" ? gart::background_kind::random
-                                            : gart::background_kind::black;
+  // Until it is settled it decides nothing.
+  o.background = gart::from_string(a.background, gart::background_kind::black);
   o.check_finite = a.check_finite;
   o.seed = a.seed;
   o.render.alpha_min = a.alpha_min;
   o.render.transmittance_min = a.t_min;
   o.render.max_hits = a.max_hits;
   o.render.antialias = a.antialias ? gart::usual_antialias : 0;
-  o.render.rebuild_every = a.rebuild_every;
+  // The other tracers build no tree, and the images are the same.
+  o.render.rebuild_every = a.tracer == gart::to_string(gart::tracer_kind::bvh) ? a.rebuild_every : 1;
   set_fields(o, a.set);
   return o;
 }

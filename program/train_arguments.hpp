@@ -3,6 +3,7 @@
 
 #include "options.hpp"
 
+#include <gart/runtime/choose.hpp>
 #include <gart/runtime/session.hpp>
 #include <gart/train/options.hpp>
 
@@ -32,7 +33,7 @@ struct train_arguments {
   int kernel_degree = 2, tile_size = 0, window = 0;
   bool automatic = false;
   std::string sh_degree = "auto";
-  float sh_gain = 0.02f;
+  float sh_gain = gart::usual_sh_gain;
   int downscale = 1, test_every = 8, eval_every = -1;
   float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
   std::string exposure = "auto", adam = "all", set;
@@ -64,10 +65,9 @@ struct train_arguments {
 };
 
 void add_arguments(CLI::App& train, train_arguments& a);
-// Sets what the command line leaves open: what the preset says, and --auto in runs of measured_from steps or more.
+// Sets what the command line leaves open: what the preset says, and --auto in runs of gart::measured_from steps or
+// more.
 void fill_in(CLI::App const& train, train_arguments& a);
-// Shorter runs end with a lower score for the views that are held out of their first half (docs/auto.md).
-inline constexpr int measured_from = 5000;
 // Takes the options of the run in `out`, and its dataset where none was named. io_error where there is no such run.
 void continue_run(train_arguments& a);
 gart::configuration_request configuration_request_of(train_arguments const& a);

@@ -85,7 +85,8 @@ struct cuda_exec::resources {
   }
 };
 
-cuda_exec::cuda_exec(int device_index) : device_index_(device_index) {
+cuda_exec::cuda_exec(int device_index, void* stream)
+    : device_index_(device_index), stream_(stream), owns_stream_(stream == nullptr) {
   std::string reason;
   auto const devices = cuda_devices(&reason);
   if (devices.empty())
@@ -113,16 +114,17 @@ cuda_exec::cuda_exec(int device_index) : device_index_(device_index) {
     check_cuda(cudaMemPoolSetAttribute(resources_->pool, cudaMemPoolAttrReleaseThreshold, &keep_all),
                "setting up a memory pool");
   }
-  cudaStream_t stream = nullptr;
-  check_cuda(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "creating a stream");
-  stream_ = stream;
+  if (!owns_stream_) return;
+  cudaStream_t own = nullptr;
+  check_cuda(cudaStreamCreateWithFlags(&own, cudaStreamNonBlocking), "creating a stream");
+  stream_ = own;
 }
 
 cuda_exec::~cuda_exec() {
   cudaSetDevice(device_index_);
   cudaStreamSynchronize(as_stream(stream_));
   resources_.reset();
-  cudaStreamDestroy(as_stream(stream_));
+  if (owns_stream_) cudaStreamDestroy(as_stream(stream_));
 }
 
 void cuda_exec::make_current() const { check_cuda(cudaSetDevice(device_index_), "choosing the device"); }

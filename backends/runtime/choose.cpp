@@ -158,9 +158,9 @@ chosen<background_kind> choose_background(capture_traits const& t) {
           "the images' borders are plain (" + color + "), neither white nor black: Gaussians show it"};
 }
 
-chosen<std::string> choose_tracer(capture_traits const& t) {
-  if (t.folding) return {"bvh", folds(t)};
-  return {"auto", lenses(t)};
+chosen<tracer_kind> choose_tracer(capture_traits const& t) {
+  if (t.folding) return {tracer_kind::bvh, folds(t)};
+  return {tracer_kind::automatic, lenses(t)};
 }
 
 chosen<std::string> choose_backward(capture_traits const& t) {
@@ -187,6 +187,22 @@ chosen<starting_points> choose_start(dataset const& data, train_options const& o
   return {start, !start.random ? "the capture's points lie on surfaces"
                  : sparse      ? "random points are mostly in empty space, and the dead move"
                                : "random points"};
+}
+
+chosen<float> choose_sh_gain(train_options const& options) {
+  if (options.iterations >= measured_from) return {usual_sh_gain, "what a band buys is measured"};
+  return {0, "a run of less than " + std::to_string(measured_from) + " steps would miss the views held out"};
+}
+
+recommendation recommended(train_options const& options, dataset const& data, configuration_request const& request) {
+  capture_traits const traits = inspect(data);
+  recommendation all{request, options};
+  if (request.tracer == tracer_kind::automatic) all.request.tracer = choose_tracer(traits).value;
+  if (request.backward == "auto") all.request.backward = choose_backward(traits).value;
+  all.options.background = choose_background(traits).value;
+  all.options.exposure = choose_exposure(traits).value;
+  all.options.sh_gain = choose_sh_gain(options).value;
+  return all;
 }
 
 }  // namespace gart

@@ -188,7 +188,7 @@ class degree_selection final : public session {
   // One session at a time: the old one's memory goes before the new one's comes.
   void open(gaussian_model const& start) {
     close();
-    request_.sh_degree = options_.sh_degree = start.sh_degree;
+    request_.sh_degree = start.sh_degree;
     inner_ = make_session(request_, options_, data_, &start);
   }
   void open(training_state const& state) {

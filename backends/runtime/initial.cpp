@@ -124,7 +124,7 @@ point_cloud random_points(vec3d lo, vec3d hi, index_t count, u64 seed) {
   return out;
 }
 
-gaussian_model initial_model(dataset const& data, train_options const& options) {
+gaussian_model initial_model(dataset const& data, train_options const& options, int sh_degree) {
   if (options.max_gaussians == 0) throw invalid_argument("train_options.max_gaussians must be at least 1");
   starting_points const start = choose_start(data, options).value;
   point_cloud points =
@@ -143,7 +143,7 @@ gaussian_model initial_model(dataset const& data, train_options const& options) 
     points.position.resize(std::size_t{3} * options.max_gaussians);
     points.color.resize(std::size_t{3} * options.max_gaussians);
   }
-  return model_from_points(points, options.sh_degree, start.opacity, start.scale, 1e-4f * data.extent);
+  return model_from_points(points, sh_degree, start.opacity, start.scale, 1e-4f * data.extent);
 }
 
 }  // namespace gart

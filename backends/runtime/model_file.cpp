@@ -1,4 +1,5 @@
 #include <gart/core/error.hpp>
+#include <gart/runtime/kinds.hpp>
 #include <gart/runtime/model_file.hpp>
 
 #include <algorithm>
@@ -9,16 +10,14 @@
 
 namespace gart {
 
-namespace {
-char const* const kernel_degrees[] = {"1", "2", "3", "4", "5", "8"};
-}
-
 model_file load_model(std::filesystem::path const& path) {
   ply_traits traits;
   model_file file;
   file.model = read_splat_ply(path, &traits);
   if (auto const kernel = traits.find("kernel_degree"); kernel != traits.end()) {
-    if (std::find(std::begin(kernel_degrees), std::end(kernel_degrees), kernel->second) == std::end(kernel_degrees)) {
+    bool const known = std::any_of(std::begin(kernel_degrees), std::end(kernel_degrees),
+                                   [&](int degree) { return std::to_string(degree) == kernel->second; });
+    if (!known) {
       throw io_error(path.string(), "comment gart kernel_degree is '" + kernel->second + "'",
                      "1, 2, 3, 4, 5 or 8 belongs there; remove the comment for Gaussians (2)");
     }

@@ -24,14 +24,13 @@ int main(int argc, char** argv) try {
   gart::train_options options;
   options.iterations = argc > 3 ? std::atoi(argv[3]) : 2000;
   options.max_gaussians = 20'000;
-  options.sh_degree = 1;
 
   gart::configuration_request request;
   request.sh_degree = 1;
   request.kernel_degree = 4;
   auto const training = gart::make_session(request, options, data);
   gart::configuration_info const configuration = training->configuration();
-  std::printf("%s, %s, %s: kernel degree %d\n", configuration.backend.c_str(), configuration.tracer.c_str(),
+  std::printf("%s, %s, %s: kernel degree %d\n", to_string(configuration.backend), to_string(configuration.tracer),
               configuration.backward.c_str(), configuration.kernel_degree);
   gart::step_report done;
   while (training->steps_done() < options.iterations) done = training->step();

@@ -18,6 +18,7 @@
 #include <gart/runtime/choose.hpp>
 #include <gart/runtime/degree_selection.hpp>
 #include <gart/runtime/initial.hpp>
+#include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>

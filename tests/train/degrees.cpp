@@ -3,6 +3,7 @@
 #include <support/policies.hpp>
 
 #include <gart/runtime/degree_selection.hpp>
+#include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
 
 #include <algorithm>
@@ -16,7 +17,13 @@
 namespace {
 
 constexpr int iterations = 600, views = 20;
-gart::configuration_request const serial{"serial", "auto", "auto", 3};
+gart::configuration_request const serial{gart::backend_kind::serial};
+
+gart::configuration_request with_degree(int sh_degree) {
+  gart::configuration_request request = serial;
+  request.sh_degree = sh_degree;
+  return request;
+}
 
 struct fixture {
   gart::dataset data;
@@ -39,7 +46,7 @@ fixture make(std::uint64_t seed, float view_dependence) {
     truth.sh[i] = (i % 12 < 3 ? 0.5f : view_dependence) * normal(engine);
 
   fixture f;
-  auto const renderer = gart::make_renderer({"serial", "auto", "auto", 1});
+  auto const renderer = gart::make_renderer(with_degree(1));
   renderer->set_model(truth);
   for (int v = 0; v < views; ++v) {
     gart::dataset_view view;
@@ -230,7 +237,7 @@ TEST_CASE("the threshold decides, the scores are those of the views held out, an
   CHECK(after.size() == views);
 
   f.options.sh_gain = 1e-6f;
-  auto const kept = gart::make_session({"serial", "auto", "auto", 1}, f.options, f.data, &f.start);
+  auto const kept = gart::make_session(with_degree(1), f.options, f.data, &f.start);
   while (kept->steps_done() < iterations) kept->step();
   REQUIRE(kept->trials().size() == 1);
   CHECK(kept->trials()[0].kept());

@@ -8,6 +8,7 @@
 // what a bounded object in front of a uniform background looks like, and a photograph of a scene never.
 
 #include <gart/io/dataset.hpp>
+#include <gart/runtime/request.hpp>
 #include <gart/train/options.hpp>
 
 #include <string>
@@ -41,12 +42,18 @@ chosen<background_kind> choose_background(capture_traits const& traits);
 
 // Footprints, which the tiles tracer and every strategy but pixel stand on, need a lens that is one to one over the
 // image: where one is not, bvh and pixel; else "auto", the fastest there is.
-chosen<std::string> choose_tracer(capture_traits const& traits);
+chosen<tracer_kind> choose_tracer(capture_traits const& traits);
 chosen<std::string> choose_backward(capture_traits const& traits);
 
 // Exposures are learned where photographs of neighbouring poses differ in brightness by more than 3%, the median
 // (exposure/exposure.hpp), and the scene is unbounded (what captures give: bench/results/exposure.json).
 chosen<bool> choose_exposure(capture_traits const& traits);
+
+// The gain that a band of spherical harmonics has to buy to be stored, in dB; 0: nothing is measured. Shorter runs than
+// measured_from would end with a lower score for the views that are held out of their first half (docs/auto.md).
+inline constexpr int measured_from = 5000;
+inline constexpr float usual_sh_gain = 0.02f;
+chosen<float> choose_sh_gain(train_options const& options);
 
 // The capture's points, or random ones in its bounds. A capture's points lie on surfaces, and opacity 0.1 and a scale
 // of 1.0 (times the distance to the neighbours) fill the gaps between them. Random points are mostly in empty space:
@@ -57,6 +64,15 @@ struct starting_points {
   float opacity = 0, scale = 0;
 };
 chosen<starting_points> choose_start(dataset const& data, train_options const& options);
+
+// All of these, as `gart train` takes them: what `request` leaves to gart's choice, and in the options background,
+// exposure and sh_gain, in place of what they say. A choice that is to be another is set afterwards.
+struct recommendation {
+  configuration_request request;
+  train_options options;
+};
+recommendation recommended(train_options const& options, dataset const& data,
+                           configuration_request const& request = {});
 
 // Whether undistort() and the lens agree over the whole image, and neighbours stay neighbours.
 bool one_to_one(camera const& view);

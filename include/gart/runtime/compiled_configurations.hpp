@@ -16,21 +16,38 @@ namespace gart::inline GART_ISA {
 template <execution E, class Traits, class Tracer, class Strategy>
 configuration_info configuration_of() {
   using response = typename Traits::response;
-  configuration_info configuration{E::name, Tracer::name, Strategy::name, Traits::sh_degree, response::degree};
-  configuration.arithmetic = response::fast ? "fast" : "exact";
+  configuration_info configuration;
+  configuration.backend = from_string(E::name, backend_kind::automatic);
+  configuration.tracer = from_string(Tracer::name, tracer_kind::own);
+  configuration.backward = Strategy::name;
+  configuration.sh_degree = Traits::sh_degree, configuration.kernel_degree = response::degree;
+  configuration.arithmetic = response::fast ? arithmetic_kind::fast : arithmetic_kind::exact;
   using record = typename Strategy::template record<tile_size_of<Tracer>>;
-  if constexpr (requires { record::entry::name; }) configuration.lt_format = record::entry::name;
+  if constexpr (requires { record::entry::name; })
+    configuration.lt_format = from_string(record::entry::name, lt_format_kind::none);
   configuration.tile_size = tile_size_of<Tracer>;
   configuration.window = Tracer::window;
   if constexpr (!E::device) configuration.instruction_set = instruction_set;
   return configuration;
 }
 
+// The policy that a request asks for.
+template <execution E>
+E policy_of(configuration_request const& request) {
+  if constexpr (E::device)
+    return E(request.device, request.stream);
+  else if constexpr (std::is_constructible_v<E, int>)
+    return E(request.threads);
+  else
+    return E();
+}
+
 template <execution E, class Traits, class Tracer, class Strategy>
 class compiled_session final : public session {
  public:
-  compiled_session(train_options const& options, dataset const& data, gaussian_model const& start)
-      : trainer_(exec_, options, data, start) {}
+  compiled_session(configuration_request const& request, train_options const& options, dataset const& data,
+                   gaussian_model const& start)
+      : exec_(policy_of<E>(request)), trainer_(exec_, options, data, start) {}
   step_report step() override { return trainer_.step(); }
   int steps_done() const override { return trainer_.steps_done(); }
   void set_iterations(int iterations) override { trainer_.set_iterations(iterations); }
@@ -59,8 +76,9 @@ class compiled_renderer final : public renderer {
  public:
   static constexpr int sh_degree = Traits::sh_degree;
 
-  compiled_renderer()
-      : filter_(exec_),
+  explicit compiled_renderer(configuration_request const& request)
+      : exec_(policy_of<E>(request)),
+        filter_(exec_),
         records_(exec_),
         tracer_(exec_),
         pass_(exec_),
@@ -73,9 +91,11 @@ class compiled_renderer final : public renderer {
     scene_.assign(model);
   }
   rendered render(camera const& view, render_options const& options) override {
+    require_tree(options.rebuild_every, configuration().tracer);
     return render_image<Traits::sh_degree>(exec_, tracer_, records_, std::as_const(scene_).view(), view, options);
   }
   void differentiate(camera const& view, render_options const& options, image_float const& color_gradient) override {
+    require_tree(options.rebuild_every, configuration().tracer);
     std::size_t const floats = std::size_t{3} * view.width * view.height;
     if (color_gradient.data.size() != floats)
       throw invalid_argument("renderer: the colour's gradient must have three values for each pixel of the view");
@@ -113,12 +133,15 @@ class compiled_renderer final : public renderer {
 
 template <execution E, class Traits, class Tracer, class Strategy>
 void register_configuration_of(int rank, bool (*available)(std::string*) = always_available) {
-  register_configuration(
-      {configuration_of<E, Traits, Tracer, Strategy>(), rank, available,
-       []() -> std::unique_ptr<renderer> { return std::make_unique<compiled_renderer<E, Traits, Tracer, Strategy>>(); },
-       [](train_options const& options, dataset const& data, gaussian_model const& start) -> std::unique_ptr<session> {
-         return std::make_unique<compiled_session<E, Traits, Tracer, Strategy>>(options, data, start);
-       }});
+  register_configuration({configuration_of<E, Traits, Tracer, Strategy>(), rank, available,
+                          [](configuration_request const& request) -> std::unique_ptr<renderer> {
+                            return std::make_unique<compiled_renderer<E, Traits, Tracer, Strategy>>(request);
+                          },
+                          [](configuration_request const& request, train_options const& options, dataset const& data,
+                             gaussian_model const& start) -> std::unique_ptr<session> {
+                            return std::make_unique<compiled_session<E, Traits, Tracer, Strategy>>(request, options,
+                                                                                                   data, start);
+                          }});
 }
 
 template <execution E, class Tracer, class Strategy>

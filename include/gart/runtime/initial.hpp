@@ -14,7 +14,7 @@ gaussian_model model_from_points(point_cloud const& points, int sh_degree, float
 point_cloud random_points(vec3d lo, vec3d hi, index_t count, u64 seed);
 
 // The dataset's points, or random ones in its bounds; at most options.max_gaussians (a random subset beyond).
-gaussian_model initial_model(dataset const& data, train_options const& options);
+gaussian_model initial_model(dataset const& data, train_options const& options, int sh_degree);
 
 // Mean squared distance of each point to its 3 nearest others. O(n log n).
 std::vector<float> neighbor_distance2(std::vector<float> const& position);

@@ -14,6 +14,8 @@ struct preset {
   std::string name;
   float alpha_min = render_options{}.alpha_min;
   float transmittance_min = render_options{}.transmittance_min;
+
+  void apply(approximation_options& to) const { to.alpha_min = alpha_min, to.transmittance_min = transmittance_min; }
 };
 
 // exact first: the library's defaults.

@@ -1,7 +1,6 @@
 #pragma once
-// Training and rendering behind one host-safe interface: the configuration (policy, SH degree, tracer, backward
-// strategy) is chosen at run time from the configurations that were compiled. What g++ code, the `gart` program for
-// one, uses.
+// Training behind one host-safe interface: the configuration (policy, SH degree, tracer, backward strategy) is chosen
+// at run time from those that were compiled. What g++ code, the `gart` program for one, uses.
 //
 // Errors: unsupported, naming the configurations there are and how to compile one, for a configuration that is not;
 // out_of_memory; whatever the policy throws.
@@ -10,64 +9,17 @@
 #include <gart/exposure/exposure_field.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/render/rendered.hpp>
+#include <gart/runtime/request.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/train/options.hpp>
 #include <gart/train/state.hpp>
 #include <gart/train/step_report.hpp>
 
 #include <filesystem>
-#include <functional>
-#include <map>
 #include <memory>
-#include <string>
 #include <vector>
 
 namespace gart {
-
-// "auto" and 0: the best there is on this machine.
-struct configuration_request {
-  std::string backend = "auto";   // auto serial openmp cuda
-  std::string tracer = "auto";    // auto bvh embree tiles
-  std::string backward = "auto";  // auto pixel hybrid primitive deterministic
-  int sh_degree = 3;
-  int kernel_degree = 2;             // of the generalised Gaussians (math/response.hpp)
-  std::string arithmetic = "exact";  // exact fast
-  std::string lt_format = "auto";    // what the backward pass finds of a hit (backward/lt_slot.hpp)
-  int tile_size = 0;                 // pixels a side
-  int window = 0;                    // hits that a ray keeps in order before it goes over the scene again
-};
-
-struct configuration_info {
-  std::string backend, tracer, backward;
-  int sh_degree = 3;
-  int kernel_degree = 2;
-  std::string arithmetic = "exact";
-  std::string lt_format = "none";
-  int tile_size = 8, window = 0;
-  std::string instruction_set = "";  // that a host configuration was compiled for (core/isa.hpp); empty on a device
-};
-
-// A request with every "auto" decided; unsupported, naming the configurations, where there is none.
-configuration_info resolve(configuration_request const& request);
-std::vector<configuration_info> compiled_configurations();
-
-class renderer {
- public:
-  virtual ~renderer() = default;
-  virtual void set_model(gaussian_model const& model) = 0;
-  virtual rendered render(camera const& view, render_options const& options) = 0;
-  // The forward and the backward pass of a view by the configuration's strategy, for dL/dcolour [H][W][3]. The
-  // gradients stay where the policy computes until they are fetched. "gradients" is the profiler's stage of both passes
-  // and of what prepares them. Errors: invalid_argument for a gradient of another size than the view.
-  virtual void differentiate(camera const& view, render_options const& options, image_float const& color_gradient) = 0;
-  virtual gaussian_model gradients() const = 0;  // dL/d every parameter, of the last differentiate
-  virtual profiler& profile() = 0;
-  virtual std::size_t peak_bytes() const = 0;
-  virtual std::size_t lt_bytes() const = 0;  // of the last differentiate; 0 where the strategy records nothing
-  virtual configuration_info configuration() const = 0;
-};
-
-std::unique_ptr<renderer> make_renderer(configuration_request const& request);
 
 class session {
  public:
@@ -99,8 +51,11 @@ class session {
 
 // The dataset must outlive the session. `start` seeds the Gaussians where given, else the dataset's points or random
 // ones. With options.sh_gain the session measures which bands of spherical harmonics to store, and its configuration
-// and degree change in its course (runtime/degree_selection.hpp).
+// and degree change in its course (runtime/degree_selection.hpp). Errors: invalid_argument for
+// options.render.rebuild_every where the tracer builds no tree.
 std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,
                                       dataset const& data, gaussian_model const* start = nullptr);
+std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,
+                                      dataset const&& temporary, gaussian_model const* start = nullptr) = delete;
 
 }  // namespace gart

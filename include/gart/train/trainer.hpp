@@ -11,7 +11,9 @@
 // so a state holds parameters, moments and counters only.
 
 #include <gart/backward/backward.hpp>
+#include <gart/exposure/exposure_field.hpp>
 #include <gart/exposure/exposure_training.hpp>
+#include <gart/io/dataset.hpp>
 #include <gart/loss/error_map.hpp>
 #include <gart/loss/image_loss.hpp>
 #include <gart/optim/adam.hpp>
@@ -54,6 +56,7 @@ class trainer {
                 "the tracer finds the hits of another response than the traits name");
 
   trainer(E& exec, train_options const& options, dataset const& data, gaussian_model const& start);
+  trainer(E& exec, train_options const& options, dataset const&& temporary, gaussian_model const& start) = delete;
 
   step_report step();
   template <class Loss>
@@ -93,7 +96,6 @@ class trainer {
   vec3 background_of(int step) const;
   static mcmc_options mcmc_options_of(train_options const& options) {
     mcmc_options m = options.mcmc;
-    m.kernel_degree = Traits::response::degree;
     m.dead_opacity = least_opacity(m.dead_opacity, options.render.alpha_min);
     return m;
   }

@@ -1,6 +1,7 @@
 // What the library computes: every configuration behind make_renderer and make_session.
 #include "scene.hpp"
 
+#include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
 
 void use_interface() {
@@ -10,8 +11,9 @@ void use_interface() {
     request.backend = configuration.backend, request.tracer = configuration.tracer,
     request.backward = configuration.backward;
     request.sh_degree = configuration.sh_degree;
-    std::string const name = "library/" + configuration.backend + "/" + configuration.tracer + "/" +
-                             configuration.backward + "/SH" + std::to_string(configuration.sh_degree) + "/";
+    std::string const name = std::string("library/") + to_string(configuration.backend) + "/" +
+                             to_string(configuration.tracer) + "/" + configuration.backward + "/SH" +
+                             std::to_string(configuration.sh_degree) + "/";
     gart::gaussian_model const start = some_model(configuration.sh_degree);
 
     auto const renderer = gart::make_renderer(request);

@@ -8,7 +8,7 @@ int main() {
   std::string reason;
   std::size_t const devices = gart::cuda_devices(&reason).size();
   for (gart::configuration_info const& configuration : gart::compiled_configurations())
-    if (configuration.backend == "cuda") {
+    if (configuration.backend == gart::backend_kind::cuda) {
       std::printf("cuda: %zu devices %s\n", devices, reason.c_str());
       return devices > 0 || !reason.empty() ? 0 : 1;
     }

@@ -5,7 +5,7 @@
 
 int main() {
   for (gart::configuration_info const& configuration : gart::compiled_configurations())
-    if (configuration.tracer == "embree")
-      return std::printf("%s on %s\n", configuration.tracer.c_str(), configuration.backend.c_str()), 0;
+    if (configuration.tracer == gart::tracer_kind::embree)
+      return std::printf("%s on %s\n", to_string(configuration.tracer), to_string(configuration.backend)), 0;
   return 1;
 }
