@@ -14,7 +14,7 @@
 #include <gart/loss/affine_color.hpp>
 #include <gart/loss/metrics.hpp>
 #include <gart/reference/reference.hpp>
-#include <gart/render/forward.hpp>
+#include <gart/render/frame.hpp>
 #include <gart/runtime/choose.hpp>
 #include <gart/runtime/degree_selection.hpp>
 #include <gart/runtime/initial.hpp>

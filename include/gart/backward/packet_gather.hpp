@@ -32,7 +32,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     packet_data data[packets];
   };
 
-  static_assert(Size <= packet_cell::most);
+  static_assert(Size <= packet_cell::largest_tile);
 
   gather_type gather;
 
@@ -100,7 +100,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
 
   void sum(scratch const& s, pixel_box const& area, u32 id) const {
     footprint_slots const range = gather.ranges[id];
-    packet_cell const cell(id, range, area);
+    slot_cell const cell(id, range, area);
     ray_gaussian const& g = gather.records[id];
     lanes sh_sum[2][3][band_groups];  // of even and of odd lanes: additions to one sum wait for each other
     lanes moment_sum[moment_count];

@@ -1,6 +1,6 @@
 #pragma once
 // What a render leaves out, and what shows where nothing is: the knobs that trade exactness for time.
-// Errors: require_options throws invalid_argument, naming the option; forward() calls it.
+// Errors: require_options throws invalid_argument, naming the option; frame.prepare calls it.
 
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>

@@ -13,7 +13,7 @@
 
 namespace gart::inline GART_ISA {
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 configuration_info configuration_of() {
   using response = typename Traits::response;
   configuration_info configuration;
@@ -22,10 +22,9 @@ configuration_info configuration_of() {
   configuration.backward = Strategy::name;
   configuration.sh_degree = Traits::sh_degree, configuration.kernel_degree = response::degree;
   configuration.arithmetic = response::fast ? arithmetic_kind::fast : arithmetic_kind::exact;
-  using record = typename Strategy::template record<tile_size_of<Tracer>>;
-  if constexpr (requires { record::entry::name; })
-    configuration.lt_format = from_string(record::entry::name, lt_format_kind::none);
-  configuration.tile_size = tile_size_of<Tracer>;
+  configuration.lt_format =
+      from_string(Strategy::template record<Tracer::tile_size>::entry::name, lt_format_kind::none);
+  configuration.tile_size = Tracer::tile_size;
   configuration.window = Tracer::window;
   if constexpr (!E::device) configuration.instruction_set = instruction_set;
   return configuration;
@@ -42,7 +41,7 @@ E policy_of(configuration_request const& request) {
     return E();
 }
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 class compiled_session final : public session {
  public:
   compiled_session(configuration_request const& request, train_options const& options, dataset const& data,
@@ -71,16 +70,14 @@ class compiled_session final : public session {
   trainer<E, Traits, Tracer, Strategy> trainer_;
 };
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 class compiled_renderer final : public renderer {
  public:
   static constexpr int sh_degree = Traits::sh_degree;
 
   explicit compiled_renderer(configuration_request const& request)
       : exec_(policy_of<E>(request)),
-        filter_(exec_),
-        records_(exec_),
-        tracer_(exec_),
+        frame_(exec_),
         pass_(exec_),
         scene_(exec_, 0, sh_degree),
         gradients_(exec_, 0, sh_degree),
@@ -92,7 +89,8 @@ class compiled_renderer final : public renderer {
   }
   rendered render(camera const& view, render_options const& options) override {
     require_tree(options.rebuild_every, configuration().tracer);
-    return render_image<Traits::sh_degree>(exec_, tracer_, records_, std::as_const(scene_).view(), view, options);
+    frame_.prepare(std::as_const(scene_).view(), view, options);
+    return render_image(frame_);
   }
   void differentiate(camera const& view, render_options const& options, image_float const& color_gradient) override {
     require_tree(options.rebuild_every, configuration().tracer);
@@ -101,16 +99,13 @@ class compiled_renderer final : public renderer {
       throw invalid_argument("renderer: the colour's gradient must have three values for each pixel of the view");
     color_.resize(floats), color_gradient_.assign(color_gradient.data);
     gradients_.resize_keep(scene_.size());
-    auto const scene = std::as_const(scene_).view();
     stage_scope stage(exec_, "gradients");
-    auto const seen = filter_.of(exec_, scene, view, options.antialias);
-    records_.template prepare<typename Traits::response>(exec_, seen, view.position, options.alpha_min);
-    configure(tracer_, options);
-    tracer_.prepare(exec_, seen, records_.view(), view, options.alpha_min, options.near);
-    if (!pass_.prepare(exec_, tracer_, seen, view, options.alpha_min, options.near)) throw pass_.no_room();
-    forward<sh_degree>(exec_, tracer_, scene, view, options, sh_degree, pass_.targets(color_.data()), pass_.record());
-    pass_.template run<sh_degree>(exec_, tracer_, scene, records_.view(), view, options, sh_degree, color_,
-                                  color_gradient_, gradients_);
+    frame_.prepare(std::as_const(scene_).view(), view, options);
+    if (!pass_.prepare(frame_)) throw pass_.no_room();
+    image_targets targets;
+    targets.color = color_.data();
+    pass_.render(frame_, targets);
+    gart::differentiate(frame_, pass_, color_gradient_, gradients_);
   }
   gaussian_model gradients() const override { return gradients_.to_host(); }
   profiler& profile() override {
@@ -123,15 +118,13 @@ class compiled_renderer final : public renderer {
 
  private:
   E exec_;
-  antialiased<E> filter_;
-  frame_records<E> records_;
-  Tracer tracer_;
-  backward<E, Strategy, tile_size_of<Tracer>> pass_;
+  frame<E, Traits, Tracer> frame_;
+  backward_pass<frame<E, Traits, Tracer>, Strategy> pass_;
   gaussians<E> scene_, gradients_;
   buffer<float, E> color_, color_gradient_;
 };
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 void register_configuration_of(int rank, bool (*available)(std::string*) = always_available) {
   register_configuration({configuration_of<E, Traits, Tracer, Strategy>(), rank, available,
                           [](configuration_request const& request) -> std::unique_ptr<renderer> {
@@ -144,7 +137,7 @@ void register_configuration_of(int rank, bool (*available)(std::string*) = alway
                           }});
 }
 
-template <execution E, class Tracer, class Strategy>
+template <execution E, class Tracer, strategy Strategy>
 void register_configurations(int rank, bool (*available)(std::string*) = always_available) {
   register_configuration_of<E, scene_traits<0>, Tracer, Strategy>(rank, available);
   register_configuration_of<E, scene_traits<1>, Tracer, Strategy>(rank, available);

@@ -4,17 +4,11 @@
 // O_primitive is a prefix sum of box areas in 64 bits; the rest is a closed form of the box: the tiles of a box are its
 // cells cut by the grid's lines, row by row, and each holds its pixels row by row. A bijection onto [0, sum of areas).
 
-#include <gart/tiles/grid.hpp>
+#include <gart/tiles/footprint_slots.hpp>
 
 #include <cstring>
 
 namespace gart::inline GART_ISA {
-
-// A primitive's box and where its slots begin, one 16-byte word.
-struct alignas(16) footprint_slots {
-  u64 offset = 0;
-  pixel_box box;
-};
 
 // Slots of the box before tile cell `cell` (the box cut by the tile): whole rows of cells above, cells to the left.
 GART_HD constexpr u32 tile_offset(pixel_box const& box, pixel_box const& cell) {
