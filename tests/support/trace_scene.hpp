@@ -2,6 +2,7 @@
 // Renders, gradients and hit lists of a small scene through the library's templates, for comparison with the oracle.
 
 #include <gart/backward/backward.hpp>
+#include <gart/runtime/kinds.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
 #if defined(GART_WITH_EMBREE)
@@ -16,7 +17,7 @@
 
 namespace gart_test {
 
-enum class tracer_kind { bvh, embree, tiles };
+using gart::tracer_kind;
 
 template <class E>
 struct traced {

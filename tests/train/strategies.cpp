@@ -28,7 +28,6 @@ course train(E& exec, gart::dataset const& data, u64 seed, u64 lt_budget = 0) {
   options.lt_budget = lt_budget;
   options.iterations = steps;
   options.densify = gart::densify_kind::none;
-  options.sh_degree = 1;
   gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy> run(exec, options, data,
                                                                               cloud(seed + 1, 0.7f));
   course out;

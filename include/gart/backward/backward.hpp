@@ -105,7 +105,7 @@ class backward_pass {
     return out_of_memory("LT buffer", slots * sizeof(entry), 0,
                          std::to_string(slots) +
                              " slots, and there are numbers for 2^32: render smaller, with fewer Gaussians, or take "
-                             "row_request.backward = pixel, which needs none");
+                             "configuration_request.backward = pixel, which needs none");
   }
 
  private:

@@ -11,7 +11,9 @@
 // so a state holds parameters, moments and counters only.
 
 #include <gart/backward/fallback.hpp>
+#include <gart/exposure/exposure_field.hpp>
 #include <gart/exposure/exposure_training.hpp>
+#include <gart/io/dataset.hpp>
 #include <gart/loss/error_map.hpp>
 #include <gart/loss/image_loss.hpp>
 #include <gart/optim/adam.hpp>
@@ -21,10 +23,11 @@
 #include <gart/optim/mcmc.hpp>
 #include <gart/optim/schedule.hpp>
 #include <gart/render/frame.hpp>
+#include <gart/render/render_image.hpp>
 #include <gart/scene/traits.hpp>
-#include <gart/train/render_image.hpp>
-#include <gart/train/session.hpp>
+#include <gart/train/options.hpp>
 #include <gart/train/state.hpp>
+#include <gart/train/step_report.hpp>
 #include <gart/train/training_images.hpp>
 #include <gart/train/view_order.hpp>
 
@@ -51,6 +54,7 @@ class trainer {
   static constexpr int sh_degree = Traits::sh_degree;
 
   trainer(E& exec, train_options const& options, dataset const& data, gaussian_model const& start);
+  trainer(E& exec, train_options const& options, dataset const&& temporary, gaussian_model const& start) = delete;
 
   step_report step();
   template <class Loss>
@@ -79,7 +83,6 @@ class trainer {
   vec3 background_of(int step) const;
   static mcmc_options mcmc_options_of(train_options const& options) {
     mcmc_options m = options.mcmc;
-    m.kernel_degree = Traits::response::degree;
     m.dead_opacity = least_opacity(m.dead_opacity, options.render.alpha_min);
     return m;
   }

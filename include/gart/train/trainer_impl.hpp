@@ -25,7 +25,8 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       order_(data.train.size(), options.held_out, options.seed),
       error_(exec, error_options_of(options), options.max_gaussians, options.iterations, options.seed),
       error_map_(exec),
-      mcmc_(exec, mcmc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
+      mcmc_(exec, mcmc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed,
+            Traits::response::degree),
       adc_(exec, adc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
       color_(exec),
       color_gradient_(exec),
@@ -34,7 +35,6 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
   if (options.check_finite) finite_.emplace(exec);
-  options_.render.near = options.near * data.extent;
   if (options.exposure) exposures_.emplace(exec, data.train.size());
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
@@ -63,8 +63,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   dataset_view const& view = data_.train[index];
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates const rates = rates_at(options_.rates, data_.extent, step_, options_.iterations);
-  render_options render = options_.render;
-  render.background = background_of(step_);
+  render_options const render = render_options_of(options_, data_.extent, background_of(step_));
   std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
   color_.resize(floats), color_gradient_.resize(floats);
 
@@ -143,9 +142,7 @@ vec3 trainer<E, Traits, Tracer, Strategy>::background_of(int step) const {
 
 template <execution E, class Traits, class Tracer, strategy Strategy>
 rendered trainer<E, Traits, Tracer, Strategy>::render(camera const& view, vec3 background) {
-  render_options options = options_.render;
-  options.background = background;
-  frame_.prepare(std::as_const(scene_).view(), view, options);
+  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background));
   return render_image(frame_);
 }
 

@@ -1,0 +1,13 @@
+// The OpenMP policy with gart's own BVH.
+#include <gart/exec/parallel.hpp>
+#include <gart/runtime/compiled_configurations.hpp>
+#include <gart/trace/bvh_tracer.hpp>
+
+namespace {
+using tracer = gart::bvh_tracer<gart::openmp_exec>;
+}  // namespace
+
+GART_REGISTER_CONFIGURATIONS(gart_openmp_configurations,
+                             gart::register_configurations<gart::openmp_exec, tracer, gart::pixel_strategy>(10);
+                             gart::register_configurations<gart::openmp_exec, tracer, gart::hybrid_strategy>(11);
+                             gart::register_configurations<gart::openmp_exec, tracer, gart::primitive_strategy>(12))

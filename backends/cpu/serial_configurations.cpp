@@ -1,0 +1,13 @@
+// The serial policy with gart's own BVH.
+#include <gart/exec/parallel.hpp>
+#include <gart/runtime/compiled_configurations.hpp>
+#include <gart/trace/bvh_tracer.hpp>
+
+namespace {
+using tracer = gart::bvh_tracer<gart::serial_exec>;
+}  // namespace
+
+GART_REGISTER_CONFIGURATIONS(gart_serial_configurations,
+                             gart::register_configurations<gart::serial_exec, tracer, gart::pixel_strategy>(0);
+                             gart::register_configurations<gart::serial_exec, tracer, gart::hybrid_strategy>(1);
+                             gart::register_configurations<gart::serial_exec, tracer, gart::primitive_strategy>(2))
