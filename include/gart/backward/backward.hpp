@@ -10,8 +10,7 @@
 // 16 bytes for each pixel of each box, and where the tracer has none to lend, footprints of 36 bytes a Gaussian and
 // lists of 8 a (primitive, tile) pair.
 
-#include <gart/backward/matrix_gather.hpp>
-#include <gart/backward/packet_gather.hpp>
+#include <gart/backward/gather_form.hpp>
 #include <gart/backward/scatter.hpp>
 #include <gart/backward/strategies.hpp>
 #include <gart/render/antialiased.hpp>
@@ -213,22 +212,11 @@ class backward {
   void gather_terms(E& exec, span<ray_gaussian const> gaussians_in_frame, camera const& view, int active_degree,
                     span<float const> image, span<float const> image_gradient, span<float const> error,
                     gaussians<E>& gradients) {
-    constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
-    using by_lane = gather_kernel<ShDegree, Response, typename Strategy::gather, entry, TileSize, sums, validity, E>;
-    auto const gather = [&]<class Kernel>(index_t lanes, std::type_identity<Kernel>) {
-      parallel_for(exec, "backward/gather", tile_range{grid_.count(), lanes},
-                   Kernel{view, grid_, lists_, prints_->ranges().data(), slots_.data(), gaussians_in_frame.data(),
-                          active_degree, image.data(), image_gradient.data(), error.data(), gradients.sh.data(),
-                          moments_.data(), prints_->pair_offsets().data(), rows_.data(), last_.data(), near_});
-    };
-#if defined(__CUDACC__)
-    if constexpr (matrix_gather<by_lane>::fits && !requires { Strategy::lane_by_lane; })
-      gather(matrix_gather<by_lane>::block_size, std::type_identity<matrix_gather<by_lane>>{});
-    else
-      gather(64, std::type_identity<by_lane>{});
-#else
-    gather(1, std::type_identity<packet_gather<by_lane>>{});
-#endif
+    using gather = gather_of<strategy_gather<E, ShDegree, Response, Strategy, TileSize>>;
+    parallel_for(exec, "backward/gather", tile_range{grid_.count(), gather::block_size},
+                 gather{view, grid_, lists_, prints_->ranges().data(), slots_.data(), gaussians_in_frame.data(),
+                        active_degree, image.data(), image_gradient.data(), error.data(), gradients.sh.data(),
+                        moments_.data(), prints_->pair_offsets().data(), rows_.data(), last_.data(), near_});
   }
 
   buffer<float, E> moments_;

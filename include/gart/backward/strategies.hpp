@@ -26,7 +26,7 @@ enum class slot_validity { cleared, recomputed };
 // One channel: the colour gradient of a hit needs only its weight. Geometry by pixel.
 struct hybrid_strategy {
   static constexpr char const* name = "hybrid";
-  static constexpr bool ordered = false;
+  static constexpr bool ordered = false, lane_by_lane = false;
   static constexpr slot_validity validity = slot_validity::cleared;
   template <int Size>
   using record = record_lt<weight_entry, Size>;
@@ -38,7 +38,7 @@ struct hybrid_strategy {
 // Four channels; no ray is traced twice.
 struct primitive_strategy {
   static constexpr char const* name = "primitive";
-  static constexpr bool ordered = false;
+  static constexpr bool ordered = false, lane_by_lane = false;
   static constexpr slot_validity validity = slot_validity::recomputed;
   template <int Size>
   using record = record_lt<lt_entry, Size>;
@@ -66,8 +66,8 @@ struct cleared_strategy : primitive_strategy {
   static constexpr slot_validity validity = slot_validity::cleared;
 };
 
-// The primitive strategy without matrix units (backward/matrix_gather.hpp): what these are tested and measured against,
-// on a device.
+// The primitive strategy by the plain gather (backward/gather.hpp): what packets and matrix units are tested and
+// measured against.
 struct lane_strategy : primitive_strategy {
   static constexpr char const* name = "lane";
   static constexpr bool lane_by_lane = true;
