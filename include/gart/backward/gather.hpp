@@ -84,8 +84,9 @@ struct gather_kernel {
   }
 
   // What a primitive's walk of a tile has summed goes to the Gaussian, or to its row.
-  GART_KERNEL GART_INLINE void finish(pixel_box const& box, pixel_box const& area, u32 id, float const (&sh_sum)[sh_stride],
-                                  float const (&moment_sum)[moment_stride]) const {
+  GART_KERNEL GART_INLINE void finish(pixel_box const& box, pixel_box const& area, u32 id,
+                                      float const (&sh_sum)[sh_stride],
+                                      float const (&moment_sum)[moment_stride]) const {
     if constexpr (C::terms::color) add_color_sums(box, area, id, 0, sh_sum);
     if constexpr (C::terms::geometry) add_moment_sums(box, area, id, moment_sum);
   }
@@ -162,8 +163,8 @@ struct gather_kernel {
       next = after;
       after = slot[k + 2 < last_slot ? k + 2 : last_slot];
       pixel_data const& at = s.pixels[p];
-      response r[1];
-      responses_at(r, data, [&](int) -> pixel_data const& { return at; });
+      ray_peak r[1];
+      peaks_at(r, data, [&](int) -> pixel_data const& { return at; });
       if (holds(at, entry, first + k, r[0], data)) {
         if constexpr (C::terms::color) add_color(at, entry, sh_sum);
         if constexpr (C::terms::geometry) add_moments(at, entry, r[0], data, true, moment_sum);
@@ -186,7 +187,7 @@ struct gather_kernel {
 
   // What the Gaussian has of the rays of N pixels at once.
   template <int N, class F>
-  GART_HD GART_INLINE void responses_at(response (&out)[N], lane_data const& data, F&& pixel_of) const {
+  GART_HD GART_INLINE void peaks_at(ray_peak (&out)[N], lane_data const& data, F&& pixel_of) const {
     if constexpr (std::is_same_v<lane_data, record_data>)
       evaluate_all<response_type>(out, [&](int i) {
         quad const d = pixel_of(i).direction_total;
@@ -194,7 +195,7 @@ struct gather_kernel {
       });
   }
   // Whether the slot of that number is a hit.
-  GART_HD GART_INLINE bool holds(pixel_data const& at, entry_type const& entry, u32 number, response const& r,
+  GART_HD GART_INLINE bool holds(pixel_data const& at, entry_type const& entry, u32 number, ray_peak const& r,
                                  lane_data const& data) const {
     if constexpr (recomputed)
       return is_hit(data.gaussian, r, near) & !before(at.last.v[0], float_to_bits(at.last.v[1]), r.t, number);
@@ -224,13 +225,13 @@ struct gather_kernel {
       sh_sum[3 * b + 2] += basis.y[b] * cg.z;
     }
   }
-  GART_HD GART_INLINE void add_moments(pixel_data const& at, entry_type const& entry, response const& r,
+  GART_HD GART_INLINE void add_moments(pixel_data const& at, entry_type const& entry, ray_peak const& r,
                                        lane_data const& data, bool hit, float (&moment_sum)[moment_stride]) const {
     quad const g = at.gradient;
     vec3 const opaque = entry.color();
     float const opaque_g = opaque.x * g.v[0] + opaque.y * g.v[1] + opaque.z * g.v[2];
     float const alpha = hit_alpha<response_type>(data.gaussian, r.d2);
-    moments const m =
+    moments_of<float> const m =
         hit_moments<response_type>(data.gaussian, r, alpha_gradient(opaque_g, at.direction_total.v[3], alpha), hit);
     GART_UNROLL
     for (int i = 0; i < error_place; ++i) moment_sum[i] += m.v[i];
@@ -239,8 +240,8 @@ struct gather_kernel {
 
   GART_HD GART_INLINE quad* row_of(pixel_box const& box, pixel_box const& area, u32 id) const {
     pixel_box const tiles = tiles_of<C::tile_size>(box);
-    u64 const pair = pair_offsets[id] + (area.y0 / C::tile_size - tiles.y0) * tiles.width() +
-                     (area.x0 / C::tile_size - tiles.x0);
+    u64 const pair =
+        pair_offsets[id] + (area.y0 / C::tile_size - tiles.y0) * tiles.width() + (area.x0 / C::tile_size - tiles.x0);
     return rows + pair * pair_gradient<C::sh_degree>::quads;
   }
 };

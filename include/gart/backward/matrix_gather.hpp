@@ -155,9 +155,9 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
       now = next;
       read(row < last ? row + 1 : last);
       matrix_part<2> weights[3];
-      response r[2];
+      ray_peak r[2];
       auto const pixel_of = [&](int i) -> auto const& { return s.pixels[8 * row + column + 4 * i]; };
-      this->responses_at(r, data, pixel_of);
+      this->peaks_at(r, data, pixel_of);
       GART_UNROLL
       for (int i = 0; i < 2; ++i) {
         typename base::pixel_data const& at = pixel_of(i);

@@ -116,7 +116,7 @@ struct packet_gather {
 
     // All packets are evaluated before the first is summed up: the steps of one wait for each other.
     struct {
-      response_of<lanes> r;
+      ray_peak_of<lanes> r;
       lane_mask hit;
       packet_slots slots;
       packet_data const* at;
@@ -138,7 +138,7 @@ struct packet_gather {
     for (int i = 0; i < count; ++i) {
       packet_data const& at = *found[i].at;
       lane_mask const hit = found[i].hit;
-      response_of<lanes> const& r = found[i].r;
+      ray_peak_of<lanes> const& r = found[i].r;
       packet_entries const e = found[i].slots.template read<C::terms::geometry>(gather.slots, hit);
       // Geometry first: its steps wait for each other, and those of colour fill the time to the next packet's.
       if constexpr (C::terms::geometry) {

@@ -54,8 +54,7 @@ struct emit_pairs {
   int order_bits;
   span<u32> keys, primitives;
 
-  template <class Team>
-  GART_HD void operator()(Team const& team) const {
+  GART_KERNEL void operator()(auto const& team) const {
     u32 const begin = team.tile() * share, left = static_cast<u32>(ranges.size()) - begin;
     u32 const n = left < share ? left : share;
     u64 const at = offsets[begin];
