@@ -13,7 +13,7 @@ GART_HD GART_INLINE float sigmoid(float x) {
   return divide(1.0f, add(1.0f, exponential(-clamped)));
 }
 
-GART_HD inline double sigmoid(double x) { return 1 / (1 + exp(-x)); }
-GART_HD inline double logit(double p) { return log(p / (1 - p)); }
+GART_HD inline double sigmoid_in_double(double x) { return 1 / (1 + exp(-x)); }
+GART_HD inline double logit_in_double(double p) { return log(p / (1 - p)); }
 
 }  // namespace gart::inline GART_ISA

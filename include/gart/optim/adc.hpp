@@ -268,12 +268,12 @@ class adaptive_density {
   void reset_opacity(gaussians<E>& model, optimizer_state<E>& state) {
     double const ceiling = std::min(2.0 * static_cast<double>(options_.prune_opacity), 0.99);
     parallel_for(*exec_, "adc_reset", model.size(),
-                 detail::adc_reset_kernel{model.opacity.data(), static_cast<float>(logit(ceiling))});
+                 detail::adc_reset_kernel{model.opacity.data(), static_cast<float>(logit_in_double(ceiling))});
     state.first.opacity.zero(), state.second.opacity.zero();
   }
 
  private:
-  bool running(int step) const { return step < options_.until * static_cast<float>(iterations_); }
+  bool running(int step) const { return static_cast<float>(step) < options_.until * static_cast<float>(iterations_); }
 
   void clear_statistic(index_t n) {
     gradient_sum.resize(n), touched.resize(n);

@@ -166,8 +166,8 @@ class error_growth {
   void set_iterations(int iterations) { iterations_ = iterations; }
 
   bool due(int step) const {
-    return options_.every > 0 && step > options_.from && step < options_.until * static_cast<float>(iterations_) &&
-           step % options_.every == 0;
+    return options_.every > 0 && step > options_.from && step % options_.every == 0 &&
+           static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
   }
 
   // The count that a run is to have after a step.

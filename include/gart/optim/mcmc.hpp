@@ -112,10 +112,10 @@ struct mcmc_share_kernel {
 
   GART_KERNEL void operator()(index_t i) const {
     if (copies[i] == 0) return;
-    double const o = fmin(sigmoid(static_cast<double>(model.opacity[i])), 1 - 1e-7);
+    double const o = fmin(sigmoid_in_double(static_cast<double>(model.opacity[i])), 1 - 1e-7);
     relocated_shape const shape = relocation(o, copies[i] + 1, kernel_degree);
     double const opacity = fmin(fmax(shape.opacity, static_cast<double>(least_opacity)), 1 - 1e-7);
-    model.opacity[i] = static_cast<float>(logit(opacity));
+    model.opacity[i] = static_cast<float>(logit_in_double(opacity));
     float const shift = static_cast<float>(log(shape.scale_factor));
     for (int c = 0; c < 3; ++c) model.log_scale[i * std::size_t{3} + c] += shift;
   }
@@ -221,8 +221,8 @@ class mcmc {
   }
 
   bool due(int step) const {
-    return options_.every > 0 && step > options_.from && step < options_.until * static_cast<float>(iterations_) &&
-           step % options_.every == 0;
+    return options_.every > 0 && step > options_.from && step % options_.every == 0 &&
+           static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
   }
 
   // After the optimizer's step: relocation and growth where they are due, and the noise. `mean_rate` is the rate the
