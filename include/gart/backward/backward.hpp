@@ -24,7 +24,7 @@ namespace gart::inline GART_ISA {
 
 namespace backward_kernels {
 
-// Filter: no_filter, or the pixel_filter that the records were made through; `scene` is the stored one.
+// Filter: no_filter, or the camera model's that the records were made through; `scene` is the stored one.
 struct no_filter {};
 
 template <class Filter>
@@ -87,8 +87,8 @@ class backward {
   // After the tracer's own preparation: a tracer that has the view's footprints lends them. False, and nothing
   // allocated, where the LT buffer would take more than byte_budget (0: no limit) or have more slots than there are
   // numbers of 32 bits, by which hits know theirs.
-  template <class Tracer>
-  [[nodiscard]] bool prepare(E& exec, Tracer const& tracer, gaussians_view<float const> scene, camera const& view,
+  template <class Tracer, class View>
+  [[nodiscard]] bool prepare(E& exec, Tracer const& tracer, gaussians_view<float const> scene, View const& view,
                              float alpha_min, float near, u64 byte_budget = 0) {
     if constexpr (records) {
       grid_ = {view.width, view.height};
@@ -136,9 +136,9 @@ class backward {
   // `color` and `color_gradient` are [H][W][3]; `gaussians_in_frame` and the tracer stand as the forward pass used
   // them. `scene` is the stored one, also where these were made from what a filter shows of it
   // (render/antialiased.hpp).
-  template <int ShDegree, class Tracer>
+  template <int ShDegree, class Tracer, class View>
   void run(E& exec, Tracer& tracer, gaussians_view<float const> scene, span<ray_gaussian const> gaussians_in_frame,
-           camera const& view, render_options const& options, int active_degree, span<float const> color,
+           View const& view, render_options const& options, int active_degree, span<float const> color,
            span<float const> color_gradient, gaussians<E>& gradients, span<float const> error = {}) {
     using response = typename Tracer::response_type;
     stage_scope stage(exec, "backward");
@@ -148,8 +148,8 @@ class backward {
     if constexpr (!ordered) gradients.sh.zero();
     if constexpr (records) {
       if constexpr (ordered) rows_.resize(prints_->pairs() * pair_gradient<ShDegree>::quads);
-      gather_terms<ShDegree, response>(exec, gaussians_in_frame, view, active_degree, color, color_gradient, error,
-                                       gradients);
+      gather_terms<ShDegree, response>(exec, gaussians_in_frame, tracer.rays(), active_degree, color, color_gradient,
+                                       error, gradients);
       if constexpr (ordered)
         parallel_for(
             exec, "backward/sum", scene.count * pair_gradient<ShDegree>::quads,
@@ -158,7 +158,7 @@ class backward {
     }
     if constexpr (Strategy::scatter::any) {
       pixel_order const order{view.width, view.height};
-      scatter_program<ShDegree, response, typename Strategy::scatter, E> const program{view,
+      scatter_program<ShDegree, response, typename Strategy::scatter, E> const program{tracer.rays(),
                                                                                        order,
                                                                                        scene.sh,
                                                                                        active_degree,
@@ -177,7 +177,7 @@ class backward {
                    backward_kernels::finish<Filter>{scene, gaussians_in_frame, moments_, gradients.view(), filter});
     };
     if (options.antialias > 0)
-      finish(pixel_filter(view, options.antialias));
+      visit_camera(view, [&](auto const& model) { finish(model.filter(options.antialias)); });
     else
       finish(backward_kernels::no_filter{});
   }
@@ -210,14 +210,14 @@ class backward {
   using entry = typename entry_of<record_type>::type;
 
   template <int ShDegree, class Response>
-  void gather_terms(E& exec, span<ray_gaussian const> gaussians_in_frame, camera const& view, int active_degree,
+  void gather_terms(E& exec, span<ray_gaussian const> gaussians_in_frame, pixel_rays const& rays, int active_degree,
                     span<float const> image, span<float const> image_gradient, span<float const> error,
                     gaussians<E>& gradients) {
     constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
     using by_lane = gather_kernel<ShDegree, Response, typename Strategy::gather, entry, TileSize, sums, validity, E>;
     auto const gather = [&]<class Kernel>(index_t lanes, std::type_identity<Kernel>) {
       parallel_for(exec, "backward/gather", tile_range{grid_.count(), lanes},
-                   Kernel{view, grid_, lists_, prints_->ranges().data(), slots_.data(), gaussians_in_frame.data(),
+                   Kernel{rays, grid_, lists_, prints_->ranges().data(), slots_.data(), gaussians_in_frame.data(),
                           active_degree, image.data(), image_gradient.data(), error.data(), gradients.sh.data(),
                           moments_.data(), prints_->pair_offsets().data(), rows_.data(), last_.data(), near_});
     };

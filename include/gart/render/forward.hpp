@@ -56,13 +56,14 @@ void configure(Tracer& tracer, render_options const& options) {
 }
 
 // ShDegree is the degree the coefficients are stored with; bands above active_degree are not evaluated.
-template <int ShDegree, execution E, class Tracer, class Record>
-void forward(E& exec, Tracer& tracer, gaussians_view<float const> scene, camera const& view,
+// View: what the tracer was prepared for.
+template <int ShDegree, execution E, class Tracer, class Record, class View>
+void forward(E& exec, Tracer& tracer, gaussians_view<float const> scene, View const& view,
              render_options const& options, int active_degree, image_targets const& targets, Record const& record) {
   require_camera(view);
   require_options(options);
   pixel_order const order{view.width, view.height};
-  composite<ShDegree, Record> const program{view, order, scene.sh, active_degree, options, targets, record};
+  composite<ShDegree, Record> const program{tracer.rays(), order, scene.sh, active_degree, options, targets, record};
   tracer.trace(exec, "forward", order.launch_size(), program);
 }
 

@@ -16,8 +16,8 @@ struct render_options {
   float transmittance_min = 1e-4f;  // a ray ends after the hit that brings T below this
   float near = 0.01f;               // hits lie at t > near, world units along the ray
   u32 max_hits = 0;                 // a ray ends after so many hits composited; 0: no cap
-  float antialias = 0;    // standard deviation of the pixels' filter, in pixels (scene/pixel_filter.hpp); 0: none
-  int rebuild_every = 1;  // the BVH tracer builds its tree every so many views, else refits it: exact
+  float antialias = 0;              // standard deviation of the pixels' filter, in pixels (camera/model.hpp); 0: none
+  int rebuild_every = 1;            // the BVH tracer builds its tree every so many views, else refits it: exact
   vec3 background{0.0f};
 };
 

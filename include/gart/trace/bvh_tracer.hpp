@@ -4,7 +4,7 @@
 // changed and `rebuild_every` says so.
 
 #include <gart/bvh/walk.hpp>
-#include <gart/scene/camera.hpp>
+#include <gart/camera/pixel_rays.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/scene/parameters.hpp>
 #include <gart/trace/k_buffer_visitor.hpp>
@@ -47,13 +47,16 @@ class bvh_tracer {
   static constexpr char const* name = "bvh";
   static constexpr int window = 16;
 
-  explicit bvh_tracer(E& exec) : boxes_(exec), tree_(exec) {}
+  explicit bvh_tracer(E& exec) : rays_(exec), boxes_(exec), tree_(exec) {}
 
   // Steps between rebuilds; 1 builds at every prepare.
   int rebuild_every = 1;
 
-  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
+  // View: a camera or a camera model.
+  template <class View>
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, View const& view,
                float alpha_min, float near) {
+    rays_.cast(exec, view);
     boxes_.resize(scene.count);
     parallel_for(exec, "bvh/boxes", scene.count,
                  trace_kernels::bound_ellipsoids<Response>{scene, view.position, alpha_min, boxes_});
@@ -67,6 +70,9 @@ class bvh_tracer {
     scene_ = {records.data(), scene.count, near};
   }
 
+  // Of the view that it was prepared for.
+  pixel_rays rays() const { return rays_.view(); }
+
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
     parallel_for(exec, label, rays, trace_kernels::walk_rays<Response, window, P>{tree_.view(), scene_, program});
@@ -75,6 +81,7 @@ class bvh_tracer {
   bvh<E> const& tree() const { return tree_; }
 
  private:
+  camera_rays<E> rays_;
   buffer<box, E> boxes_;
   bvh<E> tree_;
   traced_scene scene_;

@@ -70,10 +70,13 @@ class embree_tracer {
   static constexpr char const* name = "embree";
   static constexpr int window = 16;
 
-  explicit embree_tracer(E& exec) : boxes_(exec) {}
+  explicit embree_tracer(E& exec) : rays_(exec), boxes_(exec) {}
 
-  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
+  // View: a camera or a camera model.
+  template <class View>
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, View const& view,
                float alpha_min, float near) {
+    rays_.cast(exec, view);
     boxes_.resize(scene.count);
     parallel_for(exec, "embree/boxes", scene.count,
                  trace_kernels::bound_ellipsoids<Response>{scene, view.position, alpha_min, boxes_});
@@ -82,12 +85,16 @@ class embree_tracer {
     scene_ = {records.data(), scene.count, near};
   }
 
+  // Of the view that it was prepared for.
+  pixel_rays rays() const { return rays_.view(); }
+
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
     parallel_for(exec, label, rays, trace_kernels::embree_rays<Response, window, P>{&tree_, scene_, program});
   }
 
  private:
+  camera_rays<E> rays_;
   buffer<box, E> boxes_;
   embree_scene tree_;
   traced_scene scene_;

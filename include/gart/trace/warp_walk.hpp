@@ -16,6 +16,7 @@
 //   records_hits                 whether hits have places in the LT buffer (tiles/layout.hpp)
 //   add(state, t, alpha, shown, place)  composites a hit; false ends the ray
 
+#include <gart/camera/ray_depth.hpp>
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/tiles/tile_map.hpp>
 #include <gart/trace/ray_program.hpp>
@@ -48,7 +49,7 @@ class walk_tile_warps {
   tile_map_view map;
   footprint_slots const* ranges;
   traced_scene scene;
-  vec3 forward;  // the camera's axis
+  ray_depth depth;  // that lists are sorted by
   P program;
   u32* next = nullptr;         // part of a tile that is to be taken next, zero at first
   float* put_aside = nullptr;  // [teams][aside_floats]
@@ -125,9 +126,7 @@ class walk_tile_warps {
       alive_ = k.program.order.inside(at_);
       state_ = k.program.begin(index_);
       ray_ = k.program.ray_of(index_, state_);
-      vec3 const& d = ray_.direction;
-      // z = t * cosine; rounded up, so that what is said to lie nearer than a depth does.
-      cosine_ = (d.x * k.forward.x + d.y * k.forward.y + d.z * k.forward.z) * 1.000002f;
+      depth_of_t_ = k.depth.per_distance(ray_.direction);
       last_t_ = k.scene.near;
       for (int w = lane_; w < 2 * group * row_words; w += lanes)
         s.ahead[w / (group * row_words)][w / row_words % group].row[w % row_words] = {};
@@ -250,7 +249,7 @@ class walk_tile_warps {
             tried = true;
             float const depth = s_.depth[first + c];
             pass_on(depth);
-            if (!__any_sync(everyone, alive_ && !(pending_.lost_t() * cosine_ <= depth))) return false;
+            if (!__any_sync(everyone, alive_ && !(pending_.lost_t() * depth_of_t_ <= depth))) return false;
           }
           if (__any_sync(everyone, hit && alive_ && pending_.full())) pending_.make_room();
         }
@@ -284,7 +283,7 @@ class walk_tile_warps {
     // Hits nearer than `depth`, which nothing that is left of the list comes before.
     __device__ GART_INLINE void pass_on(float depth) {
       if (!alive_) return;
-      pending_.pass_on(depth, cosine_, [this](waiting_hit const& h) {
+      pending_.pass_on(depth, depth_of_t_, [this](waiting_hit const& h) {
         last_t_ = h.t, last_key_ = h.key;
         return alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::records_hits ? h.key : 0);
       });
@@ -307,7 +306,7 @@ class walk_tile_warps {
     index_t index_;
     primary_ray ray_;
     typename P::state state_;
-    float cosine_;
+    float depth_of_t_;
     bool alive_;
     float last_t_;  // the last hit passed on: at first (near, none), t > near
     u32 last_key_ = nothing;
