@@ -13,13 +13,16 @@ void tile_map(benchmark::State& state, E& exec) {
   prints.measure(exec, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);
   gart::tile_map<E, TileSize> map(exec);
   gart::tile_grid<TileSize> const grid{frame.view.width, frame.view.height};
-  gart::depth_order const by_depth(prints.depths().data(), frame.traced.gaussians().data(), frame.view);
-  gart_bench::measure(state, exec, [&] {
-    if constexpr (ByDepth)
-      map.build(exec, grid, prints, by_depth);
-    else
-      map.build(exec, grid, prints, gart::number_order{});
-  });
+  if constexpr (ByDepth) {
+    gart::depth_orders<E, TileSize> orders(exec);
+    gart::visit_camera(frame.view, [&](auto const& model) {
+      auto const by_depth =
+          orders.of(exec, model, frame.traced.rays(), prints.depths().data(), frame.traced.gaussians().data());
+      gart_bench::measure(state, exec, [&] { map.build(exec, grid, prints, by_depth); });
+    });
+  } else {
+    gart_bench::measure(state, exec, [&] { map.build(exec, grid, prints, gart::number_order{}); });
+  }
   state.counters["pairs"] = static_cast<double>(prints.pairs());
 }
 

@@ -10,7 +10,7 @@ struct count_hits : gart::ray_program_base {
     gart::u32 hits = 0;
     float transmittance = 1;
   };
-  gart::camera view;
+  gart::pixel_rays rays;
   gart::pixel_order order;
   float transmittance_min;
   gart::u32* hits;
@@ -19,7 +19,7 @@ struct count_hits : gart::ray_program_base {
   GART_HD gart::pixel at(gart::index_t i) const { return order.at(i); }
   GART_HD state begin(gart::index_t i) const {
     state s;
-    s.direction = gart::pixel_ray(view, order.at(i)).direction;
+    s.direction = gart::pixel_ray(rays, order.at(i)).direction;
     return s;
   }
   GART_HD gart::primary_ray ray_of(gart::index_t, state const& s) const { return {s.direction}; }
@@ -37,7 +37,7 @@ void trace(benchmark::State& state, E& exec) {
   frame.prepare();
   gart::buffer<gart::u32, E> hits(exec, frame.pixels());
   gart::pixel_order const order{frame.view.width, frame.view.height};
-  count_hits const program{{}, frame.view, order, frame.options.transmittance_min, hits.data()};
+  count_hits const program{{}, frame.traced.rays(), order, frame.options.transmittance_min, hits.data()};
   gart_bench::measure(state, exec, [&] { frame.traced.trace("trace", order.launch_size(), program); });
   double sum = 0;
   for (gart::u32 const n : hits.to_host()) sum += n;

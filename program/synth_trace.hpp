@@ -7,8 +7,8 @@
 
 #include "synth_scene.hpp"
 
+#include <gart/camera/models.hpp>
 #include <gart/io/dataset.hpp>
-#include <gart/scene/camera.hpp>
 #include <gart/scene/image.hpp>
 
 #include <memory>

@@ -1,8 +1,8 @@
 #pragma once
 // A capture as its files describe it, before any photo is opened: what the format readers hand to load_dataset.
 
+#include <gart/camera/models.hpp>
 #include <gart/io/dataset.hpp>
-#include <gart/scene/camera.hpp>
 
 #include <filesystem>
 #include <string>

@@ -2,6 +2,7 @@
 // https://colmap.github.io/format.html
 
 #include "bytes.hpp"
+#include "camera_formats.hpp"
 #include "capture.hpp"
 
 #include <gart/core/error.hpp>
@@ -18,33 +19,8 @@ namespace gart::io {
 namespace fs = std::filesystem;
 namespace {
 
-struct lens_model {
-  char const* name;
-  int parameters;
-};
-constexpr lens_model lens_models[] = {{"SIMPLE_PINHOLE", 3},
-                                      {"PINHOLE", 4},
-                                      {"SIMPLE_RADIAL", 4},
-                                      {"RADIAL", 5},
-                                      {"OPENCV", 8},
-                                      {"OPENCV_FISHEYE", 8},
-                                      {"FULL_OPENCV", 12},
-                                      {"FOV", 5},
-                                      {"SIMPLE_RADIAL_FISHEYE", 4},
-                                      {"RADIAL_FISHEYE", 5},
-                                      {"THIN_PRISM_FISHEYE", 12},
-                                      {"RAD_TAN_THIN_PRISM_FISHEYE", 16},
-                                      {"SIMPLE_DIVISION", 4},
-                                      {"DIVISION", 5},
-                                      {"SIMPLE_FISHEYE", 3},
-                                      {"FISHEYE", 4},
-                                      {"EUCM", 6},
-                                      {"EQUIRECTANGULAR", 2}};
-constexpr int lens_model_count = static_cast<int>(std::size(lens_models));
-constexpr int traced_models = 5;  // the first of the list
-
 struct sensor {
-  int model = 0;
+  camera_format const* model = nullptr;
   u64 width = 0, height = 0;
   std::array<double, 16> parameters{};
 };
@@ -81,16 +57,17 @@ void read_cameras_bin(fs::path const& path, model_files& model) {
   for (u64 i = 0; i < n; ++i) {
     u32 const id = in.get<u32>("a camera's id");
     sensor s;
-    s.model = in.get<std::int32_t>("a camera's model");
-    if (s.model < 0 || s.model >= lens_model_count) {
+    auto const number = in.get<std::int32_t>("a camera's model");
+    s.model = camera_format_of(number);
+    if (!s.model) {
       throw io_error(path.string(),
-                     "camera " + std::to_string(id) + " has the model number " + std::to_string(s.model) +
+                     "camera " + std::to_string(id) + " has the model number " + std::to_string(number) +
                          ", which COLMAP does not define",
                      "the file is damaged or newer than gart: export it again");
     }
     s.width = in.get<u64>("a camera's width");
     s.height = in.get<u64>("a camera's height");
-    for (int k = 0; k < lens_models[s.model].parameters; ++k) {
+    for (int k = 0; k < s.model->parameters(); ++k) {
       s.parameters[static_cast<std::size_t>(k)] = in.get<double>("a camera's parameters");
     }
     model.sensors[id] = s;
@@ -182,15 +159,13 @@ void read_cameras_txt(fs::path const& path, model_files& model) {
   while (in.next_record()) {
     u32 const id = in.number<u32>("a camera's id");
     std::string_view const name = in.word("a camera's model");
-    auto const* found =
-        std::find_if(std::begin(lens_models), std::end(lens_models), [&](auto& m) { return name == m.name; });
-    if (found == std::end(lens_models))
-      in.refuse("COLMAP has no camera model '" + std::string(name.substr(0, 40)) + "'");
     sensor s;
-    s.model = static_cast<int>(found - lens_models);
+    s.model = camera_format_of(name);
+    if (!s.model || s.model->number < 0)
+      in.refuse("COLMAP has no camera model '" + std::string(name.substr(0, 40)) + "'");
     s.width = in.number<u64>("a camera's width");
     s.height = in.number<u64>("a camera's height");
-    for (int k = 0; k < found->parameters; ++k)
+    for (int k = 0; k < s.model->parameters(); ++k)
       s.parameters[static_cast<std::size_t>(k)] = in.number<double>("a camera's parameter");
     model.sensors[id] = s;
   }
@@ -224,25 +199,20 @@ void read_points_txt(fs::path const& path, model_files& model) {
 }
 
 camera lens_of(sensor const& s, std::string const& where) {
-  if (s.model >= traced_models) {
-    throw unsupported(where + ": the camera model is " + lens_models[s.model].name +
-                      "; gart traces SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL and OPENCV (undistort the capture "
-                      "with `colmap image_undistorter`)");
+  if (!s.model->kind) {
+    throw unsupported(where + ": the camera model is " + std::string(s.model->name) + "; gart traces " +
+                      traced_camera_formats() + " (undistort the capture with `colmap image_undistorter`)");
   }
   if (s.width < 1 || s.height < 1 || s.width > 1000000 || s.height > 1000000) {
     throw io_error(
         where, "the camera's size " + std::to_string(s.width) + " x " + std::to_string(s.height) + " is out of range",
         "export the model again");
   }
-  auto const p = [&](int k) { return static_cast<float>(s.parameters[static_cast<std::size_t>(k)]); };
-  bool const one_focal = s.model == 0 || s.model == 2 || s.model == 3;
-  int const next = one_focal ? 1 : 2;
   camera c;
+  c.kind = *s.model->kind;
   c.width = static_cast<int>(s.width), c.height = static_cast<int>(s.height);
-  c.fx = p(0), c.fy = p(next - 1), c.cx = p(next), c.cy = p(next + 1);
-  if (s.model >= 2) c.lens.k1 = p(next + 2);
-  if (s.model >= 3) c.lens.k2 = p(next + 3);
-  if (s.model == 4) c.lens.p1 = p(6), c.lens.p2 = p(7);
+  for (int k = 0; k < s.model->parameters(); ++k)
+    set_field(c, s.model->field(k), s.parameters[static_cast<std::size_t>(k)]);
   return c;
 }
 

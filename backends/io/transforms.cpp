@@ -2,6 +2,7 @@
 // https://docs.nerf.studio/quickstart/data_conventions.html
 
 #include "bytes.hpp"
+#include "camera_formats.hpp"
 #include "capture.hpp"
 
 #include <gart/core/error.hpp>
@@ -113,26 +114,22 @@ fs::path find_photo(fs::path const& path) {
 }
 
 void read_lens(record const& r, frame& f) {
-  if (r.has("camera_model")) {
-    std::string const model = r.text("camera_model");
-    static std::set<std::string> const traced = {"SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL",
-                                                 "RADIAL",         "OPENCV",  "PERSPECTIVE"};
-    if (!traced.count(model)) {
-      throw unsupported(
-          r.where + ": the camera model is " + model.substr(0, 60) +
-          "; gart traces SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL and OPENCV (undistort the capture)");
-    }
+  std::string const name = r.has("camera_model") ? r.text("camera_model") : "PERSPECTIVE";
+  camera_format const* const model = camera_format_of(name);
+  if (!model || !model->kind) {
+    throw unsupported(r.where + ": the camera model is " + name.substr(0, 60) + "; gart traces " +
+                      traced_camera_formats() + " (undistort the capture)");
   }
   if (r.flag("is_fisheye"))
     throw unsupported(r.where + ": 'is_fisheye' is set; gart traces no fisheye lens (undistort the capture)");
+  f.view.kind = *model->kind;
+  for (char const* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"}) set_field(f.view, key, r.number_or(key, 0));
   for (char const* key : {"k3", "k4", "k5", "k6"}) {
     if (r.number_or(key, 0) != 0) {
       throw unsupported(r.where + ": '" + key +
                         "' is not zero; gart traces the distortion k1 k2 p1 p2 (undistort the capture)");
     }
   }
-  f.view.lens.k1 = static_cast<float>(r.number_or("k1", 0)), f.view.lens.k2 = static_cast<float>(r.number_or("k2", 0));
-  f.view.lens.p1 = static_cast<float>(r.number_or("p1", 0)), f.view.lens.p2 = static_cast<float>(r.number_or("p2", 0));
 
   auto const angle = [&](char const* key) {
     double const v = r.number_or(key, 0);

@@ -1,3 +1,4 @@
+#include <gart/camera/models.hpp>
 #include <gart/exposure/exposure_field.hpp>
 #include <gart/runtime/choose.hpp>
 
@@ -95,28 +96,7 @@ std::string folds(capture_traits const& t) {
 }  // namespace
 
 bool one_to_one(camera const& view) {
-  if (!view.lens.any()) return true;
-  constexpr int steps = 32;
-  std::array<std::array<vec2, steps + 1>, steps + 1> slope;
-  for (int j = 0; j <= steps; ++j) {
-    for (int i = 0; i <= steps; ++i) {
-      vec2 const image((static_cast<float>(i * view.width) / steps - view.cx) / view.fx,
-                       (static_cast<float>(j * view.height) / steps - view.cy) / view.fy);
-      vec2 const s = undistort(view.lens, image);
-      double u, v;
-      distort(view.lens, s.x, s.y, u, v);
-      // An image point that no direction maps to, by a tenth of a pixel.
-      if (!(std::abs(u - image.x) * view.fx < 0.1 && std::abs(v - image.y) * view.fy < 0.1)) return false;
-      slope[j][i] = s;
-    }
-  }
-  for (int j = 0; j < steps; ++j) {
-    for (int i = 0; i < steps; ++i) {
-      vec2 const across = slope[j][i + 1] - slope[j][i], down = slope[j + 1][i] - slope[j][i];
-      if (!(across.x * down.y - across.y * down.x > 0)) return false;
-    }
-  }
-  return true;
+  return visit_camera(view, [](auto const& model) { return model.one_to_one(); });
 }
 
 capture_traits inspect(dataset const& data) {

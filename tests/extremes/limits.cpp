@@ -31,6 +31,7 @@ struct no_tracer : gart::tracer_base {
   explicit no_tracer(E&) {}
   void prepare(E&, gart::gaussians_view<float const>, gart::span<gart::ray_gaussian const>, gart::camera const&,
                gart::trace_options const&) {}
+  gart::pixel_rays rays() const { return {}; }
   template <gart::ray_program P>
   void trace(E&, char const*, gart::index_t, P const&) {}
 };

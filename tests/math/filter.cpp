@@ -1,6 +1,6 @@
 // The filter of a pixel and what it makes of a Gaussian, against solid angles of pixels and areas in double, with the
 // gradients of both against differences.
-#include <gart/scene/pixel_filter.hpp>
+#include <gart/camera/models.hpp>
 #include <support/policies.hpp>
 
 #include <Eigen/Geometry>
@@ -143,23 +143,26 @@ TEST_CASE("the filter is as wide as a pixel reaches, whatever the lens, and chan
   for (int trial = 0; trial < 200; ++trial) {
     gart::camera const c = from.camera(trial % 2 == 1);
     double const pixels = from.uniform(0.1, 2);
-    gart::pixel_filter const filter(c, static_cast<float>(pixels));
     Matrix3d const axes = axes_of(c);
-    for (int k = 0; k < 10; ++k) {
-      Vector2d const at(from.uniform(10, c.width - 10), from.uniform(10, c.height - 10));
-      Vector3d const m = (axes * direction_of(c, at) * from.uniform(0.1, 50)).cast<float>().cast<double>();
-      gart::filter_at const got = filter.at(to_vec3(m));
-      auto const sigma = [&](Vector3d const& v) { return pixels * pixel_angle(c, v) * v.norm(); };
-      worst = std::max(worst, std::abs(got.sigma / sigma(m) - 1));
-      Vector3d expected;
-      double const h = 1e-3 * m.norm();
-      for (int a = 0; a < 3; ++a) {
-        Vector3d const e = h * Vector3d::Unit(a);
-        expected[a] = (std::log(sigma(m + e)) - std::log(sigma(m - e))) / (2 * h);
+    gart::visit_camera(c, [&](auto const& model) {
+      auto const filter = model.filter(static_cast<float>(pixels));
+      for (int k = 0; k < 10; ++k) {
+        Vector2d const at(from.uniform(10, c.width - 10), from.uniform(10, c.height - 10));
+        Vector3d const m =
+            (axes * direction_of(c, at) * from.uniform(0.1, 50)).template cast<float>().template cast<double>();
+        gart::filter_at const got = filter.at(to_vec3(m));
+        auto const sigma = [&](Vector3d const& v) { return pixels * pixel_angle(c, v) * v.norm(); };
+        worst = std::max(worst, std::abs(got.sigma / sigma(m) - 1));
+        Vector3d expected;
+        double const h = 1e-3 * m.norm();
+        for (int a = 0; a < 3; ++a) {
+          Vector3d const e = h * Vector3d::Unit(a);
+          expected[a] = (std::log(sigma(m + e)) - std::log(sigma(m - e))) / (2 * h);
+        }
+        Vector3d const slope(got.log_slope.x, got.log_slope.y, got.log_slope.z);
+        worst_slope = std::max(worst_slope, (slope - expected).norm() * m.norm());
       }
-      Vector3d const slope(got.log_slope.x, got.log_slope.y, got.log_slope.z);
-      worst_slope = std::max(worst_slope, (slope - expected).norm() * m.norm());
-    }
+    });
   }
   CAPTURE(worst);
   CAPTURE(worst_slope);
@@ -172,16 +175,19 @@ TEST_CASE("beside the image and behind the camera a filter is that of the neares
   source from(gart_test::seed() + 1);
   for (int trial = 0; trial < 200; ++trial) {
     gart::camera const c = from.camera(trial % 2 == 1);
-    gart::pixel_filter const filter(c, 0.3f);
     gart::vec3 const m = to_vec3(from.uniform(0.01, 100) * from.direction());
-    gart::filter_at const got = filter.at(m);
+    float behind = 0;
+    gart::filter_at const got = gart::visit_camera(c, [&](auto const& model) {
+      behind = model.filter(0.3f).sigma_at(-m);
+      return model.filter(0.3f).at(m);
+    });
     float const distance = std::sqrt(m.x * m.x + m.y * m.y + m.z * m.z);
     CHECK(got.sigma > 0.1f * 0.3f * distance / c.fx);
     CHECK(got.sigma < 1.5f * 0.3f * distance / c.fx);
     for (int k = 0; k < 3; ++k) CHECK(gart::is_finite(got.log_slope[k]));
-    CHECK(filter.sigma_at(-m) > 0);
+    CHECK(behind > 0);
   }
-  CHECK(gart::pixel_filter(from.camera(false), 0.3f).at(gart::vec3(0.0f)).sigma == 0);
+  CHECK(gart::pinhole(from.camera(false)).filter(0.3f).at(gart::vec3(0.0f)).sigma == 0);
 }
 
 TEST_CASE("a widened Gaussian covers what it did, and grows by the filter") {

@@ -1,7 +1,7 @@
 // Functions of one argument, rotations, spherical harmonics and the lens, each against double or its definition.
+#include <gart/camera/models.hpp>
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/math/sh.hpp>
-#include <gart/scene/camera.hpp>
 #include <support/policies.hpp>
 
 #include <Eigen/Geometry>

@@ -107,11 +107,14 @@ TEST_CASE("lanes: numbers in turns and in fours") {
 TEST_CASE("a packet's rays have the bits of single ones, through lenses too") {
   gart::camera view;
   view.width = 64, view.height = 48, view.fx = 40, view.fy = 41, view.cx = 31, view.cy = 25;
+  gart::serial_exec exec;
+  gart::camera_rays<gart::serial_exec> rays(exec);
   for (gart::distortion const& lens : {gart::distortion{}, gart::distortion{0.06f, -0.08f, -0.002f, 0.003f}}) {
     view.lens = lens;
+    rays.cast(exec, view);
     for (int y = 0; y < view.height; y += gart::packet_block::height)
       for (int x = 0; x < view.width; x += gart::packet_block::width) {
-        auto const d = gart::pixel_directions(view, {x, y});
+        auto const d = gart::pixel_directions(rays.view(), {x, y});
         for (int l = 0; l < gart::lane_count; ++l) {
           gart::vec3 const one =
               gart::pixel_ray(view, {x + gart::packet_block::column(l), y + gart::packet_block::row(l)}).direction;

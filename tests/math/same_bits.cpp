@@ -1,7 +1,7 @@
 // What decides a hit gives the same bits on every policy: kernels against the same functions called here.
+#include <gart/camera/pixel_rays.hpp>
 #include <gart/exec/buffer.hpp>
 #include <gart/math/ray_gaussian.hpp>
-#include <gart/scene/pixel_filter.hpp>
 #include <support/policies.hpp>
 
 #include <random>
@@ -22,7 +22,9 @@ struct outcome {
   gart::gaussian_parameters filtered;
 };
 
-GART_HD outcome outcome_of(sample const& s, gart::pixel_filter const& filter) {
+using lens_filter = gart::slope_filter<gart::opencv_lens>;
+
+GART_HD outcome outcome_of(sample const& s, lens_filter const& filter) {
   gart::ray_gaussian const g = gart::prepare(s.gaussian, gart::vec3d(0.0), 1.0f / 255);
   gart::ray_peak const r = gart::evaluate(g, gart::primary_ray{s.direction});
   float const x = s.gaussian.log_scale.x;
@@ -38,20 +40,21 @@ GART_HD outcome outcome_of(sample const& s, gart::pixel_filter const& filter) {
 }
 
 struct evaluate_samples {
-  gart::pixel_filter filter;
+  lens_filter filter;
   gart::span<sample const> samples;
   gart::span<outcome> out;
   GART_KERNEL void operator()(gart::index_t i) const { out[i] = outcome_of(samples[i], filter); }
 };
 
-GART_HD gart::vec3 ray_of(gart::camera const& view, gart::index_t i) {
+template <class Model>
+GART_HD gart::vec3 ray_of(Model const& view, gart::index_t i) {
   auto const k = static_cast<int>(i);
-  return gart::ray_direction(view, static_cast<float>(k % view.width) + 0.5f,
-                             static_cast<float>(k / view.width) + 0.5f);
+  return view.ray(static_cast<float>(k % view.width) + 0.5f, static_cast<float>(k / view.width) + 0.5f).direction;
 }
 
+template <class Model>
 struct cast_rays {
-  gart::camera view;
+  Model view;
   gart::span<gart::vec3> out;
   GART_KERNEL void operator()(gart::index_t i) const { out[i] = ray_of(view, i); }
 };
@@ -86,7 +89,7 @@ TEST_CASE_TEMPLATE("the same bits on every policy", E, GART_TEST_POLICIES) {
   gart::camera view;
   view.width = 640, view.height = 480, view.fx = view.fy = 500, view.cx = 320, view.cy = 240;
   view.lens = {0.05f, 0.01f, 0.001f, -0.002f};
-  gart::pixel_filter const filter(view, 0.3f);
+  lens_filter const filter = gart::opencv(view).filter(0.3f);
   E exec;
   gart::buffer<sample, E> in(exec, samples);
   gart::buffer<outcome, E> out(exec, samples.size());
@@ -118,13 +121,23 @@ TEST_CASE_TEMPLATE("the same rays on every policy, whatever the lens", E, GART_T
     E exec;
     auto const count = static_cast<gart::index_t>(view.width) * view.height;
     gart::buffer<gart::vec3, E> out(exec, static_cast<std::size_t>(count));
-    gart::parallel_for(exec, "cast", count, cast_rays{view, out});
-    auto const got = out.to_host();
+    gart::camera_rays<E> rays(exec);
+    rays.cast(exec, view);
     long other = 0;
-    for (gart::index_t i = 0; i < count; ++i) {
-      gart::vec3 const expected = ray_of(view, i);
-      for (int c = 0; c < 3; ++c) other += !same(expected[c], got[static_cast<std::size_t>(i)][c]);
-    }
+    gart::visit_camera(view, [&]<class Model>(Model const& model) {
+      gart::parallel_for(exec, "cast", count, cast_rays<Model>{model, out});
+      auto const got = out.to_host();
+      std::vector<gart::vec3> table(got);
+      if (gart::vec3 const* const from = rays.view().directions)
+        exec.copy_out(table.data(), from, table.size() * sizeof(gart::vec3));
+      for (gart::index_t i = 0; i < count; ++i) {
+        gart::vec3 const expected = ray_of(model, i);
+        for (int c = 0; c < 3; ++c) {
+          other += !same(expected[c], got[static_cast<std::size_t>(i)][c]);
+          other += !same(expected[c], table[static_cast<std::size_t>(i)][c]);
+        }
+      }
+    });
     CHECK(other == 0);
   }
 }

@@ -34,7 +34,7 @@ struct list_program : gart::ray_program_base {
     gart::u32 at = 0;
     float transmittance = 1;
   };
-  gart::camera view;
+  gart::pixel_rays rays;
   gart::pixel_order order;
   float transmittance_min;
   gart::u32 max_hits;
@@ -46,7 +46,7 @@ struct list_program : gart::ray_program_base {
   GART_HD gart::pixel at(gart::index_t i) const { return order.at(i); }
   GART_HD state begin(gart::index_t i) const {
     state s;
-    s.direction = gart::pixel_ray(view, order.at(i)).direction;
+    s.direction = gart::pixel_ray(rays, order.at(i)).direction;
     if (list) s.at = offsets[order.address(order.at(i))];
     return s;
   }
@@ -208,7 +208,8 @@ std::vector<std::vector<gart::hit>> hit_lists(E& exec, gart::gaussian_model cons
     gart::buffer<gart::hit, E> list(exec);
     frame.prepare(scene.view(), view, options);
     gart::pixel_order const order{view.width, view.height};
-    list_program program{{}, view, order, options.transmittance_min, options.max_hits, counts.data(), nullptr, nullptr};
+    list_program program{{},      frame.rays(), order, options.transmittance_min, options.max_hits, counts.data(),
+                         nullptr, nullptr};
     frame.trace("count", order.launch_size(), program);
     std::vector<gart::u32> const count = counts.to_host();
     std::vector<gart::u32> offset(pixels + 1, 0);

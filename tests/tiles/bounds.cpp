@@ -3,7 +3,6 @@
 #include <tiles/ellipsoids.hpp>
 
 #include <gart/render/pixels.hpp>
-#include <gart/tiles/camera_footprint.hpp>
 #include <support/policies.hpp>
 
 #include <algorithm>
@@ -19,14 +18,15 @@ constexpr int ellipsoids_per_camera = 72;  // 100,800 in all
 
 struct rays {
   std::vector<gart::primary_ray> primary;
-  std::vector<double> cosine;
+  std::vector<double> depth;  // over distance, as the camera measures it
 
   explicit rays(gart::camera const& c) {
+    gart::ray_depth const along = gart::visit_camera(c, [](auto const& model) { return model.depth(); });
     for (int y = 0; y < c.height; ++y)
       for (int x = 0; x < c.width; ++x) {
         primary.push_back(gart::pixel_ray(c, {x, y}));
-        gart::vec3d const d(primary.back().direction), forward(c.rotation[2]);
-        cosine.push_back(d.x * forward.x + d.y * forward.y + d.z * forward.z);
+        gart::vec3d const d(primary.back().direction), axis(along.axis);
+        depth.push_back(d.x * axis.x + d.y * axis.y + d.z * axis.z + along.offset);
       }
   }
 };
@@ -49,7 +49,7 @@ struct tally {
         if (!gart::is_hit(record, e, near)) continue;
         x0 = std::min(x0, x), x1 = std::max(x1, x + 1), y0 = std::min(y0, y), y1 = std::max(y1, y + 1);
         out += x < f.box.x0 || x >= f.box.x1 || y < f.box.y0 || y >= f.box.y1;
-        nearer += e.t * r.cosine[i] < f.depth;
+        nearer += e.t * r.depth[i] < f.depth;
       }
     ++gaussians, outside += out > 0, too_near += nearer > 0;
     if ((out || nearer) && first.empty()) describe(c, near, g, f, {x0, y0, x1, y1}, out, nearer);
@@ -88,11 +88,13 @@ tally measure(placement p) {
     gart::camera const c = source.camera(p);
     float const near = source.near_distance(p);
     rays const r(c);
-    gart::camera_footprint const project(c, near);
-    for (int i = 0; i < ellipsoids_per_camera; ++i) {
-      gart::gaussian_parameters const g = source.gaussian(p, c);
-      all.measure(c, near, r, g, project(g, c.position, alpha_min));
-    }
+    gart::visit_camera(c, [&](auto const& model) {
+      auto const bounds = model.bounds(near);
+      for (int i = 0; i < ellipsoids_per_camera; ++i) {
+        gart::gaussian_parameters const g = source.gaussian(p, c);
+        all.measure(c, near, r, g, gart::footprint_of(bounds, g, c.position, alpha_min));
+      }
+    });
   }
   return all;
 }

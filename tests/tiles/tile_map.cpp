@@ -52,14 +52,15 @@ struct pass {
   // A device may contract the double arithmetic and so move a bound that lies on a pixel's edge.
   static void check_boxes(gart::gaussian_model const& model, gart::camera const& view, float near,
                           std::vector<gart::footprint_slots> const& ranges, std::vector<float> const& depths) {
-    gart::camera_footprint const project(view, near);
     u32 const n = static_cast<u32>(model.size());
     gart::gaussians_view<float const> const all{model.mean.data(),    model.log_scale.data(), model.quaternion.data(),
                                                 model.opacity.data(), model.sh.data(),        n,
                                                 model.sh_degree};
     std::size_t other = 0;
     for (u32 i = 0; i < n; ++i) {
-      gart::footprint const f = project(gart::load_parameters(all, i), view.position, alpha_min);
+      gart::footprint const f = gart::visit_camera(view, [&](auto const& model) {
+        return gart::footprint_of(model.bounds(near), gart::load_parameters(all, i), view.position, alpha_min);
+      });
       other += !same(f.box, ranges[i].box) || std::fabs(f.depth - depths[i]) > 1e-5f * std::fabs(f.depth);
     }
     CHECK(other <= (E::device ? model.size() / 200 : 0));
@@ -117,10 +118,13 @@ struct pass {
     for (u32 i = 0; i < n; ++i)
       gaussians.push_back(gart::prepare(gart::load_parameters(all, i), view.position, alpha_min));
     records.assign(gaussians);
-    gart::buffer<gart::lens_shift, E> shifts(exec);
-    shifts.resize(grid.count());
-    gart::parallel_for(exec, "lens", grid.count(), gart::lens_shifts<Size>{view, grid, shifts});
-    map.build(exec, grid, prints, gart::depth_order(prints.depths().data(), records.data(), view, shifts.data()));
+    gart::camera_rays<E> rays(exec);
+    rays.cast(exec, view);
+    gart::depth_orders<E, Size> orders(exec);
+    gart::visit_camera(view, [&](auto const& model) {
+      map.build(exec, grid, prints, orders.of(exec, model, rays.view(), prints.depths().data(), records.data()));
+    });
+    gart::ray_depth const depth = gart::visit_camera(view, [](auto const& model) { return model.depth(); });
     gart::tile_map_view const made = map.view();
     auto const offsets = host_copy(exec, made.offsets);
     auto const primitives = host_copy(exec, made.primitives);
@@ -142,9 +146,9 @@ struct pass {
             gart::ray_peak const r = gart::evaluate(gaussians[i], gart::primary_ray{d});
             if (!gart::is_hit(gaussians[i], r, near)) continue;
             ++hits;
-            float const cosine = glm::dot(d, view.rotation[2]) * 1.000002f;  // as the tracer bounds z
-            if (!(r.t * cosine >= on_host.depth(k)))
-              FAIL_CHECK("a hit of Gaussian " << i << " at " << r.t * cosine << " before " << on_host.depth(k));
+            float const of_hit = r.t * depth.per_distance(d);
+            if (!(of_hit >= on_host.depth(k)))
+              FAIL_CHECK("a hit of Gaussian " << i << " at " << of_hit << " before " << on_host.depth(k));
           }
       }
     CAPTURE(hits);

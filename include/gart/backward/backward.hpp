@@ -49,7 +49,7 @@ class backward_pass {
     if constexpr (records) {
       using tracer_type = typename Frame::tracer_type;
       execution_type& exec = frame.exec();
-      camera const& view = frame.view();
+      auto const& view = frame.view();
       grid_ = {view.width, view.height};
       if constexpr (tracer_type::lends_footprints) {
         static_assert(footprint_tracer<tracer_type, execution_type>);
@@ -124,7 +124,7 @@ class backward_pass {
     require(frame, rendered, "differentiate: call backward_pass.render first, after frame.prepare");
     execution_type& exec = frame.exec();
     gaussians_view<float const> const scene = frame.scene();
-    camera const& view = frame.view();
+    auto const& view = frame.view();
     std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
     if (!color_) throw invalid_argument("differentiate needs the image's colour: give backward_pass.render its target");
     if (color_gradient.size() != 3 * pixels)
@@ -152,7 +152,7 @@ class backward_pass {
       frame.trace("backward/scatter", order.launch_size(),
                   scatter_program<sh_degree, response, typename Strategy::scatter, execution_type>{
                       {},
-                      view,
+                      frame.rays(),
                       order,
                       scene.sh,
                       frame.active_degree(),
@@ -170,7 +170,7 @@ class backward_pass {
                    backward_kernels::finish<Filter>{scene, frame.gaussians(), moments_, gradients.view(), filter});
     };
     if (frame.options().antialias > 0)
-      finish(pixel_filter(view, frame.options().antialias));
+      visit_camera(view, [&](auto const& model) { finish(model.filter(frame.options().antialias)); });
     else
       finish(backward_kernels::no_filter{});
   }
@@ -180,7 +180,7 @@ class backward_pass {
     using kernel = gather_of<strategy_gather<execution_type, sh_degree, typename Frame::response, Strategy, tile_size>>;
     parallel_for(
         frame.exec(), "backward/gather", tile_range{grid_.count(), kernel::block_size},
-        kernel{frame.view(), grid_, lists_, prints_->ranges().data(), slots_.data(), frame.gaussians().data(),
+        kernel{frame.rays(), grid_, lists_, prints_->ranges().data(), slots_.data(), frame.gaussians().data(),
                frame.active_degree(), color_, color_gradient.data(), error.data(), gradients.sh.data(), moments_.data(),
                prints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near});
   }

@@ -4,15 +4,15 @@
 
 #include <gart/core/span.hpp>
 #include <gart/math/hit_gradient.hpp>
+#include <gart/math/widened.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/scene/parameters.hpp>
-#include <gart/scene/pixel_filter.hpp>
 
 namespace gart::inline GART_ISA {
 
 namespace backward_kernels {
 
-// Filter: no_filter, or the pixel_filter that the Gaussians were made through; `scene` is the stored one.
+// Filter: no_filter, or the camera model's that the Gaussians were made through; `scene` is the stored one.
 struct no_filter {};
 
 template <class Filter>

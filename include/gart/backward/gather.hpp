@@ -51,7 +51,7 @@ struct gather_kernel {
     pixel_data pixels[grid_type::pixels];
   };
 
-  camera view;
+  pixel_rays rays;
   grid_type grid;
   tile_map_view map;
   footprint_slots const* ranges = nullptr;
@@ -127,8 +127,8 @@ struct gather_kernel {
   }
 
   GART_HD void load_pixel(pixel_data& out, pixel const& at) const {
-    std::size_t const a = 3 * (static_cast<std::size_t>(at.y) * view.width + at.x);
-    vec3 const d = pixel_ray(view, at).direction;
+    std::size_t const a = 3 * (static_cast<std::size_t>(at.y) * rays.view.width + at.x);
+    vec3 const d = pixel_ray(rays, at).direction;
     vec3 const c(color[a], color[a + 1], color[a + 2]);
     vec3 const g(color_gradient[a], color_gradient[a + 1], color_gradient[a + 2]);
     out.direction_total = {{d.x, d.y, d.z, c.x * g.x + c.y * g.y + c.z * g.z}};

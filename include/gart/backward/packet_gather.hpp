@@ -62,11 +62,11 @@ struct packet_gather {
  private:
   // Pixels beyond the image are given the gradient zero and no hit.
   void load(packet_data& out, pixel_box const& area, packet_block const& block) const {
-    out.x = block.x % Size, out.y = block.y % Size, out.direction = pixel_directions(gather.view, block);
+    out.x = block.x % Size, out.y = block.y % Size, out.direction = pixel_directions(gather.rays, block);
     for (int l = 0; l < lane_count; ++l) {
       pixel const at{block.x + packet_block::column(l), block.y + packet_block::row(l)};
       bool const inside = at.x < area.x1 && at.y < area.y1;
-      std::size_t const a = static_cast<std::size_t>(at.y) * gather.view.width + at.x;
+      std::size_t const a = static_cast<std::size_t>(at.y) * gather.rays.view.width + at.x;
       float total = 0;
       for (int k = 0; k < 3; ++k) {
         float const g = inside ? gather.color_gradient[3 * a + k] : 0.0f;

@@ -25,7 +25,7 @@ struct scatter_program : ray_program_base {
     u32 left;  // hits until the cap; from 0, no cap, it counts down past it
   };
 
-  camera view;
+  pixel_rays rays;
   pixel_order order;
   float const* sh = nullptr;
   int active_degree = ShDegree;
@@ -43,7 +43,7 @@ struct scatter_program : ray_program_base {
   GART_HD state begin(index_t i) const {
     state s;
     pixel const at = order.at(i);
-    s.direction = pixel_ray(view, at).direction;
+    s.direction = pixel_ray(rays, at).direction;
     s.basis = sh_basis<ShDegree>(s.direction);
     float const* c = color + 3 * order.address(at);
     float const* g = color_gradient + 3 * order.address(at);

@@ -1,6 +1,6 @@
 #pragma once
-// Where on the image a Gaussian can be hit: the perspective-correct bounds of its ellipsoid |p|^2 <= cutoff, for a
-// pinhole.
+// Where on the image a Gaussian can be hit: its ellipsoid |p|^2 <= cutoff, which the bounds of a camera are of
+// (camera/model.hpp), and the perspective-correct bounds of one for a pinhole.
 //
 // In camera space the ellipsoid is m + A s, |s| <= 1, A = c W R S with c^2 the cutoff and rows A_x, A_y, A_z. Planes
 // x = u z through the camera touch it where (m_x - u m_z)^2 = |A_x - u A_z|^2, a quadratic in u: the roots are the
@@ -29,8 +29,53 @@ struct pixel_box {
 
 struct footprint {
   pixel_box box;
-  float depth = 0;  // no hit has a smaller z in camera space: conservative near depth
+  float depth = 0;  // no hit has a smaller one, along what its camera measures depth: conservative near depth
 };
+
+// How far float arithmetic may move a hit, by the distance: 32 roundings.
+inline constexpr double rounding_of_hits = 4e-6;
+
+// m + A s, |s| <= 1, in world axes; m relative to the camera's centre.
+struct ellipsoid {
+  vec3d center;
+  mat3d axes;
+};
+
+// Where the Gaussian can be hit: A = c R S, c^2 the cutoff. False where nowhere.
+template <class Response = generalized_gaussian<>>
+GART_HD inline bool ellipsoid_of(gaussian_parameters const& g, vec3d const& frame, float alpha_min, ellipsoid& out) {
+  float const cutoff = hit_cutoff<Response>(g, alpha_min);
+  if (cutoff < 0) return false;
+  mat3 const rotation = to_matrix(g.rotation);
+  vec3 const scale = scale_of(g);
+  double const c = sqrt(static_cast<double>(cutoff));
+  for (int k = 0; k < 3; ++k) out.axes[k] = vec3d(rotation[k]) * (c * static_cast<double>(scale[k]));
+  out.center = vec3d(g.mean) - frame;
+  return true;
+}
+
+// By the bounds of a camera model.
+template <class Response = generalized_gaussian<>, class Bounds>
+GART_HD inline footprint footprint_of(Bounds const& bounds, gaussian_parameters const& g, vec3d const& frame,
+                                      float alpha_min) {
+  ellipsoid e;
+  return ellipsoid_of<Response>(g, frame, alpha_min, e) ? bounds(e) : footprint{};
+}
+
+// No hit at t > near is nearer to the camera's centre: the ellipsoid lies beyond the plane across its own direction.
+GART_HD inline float least_distance(ellipsoid const& e, float near) {
+  vec3d const& m = e.center;
+  double const distance = sqrt(m.x * m.x + m.y * m.y + m.z * m.z);
+  double half2 = 0, reach = 0;
+  for (int k = 0; k < 3; ++k) {
+    vec3d const& a = e.axes[k];
+    double const along = a.x * m.x + a.y * m.y + a.z * m.z;
+    half2 += along * along;
+    reach += fabs(m[k]) + fabs(a.x) + fabs(a.y) + fabs(a.z);
+  }
+  double const least = distance > 0 ? distance - sqrt(half2) / distance - rounding_of_hits * reach : 0;
+  return static_cast<float>((least > near ? least : near) * (1 - 1e-6));
+}
 
 // The pinhole a footprint is for.
 struct footprint_view {
@@ -104,16 +149,17 @@ struct slope_box {
   bool visible = false;
 };
 
-// `center` and `axes` (columns c R S) in world axes relative to the camera. Sets the footprint's depth only.
-GART_HD inline footprint project(footprint_view const& v, vec3d const& center, mat3d const& axes, slope_box& s) {
+// Sets the footprint's depth only.
+GART_HD inline footprint project(footprint_view const& v, ellipsoid const& e, slope_box& s) {
   footprint out;
+  vec3d const& center = e.center;
   vec3d const m = v.to_camera * center;
-  mat3d const a = v.to_camera * axes;
+  mat3d const a = v.to_camera * e.axes;
   vec3d const ax(a[0][0], a[1][0], a[2][0]), ay(a[0][1], a[1][1], a[2][1]), az(a[0][2], a[1][2], a[2][2]);
   double const depth = sqrt(az.x * az.x + az.y * az.y + az.z * az.z);
   double const reach = fabs(center.x) + fabs(center.y) + fabs(center.z) + depth +
                        sqrt(ax.x * ax.x + ax.y * ax.y + ax.z * ax.z) + sqrt(ay.x * ay.x + ay.y * ay.y + ay.z * ay.z);
-  double const error = 4e-6 * reach;
+  double const error = rounding_of_hits * reach;
   if (!(m.z + depth + error >= v.near)) return out;
   double const nearest = m.z - depth - error > v.near ? m.z - depth - error : v.near;
   s.u = detail::slope_bounds(m.x, ax, m.z, az, v.near);
@@ -122,19 +168,6 @@ GART_HD inline footprint project(footprint_view const& v, vec3d const& center, m
   s.visible = true;
   out.depth = static_cast<float>(nearest * (1 - 1e-6));
   return out;
-}
-
-template <class Response = generalized_gaussian<>>
-GART_HD inline footprint gaussian_slopes(footprint_view const& v, gaussian_parameters const& g, vec3d const& frame,
-                                         float alpha_min, slope_box& s) {
-  float const cutoff = hit_cutoff<Response>(g, alpha_min);
-  if (cutoff < 0) return {};
-  mat3 const rotation = to_matrix(g.rotation);
-  vec3 const scale = scale_of(g);
-  double const c = sqrt(static_cast<double>(cutoff));
-  mat3d axes;
-  for (int k = 0; k < 3; ++k) axes[k] = vec3d(rotation[k]) * (c * static_cast<double>(scale[k]));
-  return project(v, vec3d(g.mean) - frame, axes, s);
 }
 
 GART_HD inline pixel_box pixels_of(footprint_view const& v, slope_box const& s) {

@@ -1,11 +1,12 @@
 #pragma once
-// How near a camera's rays can hit a Gaussian where they pass through a rectangle of the image: a lower bound of z over
-// all slopes (u, v) = (x / z, y / z) of the rectangle.
+// How near rays from one point can hit a Gaussian where they pass through a parallelogram of a plane: of all points
+// d = u x + v y + z of it, u and v of a rectangle, a lower bound of the factor by which the ray reaches the hit from d.
+// For the axes x, y, z of a camera u and v are slopes, and the factor is the hit's depth in camera space.
 //
-// With rows m_k of M in the camera's axes and d = (u, v, 1), the depth of the largest response is
-//   z = N / Q,  N = -sum_k o_k (m_k . d),  Q = sum_k (m_k . d)^2.
-// N is linear in the slopes and Q convex, so {N >= c Q} is convex for c >= 0: z is quasi-concave where it is positive,
-// and its least value over a rectangle lies at a corner. What rounding can move z, at a corner or at a hit, is taken
+// With rows m_k of M the factor at the largest response is
+//   N / Q,  N = -sum_k o_k (m_k . d),  Q = sum_k (m_k . d)^2.
+// N is linear in u and v and Q convex, so {N >= c Q} is convex for c >= 0: N / Q is quasi-concave where it is positive,
+// and its least value over a rectangle lies at a corner. What rounding can move it, at a corner or at a hit, is taken
 // off N and added to |m_k . d| in a way that leaves the one linear and the other convex: the bound holds for every ray.
 
 #include <gart/math/ray_gaussian.hpp>
@@ -15,20 +16,20 @@ namespace gart::inline GART_ISA {
 class rectangle_depth {
  public:
   rectangle_depth() = default;
-  // `g`: relative to the camera's centre. rotation: its columns are the camera's axes. reach: at least 1 + |u| + |v| of
-  // every slope asked for.
-  GART_HD rectangle_depth(ray_gaussian const& g, mat3 const& rotation, float reach) {
+  // `g`: relative to the point. plane: its columns are x, y and z. reach: at least |u| |x| + |v| |y| + |z| of every
+  // point asked for.
+  GART_HD rectangle_depth(ray_gaussian const& g, mat3 const& plane, float reach) {
     loss_ = 0;
     for (int k = 0; k < 3; ++k) {
       vec3 const m(g.m[k].x, g.m[k].y, g.m[k].z);
-      for (int j = 0; j < 3; ++j) m_[k][j] = m.x * rotation[j].x + m.y * rotation[j].y + m.z * rotation[j].z;
+      for (int j = 0; j < 3; ++j) m_[k][j] = m.x * plane[j].x + m.y * plane[j].y + m.z * plane[j].z;
       o_[k] = g.m[k].o;
       error_[k] = rounding * reach * (fabsf(m.x) + fabsf(m.y) + fabsf(m.z));
       loss_ += fabsf(o_[k]) * error_[k];
     }
   }
 
-  // At most the z of any hit with slopes in [u0, u1] x [v0, v1]; not positive, or NaN, where it says nothing.
+  // At most the factor of any hit through [u0, u1] x [v0, v1]; not positive, or NaN, where it says nothing.
   GART_HD GART_INLINE float operator()(float u0, float u1, float v0, float v1) const {
     float const a = at(u0, v0), b = at(u1, v0), c = at(u0, v1), d = at(u1, v1);
     float const ab = b < a ? b : a, cd = d < c ? d : c;

@@ -54,7 +54,7 @@ struct composite : ray_program_base {
     sh_basis<ShDegree> basis;
   };
 
-  camera view;
+  pixel_rays rays;
   pixel_order order;
   float const* sh = nullptr;
   int active_degree = ShDegree;
@@ -67,7 +67,7 @@ struct composite : ray_program_base {
   GART_HD state begin(index_t i) const {
     state s;
     s.at = order.at(i);
-    s.direction = pixel_ray(view, s.at).direction;
+    s.direction = pixel_ray(rays, s.at).direction;
     s.basis = sh_basis<ShDegree>(s.direction);
     return s;
   }

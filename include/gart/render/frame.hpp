@@ -18,6 +18,7 @@
 #include <gart/scene/traits.hpp>
 #include <gart/trace/tracer.hpp>
 
+#include <optional>
 #include <string>
 
 namespace gart::inline GART_ISA {
@@ -37,7 +38,8 @@ struct prepare_gaussians {
 
 }  // namespace render_kernels
 
-template <execution E, scene_requirements Traits, class Tracer>
+// View: a camera, or a model of a program's own (camera/model.hpp).
+template <execution E, scene_requirements Traits, class Tracer, class View = camera>
 requires tracer<Tracer, E>
 class frame {
  public:
@@ -52,13 +54,14 @@ class frame {
   explicit frame(E& exec) : exec_(&exec), filter_(exec), gaussians_(exec), tracer_(exec) {}
 
   // The scene's coefficients are of Traits::sh_degree; bands above active_degree are not evaluated.
-  void prepare(gaussians_view<float const> scene, camera const& view, render_options const& options = {},
+  void prepare(gaussians_view<float const> scene, View const& view, render_options const& options = {},
                int active_degree = sh_degree) {
     prepared_ = false;
     if (scene.sh_degree != sh_degree) throw invalid_argument("frame.prepare: the scene has another SH degree");
     require_camera(view);
     require_options(options);
-    scene_ = scene, view_ = view, options_ = options, active_degree_ = active_degree;
+    scene_ = scene, options_ = options, active_degree_ = active_degree;
+    view_.emplace(view);
     seen_ = filter_.of(*exec_, scene, view, options.antialias);
     gaussians_.resize(scene.count);
     parallel_for(
@@ -73,10 +76,11 @@ class frame {
   // The forward pass. `record` takes what a backward pass wants to find of each hit.
   template <hit_record Record = record_none>
   void render(image_targets const& targets, Record const& record = {}) {
+    if constexpr (camera_model<View>) static_assert(central_camera<View>, "images need a camera with one centre");
     require_prepared("render");
-    pixel_order const order{view_.width, view_.height};
+    pixel_order const order{view_->width, view_->height};
     trace("forward", order.launch_size(),
-          composite<sh_degree, Record>{{}, view_, order, scene_.sh, active_degree_, options_, targets, record});
+          composite<sh_degree, Record>{{}, rays(), order, scene_.sh, active_degree_, options_, targets, record});
   }
 
   // Any other rays through the Gaussians; tracers by tiles take pixel programs alone.
@@ -89,9 +93,10 @@ class frame {
   // As they were prepared: throw where nothing was.
   gaussians_view<float const> scene() const { return require_prepared("scene"), scene_; }
   gaussians_view<float const> seen() const { return require_prepared("seen"), seen_; }  // through the pixels' filter
-  camera const& view() const { return require_prepared("view"), view_; }
+  View const& view() const { return require_prepared("view"), *view_; }
   render_options const& options() const { return require_prepared("options"), options_; }
   int active_degree() const { return require_prepared("active_degree"), active_degree_; }
+  pixel_rays rays() const { return require_prepared("rays"), tracer_.rays(); }  // of the view's pixels
   span<ray_gaussian const> gaussians() const { return gaussians_; }
   Tracer const& tracer() const { return tracer_; }
   E& exec() const { return *exec_; }
@@ -108,7 +113,7 @@ class frame {
   buffer<ray_gaussian, E> gaussians_;
   Tracer tracer_;
   gaussians_view<float const> scene_, seen_;
-  camera view_;
+  std::optional<View> view_;
   render_options options_;
   int active_degree_ = sh_degree;
   bool prepared_ = false;

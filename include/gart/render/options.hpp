@@ -15,7 +15,7 @@ struct approximation_options {
   float alpha_min = 1.0f / 255.0f;  // a Gaussian is hit where sigma * rho >= alpha_min
   float transmittance_min = 1e-4f;  // a ray ends after the hit that brings T below this
   u32 max_hits = 0;                 // a ray ends after so many hits composited; 0: no cap
-  float antialias = 0;  // standard deviation of the pixels' filter, in pixels (scene/pixel_filter.hpp); 0: none
+  float antialias = 0;              // standard deviation of the pixels' filter, in pixels (camera/model.hpp); 0: none
   // The BVH tracer builds its tree every so many views, else refits it: exact. Another tracer has no tree: sessions and
   // renderers refuse what is not 1 there.
   int rebuild_every = 1;

@@ -34,7 +34,7 @@ struct packet_composite {
       inside |= (program.order.inside(pixel_of(block, l)) ? 1u : 0u) << l;
     }
     s.inside = lanes_of(inside);
-    s.directions = pixel_directions(program.view, block);
+    s.directions = pixel_directions(program.rays, block);
     s.basis = sh_basis<ShDegree, lanes>(s.directions);
     return s;
   }

@@ -4,27 +4,27 @@
 // read of two totals by the host, from which buffers are sized.
 
 #include <gart/algorithm/exclusive_scan.hpp>
+#include <gart/camera/models.hpp>
 #include <gart/exec/stage.hpp>
-#include <gart/scene/camera.hpp>
 #include <gart/scene/parameters.hpp>
-#include <gart/tiles/camera_footprint.hpp>
 #include <gart/tiles/footprint_slots.hpp>
 
 namespace gart::inline GART_ISA {
 
 namespace tile_kernels {
 
-template <class Response, int Size>
+// Bounds: of a camera model.
+template <class Response, int Size, class Bounds>
 struct measure {
   gaussians_view<float const> scene;
-  camera_footprint view;
+  Bounds bounds;
   vec3d frame;
   float alpha_min;
   span<footprint_slots> ranges;
   span<float> depths;
   span<u32> areas, tiles;
   GART_KERNEL void operator()(index_t i) const {
-    footprint const f = view.template operator()<Response>(load_parameters(scene, i), frame, alpha_min);
+    footprint const f = footprint_of<Response>(bounds, load_parameters(scene, i), frame, alpha_min);
     ranges[i].box = f.box;
     depths[i] = f.depth;
     areas[i] = f.box.area();
@@ -52,8 +52,11 @@ class footprints {
         pair_offsets_(exec),
         totals_(exec, 2) {}
 
-  template <class Response = generalized_gaussian<>>
-  void measure(E& exec, gaussians_view<float const> scene, camera const& view, float alpha_min, float near) {
+  // View: a camera or a camera model. invalid_argument for one that no ray can be cast by, or a near distance that is
+  // not positive.
+  template <class Response = generalized_gaussian<>, class View>
+  void measure(E& exec, gaussians_view<float const> scene, View const& view, float alpha_min, float near) {
+    require_camera(view);
     index_t const n = scene.count;
     ranges_.resize(n), depths_.resize(n), areas_.resize(n), tiles_.resize(n), area_offsets_.resize(n),
         pair_offsets_.resize(n);
@@ -63,9 +66,12 @@ class footprints {
     }
     {
       stage_scope stage(exec, "footprint");
-      parallel_for(exec, "footprint/measure", n,
-                   tile_kernels::measure<Response, Size>{scene, camera_footprint(view, near), view.position, alpha_min,
-                                                         ranges_, depths_, areas_, tiles_});
+      visit_camera(view, [&](auto const& model) {
+        auto const bounds = model.bounds(near);
+        parallel_for(exec, "footprint/measure", n,
+                     tile_kernels::measure<Response, Size, std::remove_const_t<decltype(bounds)>>{
+                         scene, bounds, model.position, alpha_min, ranges_, depths_, areas_, tiles_});
+      });
     }
     stage_scope stage(exec, "scan");
     exclusive_scan(exec, span<u32 const>(areas_), area_offsets_.view(), totals_.view().subspan(0, 1));

@@ -5,10 +5,10 @@
 //   shift()           of a depth, how many low bits keys leave out; 0 where they hold none
 //   key(p, cell, tile)  of the pair whose pixels are `cell`, the primitive's box cut by the tile of this number
 
+#include <gart/camera/models.hpp>
 #include <gart/math/rectangle_depth.hpp>
-#include <gart/scene/camera.hpp>
 #include <gart/tiles/grid.hpp>
-#include <gart/tiles/lens_shifts.hpp>
+#include <gart/tiles/tile_planes.hpp>
 
 #include <concepts>
 #include <type_traits>
@@ -29,29 +29,41 @@ concept tile_order = std::is_trivially_copyable_v<O> &&
 GART_HD GART_INLINE u32 depth_key(float depth, int shift) { return float_to_bits(depth) >> shift; }
 GART_HD GART_INLINE float near_depth(u32 key, int shift) { return bits_to_float(key << shift); }
 
-// By how near the pair's pixels can hit the primitive: what the tile-list tracer reads. No hit of the pair has a
-// smaller z than its key stands for.
-class depth_order {
- public:
-  // depths: near depth of each primitive, anywhere. gaussians: null where that is all there is to go by; else the depth
-  // is bounded in each tile (math/rectangle_depth.hpp), for a camera with a lens if its tiles' shifts are given.
-  depth_order(float const* depths, ray_gaussian const* gaussians, camera const& view,
-              lens_shift const* shifts = nullptr)
-      : depths_(depths),
-        gaussians_(view.lens.any() && !shifts ? nullptr : gaussians),
-        shifts_(view.lens.any() ? shifts : nullptr),
-        rotation_(view.rotation) {
-    to_u_ = 1 / view.fx, to_v_ = 1 / view.fy, cx_ = view.cx, cy_ = view.cy;
-    float const u = std::fmax(std::fabs(view.cx), std::fabs(static_cast<float>(view.width) - view.cx)) * to_u_;
-    float const v = std::fmax(std::fabs(view.cy), std::fabs(static_cast<float>(view.height) - view.cy)) * to_v_;
-    reach_ = 1.01f + (shifts_ ? 2 : 1) * (u + v);
-  }
+namespace detail {
 
+// A key in as many bits as are free.
+class depth_bits {
+ public:
   int take(int free_bits) {
     shift_ = 31 - free_bits > 0 ? 31 - free_bits : 0;  // 31: a depth's sign bit is never set
     return free_bits;
   }
   int shift() const { return shift_; }
+
+ protected:
+  // The larger of two bounds, the first of which may say nothing.
+  GART_HD GART_INLINE u32 key_of(float bound, float anywhere) const {
+    return depth_key(bound > anywhere && bound <= 3.402823466e38f ? bound : anywhere, shift_);
+  }
+  int shift_ = 0;
+};
+
+}  // namespace detail
+
+// By how near the pair's pixels can hit the primitive: what the tile-list tracer reads. No hit of the pair has a
+// smaller depth, as the camera measures it, than its key stands for. This one is a pinhole's, whose rays all lie on one
+// plane's grid; others are of any_depth_order.
+class depth_order : public detail::depth_bits {
+ public:
+  // depths: of each primitive, anywhere. gaussians: null where that is all there is to go by; else the depth is bounded
+  // in each tile (math/rectangle_depth.hpp).
+  depth_order(float const* depths, ray_gaussian const* gaussians, pinhole const& view)
+      : depths_(depths), gaussians_(gaussians), rotation_(view.rotation) {
+    to_u_ = 1 / view.fx, to_v_ = 1 / view.fy, cx_ = view.cx, cy_ = view.cy;
+    float const u = std::fmax(std::fabs(view.cx), std::fabs(static_cast<float>(view.width) - view.cx)) * to_u_;
+    float const v = std::fmax(std::fabs(view.cy), std::fabs(static_cast<float>(view.height) - view.cy)) * to_v_;
+    reach_ = 1.01f + u + v;
+  }
 
   struct primitive {
     rectangle_depth in;
@@ -60,30 +72,75 @@ class depth_order {
   GART_HD primitive of(index_t i) const {
     return {rectangle_depth(gaussians_ ? gaussians_[i] : ray_gaussian{}, rotation_, reach_), depths_[i]};
   }
-  GART_HD u32 key(primitive const& p, pixel_box const& cell, u32 tile) const {
-    u32 const anywhere = depth_key(p.depth, shift_);
-    if (!gaussians_) return anywhere;
-    // Rays go through the middle of pixels; a little more, for the rounding of directions.
-    constexpr float inset = 0.45f;
-    float u0 = (cell.x0 + inset - cx_) * to_u_, u1 = (cell.x1 - inset - cx_) * to_u_;
-    float v0 = (cell.y0 + inset - cy_) * to_v_, v1 = (cell.y1 - inset - cy_) * to_v_;
-    if (shifts_) {
-      lens_shift const s = shifts_[tile];
-      u0 += s.u - s.widening, u1 += s.u + s.widening, v0 += s.v - s.widening, v1 += s.v + s.widening;
-      float const u = fabsf(u0) > fabsf(u1) ? fabsf(u0) : fabsf(u1), v = fabsf(v0) > fabsf(v1) ? fabsf(v0) : fabsf(v1);
-      if (!(1 + u + v < reach_)) return anywhere;
-    }
-    float const z = p.in(u0, u1, v0, v1);
-    return z > p.depth && z <= 3.402823466e38f ? depth_key(z, shift_) : anywhere;
+  GART_HD u32 key(primitive const& p, pixel_box const& cell, u32 /*tile*/) const {
+    if (!gaussians_) return depth_key(p.depth, shift_);
+    constexpr float inset = tile_plane::inset;
+    float const u0 = (cell.x0 + inset - cx_) * to_u_, u1 = (cell.x1 - inset - cx_) * to_u_;
+    float const v0 = (cell.y0 + inset - cy_) * to_v_, v1 = (cell.y1 - inset - cy_) * to_v_;
+    return key_of(p.in(u0, u1, v0, v1), p.depth);
   }
 
  private:
   float const* depths_;
   ray_gaussian const* gaussians_;
-  lens_shift const* shifts_;
   mat3 rotation_;
   float to_u_, to_v_, cx_, cy_, reach_;
-  int shift_ = 0;
+};
+
+// The same for any camera, by distance along the ray: bounded by the tile's plane where there are planes.
+template <int Size>
+class any_depth_order : public detail::depth_bits {
+ public:
+  any_depth_order(float const* depths, ray_gaussian const* gaussians, tile_plane const* planes)
+      : depths_(depths), gaussians_(gaussians), planes_(planes) {}
+
+  struct primitive {
+    ray_gaussian gaussian;
+    float depth;
+  };
+  GART_HD primitive of(index_t i) const { return {planes_ ? gaussians_[i] : ray_gaussian{}, depths_[i]}; }
+  GART_HD u32 key(primitive const& p, pixel_box const& cell, u32 tile) const {
+    if (!planes_) return depth_key(p.depth, shift_);
+    tile_plane const plane = planes_[tile];
+    if (!(plane.reach > 0)) return depth_key(p.depth, shift_);
+    constexpr float inset = tile_plane::inset;
+    float const x0 = cell.x0 % Size + inset - plane.widen_x, x1 = (cell.x1 - 1) % Size + 1 - inset + plane.widen_x;
+    float const y0 = cell.y0 % Size + inset - plane.widen_y, y1 = (cell.y1 - 1) % Size + 1 - inset + plane.widen_y;
+    rectangle_depth const in(p.gaussian, mat3(plane.dx, plane.dy, plane.origin), plane.reach);
+    return key_of(in(x0, x1, y0, y1), p.depth);
+  }
+
+ private:
+  float const* depths_;
+  ray_gaussian const* gaussians_;
+  tile_plane const* planes_;
+};
+
+// The order that a camera's tile lists are sorted by.
+template <execution E, int Size>
+class depth_orders {
+ public:
+  explicit depth_orders(E& exec) : planes_(exec) {}
+
+  // rays: of the model, where they have one centre. The order is valid until the next call.
+  depth_order of(E&, pinhole const& model, pixel_rays const&, float const* depths, ray_gaussian const* gaussians) {
+    return {depths, gaussians, model};
+  }
+  template <camera_model M>
+  any_depth_order<Size> of(E& exec, M const& model, [[maybe_unused]] pixel_rays const& rays, float const* depths,
+                           ray_gaussian const* gaussians) {
+    if constexpr (central_camera<M>) {
+      tile_grid<Size> const grid{model.width, model.height};
+      planes_.resize(grid.count());
+      parallel_for(exec, "map/planes", grid.count(), tile_planes<Size>{rays, grid, planes_});
+      return {depths, gaussians, planes_.data()};
+    } else {
+      return {depths, gaussians, nullptr};
+    }
+  }
+
+ private:
+  buffer<tile_plane, E> planes_;
 };
 
 // By the primitives' numbers, in which the pairs come.

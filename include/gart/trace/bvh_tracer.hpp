@@ -4,7 +4,7 @@
 // changed and trace_options.rebuild_every says so.
 
 #include <gart/bvh/walk.hpp>
-#include <gart/scene/camera.hpp>
+#include <gart/camera/pixel_rays.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/scene/parameters.hpp>
 #include <gart/trace/k_buffer_visitor.hpp>
@@ -48,10 +48,13 @@ class bvh_tracer : public tracer_base {
   static constexpr char const* name = "bvh";
   static constexpr int window = 16;
 
-  explicit bvh_tracer(E& exec) : boxes_(exec), tree_(exec) { static_assert(tracer<bvh_tracer, E>); }
+  explicit bvh_tracer(E& exec) : rays_(exec), boxes_(exec), tree_(exec) { static_assert(tracer<bvh_tracer, E>); }
 
-  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, camera const& view,
+  // View: a camera or a camera model.
+  template <class View>
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, View const& view,
                trace_options const& options) {
+    rays_.cast(exec, view);
     boxes_.resize(scene.count);
     parallel_for(exec, "bvh/boxes", scene.count,
                  trace_kernels::bound_ellipsoids<Response>{scene, view.position, options.alpha_min, boxes_});
@@ -65,6 +68,9 @@ class bvh_tracer : public tracer_base {
     scene_ = {gaussians.data(), scene.count, options.near};
   }
 
+  // Of the view that it was prepared for.
+  pixel_rays rays() const { return rays_.view(); }
+
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
     parallel_for(exec, label, rays, trace_kernels::walk_rays<Response, window, P>{tree_.view(), scene_, program});
@@ -73,6 +79,7 @@ class bvh_tracer : public tracer_base {
   bvh<E> const& tree() const { return tree_; }
 
  private:
+  camera_rays<E> rays_;
   buffer<box, E> boxes_;
   bvh<E> tree_;
   traced_scene scene_;

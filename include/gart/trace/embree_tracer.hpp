@@ -71,10 +71,13 @@ class embree_tracer : public tracer_base {
   static constexpr char const* name = "embree";
   static constexpr int window = 16;
 
-  explicit embree_tracer(E& exec) : boxes_(exec) { static_assert(tracer<embree_tracer, E>); }
+  explicit embree_tracer(E& exec) : rays_(exec), boxes_(exec) { static_assert(tracer<embree_tracer, E>); }
 
-  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, camera const& view,
+  // View: a camera or a camera model.
+  template <class View>
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, View const& view,
                trace_options const& options) {
+    rays_.cast(exec, view);
     boxes_.resize(scene.count);
     parallel_for(exec, "embree/boxes", scene.count,
                  trace_kernels::bound_ellipsoids<Response>{scene, view.position, options.alpha_min, boxes_});
@@ -83,12 +86,16 @@ class embree_tracer : public tracer_base {
     scene_ = {gaussians.data(), scene.count, options.near};
   }
 
+  // Of the view that it was prepared for.
+  pixel_rays rays() const { return rays_.view(); }
+
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
     parallel_for(exec, label, rays, trace_kernels::embree_rays<Response, window, P>{&tree_, scene_, program});
   }
 
  private:
+  camera_rays<E> rays_;
   buffer<box, E> boxes_;
   embree_scene tree_;
   traced_scene scene_;

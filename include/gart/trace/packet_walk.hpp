@@ -7,6 +7,7 @@
 //
 // A packet that has more hits waiting than there are groups for says so, and its rays are traced one by one.
 
+#include <gart/camera/ray_depth.hpp>
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/tiles/tile_map.hpp>
 #include <gart/trace/packet_program.hpp>
@@ -29,11 +30,10 @@ class packet_walk {
 
   // False where more hits waited than there is room for; nothing then counts.
   bool operator()(P const& program, traced_scene const& scene, tile_map_view const& map, footprint_slots const* ranges,
-                  vec3 const& forward, u32 tile, packet_block block) {
+                  ray_depth const& depth, u32 tile, packet_block block) {
     auto state = program.begin(block);
     vec3_of<lanes> const& d = state.directions;
-    // z = t * cosine; rounded up, so that what is said to lie nearer than a depth does.
-    lanes const cosine = (d.x * lanes(forward.x) + d.y * lanes(forward.y) + d.z * lanes(forward.z)) * lanes(1.000002f);
+    lanes const depth_of_t = depth.per_distance(d);
     alive_ = state.inside, farthest_ = 0.0f, count_ = used_ = 0, free_ = sentinel;
     pool_[sentinel].nearer = pool_[sentinel].farther = sentinel;
     int const x = block.x % Size, y = block.y % Size;
@@ -48,13 +48,13 @@ class packet_walk {
           n += any(cells_[k].inside(x, y)) ? 1 : 0;
         }
         if (count_ >= pass_threshold) {
-          pass_on(program, state, cosine, bound);
+          pass_on(program, state, depth_of_t, bound);
           if (!any(alive_)) break;
         }
         if (!take(program, scene, state, d, n)) return false;
       }
     }
-    pass_on(program, state, cosine, no_bound);
+    pass_on(program, state, depth_of_t, no_bound);
     program.end(state);
     return true;
   }
@@ -160,7 +160,7 @@ class packet_walk {
 
   // Hits nearer than all that is left of the list go to the program.
   template <class State>
-  void pass_on(P const& program, State& state, lanes const& cosine, float bound) {
+  void pass_on(P const& program, State& state, lanes const& depth_of_t, float bound) {
     lane_mask stay = lanes_of(0);
     u16 last = sentinel, at = pool_[sentinel].farther;  // of those that stay; the next to look at
     for (;;) {
@@ -174,7 +174,7 @@ class packet_walk {
         lane_mask const rays = r.rays & alive_;
         lane_mask pass = rays;
         if (bound != no_bound) {
-          pass &= ~stay & (r.t * cosine < lanes(bound));
+          pass &= ~stay & (r.t * depth_of_t < lanes(bound));
           // A group goes as one, unless there is no room for more of them.
           if (any(rays & ~pass) && count_ < split_threshold) pass = lanes_of(0);
         }

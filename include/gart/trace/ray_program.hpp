@@ -37,7 +37,6 @@ concept ray_program = std::is_trivially_copyable_v<P> && requires(P const& p, in
 // A ray program whose rays are those of an image's pixels: what a tracer by tiles can follow.
 template <class P>
 concept pixel_program = ray_program<P> && requires(P const& p, index_t i) {
-  requires std::same_as<typename P::ray_type, primary_ray>;
   { p.at(i) } -> std::same_as<pixel>;                      // of ray i
   { p.order } -> std::convertible_to<pixel_order const&>;  // ray i is the i-th in it
 };

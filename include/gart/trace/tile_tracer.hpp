@@ -1,5 +1,5 @@
 #pragma once
-// The traverser on tile lists, for the primary rays of a camera: no tree. A tile's list holds every Gaussian that any
+// The traverser on tile lists, for the rays of a camera's pixels: no tree. A tile's list holds every Gaussian that any
 // of its pixels can hit, sorted by how near it can be hit there (tiles/tile_order.hpp). A pixel walks the list and
 // keeps the hits found in a small window sorted by (t, id); the first of them is next as soon as it lies nearer than
 // all that is left of the list can. When the window overflows its nearest are kept, and the ray resumes strictly after
@@ -13,7 +13,6 @@
 // It traces pixel programs (trace/ray_program.hpp). Cost: the footprints, one sort of the (primitive, tile) pairs, and
 // a walk of each tile's list up to where its rays end.
 
-#include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/tiles/tile_map.hpp>
 #include <gart/trace/hit_ring.hpp>
@@ -34,7 +33,7 @@ struct walk_tiles {
   tile_grid<Size> grid;
   tile_map_view map;
   traced_scene scene;
-  vec3 forward;  // the camera's axis
+  ray_depth depth;  // that lists are sorted by
   P program;
 
   GART_KERNEL void operator()(index_t i) const {
@@ -47,11 +46,9 @@ struct walk_tiles {
   }
 
  private:
-  template <class State>
-  GART_HD GART_INLINE void walk(State& state, primary_ray const& ray, u32 tile) const {
-    vec3 const& d = ray.direction;
-    // z = t * cosine; rounded up, so that what is said to lie nearer than a depth does.
-    float const cosine = (d.x * forward.x + d.y * forward.y + d.z * forward.z) * 1.000002f;
+  template <class State, class Ray>
+  GART_HD GART_INLINE void walk(State& state, Ray const& ray, u32 tile) const {
+    float const depth_of_t = depth.per_distance(ray.direction);
     u32 const end = map.offsets[tile + 1];
     u32 const* const list = map.primitives.data();
     auto const nearer = [list](pending_hit const& a, pending_hit const& b) {
@@ -78,9 +75,9 @@ struct walk_tiles {
         next = scene.gaussians[next_id];
         if ((k - first) % stride == 0) {
           float const bound = map.depth(k);  // of all that is left of the list
-          while (!pending.empty() && pending.front().t * cosine < bound)
+          while (!pending.empty() && pending.front().t * depth_of_t < bound)
             if (!pass_on()) return;
-          if (resume < end && pending.empty() && limit.t * cosine < bound) break;
+          if (resume < end && pending.empty() && limit.t * depth_of_t < bound) break;
         }
         ray_peak const r = evaluate<Response>(g, ray);
         if (!is_hit(g, r, scene.near) || !before(last_t, last_id, r.t, id)) continue;
@@ -118,8 +115,7 @@ struct walk_tile_packets {
     team.scratch().enter(tile);
     for (int y = tile.y0; y < tile.y1; y += packet_block::height)
       for (int x = tile.x0; x < tile.x1; x += packet_block::width)
-        if (!team.scratch()(program, rays.scene, rays.map, ranges, rays.forward, team.tile(), {x, y}))
-          one_by_one({x, y});
+        if (!team.scratch()(program, rays.scene, rays.map, ranges, rays.depth, team.tile(), {x, y})) one_by_one({x, y});
   }
 
  private:
@@ -146,23 +142,29 @@ class tile_tracer : public tracer_base {
   static constexpr bool lends_footprints = true;
   static constexpr int window = Window;
 
-  explicit tile_tracer(E& exec) : prints_(exec), map_(exec), shifts_(exec), next_(exec), spilled_(exec) {
+  explicit tile_tracer(E& exec) : rays_(exec), prints_(exec), map_(exec), orders_(exec), next_(exec), spilled_(exec) {
     static_assert(footprint_tracer<tile_tracer, E>);
   }
 
-  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, camera const& view,
+  // View: a camera or a camera model.
+  template <class View>
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, View const& view,
                trace_options const& options) {
-    grid_ = {view.width, view.height};
-    prints_.template measure<Response>(exec, scene, view, options.alpha_min, options.near);
-    if (view.lens.any()) {
-      shifts_.resize(grid_.count());
-      parallel_for(exec, "map/lens", grid_.count(), lens_shifts<Size>{view, grid_, shifts_});
-    }
-    map_.build(exec, grid_, prints_, depth_order(prints_.depths().data(), gaussians.data(), view, shifts_.data()));
+    require_camera(view);
+    visit_camera(view, [&](auto const& model) {
+      grid_ = {model.width, model.height};
+      rays_.cast(exec, model);
+      depth_ = model.depth();
+      prints_.template measure<Response>(exec, scene, model, options.alpha_min, options.near);
+      map_.build(exec, grid_, prints_,
+                 orders_.of(exec, model, rays_.view(), prints_.depths().data(), gaussians.data()));
+    });
     if constexpr (E::device) map_.rank_tiles(exec);
     scene_ = {gaussians.data(), scene.count, options.near};
-    forward_ = view.rotation[2];
   }
+
+  // Of the view that it was prepared for.
+  pixel_rays rays() const { return rays_.view(); }
 
   template <pixel_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
@@ -176,11 +178,11 @@ class tile_tracer : public tracer_base {
       next_.zero();
       parallel_for(
           exec, label, tile_range{teams, walk::block_size},
-          walk{grid_, map_.view(), prints_.ranges().data(), scene_, forward_, program, next_.data(), spilled_.data()});
+          walk{grid_, map_.view(), prints_.ranges().data(), scene_, depth_, program, next_.data(), spilled_.data()});
       return;
     }
 #endif
-    trace_kernels::walk_tiles<Response, Window, Size, P> const walk{grid_, map_.view(), scene_, forward_, program};
+    trace_kernels::walk_tiles<Response, Window, Size, P> const walk{grid_, map_.view(), scene_, depth_, program};
 #if !defined(__CUDACC__)
     if constexpr (!E::device && P::has_packets) {
       parallel_for(exec, label, tile_range{grid_.count(), 1},
@@ -196,13 +198,14 @@ class tile_tracer : public tracer_base {
 
  private:
   tile_grid<Size> grid_;
+  camera_rays<E> rays_;
   footprints<E, Size> prints_;
   tile_map<E, Size> map_;
-  buffer<lens_shift, E> shifts_;
+  depth_orders<E, Size> orders_;
   buffer<u32, E> next_;  // of the device's walk (trace/warp_walk.hpp)
   buffer<float, E> spilled_;
   traced_scene scene_;
-  vec3 forward_{0, 0, 1};
+  ray_depth depth_;
 };
 
 }  // namespace gart::inline GART_ISA

@@ -6,8 +6,8 @@
 // A tracer derives from tracer_base and is held to the concept where it is defined. render/frame.hpp has one, and calls
 // it in the right order.
 
+#include <gart/camera/pixel_rays.hpp>
 #include <gart/exec/concepts.hpp>
-#include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/tiles/tile_map.hpp>
 #include <gart/trace/ray_program.hpp>
@@ -54,14 +54,16 @@ static_assert(pixel_program<no_rays>);
 
 template <class T, class E>
 concept tracer = execution<E> && std::constructible_from<T, E&> &&
-    requires(T& t, E& e, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, camera const& view,
-             trace_options const& options, trace_kernels::no_rays const& program) {
+    requires(T& t, T const& prepared, E& e, gaussians_view<float const> scene, span<ray_gaussian const> gaussians,
+             camera const& view, trace_options const& options, trace_kernels::no_rays const& program) {
   typename T::response_type;                        // of the Gaussians whose hits it finds (math/response.hpp)
   { T::name } -> std::convertible_to<char const*>;  // "bvh", "tiles", ...
   { T::window } -> std::convertible_to<int>;        // hits of a ray that are kept at a time
-  // `gaussians` are those of `scene` in the view's frame. Both are read until the next prepare.
+  // `gaussians` are those of `scene` in the view's frame. Both are read until the next prepare. The view is a camera or
+  // a camera model (camera/model.hpp).
   t.prepare(e, scene, gaussians, view, options);
-  t.trace(e, "label", index_t{}, program);  // rays 0 to a number
+  { prepared.rays() } -> std::same_as<pixel_rays>;  // of the view's pixels
+  t.trace(e, "label", index_t{}, program);          // rays 0 to a number
   // From tracer_base:
   { T::tile_size } -> std::convertible_to<int>;
   { T::lends_footprints } -> std::convertible_to<bool>;

@@ -8,14 +8,15 @@
 
 namespace gart::inline GART_ISA {
 
-// The cell of a program whose hits have no places: a word, so that what lies beside it in shared memory is aligned as it
-// is beside others.
+// The cell of a program whose hits have no places: a word, so that what lies beside it in shared memory is aligned as
+// it is beside others.
 struct alignas(16) no_cell {};
 
 template <class P>
 concept warp_program = pixel_program<P> &&
     requires(P const& p, typename P::state& s, float const* row, vec3 const& shown, float x, u32 place) {
   requires P::has_warps;
+  requires std::same_as<typename P::ray_type, primary_ray>;
   { P::row_floats } -> std::convertible_to<int>;           // of a Gaussian's row
   { p.rows_from() } -> std::same_as<float const*>;         // where the rows of all Gaussians begin
   { p.row_floats_read() } -> std::convertible_to<int>;     // how many of them are to be read; the rest is zero

@@ -8,6 +8,7 @@
 // queue loses a hit the ray passes on what lies before it, and walks the list again, strictly after its last hit. The
 // queues take 5 KB of device memory for each ray that the device holds at a time: 298 MB on 132 multiprocessors.
 
+#include <gart/camera/ray_depth.hpp>
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/tiles/tile_map.hpp>
 #include <gart/trace/tracer.hpp>
@@ -38,7 +39,7 @@ class walk_tile_warps {
   tile_map_view map;
   footprint_slots const* ranges;
   traced_scene scene;
-  vec3 forward;  // the camera's axis
+  ray_depth depth;  // that lists are sorted by
   P program;
   u32* next = nullptr;       // part of a tile that is to be taken next, zero at first
   float* spilled = nullptr;  // [teams][spill_floats]
@@ -115,9 +116,7 @@ class walk_tile_warps {
       alive_ = k.program.order.inside(at_);
       state_ = k.program.begin(index_);
       ray_ = k.program.ray_of(index_, state_);
-      vec3 const& d = ray_.direction;
-      // z = t * cosine; rounded up, so that what is said to lie nearer than a depth does.
-      cosine_ = (d.x * k.forward.x + d.y * k.forward.y + d.z * k.forward.z) * 1.000002f;
+      depth_of_t_ = k.depth.per_distance(ray_.direction);
       last_t_ = k.scene.near;
       for (int w = lane_; w < 2 * group * row_words; w += lanes)
         s.staged[w / (group * row_words)][w / row_words % group].row[w % row_words] = {};
@@ -240,7 +239,7 @@ class walk_tile_warps {
             tried = true;
             float const depth = s_.depth[first + c];
             pass_on(depth);
-            if (!__any_sync(full_warp, alive_ && !(pending_.lost_t() * cosine_ <= depth))) return false;
+            if (!__any_sync(full_warp, alive_ && !(pending_.lost_t() * depth_of_t_ <= depth))) return false;
           }
           if (__any_sync(full_warp, hit && alive_ && pending_.full())) pending_.make_room();
         }
@@ -274,7 +273,7 @@ class walk_tile_warps {
     // Hits nearer than `depth`, which nothing that is left of the list comes before.
     __device__ GART_INLINE void pass_on(float depth) {
       if (!alive_) return;
-      pending_.pass_on(depth, cosine_, [this](waiting_hit const& h) {
+      pending_.pass_on(depth, depth_of_t_, [this](waiting_hit const& h) {
         last_t_ = h.t, last_key_ = h.key;
         return alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::places_hits ? h.key : 0);
       });
@@ -297,7 +296,7 @@ class walk_tile_warps {
     index_t index_;
     primary_ray ray_;
     typename P::state state_;
-    float cosine_;
+    float depth_of_t_;
     bool alive_;
     float last_t_;  // the last hit passed on: at first (near, none), t > near
     u32 last_key_ = no_key;

@@ -9,6 +9,7 @@ struct nothing : gart::tracer_base {
   explicit nothing(gart::serial_exec&) {}
   void prepare(gart::serial_exec&, gart::gaussians_view<float const>, gart::span<gart::ray_gaussian const>,
                gart::camera const&, gart::trace_options const&) {}
+  gart::pixel_rays rays() const { return {}; }
 #ifdef GART_WHOLE
   template <gart::ray_program P>
   void trace(gart::serial_exec&, char const*, gart::index_t, P const&) {}

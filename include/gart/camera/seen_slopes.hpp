@@ -1,8 +1,8 @@
 #pragma once
-// What a camera's image sees, in slopes x / z and y / z: the rectangle about it, by sampling the image's border. Host
-// side, in double.
+// What a camera's image sees, in slopes x / z and y / z: the rectangle about it, by sampling the image's border. For
+// models that project slopes to the image. Host side, in double.
 
-#include <gart/scene/camera.hpp>
+#include <gart/math/glm.hpp>
 
 #include <cmath>
 
@@ -13,18 +13,19 @@ struct seen_slopes {
   double least_cosine = 1;  // of a border pixel's ray with the camera's axis
 };
 
-inline seen_slopes slopes_seen(camera const& c) {
+// View: size, focal lengths and principal point. slopes_of: from an image point, in units of the focal length about the
+// principal point.
+template <class View, class F>
+seen_slopes slopes_seen(View const& c, F const& slopes_of) {
   seen_slopes out;
   constexpr int steps = 64;
-  // A loop: unrolled, a lens would take the registers of cameras without one.
-  GART_NO_UNROLL
   for (int k = 0; k <= steps; ++k) {
     double const s = static_cast<double>(k) / steps;
     double const border[4][2] = {
         {s * c.width, 0}, {s * c.width, 1.0 * c.height}, {0, s * c.height}, {1.0 * c.width, s * c.height}};
     for (auto const& b : border) {
-      vec2 p(static_cast<float>((b[0] - c.cx) / c.fx), static_cast<float>((b[1] - c.cy) / c.fy));
-      if (c.lens.any()) p = undistort(c.lens, p);
+      vec2 const p =
+          slopes_of(vec2(static_cast<float>((b[0] - c.cx) / c.fx), static_cast<float>((b[1] - c.cy) / c.fy)));
       out.x0 = p.x < out.x0 ? p.x : out.x0, out.x1 = p.x > out.x1 ? p.x : out.x1;
       out.y0 = p.y < out.y0 ? p.y : out.y0, out.y1 = p.y > out.y1 ? p.y : out.y1;
       double const cosine = 1 / std::sqrt(1.0 + double{p.x} * p.x + double{p.y} * p.y);
@@ -32,6 +33,11 @@ inline seen_slopes slopes_seen(camera const& c) {
     }
   }
   return out;
+}
+
+template <class View>
+seen_slopes slopes_seen(View const& c) {
+  return slopes_seen(c, [](vec2 const& p) { return p; });
 }
 
 }  // namespace gart::inline GART_ISA

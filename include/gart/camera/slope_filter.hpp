@@ -1,29 +1,46 @@
 #pragma once
-// The filter of a camera's pixels (render_options.antialias): a Gaussian whose standard deviation at a point is so many
-// pixels, as far as a pixel reaches there,
+// The filter of the pixels of a camera that projects slopes (render_options.antialias): a Gaussian whose standard
+// deviation at a point is so many pixels, as far as a pixel reaches there,
 //   r = pixels x angle of a pixel x distance,   angle = the square root of a pixel's solid angle,
-// which for slopes x, y through a lens of Jacobian J (scene/camera.hpp; 1 without one) is
+// which for slopes x, y through a lens of Jacobian J (1 without one) is
 //   angle^2 = (1 + x^2 + y^2)^-3/2 / (fx fy det J).
 // Means beside the image, and behind the camera, take the slopes of the image's nearest border. What widens a Gaussian
 // by r is math/widened.hpp. Fixed arithmetic where r is made: the same bits on every policy.
 
+#include <gart/camera/seen_slopes.hpp>
 #include <gart/math/widened.hpp>
-#include <gart/scene/parameters.hpp>
-#include <gart/scene/seen_slopes.hpp>
+
+#include <cmath>
 
 namespace gart::inline GART_ISA {
 
-class pixel_filter {
+// Of the image by the slopes, symmetric.
+struct lens_jacobian {
+  float xx = 1, xy = 0, yy = 1, det = 1;
+};
+
+// Lens: jacobian_at(x, y), and how its determinant changes there.
+struct no_lens {
+  GART_HD GART_INLINE lens_jacobian jacobian_at(float, float) const { return {}; }
+  GART_HD GART_INLINE vec2 slope_of_det(lens_jacobian const&, float, float) const { return {0, 0}; }
+};
+
+template <class Lens = no_lens>
+class slope_filter {
  public:
-  // Host side. invalid_argument for a camera that no ray can be cast by.
-  pixel_filter(camera const& c, float pixels)
-      : position_(c.position), right_(c.rotation[0]), down_(c.rotation[1]), forward_(c.rotation[2]), lens_(c.lens) {
-    require_camera(c);
-    size_ = static_cast<float>(pixels / std::sqrt(double{c.fx} * c.fy));
-    seen_slopes const s = slopes_seen(c);
-    x0_ = static_cast<float>(s.x0), x1_ = static_cast<float>(s.x1);
-    y0_ = static_cast<float>(s.y0), y1_ = static_cast<float>(s.y1);
-  }
+  // Host side. View: position, rotation, focal lengths.
+  template <class View>
+  slope_filter(View const& c, Lens const& lens, seen_slopes const& s, float pixels)
+      : position_(c.position),
+        right_(c.rotation[0]),
+        down_(c.rotation[1]),
+        forward_(c.rotation[2]),
+        lens_(lens),
+        size_(static_cast<float>(pixels / std::sqrt(double{c.fx} * c.fy))),
+        x0_(static_cast<float>(s.x0)),
+        x1_(static_cast<float>(s.x1)),
+        y0_(static_cast<float>(s.y0)),
+        y1_(static_cast<float>(s.y1)) {}
 
   GART_HD GART_INLINE vec3 from_camera(gaussian_parameters const& g) const { return relative_mean(g.mean, position_); }
 
@@ -36,7 +53,7 @@ class pixel_filter {
     filter_at out{p.sigma, square > 0 ? m / square : vec3(0.0f)};
     float by_x = -1.5f * p.x / p.l2, by_y = -1.5f * p.y / p.l2;
     if (p.lens.det > least_det) {
-      lens_slope const slope = slope_of(p);
+      vec2 const slope = lens_.slope_of_det(p.lens, p.x, p.y);
       by_x -= 0.5f * slope.x / p.lens.det, by_y -= 0.5f * slope.y / p.lens.det;
     }
     if (p.free_x)
@@ -50,16 +67,10 @@ class pixel_filter {
   // Where a lens folds a pixel would see everything.
   static constexpr float least_det = 0.05f;
 
-  struct jacobian {
-    float xx = 1, xy = 0, yy = 1, det = 1;
-  };
   struct point {
     float sigma, distance, z, x, y, l2;
     bool free_x, free_y;  // between the image's borders
-    jacobian lens;
-  };
-  struct lens_slope {
-    float x, y;
+    lens_jacobian lens;
   };
 
   GART_HD GART_INLINE static float dot(vec3 const& a, vec3 const& b) {
@@ -78,7 +89,7 @@ class pixel_filter {
     p.y = slope_between(dot(m, down_), p.z, y0_, y1_, p.free_y);
     p.distance = square_root(dot(m, m));
     p.l2 = fma(p.x, p.x, fma(p.y, p.y, 1.0f));
-    if (lens_.any()) p.lens = jacobian_at(p.x, p.y);
+    p.lens = lens_.jacobian_at(p.x, p.y);
     float const det = p.lens.det > least_det ? p.lens.det : least_det;
     float const length = square_root(p.l2);
     float const inverse_angle = mul(mul(length, square_root(length)), square_root(det));  // in units of size_
@@ -86,40 +97,16 @@ class pixel_filter {
     return p;
   }
 
-  GART_HD GART_INLINE jacobian jacobian_at(float x, float y) const {
-    float const r2 = fma(x, x, mul(y, y));
-    float const radial = fma(r2, fma(r2, lens_.k2, lens_.k1), 1.0f);
-    float const slope = fma(mul(4.0f, lens_.k2), r2, mul(2.0f, lens_.k1));  // d radial / d x = slope * x
-    jacobian j;
-    j.xx = fma(mul(slope, x), x, fma(mul(2.0f, lens_.p1), y, fma(mul(6.0f, lens_.p2), x, radial)));
-    j.xy = fma(mul(slope, x), y, fma(mul(2.0f, lens_.p1), x, mul(mul(2.0f, lens_.p2), y)));
-    j.yy = fma(mul(slope, y), y, fma(mul(2.0f, lens_.p2), x, fma(mul(6.0f, lens_.p1), y, radial)));
-    j.det = fma(j.xx, j.yy, -mul(j.xy, j.xy));
-    return j;
-  }
-
-  // Of the Jacobian's determinant.
-  GART_HD GART_INLINE lens_slope slope_of(point const& p) const {
-    if (!lens_.any()) return {0, 0};
-    float const x = p.x, y = p.y, r2 = x * x + y * y;
-    float const slope = 2 * lens_.k1 + 4 * lens_.k2 * r2, bend = 8 * lens_.k2;
-    float const xxx = 3 * slope * x + bend * x * x * x + 6 * lens_.p2,
-                xxy = slope * y + bend * x * x * y + 2 * lens_.p1;
-    float const xyy = slope * x + bend * x * y * y + 2 * lens_.p2,
-                yyy = 3 * slope * y + bend * y * y * y + 6 * lens_.p1;
-    jacobian const& j = p.lens;
-    return {xxx * j.yy + j.xx * xyy - 2 * j.xy * xxy, xxy * j.yy + j.xx * yyy - 2 * j.xy * xyy};
-  }
-
   vec3d position_;
   vec3 right_, down_, forward_;
-  distortion lens_;
+  Lens lens_;
   float size_ = 0;  // pixels over the focal length: the standard deviation's angle on the axis
   float x0_ = 0, x1_ = 0, y0_ = 0, y1_ = 0;
 };
 
-// As the pixels of a camera see it.
-GART_HD GART_INLINE gaussian_parameters filtered(gaussian_parameters const& g, pixel_filter const& filter) {
+// As the pixels of a camera see it. Filter: a camera model's.
+template <class Filter>
+GART_HD GART_INLINE gaussian_parameters filtered(gaussian_parameters const& g, Filter const& filter) {
   vec3 const mean = filter.from_camera(g);
   return widened(g, mean, filter.sigma_at(mean));
 }
