@@ -5,10 +5,10 @@
 
 namespace {
 
-template <gart::execution E, class By, class Strategy, int TileSize>
+template <gart::execution E, class By, class Strategy>
 struct backward_frame {
   gart_bench::frame<E, By> frame;
-  gart::backward<E, Strategy, TileSize> pass;
+  gart::backward_pass<typename gart_bench::frame<E, By>::traced_type, Strategy> pass;
   gart::gaussians<E> gradients;
   gart::buffer<float, E> color, color_gradient;
 
@@ -18,52 +18,53 @@ struct backward_frame {
         gradients(exec, frame.gaussians.size(), gart_bench::sh_degree),
         color(exec, 3 * frame.pixels()),
         color_gradient(exec, gart_bench::noise(3 * frame.pixels(), 1e-6f)) {
-    frame.prepare(exec);
-    prepare(exec);
-    gart::forward<gart_bench::sh_degree>(exec, frame.tracer, frame.scene(), frame.view, frame.options,
-                                         gart_bench::sh_degree, pass.targets(color.data()), pass.record());
+    frame.prepare();
+    prepare();
+    pass.render(frame.traced, {color.data()});
   }
-  void prepare(E& exec) {
-    if (!pass.prepare(exec, frame.tracer, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near))
-      throw pass.no_room();
-  }
-  void run(E& exec) {
-    pass.template run<gart_bench::sh_degree>(exec, frame.tracer, frame.scene(), frame.records.view(), frame.view,
-                                             frame.options, gart_bench::sh_degree, color, color_gradient, gradients);
+  void prepare() {
+    if (!pass.prepare(frame.traced)) throw pass.no_room();
   }
 };
 
-template <class By, class Strategy, int TileSize, gart::execution E>
+template <class By, class Strategy, gart::execution E>
 void backward(benchmark::State& state, E& exec) {
-  backward_frame<E, By, Strategy, TileSize> f(exec);
-  gart_bench::measure(state, exec, [&] { f.run(exec); });
+  backward_frame<E, By, Strategy> f(exec);
+  gart_bench::measure(state, exec, [&] { gart::differentiate(f.frame.traced, f.pass, f.color_gradient, f.gradients); });
   state.counters["lt_bytes"] = static_cast<double>(f.pass.lt_bytes());
 }
 
 // The tile lists and the clear of the LT buffer, and footprints where no tracer lends them.
-template <class By, class Strategy, int TileSize, gart::execution E>
+template <class By, class Strategy, gart::execution E>
 void prepare(benchmark::State& state, E& exec) {
-  backward_frame<E, By, Strategy, TileSize> f(exec);
-  gart_bench::measure(state, exec, [&] { f.prepare(exec); });
+  backward_frame<E, By, Strategy> f(exec);
+  gart_bench::measure(state, exec, [&] { f.prepare(); });
   state.counters["lt_bytes"] = static_cast<double>(f.pass.lt_bytes());
+}
+
+template <class By, class Strategy>
+void add(std::string const& name) {
+  gart_bench::add(name.c_str(), [](benchmark::State& state, auto& exec) { backward<By, Strategy>(state, exec); });
 }
 
 using gart_bench::by_bvh;
 using gart_bench::by_tiles;
 
+// Every strategy on tile lists; on the BVH those for training. `/8`: the tiles that footprints are cut into.
+bool const added = [] {
+  gart::strategies::for_each([]<class Strategy>(Strategy) {
+    std::string const name = Strategy::name, cut = Strategy::gather::any ? "/8" : "";
+    if constexpr (!Strategy::lane_by_lane || gart_bench::on_device)
+      add<by_tiles<8>, Strategy>("backward/tiles/" + name + cut);
+    if constexpr (!Strategy::ordered && Strategy::use == gart::strategy_use::training)
+      add<by_bvh, Strategy>("backward/bvh/" + name + cut);
+  });
+  return true;
+}();
+
 }  // namespace
 
-GART_BENCH("backward/bvh/pixel", backward<by_bvh, gart::pixel_strategy, 8>)
-GART_BENCH("backward/bvh/hybrid/8", backward<by_bvh, gart::hybrid_strategy, 8>)
-GART_BENCH("backward/bvh/primitive/8", backward<by_bvh, gart::primitive_strategy, 8>)
-GART_BENCH("backward/tiles/pixel", backward<by_tiles<8>, gart::pixel_strategy, 8>)
-GART_BENCH("backward/tiles/hybrid/8", backward<by_tiles<8>, gart::hybrid_strategy, 8>)
-GART_BENCH("backward/tiles/primitive/4", backward<by_tiles<4>, gart::primitive_strategy, 4>)
-GART_BENCH("backward/tiles/primitive/8", backward<by_tiles<8>, gart::primitive_strategy, 8>)
-GART_BENCH("backward/tiles/primitive/16", backward<by_tiles<16>, gart::primitive_strategy, 16>)
-#if defined(GART_BENCH_CUDA)
-GART_BENCH("backward/tiles/lane/8", backward<by_tiles<8>, gart::lane_strategy, 8>)
-#endif
-GART_BENCH("backward/tiles/deterministic/8", backward<by_tiles<8>, gart::deterministic_strategy, 8>)
-GART_BENCH("prepare/bvh/primitive/8", prepare<by_bvh, gart::primitive_strategy, 8>)
-GART_BENCH("prepare/tiles/primitive/8", prepare<by_tiles<8>, gart::primitive_strategy, 8>)
+GART_BENCH("backward/tiles/primitive/4", backward<by_tiles<4>, gart::primitive_strategy>)
+GART_BENCH("backward/tiles/primitive/16", backward<by_tiles<16>, gart::primitive_strategy>)
+GART_BENCH("prepare/bvh/primitive/8", prepare<by_bvh, gart::primitive_strategy>)
+GART_BENCH("prepare/tiles/primitive/8", prepare<by_tiles<8>, gart::primitive_strategy>)

@@ -8,15 +8,11 @@ namespace {
 template <class By, class Strategy, gart::execution E>
 void forward(benchmark::State& state, E& exec) {
   gart_bench::frame<E, By> frame(exec);
-  frame.prepare(exec);
-  gart::backward<E, Strategy> pass(exec);
-  if (!pass.prepare(exec, frame.tracer, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near))
-    throw pass.no_room();
+  frame.prepare();
+  gart::backward_pass<typename gart_bench::frame<E, By>::traced_type, Strategy> pass(exec);
+  if (!pass.prepare(frame.traced)) throw pass.no_room();
   gart::buffer<float, E> color(exec, 3 * frame.pixels());
-  gart_bench::measure(state, exec, [&] {
-    gart::forward<gart_bench::sh_degree>(exec, frame.tracer, frame.scene(), frame.view, frame.options,
-                                         gart_bench::sh_degree, {color.data()}, pass.record());
-  });
+  gart_bench::measure(state, exec, [&] { pass.render(frame.traced, {color.data()}); });
   state.counters["lt_bytes"] = static_cast<double>(pass.lt_bytes());
 }
 

@@ -52,7 +52,7 @@ with open(a.out + ".part", "w") as f:
     json.dump({"what": "registers", "arch": a.arch, "rows": rows}, f, indent=1)
     f.write("\n")
 os.replace(a.out + ".part", a.out)
-print("| row | forward | gather |\n|---|---|---|")
+print("| configuration | forward | gather |\n|---|---|---|")
 for row in sorted(rows):
     cells = [rows[row].get(k) for k in ("forward", "gather")]
     text = [f"{c['registers']}" + (f", {c['spilled']} B spilled" if c["spilled"] else "") if c else "" for c in cells]

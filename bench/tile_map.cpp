@@ -8,12 +8,12 @@ namespace {
 template <int TileSize, bool ByDepth, gart::execution E>
 void tile_map(benchmark::State& state, E& exec) {
   gart_bench::frame<E> frame(exec);
-  frame.prepare(exec);
+  frame.prepare();
   gart::footprints<E, TileSize> prints(exec);
   prints.measure(exec, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);
   gart::tile_map<E, TileSize> map(exec);
   gart::tile_grid<TileSize> const grid{frame.view.width, frame.view.height};
-  gart::depth_order const by_depth(prints.depths().data(), frame.records.view().data(), frame.view);
+  gart::depth_order const by_depth(prints.depths().data(), frame.traced.gaussians().data(), frame.view);
   gart_bench::measure(state, exec, [&] {
     if constexpr (ByDepth)
       map.build(exec, grid, prints, by_depth);

@@ -3,7 +3,7 @@
 
 namespace {
 
-struct count_hits {
+struct count_hits : gart::ray_program_base {
   using ray_type = gart::primary_ray;
   struct state {
     gart::vec3 direction;
@@ -34,11 +34,11 @@ struct count_hits {
 template <class By, gart::execution E>
 void trace(benchmark::State& state, E& exec) {
   gart_bench::frame<E, By> frame(exec);
-  frame.prepare(exec);
+  frame.prepare();
   gart::buffer<gart::u32, E> hits(exec, frame.pixels());
   gart::pixel_order const order{frame.view.width, frame.view.height};
-  count_hits const program{frame.view, order, frame.options.transmittance_min, hits.data()};
-  gart_bench::measure(state, exec, [&] { frame.tracer.trace(exec, "trace", order.launch_size(), program); });
+  count_hits const program{{}, frame.view, order, frame.options.transmittance_min, hits.data()};
+  gart_bench::measure(state, exec, [&] { frame.traced.trace("trace", order.launch_size(), program); });
   double sum = 0;
   for (gart::u32 const n : hits.to_host()) sum += n;
   state.counters["hits_per_ray"] = sum / static_cast<double>(frame.pixels());

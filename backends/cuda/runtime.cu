@@ -85,13 +85,14 @@ struct cuda_exec::resources {
   }
 };
 
-cuda_exec::cuda_exec(int device_index) : device_index_(device_index) {
+cuda_exec::cuda_exec(int device_index, void* stream)
+    : device_index_(device_index), stream_(stream), owns_stream_(stream == nullptr) {
   std::string reason;
   auto const devices = cuda_devices(&reason);
   if (devices.empty())
-    throw unsupported("no CUDA device: " + reason + "; install an NVIDIA driver of CUDA " +
-                      std::to_string(CUDART_VERSION / 1000) +
-                      " or later, make a GPU visible (CUDA_VISIBLE_DEVICES), or use row_request.backend = openmp");
+    throw unsupported(
+        "no CUDA device: " + reason + "; install an NVIDIA driver of CUDA " + std::to_string(CUDART_VERSION / 1000) +
+        " or later, make a GPU visible (CUDA_VISIBLE_DEVICES), or use configuration_request.backend = openmp");
   if (device_index < 0 || device_index >= static_cast<int>(devices.size()))
     throw invalid_argument("CUDA device " + std::to_string(device_index) + " does not exist; there are " +
                            std::to_string(devices.size()) + ", counted from 0");
@@ -113,16 +114,17 @@ cuda_exec::cuda_exec(int device_index) : device_index_(device_index) {
     check_cuda(cudaMemPoolSetAttribute(resources_->pool, cudaMemPoolAttrReleaseThreshold, &keep_all),
                "setting up a memory pool");
   }
-  cudaStream_t stream = nullptr;
-  check_cuda(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "creating a stream");
-  stream_ = stream;
+  if (!owns_stream_) return;
+  cudaStream_t own = nullptr;
+  check_cuda(cudaStreamCreateWithFlags(&own, cudaStreamNonBlocking), "creating a stream");
+  stream_ = own;
 }
 
 cuda_exec::~cuda_exec() {
   cudaSetDevice(device_index_);
   cudaStreamSynchronize(as_stream(stream_));
   resources_.reset();
-  cudaStreamDestroy(as_stream(stream_));
+  if (owns_stream_) cudaStreamDestroy(as_stream(stream_));
 }
 
 void cuda_exec::make_current() const { check_cuda(cudaSetDevice(device_index_), "choosing the device"); }
@@ -149,7 +151,7 @@ void* cuda_exec::allocate(std::size_t bytes) {
     cudaMemGetInfo(&free_bytes, &total_bytes);
     throw out_of_memory("CUDA device", bytes, free_bytes,
                         "lower train_options.max_gaussians, raise dataset_options.downscale, or use "
-                        "row_request.backward = hybrid");
+                        "configuration_request.backward = hybrid");
   }
   check_cuda(code, "allocating memory");
   memory.allocated(bytes);

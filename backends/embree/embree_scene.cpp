@@ -100,7 +100,7 @@ void embree_scene::build(span<box const> boxes) {
   if (handles_->source.beyond)
     throw unsupported(
         "a Gaussian reaches 1.8e18 units from the camera, where Embree's coordinates end: take another "
-        "tracer (row_request.tracer = tiles or bvh), or remove it");
+        "tracer (configuration_request.tracer = tiles or bvh), or remove it");
 }
 
 void embree_scene::intersect(vec3 origin, vec3 direction, float near, float far, leaf_function leaf,

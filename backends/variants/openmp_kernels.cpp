@@ -1,6 +1,6 @@
 // The OpenMP policy's variants: kernels.
-#include "variant_rows.hpp"
+#include "variant_configurations.hpp"
 
 #include <gart/exec/parallel.hpp>
 
-GART_REGISTER_ROWS(gart_openmp_kernels, gart::register_kernel_variants<gart::openmp_exec>())
+GART_REGISTER_CONFIGURATIONS(gart_openmp_kernels, gart::register_kernel_variants<gart::openmp_exec>())

@@ -18,6 +18,12 @@
 
 namespace gart_bench {
 
+#if defined(GART_BENCH_CUDA)
+inline constexpr bool on_device = true;
+#else
+inline constexpr bool on_device = false;
+#endif
+
 template <gart::execution E, class Body>
 void add_row(char const* name, Body body) {
   auto const run = [body](benchmark::State& state) {

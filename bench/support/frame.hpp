@@ -5,7 +5,7 @@
 #include "support/bench.hpp"
 #include "support/scene.hpp"
 
-#include <gart/render/forward.hpp>
+#include <gart/render/frame.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
 
@@ -29,19 +29,16 @@ struct frame {
   gart::camera view;
   gart::render_options options;
   gart::gaussians<E> gaussians;
-  gart::frame_records<E> records;
-  typename By::template tracer<E> tracer;
+  using traced_type = gart::frame<E, gart::scene_traits<sh_degree>, typename By::template tracer<E>>;
+  traced_type traced;
 
-  explicit frame(E& exec) : view(the_scene().view()), gaussians(exec, the_scene().model), records(exec), tracer(exec) {}
+  explicit frame(E& exec) : view(the_scene().view()), gaussians(exec, the_scene().model), traced(exec) {}
 
   gart::gaussians_view<float const> scene() const { return gaussians.view(); }
   std::size_t pixels() const { return static_cast<std::size_t>(view.width) * view.height; }
 
   // What a traced pass needs.
-  void prepare(E& exec) {
-    records.prepare(exec, scene(), view.position, options.alpha_min);
-    tracer.prepare(exec, scene(), records.view(), view, options.alpha_min, options.near);
-  }
+  void prepare() { traced.prepare(scene(), view, options); }
 };
 
 // What stands for an image's gradient, and for a photo.

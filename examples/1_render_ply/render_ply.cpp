@@ -2,7 +2,7 @@
 #include <gart/core/error.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
-#include <gart/train/session.hpp>
+#include <gart/runtime/renderer.hpp>
 
 #include <algorithm>
 #include <cstdio>
@@ -34,7 +34,7 @@ int main(int argc, char** argv) try {
   }
   view.position.z -= 1.8 * size + 0.1;
 
-  gart::row_request request;
+  gart::configuration_request request;
   request.sh_degree = model.sh_degree;
   auto const renderer = gart::make_renderer(request);
   renderer->set_model(model);
@@ -42,7 +42,7 @@ int main(int argc, char** argv) try {
   options.background = gart::vec3(1.0f);
   gart::rendered const image = renderer->render(view, options);
   gart::write_png(argv[2], gart::to_8bit(image.color));
-  std::printf("%zu Gaussians on %s -> %s\n", model.size(), renderer->row().backend.c_str(), argv[2]);
+  std::printf("%zu Gaussians on %s -> %s\n", model.size(), to_string(renderer->configuration().backend), argv[2]);
   return 0;
 } catch (std::exception const& e) {
   return std::fprintf(stderr, "render_ply: %s\n", e.what()), 1;

@@ -1,6 +1,6 @@
 // Trains on a capture (COLMAP, Blender, nerfstudio) and writes the scene: train_scene DATASET MODEL.ply [ITERATIONS]
 #include <gart/io/ply.hpp>
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <cstdio>
 #include <cstdlib>

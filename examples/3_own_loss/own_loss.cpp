@@ -4,8 +4,8 @@
 #include <gart/backward/strategies.hpp>
 #include <gart/exec/parallel.hpp>
 #include <gart/io/ply.hpp>
+#include <gart/runtime/initial.hpp>
 #include <gart/trace/bvh_tracer.hpp>
-#include <gart/train/initial.hpp>
 #include <gart/train/trainer.hpp>
 
 #include <cmath>
@@ -45,12 +45,11 @@ int main(int argc, char** argv) try {
   gart::train_options options;
   options.iterations = argc > 3 ? std::atoi(argv[3]) : 2000;
   options.max_gaussians = 20'000;
-  options.sh_degree = 1;
 
   using exec = gart::openmp_exec;
   exec queue;
   gart::trainer<exec, gart::scene_traits<1>, gart::bvh_tracer<exec>, gart::pixel_strategy> training(
-      queue, options, data, gart::initial_model(data, options));
+      queue, options, data, gart::initial_model(data, options, 1));
 
   gart::buffer<float, exec> loss(queue), squared(queue);
   auto const own_loss = [&](gart::loss_input<exec> const& in) {

@@ -14,11 +14,12 @@
 #include <gart/loss/affine_color.hpp>
 #include <gart/loss/metrics.hpp>
 #include <gart/reference/reference.hpp>
-#include <gart/render/forward.hpp>
+#include <gart/render/frame.hpp>
+#include <gart/runtime/choose.hpp>
+#include <gart/runtime/degree_selection.hpp>
+#include <gart/runtime/initial.hpp>
+#include <gart/runtime/renderer.hpp>
+#include <gart/runtime/session.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
-#include <gart/train/choose.hpp>
-#include <gart/train/degree_selection.hpp>
-#include <gart/train/initial.hpp>
-#include <gart/train/session.hpp>
 #include <gart/train/trainer.hpp>

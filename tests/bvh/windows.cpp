@@ -1,4 +1,5 @@
 // The window of nearest hits, and rays with more hits than a window holds: resumed, nothing is lost or doubled.
+#include <gart/render/frame.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <support/policies.hpp>
 
@@ -90,7 +91,7 @@ void check_window(E& exec, std::mt19937_64& random) {
 }
 
 // Ray i is rays[i]; its hits go to list[i][most], up to `wanted` of them.
-struct collect {
+struct collect : gart::ray_program_base {
   using ray_type = gart::ray;
   struct state {
     u32 ray, count;
@@ -133,15 +134,6 @@ struct evaluate_all {
   }
 };
 
-struct prepare_all {
-  gart::gaussians_view<float const> scene;
-  gart::vec3d frame;
-  gart::ray_gaussian* records;
-  GART_KERNEL void operator()(gart::index_t i) const {
-    records[i] = gart::prepare(gart::load_parameters(scene, i), frame, 1.0f / 255);
-  }
-};
-
 void add(gart::gaussian_model& m, vec3 at, float scale, float opacity = 0.0f) {
   for (int k = 0; k < 3; ++k) m.mean.push_back(at[k]), m.log_scale.push_back(std::log(scale)), m.sh.push_back(0);
   for (float q : {1.0f, 0.0f, 0.0f, 0.0f}) m.quaternion.push_back(q);
@@ -153,10 +145,13 @@ void check_rays(E& exec, gart::gaussian_model const& model, std::vector<gart::ra
                 std::size_t least_hits) {
   gart::gaussians<E> const scene(exec, model);
   u32 const n = scene.size(), number = static_cast<u32>(rays.size());
-  gart::camera const at_origin;
-  gart::buffer<gart::ray_gaussian, E> records(exec, n);
-  gart::parallel_for(exec, "prepare", n, prepare_all{scene.view(), at_origin.position, records.data()});
-  gart::traced_scene const traced{records.data(), n, near};
+  gart::camera at_origin;
+  at_origin.width = at_origin.height = 1, at_origin.fx = at_origin.fy = 1;
+  gart::render_options options;
+  options.near = near;
+  gart::frame<E, gart::scene_traits<0>, gart::bvh_tracer<E>> frame(exec);
+  frame.prepare(scene.view(), at_origin, options);
+  gart::traced_scene const traced{frame.gaussians().data(), n, near};
   gart::buffer<gart::ray, E> in(exec, rays);
   gart::buffer<hit, E> list(exec, std::size_t{number} * n), single(exec, n);
   gart::buffer<u32, E> counts(exec, number);
@@ -182,17 +177,15 @@ void check_rays(E& exec, gart::gaussian_model const& model, std::vector<gart::ra
       CHECK(same({flat.begin() + std::size_t{i} * n, flat.begin() + std::size_t{i} * n + found[i]}, want));
     }
   };
-  gart::bvh_tracer<E> tracer(exec);
-  tracer.prepare(exec, scene.view(), records.view(), at_origin, 1.0f / 255, near);
   for (u32 wanted : {0xffffffffu, 16u, 17u, 1u}) {
-    collect const program{in.data(), list.data(), counts.data(), number, n, wanted};
-    tracer.trace(exec, "bvh", number, program);
+    collect const program{{}, in.data(), list.data(), counts.data(), number, n, wanted};
+    frame.trace("bvh", number, program);
     compare("bvh", wanted);
     gart::parallel_for(exec, "brute", number, brute_windows<16>{traced, program});
     compare("window of 16", wanted);
   }
   gart::parallel_for(exec, "brute", number,
-                     brute_windows<1>{traced, {in.data(), list.data(), counts.data(), number, n, 40}});
+                     brute_windows<1>{traced, {{}, in.data(), list.data(), counts.data(), number, n, 40}});
   compare("window of 1", 40);
 }
 

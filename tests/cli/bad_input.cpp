@@ -77,7 +77,7 @@ TEST_CASE("a model that was trained with another kernel is not drawn with this o
   // SH degree 0 is compiled for Gaussians only.
   gart::write_splat_ply(here / "k4.ply", one_gaussian(), {{"kernel_degree", "4"}});
   fails(here.gart("render k4.ply capture --out images"),
-        {"k4.ply", "SH degree 0, kernel degree 4", "openmp / tiles / primitive", "examples/5_own_row"});
+        {"k4.ply", "SH degree 0, kernel degree 4", "openmp / tiles / primitive", "examples/5_own_configuration"});
   gart::write_splat_ply(here / "cap.ply", one_gaussian(), {{"max_hits", "few"}});
   fails(here.gart("render cap.ply capture --out images"), {"cap.ply", "max_hits is 'few'"});
   gart::write_splat_ply(here / "a.ply", one_gaussian(), {{"alpha_min", "much"}});

@@ -10,9 +10,11 @@ using namespace cli_test;
 
 TEST_CASE("a message names options where the library names fields") {
   using gart_cli::in_options;
-  CHECK(in_options("lower train_options.max_gaussians, raise dataset_options.downscale, or use row_request.backward = "
-                   "hybrid") == "lower --max-gaussians, raise --downscale, or use --backward hybrid");
-  CHECK(in_options("(row_request.tracer = tiles or bvh)") == "(--tracer tiles or bvh)");
+  CHECK(
+      in_options(
+          "lower train_options.max_gaussians, raise dataset_options.downscale, or use configuration_request.backward = "
+          "hybrid") == "lower --max-gaussians, raise --downscale, or use --backward hybrid");
+  CHECK(in_options("(configuration_request.tracer = tiles or bvh)") == "(--tracer tiles or bvh)");
   CHECK(in_options("render_options.transmittance_min") == "--t-min");
   // A field at the end of a sentence, and a value that is not this field's.
   CHECK(in_options("raise dataset_options.downscale. = 3") == "raise --downscale. = 3");

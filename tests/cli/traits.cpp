@@ -1,4 +1,4 @@
-// Rows chosen by what a model is and what is traded: by the program's own options and files.
+// Configurations chosen by what a model is and what is traded: by the program's own options and files.
 
 #include "program.hpp"
 
@@ -24,15 +24,15 @@ TEST_CASE("SH degree 0 stores and optimises 14 floats a Gaussian") {
   CHECK(fs::file_size(here / "run/checkpoint.gart") < 40 * 3 * 4 * 14 + 1000);
 }
 
-TEST_CASE("a row that is not compiled is refused with those that are") {
+TEST_CASE("a configuration that is not compiled is refused with those that are") {
   folder const here;
   write_capture(here / "capture");
   auto const run = here.gart("train capture --out run --sh-degree 1 --kernel-degree 8 --backend serial");
   CHECK(run.code == 1);
   CHECK_MESSAGE(has(run.err, "SH degree 1, kernel degree 8"), run.err);
   CHECK(has(run.err, "serial / bvh / primitive (SH 0 1 2 3)"));
-  CHECK(has(run.err, "GART_REGISTER_ROWS"));
-  CHECK(has(run.err, "examples/5_own_row"));
+  CHECK(has(run.err, "GART_REGISTER_CONFIGURATIONS"));
+  CHECK(has(run.err, "examples/5_own_configuration"));
   CHECK_FALSE(fs::exists(here / "run"));
 }
 

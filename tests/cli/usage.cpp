@@ -127,7 +127,7 @@ TEST_CASE("output that cannot be written is a failure") {
   }
 }
 
-TEST_CASE("info names the version and the rows") {
+TEST_CASE("info names the version and the configurations") {
   folder const here;
   auto const info = here.gart("info");
   CHECK(info.code == 0);

@@ -2,7 +2,7 @@
 #include <extremes/scenes.hpp>
 #include <extremes/ways.hpp>
 
-#include <gart/train/initial.hpp>
+#include <gart/runtime/initial.hpp>
 
 #include <chrono>
 #include <cmath>

@@ -22,9 +22,19 @@ gart::gaussian_model around_the_camera(int count) {
   return m;
 }
 
-struct no_tracer {
+// Prepares nothing, where the tracers would build their structures.
+template <class E>
+struct no_tracer : gart::tracer_base {
   using response_type = gart::generalized_gaussian<>;
+  static constexpr char const* name = "none";
+  static constexpr int window = 1;
+  explicit no_tracer(E&) {}
+  void prepare(E&, gart::gaussians_view<float const>, gart::span<gart::ray_gaussian const>, gart::camera const&,
+               gart::trace_options const&) {}
+  template <gart::ray_program P>
+  void trace(E&, char const*, gart::index_t, P const&) {}
 };
+static_assert(gart::tracer<no_tracer<gart::serial_exec>, gart::serial_exec>);
 
 template <class Body>
 std::string error_of(Body const& body) {
@@ -76,11 +86,14 @@ TEST_CASE_TEMPLATE("sums past 2^32 and pairs past 2^31", E, GART_TEST_POLICIES) 
   CHECK(exec.memory.current == before);
 
   // A budget is held before anything is allocated for it.
-  gart::backward<E, gart::primitive_strategy> pass(exec);
-  CHECK_FALSE(pass.prepare(exec, no_tracer{}, scene.view(), view, 1.0f / 255, 0.01f, u64{1} << 40));
+  using frame_type = gart::frame<E, gart::scene_traits<0>, no_tracer<E>>;
+  frame_type frame(exec);
+  frame.prepare(scene.view(), view);
+  gart::backward_pass<frame_type, gart::primitive_strategy> pass(exec);
+  CHECK_FALSE(pass.prepare(frame, u64{1} << 40));
   CHECK(pass.lt_bytes() == 0);
   // Nor are slots that have no number of 32 bits.
-  CHECK_FALSE(pass.prepare(exec, no_tracer{}, scene.view(), view, 1.0f / 255, 0.01f));
+  CHECK_FALSE(pass.prepare(frame));
   CHECK(pass.lt_bytes() == 0);
 }
 
@@ -114,17 +127,12 @@ TEST_CASE_TEMPLATE("cameras and options that no ray can be traced by are named",
   E exec;
   gart::gaussian_model const model = around_the_camera(2);
   gart::gaussians<E> const scene(exec, model);
-  gart::frame_records<E> records(exec);
   gart::buffer<float, E> color(exec, 3 * 4 * 4);
   auto const render = [&](gart::camera const& view, gart::render_options const& options) {
     return error_of([&] {
-      gart::tile_tracer<E> tracer(exec);
-      records.prepare(exec, scene.view(), view.position, options.alpha_min);
-      // The tracer sees the camera first; forward() the options that no tracer looks at.
-      tracer.prepare(exec, scene.view(), records.view(), view, options.alpha_min, options.near);
-      gart::image_targets targets;
-      targets.color = color.data();
-      gart::forward<0>(exec, tracer, scene.view(), view, options, 0, targets, gart::record_none{});
+      gart::frame<E, gart::scene_traits<0>, gart::tile_tracer<E>> frame(exec);
+      frame.prepare(scene.view(), view, options);
+      frame.render({color.data()});
     });
   };
   gart::camera const good = gart_test::looking_along_z(4, 4, 4);

@@ -235,7 +235,8 @@ TEST_CASE_TEMPLATE("error budget: every extreme by every tracer and strategy", E
       check_same_image(o, all.front());
     }
     // What is a hit is decided once: `primitive` decides again what `cleared` reads. The same terms, in another order.
-    CHECK(gradient_distance(all[0], all[1]) < 1e-4);
+    for (outcome const& o : all)
+      if (o.way == "tiles, cleared") CHECK(gradient_distance(all.front(), o) < 1e-4);
     if (p.e.tolerance == undecided) continue;
 
     CHECK(p.decided >= p.e.decided);

@@ -3,7 +3,7 @@
 
 #include "fuzz/support.hpp"
 
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <memory>
 
@@ -30,8 +30,8 @@ std::unique_ptr<gart::session> small_session(gart::dataset const& data, gart::de
   start.resize(2, 0);
   start.quaternion[0] = start.quaternion[4] = 1;
   gart::train_options options;
-  options.iterations = 2000, options.max_gaussians = 8, options.sh_degree = 0, options.densify = densify;
-  return gart::make_session({"serial", "bvh", "pixel", 0}, options, data, &start);
+  options.iterations = 2000, options.max_gaussians = 8, options.densify = densify;
+  return gart::make_session({gart::backend_kind::serial, gart::tracer_kind::bvh, "pixel", 0}, options, data, &start);
 }
 
 bool same(gart::gaussian_model const& a, gart::gaussian_model const& b) {

@@ -50,7 +50,6 @@ bool resume_config(std::string_view input) {
                 o.render.transmittance_min < 1 && o.initial_opacity >= 0 && o.initial_opacity < 1 &&
                 o.initial_scale >= 0 && a.lt_budget_gb >= 0,
             "a number that the command line would refuse");
-    promise(o.sh_degree >= 0 && o.sh_degree <= 3, "an SH degree that the command line would refuse");
     gart_cli::check_same_dataset(a, data);
   });
 }

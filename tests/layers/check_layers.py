@@ -14,8 +14,8 @@ import tempfile
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
 OPTION = re.compile(r"""^"--|(?<![^\s(`"'])--[a-z"]""")
-FIELD = re.compile(r"\b(?:train_options|render_options|dataset_options|row_request)\.[a-z_]+")
-FIELD_TABLE = "examples/cli/field_names.cpp"
+FIELD = re.compile(r"\b(?:train_options|render_options|dataset_options|configuration_request)\.[a-z_]+")
+FIELD_TABLE = "program/field_names.cpp"
 SUFFIXES = {".hpp", ".cuh", ".cpp", ".cu", ".h"}
 
 

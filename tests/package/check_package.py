@@ -95,7 +95,7 @@ with tempfile.TemporaryDirectory() as temporary:
         binary = build(here / "downstream" / component)
         expect(run(binary / f"use_{component}"), component)
     told = configure(here / "downstream" / "missing", fails=True)
-    expect(" ".join(told.split()), "has no component optix, telepathy", "it has: headers, io, cpu")
+    expect(" ".join(told.split()), "has no component optix, telepathy", "it has: headers, io, runtime, reference, cpu")
 
     examples = {path.name: build(path) for path in sorted((a.source / "examples").glob("[0-9]_*"))}
     image = folder / "image.png"
@@ -108,7 +108,7 @@ with tempfile.TemporaryDirectory() as temporary:
         assert trained.read_bytes().startswith(b"ply\n")
     expect(run(examples["4_bvh_query"] / "bvh_query", 1000), "1000 boxes")
     own = folder / "own.ply"
-    expect(run(examples["5_own_row"] / "own_row", capture, own, 3), "openmp, tiles, primitive: kernel degree 4")
+    expect(run(examples["5_own_configuration"] / "own_configuration", capture, own, 3), "openmp, tiles, primitive: kernel degree 4")
     expect(own.read_bytes()[:400].decode("latin-1"), "comment gart kernel_degree 4\n")
 
     if a.program:

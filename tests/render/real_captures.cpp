@@ -5,7 +5,7 @@
 #include <render/expected.hpp>
 
 #include <gart/io/dataset.hpp>
-#include <gart/train/initial.hpp>
+#include <gart/runtime/initial.hpp>
 
 #include <filesystem>
 #include <set>
@@ -39,9 +39,9 @@ std::vector<capture> captures() {
     reading.load_images = false;
     gart::dataset const data = gart::load_dataset(folder, reading);
     gart::train_options options;
-    options.sh_degree = 0;
     gart::camera const& full = data.train[data.train.size() / 2].view;
-    found.push_back({name, gart::initial_model(data, options), gart::resized(full, full.width / 8, full.height / 8)});
+    found.push_back(
+        {name, gart::initial_model(data, options, 0), gart::resized(full, full.width / 8, full.height / 8)});
   }
   return found;
 }

@@ -2,19 +2,22 @@
 // Renders, gradients and hit lists of a small scene through the library's templates, for comparison with the oracle.
 
 #include <gart/backward/backward.hpp>
+#include <gart/runtime/kinds.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
 #if defined(GART_WITH_EMBREE)
 #include <gart/trace/embree_tracer.hpp>
 #endif
 
+#include <concepts>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace gart_test {
 
-enum class tracer_kind { bvh, embree, tiles };
+using gart::tracer_kind;
 
 template <class E>
 struct traced {
@@ -23,7 +26,7 @@ struct traced {
 };
 
 // Counts with a null list, then writes into the places found by the count.
-struct list_program {
+struct list_program : gart::ray_program_base {
   using ray_type = gart::primary_ray;
   struct state {
     gart::vec3 direction;
@@ -59,21 +62,13 @@ struct list_program {
 
 namespace detail {
 
-template <class Response = gart::generalized_gaussian<>, class E, class F>
-auto with_tracer(E& exec, tracer_kind kind, F&& body) {
-  if (kind == tracer_kind::bvh) {
-    gart::bvh_tracer<E, Response> tracer(exec);
-    return body(tracer);
-  }
-  if (kind == tracer_kind::tiles) {
-    gart::tile_tracer<E, 8, Response> tracer(exec);
-    return body(tracer);
-  }
+// Calls body(std::type_identity<tracer>).
+template <class E, class Response = gart::generalized_gaussian<>, class F>
+auto with_tracer(tracer_kind kind, F&& body) {
+  if (kind == tracer_kind::bvh) return body(std::type_identity<gart::bvh_tracer<E, Response>>{});
+  if (kind == tracer_kind::tiles) return body(std::type_identity<gart::tile_tracer<E, 8, Response>>{});
 #if defined(GART_WITH_EMBREE)
-  if constexpr (!E::device) {
-    gart::embree_tracer<E, Response> tracer(exec);
-    return body(tracer);
-  }
+  if constexpr (!E::device) return body(std::type_identity<gart::embree_tracer<E, Response>>{});
 #endif
   throw std::runtime_error("no such tracer for this policy");
 }
@@ -95,29 +90,27 @@ auto with_degree(int degree, F&& body) {
 }  // namespace detail
 
 template <int Degree, class Tracer, class E>
-traced<E> render_by(E& exec, Tracer& tracer, gart::gaussian_model const& model, gart::camera const& view,
+using frame_by = gart::frame<E, gart::scene_traits<Degree, typename Tracer::response_type>, Tracer>;
+
+template <int Degree, class Tracer, class E>
+traced<E> render_by(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                     gart::render_options const& options, int active_degree) {
-  gart::gaussians<E> scene(exec, model);
-  gart::frame_records<E> records(exec);
+  gart::gaussians<E> const scene(exec, model);
+  frame_by<Degree, Tracer, E> frame(exec);
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
   gart::buffer<float, E> color(exec, 3 * pixels), transmittance(exec, pixels), depth(exec, pixels);
   gart::buffer<gart::u32, E> hits(exec, pixels);
-  auto const constant = std::as_const(scene).view();
-  gart::antialiased<E> filter(exec);
-  auto const seen = filter.of(exec, constant, view, options.antialias);
-  records.template prepare<typename Tracer::response_type>(exec, seen, view.position, options.alpha_min);
-  tracer.prepare(exec, seen, records.view(), view, options.alpha_min, options.near);
-  gart::forward<Degree>(exec, tracer, constant, view, options, active_degree,
-                        {color.data(), transmittance.data(), depth.data(), hits.data()}, gart::record_none{});
+  frame.prepare(scene.view(), view, options, active_degree);
+  frame.render({color.data(), transmittance.data(), depth.data(), hits.data()});
   return {color.to_host(), transmittance.to_host(), depth.to_host(), hits.to_host()};
 }
 
 template <class E>
 traced<E> render_scene(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                        gart::render_options const& options, int active_degree, tracer_kind kind) {
-  return detail::with_tracer(exec, kind, [&](auto& tracer) {
+  return detail::with_tracer<E>(kind, [&]<class Tracer>(std::type_identity<Tracer>) {
     return detail::with_degree(model.sh_degree, [&](auto degree) {
-      return render_by<degree>(exec, tracer, model, view, options, active_degree);
+      return render_by<degree, Tracer>(exec, model, view, options, active_degree);
     });
   });
 }
@@ -131,24 +124,17 @@ template <int Degree, class Strategy, class Tracer, class E>
 gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                                   gart::render_options const& options, int active_degree,
                                   std::vector<float> const& color_gradient, attributed_error* error = nullptr) {
-  Tracer tracer(exec);
-  gart::gaussians<E> scene(exec, model);
+  gart::gaussians<E> const scene(exec, model);
   gart::gaussians<E> gradients(exec, scene.size(), model.sh_degree);
-  gart::frame_records<E> records(exec);
-  gart::backward<E, Strategy, gart::tile_size_of<Tracer>> pass(exec);
+  frame_by<Degree, Tracer, E> frame(exec);
+  gart::backward_pass<frame_by<Degree, Tracer, E>, Strategy> pass(exec);
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
   gart::buffer<float, E> color(exec, 3 * pixels), gradient(exec, color_gradient);
-  auto const constant = std::as_const(scene).view();
-  gart::antialiased<E> filter(exec);
-  auto const seen = filter.of(exec, constant, view, options.antialias);
-  records.template prepare<typename Tracer::response_type>(exec, seen, view.position, options.alpha_min);
-  tracer.prepare(exec, seen, records.view(), view, options.alpha_min, options.near);
-  if (!pass.prepare(exec, tracer, seen, view, options.alpha_min, options.near)) throw pass.no_room();
-  gart::forward<Degree>(exec, tracer, constant, view, options, active_degree, pass.targets(color.data()),
-                        pass.record());
+  frame.prepare(scene.view(), view, options, active_degree);
+  if (!pass.prepare(frame)) throw pass.no_room();
+  pass.render(frame, {color.data()});
   gart::buffer<float, E> pixel_error(exec, error ? error->of_pixels : std::vector<float>{});
-  pass.template run<Degree>(exec, tracer, constant, records.view(), view, options, active_degree, color, gradient,
-                            gradients, pixel_error);
+  gart::differentiate(frame, pass, gradient, gradients, pixel_error);
   if (error) {
     std::vector<float> moments(pass.moments().size());
     exec.copy_out(moments.data(), pass.moments().data(), moments.size() * sizeof(float));
@@ -158,14 +144,27 @@ gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, ga
   return gradients.to_host();
 }
 
-// Which strategies are compiled here for a tracer and a degree: each strategy and each tracer at every degree, the
-// other combinations at degree 3 only, for the sake of the compiler's time.
+// Whether a strategy is compiled here for a tracer and a degree: at degree 3 all for tile lists, for a BVH those that
+// record or scatter otherwise (others differ in the gather alone, which does not know the tracer); at other degrees one
+// for each tracer, for the sake of the compiler's time.
+template <class Strategy>
+inline constexpr bool differs_in_gather =
+    std::derived_from<Strategy, gart::primitive_strategy> && !std::same_as<Strategy, gart::primitive_strategy>;
+
+template <class Strategy>
+constexpr bool compiled_for(tracer_kind kind, int degree) {
+  if (kind == tracer_kind::embree || (kind == tracer_kind::bvh && degree != 3))
+    return std::same_as<Strategy, gart::pixel_strategy>;
+  if (kind == tracer_kind::bvh) return !differs_in_gather<Strategy>;
+  return degree == 3 || std::same_as<Strategy, gart::primitive_strategy>;
+}
+
 inline std::vector<std::string> strategies_for(tracer_kind kind, int degree) {
-  if (kind == tracer_kind::embree) return {"pixel"};
-  if (kind == tracer_kind::tiles)
-    return degree == 3 ? std::vector<std::string>{"pixel", "hybrid", "primitive", "deterministic", "cleared", "lane"}
-                       : std::vector<std::string>{"primitive"};
-  return degree == 3 ? std::vector<std::string>{"pixel", "hybrid", "primitive"} : std::vector<std::string>{"pixel"};
+  std::vector<std::string> names;
+  gart::strategies::for_each([&]<class Strategy>(Strategy) {
+    if (compiled_for<Strategy>(kind, degree)) names.emplace_back(Strategy::name);
+  });
+  return names;
 }
 
 template <class E>
@@ -173,64 +172,51 @@ gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model,
                                      gart::render_options const& options, int active_degree, tracer_kind kind,
                                      std::string const& strategy, std::vector<float> const& color_gradient,
                                      attributed_error* error = nullptr) {
-  using bvh = gart::bvh_tracer<E>;
-  using tiles = gart::tile_tracer<E>;
-  return detail::with_degree(model.sh_degree, [&](auto degree) -> gart::gaussian_model {
-    auto const by = [&]<class Strategy, class Tracer>(Strategy, std::type_identity<Tracer>) {
-      return gradients_by<degree, Strategy, Tracer>(exec, model, view, options, active_degree, color_gradient, error);
+  std::optional<gart::gaussian_model> out;
+  detail::with_degree(model.sh_degree, [&](auto degree) {
+    auto const by = [&]<tracer_kind Kind, class Tracer>(std::integral_constant<tracer_kind, Kind>,
+                                                        std::type_identity<Tracer>) {
+      gart::strategies::with(strategy, [&]<class Strategy>(Strategy) {
+        if constexpr (compiled_for<Strategy>(Kind, degree))
+          out =
+              gradients_by<degree, Strategy, Tracer>(exec, model, view, options, active_degree, color_gradient, error);
+      });
     };
-    if (kind == tracer_kind::bvh && strategy == "pixel") return by(gart::pixel_strategy{}, std::type_identity<bvh>{});
-    if (kind == tracer_kind::tiles && strategy == "primitive")
-      return by(gart::primitive_strategy{}, std::type_identity<tiles>{});
-    if constexpr (degree == 3) {
-      if (kind == tracer_kind::bvh && strategy == "hybrid")
-        return by(gart::hybrid_strategy{}, std::type_identity<bvh>{});
-      if (kind == tracer_kind::bvh && strategy == "primitive")
-        return by(gart::primitive_strategy{}, std::type_identity<bvh>{});
-      if (kind == tracer_kind::tiles && strategy == "pixel")
-        return by(gart::pixel_strategy{}, std::type_identity<tiles>{});
-      if (kind == tracer_kind::tiles && strategy == "hybrid")
-        return by(gart::hybrid_strategy{}, std::type_identity<tiles>{});
-      if (kind == tracer_kind::tiles && strategy == "deterministic")
-        return by(gart::deterministic_strategy{}, std::type_identity<tiles>{});
-      if (kind == tracer_kind::tiles && strategy == "cleared")
-        return by(gart::cleared_strategy{}, std::type_identity<tiles>{});
-      if (kind == tracer_kind::tiles && strategy == "lane")
-        return by(gart::lane_strategy{}, std::type_identity<tiles>{});
-    }
+    if (kind == tracer_kind::bvh)
+      by(std::integral_constant<tracer_kind, tracer_kind::bvh>{}, std::type_identity<gart::bvh_tracer<E>>{});
+    if (kind == tracer_kind::tiles)
+      by(std::integral_constant<tracer_kind, tracer_kind::tiles>{}, std::type_identity<gart::tile_tracer<E>>{});
 #if defined(GART_WITH_EMBREE)
     if constexpr (!E::device)
-      if (kind == tracer_kind::embree && strategy == "pixel")
-        return by(gart::pixel_strategy{}, std::type_identity<gart::embree_tracer<E>>{});
+      if (kind == tracer_kind::embree)
+        by(std::integral_constant<tracer_kind, tracer_kind::embree>{}, std::type_identity<gart::embree_tracer<E>>{});
 #endif
-    throw std::runtime_error("not compiled here: " + strategy);
   });
+  if (!out) throw std::runtime_error("not compiled here: " + strategy);
+  return *out;
 }
 
 template <class Response = gart::generalized_gaussian<>, class E>
 std::vector<std::vector<gart::hit>> hit_lists(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                                               gart::render_options const& options, tracer_kind kind) {
-  return detail::with_tracer<Response>(exec, kind, [&](auto& tracer) {
-    gart::gaussians<E> scene(exec, model);
-    gart::frame_records<E> records(exec);
+  return detail::with_tracer<E, Response>(kind, [&]<class Tracer>(std::type_identity<Tracer>) {
+    // A list has no colours: of whichever degree.
+    gart::gaussians<E> const scene(exec, gart::with_sh_degree(model, 0));
+    frame_by<0, Tracer, E> frame(exec);
     std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
     gart::buffer<gart::u32, E> counts(exec, pixels), starts(exec);
     gart::buffer<gart::hit, E> list(exec);
-    auto const constant = std::as_const(scene).view();
-    gart::antialiased<E> filter(exec);
-    auto const seen = filter.of(exec, constant, view, options.antialias);
-    records.template prepare<Response>(exec, seen, view.position, options.alpha_min);
-    tracer.prepare(exec, seen, records.view(), view, options.alpha_min, options.near);
+    frame.prepare(scene.view(), view, options);
     gart::pixel_order const order{view.width, view.height};
-    list_program program{view, order, options.transmittance_min, options.max_hits, counts.data(), nullptr, nullptr};
-    tracer.trace(exec, "count", order.launch_size(), program);
+    list_program program{{}, view, order, options.transmittance_min, options.max_hits, counts.data(), nullptr, nullptr};
+    frame.trace("count", order.launch_size(), program);
     std::vector<gart::u32> const count = counts.to_host();
     std::vector<gart::u32> offset(pixels + 1, 0);
     for (std::size_t i = 0; i < pixels; ++i) offset[i + 1] = offset[i] + count[i];
     starts.assign(offset);
     list.resize(offset.back() + 1);
     program.offsets = starts.data(), program.list = list.data();
-    tracer.trace(exec, "list", order.launch_size(), program);
+    frame.trace("list", order.launch_size(), program);
     std::vector<gart::hit> const flat = list.to_host();
     std::vector<std::vector<gart::hit>> lists(pixels);
     for (std::size_t i = 0; i < pixels; ++i) lists[i].assign(flat.begin() + offset[i], flat.begin() + offset[i + 1]);

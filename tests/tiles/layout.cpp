@@ -1,5 +1,5 @@
 // The addresses of the LT buffer: one to one onto [0, sum of box areas), primitive by primitive, tile by tile.
-#include <gart/tiles/layout.hpp>
+#include <gart/backward/lt_layout.hpp>
 #include <support/policies.hpp>
 
 #include <random>

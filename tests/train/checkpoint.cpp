@@ -3,7 +3,7 @@
 
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
-#include <gart/train/checkpoint.hpp>
+#include <gart/runtime/checkpoint.hpp>
 #include <gart/train/state.hpp>
 
 #include <unistd.h>

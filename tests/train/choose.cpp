@@ -1,8 +1,8 @@
 // What is chosen for a capture, from captures made by hand.
 #include <support/policies.hpp>
 
-#include <gart/train/choose.hpp>
-#include <gart/train/degree_selection.hpp>
+#include <gart/runtime/choose.hpp>
+#include <gart/runtime/degree_selection.hpp>
 
 #include <algorithm>
 
@@ -92,18 +92,18 @@ TEST_CASE("masks are counted, and a capture without images has nothing to tell")
 
 TEST_CASE("a lens is traced by tiles where it is one to one over the image, else by what needs no footprints") {
   auto data = capture(3, 90);
-  CHECK(gart::choose_tracer(gart::inspect(data)).value == "auto");
+  CHECK(gart::choose_tracer(gart::inspect(data)).value == gart::tracer_kind::automatic);
   data.train[0].view.lens.k1 = -0.1f, data.train[0].view.lens.p1 = 0.01f;
   auto const mild = gart::inspect(data);
   CHECK(mild.distorted == 1);
   CHECK(mild.folding == 0);
-  CHECK(gart::choose_tracer(mild).value == "auto");
+  CHECK(gart::choose_tracer(mild).value == gart::tracer_kind::automatic);
   // r (1 + k1 r^2) has its maximum at r = 1 / sqrt(-3 k1): for k1 = -1.5 at r = 0.47, where the image is 0.31 away, and
   // the corners of the image are 0.62 away.
   data.train[1].view.lens.k1 = -1.5f;
   auto const strong = gart::inspect(data);
   CHECK(strong.folding == 1);
-  CHECK(gart::choose_tracer(strong).value == "bvh");
+  CHECK(gart::choose_tracer(strong).value == gart::tracer_kind::bvh);
   CHECK(gart::choose_backward(strong).value == "pixel");
 }
 
@@ -129,7 +129,7 @@ TEST_CASE("training starts from the capture's points, or from random ones as MCM
 }
 
 TEST_CASE("bands are measured where views and steps allow, on views evenly spread, within a quarter of the run") {
-  gart::row_request request{"serial"};
+  gart::configuration_request request{gart::backend_kind::serial};
   gart::train_options options;
   options.sh_gain = 0.02f;
   auto const plan = gart::plan_trials(request, options, 100);

@@ -2,8 +2,9 @@
 // nothing depends on where a run was interrupted.
 #include <support/policies.hpp>
 
-#include <gart/train/degree_selection.hpp>
-#include <gart/train/session.hpp>
+#include <gart/runtime/degree_selection.hpp>
+#include <gart/runtime/renderer.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +17,13 @@
 namespace {
 
 constexpr int iterations = 600, views = 20;
-gart::row_request const serial{"serial", "auto", "auto", 3};
+gart::configuration_request const serial{gart::backend_kind::serial};
+
+gart::configuration_request with_degree(int sh_degree) {
+  gart::configuration_request request = serial;
+  request.sh_degree = sh_degree;
+  return request;
+}
 
 struct fixture {
   gart::dataset data;
@@ -39,7 +46,7 @@ fixture make(std::uint64_t seed, float view_dependence) {
     truth.sh[i] = (i % 12 < 3 ? 0.5f : view_dependence) * normal(engine);
 
   fixture f;
-  auto const renderer = gart::make_renderer({"serial", "auto", "auto", 1});
+  auto const renderer = gart::make_renderer(with_degree(1));
   renderer->set_model(truth);
   for (int v = 0; v < views; ++v) {
     gart::dataset_view view;
@@ -110,7 +117,7 @@ TEST_CASE("a length that is set moves the trials as one that was known") {
   brief->set_iterations(150);
   while (brief->steps_done() < 150) CHECK_FALSE(brief->step().trial);
   CHECK(brief->trials().empty());
-  CHECK(brief->row().sh_degree == 3);
+  CHECK(brief->configuration().sh_degree == 3);
 }
 
 TEST_CASE("a band has no floats before it is used, and its coming changes no bit of the training") {
@@ -129,7 +136,7 @@ TEST_CASE("a band has no floats before it is used, and its coming changes no bit
     floats.insert(state.scene.sh.size() / state.scene.size());
   }
   CHECK(floats == std::set<std::size_t>{3, 12, 27, 48});
-  CHECK(full->row().sh_degree == 3);
+  CHECK(full->configuration().sh_degree == 3);
   CHECK(same_bits(growing->model(), full->model()));
   CHECK(same_bits(growing->state().second, full->state().second));
 }
@@ -148,7 +155,7 @@ TEST_CASE("a scene without view dependence ends in 14 floats a Gaussian, one wit
     auto const model = run->model();
     if (dependence == 0) {
       CHECK(trials.size() == 3);
-      CHECK(run->row().sh_degree == 0);
+      CHECK(run->configuration().sh_degree == 0);
       CHECK(model.sh.size() + 11 * model.size() == 14 * model.size());
       auto const state = run->state();
       CHECK(state.first.sh.size() == 3 * model.size());
@@ -157,11 +164,11 @@ TEST_CASE("a scene without view dependence ends in 14 floats a Gaussian, one wit
       // Three times 14 floats, the statistic of densification if it were on, and names and counters.
       CHECK(std::filesystem::file_size(file.path) < 3 * 14 * 4 * model.size() + 1500);
     } else {
-      CHECK(run->row().sh_degree >= 1);
+      CHECK(run->configuration().sh_degree >= 1);
       CHECK(trials.back().kept());
-      CHECK(trials.back().band == run->row().sh_degree);
+      CHECK(trials.back().band == run->configuration().sh_degree);
     }
-    CHECK(model.sh_degree == run->row().sh_degree);
+    CHECK(model.sh_degree == run->configuration().sh_degree);
   }
 }
 
@@ -197,7 +204,8 @@ TEST_CASE("the threshold decides, the scores are those of the views held out, an
   while (run->steps_done() < iterations) {
     int const step = run->steps_done();
     auto const report = run->step();
-    (run->row().sh_degree == 0 && run->trials().size() == 3 && !report.trial ? after : before).insert(report.view);
+    (run->configuration().sh_degree == 0 && run->trials().size() == 3 && !report.trial ? after : before)
+        .insert(report.view);
     CHECK(report.step == run->steps_done());
     trial_steps += report.trial;
     if (run->trials().size() == judged) {
@@ -224,17 +232,17 @@ TEST_CASE("the threshold decides, the scores are those of the views held out, an
   }
   CHECK(judged == 3);
   CHECK(trial_steps == 3 * 2 * 50);
-  CHECK(run->row().sh_degree == 0);
+  CHECK(run->configuration().sh_degree == 0);
   CHECK(std::none_of(before.begin(), before.end(), is_held));
   CHECK(after.size() == views);
 
   f.options.sh_gain = 1e-6f;
-  auto const kept = gart::make_session({"serial", "auto", "auto", 1}, f.options, f.data, &f.start);
+  auto const kept = gart::make_session(with_degree(1), f.options, f.data, &f.start);
   while (kept->steps_done() < iterations) kept->step();
   REQUIRE(kept->trials().size() == 1);
   CHECK(kept->trials()[0].kept());
   CHECK(kept->trials()[0].gain() > 0);
-  CHECK(kept->row().sh_degree == 1);
+  CHECK(kept->configuration().sh_degree == 1);
 }
 
 TEST_CASE("a run resumed while its bands grow, in a trial or after ends with the same bits") {
@@ -276,6 +284,6 @@ TEST_CASE("coefficients that a model brings along are not lost while bands grow"
   f.start = gart::with_sh_degree(f.start, 3);
   f.start.sh[3 * 4] = 0.25f;  // band 2
   auto const run = session_of(f);
-  CHECK(run->row().sh_degree == 2);
+  CHECK(run->configuration().sh_degree == 2);
   CHECK(run->model().sh[3 * 4] == 0.25f);
 }

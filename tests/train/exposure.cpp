@@ -32,7 +32,6 @@ gart::train_options still(int iterations) {
   options.iterations = iterations;
   options.max_gaussians = 400;
   options.densify = gart::densify_kind::none;
-  options.sh_degree = 1;
   options.sh_every = 1;
   options.exposure = true;
   auto& r = options.rates;

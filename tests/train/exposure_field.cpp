@@ -2,7 +2,7 @@
 #include <support/policies.hpp>
 
 #include <gart/exposure/exposure_field.hpp>
-#include <gart/train/choose.hpp>
+#include <gart/runtime/choose.hpp>
 
 #include <cmath>
 

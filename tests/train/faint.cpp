@@ -26,7 +26,6 @@ gart::gaussian_model densified(E& exec, gart::densify_kind densify, float alpha_
   options.error.from = options.mcmc.from = options.adc.from = 0;
   options.error.every = options.mcmc.every = options.adc.every = 1;
   options.adc.gradient = 1e30f;
-  options.sh_degree = 1;
   options.render.alpha_min = alpha_min;
   gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::primitive_strategy> run(exec, options, data,
                                                                                               start);

@@ -21,7 +21,6 @@ gart::train_options options_with(gart::densify_kind densify) {
   options.max_gaussians = 400;
   options.densify = densify;
   options.mcmc.from = options.adc.from = 10, options.mcmc.every = options.adc.every = 10;
-  options.sh_degree = 1;
   options.check_finite = true;
   return options;
 }

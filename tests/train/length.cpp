@@ -13,7 +13,7 @@ using run_of = gart::trainer<gart::serial_exec, gart::scene_traits<1>, gart::til
 gart::train_options options_of(gart::densify_kind densify, int iterations) {
   gart::train_options options;
   options.iterations = iterations, options.densify = densify;
-  options.max_gaussians = 220, options.sh_degree = 1, options.exposure = true;
+  options.max_gaussians = 220, options.exposure = true;
   options.mcmc.from = 20, options.mcmc.every = 10;
   options.adc.from = 20, options.adc.every = 10, options.adc.opacity_reset_every = 60, options.adc.gradient = 1e-6f;
   return options;

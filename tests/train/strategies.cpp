@@ -4,6 +4,7 @@
 
 #include <gart/train/trainer.hpp>
 
+#include <concepts>
 #include <string>
 #include <vector>
 
@@ -27,7 +28,6 @@ course train(E& exec, gart::dataset const& data, u64 seed, u64 lt_budget = 0) {
   options.lt_budget = lt_budget;
   options.iterations = steps;
   options.densify = gart::densify_kind::none;
-  options.sh_degree = 1;
   gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy> run(exec, options, data,
                                                                               cloud(seed + 1, 0.7f));
   course out;
@@ -61,9 +61,13 @@ TEST_CASE_TEMPLATE("every strategy trains along the same loss curve", E, GART_TE
   auto const with_none = train<gart::primitive_strategy>(exec, data, seed, 1);
   CHECK(with_none.backward == "pixel");
   CHECK(with_none.lt_bytes == 0);
-  for (auto const& other :
-       {with_less, with_none, train<gart::pixel_strategy>(exec, data, seed),
-        train<gart::hybrid_strategy>(exec, data, seed), train<gart::deterministic_strategy>(exec, data, seed)}) {
+  std::vector<course> others{with_less, with_none};
+  gart::strategies::for_each([&]<class Strategy>(Strategy) {
+    if constexpr (Strategy::use == gart::strategy_use::training && !std::same_as<Strategy, gart::primitive_strategy>)
+      others.push_back(train<Strategy>(exec, data, seed));
+  });
+  for (auto const& other : others) {
+    CAPTURE(other.backward);
     for (int i = 0; i < steps; ++i) {
       CAPTURE(i);
       CHECK(other.loss[i] == doctest::Approx(reference.loss[i]).epsilon(i < 20 ? 1e-3 : 2e-2));

@@ -24,7 +24,6 @@ std::vector<float> losses(E& exec, gart::dataset data, gart::gaussian_model star
   options.iterations = steps;
   options.max_gaussians = 250;
   options.densify = densify;
-  options.sh_degree = 1;
   options.error.from = options.mcmc.from = options.adc.from = 10;
   options.error.every = options.mcmc.every = options.adc.every = 10;
   options.adc.gradient = 2e-3f;

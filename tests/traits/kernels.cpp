@@ -75,8 +75,7 @@ lists hits_by_every_tracer(E& exec, oracle::scene const& s) {
 
 template <class Tracer, class E>
 image_errors errors_of_image(E& exec, expectation const& e) {
-  Tracer tracer(exec);
-  return image_error(render_by<0>(exec, tracer, e.scene.model, e.scene.view, e.scene.options, 0), e.picture);
+  return image_error(render_by<0, Tracer>(exec, e.scene.model, e.scene.view, e.scene.options, 0), e.picture);
 }
 
 template <int Degree, class E>

@@ -1,112 +1,73 @@
 #pragma once
-// From the gradient of the image to the gradients of the parameters, by any strategy (strategies.hpp):
-//   prepare()  before the forward pass: footprints, tile map and LT buffer, where the strategy records
-//   record(), targets()  what the forward pass is given
-//   run()      gathers and scatters what the strategy says, then turns the moments of each Gaussian into the gradients
-//              of its mean, log-scale, quaternion and opacity. Overwrites `gradients`. Given an error a pixel, [H][W],
-//              it also attributes that to the Gaussians: the sum over a Gaussian's hits of weight times error.
+// From the gradient of an image to the gradients of the parameters, by any strategy (backward/strategies.hpp):
+//
+//   backward_pass<frame<E, Traits, Tracer>, primitive_strategy> pass(exec);
+//   frame.prepare(scene, view, options);
+//   pass.prepare(frame);                                       // footprints, lists and LT buffer, where it records
+//   pass.render(frame, {.color = color});                      // the forward pass, with what the strategy records
+//   differentiate(frame, pass, color_gradient, gradients);     // overwrites `gradients`
+//
+// A pass knows which preparation of which frame it stands at: out of this order it throws invalid_argument.
+// backward/fallback.hpp takes a strategy that needs less where there is no room.
 //
 // Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, the LT buffer, 4 or
 // 16 bytes for each pixel of each box, and where the tracer has none to lend, footprints of 36 bytes a Gaussian and
 // lists of 8 a (primitive, tile) pair.
 
+#include <gart/backward/finish.hpp>
 #include <gart/backward/gather_form.hpp>
 #include <gart/backward/scatter.hpp>
 #include <gart/backward/strategies.hpp>
-#include <gart/render/antialiased.hpp>
-#include <gart/render/forward.hpp>
+#include <gart/render/frame.hpp>
 #include <gart/tiles/tile_map.hpp>
 
 #include <string>
 
 namespace gart::inline GART_ISA {
 
-namespace backward_kernels {
-
-// Filter: no_filter, or the pixel_filter that the records were made through; `scene` is the stored one.
-struct no_filter {};
-
-template <class Filter>
-struct finish {
-  gaussians_view<float const> scene;
-  span<ray_gaussian const> records;
-  span<float const> moments;
-  gaussians_view<float> gradients;
-  Filter filter;
-  GART_KERNEL void operator()(index_t i) const {
-    ray_gaussian const g = records[i];
-    geometry_gradient out{vec3(0.0f), vec3(0.0f), {0, 0, 0, 0}, 0};
-    if (g.cutoff >= 0) out = gradient_of(moments.data() + std::size_t{moment_stride} * i, load_parameters(scene, i), g);
-    for (int k = 0; k < 3; ++k) {
-      gradients.mean[std::size_t{3} * i + k] = out.mean[k];
-      gradients.log_scale[std::size_t{3} * i + k] = out.log_scale[k];
-    }
-    float* q = gradients.quaternion + std::size_t{4} * i;
-    q[0] = out.rotation.w, q[1] = out.rotation.x, q[2] = out.rotation.y, q[3] = out.rotation.z;
-    gradients.opacity[i] = out.opacity;
-  }
-
- private:
-  GART_HD GART_INLINE geometry_gradient gradient_of(float const* m, gaussian_parameters const& p,
-                                                    ray_gaussian const& g) const {
-    if constexpr (std::is_same_v<Filter, no_filter>) {
-      return from_moments(m, p, g);
-    } else {
-      vec3 const mean = filter.from_camera(p);
-      filter_at const at = filter.at(mean);
-      return pull_back_widened(from_moments(m, widened(p, mean, at.sigma), g), m[0], p, mean, at);
-    }
-  }
-};
-
-}  // namespace backward_kernels
-
-// The tiles that a tracer's footprints are cut into; 8 where it has none to lend.
-template <class Tracer>
-inline constexpr int tile_size_of = 8;
-template <class Tracer>
-requires requires { Tracer::tile_size; }
-inline constexpr int tile_size_of<Tracer> = Tracer::tile_size;
-
-template <execution E, class Strategy, int TileSize = 8>
-class backward {
+template <class Frame, strategy Strategy>
+class backward_pass {
  public:
-  using record_type = typename Strategy::template record<TileSize>;
+  using frame_type = Frame;
+  using strategy_type = Strategy;
+  using execution_type = typename Frame::execution_type;
+  static constexpr int sh_degree = Frame::sh_degree;
+  static constexpr int tile_size = Frame::tile_size;
+  using record_type = typename Strategy::template record<tile_size>;
   static constexpr bool records = Strategy::gather::any;
   static constexpr bool ordered = records && Strategy::ordered;
-  static constexpr slot_validity validity = [] {
-    if constexpr (!records)
-      return slot_validity::cleared;
-    else
-      return Strategy::validity;
-  }();
+  static constexpr slot_validity validity = Strategy::validity;
 
-  explicit backward(E& exec) : moments_(exec), own_prints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec) {}
+  explicit backward_pass(execution_type& exec)
+      : moments_(exec), own_prints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec) {}
 
-  // After the tracer's own preparation: a tracer that has the view's footprints lends them. False, and nothing
-  // allocated, where the LT buffer would take more than byte_budget (0: no limit) or have more slots than there are
-  // numbers of 32 bits, by which hits know theirs.
-  template <class Tracer>
-  [[nodiscard]] bool prepare(E& exec, Tracer const& tracer, gaussians_view<float const> scene, camera const& view,
-                             float alpha_min, float near, u64 byte_budget = 0) {
+  // After the frame's preparation: a tracer that has the view's footprints lends them. False, and nothing allocated,
+  // where the LT buffer would take more than byte_budget (0: no limit) or have more slots than there are numbers of 32
+  // bits, by which hits know theirs.
+  [[nodiscard]] bool prepare(Frame const& frame, u64 byte_budget = 0) {
+    stands_at_ = nothing, frame_ = &frame, preparation_ = frame.preparation();
     if constexpr (records) {
+      using tracer_type = typename Frame::tracer_type;
+      execution_type& exec = frame.exec();
+      camera const& view = frame.view();
       grid_ = {view.width, view.height};
-      if constexpr (requires { tracer.prints(); }) {
-        prints_ = &tracer.prints();
+      if constexpr (tracer_type::lends_footprints) {
+        static_assert(footprint_tracer<tracer_type, execution_type>);
+        prints_ = &frame.tracer().prints();
       } else {
-        own_prints_.template measure<typename Tracer::response_type>(exec, scene, view, alpha_min, near);
+        own_prints_.template measure<typename Frame::response>(exec, frame.seen(), view, frame.options().alpha_min,
+                                                               frame.options().near);
         prints_ = &own_prints_;
       }
       if (byte_budget && prints_->slots() * sizeof(entry) > byte_budget) return false;
       if (prints_->slots() >= tile_slots::none) return false;
-      if constexpr (requires { tracer.map(); }) {
-        lists_ = tracer.map();
+      if constexpr (tracer_type::lends_footprints) {
+        lists_ = frame.tracer().map();
       } else {
         map_.build(exec, grid_, *prints_, number_order{});
         lists_ = map_.view();
       }
       slots_.resize(prints_->slots());
-      near_ = near;
       if constexpr (validity == slot_validity::recomputed) {
         last_.resize(static_cast<std::size_t>(view.width) * view.height);
       } else {
@@ -114,75 +75,25 @@ class backward {
         exec.fill(slots_.data(), 0xff, slots_.size() * sizeof(entry));  // a NaN: not written
       }
     }
+    stands_at_ = prepared;
     return true;
   }
 
-  record_type record() const {
-    if constexpr (records)
-      return {prints_->ranges().data(), slots_.data()};
-    else
-      return {};
-  }
-
-  // What the forward pass writes for this pass: its colour, and where rays end if the slots' validity needs it.
-  image_targets targets(float* color) {
-    image_targets out;
-    out.color = color;
-    if constexpr (records && validity == slot_validity::recomputed) out.last = last_.data();
-    return out;
-  }
-
-  // `color` and `color_gradient` are [H][W][3]; `gaussians_in_frame` and the tracer stand as the forward pass used
-  // them. `scene` is the stored one, also where these were made from what a filter shows of it
-  // (render/antialiased.hpp).
-  template <int ShDegree, class Tracer>
-  void run(E& exec, Tracer& tracer, gaussians_view<float const> scene, span<ray_gaussian const> gaussians_in_frame,
-           camera const& view, render_options const& options, int active_degree, span<float const> color,
-           span<float const> color_gradient, gaussians<E>& gradients, span<float const> error = {}) {
-    using response = typename Tracer::response_type;
-    stage_scope stage(exec, "backward");
-    moments_.resize(std::size_t{moment_stride} * scene.count);
-    // The ordered sums write every Gaussian themselves.
-    if constexpr (!ordered || Strategy::scatter::any) moments_.zero();
-    if constexpr (!ordered) gradients.sh.zero();
+  // The forward pass, with what the strategy records; `targets.last` is the pass's own. The colour is read again by
+  // differentiate().
+  void render(Frame& frame, image_targets targets) {
+    require(frame, prepared, "backward_pass.render: call backward_pass.prepare first, after frame.prepare");
+    record_type record{};
     if constexpr (records) {
-      if constexpr (ordered) rows_.resize(prints_->pairs() * pair_gradient<ShDegree>::quads);
-      gather_terms<ShDegree, response>(exec, gaussians_in_frame, view, active_degree, color, color_gradient, error,
-                                       gradients);
-      if constexpr (ordered)
-        parallel_for(
-            exec, "backward/sum", scene.count * pair_gradient<ShDegree>::quads,
-            sum_pairs<ShDegree, typename Strategy::gather>{prints_->pair_offsets(), prints_->pairs(), rows_.data(),
-                                                           gradients.sh.data(), moments_.data()});
+      record = {prints_->ranges().data(), slots_.data()};
+      if constexpr (validity == slot_validity::recomputed) targets.last = last_.data();
     }
-    if constexpr (Strategy::scatter::any) {
-      pixel_order const order{view.width, view.height};
-      scatter_program<ShDegree, response, typename Strategy::scatter, E> const program{view,
-                                                                                       order,
-                                                                                       scene.sh,
-                                                                                       active_degree,
-                                                                                       options.transmittance_min,
-                                                                                       options.max_hits,
-                                                                                       gaussians_in_frame.data(),
-                                                                                       color.data(),
-                                                                                       color_gradient.data(),
-                                                                                       error.data(),
-                                                                                       gradients.sh.data(),
-                                                                                       moments_.data()};
-      tracer.trace(exec, "backward/scatter", order.launch_size(), program);
-    }
-    auto const finish = [&]<class Filter>(Filter const& filter) {
-      parallel_for(exec, "backward/finish", scene.count,
-                   backward_kernels::finish<Filter>{scene, gaussians_in_frame, moments_, gradients.view(), filter});
-    };
-    if (options.antialias > 0)
-      finish(pixel_filter(view, options.antialias));
-    else
-      finish(backward_kernels::no_filter{});
+    frame.render(targets, record);
+    color_ = targets.color, stands_at_ = rendered;
   }
 
-  // Of the last run(), [N][moment_stride]: at error_place the error that is seen through each Gaussian, where run() was
-  // given the pixels' errors.
+  // Of the last differentiate(), [N][moment_stride]: at error_place the error that is seen through each Gaussian, where
+  // the pixels' errors were given.
   span<float const> moments() const { return moments_; }
 
   std::size_t lt_bytes() const { return records ? slots_.size() * sizeof(entry) : 0; }
@@ -193,42 +104,109 @@ class backward {
     return out_of_memory("LT buffer", slots * sizeof(entry), 0,
                          std::to_string(slots) +
                              " slots, and there are numbers for 2^32: render smaller, with fewer Gaussians, or take "
-                             "row_request.backward = pixel, which needs none");
+                             "configuration_request.backward = pixel, which needs none");
   }
 
  private:
-  template <class R>
-  struct entry_of {
-    using type = float;  // no slots
-  };
-  template <class R>
-  requires requires { typename R::entry; }
-  struct entry_of<R> {
-    using type = typename R::entry;
-  };
-  using entry = typename entry_of<record_type>::type;
+  template <class F, strategy S>
+  friend void differentiate(F&, backward_pass<F, S>&, span<float const>, gaussians<typename F::execution_type>&,
+                            span<float const>);
+  using entry = typename record_type::entry;
+  enum standing { nothing, prepared, rendered };
 
-  template <int ShDegree, class Response>
-  void gather_terms(E& exec, span<ray_gaussian const> gaussians_in_frame, camera const& view, int active_degree,
-                    span<float const> image, span<float const> image_gradient, span<float const> error,
-                    gaussians<E>& gradients) {
-    using gather = gather_of<strategy_gather<E, ShDegree, Response, Strategy, TileSize>>;
-    parallel_for(exec, "backward/gather", tile_range{grid_.count(), gather::block_size},
-                 gather{view, grid_, lists_, prints_->ranges().data(), slots_.data(), gaussians_in_frame.data(),
-                        active_degree, image.data(), image_gradient.data(), error.data(), gradients.sh.data(),
-                        moments_.data(), prints_->pair_offsets().data(), rows_.data(), last_.data(), near_});
+  void require(Frame const& frame, standing least, char const* what) const {
+    if (stands_at_ < least || frame_ != &frame || preparation_ != frame.preparation()) throw invalid_argument(what);
   }
 
-  buffer<float, E> moments_;
-  footprints<E, TileSize> own_prints_;
-  footprints<E, TileSize> const* prints_ = nullptr;
-  tile_grid<TileSize> grid_;
-  tile_map<E, TileSize> map_;
+  void run(Frame& frame, span<float const> color_gradient, gaussians<execution_type>& gradients,
+           span<float const> error) {
+    using response = typename Frame::response;
+    require(frame, rendered, "differentiate: call backward_pass.render first, after frame.prepare");
+    execution_type& exec = frame.exec();
+    gaussians_view<float const> const scene = frame.scene();
+    camera const& view = frame.view();
+    std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
+    if (!color_) throw invalid_argument("differentiate needs the image's colour: give backward_pass.render its target");
+    if (color_gradient.size() != 3 * pixels)
+      throw invalid_argument("differentiate: the image's gradient must have three values for each pixel of the view");
+    if (!error.empty() && error.size() != pixels)
+      throw invalid_argument("differentiate: the error must have a value for each pixel of the view");
+    if (gradients.size() != scene.count || gradients.sh_degree() != sh_degree)
+      throw invalid_argument("differentiate: the gradients must have the number and the SH degree of the Gaussians");
+    stage_scope stage(exec, "backward");
+    moments_.resize(std::size_t{moment_stride} * scene.count);
+    // The ordered sums write every Gaussian themselves.
+    if constexpr (!(ordered && Strategy::gather::geometry)) moments_.zero();
+    if constexpr (!(ordered && Strategy::gather::color)) gradients.sh.zero();
+    if constexpr (records) {
+      if constexpr (ordered) rows_.resize(prints_->pairs() * pair_gradient<sh_degree>::quads);
+      gather(frame, color_gradient, error, gradients);
+      if constexpr (ordered)
+        parallel_for(
+            exec, "backward/sum", scene.count * pair_gradient<sh_degree>::quads,
+            sum_pairs<sh_degree, typename Strategy::gather>{prints_->pair_offsets(), prints_->pairs(), rows_.data(),
+                                                            gradients.sh.data(), moments_.data()});
+    }
+    if constexpr (Strategy::scatter::any) {
+      pixel_order const order{view.width, view.height};
+      frame.trace("backward/scatter", order.launch_size(),
+                  scatter_program<sh_degree, response, typename Strategy::scatter, execution_type>{
+                      {},
+                      view,
+                      order,
+                      scene.sh,
+                      frame.active_degree(),
+                      frame.options().transmittance_min,
+                      frame.options().max_hits,
+                      frame.gaussians().data(),
+                      color_,
+                      color_gradient.data(),
+                      error.data(),
+                      gradients.sh.data(),
+                      moments_.data()});
+    }
+    auto const finish = [&]<class Filter>(Filter const& filter) {
+      parallel_for(exec, "backward/finish", scene.count,
+                   backward_kernels::finish<Filter>{scene, frame.gaussians(), moments_, gradients.view(), filter});
+    };
+    if (frame.options().antialias > 0)
+      finish(pixel_filter(view, frame.options().antialias));
+    else
+      finish(backward_kernels::no_filter{});
+  }
+
+  void gather(Frame const& frame, span<float const> color_gradient, span<float const> error,
+              gaussians<execution_type>& gradients) {
+    using kernel = gather_of<strategy_gather<execution_type, sh_degree, typename Frame::response, Strategy, tile_size>>;
+    parallel_for(
+        frame.exec(), "backward/gather", tile_range{grid_.count(), kernel::block_size},
+        kernel{frame.view(), grid_, lists_, prints_->ranges().data(), slots_.data(), frame.gaussians().data(),
+               frame.active_degree(), color_, color_gradient.data(), error.data(), gradients.sh.data(), moments_.data(),
+               prints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near});
+  }
+
+  Frame const* frame_ = nullptr;
+  u64 preparation_ = 0;
+  standing stands_at_ = nothing;
+  float const* color_ = nullptr;
+  buffer<float, execution_type> moments_;
+  footprints<execution_type, tile_size> own_prints_;
+  footprints<execution_type, tile_size> const* prints_ = nullptr;
+  tile_grid<tile_size> grid_;
+  tile_map<execution_type, tile_size> map_;
   tile_map_view lists_;
-  buffer<entry, E> slots_;
-  buffer<quad, E> rows_;
-  buffer<last_hit, E> last_;
-  float near_ = 0;
+  buffer<entry, execution_type> slots_;
+  buffer<quad, execution_type> rows_;
+  buffer<last_hit, execution_type> last_;
 };
+
+// From color_gradient, [H][W][3], the gradient of the image that the pass rendered, to those of the scene's parameters,
+// without the filter of the pixels. Given an error a pixel, [H][W], it also attributes that to the Gaussians: the sum
+// over a Gaussian's hits of weight times error (backward_pass.moments).
+template <class Frame, strategy Strategy>
+void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, span<float const> color_gradient,
+                   gaussians<typename Frame::execution_type>& gradients, span<float const> error = {}) {
+  pass.run(frame, color_gradient, gradients, error);
+}
 
 }  // namespace gart::inline GART_ISA

@@ -8,7 +8,8 @@
 //   tile_size  side of a tile, in pixels
 //   sums       where a pair's sums go
 //   validity   how a slot that is a hit is told from one that is none (backward/strategies.hpp)
-//   form       which form of the kernel runs (exec/concepts.hpp): the policy's, unless a strategy asks for the plain one
+//   form       which form of the kernel runs (exec/concepts.hpp): the policy's, unless a strategy asks for the plain
+//   one
 // strategy_gather makes one of a strategy; a struct of a program's own does as well (bench/registers.cu).
 
 #include <gart/backward/strategies.hpp>
@@ -35,9 +36,10 @@ concept gather_configuration = requires {
   { C::sums } -> std::convertible_to<gather_sums>;
   { C::validity } -> std::convertible_to<slot_validity>;
   { C::form } -> std::convertible_to<kernel_form>;
-} && execution<typename C::policy> && response_function<typename C::response>;
+}
+&&execution<typename C::policy>&& response_function<typename C::response>;
 
-template <execution E, int ShDegree, response_function Response, class Strategy, int TileSize>
+template <execution E, int ShDegree, response_function Response, strategy Strategy, int TileSize>
 struct strategy_gather {
   using policy = E;
   using response = Response;

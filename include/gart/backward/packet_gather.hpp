@@ -37,7 +37,7 @@ struct packet_gather {
     packet_data data[packets];
   };
 
-  static_assert(Size <= packet_cell::most);
+  static_assert(Size <= packet_cell::largest_tile);
 
   gather_type gather;
 
@@ -104,7 +104,7 @@ struct packet_gather {
 
   void sum(scratch const& s, pixel_box const& area, u32 id) const {
     footprint_slots const range = gather.ranges[id];
-    packet_cell const cell(id, range, area);
+    slot_cell const cell(id, range, area);
     ray_gaussian const& g = gather.records[id];
     lanes sh_sum[2][3][band_groups];  // of even and of odd lanes: two chains of additions hide each other's latency
     lanes moment_sum[moment_count];

@@ -2,6 +2,7 @@
 // The slots (backward/lt_slot.hpp) of a Gaussian's hits with a packet's rays (trace/packet_walk.hpp): those of a row of
 // pixels lie one after another, rows the width of the cell apart.
 
+#include <gart/backward/lt_layout.hpp>
 #include <gart/backward/lt_slot.hpp>
 #include <gart/trace/packet_cell.hpp>
 
@@ -18,13 +19,28 @@ struct packet_entries {
   lane_mask clamped[3];  // channels of the hit's colour
 };
 
+// A cell with the place of its slots.
+struct slot_cell : packet_cell {
+  std::ptrdiff_t first;  // number of the slot of the tile's first pixel, had it one: cells may begin behind it
+  u32 width;             // from a slot to that of the pixel below
+
+  slot_cell() = default;
+  GART_INLINE slot_cell(u32 id, footprint_slots const& range, pixel_box const& tile) : packet_cell(id, range, tile) {
+    pixel_box const cell = intersect(range.box, tile);
+    u32 const x = u32{cell.x0} - tile.x0, y = u32{cell.y0} - tile.y0;
+    width = cell.width();
+    first = static_cast<std::ptrdiff_t>(range.offset + tile_offset(range.box, cell)) -
+            static_cast<std::ptrdiff_t>(y * width + x);
+  }
+};
+
 class packet_slots {
  public:
   lane_mask inside;  // the pixels that have a slot
 
   packet_slots() = default;
   // Of the packet at (x, y) in the tile.
-  GART_INLINE packet_slots(packet_cell const& cell, int x, int y)
+  GART_INLINE packet_slots(slot_cell const& cell, int x, int y)
       : inside(cell.inside(x, y)),
         width_(static_cast<int>(cell.width)),
         first_(cell.first + static_cast<std::ptrdiff_t>(y) * width_ + x) {}

@@ -1,17 +1,18 @@
 #pragma once
 // What the primitive and hybrid strategies record of a hit: a slot (backward/lt_slot.hpp) at its place in the LT buffer
-// (tiles/layout.hpp).
+// (backward/lt_layout.hpp).
 
+#include <gart/backward/lt_layout.hpp>
 #include <gart/backward/lt_slot.hpp>
 #include <gart/backward/packet_slots.hpp>
 #include <gart/render/record.hpp>
-#include <gart/tiles/layout.hpp>
 
 namespace gart::inline GART_ISA {
 
 template <class Entry, int Size>
 struct record_lt {
   using entry = Entry;
+  using cell = tile_slots;
   footprint_slots const* ranges = nullptr;
   Entry* slots = nullptr;
 
@@ -29,8 +30,9 @@ struct record_lt {
   }
 
 #if !defined(__CUDACC__)
+  using packet_cell = slot_cell;
   using note = packet_slots;
-  GART_INLINE note expect(packet_cell const& cell, packet_block const& block) const {
+  GART_INLINE note expect(slot_cell const& cell, packet_block const& block) const {
     packet_slots const at(cell, block.x % Size, block.y % Size);
     at.fetch_to_write(slots);
     return at;
@@ -42,5 +44,6 @@ struct record_lt {
   }
 #endif
 };
+static_assert(hit_record<record_lt<lt_entry, 8>>);
 
 }  // namespace gart::inline GART_ISA

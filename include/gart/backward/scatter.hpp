@@ -14,7 +14,7 @@
 namespace gart::inline GART_ISA {
 
 template <int ShDegree, class Response, class Terms, execution E>
-struct scatter_program {
+struct scatter_program : ray_program_base {
   using ray_type = primary_ray;
   static constexpr int sh_stride = 3 * sh_basis<ShDegree>::size;
   struct state {

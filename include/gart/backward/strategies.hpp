@@ -1,50 +1,44 @@
 #pragma once
-// A backward strategy is a composition: what the forward pass records of a hit, which terms are gathered by
-// primitive and which are scattered by pixel.
+// The backward strategies, and the one list of them: the program, the benchmarks and the tests take them from here.
 
 #include <gart/backward/record_lt.hpp>
-#include <gart/backward/terms.hpp>
+#include <gart/backward/strategy.hpp>
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <vector>
 
 namespace gart::inline GART_ISA {
 
 // Nothing recorded; every ray is traced again and scatters.
-struct pixel_strategy {
+struct pixel_strategy : strategy_base {
   static constexpr char const* name = "pixel";
-  static constexpr bool ordered = false;  // sums in a fixed order: the same bits in every run
   template <int Size>
   using record = record_none;
   using gather = terms<>;
   using scatter = terms<color, geometry>;
 };
 
-// How a slot of the LT buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN before
-// every forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held against the
-// last hit of its ray: the same decision, bit for bit, with nothing to clear. It measured better on a device and on a
-// host (docs/backward.md).
-enum class slot_validity { cleared, recomputed };
-
 // One channel: the colour gradient of a hit needs only its weight. Geometry by pixel.
-struct hybrid_strategy {
+struct hybrid_strategy : strategy_base {
   static constexpr char const* name = "hybrid";
-  static constexpr bool ordered = false, lane_by_lane = false;
-  static constexpr slot_validity validity = slot_validity::cleared;
   template <int Size>
   using record = record_lt<weight_entry, Size>;
   using gather = terms<color>;
   using scatter = terms<geometry>;
-  using fallback = pixel_strategy;  // where that has no room either: it needs none
+  using fallback = pixel_strategy;  // it needs no room
 };
 
 // Four channels; no ray is traced twice.
-struct primitive_strategy {
+struct primitive_strategy : strategy_base {
   static constexpr char const* name = "primitive";
-  static constexpr bool ordered = false, lane_by_lane = false;
   static constexpr slot_validity validity = slot_validity::recomputed;
   template <int Size>
   using record = record_lt<lt_entry, Size>;
   using gather = terms<color, geometry>;
   using scatter = terms<>;
-  using fallback = hybrid_strategy;  // where the LT buffer has no room: a quarter of it
+  using fallback = hybrid_strategy;  // a quarter of the room
 };
 
 // The primitive strategy with slots of another format (backward/lt_slot.hpp): less memory for less exact gradients.
@@ -64,6 +58,7 @@ struct deterministic_strategy : primitive_strategy {
 struct cleared_strategy : primitive_strategy {
   static constexpr char const* name = "cleared";
   static constexpr slot_validity validity = slot_validity::cleared;
+  static constexpr strategy_use use = strategy_use::measuring;
 };
 
 // The primitive strategy by the plain gather (backward/gather.hpp): what packets and matrix units are tested and
@@ -71,6 +66,38 @@ struct cleared_strategy : primitive_strategy {
 struct lane_strategy : primitive_strategy {
   static constexpr char const* name = "lane";
   static constexpr bool lane_by_lane = true;
+  static constexpr strategy_use use = strategy_use::testing;
 };
+
+template <strategy... S>
+struct strategy_list {
+  static constexpr std::array<char const*, sizeof...(S)> names{S::name...};
+
+  // f(S{}) for each, in order.
+  template <class F>
+  static void for_each(F&& f) {
+    (f(S{}), ...);
+  }
+  // f(S{}) for the one of that name. False where there is none.
+  template <class F>
+  static bool with(std::string_view name, F&& f) {
+    return ((name == S::name && (f(S{}), true)) || ...);
+  }
+};
+
+// In the order of preference, the best last.
+using strategies = strategy_list<lane_strategy, cleared_strategy, pixel_strategy, hybrid_strategy,
+                                 deterministic_strategy, primitive_strategy>;
+
+// Of those for training, and up to `use`.
+inline std::vector<std::string> strategy_names(strategy_use use = strategy_use::training) {
+  std::vector<std::string> names;
+  strategies::for_each([&]<strategy S>(S) {
+    if (S::use <= use) names.emplace_back(S::name);
+  });
+  return names;
+}
+
+static_assert(strategy<primitive_strategy_in<lt_half_entry>> && strategy<primitive_strategy_in<lt_shared_entry>>);
 
 }  // namespace gart::inline GART_ISA

@@ -1,8 +1,8 @@
 #pragma once
 // The errors gart throws. Each message says what was wrong, where, and what to do about it; the types let a program
 // react without reading the text. A setting is named by its field, `struct.field`, with ` = value` after it where the
-// remedy is a value: "raise dataset_options.downscale", "use row_request.backend = openmp". A program whose settings
-// have other names replaces these in what it shows (examples/cli/field_names.hpp).
+// remedy is a value: "raise dataset_options.downscale", "use configuration_request.backend = openmp". A program whose
+// settings have other names replaces these in what it shows (program/field_names.hpp).
 
 #include <cstddef>
 #include <stdexcept>
@@ -22,7 +22,8 @@ struct io_error : error {
   std::string place;
 };
 
-// A request that this build or this machine cannot serve: a camera model, a backend, a row that is not instantiated.
+// A request that this build or this machine cannot serve: a camera model, a backend, a configuration that is not
+// instantiated.
 struct unsupported : error {
   using error::error;
 };

@@ -39,7 +39,8 @@ class cuda_exec {
   profiler profile;
   memory_use memory;
 
-  explicit cuda_exec(int device_index = 0);
+  // `stream`, a cudaStream_t of that device, stays its owner's and must outlive this; null: one of its own.
+  explicit cuda_exec(int device_index = 0, void* stream = nullptr);
   ~cuda_exec();
   cuda_exec(cuda_exec const&) = delete;
   cuda_exec& operator=(cuda_exec const&) = delete;
@@ -103,6 +104,7 @@ class cuda_exec {
   struct resources;
   void fold_stages();
   void* stream_ = nullptr;
+  bool owns_stream_ = true;
   int device_index_ = 0;
   int multiprocessors_ = 0;
   std::unique_ptr<resources> resources_;

@@ -192,9 +192,11 @@ template <execution E>
 class mcmc {
  public:
   // `extent` is the scene's, in world units.
-  mcmc(E& exec, mcmc_options const& options, index_t max_gaussians, int iterations, float extent, u64 seed)
+  mcmc(E& exec, mcmc_options const& options, index_t max_gaussians, int iterations, float extent, u64 seed,
+       int kernel_degree = 2)
       : exec_(&exec),
         options_(options),
+        kernel_degree_(kernel_degree),
         max_gaussians_(max_gaussians),
         iterations_(iterations),
         extent_(extent),
@@ -293,7 +295,7 @@ class mcmc {
     parallel_for(*exec_, "mcmc_draw", draws,
                  detail::mcmc_draw_kernel<E>{before_.data(), totals_.data(), n, random, source_.data(), copies.data()});
     parallel_for(*exec_, "mcmc_share", n,
-                 detail::mcmc_share_kernel{model.view(), copies.data(), options_.dead_opacity, options_.kernel_degree});
+                 detail::mcmc_share_kernel{model.view(), copies.data(), options_.dead_opacity, kernel_degree_});
     for_each_element(*exec_, "mcmc_copy", draws, model.sh_degree(),
                      detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(),
                                             target_.data(), random.use == random_use::growth});
@@ -301,6 +303,7 @@ class mcmc {
 
   E* exec_;
   mcmc_options options_;
+  int kernel_degree_;  // of the Gaussians that are relocated
   index_t max_gaussians_;
   int iterations_;
   float extent_;

@@ -37,17 +37,16 @@ struct mcmc_options {
   int from = 500, every = 100;
   float until = 5.0f / 6;       // share of the run
   float growth = 1.05f;         // a step of growth, up to max_gaussians; more in runs too short for it (growth_for)
-  float dead_opacity = 0.005f;  // a trainer raises it to least_opacity
+  float dead_opacity = 0.005f;  // as least_opacity has it for the alpha_min traced with
   float noise = 1e6f;           // times the rate of the means, and the covariance in units of the extent
   float opacity_penalty = 0.01f, scale_penalty = 0.014f;  // the scale in units of the extent
-  int kernel_degree = 2;                                  // of the Gaussians that are relocated; a trainer sets its own
 };
 
 struct error_growth_options {
   int from = 500, every = 100;
   float fill = 0.5f;               // share of the run at which the count has reached its budget
   float until = 5.0f / 6;          // share of the run after which the dead stay where they are
-  float dead_opacity = 0.005f;     // a trainer raises it to least_opacity
+  float dead_opacity = 0.005f;     // as least_opacity has it for the alpha_min traced with
   float opacity_penalty = 0.003f;  // times the mean opacity
 };
 
@@ -56,7 +55,7 @@ struct adc_options {
   float until = 0.5f;
   float gradient = 2e-4f;        // mean length of the mean's gradient in the image that makes a Gaussian grow
   float dense = 0.01f;           // times the extent: larger ones split, smaller ones are cloned
-  float prune_opacity = 0.005f;  // a trainer raises it to least_opacity
+  float prune_opacity = 0.005f;  // as least_opacity has it for the alpha_min traced with
   float prune_scale = 0.1f;      // times the extent, after the first opacity reset
 };
 

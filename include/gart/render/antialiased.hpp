@@ -2,11 +2,11 @@
 // A scene as the pixels of one view see it: every Gaussian widened by the filter of its pixels
 // (scene/pixel_filter.hpp), once, before anything is made of it, so that every tracer, footprint and box has the same
 // bits of it. Without a filter it is the scene itself, and nothing is launched.
+// A frame has one (render/frame.hpp); the way back is the backward pass's (backward/finish.hpp).
 //
 //   antialiased<E> seen(exec);
-//   auto const scene = seen.of(exec, stored, view, options.antialias);   // for records, tracer and backward.prepare()
+//   auto const scene = seen.of(exec, stored, view, options.antialias);
 //
-// What stores gradients (backward::run) is given the stored scene: its `finish` goes the way back through the filter.
 // Memory: 16 bytes a Gaussian where there is a filter. Errors: invalid_argument for a camera no ray can be cast by.
 
 #include <gart/exec/buffer.hpp>

@@ -44,8 +44,9 @@ struct composited_hits {
   words last_place{};
 };
 
-template <int ShDegree, class Record>
-struct composite {
+template <int ShDegree, hit_record Record>
+struct composite : ray_program_base {
+  static constexpr bool has_packets = true, has_warps = true;
   using ray_type = primary_ray;
   struct state : composited_hits<float> {
     pixel at;
@@ -79,7 +80,8 @@ struct composite {
 
   // The same in steps, for rays that meet a Gaussian together (trace/warp_walk.hpp).
   static constexpr int row_floats = 3 * sh_basis<ShDegree>::size;
-  static constexpr bool records_hits = Record::any;
+  static constexpr bool places_hits = Record::any;
+  using cell = typename Record::cell;
   GART_HD float const* rows_from() const { return sh; }
   GART_HD int row_floats_read() const { return 3 * sh_coefficients(active_degree); }
   GART_HD GART_INLINE vec3 shade(state const& s, float const* row) const {
@@ -124,5 +126,6 @@ struct composite {
     if (out.last) out.last[a] = {s.last_t, s.last_place};
   }
 };
+static_assert(warp_program<composite<3, record_none>>);
 
 }  // namespace gart::inline GART_ISA

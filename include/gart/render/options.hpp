@@ -1,6 +1,6 @@
 #pragma once
 // What a render leaves out, and what shows where nothing is: the knobs that trade exactness for time.
-// Errors: require_options throws invalid_argument, naming the option; forward() calls it.
+// Errors: require_options throws invalid_argument, naming the option; frame.prepare calls it.
 
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>
@@ -11,13 +11,18 @@
 
 namespace gart {
 
-struct render_options {
+struct approximation_options {
   float alpha_min = 1.0f / 255.0f;  // a Gaussian is hit where sigma * rho >= alpha_min
   float transmittance_min = 1e-4f;  // a ray ends after the hit that brings T below this
-  float near = 0.01f;               // hits lie at t > near, world units along the ray
   u32 max_hits = 0;                 // a ray ends after so many hits composited; 0: no cap
-  float antialias = 0;    // standard deviation of the pixels' filter, in pixels (scene/pixel_filter.hpp); 0: none
-  int rebuild_every = 1;  // the BVH tracer builds its tree every so many views, else refits it: exact
+  float antialias = 0;  // standard deviation of the pixels' filter, in pixels (scene/pixel_filter.hpp); 0: none
+  // The BVH tracer builds its tree every so many views, else refits it: exact. Another tracer has no tree: sessions and
+  // renderers refuse what is not 1 there.
+  int rebuild_every = 1;
+};
+
+struct render_options : approximation_options {
+  float near = 0.01f;  // hits lie at t > near, world units along the ray
   vec3 background{0.0f};
 };
 

@@ -8,8 +8,9 @@
 
 namespace gart::inline GART_ISA {
 
-template <int ShDegree, class Record>
+template <int ShDegree, hit_record Record>
 struct packet_composite {
+  using cell = typename Record::packet_cell;
   using note = typename Record::note;
   using shaded = vec3_of<lanes>;  // colour before the clamp
   struct state : composited_hits<lanes> {
@@ -38,9 +39,7 @@ struct packet_composite {
     return s;
   }
 
-  GART_INLINE note expect(state const& s, packet_cell const& cell) const {
-    return program.record.expect(cell, s.block);
-  }
+  GART_INLINE note expect(state const& s, cell const& cell) const { return program.record.expect(cell, s.block); }
   GART_INLINE void fetch(u32 id) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
     float const* const row = program.sh + stride * id;
@@ -72,8 +71,10 @@ struct packet_composite {
   }
 };
 
+static_assert(packet_program<packet_composite<3, record_none>>);
+
 // The packets of a ray program, for tracers that have a use for them.
-template <int ShDegree, class Record>
+template <int ShDegree, hit_record Record>
 packet_composite<ShDegree, Record> packets_of(composite<ShDegree, Record> const& program) {
   return {program};
 }

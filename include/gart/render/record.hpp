@@ -1,25 +1,63 @@
 #pragma once
-// What the forward pass leaves of each hit for the backward pass to find. A record says where a hit belongs (place_of,
-// when it is found) and is called once a hit, after it has been composited, with that place, the colour
-// that the pixel would have if the hit were opaque, its weight T alpha and its own colour before the clamp; it is part
-// of a strategy (backward/strategies.hpp). On hosts it also takes the hits of one Gaussian with a packet of rays at
-// once (trace/packet_walk.hpp), by the note it made when they were found, and says their places.
+// What the forward pass leaves of each hit for the backward pass to find; part of a strategy (backward/strategy.hpp). A
+// record says where a hit belongs when it is found, and is called once a hit, after it has been composited. On hosts it
+// also takes the hits of one Gaussian with a packet of rays at once (trace/packet_walk.hpp).
 
 #include <gart/render/pixels.hpp>
-#include <gart/tiles/layout.hpp>
 #include <gart/trace/hit.hpp>
-#include <gart/trace/packet_cell.hpp>
+#include <gart/trace/packet_program.hpp>
+#include <gart/trace/warp_program.hpp>
+
+#include <concepts>
+#include <type_traits>
 
 namespace gart::inline GART_ISA {
+
+namespace detail {
+
+#if defined(__CUDACC__)
+template <class R>
+concept packet_record = true;
+#else
+template <class R>
+concept packet_record = requires(R const& r, packet_block const& block, typename R::packet_cell const& cell,
+                                 typename R::note const& note, lane_mask hits, vec3_of<lanes> const& color, lanes x) {
+  typename R::packet_cell;  // as packet_program has them
+  typename R::note;
+  { r.expect(cell, block) } -> std::same_as<typename R::note>;
+  // As below, for the hits of a mask; their places.
+  { r(note, hits, color, x, color) } -> std::same_as<lane_words>;
+};
+#endif
+
+}  // namespace detail
+
+template <class R>
+concept hit_record = std::is_trivially_copyable_v<R> &&
+    requires(R const& r, u32 id, pixel at, u32 place, vec3 const& color, float weight) {
+  { R::any } -> std::convertible_to<bool>;      // whether anything is left; places then order a pixel's hits by id
+  typename R::entry;                            // what a place holds, with a `name`
+  typename R::cell;                             // as warp_program has it
+  { r.place_of(id, at) } -> std::same_as<u32>;  // where the hit of Gaussian `id` at that pixel belongs
+  // The colour that the pixel would have if the hit were opaque, the hit's weight T alpha, its colour before the clamp.
+  r(place, color, weight, color);
+} && detail::packet_record<R>;
+
+struct no_entry {
+  static constexpr char const* name = "none";
+};
 
 // Nothing: the backward pass traces again.
 struct record_none {
   static constexpr bool any = false;
+  using entry = no_entry;
+  using cell = no_cell;
   GART_HD GART_INLINE u32 place_of(u32 /*id*/, pixel) const { return 0; }
   GART_HD GART_INLINE void operator()(u32 /*place*/, vec3 const& /*opaque*/, float /*weight*/,
                                       vec3 const& /*unclamped*/) const {}
 
 #if !defined(__CUDACC__)
+  using packet_cell = gart::packet_cell;
   struct note {};
   note expect(packet_cell const&, packet_block const&) const { return {}; }
   lane_words operator()(note, lane_mask, vec3_of<lanes> const&, lanes, vec3_of<lanes> const&) const {
@@ -27,5 +65,6 @@ struct record_none {
   }
 #endif
 };
+static_assert(hit_record<record_none>);
 
 }  // namespace gart::inline GART_ISA

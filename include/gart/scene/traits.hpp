@@ -1,7 +1,7 @@
 #pragma once
 // What a scene requires, at compile time. Kernels choose code by it, so that what a scene does not need has no
-// registers, no fields and no bytes. The rows that gart's libraries compile are listed by `gart info`; train/rows.hpp
-// is how a program compiles its own (examples/5_own_row).
+// registers, no fields and no bytes. The rows that gart's libraries compile are listed by `gart info`;
+// runtime/registry.hpp is how a program compiles its own (examples/5_own_configuration).
 
 #include <gart/math/response.hpp>
 

@@ -8,7 +8,7 @@
 #include <gart/scene/camera.hpp>
 #include <gart/scene/parameters.hpp>
 #include <gart/tiles/camera_footprint.hpp>
-#include <gart/tiles/layout.hpp>
+#include <gart/tiles/footprint_slots.hpp>
 
 namespace gart::inline GART_ISA {
 

@@ -135,8 +135,8 @@ class tile_map {
       throw out_of_memory("tile map", pairs * 16, 0,
                           std::to_string(pairs) +
                               " (primitive, tile) pairs, and a map holds 2^31: raise dataset_options.downscale, "
-                              "lower train_options.max_gaussians, or take row_request.tracer = bvh with "
-                              "row_request.backward = pixel");
+                              "lower train_options.max_gaussians, or take configuration_request.tracer = bvh with "
+                              "configuration_request.backward = pixel");
     int const tile_bits = bits_for(grid.count());
     order_bits_ = order.take(32 - tile_bits);
     depth_shift_ = order.shift();

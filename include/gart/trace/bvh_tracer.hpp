@@ -1,13 +1,14 @@
 #pragma once
 // The traverser on gart's own BVH, on every policy: one ray a thread, a window of the nearest hits, resumed until the
 // ray ends. prepare() fits the tree to the Gaussians of a frame: built anew, or refitted when their number has not
-// changed and `rebuild_every` says so.
+// changed and trace_options.rebuild_every says so.
 
 #include <gart/bvh/walk.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/scene/parameters.hpp>
 #include <gart/trace/k_buffer_visitor.hpp>
+#include <gart/trace/tracer.hpp>
 
 namespace gart::inline GART_ISA {
 
@@ -41,30 +42,27 @@ struct walk_rays {
 
 // Response: what the scene's Gaussians are (math/response.hpp).
 template <execution E, class Response = generalized_gaussian<>>
-class bvh_tracer {
+class bvh_tracer : public tracer_base {
  public:
   using response_type = Response;
   static constexpr char const* name = "bvh";
   static constexpr int window = 16;
 
-  explicit bvh_tracer(E& exec) : boxes_(exec), tree_(exec) {}
+  explicit bvh_tracer(E& exec) : boxes_(exec), tree_(exec) { static_assert(tracer<bvh_tracer, E>); }
 
-  // Steps between rebuilds; 1 builds at every prepare.
-  int rebuild_every = 1;
-
-  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
-               float alpha_min, float near) {
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, camera const& view,
+               trace_options const& options) {
     boxes_.resize(scene.count);
     parallel_for(exec, "bvh/boxes", scene.count,
-                 trace_kernels::bound_ellipsoids<Response>{scene, view.position, alpha_min, boxes_});
-    bool const rebuild = tree_.view().count != scene.count || ++age_ >= rebuild_every;
+                 trace_kernels::bound_ellipsoids<Response>{scene, view.position, options.alpha_min, boxes_});
+    bool const rebuild = tree_.view().count != scene.count || ++age_ >= options.rebuild_every;
     if (rebuild) {
       tree_.build(exec, boxes_);
       age_ = 0;
     } else {
       tree_.refit(exec, boxes_);
     }
-    scene_ = {records.data(), scene.count, near};
+    scene_ = {gaussians.data(), scene.count, options.near};
   }
 
   template <ray_program P>

@@ -7,6 +7,7 @@
 #include <gart/scene/parameters.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/k_buffer_visitor.hpp>
+#include <gart/trace/tracer.hpp>
 
 #include <memory>
 
@@ -64,22 +65,22 @@ struct embree_rays {
 }  // namespace trace_kernels
 
 template <host_execution E, class Response = generalized_gaussian<>>
-class embree_tracer {
+class embree_tracer : public tracer_base {
  public:
   using response_type = Response;
   static constexpr char const* name = "embree";
   static constexpr int window = 16;
 
-  explicit embree_tracer(E& exec) : boxes_(exec) {}
+  explicit embree_tracer(E& exec) : boxes_(exec) { static_assert(tracer<embree_tracer, E>); }
 
-  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
-               float alpha_min, float near) {
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, camera const& view,
+               trace_options const& options) {
     boxes_.resize(scene.count);
     parallel_for(exec, "embree/boxes", scene.count,
-                 trace_kernels::bound_ellipsoids<Response>{scene, view.position, alpha_min, boxes_});
+                 trace_kernels::bound_ellipsoids<Response>{scene, view.position, options.alpha_min, boxes_});
     stage_scope stage(exec, "embree/build");
     tree_.build(boxes_);
-    scene_ = {records.data(), scene.count, near};
+    scene_ = {gaussians.data(), scene.count, options.near};
   }
 
   template <ray_program P>

@@ -3,7 +3,7 @@
 // particular order.
 
 #include <gart/trace/k_buffer.hpp>
-#include <gart/trace/ray_program.hpp>
+#include <gart/trace/tracer.hpp>
 
 namespace gart::inline GART_ISA {
 

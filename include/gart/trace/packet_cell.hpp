@@ -1,9 +1,9 @@
 #pragma once
-// The part of a Gaussian's box that lies in a tile (a cell, tiles/layout.hpp), as the packets of the tile look at it:
-// which of their pixels are in the box, and where the slots of these lie. Worked out once a (tile, Gaussian) pair for
-// all packets of the tile.
+// The part of a Gaussian's box that lies in a tile (a cell), as the packets of the tile look at it: which of their
+// pixels are in the box. Worked out once a (tile, Gaussian) pair for all packets of the tile. A packet program adds
+// what it wants to know of the pair by deriving from it.
 
-#include <gart/tiles/layout.hpp>
+#include <gart/tiles/footprint_slots.hpp>
 #include <gart/trace/packet_block.hpp>
 
 #if !defined(__CUDACC__)
@@ -11,22 +11,17 @@
 namespace gart::inline GART_ISA {
 
 struct packet_cell {
-  static constexpr int most = 16;  // side of a tile
-  std::ptrdiff_t first;  // number of the slot of the tile's first pixel, had it one: cells may begin behind it
-  u64 rows;              // of the tile's rows, bit 4 r: whether row r is in the box
-  u32 columns;           // of its columns, a bit each
-  u32 width;             // from a slot to that of the pixel below
+  static constexpr int largest_tile = 16;  // its side
+  u64 rows;                                // of the tile's rows, bit 4 r: whether row r is in the box
+  u32 columns;                             // of its columns, a bit each
   u32 id;
 
   packet_cell() = default;
   GART_INLINE packet_cell(u32 gaussian, footprint_slots const& range, pixel_box const& tile) : id(gaussian) {
     pixel_box const cell = intersect(range.box, tile);
     u32 const x = u32{cell.x0} - tile.x0, y = u32{cell.y0} - tile.y0;
-    width = cell.width();
-    columns = ((u32{1} << width) - 1) << x;
+    columns = ((u32{1} << cell.width()) - 1) << x;
     rows = (~u64{0} >> (64 - 4 * cell.height()) << 4 * y) & 0x1111111111111111u;
-    first = static_cast<std::ptrdiff_t>(range.offset + tile_offset(range.box, cell)) -
-            static_cast<std::ptrdiff_t>(y * width + x);
   }
 
   // The pixels of the packet at (x, y) in the tile that are in the box.

@@ -1,35 +1,28 @@
 #pragma once
 // The walk of tile lists on a host: rays in packets, a lane a pixel (math/lanes.hpp). The same as walk_tiles
 // (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that a candidate is evaluated for all rays of a
-// packet at once, and that its hits stay together: what waits for its turn is a list of rows, each one Gaussian's hits
-// with some of the rays, in an order that sorts the hits of each ray by (t, id). Where rays meet two Gaussians in
-// opposite orders no one place suits all hits of a candidate, and it takes two rows.
+// packet at once, and that its hits stay together: what waits for its turn is a list of groups, each one Gaussian's
+// hits with some of the rays, in an order that sorts the hits of each ray by (t, id). Where rays meet two Gaussians in
+// opposite orders no one place suits all hits of a candidate, and it takes two groups.
 //
-// A packet program is the ray program for packets:
-// - begin(block): the state of a block's rays; says `directions` and which lanes are `inside`
-// - expect(state, cell): a note on a Gaussian that may be hit; what its hits will write may be fetched
-// - fetch(id): a Gaussian was hit; what shade will read may be fetched
-// - shade(state, id): what it shows each ray, of type `shaded`
-// - on_hit(state, lanes, t, alpha, shaded, note): composites its hits with the rays of a mask; the rays that go on
-// - end(state)
-//
-// A packet that has more hits waiting than there are rows for says so, and its rays are traced one by one.
+// A packet that has more hits waiting than there are groups for says so, and its rays are traced one by one.
 
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/tiles/tile_map.hpp>
-#include <gart/trace/packet_cell.hpp>
-#include <gart/trace/ray_program.hpp>
+#include <gart/trace/packet_program.hpp>
+#include <gart/trace/tracer.hpp>
 
 #if !defined(__CUDACC__)
 
 namespace gart::inline GART_ISA {
 
-// Window: what a ray traced alone keeps (tile_tracer). A packet keeps 32 times that in rows: what runs over is traced
-// again from the start, not resumed.
-template <class Response, int Window, int Size, class P>
+// Window: what a ray traced alone keeps (tile_tracer). A packet keeps 32 times that in groups: what runs over is
+// traced again from the start, not resumed.
+template <class Response, int Window, int Size, packet_program P>
 class packet_walk {
  public:
-  static_assert(Size % packet_block::width == 0 && Size % packet_block::height == 0 && Size <= packet_cell::most);
+  static_assert(Size % packet_block::width == 0 && Size % packet_block::height == 0 &&
+                Size <= packet_cell::largest_tile);
 
   // To be called before the first packet of a tile, whose pixels are `area`.
   void enter(pixel_box const& area) { area_ = area, loaded_ = ~u32{0}; }
@@ -41,11 +34,11 @@ class packet_walk {
     vec3_of<lanes> const& d = state.directions;
     // z = t * cosine; rounded up, so that what is said to lie nearer than a depth does.
     lanes const cosine = (d.x * lanes(forward.x) + d.y * lanes(forward.y) + d.z * lanes(forward.z)) * lanes(1.000002f);
-    alive_ = state.inside, farthest_ = 0.0f, count_ = used_ = 0, free_ = ends;
-    pool_[ends].nearer = pool_[ends].farther = ends;
+    alive_ = state.inside, farthest_ = 0.0f, count_ = used_ = 0, free_ = sentinel;
+    pool_[sentinel].nearer = pool_[sentinel].farther = sentinel;
     int const x = block.x % Size, y = block.y % Size;
     u32 const end = map.offsets[tile + 1];
-    for (u32 first = map.offsets[tile]; first < end && any(alive_); first += most) {
+    for (u32 first = map.offsets[tile]; first < end && any(alive_); first += chunk) {
       int const cells = load(scene, map, ranges, first, end);
       for (int k = 0; k < cells;) {
         float const bound = map.depth(first + static_cast<u32>(k));
@@ -54,29 +47,29 @@ class packet_walk {
           near_[n] = static_cast<u16>(k);
           n += any(cells_[k].inside(x, y)) ? 1 : 0;
         }
-        if (count_ >= often) {
+        if (count_ >= pass_threshold) {
           pass_on(program, state, cosine, bound);
           if (!any(alive_)) break;
         }
         if (!take(program, scene, state, d, n)) return false;
       }
     }
-    pass_on(program, state, cosine, everything);
+    pass_on(program, state, cosine, no_bound);
     program.end(state);
     return true;
   }
 
  private:
-  static constexpr int rows = 32 * Window;
-  static constexpr int batch = 16;    // candidates between two looks at what has become certain
-  static constexpr int often = 12;    // rows below which looking does not pay
-  static constexpr u32 most = 256;    // candidates of a tile looked at at a time
-  static constexpr u32 ahead = 6;     // whose ranges are fetched while one is looked at
-  static constexpr int together = 4;  // rows shaded at a time
-  static constexpr int crowded = rows / 2;
-  static constexpr float everything = -1;  // no bound: the list is at its end
+  static constexpr int most_groups = 32 * Window;
+  static constexpr int split_threshold = most_groups / 2;  // of groups, from which one may be passed on in parts
+  static constexpr int pass_threshold = 12;    // of groups, below which a look at what has become certain does not pay
+  static constexpr int batch = 16;             // candidates between two such looks
+  static constexpr u32 chunk = 256;            // candidates of a tile whose cells are kept at a time
+  static constexpr u32 prefetch_distance = 6;  // in candidates
+  static constexpr int shaded_at_once = 4;     // groups
+  static constexpr float no_bound = -1;        // the list is at its end
 
-  static constexpr u16 ends = rows;  // before the first and behind the last
+  static constexpr u16 sentinel = most_groups;  // the group before the first and behind the last
 
   struct hits {
     lanes t, alpha;
@@ -84,32 +77,32 @@ class packet_walk {
     u32 id;
     typename P::note note;
   };
-  struct row : hits {
+  struct group : hits {
     u16 nearer, farther;  // its neighbours
   };
 
   // The tile's candidates from `first` on, once for all packets of a tile that has no more of them.
   int load(traced_scene const& scene, tile_map_view const& map, footprint_slots const* ranges, u32 first, u32 end) {
-    u32 const n = end - first < most ? end - first : most;
+    u32 const n = end - first < chunk ? end - first : chunk;
     if (loaded_ == first) return static_cast<int>(n);
     u32 const* const list = map.primitives.data() + first;
     for (u32 k = 0; k < n; ++k) {
-      if (k + ahead < n) prefetch(&ranges[list[k + ahead]]);
+      if (k + prefetch_distance < n) prefetch(&ranges[list[k + prefetch_distance]]);
       prefetch(&scene.gaussians[list[k]]);
-      cells_[k] = packet_cell(list[k], ranges[list[k]], area_);
+      cells_[k] = typename P::cell(list[k], ranges[list[k]], area_);
     }
     loaded_ = first;
     return static_cast<int>(n);
   }
 
-  // The hits of the batch's n candidates. All are evaluated before the first is put in its place: the steps of one
-  // evaluation wait for each other, and where a hit goes is what a processor guesses wrong.
+  // The hits of the batch's n candidates. All are evaluated before the first is put in its place: the latency of one
+  // evaluation is hidden by the next, and where a hit goes is a branch that is predicted badly.
   template <class State>
   GART_INLINE bool take(P const& program, traced_scene const& scene, State const& state, vec3_of<lanes> const& d,
                         int n) {
     int count = 0;
     for (int i = 0; i < n; ++i) {
-      packet_cell const& cell = cells_[near_[i]];
+      typename P::cell const& cell = cells_[near_[i]];
       ray_gaussian const& g = scene.gaussians[cell.id];
       ray_peak_of<lanes> const r = evaluate<Response>(g, primary_ray_of<lanes>{d});
       hits& h = found_[count];  // alpha: |p|^2 for now
@@ -129,13 +122,13 @@ class packet_walk {
   }
 
   // Hits behind all others of their rays stand last; the rest go forward from there. A hit may stand behind the last
-  // row that it must follow and before the first that must follow it; rays that share a gap share a row.
+  // group that it must follow and before the first that must follow it; rays that share a gap share a group.
   GART_INLINE bool insert(hits const& h) {
     lane_mask settled = h.rays & (h.t > farthest_), left = h.rays & ~settled;
     farthest_ = select(settled, h.t, farthest_);
-    u16 gap = ends;  // before this row
-    for (u16 at = pool_[ends].nearer; any(left) && at != ends; at = pool_[at].nearer) {
-      row const& other = pool_[at];
+    u16 gap = sentinel;  // before this group
+    for (u16 at = pool_[sentinel].nearer; any(left) && at != sentinel; at = pool_[at].nearer) {
+      group const& other = pool_[at];
       lane_mask const both = left & other.rays;
       // Of two at one t; no branch, for ids are in no order.
       lane_mask const first = lanes_of(h.id < other.id ? ~u32{0} : u32{0});
@@ -151,13 +144,13 @@ class packet_walk {
 
   GART_INLINE bool put(hits const& h, lane_mask rays, u16 gap) {
     u16 at = free_;
-    if (at != ends)
+    if (at != sentinel)
       free_ = pool_[at].farther;
-    else if (used_ < rows)
+    else if (used_ < most_groups)
       at = used_++;
     else
       return false;
-    row& r = pool_[at];
+    group& r = pool_[at];
     r.t = h.t, r.alpha = h.alpha, r.rays = rays, r.id = h.id, r.note = h.note;
     r.farther = gap, r.nearer = pool_[gap].nearer;
     pool_[r.nearer].farther = at, pool_[gap].nearer = at;
@@ -169,21 +162,21 @@ class packet_walk {
   template <class State>
   void pass_on(P const& program, State& state, lanes const& cosine, float bound) {
     lane_mask stay = lanes_of(0);
-    u16 last = ends, at = pool_[ends].farther;  // of those that stay; the next to look at
+    u16 last = sentinel, at = pool_[sentinel].farther;  // of those that stay; the next to look at
     for (;;) {
-      // A few rows at a time, shaded side by side: a colour's sum is a chain of steps that wait for each other.
-      row const* ready[together];
-      lane_mask now[together];
-      typename P::shaded shaded[together];
+      // A few groups at a time, shaded side by side: the latency of one colour's sum is hidden by the others.
+      group const* ready[shaded_at_once];
+      lane_mask now[shaded_at_once];
+      typename P::shaded shaded[shaded_at_once];
       int n = 0;
-      while (n < together && at != ends && any(alive_ & ~stay)) {
-        row& r = pool_[at];
+      while (n < shaded_at_once && at != sentinel && any(alive_ & ~stay)) {
+        group& r = pool_[at];
         lane_mask const rays = r.rays & alive_;
         lane_mask pass = rays;
-        if (bound != everything) {
+        if (bound != no_bound) {
           pass &= ~stay & (r.t * cosine < lanes(bound));
-          // A row goes as one, unless rows run out.
-          if (any(rays & ~pass) && count_ < crowded) pass = lanes_of(0);
+          // A group goes as one, unless there is no room for more of them.
+          if (any(rays & ~pass) && count_ < split_threshold) pass = lanes_of(0);
         }
         if (any(pass)) ready[n] = &r, now[n++] = pass;
         u16 const next = r.farther;
@@ -200,7 +193,7 @@ class packet_walk {
       if (n == 0) break;
       for (int i = 0; i < n; ++i) shaded[i] = program.shade(state, ready[i]->id);
       for (int i = 0; i < n; ++i) {
-        row const& r = *ready[i];
+        group const& r = *ready[i];
         lane_mask const rays = now[i] & alive_;
         if (any(rays)) alive_ &= program.on_hit(state, rays, r.t, r.alpha, shaded[i], r.note) | ~rays;
       }
@@ -208,14 +201,14 @@ class packet_walk {
   }
 
   lane_mask alive_;
-  lanes farthest_;   // of each ray's hits so far
-  int count_ = 0;    // rows that wait
-  u16 used_ = 0;     // rows taken so far,
-  u16 free_ = ends;  // and those of them that are free again, linked by `farther`
-  row pool_[rows + 1];
+  lanes farthest_;       // of each ray's hits so far
+  int count_ = 0;        // groups that wait
+  u16 used_ = 0;         // groups taken so far,
+  u16 free_ = sentinel;  // and those of them that are free again, linked by `farther`
+  group pool_[most_groups + 1];
 
   pixel_box area_;
-  packet_cell cells_[most];  // of the tile's list, from entry loaded_ of the map on
+  typename P::cell cells_[chunk];  // of the tile's list, from entry loaded_ of the map on
   u32 loaded_;
   u16 near_[batch];  // those of a batch whose boxes the packet overlaps
   hits found_[batch];

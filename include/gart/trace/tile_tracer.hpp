@@ -10,26 +10,26 @@
 // (trace/packet_walk.hpp), warps on a device (trace/warp_walk.hpp, tiles of a multiple of 8). Other programs' rays are
 // walked one by one.
 //
-// Ray programs must also say where a ray's pixel is: at(i), with x and y. Cost: the footprints, one sort of the
-// (primitive, tile) pairs, and a walk of each tile's list up to where its rays end.
+// It traces pixel programs (trace/ray_program.hpp). Cost: the footprints, one sort of the (primitive, tile) pairs, and
+// a walk of each tile's list up to where its rays end.
 
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/tiles/tile_map.hpp>
 #include <gart/trace/hit_ring.hpp>
 #include <gart/trace/packet_walk.hpp>
-#include <gart/trace/ray_program.hpp>
+#include <gart/trace/tracer.hpp>
 #include <gart/trace/warp_walk.hpp>
 
 namespace gart::inline GART_ISA {
 
 namespace trace_kernels {
 
-template <class Response, int Capacity, int Size, ray_program P>
+template <class Response, int Capacity, int Size, pixel_program P>
 struct walk_tiles {
   static constexpr int block_size = 64, min_blocks = 8;
-  // Candidates between two looks at what has become certain: rays of a warp then pass on several hits at a time
-  // together.
+  // Candidates between two looks at what has become certain: the rays of a warp then pass on several hits at a time
+  // together, with less divergence.
   static constexpr u32 stride = 8;
   tile_grid<Size> grid;
   tile_map_view map;
@@ -70,7 +70,7 @@ struct walk_tiles {
       pending_hit limit{3.402823466e38f, end, 0};
       u32 resume = end;
       u32 next_id = list[first];
-      ray_gaussian next = scene.gaussians[next_id];  // read one ahead: the work between hides the way from memory
+      ray_gaussian next = scene.gaussians[next_id];  // read one ahead, to hide the latency
       for (u32 k = first; k < end; ++k) {
         u32 const id = next_id;
         ray_gaussian const g = next;
@@ -104,7 +104,7 @@ struct walk_tiles {
 
 #if !defined(__CUDACC__)
 // On a host, programs with packets: a tile's packets one after another; rays of a packet that runs over one by one.
-template <class Response, int Window, int Size, ray_program P>
+template <class Response, int Window, int Size, pixel_program P>
 struct walk_tile_packets {
   using packets = decltype(packets_of(std::declval<P const&>()));
   using scratch = packet_walk<Response, Window, Size, packets>;
@@ -126,69 +126,63 @@ struct walk_tile_packets {
   void one_by_one(packet_block const& block) const {
     auto const& order = rays.program.order;
     for (int l = 0; l < lane_count; ++l) {
-      auto const at = packets::pixel_of(block, l);
+      pixel const at{block.x + packet_block::column(l), block.y + packet_block::row(l)};
       if (order.inside(at)) rays(order.index(at));
     }
   }
 };
-
-template <class P>
-concept has_packets = requires(P const& p) {
-  packets_of(p);
-};
 #endif
-
-template <class P>
-concept has_warps = requires {
-  P::row_floats;
-};
 
 }  // namespace trace_kernels
 
 // Size: side of a tile. Window: hits that a ray walked alone keeps at most, a power of two; a smaller one is walked
 // again more often.
 template <execution E, int Size = 8, class Response = generalized_gaussian<>, int Window = 32>
-class tile_tracer {
+class tile_tracer : public tracer_base {
  public:
   using response_type = Response;
   static constexpr char const* name = "tiles";
   static constexpr int tile_size = Size;
+  static constexpr bool lends_footprints = true;
   static constexpr int window = Window;
 
-  explicit tile_tracer(E& exec) : prints_(exec), map_(exec), shifts_(exec), next_(exec), put_aside_(exec) {}
+  explicit tile_tracer(E& exec) : prints_(exec), map_(exec), shifts_(exec), next_(exec), spilled_(exec) {
+    static_assert(footprint_tracer<tile_tracer, E>);
+  }
 
-  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> records, camera const& view,
-               float alpha_min, float near) {
+  void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, camera const& view,
+               trace_options const& options) {
     grid_ = {view.width, view.height};
-    prints_.template measure<Response>(exec, scene, view, alpha_min, near);
+    prints_.template measure<Response>(exec, scene, view, options.alpha_min, options.near);
     if (view.lens.any()) {
       shifts_.resize(grid_.count());
       parallel_for(exec, "map/lens", grid_.count(), lens_shifts<Size>{view, grid_, shifts_});
     }
-    map_.build(exec, grid_, prints_, depth_order(prints_.depths().data(), records.data(), view, shifts_.data()));
+    map_.build(exec, grid_, prints_, depth_order(prints_.depths().data(), gaussians.data(), view, shifts_.data()));
     if constexpr (E::device) map_.rank_tiles(exec);
-    scene_ = {records.data(), scene.count, near};
+    scene_ = {gaussians.data(), scene.count, options.near};
     forward_ = view.rotation[2];
   }
 
-  template <ray_program P>
+  template <pixel_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
+    if constexpr (P::has_warps) static_assert(warp_program<P>, "a ray program that says has_warps is a warp_program");
 #if defined(__CUDACC__)
-    if constexpr (E::device && trace_kernels::has_warps<P> && Size % 8 == 0) {
+    if constexpr (E::device && P::has_warps && Size % 8 == 0) {
       using walk = walk_tile_warps<Response, Size, P>;
       u32 const most = static_cast<u32>(exec.multiprocessors()) * walk::min_blocks;
       u32 const parts = grid_.count() * walk::tile_parts, teams = parts < most ? parts : most;
-      next_.resize(1), put_aside_.resize(teams * walk::aside_floats);
+      next_.resize(1), spilled_.resize(teams * walk::spill_floats);
       next_.zero();
-      parallel_for(exec, label, tile_range{teams, walk::block_size},
-                   walk{grid_, map_.view(), prints_.ranges().data(), scene_, forward_, program, next_.data(),
-                        put_aside_.data()});
+      parallel_for(
+          exec, label, tile_range{teams, walk::block_size},
+          walk{grid_, map_.view(), prints_.ranges().data(), scene_, forward_, program, next_.data(), spilled_.data()});
       return;
     }
 #endif
     trace_kernels::walk_tiles<Response, Window, Size, P> const walk{grid_, map_.view(), scene_, forward_, program};
 #if !defined(__CUDACC__)
-    if constexpr (!E::device && trace_kernels::has_packets<P>) {
+    if constexpr (!E::device && P::has_packets) {
       parallel_for(exec, label, tile_range{grid_.count(), 1},
                    trace_kernels::walk_tile_packets<Response, Window, Size, P>{walk, prints_.ranges().data()});
       return;
@@ -206,7 +200,7 @@ class tile_tracer {
   tile_map<E, Size> map_;
   buffer<lens_shift, E> shifts_;
   buffer<u32, E> next_;  // of the device's walk (trace/warp_walk.hpp)
-  buffer<float, E> put_aside_;
+  buffer<float, E> spilled_;
   traced_scene scene_;
   vec3 forward_{0, 0, 1};
 };

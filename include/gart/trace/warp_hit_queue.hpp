@@ -1,9 +1,9 @@
 #pragma once
 // The pending hits of one ray of a warp (trace/warp_walk.hpp), in the order (t, id). The latest 16 lie in a window in
-// shared memory, each lane in a bank of its own, their order a register of sixteen 4-bit numbers. A full window puts
-// all but its first hit aside as a run, in order, in memory of its own; of each run the next hit's t is in a register.
-// The next hit of all is the window's first or that of a run. So a hit is put aside once at most, and the order of
-// others is never made anew for it.
+// shared memory, each lane in a bank of its own, their order a register of sixteen 4-bit numbers. A full window is
+// spilled, all but its first hit, as a run, in order, to memory of its own; of each run the next hit's t is in a
+// register. The next hit of all is the window's first or that of a run. So a hit is spilled once at most, and the order
+// of others is never made anew for it.
 //
 // Where all runs are taken a hit is lost: what is passed on from then on lies before the nearest hit that was.
 // Memory: 24 bytes for each of 210 hits a lane. Device only.
@@ -20,7 +20,7 @@ namespace gart::inline GART_ISA {
 struct waiting_hit {
   float t, alpha;
   vec3 shown;
-  u32 key;  // a hit's place where hits are recorded (tiles/layout.hpp), else its Gaussian's entry in the list
+  u32 key;  // a hit's place where hits have places (trace/warp_program.hpp), else its Gaussian's entry in the list
 };
 
 // Order of hits at one t: places of a pixel's hits have the order of their ids; entries are asked for them.
@@ -48,12 +48,12 @@ class warp_hit_queue {
   struct scratch {  // of a warp
     float words[6][window][lanes];
   };
-  static constexpr std::size_t floats_aside = std::size_t{6} * runs * run;  // of a lane
+  static constexpr std::size_t spill_floats_a_lane = std::size_t{6} * runs * run;  // of a lane
 
-  // aside: of the warp's lanes, on a boundary of 8 bytes.
-  __device__ GART_INLINE warp_hit_queue(scratch& s, float* aside, int lane, KeyOrder before)
+  // spill_memory: of the warp's lanes, on a boundary of 8 bytes.
+  __device__ GART_INLINE warp_hit_queue(scratch& s, float* spill_memory, int lane, KeyOrder before)
       : own_(&detail::kept_address<float>(&s.words[0][0][lane])),
-        aside_(reinterpret_cast<pair*>(aside) + 3 * runs * run * lane),
+        spilled_(reinterpret_cast<pair*>(spill_memory) + 3 * runs * run * lane),
         before_(before) {
     clear();
   }
@@ -71,11 +71,11 @@ class warp_hit_queue {
   __device__ GART_INLINE bool lost() const { return lost_t_ < infinity; }
   __device__ GART_INLINE float lost_t() const { return lost_t_; }  // infinity: none
 
-  // For a window that is full, and for one that soon will be: lanes that put hits aside do so together.
+  // For a window that is full, and for one that soon will be: lanes that spill do so together, without divergence.
   __device__ GART_INLINE void make_room() {
     if (count_ < window - 3) return;
     int const to = free_run();
-    if (to < runs) put_aside(to);
+    if (to < runs) spill(to);
   }
 
   // Needs room, where there can be.
@@ -95,10 +95,11 @@ class warp_hit_queue {
       int const slot = slot_of(0);
       float t = count_ > 0 ? word(time, slot) : infinity;
       bool from_run = false;
-      if ((next_t_ < infinity) & (next_t_ <= t)) from_run = next_t_ < t || before_(key_of(next_record()), key_at(slot));
+      if ((next_t_ < infinity) & (next_t_ <= t))
+        from_run = next_t_ < t || before_(key_of(next_spilled()), key_at(slot));
       t = from_run ? next_t_ : t;
       if ((t == infinity) | !(t * cosine < depth)) return;
-      if (t >= lost_t_ && !nearer(t, from_run ? key_of(next_record()) : key_at(slot), lost_t_, lost_key_)) return;
+      if (t >= lost_t_ && !nearer(t, from_run ? key_of(next_spilled()) : key_at(slot), lost_t_, lost_key_)) return;
       if (!f(from_run ? take_of_run() : take_first())) return;
     }
   }
@@ -169,19 +170,19 @@ class warp_hit_queue {
     u64 const any = left_ | left_ >> 1 | left_ >> 2 | left_ >> 3;
     return (__ffsll(static_cast<long long>(~any & 0x1111111111111111ull)) - 1) / 4;
   }
-  __device__ GART_INLINE pair* record(int r, int k) const { return aside_ + 3 * (r * run + k); }
-  __device__ GART_INLINE pair* next_record(int r) const {
-    return record(r, run - (static_cast<int>(left_ >> (4 * r)) & 15));
+  __device__ GART_INLINE pair* spilled_at(int r, int k) const { return spilled_ + 3 * (r * run + k); }
+  __device__ GART_INLINE pair* next_spilled(int r) const {
+    return spilled_at(r, run - (static_cast<int>(left_ >> (4 * r)) & 15));
   }
-  __device__ GART_INLINE pair* next_record() const { return next_record(next_run_); }
-  __device__ GART_INLINE static u32 key_of(pair const* record) { return float_to_bits(record[0].b); }
+  __device__ GART_INLINE pair* next_spilled() const { return next_spilled(next_run_); }
+  __device__ GART_INLINE static u32 key_of(pair const* spilled) { return float_to_bits(spilled[0].b); }
 
   // All but the first of the window, at a run's end.
-  __device__ GART_INLINE void put_aside(int to) {
+  __device__ GART_INLINE void spill(int to) {
     int const count = count_ - 1;
     u64 rest = order_ >> 4;
     float const first = word(time, static_cast<int>(rest) & 15);
-    pair* out = record(to, run - count);
+    pair* out = spilled_at(to, run - count);
     for (int k = 0; k < count; ++k, rest >>= 4, out += 3) {
       int const slot = static_cast<int>(rest) & 15;
       waiting_hit const h = at(slot);
@@ -195,7 +196,7 @@ class warp_hit_queue {
 
   __device__ GART_INLINE waiting_hit take_of_run() {
     int const from = next_run_;
-    pair const* const out = next_record();
+    pair const* const out = next_spilled();
     pair const a = out[0], b = out[1], c = out[2];
     left_ -= u64{1} << (4 * from);
     bool const more = (left_ >> (4 * from) & 15) != 0;
@@ -216,12 +217,12 @@ class warp_hit_queue {
     if (ties == 0 || next_t_ == infinity) return;
     GART_UNROLL
     for (int k = 1; k < runs; ++k)
-      if (k > next_run_ && first_t_[k] == next_t_ && before_(key_of(next_record(k)), key_of(next_record())))
+      if (k > next_run_ && first_t_[k] == next_t_ && before_(key_of(next_spilled(k)), key_of(next_spilled())))
         next_run_ = k;
   }
 
-  float* own_;   // the lane's words of the window
-  pair* aside_;  // the lane's own, [runs][run][3]: t and key, alpha and what is shown
+  float* own_;     // the lane's words of the window
+  pair* spilled_;  // the lane's own, [runs][run][3]: t and key, alpha and what is shown
   KeyOrder before_;
   u64 order_, left_;
   u32 free_;

@@ -7,31 +7,21 @@
 // on when the window of some ray's queue is full: many rays then have some to pass on, and do it together. Where a
 // queue loses a hit the ray passes on what lies before it, and walks the list again, strictly after its last hit. The
 // queues take 5 KB of device memory for each ray that the device holds at a time: 298 MB on 132 multiprocessors.
-//
-// Beside what every ray program offers, one for warps offers
-//   order                        the pixels (render/pixels.hpp)
-//   row_floats, row_floats_read  what it reads of a Gaussian to shade a hit, and how much of that is to be read (the
-//                                rest is zero); rows_from, where the rows of all Gaussians begin
-//   shade(state, row)            what a hit shows
-//   records_hits                 whether hits have places in the LT buffer (tiles/layout.hpp)
-//   add(state, t, alpha, shown, place)  composites a hit; false ends the ray
 
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/tiles/tile_map.hpp>
-#include <gart/trace/ray_program.hpp>
+#include <gart/trace/tracer.hpp>
 #include <gart/trace/warp_hit_queue.hpp>
+#include <gart/trace/warp_program.hpp>
 
 #if defined(__CUDACC__)
 
 #include <cuda_pipeline.h>
 
-#include <utility>
-
 namespace gart::inline GART_ISA {
 
-template <class Response, int Size, class P>
+template <class Response, int Size, warp_program P>
 class walk_tile_warps {
-  using pixel = decltype(std::declval<P const&>().at(index_t{}));
   static constexpr int lanes = 32, warps = 2;
   static constexpr int block_width = 8, block_height = 4;
   static constexpr int tile_blocks = Size * Size / lanes;
@@ -40,9 +30,9 @@ class walk_tile_warps {
  public:
   static constexpr int block_size = warps * lanes, min_blocks = 7;
   static constexpr u32 tile_parts = tile_blocks;
-  using key_order = std::conditional_t<P::records_hits, place_order, entry_order>;
+  using key_order = std::conditional_t<P::places_hits, place_order, entry_order>;
   using queue = warp_hit_queue<key_order>;
-  static constexpr std::size_t aside_floats = queue::floats_aside * block_size;  // of a team's rays
+  static constexpr std::size_t spill_floats = queue::spill_floats_a_lane * block_size;  // of a team's rays
 
   tile_grid<Size> grid;
   tile_map_view map;
@@ -50,16 +40,16 @@ class walk_tile_warps {
   traced_scene scene;
   vec3 forward;  // the camera's axis
   P program;
-  u32* next = nullptr;         // part of a tile that is to be taken next, zero at first
-  float* put_aside = nullptr;  // [teams][aside_floats]
+  u32* next = nullptr;       // part of a tile that is to be taken next, zero at first
+  float* spilled = nullptr;  // [teams][spill_floats]
 
  private:
-  static constexpr int group = 4;  // candidates read ahead at once
-  // 16-byte words of a candidate: its record, then its row, which may not be a whole number of them.
-  static constexpr int record_words = sizeof(ray_gaussian) / sizeof(quad), row_words = (P::row_floats + 3) / 4;
+  static constexpr int group = 4;  // candidates staged at once
+  // 16-byte words of a candidate: its Gaussian, then its row, which may not be a whole number of them.
+  static constexpr int gaussian_words = sizeof(ray_gaussian) / sizeof(quad), row_words = (P::row_floats + 3) / 4;
   static constexpr bool whole_rows = P::row_floats % 4 == 0;
-  static constexpr u32 everyone = 0xffffffffu;
-  static constexpr u32 nothing = 0xffffffffu;
+  static constexpr u32 full_warp = 0xffffffffu;
+  static constexpr u32 no_key = 0xffffffffu;
 
   struct candidate {
     ray_gaussian gaussian;
@@ -67,9 +57,9 @@ class walk_tile_warps {
   };
 
   struct warp_scratch {
-    candidate ahead[2][group];
+    candidate staged[2][group];
     // Of the candidates that 32 entries of the list leave.
-    tile_slots cell[P::records_hits ? lanes : 1];
+    typename P::cell cell[P::places_hits ? lanes : 1];
     u32 id[lanes], entry[lanes];
     float depth[lanes];
     typename queue::scratch pending;
@@ -86,12 +76,12 @@ class walk_tile_warps {
   __device__ void operator()(Team const& team) const {
     int const warp = static_cast<int>(threadIdx.x) / lanes;
     warp_scratch& s = team.scratch().warp[warp];
-    float* const memory = put_aside + team.tile() * aside_floats + warp * (aside_floats / warps);
+    float* const memory = spilled + team.tile() * spill_floats + warp * (spill_floats / warps);
     u32 const parts = grid.count() * tile_parts;
     while (true) {
       u32 part = 0;
       if (threadIdx.x % lanes == 0) part = atomicAdd(next, 1u);
-      part = __shfl_sync(everyone, part, 0);
+      part = __shfl_sync(full_warp, part, 0);
       if (part >= parts) return;
       trace(s, memory, map.longest_first[part / tile_parts], part % tile_parts);
     }
@@ -130,7 +120,7 @@ class walk_tile_warps {
       cosine_ = (d.x * k.forward.x + d.y * k.forward.y + d.z * k.forward.z) * 1.000002f;
       last_t_ = k.scene.near;
       for (int w = lane_; w < 2 * group * row_words; w += lanes)
-        s.ahead[w / (group * row_words)][w / row_words % group].row[w % row_words] = {};
+        s.staged[w / (group * row_words)][w / row_words % group].row[w % row_words] = {};
     }
 
     // Once along the list. Whether to walk it again, for hits that were lost.
@@ -149,7 +139,7 @@ class walk_tile_warps {
       }
       pass_on(infinity);
       alive_ = alive_ && pending_.lost();
-      return __any_sync(everyone, alive_);
+      return __any_sync(full_warp, alive_);
     }
 
     __device__ GART_INLINE void end() {
@@ -164,11 +154,11 @@ class walk_tile_warps {
       pixel_box const& b = range.box;
       bool const wanted = exists && b.x0 < corner_.x + block_width && b.x1 > corner_.x &&
                           b.y0 < corner_.y + block_height && b.y1 > corner_.y;
-      u32 const all = __ballot_sync(everyone, wanted);
+      u32 const all = __ballot_sync(full_warp, wanted);
       if (wanted) {
         int const to = __popc(all & ((1u << lane_) - 1));
         s_.id[to] = id, s_.entry[to] = entry, s_.depth[to] = depth;
-        if constexpr (P::records_hits) s_.cell[to] = tile_slots(range, area_);
+        if constexpr (P::places_hits) s_.cell[to] = typename P::cell(range, area_);
       }
       __syncwarp();
       return __popc(all);
@@ -182,7 +172,7 @@ class walk_tile_warps {
         read(side ^ 1, first + group, count);
         __pipeline_wait_prior(1);
         __syncwarp();
-        more = evaluate(s_.ahead[side], first, count);
+        more = evaluate(s_.staged[side], first, count);
         __syncwarp();
       }
       __pipeline_wait_prior(0);
@@ -196,22 +186,22 @@ class walk_tile_warps {
       int const reader = lane_ % readers, number = first + lane_ / readers;
       if (number < count) {
         u32 const id = s_.id[number];
-        candidate& to = s_.ahead[side][lane_ / readers];
-        quad const* const record = reinterpret_cast<quad const*>(k_.scene.gaussians + id);
+        candidate& to = s_.staged[side][lane_ / readers];
+        quad const* const gaussian = reinterpret_cast<quad const*>(k_.scene.gaussians + id);
         float const* const row = k_.program.rows_from() + static_cast<std::size_t>(P::row_floats) * id;
         if constexpr (whole_rows) {
           GART_UNROLL
-          for (int w = 0; w < record_words + row_words; w += readers) {
-            int const word = w + reader, in_row = word - record_words;
-            bool const is_record = in_row < 0;
-            if (is_record || (in_row < row_words && 4 * in_row < k_.program.row_floats_read()))
+          for (int w = 0; w < gaussian_words + row_words; w += readers) {
+            int const word = w + reader, in_row = word - gaussian_words;
+            bool const of_gaussian = in_row < 0;
+            if (of_gaussian || (in_row < row_words && 4 * in_row < k_.program.row_floats_read()))
               __pipeline_memcpy_async(reinterpret_cast<quad*>(&to) + word,
-                                      is_record ? record + word : reinterpret_cast<quad const*>(row) + in_row,
+                                      of_gaussian ? gaussian + word : reinterpret_cast<quad const*>(row) + in_row,
                                       sizeof(quad));
           }
         } else {
-          if (reader < record_words)
-            __pipeline_memcpy_async(reinterpret_cast<quad*>(&to) + reader, record + reader, sizeof(quad));
+          if (reader < gaussian_words)
+            __pipeline_memcpy_async(reinterpret_cast<quad*>(&to) + reader, gaussian + reader, sizeof(quad));
           for (int w = reader; w < k_.program.row_floats_read(); w += readers)
             __pipeline_memcpy_async(reinterpret_cast<float*>(to.row) + w, row + w, sizeof(float));
         }
@@ -233,26 +223,26 @@ class walk_tile_warps {
         found |= (exists & is_new ? 1u : 0u) << c;
         tied |= (exists & (r.t == last_t_) ? 1u : 0u) << c;
       }
-      if (tied && last_key_ != nothing) {
+      if (tied && last_key_ != no_key) {
         GART_UNROLL
         for (int c = 0; c < group; ++c)
           if ((tied >> c & 1) && follows_last(from[c].gaussian, t[c], d2[c], first + c)) found |= 1u << c;
       }
       if (!alive_) found = 0;
-      bool const crowded = __any_sync(everyone, __popc(found) > pending_.room());
+      bool const crowded = __any_sync(full_warp, __popc(found) > pending_.room());
       bool tried = false;
       GART_NO_UNROLL
-      for (u32 left = __reduce_or_sync(everyone, found); left; left &= left - 1) {
+      for (u32 left = __reduce_or_sync(full_warp, found); left; left &= left - 1) {
         int const c = __ffs(static_cast<int>(left)) - 1;
         bool const hit = alive_ && (found >> c & 1);
-        if (crowded && __any_sync(everyone, hit && pending_.full())) {
+        if (crowded && __any_sync(full_warp, hit && pending_.full())) {
           if (!tried) {
             tried = true;
             float const depth = s_.depth[first + c];
             pass_on(depth);
-            if (!__any_sync(everyone, alive_ && !(pending_.lost_t() * cosine_ <= depth))) return false;
+            if (!__any_sync(full_warp, alive_ && !(pending_.lost_t() * cosine_ <= depth))) return false;
           }
-          if (__any_sync(everyone, hit && alive_ && pending_.full())) pending_.make_room();
+          if (__any_sync(full_warp, hit && alive_ && pending_.full())) pending_.make_room();
         }
         if (hit && alive_)
           pending_.add({pick(t, c), hit_alpha<Response>(from[c].gaussian, pick(d2, c)),
@@ -275,8 +265,8 @@ class walk_tile_warps {
     }
 
     __device__ GART_INLINE u32 key_of(int number) const {
-      if constexpr (P::records_hits)
-        return tile_slots::read(s_.cell[number]).place_of(at_.x, at_.y);
+      if constexpr (P::places_hits)
+        return P::cell::read(s_.cell[number]).place_of(at_.x, at_.y);
       else
         return s_.entry[number];
     }
@@ -286,12 +276,12 @@ class walk_tile_warps {
       if (!alive_) return;
       pending_.pass_on(depth, cosine_, [this](waiting_hit const& h) {
         last_t_ = h.t, last_key_ = h.key;
-        return alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::records_hits ? h.key : 0);
+        return alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::places_hits ? h.key : 0);
       });
     }
 
     __device__ GART_INLINE static key_order order_of(walk_tile_warps const& k) {
-      if constexpr (P::records_hits)
+      if constexpr (P::places_hits)
         return {};
       else
         return {k.map.primitives.data()};
@@ -310,7 +300,7 @@ class walk_tile_warps {
     float cosine_;
     bool alive_;
     float last_t_;  // the last hit passed on: at first (near, none), t > near
-    u32 last_key_ = nothing;
+    u32 last_key_ = no_key;
     key_order before_;
     queue pending_;
   };

@@ -1,6 +1,7 @@
 #pragma once
 // Everything a training run is made of besides the data, with the defaults of the literature (3DGS, 3DGS-MCMC, gsplat).
 
+#include <gart/core/names.hpp>
 #include <gart/core/types.hpp>
 #include <gart/optim/options.hpp>
 #include <gart/render/options.hpp>
@@ -11,22 +12,30 @@
 namespace gart {
 
 enum class densify_kind { none, error, mcmc, adc };
+constexpr auto names_of(densify_kind) {
+  using enum densify_kind;
+  return std::array<name_of<densify_kind>, 4>{{{error, "error"}, {mcmc, "mcmc"}, {adc, "adc"}, {none, "none"}}};
+}
+
 enum class background_kind { black, white, random };
+constexpr auto names_of(background_kind) {
+  using enum background_kind;
+  return std::array<name_of<background_kind>, 3>{{{white, "white"}, {black, "black"}, {random, "random"}}};
+}
 
 struct train_options {
   int iterations = 30000;
   index_t max_gaussians = 1'000'000;
   index_t random_points = 100'000;  // where the capture has no points
   densify_kind densify = densify_kind::error;
-  int sh_degree = 3;
   int sh_every = 1000;  // a degree more after so many steps (or iterations / (3 * degrees) in shorter runs)
-  // Held-out gain in PSNR, dB, that a band of spherical harmonics must buy to be stored (train/degree_selection.hpp);
-  // 0: every band up to sh_degree is, without a measurement.
+  // Held-out gain in PSNR, dB, that a band of spherical harmonics must buy to be stored (runtime/degree_selection.hpp);
+  // 0: every band is, without a measurement.
   float sh_gain = 0;
   std::vector<std::size_t> held_out = {};  // training views, by index, that are not trained on
   background_kind background = background_kind::black;
   // Of the first Gaussians; the scale is times the distance to the neighbours. 0: what suits the start
-  // (train/choose.hpp).
+  // (runtime/choose.hpp).
   float initial_opacity = 0;
   float initial_scale = 0;
   float ssim_weight = 0.2f;
@@ -36,13 +45,22 @@ struct train_options {
   // first (optim/finite.hpp).
   bool check_finite = false;
   u64 seed = 1;
-  float near = 0.002f;         // hits lie at t > near, times the scene's extent
-  render_options render = {};  // its background is set from `background`, its near from `near`
+  float near = 0.002f;  // hits lie at t > near, times the scene's extent
+  approximation_options render = {};
   learning_rates rates = {};
   adam_options adam = {};
   error_growth_options error = {};
   mcmc_options mcmc = {};
   adc_options adc = {};
 };
+
+// What a scene of that extent is traced with.
+inline render_options render_options_of(train_options const& options, float extent, vec3 background = vec3(0.0f)) {
+  render_options render;
+  static_cast<approximation_options&>(render) = options.render;
+  render.near = options.near * extent;
+  render.background = background;
+  return render;
+}
 
 }  // namespace gart

@@ -13,7 +13,7 @@
 
 namespace gart {
 
-// What a trial of one band of spherical harmonics found (train/degree_selection.hpp). PSNR in dB, the mean over the
+// What a trial of one band of spherical harmonics found (runtime/degree_selection.hpp). PSNR in dB, the mean over the
 // views held out.
 struct band_trial {
   int band = 0;         // the degree whose coefficients were tried

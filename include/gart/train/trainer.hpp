@@ -10,8 +10,10 @@
 // The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step),
 // so a state holds parameters, moments and counters only.
 
-#include <gart/backward/backward.hpp>
+#include <gart/backward/fallback.hpp>
+#include <gart/exposure/exposure_field.hpp>
 #include <gart/exposure/exposure_training.hpp>
+#include <gart/io/dataset.hpp>
 #include <gart/loss/error_map.hpp>
 #include <gart/loss/image_loss.hpp>
 #include <gart/optim/adam.hpp>
@@ -20,11 +22,12 @@
 #include <gart/optim/finite.hpp>
 #include <gart/optim/mcmc.hpp>
 #include <gart/optim/schedule.hpp>
-#include <gart/render/forward.hpp>
+#include <gart/render/frame.hpp>
+#include <gart/render/render_image.hpp>
 #include <gart/scene/traits.hpp>
-#include <gart/train/render_image.hpp>
-#include <gart/train/session.hpp>
+#include <gart/train/options.hpp>
 #include <gart/train/state.hpp>
+#include <gart/train/step_report.hpp>
 #include <gart/train/training_images.hpp>
 #include <gart/train/view_order.hpp>
 
@@ -45,14 +48,13 @@ struct loss_input {
   span<float> value;        // [2]
 };
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 class trainer {
  public:
   static constexpr int sh_degree = Traits::sh_degree;
-  static_assert(std::is_same_v<typename Tracer::response_type, typename Traits::response>,
-                "the tracer finds the hits of another response than the traits name");
 
   trainer(E& exec, train_options const& options, dataset const& data, gaussian_model const& start);
+  trainer(E& exec, train_options const& options, dataset const&& temporary, gaussian_model const& start) = delete;
 
   step_report step();
   template <class Loss>
@@ -72,27 +74,15 @@ class trainer {
   gaussians<E> const& gradients() const { return gradients_; }
 
  private:
-  template <class S>
-  struct fallback_of {
-    using type = S;
-  };
-  template <class S>
-  requires requires { typename S::fallback; }
-  struct fallback_of<S> {
-    using type = typename S::fallback;
-  };
-  using fallback_strategy = typename fallback_of<Strategy>::type;
-  using last_strategy = typename fallback_of<fallback_strategy>::type;
+  using frame_type = frame<E, Traits, Tracer>;
 
   template <class Pass, class Loss>
-  void differentiate(Pass& pass, Loss&& loss, std::size_t view, render_options const& render,
-                     learning_rates const& rates, int degree);
+  void differentiate_by(Pass& pass, Loss&& loss, std::size_t view, learning_rates const& rates);
   void update(dataset_view const& view, learning_rates const& rates, int degree, span<float const> moments);
   bool grows_by_error() const { return options_.densify == densify_kind::error; }
   vec3 background_of(int step) const;
   static mcmc_options mcmc_options_of(train_options const& options) {
     mcmc_options m = options.mcmc;
-    m.kernel_degree = Traits::response::degree;
     m.dead_opacity = least_opacity(m.dead_opacity, options.render.alpha_min);
     return m;
   }
@@ -112,12 +102,8 @@ class trainer {
   dataset const& data_;
   gaussians<E> scene_, gradients_;
   optimizer_state<E> state_;
-  antialiased<E> filter_;
-  frame_records<E> records_;
-  Tracer tracer_;
-  backward<E, Strategy, tile_size_of<Tracer>> backward_;
-  backward<E, fallback_strategy, tile_size_of<Tracer>> fallback_;
-  backward<E, last_strategy, tile_size_of<Tracer>> last_;
+  frame_type frame_;
+  backward_passes<frame_type, Strategy> passes_;
   image_loss<E> loss_;
   training_images<E> images_;
   view_order order_;

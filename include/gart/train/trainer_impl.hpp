@@ -9,7 +9,7 @@
 
 namespace gart::inline GART_ISA {
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& options, dataset const& data,
                                               gaussian_model const& start)
     : exec_(exec),
@@ -18,18 +18,15 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       scene_(exec, start),
       gradients_(exec, static_cast<index_t>(start.size()), sh_degree),
       state_(exec, static_cast<index_t>(start.size()), sh_degree),
-      filter_(exec),
-      records_(exec),
-      tracer_(exec),
-      backward_(exec),
-      fallback_(exec),
-      last_(exec),
+      frame_(exec),
+      passes_(exec),
       loss_(exec),
       images_(data),
       order_(data.train.size(), options.held_out, options.seed),
       error_(exec, error_options_of(options), options.max_gaussians, options.iterations, options.seed),
       error_map_(exec),
-      mcmc_(exec, mcmc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
+      mcmc_(exec, mcmc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed,
+            Traits::response::degree),
       adc_(exec, adc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
       color_(exec),
       color_gradient_(exec),
@@ -38,13 +35,12 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
   if (options.check_finite) finite_.emplace(exec);
-  options_.render.near = options.near * data.extent;
   if (options.exposure) exposures_.emplace(exec, data.train.size());
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
 }
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 void trainer<E, Traits, Tracer, Strategy>::set_iterations(int iterations) {
   if (iterations == options_.iterations) return;
   options_.iterations = iterations;
@@ -53,46 +49,32 @@ void trainer<E, Traits, Tracer, Strategy>::set_iterations(int iterations) {
   mcmc_.set_growth(growth_);
 }
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 step_report trainer<E, Traits, Tracer, Strategy>::step() {
   return step([this](loss_input<E> const& in) {
     loss_.evaluate(in.image, in.truth, in.width, in.height, options_.ssim_weight, in.gradient, in.value);
   });
 }
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 template <class Loss>
 step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   std::size_t const index = order_.at(step_);
   dataset_view const& view = data_.train[index];
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates const rates = rates_at(options_.rates, data_.extent, step_, options_.iterations);
-  render_options render = options_.render;
-  render.background = background_of(step_);
-  auto const constant = std::as_const(scene_).view();
+  render_options const render = render_options_of(options_, data_.extent, background_of(step_));
   std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
   color_.resize(floats), color_gradient_.resize(floats);
 
-  auto const seen = filter_.of(exec_, constant, view.view, render.antialias);
-  records_.template prepare<typename Traits::response>(exec_, seen, view.view.position, render.alpha_min);
-  configure(tracer_, render);
-  tracer_.prepare(exec_, seen, records_.view(), view.view, render.alpha_min, render.near);
+  frame_.prepare(std::as_const(scene_).view(), view.view, render, degree);
   span<float const> moments;
+  char const* used = nullptr;
   // With less memory where the LT buffer would pass its budget or the numbers of its slots, and then with none.
-  auto const with = [&](auto& pass) {
-    if (!pass.prepare(exec_, tracer_, seen, view.view, render.alpha_min, render.near, options_.lt_budget)) return false;
-    differentiate(pass, loss, index, render, rates, degree);
-    moments = pass.moments(), lt_bytes_ = pass.lt_bytes();
-    return true;
-  };
-  char const* used = Strategy::name;
-  if (!with(backward_)) {
-    used = fallback_strategy::name;
-    if (!with(fallback_)) {
-      used = last_strategy::name;
-      if (!with(last_)) throw last_.no_room();
-    }
-  }
+  passes_.with_room(frame_, options_.lt_budget, [&]<class Pass>(Pass& pass) {
+    differentiate_by(pass, loss, index, rates);
+    moments = pass.moments(), lt_bytes_ = pass.lt_bytes(), used = Pass::strategy_type::name;
+  });
   ++step_;
   update(view, rates, degree, moments);
 
@@ -108,28 +90,27 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   return report;
 }
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 template <class Pass, class Loss>
-void trainer<E, Traits, Tracer, Strategy>::differentiate(Pass& pass, Loss&& loss, std::size_t index,
-                                                         render_options const& render, learning_rates const& rates,
-                                                         int degree) {
+void trainer<E, Traits, Tracer, Strategy>::differentiate_by(Pass& pass, Loss&& loss, std::size_t index,
+                                                            learning_rates const& rates) {
   dataset_view const& view = data_.train[index];
-  auto const constant = std::as_const(scene_).view();
-  forward<sh_degree>(exec_, tracer_, constant, view.view, render, degree, pass.targets(color_.data()), pass.record());
+  image_targets targets;
+  targets.color = color_.data();
+  pass.render(frame_, targets);
   {
     stage_scope stage(exec_, "loss");
     span<float const> const image = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
-    truth_view const truth = images_.get(exec_, index, render.background);
+    truth_view const truth = images_.get(exec_, index, frame_.options().background);
     loss(loss_input<E>{exec_, view, truth, view.view.width, view.view.height, image, color_gradient_, value_});
     if (grows_by_error()) error_map(exec_, image, truth, error_map_);
     if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }
-  pass.template run<sh_degree>(exec_, tracer_, constant, records_.view(), view.view, render, degree, color_,
-                               color_gradient_, gradients_, error_map_);
+  differentiate(frame_, pass, color_gradient_, gradients_, error_map_);
 }
 
 // The optimizer's step and what grows, moves and prunes the Gaussians.
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, learning_rates const& rates, int degree,
                                                   span<float const> moments) {
   bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
@@ -145,7 +126,7 @@ void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, lear
   if (change.added || change.removed) gradients_.resize_keep(scene_.size());
 }
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 vec3 trainer<E, Traits, Tracer, Strategy>::background_of(int step) const {
   switch (options_.background) {
     case background_kind::black:
@@ -159,14 +140,13 @@ vec3 trainer<E, Traits, Tracer, Strategy>::background_of(int step) const {
   }
 }
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 rendered trainer<E, Traits, Tracer, Strategy>::render(camera const& view, vec3 background) {
-  render_options options = options_.render;
-  options.background = background;
-  return render_image<sh_degree>(exec_, tracer_, records_, std::as_const(scene_).view(), view, options);
+  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background));
+  return render_image(frame_);
 }
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 exposure_field trainer<E, Traits, Tracer, Strategy>::exposures() const {
   std::vector<view_exposure> views;
   exposure_state const learned = exposures_ ? exposures_->state() : exposure_state{};
@@ -180,7 +160,7 @@ exposure_field trainer<E, Traits, Tracer, Strategy>::exposures() const {
   return exposure_field(std::move(views));
 }
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 training_state trainer<E, Traits, Tracer, Strategy>::state() const {
   training_state s;
   s.scene = scene_.to_host(), s.first = state_.first.to_host(), s.second = state_.second.to_host();
@@ -191,7 +171,7 @@ training_state trainer<E, Traits, Tracer, Strategy>::state() const {
   return s;
 }
 
-template <execution E, class Traits, class Tracer, class Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy>
 void trainer<E, Traits, Tracer, Strategy>::set_state(training_state const& s) {
   if (s.scene.sh_degree != sh_degree) throw invalid_argument("trainer: the state has another SH degree");
   scene_.assign(s.scene), state_.first.assign(s.first), state_.second.assign(s.second);

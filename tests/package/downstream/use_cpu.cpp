@@ -2,7 +2,7 @@
 #include <gart/io/file.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
-#include <gart/train/session.hpp>
+#include <gart/runtime/session.hpp>
 
 #include <cstdio>
 #include <exception>
@@ -32,13 +32,14 @@ int main(int argc, char** argv) try {
   gart::train_options options;
   options.iterations = 3;
   options.random_points = 500;
-  for (char const* backend : {"serial", "openmp"}) {
-    gart::row_request request;
+  for (gart::backend_kind const backend : {gart::backend_kind::serial, gart::backend_kind::openmp}) {
+    gart::configuration_request request;
     request.backend = backend;
     auto const training = gart::make_session(request, options, data);
     while (training->steps_done() < options.iterations) training->step();
     gart::write_splat_ply(argv[2], training->model());
-    std::printf("%s: %zu Gaussians\n", training->row().backend.c_str(), gart::read_splat_ply(argv[2]).size());
+    std::printf("%s: %zu Gaussians\n", to_string(training->configuration().backend),
+                gart::read_splat_ply(argv[2]).size());
   }
   return 0;
 } catch (std::exception const& e) {

@@ -1,17 +1,20 @@
-// What the library computes: every row behind make_renderer and make_session.
+// What the library computes: every configuration behind make_renderer and make_session.
 #include "scene.hpp"
 
-#include <gart/train/session.hpp>
+#include <gart/runtime/renderer.hpp>
+#include <gart/runtime/session.hpp>
 
 void use_interface() {
   gart::dataset const data = some_capture();
-  for (gart::row_info const& row : gart::compiled_rows()) {
-    gart::row_request request;
-    request.backend = row.backend, request.tracer = row.tracer, request.backward = row.backward;
-    request.sh_degree = row.sh_degree;
-    std::string const name =
-        "library/" + row.backend + "/" + row.tracer + "/" + row.backward + "/SH" + std::to_string(row.sh_degree) + "/";
-    gart::gaussian_model const start = some_model(row.sh_degree);
+  for (gart::configuration_info const& configuration : gart::compiled_configurations()) {
+    gart::configuration_request request;
+    request.backend = configuration.backend, request.tracer = configuration.tracer,
+    request.backward = configuration.backward;
+    request.sh_degree = configuration.sh_degree;
+    std::string const name = std::string("library/") + to_string(configuration.backend) + "/" +
+                             to_string(configuration.tracer) + "/" + configuration.backward + "/SH" +
+                             std::to_string(configuration.sh_degree) + "/";
+    gart::gaussian_model const start = some_model(configuration.sh_degree);
 
     auto const renderer = gart::make_renderer(request);
     renderer->set_model(start);
@@ -22,7 +25,7 @@ void use_interface() {
     renderer->differentiate(view, {}, seen.color);
     tell(name + "gradients", renderer->gradients());
 
-    gart::train_options const options = some_options(row.sh_degree);
+    gart::train_options const options = some_options(configuration.sh_degree);
     auto const training = gart::make_session(request, options, data, &start);
     std::vector<float> losses;
     while (training->steps_done() < options.iterations) losses.push_back(training->step().loss);

@@ -55,7 +55,6 @@ gart::train_options some_options(int degree) {
   gart::train_options o;
   o.iterations = 4;
   o.max_gaussians = 160;
-  o.sh_degree = degree;
   o.sh_every = 1;
   o.exposure = o.check_finite = true;
   o.mcmc.from = 1, o.mcmc.every = 1;

@@ -1,10 +1,11 @@
-// gart::embree: its rows are there.
-#include <gart/train/session.hpp>
+// gart::embree: its configurations are there.
+#include <gart/runtime/session.hpp>
 
 #include <cstdio>
 
 int main() {
-  for (gart::row_info const& row : gart::compiled_rows())
-    if (row.tracer == "embree") return std::printf("%s on %s\n", row.tracer.c_str(), row.backend.c_str()), 0;
+  for (gart::configuration_info const& configuration : gart::compiled_configurations())
+    if (configuration.tracer == gart::tracer_kind::embree)
+      return std::printf("%s on %s\n", to_string(configuration.tracer), to_string(configuration.backend)), 0;
   return 1;
 }

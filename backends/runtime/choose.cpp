@@ -1,0 +1,208 @@
+#include <gart/exposure/exposure_field.hpp>
+#include <gart/runtime/choose.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace gart {
+
+namespace {
+
+constexpr std::size_t most_images = 64;
+constexpr int plain_levels = 12;      // of 255
+constexpr double plain_share = 0.95;  // of the border's pixels
+constexpr double brightness_step_most = 0.03;
+constexpr int white_from = 230, black_to = 25;
+
+std::string percent(double share) {
+  char text[32];
+  std::snprintf(text, sizeof text, share > 0 && share < 0.001 ? "%.2g%%" : "%.1f%%", 100 * share);
+  return text;
+}
+
+std::string counted(std::size_t n, char const* noun) { return std::to_string(n) + " " + noun + (n == 1 ? "" : "s"); }
+
+// f(pixel, channels) for the outermost pixels of some training images; images have 3 or 4 channels.
+template <class F>
+void for_each_border_pixel(dataset const& data, F const& f) {
+  std::size_t const images = std::min(data.train.size(), most_images);
+  for (std::size_t i = 0; i < images; ++i) {
+    image8 const& image = data.train[i * data.train.size() / images].image;
+    for (int y = 0; y < image.height; ++y) {
+      bool const all = y == 0 || y == image.height - 1 || image.width == 1;
+      for (int x = 0; x < image.width; x += all ? 1 : image.width - 1) f(&image.at(x, y, 0), image.channels);
+    }
+  }
+}
+
+void look_at_borders(dataset const& data, capture_traits& traits) {
+  std::array<std::array<std::size_t, 256>, 3> histogram{};
+  std::size_t pixels = 0, clear = 0, alike = 0;
+  for_each_border_pixel(data, [&](u8 const* p, int channels) {
+    ++pixels, clear += channels == 4 && p[3] == 0;
+    for (std::size_t c = 0; c < 3; ++c) ++histogram[c][p[c]];
+  });
+  if (pixels == 0) return;
+  auto const most = [&](std::size_t n) { return static_cast<double>(n) >= plain_share * static_cast<double>(pixels); };
+  traits.clear_border = most(clear);
+  if (clear) return;
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::size_t level = 0, below = histogram[c][0];
+    while (2 * below < pixels) below += histogram[c][++level];
+    traits.border[c] = static_cast<u8>(level);
+  }
+  for_each_border_pixel(data, [&](u8 const* p, int) {
+    bool near = true;
+    for (int c = 0; c < 3; ++c) near = near && std::abs(p[c] - traits.border[c]) <= plain_levels;
+    alike += near;
+  });
+  traits.plain_border = most(alike);
+}
+
+// Of opaque photographs, every seventh pixel of a row; 0 where fewer than two are.
+double brightness_step(std::vector<dataset_view> const& views) {
+  std::vector<view_exposure> poses;
+  std::vector<double> level;
+  for (dataset_view const& v : views) {
+    if (v.image.channels != 3 || v.image.empty()) continue;
+    double sum = 0;
+    std::size_t values = 0;
+    for (std::size_t i = 0; i < v.image.data.size(); i += 7) sum += v.image.data[i], ++values;
+    poses.push_back({v.name, v.view.position, v.view.rotation[2], {}});
+    level.push_back(std::log(std::max(sum / static_cast<double>(values), 1.0)));
+  }
+  exposure_field const field(std::move(poses));
+  std::vector<double> steps;
+  for (std::size_t i = 0; i < level.size() && level.size() > 1; ++i)
+    steps.push_back(std::abs(level[i] - level[field.nearest(i)]));
+  if (steps.empty()) return 0;
+  auto const middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+std::string lenses(capture_traits const& t) {
+  return t.distorted == 0 ? "the lenses are pinholes"
+                          : "the lenses of " + counted(t.distorted, "view") + " are distorted, and traced as they are";
+}
+
+std::string folds(capture_traits const& t) {
+  return "the lenses of " + counted(t.folding, "view") + " are not one to one over the image, and footprints need that";
+}
+
+}  // namespace
+
+bool one_to_one(camera const& view) {
+  if (!view.lens.any()) return true;
+  constexpr int steps = 32;
+  std::array<std::array<vec2, steps + 1>, steps + 1> slope;
+  for (int j = 0; j <= steps; ++j) {
+    for (int i = 0; i <= steps; ++i) {
+      vec2 const image((static_cast<float>(i * view.width) / steps - view.cx) / view.fx,
+                       (static_cast<float>(j * view.height) / steps - view.cy) / view.fy);
+      vec2 const s = undistort(view.lens, image);
+      double u, v;
+      distort(view.lens, s.x, s.y, u, v);
+      // An image point that no direction maps to, by a tenth of a pixel.
+      if (!(std::abs(u - image.x) * view.fx < 0.1 && std::abs(v - image.y) * view.fy < 0.1)) return false;
+      slope[j][i] = s;
+    }
+  }
+  for (int j = 0; j < steps; ++j) {
+    for (int i = 0; i < steps; ++i) {
+      vec2 const across = slope[j][i + 1] - slope[j][i], down = slope[j + 1][i] - slope[j][i];
+      if (!(across.x * down.y - across.y * down.x > 0)) return false;
+    }
+  }
+  return true;
+}
+
+capture_traits inspect(dataset const& data) {
+  capture_traits traits;
+  traits.views = data.train.size();
+  for (auto const* views : {&data.train, &data.test}) {
+    for (dataset_view const& v : *views) {
+      if (!v.view.lens.any()) continue;
+      ++traits.distorted;
+      traits.folding += !one_to_one(v.view);
+    }
+  }
+  std::size_t pixels = 0, clear = 0;
+  for (dataset_view const& v : data.train) {
+    traits.masked += !v.mask.empty();
+    if (v.image.empty()) continue;
+    pixels += v.image.data.size() / static_cast<std::size_t>(v.image.channels);
+    if (v.image.channels != 4) continue;
+    for (std::size_t i = 3; i < v.image.data.size(); i += 4) clear += v.image.data[i] != 255;
+  }
+  if (pixels) traits.transparent = static_cast<double>(clear) / static_cast<double>(pixels);
+  look_at_borders(data, traits);
+  traits.brightness_step = brightness_step(data.train);
+  return traits;
+}
+
+chosen<background_kind> choose_background(capture_traits const& t) {
+  if (t.transparent > 0) {
+    return {background_kind::white,
+            percent(t.transparent) + " of the pixels are transparent, and published results have white there"};
+  }
+  if (!t.plain_border) return {background_kind::black, "the scene fills the images"};
+  std::string const color =
+      std::to_string(t.border[0]) + " " + std::to_string(t.border[1]) + " " + std::to_string(t.border[2]);
+  auto const [low, high] = std::minmax_element(std::begin(t.border), std::end(t.border));
+  if (*low >= white_from) return {background_kind::white, "the images' borders are plain white (" + color + ")"};
+  if (*high <= black_to) return {background_kind::black, "the images' borders are plain black (" + color + ")"};
+  return {background_kind::black,
+          "the images' borders are plain (" + color + "), neither white nor black: Gaussians show it"};
+}
+
+chosen<tracer_kind> choose_tracer(capture_traits const& t) {
+  if (t.folding) return {tracer_kind::bvh, folds(t)};
+  return {tracer_kind::automatic, lenses(t)};
+}
+
+chosen<std::string> choose_backward(capture_traits const& t) {
+  if (t.folding) return {"pixel", folds(t)};
+  return {"auto", "the fastest there is"};
+}
+
+chosen<bool> choose_exposure(capture_traits const& t) {
+  if (t.bounded() || t.transparent > 0) return {false, "a bounded object, lit alike in all images"};
+  std::string const step = percent(t.brightness_step);
+  if (t.brightness_step > brightness_step_most)
+    return {true, "the brightness of neighbouring photographs differs by " + step};
+  return {false, "the brightness of neighbouring photographs differs by " + step + " only"};
+}
+
+chosen<starting_points> choose_start(dataset const& data, train_options const& options) {
+  starting_points start;
+  start.random = data.points.size() == 0;
+  bool const sparse = start.random && (options.densify == densify_kind::error || options.densify == densify_kind::mcmc);
+  std::size_t const points = start.random ? options.random_points : data.points.size();
+  start.count = static_cast<index_t>(std::min<std::size_t>(points, options.max_gaussians));
+  start.opacity = options.initial_opacity != 0 ? options.initial_opacity : sparse ? 0.5f : 0.1f;
+  start.scale = options.initial_scale != 0 ? options.initial_scale : sparse ? 0.1f : 1.0f;
+  return {start, !start.random ? "the capture's points lie on surfaces"
+                 : sparse      ? "random points are mostly in empty space, and the dead move"
+                               : "random points"};
+}
+
+chosen<float> choose_sh_gain(train_options const& options) {
+  if (options.iterations >= measured_from) return {usual_sh_gain, "what a band buys is measured"};
+  return {0, "a run of less than " + std::to_string(measured_from) + " steps would miss the views held out"};
+}
+
+recommendation recommended(train_options const& options, dataset const& data, configuration_request const& request) {
+  capture_traits const traits = inspect(data);
+  recommendation all{request, options};
+  if (request.tracer == tracer_kind::automatic) all.request.tracer = choose_tracer(traits).value;
+  if (request.backward == "auto") all.request.backward = choose_backward(traits).value;
+  all.options.background = choose_background(traits).value;
+  all.options.exposure = choose_exposure(traits).value;
+  all.options.sh_gain = choose_sh_gain(options).value;
+  return all;
+}
+
+}  // namespace gart

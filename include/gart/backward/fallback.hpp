@@ -1,0 +1,43 @@
+#pragma once
+// A strategy and those that it falls back to, so that a step can be done in the memory there is.
+//
+//   backward_passes<frame<E, Traits, Tracer>, primitive_strategy> passes(exec);
+//   passes.with_room(frame, byte_budget, [&](auto& pass) { pass.render(frame, targets); ... });
+
+#include <gart/backward/backward.hpp>
+
+namespace gart::inline GART_ISA {
+
+template <class Frame, strategy Strategy>
+class backward_passes {
+  using fallback = typename Strategy::fallback;
+  static constexpr bool is_last = std::is_void_v<fallback>;
+  struct none {
+    explicit none(typename Frame::execution_type&) {}
+  };
+  template <class S>
+  struct rest_of {
+    using type = backward_passes<Frame, S>;
+  };
+
+ public:
+  explicit backward_passes(typename Frame::execution_type& exec) : pass_(exec), rest_(exec) {}
+
+  // Calls f with the first pass whose LT buffer has room (backward_pass.prepare), prepared. Errors: out_of_memory where
+  // none has.
+  template <class F>
+  void with_room(Frame const& frame, u64 byte_budget, F&& f) {
+    if (pass_.prepare(frame, byte_budget))
+      f(pass_);
+    else if constexpr (is_last)
+      throw pass_.no_room();
+    else
+      rest_.with_room(frame, byte_budget, f);
+  }
+
+ private:
+  backward_pass<Frame, Strategy> pass_;
+  typename std::conditional_t<is_last, std::type_identity<none>, rest_of<fallback>>::type rest_;
+};
+
+}  // namespace gart::inline GART_ISA

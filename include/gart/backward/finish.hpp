@@ -1,0 +1,53 @@
+#pragma once
+// The last step of the backward pass: from the moments of each Gaussian to the gradients of its mean, log-scale,
+// quaternion and opacity (math/hit_gradient.hpp), back through the filter of the pixels where there is one.
+
+#include <gart/core/span.hpp>
+#include <gart/math/hit_gradient.hpp>
+#include <gart/scene/gaussians.hpp>
+#include <gart/scene/parameters.hpp>
+#include <gart/scene/pixel_filter.hpp>
+
+namespace gart::inline GART_ISA {
+
+namespace backward_kernels {
+
+// Filter: no_filter, or the pixel_filter that the Gaussians were made through; `scene` is the stored one.
+struct no_filter {};
+
+template <class Filter>
+struct finish {
+  gaussians_view<float const> scene;
+  span<ray_gaussian const> gaussians;
+  span<float const> moments;
+  gaussians_view<float> gradients;
+  Filter filter;
+  GART_KERNEL void operator()(index_t i) const {
+    ray_gaussian const g = gaussians[i];
+    geometry_gradient out{vec3(0.0f), vec3(0.0f), {0, 0, 0, 0}, 0};
+    if (g.cutoff >= 0) out = gradient_of(moments.data() + std::size_t{moment_stride} * i, load_parameters(scene, i), g);
+    for (int k = 0; k < 3; ++k) {
+      gradients.mean[std::size_t{3} * i + k] = out.mean[k];
+      gradients.log_scale[std::size_t{3} * i + k] = out.log_scale[k];
+    }
+    float* q = gradients.quaternion + std::size_t{4} * i;
+    q[0] = out.rotation.w, q[1] = out.rotation.x, q[2] = out.rotation.y, q[3] = out.rotation.z;
+    gradients.opacity[i] = out.opacity;
+  }
+
+ private:
+  GART_HD GART_INLINE geometry_gradient gradient_of(float const* m, gaussian_parameters const& p,
+                                                    ray_gaussian const& g) const {
+    if constexpr (std::is_same_v<Filter, no_filter>) {
+      return from_moments(m, p, g);
+    } else {
+      vec3 const mean = filter.from_camera(p);
+      filter_at const at = filter.at(mean);
+      return pull_back_widened(from_moments(m, widened(p, mean, at.sigma), g), m[0], p, mean, at);
+    }
+  }
+};
+
+}  // namespace backward_kernels
+
+}  // namespace gart::inline GART_ISA

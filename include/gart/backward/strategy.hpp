@@ -1,0 +1,49 @@
+#pragma once
+// What a backward strategy is: what the forward pass records of a hit, which terms of the gradient are gathered by
+// primitive and which are scattered by pixel. It derives from strategy_base, which has what most do not say; a program
+// static_asserts strategy<its own> where it defines it, so that a name that is misspelt is found there.
+
+#include <gart/backward/terms.hpp>
+#include <gart/render/record.hpp>
+
+#include <concepts>
+
+namespace gart::inline GART_ISA {
+
+// How a slot of the LT buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN before
+// every forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held against the
+// last hit of its ray: the same decision, bit for bit, with nothing to clear. It measured better on a device and on a
+// host (docs/backward.md).
+enum class slot_validity { cleared, recomputed };
+
+// What a strategy is there for: to train by, to measure what another way would cost, or to be held against in tests.
+enum class strategy_use { training, measuring, testing };
+
+struct strategy_base {
+  static constexpr bool ordered = false;       // sums in a fixed order: the same bits in every run
+  static constexpr bool lane_by_lane = false;  // by the plain gather, whatever the policy (backward/gather_form.hpp)
+  static constexpr slot_validity validity = slot_validity::cleared;
+  static constexpr strategy_use use = strategy_use::training;
+  using fallback = void;  // the strategy that a step is done by where the LT buffer has no room
+};
+
+template <class S>
+concept strategy = requires {
+  { S::name } -> std::convertible_to<char const*>;  // what programs and reports call it
+  typename S::template record<8>;                   // by tile size: a hit_record (render/record.hpp)
+  typename S::gather;                               // terms<...>: summed by primitive, from what was recorded
+  typename S::scatter;                              // terms<...>: added by pixel, as the rays are traced again
+  // From strategy_base:
+  { S::ordered } -> std::convertible_to<bool>;
+  { S::lane_by_lane } -> std::convertible_to<bool>;
+  { S::validity } -> std::convertible_to<slot_validity>;
+  { S::use } -> std::convertible_to<strategy_use>;
+  typename S::fallback;
+  // Each term once, and a record where there is something to gather.
+  requires hit_record<typename S::template record<8>>;
+  requires S::gather::color != S::scatter::color;
+  requires S::gather::geometry != S::scatter::geometry;
+  requires S::gather::any == S::template record<8>::any;
+};
+
+}  // namespace gart::inline GART_ISA

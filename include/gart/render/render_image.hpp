@@ -1,0 +1,27 @@
+#pragma once
+// One image to host memory, with everything a pixel can tell.
+
+#include <gart/render/frame.hpp>
+#include <gart/render/rendered.hpp>
+
+namespace gart::inline GART_ISA {
+
+// Of a frame that is prepared.
+template <class Frame>
+rendered render_image(Frame& frame) {
+  using E = typename Frame::execution_type;
+  camera const& view = frame.view();
+  std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
+  buffer<float, E> color(frame.exec(), 3 * pixels), transmittance(frame.exec(), pixels), depth(frame.exec(), pixels);
+  buffer<u32, E> hits(frame.exec(), pixels);
+  frame.render({color.data(), transmittance.data(), depth.data(), hits.data()});
+  rendered out;
+  out.color.width = out.transmittance.width = out.depth.width = out.hits.width = view.width;
+  out.color.height = out.transmittance.height = out.depth.height = out.hits.height = view.height;
+  out.transmittance.channels = out.depth.channels = out.hits.channels = 1;
+  out.color.data = color.to_host(), out.transmittance.data = transmittance.to_host();
+  out.depth.data = depth.to_host(), out.hits.data = hits.to_host();
+  return out;
+}
+
+}  // namespace gart::inline GART_ISA

@@ -1,0 +1,165 @@
+#pragma once
+// Turns templates into configurations: sessions and renderers of a policy, traits, a tracer and a strategy. Include
+// where the kernels of the policy can be compiled, and call from GART_REGISTER_CONFIGURATIONS register_configurations,
+// for every SH degree, or register_configuration_of for one configuration:
+//   using response = gart::generalized_gaussian<4>;
+//   GART_REGISTER_CONFIGURATIONS(my_configurations,
+//                                gart::register_configuration_of<gart::openmp_exec, gart::scene_traits<3, response>,
+//                                                                gart::tile_tracer<gart::openmp_exec, 8, response>,
+//                                                                gart::primitive_strategy>(-1))
+
+#include <gart/runtime/registry.hpp>
+#include <gart/train/trainer.hpp>
+
+namespace gart::inline GART_ISA {
+
+template <execution E, class Traits, class Tracer, strategy Strategy>
+configuration_info configuration_of() {
+  using response = typename Traits::response;
+  configuration_info configuration;
+  configuration.backend = from_string(E::name, backend_kind::automatic);
+  configuration.tracer = from_string(Tracer::name, tracer_kind::own);
+  configuration.backward = Strategy::name;
+  configuration.sh_degree = Traits::sh_degree, configuration.kernel_degree = response::degree;
+  configuration.arithmetic = response::fast ? arithmetic_kind::fast : arithmetic_kind::exact;
+  configuration.lt_format =
+      from_string(Strategy::template record<Tracer::tile_size>::entry::name, lt_format_kind::none);
+  configuration.tile_size = Tracer::tile_size;
+  configuration.window = Tracer::window;
+  if constexpr (!E::device) configuration.instruction_set = instruction_set;
+  return configuration;
+}
+
+// The policy that a request asks for.
+template <execution E>
+E policy_of(configuration_request const& request) {
+  if constexpr (E::device)
+    return E(request.device, request.stream);
+  else if constexpr (std::is_constructible_v<E, int>)
+    return E(request.threads);
+  else
+    return E();
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy>
+class compiled_session final : public session {
+ public:
+  compiled_session(configuration_request const& request, train_options const& options, dataset const& data,
+                   gaussian_model const& start)
+      : exec_(policy_of<E>(request)), trainer_(exec_, options, data, start) {}
+  step_report step() override { return trainer_.step(); }
+  int steps_done() const override { return trainer_.steps_done(); }
+  void set_iterations(int iterations) override { trainer_.set_iterations(iterations); }
+  gaussian_model model() const override { return trainer_.model(); }
+  rendered render(camera const& view, vec3 background) override { return trainer_.render(view, background); }
+  void save(std::filesystem::path const& path) const override { trainer_.save(path); }
+  void load(std::filesystem::path const& path) override { trainer_.load(path); }
+  training_state state() const override { return trainer_.state(); }
+  void set_state(training_state const& state) override { trainer_.set_state(state); }
+  exposure_field exposures() const override { return trainer_.exposures(); }
+  profiler& profile() override {
+    exec_.synchronize();
+    return exec_.profile;
+  }
+  std::size_t peak_bytes() const override { return exec_.memory.peak; }
+  std::size_t lt_bytes() const override { return trainer_.lt_bytes(); }
+  configuration_info configuration() const override { return configuration_of<E, Traits, Tracer, Strategy>(); }
+
+ private:
+  E exec_;
+  trainer<E, Traits, Tracer, Strategy> trainer_;
+};
+
+template <execution E, class Traits, class Tracer, strategy Strategy>
+class compiled_renderer final : public renderer {
+ public:
+  static constexpr int sh_degree = Traits::sh_degree;
+
+  explicit compiled_renderer(configuration_request const& request)
+      : exec_(policy_of<E>(request)),
+        frame_(exec_),
+        pass_(exec_),
+        scene_(exec_, 0, sh_degree),
+        gradients_(exec_, 0, sh_degree),
+        color_(exec_),
+        color_gradient_(exec_) {}
+  void set_model(gaussian_model const& model) override {
+    if (model.sh_degree != Traits::sh_degree) throw invalid_argument("renderer: the model has another SH degree");
+    scene_.assign(model);
+  }
+  rendered render(camera const& view, render_options const& options) override {
+    require_tree(options.rebuild_every, configuration().tracer);
+    frame_.prepare(std::as_const(scene_).view(), view, options);
+    return render_image(frame_);
+  }
+  void differentiate(camera const& view, render_options const& options, image_float const& color_gradient) override {
+    require_tree(options.rebuild_every, configuration().tracer);
+    std::size_t const floats = std::size_t{3} * view.width * view.height;
+    if (color_gradient.data.size() != floats)
+      throw invalid_argument("renderer: the colour's gradient must have three values for each pixel of the view");
+    color_.resize(floats), color_gradient_.assign(color_gradient.data);
+    gradients_.resize_keep(scene_.size());
+    stage_scope stage(exec_, "gradients");
+    frame_.prepare(std::as_const(scene_).view(), view, options);
+    if (!pass_.prepare(frame_)) throw pass_.no_room();
+    image_targets targets;
+    targets.color = color_.data();
+    pass_.render(frame_, targets);
+    gart::differentiate(frame_, pass_, color_gradient_, gradients_);
+  }
+  gaussian_model gradients() const override { return gradients_.to_host(); }
+  profiler& profile() override {
+    exec_.synchronize();
+    return exec_.profile;
+  }
+  std::size_t peak_bytes() const override { return exec_.memory.peak; }
+  std::size_t lt_bytes() const override { return pass_.lt_bytes(); }
+  configuration_info configuration() const override { return configuration_of<E, Traits, Tracer, Strategy>(); }
+
+ private:
+  E exec_;
+  frame<E, Traits, Tracer> frame_;
+  backward_pass<frame<E, Traits, Tracer>, Strategy> pass_;
+  gaussians<E> scene_, gradients_;
+  buffer<float, E> color_, color_gradient_;
+};
+
+template <execution E, class Traits, class Tracer, strategy Strategy>
+void register_configuration_of(int rank, bool (*available)(std::string*) = always_available) {
+  register_configuration({configuration_of<E, Traits, Tracer, Strategy>(), rank, available,
+                          [](configuration_request const& request) -> std::unique_ptr<renderer> {
+                            return std::make_unique<compiled_renderer<E, Traits, Tracer, Strategy>>(request);
+                          },
+                          [](configuration_request const& request, train_options const& options, dataset const& data,
+                             gaussian_model const& start) -> std::unique_ptr<session> {
+                            return std::make_unique<compiled_session<E, Traits, Tracer, Strategy>>(request, options,
+                                                                                                   data, start);
+                          }});
+}
+
+template <execution E, class Tracer, strategy Strategy>
+void register_configurations(int rank, bool (*available)(std::string*) = always_available) {
+  register_configuration_of<E, scene_traits<0>, Tracer, Strategy>(rank, available);
+  register_configuration_of<E, scene_traits<1>, Tracer, Strategy>(rank, available);
+  register_configuration_of<E, scene_traits<2>, Tracer, Strategy>(rank, available);
+  register_configuration_of<E, scene_traits<3>, Tracer, Strategy>(rank, available);
+}
+
+// Which strategies gart's libraries compile for a policy and a tracer: those to train by, but on hosts none with
+// ordered sums (a variant has it); on a device's tile lists also those to measure.
+template <execution E, class Tracer, strategy Strategy>
+inline constexpr bool is_compiled =
+    Strategy::use == strategy_use::training
+        ? E::device || !Strategy::ordered
+        : Strategy::use == strategy_use::measuring && E::device && Tracer::lends_footprints;
+
+// All of these, ranked from first_rank in the list's order of preference.
+template <execution E, class Tracer>
+void register_strategies(int first_rank, bool (*available)(std::string*) = always_available) {
+  int rank = first_rank;
+  strategies::for_each([&]<strategy Strategy>(Strategy) {
+    if constexpr (is_compiled<E, Tracer, Strategy>) register_configurations<E, Tracer, Strategy>(rank++, available);
+  });
+}
+
+}  // namespace gart::inline GART_ISA

@@ -1,0 +1,78 @@
+#pragma once
+// What a tracer is: it is prepared for the Gaussians of one view, and feeds a ray program the hits of each of its rays
+// in order, until the program has had enough. Its structure yields candidates only: what is a hit, its t and its alpha
+// come from math/ray_gaussian.hpp, so all tracers give the same hits in the same order, bit for bit.
+//
+// A tracer derives from tracer_base and is held to the concept where it is defined. render/frame.hpp has one, and calls
+// it in the right order.
+
+#include <gart/exec/concepts.hpp>
+#include <gart/scene/camera.hpp>
+#include <gart/scene/gaussians.hpp>
+#include <gart/tiles/tile_map.hpp>
+#include <gart/trace/ray_program.hpp>
+
+namespace gart::inline GART_ISA {
+
+// What a tracer is told of the way to trace.
+struct trace_options {
+  float alpha_min = 1.0f / 255.0f;  // a Gaussian is hit where sigma * rho >= alpha_min
+  float near = 0.01f;               // hits lie at t > near
+  int rebuild_every = 1;            // views between two builds of a structure that can be refitted
+};
+
+// What every tracer needs of the scene: the Gaussians in one frame, and the distance hits begin at.
+struct traced_scene {
+  ray_gaussian const* gaussians = nullptr;
+  index_t count = 0;
+  float near = 0;
+};
+
+// What a tracer has unless it says otherwise.
+struct tracer_base {
+  static constexpr int tile_size = 8;              // side of the tiles that footprints are cut into
+  static constexpr bool lends_footprints = false;  // it has the view's footprints and lists, of its own tile_size
+};
+
+namespace trace_kernels {
+
+// Stands for every ray program in the concept.
+struct no_rays : ray_program_base {
+  using ray_type = primary_ray;
+  struct state {};
+  pixel_order order;
+  GART_HD bool active(index_t) const { return false; }
+  GART_HD pixel at(index_t i) const { return order.at(i); }
+  GART_HD state begin(index_t) const { return {}; }
+  GART_HD primary_ray ray_of(index_t, state const&) const { return {}; }
+  GART_HD bool on_hit(state&, hit const&) const { return false; }
+  GART_HD void end(index_t, state const&) const {}
+};
+static_assert(pixel_program<no_rays>);
+
+}  // namespace trace_kernels
+
+template <class T, class E>
+concept tracer = execution<E> && std::constructible_from<T, E&> &&
+    requires(T& t, E& e, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, camera const& view,
+             trace_options const& options, trace_kernels::no_rays const& program) {
+  typename T::response_type;                        // of the Gaussians whose hits it finds (math/response.hpp)
+  { T::name } -> std::convertible_to<char const*>;  // "bvh", "tiles", ...
+  { T::window } -> std::convertible_to<int>;        // hits of a ray that are kept at a time
+  // `gaussians` are those of `scene` in the view's frame. Both are read until the next prepare.
+  t.prepare(e, scene, gaussians, view, options);
+  t.trace(e, "label", index_t{}, program);  // rays 0 to a number
+  // From tracer_base:
+  { T::tile_size } -> std::convertible_to<int>;
+  { T::lends_footprints } -> std::convertible_to<bool>;
+};
+
+// A tracer that lends the backward pass the footprints that it has measured, and its lists.
+template <class T, class E>
+concept footprint_tracer = tracer<T, E> && requires(T const& t) {
+  requires T::lends_footprints;
+  { t.prints() } -> std::same_as<footprints<E, T::tile_size> const&>;
+  { t.map() } -> std::same_as<tile_map_view>;
+};
+
+}  // namespace gart::inline GART_ISA

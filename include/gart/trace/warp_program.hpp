@@ -1,0 +1,31 @@
+#pragma once
+// A pixel program whose rays can meet a Gaussian together (trace/warp_walk.hpp): what a hit shows is asked for where it
+// is found, from a row of floats of the Gaussian that the whole warp has read; it is composited when its turn comes.
+
+#include <gart/math/glm.hpp>
+#include <gart/tiles/footprint_slots.hpp>
+#include <gart/trace/ray_program.hpp>
+
+namespace gart::inline GART_ISA {
+
+// The cell of a program whose hits have no places: a word, so that what lies beside it in shared memory is aligned as it
+// is beside others.
+struct alignas(16) no_cell {};
+
+template <class P>
+concept warp_program = pixel_program<P> &&
+    requires(P const& p, typename P::state& s, float const* row, vec3 const& shown, float x, u32 place) {
+  requires P::has_warps;
+  { P::row_floats } -> std::convertible_to<int>;           // of a Gaussian's row
+  { p.rows_from() } -> std::same_as<float const*>;         // where the rows of all Gaussians begin
+  { p.row_floats_read() } -> std::convertible_to<int>;     // how many of them are to be read; the rest is zero
+  { p.shade(s, row) } -> std::same_as<vec3>;               // what a hit shows
+  { p.add(s, x, x, shown, place) } -> std::same_as<bool>;  // composites a hit (t, alpha); false ends the ray
+  // Whether hits have places: numbers of 32 bits that order a pixel's hits as their Gaussians' ids do. They are then
+  // found by cells: cell(footprint_slots, tile's box), cell::read from shared memory, cell.place_of(x, y).
+  { P::places_hits } -> std::convertible_to<bool>;
+  typename P::cell;
+  requires !P::places_hits || std::constructible_from<typename P::cell, footprint_slots const&, pixel_box const&>;
+};
+
+}  // namespace gart::inline GART_ISA

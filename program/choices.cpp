@@ -1,0 +1,108 @@
+#include "choices.hpp"
+
+#include "progress.hpp"
+
+#include <gart/runtime/degree_selection.hpp>
+
+#include <cstdio>
+
+namespace gart_cli {
+
+namespace {
+
+char const* const by_option = "given";
+
+std::string short_number(float value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", static_cast<double>(value));
+  return text;
+}
+
+}  // namespace
+
+gart::chosen<std::string> background_for(gart::capture_traits const& traits) {
+  auto const choice = gart::choose_background(traits);
+  return {gart::to_string(choice.value), choice.why};
+}
+
+nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
+  gart::capture_traits const traits = gart::inspect(data);
+  nlohmann::json all = nlohmann::json::array();
+  auto const say = [&](std::string const& what, std::string const& value, std::string const& why) {
+    all.push_back({{"option", what}, {"value", value}, {"why", why}});
+  };
+  auto const settle = [&](std::string const& what, std::string& value, gart::chosen<std::string> const& choice) {
+    bool const given = value != "auto";
+    if (!given) value = choice.value;
+    say(what, value, given ? by_option : choice.why);
+  };
+
+  say("scene", traits.bounded() ? "bounded" : "unbounded",
+      traits.clear_border   ? "the images' borders are transparent"
+      : traits.plain_border ? "the images' borders are plain"
+                            : "the images' borders show it");
+  settle("--background", a.background, background_for(traits));
+  auto const tracer = gart::choose_tracer(traits);
+  settle("--tracer", a.tracer, {gart::to_string(tracer.value), tracer.why});
+  settle("--backward", a.backward, gart::choose_backward(traits));
+  auto const exposure = gart::choose_exposure(traits);
+  settle("--exposure", a.exposure, {exposure.value ? "on" : "off", exposure.why});
+  say("masks", traits.masked ? std::to_string(traits.masked) + " of " + std::to_string(traits.views) : "none",
+      traits.masked ? "what they exclude counts in no loss" : "the capture has none");
+
+  if (a.start.empty()) {
+    auto const start = gart::choose_start(data, train_options_of(a));
+    say("start", with_commas(start.value.count),
+        start.value.random                        ? "the capture has no points: random ones"
+        : start.value.count == data.points.size() ? "the capture's points"
+                                                  : "a random subset of the capture's points");
+    say("--init-opacity", short_number(start.value.opacity), a.initial_opacity != 0 ? by_option : start.why);
+    say("--init-scale", short_number(start.value.scale), a.initial_scale != 0 ? by_option : start.why);
+  }
+  gart::train_options const options = train_options_of(a);
+  gart::configuration_request const wanted = configuration_request_of(a);
+  auto const plan = gart::plan_trials(wanted, options, data.train.size());
+  bool const measured = !plan.held_out.empty();
+  say("--sh-degree", (measured ? "at most " : "") + std::to_string(wanted.sh_degree),
+      a.sh_degree != "auto" ? by_option
+      : !a.automatic        ? "every band; --auto measures which pay"
+                            : plan.why);
+  return all;
+}
+
+nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const& now) {
+  auto const found = config.find("chosen");
+  if (found == config.end() || !found->is_array()) return now;
+  for (auto const& choice : *found) {
+    for (char const* key : {"option", "value", "why"})
+      if (!choice.is_object() || !choice.contains(key) || !choice[key].is_string()) return now;
+  }
+  return *found;
+}
+
+nlohmann::json trials_of(std::vector<gart::band_trial> const& trials) {
+  nlohmann::json all = nlohmann::json::array();
+  for (auto const& t : trials) {
+    all.push_back({{"band", t.band},
+                   {"step", t.step},
+                   {"psnr_with", t.with},
+                   {"psnr_without", t.without},
+                   {"gain", t.gain()},
+                   {"gain_error", t.error},
+                   {"forecast", t.forecast},
+                   {"gain_wanted", t.gain_wanted},
+                   {"kept", t.kept()}});
+  }
+  return all;
+}
+
+std::string in_words(gart::band_trial const& t) {
+  return "SH band " + std::to_string(t.band) + ": " + fixed(t.with, 3) + " dB on the views held out, " +
+         fixed(t.without, 3) + " dB without it: a gain of " + fixed(t.gain(), 3) + " dB, give or take " +
+         fixed(t.error, 3) + ", by the end at most " + fixed(t.forecast, 3) + " dB: " +
+         (!t.kept()                    ? "goes"
+          : t.forecast < t.gain_wanted ? "the views differ too much to tell, and it stays"
+                                       : "stays");
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,29 @@
+#pragma once
+// What the program settles for a capture where the command line leaves it open, each with its reason: said at the start
+// of a run and kept under "chosen" in config.json, metrics.json and report.html.
+
+#include "train_arguments.hpp"
+
+#include <gart/runtime/choose.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <string>
+
+namespace gart_cli {
+
+// "white" or "black".
+gart::chosen<std::string> background_for(gart::capture_traits const& traits);
+
+// Replaces what is "auto" in `a` by what suits the capture; a list of {"option", "value", "why"}. Where an option was
+// given, "why" says so.
+nlohmann::json choose(train_arguments& a, gart::dataset const& data);
+
+// What a run that is resumed had chosen, as its config.json has it; `now` where that does not say.
+nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const& now);
+
+// What was measured since: the degree the run ended in, and each trial.
+nlohmann::json trials_of(std::vector<gart::band_trial> const& trials);
+std::string in_words(gart::band_trial const& trial);
+
+}  // namespace gart_cli

@@ -1,0 +1,153 @@
+#include "choices.hpp"
+#include "commands.hpp"
+#include "options.hpp"
+#include "output.hpp"
+#include "progress.hpp"
+#include "scores.hpp"
+
+#include <gart/io/dataset.hpp>
+#include <gart/io/exposure_file.hpp>
+#include <gart/io/image_file.hpp>
+
+#include <cstdio>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace gart_cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct eval_arguments {
+  fs::path model, dataset, out, renders, pairs, exposures;
+  configuration_options configuration;
+  std::string background = "auto";
+  int downscale = 1, test_every = 8;
+  int max_hits = -1;
+  bool quiet = false;
+};
+
+// A program that scores a folder against another takes all that is in them.
+void refuse_other_images(fs::path const& pairs, std::vector<gart::dataset_view> const& views) {
+  std::set<std::string> ours;
+  for (auto const& v : views) ours.insert(v.name + ".png");
+  for (char const* side : {"render", "truth"}) {
+    for (auto const& file : fs::directory_iterator(pairs / side)) {
+      if (ours.count(file.path().filename().string()) == 0)
+        throw gart::io_error(file.path().string(), "is no test view of this capture, and would be scored with them",
+                             "remove it, or name another folder");
+    }
+  }
+}
+
+int run_eval(eval_arguments const& a) {
+  gart::model_file file = gart::load_model(a.model);
+  auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
+  prepare_file(a.out);
+  if (!a.renders.empty()) prepare_folder(a.renders);
+  for (char const* side : {"render", "truth"})
+    if (!a.pairs.empty()) prepare_folder(a.pairs / side);
+  gart::dataset_options load;
+  load.downscale = a.downscale;
+  load.test_every = a.test_every;
+  gart::dataset const data = gart::load_dataset(a.dataset, load);
+  if (data.test.empty()) {
+    throw gart::io_error(a.dataset.string(), "has no test views (" + data.split + ")",
+                         "--test-every 8 keeps each 8th view");
+  }
+  if (!a.pairs.empty()) refuse_other_images(a.pairs, data.test);
+  std::string const background = a.background != "auto" ? a.background : background_for(gart::inspect(data)).value;
+  gart::render_options options = file.render;
+  options.background = background_color(background);
+  if (a.max_hits >= 0) options.max_hits = static_cast<gart::u32>(a.max_hits);
+  renderer->set_model(file.model);
+
+  gart::exposure_field const exposures =
+      a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures);
+
+  progress say(a.quiet);
+  auto const draw = [&](gart::camera const& view) { return renderer->render(view, options); };
+  gart::scores const result = gart::evaluate(
+      gart::all_of(data.test), options.background, exposures, draw,
+      [&](std::size_t i, gart::view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
+        if (!a.renders.empty()) {
+          gart::write_png(a.renders / (s.name + ".png"), gart::to_8bit(render));
+          gart::write_png(a.renders / (s.name + "_truth.png"), gart::to_8bit(truth));
+        }
+        if (!a.pairs.empty()) {
+          gart::write_png(a.pairs / "render" / (s.name + ".png"), gart::to_8bit(render));
+          gart::write_png(a.pairs / "truth" / (s.name + ".png"), gart::to_8bit(truth));
+        }
+        say.state("scored " + std::to_string(i + 1) + "/" + std::to_string(data.test.size()) + "  " + s.name + " " +
+                      fixed(s.psnr, 2) + " dB",
+                  static_cast<double>(i + 1) / static_cast<double>(data.test.size()));
+      });
+  say.state("scoring training views", 1);
+  gart::scores const training =
+      gart::evaluate(gart::evenly_spread(data.train, data.test.size()), options.background, exposures, draw);
+  auto const configuration = renderer->configuration();
+  nlohmann::json metrics = to_json(result, training, data.train.size());
+  metrics["format"] = data.format, metrics["split"] = data.split, metrics["resize_filter"] = data.resize_filter;
+  metrics["background"] = background, metrics["notes"] = data.notes;
+  metrics["gaussians"] = file.model.size(), metrics["sh_degree"] = file.model.sh_degree;
+  metrics["kernel_degree"] = file.kernel_degree;
+  metrics["backend"] = gart::to_string(configuration.backend),
+  metrics["tracer"] = gart::to_string(configuration.tracer);
+  metrics["approximations"] = approximations_of(options, configuration);
+  metrics["peak_bytes"] = renderer->peak_bytes();
+  write_json(a.out, metrics);
+  say.clear();
+  if (!a.quiet) {
+    std::printf("%s%s; %s background\n", in_words(result, training, data.train.size()).c_str(), data.split.c_str(),
+                background.c_str());
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_eval(CLI::App& app, command& selected) {
+  auto a = std::make_shared<eval_arguments>();
+  CLI::App* eval = app.add_subcommand("eval", "Score a model against the test views of a capture: PSNR and SSIM.");
+  eval->add_option("MODEL.ply", a->model, "Gaussians, from gart or another program")->type_name("")->required();
+  eval->add_option("DATASET", a->dataset, "The capture, as gart train reads it")->type_name("")->required();
+  eval->add_option("--out", a->out, "Where the scores go")->type_name("METRICS.json")->required();
+  eval->add_option("--renders", a->renders, "Also keep NAME.png and NAME_truth.png of each view here")
+      ->type_name("DIR");
+  eval->add_option(
+          "--pairs", a->pairs,
+          "Also keep DIR/render/NAME.png and DIR/truth/NAME.png of each\nview, for LPIPS and what else compares "
+          "two folders")
+      ->type_name("DIR");
+  add_exposures(*eval, a->exposures);
+  eval->add_option("--background", a->background, "white or black; auto: as gart train chooses")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(one_of({"auto", "white", "black"}));
+  eval->add_option("--downscale", a->downscale, "Shrink images by this whole factor")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 64));
+  eval->add_option("--test-every", a->test_every, "Each Nth view is for testing, where the capture does not say")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 1e6));
+  add_max_hits(*eval, a->max_hits);
+  eval->add_flag("--quiet", a->quiet, "Say nothing but errors");
+  add_configuration_options(*eval, a->configuration);
+  eval->footer(
+      "\nWrites METRICS.json: psnr (dB) and ssim, their means over the test views and each view's, and how they were "
+      "taken.\npsnr_affine_colour is a diagnostic, no score: PSNR after the affine colour that brings each render "
+      "nearest to its\nphotograph. training_scores are those of training views, evenly spread, as many as there are "
+      "test "
+      "views at most.\n"
+      "\nExamples:\n"
+      "  gart eval run/model.ply lego --out metrics.json\n"
+      "  gart eval other.ply garden --downscale 4 --out scores.json --renders images");
+  eval->callback([a, &selected] { selected = [a] { return run_eval(*a); }; });
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,143 @@
+#include "options.hpp"
+
+#include "commands.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace gart_cli {
+
+nlohmann::json recorded_options::values() const {
+  nlohmann::json all = nlohmann::json::object();
+  for (auto const& e : entries_) all[e.name] = e.get();
+  return all;
+}
+
+nlohmann::json recorded_options::continue_from(nlohmann::json const& saved, std::filesystem::path const& file,
+                                               std::vector<std::string> const& may_rise) {
+  nlohmann::json raised = nlohmann::json::object();
+  for (auto const& e : entries_) {
+    if (!saved.contains(e.name)) {
+      throw gart::io_error(file.string(), "has no option \"" + e.name + "\"", "start anew without --resume");
+    }
+    nlohmann::json const given = e.get(), &value = saved[e.name];
+    bool const named = e.option->count() > 0;
+    auto const take = [&e](nlohmann::json const& from) {
+      e.option->clear();
+      e.option->add_result(from.is_string() ? from.get<std::string>() : from.dump());
+      e.option->run_callback();
+    };
+    try {
+      if (value.is_structured() || value.is_null()) throw CLI::ConversionError("it is not one value");
+      take(value);
+    } catch (CLI::Error const& wrong) {
+      throw gart::io_error(file.string(), "option \"" + e.name + "\" is not valid: " + wrong.what(),
+                           "correct it, or start anew without --resume");
+    }
+    if (!named || given == e.get()) continue;
+    bool const rises = std::find(may_rise.begin(), may_rise.end(), e.name) != may_rise.end();
+    if (rises && given > e.get()) {
+      raised[e.name] = e.get();
+      take(given);
+    } else {
+      throw usage_error("--" + e.name + " " + given.dump() + ": the run to be resumed has " + e.get().dump() + " in " +
+                        file.string() + (rises ? ", and it can only be raised" : "") +
+                        " (leave the option out to continue that run, or start another from its "
+                        "Gaussians with --start MODEL.ply and another --out)");
+    }
+  }
+  return raised;
+}
+
+CLI::Validator strategy_names() { return one_of({"auto", "pixel", "hybrid", "primitive", "deterministic", "cleared"}); }
+
+CLI::Validator kernel_degree_names() {
+  std::vector<std::string> names;
+  for (int const degree : gart::kernel_degrees) names.push_back(std::to_string(degree));
+  return one_of(names);
+}
+
+gart::configuration_request configuration_options::request() const {
+  gart::configuration_request wanted;
+  wanted.backend = gart::from_string<gart::backend_kind>(backend);
+  wanted.tracer = gart::from_string<gart::tracer_kind>(tracer);
+  wanted.arithmetic = gart::from_string<gart::arithmetic_kind>(arithmetic);
+  wanted.tile_size = tile_size, wanted.window = window, wanted.threads = threads;
+  return wanted;
+}
+
+void add_threads(CLI::App& app, int& threads) {
+  app.add_option("--threads", threads, "Threads of the openmp backend, 0: all cores")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(0, 4096));
+}
+
+void add_configuration_options(CLI::App& app, configuration_options& options) {
+  app.add_option("--backend", options.backend,
+                 "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(name_of_a<gart::backend_kind>());
+  app.add_option("--tracer", options.tracer,
+                 "What finds the hits: tiles, bvh, or embree (CPU);\nthe images are the same")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(name_of_a<gart::tracer_kind>());
+  add_threads(app, options.threads);
+  std::string const group = "Traits that trade (gart info lists the configurations that have them)";
+  app.add_option("--arithmetic", options.arithmetic, "exact, or fast: shorter exponentials and reciprocals")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(name_of_a<gart::arithmetic_kind>())
+      ->group(group);
+  app.add_option("--tile-size", options.tile_size, "Pixels a side of a tile, 0: what suits")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(0, 64))
+      ->group(group);
+  app.add_option("--window", options.window, "Hits a ray keeps in order at a time, 0: what suits")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(0, 1024))
+      ->group(group);
+}
+
+void add_max_hits(CLI::App& app, int& max_hits) {
+  app.add_option("--max-hits", max_hits,
+                 "Hits after which a ray ends, 0: no cap\n(default: what the model says, else 0)")
+      ->type_name("N")
+      ->check(between(0, gart::max_hits_most));
+}
+
+void add_exposures(CLI::App& app, std::filesystem::path& file) {
+  app.add_option("--exposures", file,
+                 "exposures.json of the model's training: each view gets the exposure\nof the training views about it")
+      ->type_name("FILE");
+}
+
+gart::vec3 background_color(std::string const& name) { return gart::vec3(name == "white" ? 1.0f : 0.0f); }
+
+gart::configuration_request configuration_request_for(gart::model_file const& file, std::filesystem::path const& path,
+                                                      gart::configuration_request wanted) {
+  wanted.sh_degree = file.model.sh_degree;
+  wanted.kernel_degree = file.kernel_degree;
+  try {
+    gart::resolve(wanted);
+  } catch (gart::unsupported const& e) {
+    throw gart::unsupported(path.string() + ": " + e.what());
+  }
+  return wanted;
+}
+
+nlohmann::json approximations_of(gart::approximation_options const& render,
+                                 gart::configuration_info const& configuration) {
+  return {{"alpha_min", render.alpha_min},
+          {"t_min", render.transmittance_min},
+          {"max_hits", render.max_hits},
+          {"antialias", render.antialias},
+          {"arithmetic", gart::to_string(configuration.arithmetic)},
+          {"lt_format", gart::to_string(configuration.lt_format)}};
+}
+
+}  // namespace gart_cli

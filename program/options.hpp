@@ -1,0 +1,83 @@
+#pragma once
+// Options that several commands share, and the record of a training run's options that --resume reads back.
+
+#include "help.hpp"
+
+#include <gart/runtime/model_file.hpp>
+#include <gart/runtime/renderer.hpp>
+#include <gart/runtime/session.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace gart_cli {
+
+// Options that config.json keeps. The values bound must live as long as this does.
+class recorded_options {
+ public:
+  template <class T>
+  CLI::Option* add(CLI::App& app, std::string const& flag, T& value, std::string const& type, std::string const& help) {
+    CLI::Option* option = app.add_option(flag, value, help)->capture_default_str()->type_name(type);
+    entries_.push_back({flag.substr(2), option, [&value] { return nlohmann::json(value); }});
+    return option;
+  }
+  // A flag with its opposite: "--auto,!--no-auto".
+  CLI::Option* add_flag(CLI::App& app, std::string const& flags, bool& value, std::string const& help) {
+    CLI::Option* option = app.add_flag(flags, value, help);
+    entries_.push_back({flags.substr(2, flags.find(',') - 2), option, [&value] { return nlohmann::json(value); }});
+    return option;
+  }
+  nlohmann::json values() const;
+  // Takes the values of an earlier run as if they stood on the command line, by the same checks. usage_error for an
+  // option that was given and says otherwise; io_error, naming `file` and the option, for one that is missing or that
+  // the command line would refuse. An option of `may_rise` may be given larger than it was, and stays so: the result
+  // names each, with the value of the earlier run.
+  nlohmann::json continue_from(nlohmann::json const& saved, std::filesystem::path const& file,
+                               std::vector<std::string> const& may_rise = {});
+
+ private:
+  struct entry {
+    std::string name;
+    CLI::Option* option;
+    std::function<nlohmann::json()> get;
+  };
+  std::vector<entry> entries_;
+};
+
+// --backend --tracer --threads, as every command that traces rays has them, and the traits that trade one thing for
+// another: --arithmetic --tile-size --window.
+struct configuration_options {
+  std::string backend = "auto", tracer = "auto", arithmetic = "exact";
+  int tile_size = 0, window = 0, threads = 0;
+
+  gart::configuration_request request() const;
+};
+void add_threads(CLI::App& app, int& threads);
+void add_configuration_options(CLI::App& app, configuration_options& options);
+// --max-hits of a model to be rendered: negative where the model says.
+void add_max_hits(CLI::App& app, int& max_hits);
+// --exposures of a model that was trained with them.
+void add_exposures(CLI::App& app, std::filesystem::path& file);
+
+// One of an enumeration's names.
+template <gart::named E>
+CLI::Validator name_of_a() {
+  return one_of(gart::list_of_names<E>());
+}
+CLI::Validator strategy_names();
+CLI::Validator kernel_degree_names();
+
+gart::vec3 background_color(std::string const& name);
+
+// The configuration for a model; unsupported, naming its file, where there is none of its degrees.
+gart::configuration_request configuration_request_for(gart::model_file const& file, std::filesystem::path const& path,
+                                                      gart::configuration_request wanted);
+// What a run left out or computed shorter, as every report tells it.
+nlohmann::json approximations_of(gart::approximation_options const& render,
+                                 gart::configuration_info const& configuration);
+
+}  // namespace gart_cli

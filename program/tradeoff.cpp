@@ -1,0 +1,354 @@
+#include "commands.hpp"
+#include "field_names.hpp"
+#include "options.hpp"
+#include "output.hpp"
+#include "processor_time.hpp"
+#include "progress.hpp"
+#include "tradeoff_page.hpp"
+#include "tradeoff_settings.hpp"
+#include "tradeoff_views.hpp"
+
+#include <gart/io/file.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <random>
+#if defined(_OPENMP)
+#include <omp.h>
+#endif
+
+namespace gart_cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+struct tradeoff_arguments {
+  fs::path model, cameras, out;
+  configuration_options configuration;
+  std::string backward = "auto", background = "auto", clock = "wall";
+  std::vector<std::string> settings;
+  view_choice views;
+  int repeats = 5;
+  float reference_alpha_min = 0;
+  bool quiet = false;
+};
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  std::size_t const n = values.size();
+  return n == 0 ? 0 : n % 2 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+}
+
+double mean(std::vector<double> const& values) {
+  double sum = 0;
+  for (double const v : values) sum += v;
+  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// The geometry after one more step of training, about: every number moves by up to Adam's rate for it.
+void move_geometry(gart::gaussian_model& model, float extent, std::mt19937& engine) {
+  gart::learning_rates const rates;
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  for (float& x : model.mean) x += rates.mean * extent * uniform(engine);
+  for (float& x : model.log_scale) x += rates.log_scale * uniform(engine);
+  for (float& x : model.quaternion) x += rates.quaternion * uniform(engine);
+  for (float& x : model.opacity) x += rates.opacity * uniform(engine);
+}
+
+class tradeoff_run {
+ public:
+  explicit tradeoff_run(tradeoff_arguments const& a) : a_(a), say_(a.quiet) {}
+
+  int run() {
+    auto const start = std::chrono::steady_clock::now();
+    prepare();
+    json result = description();
+    result["settings"] = json::array(), result["absent"] = json::array();
+    for (std::size_t i = 0; i < settings_.size(); ++i) {
+      say_.state(
+          "measuring " + std::to_string(i + 1) + "/" + std::to_string(settings_.size()) + "  " + settings_[i].name(),
+          static_cast<double>(i) / static_cast<double>(settings_.size()));
+      try {
+        gart::resolve(settings_[i].use.configuration);
+      } catch (gart::unsupported const& e) {
+        result["absent"].push_back({{"name", settings_[i].name()}, {"why", in_options(e.what())}});
+        continue;
+      }
+      result["settings"].push_back(measure(settings_[i]));
+    }
+    mark_fronts(result);
+    result["seconds"] = seconds_since(start), result["reference_seconds"] = reference_seconds_;
+    std::string const table = tradeoff_table(result);
+    write_json(a_.out / "tradeoff.json", result);
+    gart::write_file(a_.out / "table.txt", table);
+    gart::write_file(a_.out / "tradeoff.html", tradeoff_page(result));
+    say_.clear();
+    if (!a_.quiet) {
+      std::printf("%s\npage  %s\n", table.c_str(), (a_.out / "tradeoff.html").string().c_str());
+    }
+    return 0;
+  }
+
+ private:
+  void prepare() {
+#if defined(_OPENMP)
+    if (a_.configuration.threads > 0) omp_set_num_threads(a_.configuration.threads);  // the reference's
+#endif
+    file_ = gart::load_model(a_.model);
+    configuration exact;
+    gart::configuration_request wanted = a_.configuration.request();
+    wanted.backward = a_.backward;
+    exact.configuration = configuration_request_for(file_, a_.model, wanted);
+    gart::configuration_info const configuration = gart::resolve(exact.configuration);
+    exact.configuration.backend = configuration.backend, exact.configuration.tracer = configuration.tracer,
+    exact.configuration.backward = configuration.backward;
+    exact.render = file_.render;
+    settings_ = selected_settings(settings_of(exact), a_.settings);
+
+    say_.state("reading views", 0);
+    set_ = load_views(a_.cameras, a_.views);
+    background_ = a_.background != "auto" ? a_.background : set_.background;
+    for (setting& s : settings_) s.use.render.background = background_color(background_);
+    prepare_folder(a_.out);
+
+    reference_ = settings_.front().use.render;
+    reference_.transmittance_min = 0, reference_.max_hits = 0;
+    if (a_.reference_alpha_min > 0) reference_.alpha_min = a_.reference_alpha_min;
+    auto const renderer = gart::make_renderer(settings_.front().use.configuration);
+    renderer->set_model(file_.model);
+    float const ssim_weight = gart::train_options().ssim_weight;
+    for (std::size_t i = 0; i < set_.views.size(); ++i) {
+      say_.state("reference of view " + std::to_string(i + 1) + "/" + std::to_string(set_.views.size()) + "  " +
+                     set_.views[i].name,
+                 0);
+      auto& v = set_.views[i];
+      set_color_gradient(v, renderer->render(v.view, settings_.front().use.render).color, reference_.background,
+                         ssim_weight);
+      auto const start = std::chrono::steady_clock::now();
+      trace_reference(v, file_, reference_);
+      reference_seconds_ += seconds_since(start);
+    }
+  }
+
+  json description() const {
+    auto const& first = set_.views.front();
+    auto const& exact = settings_.front().use;
+    json names = json::array();
+    std::size_t pixels = 0;
+    for (auto const& v : set_.views) names.push_back(v.name), pixels += v.pixels.size();
+    return {{"model", a_.model.filename().string()},
+            {"cameras", fs::absolute(a_.cameras).lexically_normal().filename().string()},
+            {"gaussians", file_.model.size()},
+            {"sh_degree", file_.model.sh_degree},
+            {"kernel_degree", file_.kernel_degree},
+            {"backend", gart::to_string(exact.configuration.backend)},
+            {"width", first.view.width},
+            {"height", first.view.height},
+            {"views", names},
+            {"pixels", pixels},
+            {"repeats", a_.repeats},
+            {"clock", a_.clock},
+            {"background", background_},
+            {"gradient_of", first.truth.empty() ? "a random weight of every colour" : "the training loss"},
+            {"reference", {{"alpha_min", reference_.alpha_min}, {"t_min", reference_.transmittance_min}}}};
+  }
+
+  json measure(setting const& s) {
+    gart::gaussian_model const model = gart::with_sh_degree(file_.model, s.use.configuration.sh_degree);
+    auto const renderer = gart::make_renderer(s.use.configuration);
+    renderer->set_model(model);
+    error_sums errors;
+    std::map<std::string, double> stages;
+    double lt_bytes = 0;
+    double const share = 1 / static_cast<double>(set_.views.size());
+    for (tradeoff_view const& v : set_.views) {
+      gart::camera const view = s.use.shrink == 1 ? v.view : smaller(v.view, s.use.shrink);
+      gart::image_float const gradient =
+          s.use.shrink == 1 ? v.color_gradient : gradient_of_smaller(v.color_gradient, view.width, view.height);
+      for (auto const& [label, samples] : time(*renderer, s, model, view, gradient)) {
+        stages[label] += share * (s.use.render.rebuild_every > 1 ? mean(samples) : median(samples));
+      }
+      errors.add_gradients(v, renderer->gradients());
+      lt_bytes += share * static_cast<double>(renderer->lt_bytes());
+      gart::image_float const image = renderer->render(view, s.use.render).color;
+      errors.add_image(v, s.use.shrink == 1 ? image : enlarged(image, v.view.width, v.view.height));
+    }
+    return entry(s, renderer->configuration(), errors, stages, lt_bytes, renderer->peak_bytes());
+  }
+
+  static constexpr char const* processor = "processor";
+
+  // Milliseconds of every stage, and of the processor, repeat by repeat. A tree that is refitted is timed over whole
+  // intervals between builds, with the Gaussians moving; in the end they are back in place.
+  std::map<std::string, std::vector<double>> time(gart::renderer& renderer, setting const& s,
+                                                  gart::gaussian_model const& model, gart::camera const& view,
+                                                  gart::image_float const& gradient) {
+    std::map<std::string, std::vector<double>> samples;
+    int const interval = s.use.render.rebuild_every;
+    int const repeats = (a_.repeats + interval - 1) / interval * interval;
+    gart::gaussian_model moved = model;
+    std::mt19937 engine(0);
+    renderer.differentiate(view, s.use.render, gradient);  // allocates, and warms the caches
+    for (int i = 0; i < repeats; ++i) {
+      if (interval > 1) {
+        move_geometry(moved, set_.extent, engine);
+        renderer.set_model(moved);
+      }
+      renderer.profile().clear();
+      renderer.profile().enable(true);
+      double const before = processor_ms();
+      renderer.differentiate(view, s.use.render, gradient);
+      samples[processor].push_back(processor_ms() - before);
+      for (auto const& [label, stage] : renderer.profile().stages()) {
+        samples[label].resize(static_cast<std::size_t>(i));  // a stage may be there in some repeats only
+        samples[label].push_back(stage.milliseconds);
+      }
+      renderer.profile().enable(false);
+    }
+    for (auto& [label, list] : samples) list.resize(static_cast<std::size_t>(repeats));
+    if (interval > 1) {
+      renderer.set_model(model);
+      renderer.differentiate(view, s.use.render, gradient);
+    }
+    return samples;
+  }
+
+  static gart::camera smaller(gart::camera const& view, int by) {
+    return gart::resized(view, std::max(1, view.width / by), std::max(1, view.height / by));
+  }
+
+  json entry(setting const& s, gart::configuration_info const& configuration, error_sums const& errors,
+             std::map<std::string, double> const& stages, double lt_bytes, std::size_t peak_bytes) const {
+    auto const of = [&](char const* label) { return stages.count(label) ? stages.at(label) : 0.0; };
+    auto const groups = errors.gradients();
+    double worst = 0;
+    for (auto const& [name, error] : groups) worst = error <= worst ? worst : error;
+    auto without_processor = stages;
+    without_processor.erase(processor);
+    double const total = of("gradients"), forward = of("forward"), backward = of("backward");
+    return {{"name", s.name()},
+            {"knob", s.knob},
+            {"tracer", gart::to_string(configuration.tracer)},
+            {"backward", configuration.backward},
+            {"sh_degree", configuration.sh_degree},
+            {"kernel_degree", configuration.kernel_degree},
+            {"tile_size", configuration.tile_size},
+            {"window", configuration.window},
+            {"approximations", approximations_of(s.use.render, configuration)},
+            {"rebuild_every", s.use.render.rebuild_every},
+            {"shrink", s.use.shrink},
+            {"image", {{"max", errors.image_max()}, {"rms", errors.image_rms()}, {"psnr", errors.psnr()}}},
+            {"gradients", groups},
+            {"gradient_worst", worst},
+            {"total_ms", total},
+            {"prepare_ms", total - forward - backward},
+            {"forward_ms", forward},
+            {"backward_ms", backward},
+            {"processor_ms", of(processor)},
+            {"stages_ms", without_processor},
+            {"lt_bytes", lt_bytes},
+            {"peak_bytes", peak_bytes}};
+  }
+
+  tradeoff_arguments const& a_;
+  progress say_;
+  gart::model_file file_;
+  std::vector<setting> settings_;
+  view_set set_;
+  std::string background_;
+  gart::render_options reference_;
+  double reference_seconds_ = 0;
+};
+
+}  // namespace
+
+void add_tradeoff(CLI::App& app, command& selected) {
+  auto a = std::make_shared<tradeoff_arguments>();
+  CLI::App* tradeoff = app.add_subcommand(
+      "tradeoff",
+      "Measure what each approximation costs and buys: errors against a reference in double, times, bytes.");
+  tradeoff->add_option("MODEL.ply", a->model, "Gaussians, from gart or another program")->type_name("")->required();
+  tradeoff
+      ->add_option("CAMERAS", a->cameras,
+                   "A capture, whose photographs give the loss that is\ndifferentiated; or a camera JSON as for gart "
+                   "render")
+      ->type_name("")
+      ->required();
+  tradeoff->add_option("--out", a->out, "Folder of the results; made where there is none")
+      ->type_name("DIR")
+      ->required();
+  tradeoff
+      ->add_option("--settings", a->settings,
+                   "Only these knobs or settings, comma-separated: t_min,\ntracer=bvh and so on; exact is always "
+                   "measured")
+      ->type_name("A,B")
+      ->delimiter(',');
+  tradeoff->add_option("--views", a->views.count, "Views, evenly spread; more for a mean over more of the scene")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 10000));
+  tradeoff
+      ->add_option("--pixels", a->views.pixels,
+                   "Pixels of each view that are compared, at random; times\nare of whole views")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 1e9));
+  tradeoff->add_option("--repeats", a->repeats, "Timed runs a view and setting; the median counts")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 1000));
+  tradeoff->add_option("--downscale", a->views.downscale, "Shrink images by this whole factor")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 64));
+  tradeoff->add_option("--background", a->background, "white or black; auto: as gart train chooses")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(one_of({"auto", "white", "black"}));
+  tradeoff
+      ->add_option("--backward", a->backward,
+                   "Backward strategy of all settings that do not name one:\nauto, pixel, hybrid, primitive, "
+                   "deterministic or cleared")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(strategy_names());
+  tradeoff
+      ->add_option("--reference-alpha-min", a->reference_alpha_min,
+                   "Opacity below which the reference sees no hit, 0: the\nmodel's own, with which it was trained; "
+                   "1e-5 shows what\nthat cut-off itself leaves out")
+      ->type_name("A")
+      ->capture_default_str()
+      ->check(between(0, 0.99));
+  tradeoff
+      ->add_option("--clock", a->clock,
+                   "What the fronts are drawn over: wall, or processor, the time\nof all threads together, for a CPU "
+                   "that has other work")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(one_of({"wall", "processor"}));
+  tradeoff->add_flag("--quiet", a->quiet, "Say nothing but errors");
+  add_configuration_options(*tradeoff, a->configuration);
+  tradeoff->footer(
+      "\nThe reference traces in double, ends no ray early and evaluates every band of colour. Each setting turns one\n"
+      "knob of the model as it was trained (exact), or a few. Errors: the largest and the root mean square of the\n"
+      "colour's, and for each parameter group |gradient - reference| / |reference|. Times: a forward and a backward\n"
+      "pass of a view with all that prepares them.\n"
+      "\nWrites into DIR:\n"
+      "  tradeoff.html   one page: error against time, settings that another one beats in both greyed, and the table\n"
+      "  table.txt       the table, as it is printed\n"
+      "  tradeoff.json   everything, every stage's time included\n"
+      "\nExamples:\n"
+      "  gart tradeoff run/model.ply lego --out trade\n"
+      "  gart tradeoff scene.ply path.json --out trade --settings alpha_min,t_min --views 4 --repeats 20");
+  tradeoff->callback([a, &selected] { selected = [a] { return tradeoff_run(*a).run(); }; });
+}
+
+}  // namespace gart_cli

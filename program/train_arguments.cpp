@@ -1,0 +1,278 @@
+#include "train_arguments.hpp"
+
+#include "commands.hpp"
+#include "output.hpp"
+#include "train_fields.hpp"
+
+#include <gart/core/version.hpp>
+#include <gart/runtime/choose.hpp>
+#include <gart/runtime/presets.hpp>
+
+#include <cstdio>
+
+namespace gart_cli {
+
+namespace fs = std::filesystem;
+
+namespace {
+// A line a preset, with what it sets.
+std::string presets_help() {
+  std::string text =
+      "What is left out for speed; options given besides win. What\nit costs in quality: gart tradeoff, and "
+      "docs/tradeoffs.md";
+  for (gart::preset const& p : gart::presets()) {
+    char knobs[80];
+    std::snprintf(knobs, sizeof knobs, ": --alpha-min %.4g --t-min %.4g", p.alpha_min, p.transmittance_min);
+    text += "\n" + p.name + knobs;
+  }
+  return text;
+}
+}  // namespace
+
+void add_arguments(CLI::App& train, train_arguments& a) {
+  auto& r = a.recorded;
+  train
+      .add_option("DATASET", a.dataset,
+                  "Capture: a folder with COLMAP's sparse/ and images/, Blender's\n"
+                  "transforms_train.json, or a transforms.json; or such a file")
+      ->type_name("");
+  train.add_option("--out", a.out, "Folder of the results; made where there is none")->type_name("DIR")->required();
+  train.add_flag("--resume", a.resume,
+                 "Continue the run in DIR from its last checkpoint, with its\noptions; DATASET may be left out");
+  train.add_flag("--quiet", a.quiet, "Say nothing but errors");
+
+  std::string group = "Training";
+  auto const in_group = [&group](CLI::Option* option) { return option->group(group); };
+  in_group(
+      r.add(train, "--iterations", a.iterations, "N",
+            "Steps, one training view each. With --resume it may be\nraised: rates, degrees and densification then "
+            "follow the new\nlength, so rates that had fallen rise again"))
+      ->check(between(1, 1e9));
+  in_group(r.add(train, "--max-gaussians", a.max_gaussians, "N", "Gaussians at most; memory and time grow with them"))
+      ->check(between(1, static_cast<double>(gart::most_gaussians)));
+  in_group(r.add(train, "--time-budget", a.time_budget, "S",
+                 "Seconds of training after which the run ends, where\n--iterations do not end it before, 0: no limit. "
+                 "Rates, degrees\nand densification go by the larger of both shares. Such a run\ndepends on the "
+                 "machine and its load, whatever the seed. It may\nbe raised as --iterations may"))
+      ->check(between(0, 1e9));
+  in_group(
+      r.add(train, "--densify", a.densify, "NAME",
+            "How Gaussians are added: error (those split through which\nthe image's error is seen, up to "
+            "--max-gaussians), mcmc\n(copies by opacity, random steps), adc (clones and splits by\ngradient) or none"))
+      ->check(name_of_a<gart::densify_kind>());
+  in_group(r.add_flag(train, "--auto,!--no-auto", a.automatic,
+                      "Model only what the scene requires: measure on held-out\ntraining views which bands of "
+                      "spherical harmonics pay, and\nstore no others. --no-auto stores all and holds no view out.\n"
+                      "Where neither is given: --auto from " +
+                          std::to_string(gart::measured_from) +
+                          " steps on; shorter\nruns would miss the views held out"));
+  in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3",
+                 "Degree of the spherical harmonics of colour; auto: 3, or\nwhat --auto measures"))
+      ->check(one_of({"auto", "0", "1", "2", "3"}));
+  in_group(r.add(train, "--sh-gain", a.sh_gain, "DB", "PSNR on the held-out views that a band must buy by the end"))
+      ->check(between(1e-6, 100));
+  in_group(r.add(train, "--points", a.points, "N", "Gaussians placed at random where the capture has no points"))
+      ->check(between(1, 2147483647.0));
+  in_group(r.add(train, "--init-opacity", a.initial_opacity, "A",
+                 "Opacity of the first Gaussians, below 1; 0: 0.5 for random\npoints with error or mcmc, else 0.1"))
+      ->check(between(0, 0.99));
+  in_group(r.add(train, "--init-scale", a.initial_scale, "X",
+                 "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 for random points "
+                 "with\nerror or mcmc, else 1"))
+      ->check(between(0, 100));
+  in_group(
+      r.add(train, "--mcmc-noise", a.mcmc_noise, "X", "Strength of the random steps of mcmc over the usual; 0: none"))
+      ->check(between(0, 1e6));
+  in_group(r.add(train, "--mcmc-penalty", a.mcmc_penalty, "X",
+                 "Strength of the penalties of mcmc on opacity and size over\nthe usual; 0: none"))
+      ->check(between(0, 1e6));
+  in_group(r.add(train, "--adam", a.adam, "NAME",
+                 "all: each step moves every Gaussian; seen: only those that\nits view shows, as sparse Adam does; for "
+                 "views that show a\nsmall part of a large scene"))
+      ->check(one_of({"all", "seen"}));
+  in_group(r.add(train, "--set", a.set, "NAME=VALUE,...",
+                 "Rules by name, for measuring them: error.fill=0.25,\nrates.opacity=0.05 and so on "
+                 "(docs/training.md); a name that\nthere is not lists those there are"));
+  in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
+  in_group(r.add(train, "--seed", a.seed, "N",
+                 "Seed of everything random; on the serial backend the same\nseed gives the same bits"))
+      ->check(whole_number());
+
+  in_group(r.add(train, "--kernel-degree", a.kernel_degree, "N",
+                 "How Gaussians fall from their centres, exp(-4.5 (r / 3)^N):\n2, or the generalised 1, 3, 4, 5, 8 of "
+                 "3DGRT"))
+      ->check(kernel_degree_names());
+
+  in_group(r.add_flag(
+      train, "--antialias", a.antialias,
+      "Each pixel sees the Gaussians through a filter of its own\nwidth: for models that are shown smaller or from "
+      "farther away\nthan they were trained. The model says so to who renders it"));
+
+  group = "Capture";
+  in_group(r.add(train, "--exposure", a.exposure, "NAME",
+                 "on: learn the exposure and white balance of each photograph;\ntest views get theirs from the "
+                 "training views about them.\nauto: where neighbouring photographs differ in brightness"))
+      ->check(one_of({"auto", "on", "off"}));
+  in_group(r.add(train, "--downscale", a.downscale, "N", "Shrink images by this whole factor"))->check(between(1, 64));
+  in_group(r.add(train, "--background", a.background, "NAME",
+                 "white, black, or random (another at each step; tests on black);\nauto: white for transparent "
+                 "images and plain white borders,\nelse black"))
+      ->check(one_of({"auto", "white", "black", "random"}));
+  in_group(
+      r.add(train, "--test-every", a.test_every, "N",
+            "Keep each Nth view for testing, 0: none; for captures that do\nnot say themselves which are for testing"))
+      ->check(between(0, 1e6));
+
+  group = "Machine";
+  in_group(r.add(train, "--backend", a.backend, "NAME",
+                 "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is"))
+      ->check(name_of_a<gart::backend_kind>());
+  in_group(r.add(train, "--tracer", a.tracer, "NAME",
+                 "What finds the hits: tiles, bvh, or embree (CPU);\nthe images are the same"))
+      ->check(name_of_a<gart::tracer_kind>());
+  in_group(r.add(train, "--backward", a.backward, "NAME",
+                 "How gradients are summed: primitive (one sum a Gaussian and\ntile), hybrid (a quarter of the "
+                 "memory), pixel, or\ndeterministic (the same bits in every run); auto: the fastest"))
+      ->check(strategy_names());
+  in_group(r.add(train, "--lt-budget", a.lt_budget_gb, "GB",
+                 "Memory for what the forward pass records; a step that\nneeds more is done by hybrid, which needs a "
+                 "quarter, and where\nthat is too much by pixel, which needs none. 0: no limit"))
+      ->check(between(0, 1e6));
+  in_group(r.add(train, "--rebuild-every", a.rebuild_every, "N",
+                 "Steps between builds of the bvh tracer's tree, which is\nrefitted in between; the images are the "
+                 "same"))
+      ->check(between(1, 1e6));
+  add_threads(train, a.threads);
+  in_group(train.get_option("--threads"));
+
+  group = "Accuracy";
+  in_group(r.add(train, "--preset", a.preset, "NAME", presets_help()))->check(one_of(gart::preset_names()));
+  in_group(r.add(train, "--alpha-min", a.alpha_min, "A",
+                 "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as others have it"))
+      ->check(between(1e-6, 0.99));
+  in_group(r.add(train, "--t-min", a.t_min, "T", "Transmittance below which a ray ends, 0 to 1"))
+      ->check(between(0, 0.99));
+  in_group(r.add(train, "--max-hits", a.max_hits, "N", "Hits after which a ray ends, 0: no cap"))
+      ->check(between(0, gart::max_hits_most));
+
+  in_group(r.add(train, "--arithmetic", a.arithmetic, "NAME", "exact, or fast: shorter exponentials and reciprocals"))
+      ->check(name_of_a<gart::arithmetic_kind>());
+  in_group(r.add(train, "--lt-format", a.lt_format, "NAME",
+                 "What the forward pass leaves of a hit for primitive: float4,\nhalf or shared (half the memory, less "
+                 "exact gradients)"))
+      ->check(name_of_a<gart::lt_format_kind>());
+  in_group(r.add(train, "--tile-size", a.tile_size, "N", "Pixels a side of a tile, 0: what suits"))
+      ->check(between(0, 64));
+  in_group(r.add(train, "--window", a.window, "N", "Hits a ray keeps in order at a time, 0: what suits"))
+      ->check(between(0, 1024));
+
+  group = "Course";
+  in_group(r.add(train, "--eval-every", a.eval_every, "N",
+                 "Steps between tests on the test views, 0: only at the end,\n-1: five in the run"))
+      ->check(between(-1, 1e9));
+  in_group(
+      train.add_option("--checkpoint-every", a.checkpoint_minutes, "Minutes between checkpoints, 0: only at the end"))
+      ->type_name("M")
+      ->capture_default_str()
+      ->check(between(0, 1e6));
+  in_group(train.add_flag("--check-finite", a.check_finite,
+                          "After each step look for numbers that are not finite in all\nparameters and Adam's moments, "
+                          "and stop at the first with exit\ncode 1; metrics.json says how many steps were checked"));
+  in_group(train.add_option("--stop-at", a.stop_at,
+                            "Stop after this step as Ctrl-C would, 0: do not; the run can\nthen be resumed"))
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(0, 1e9));
+}
+
+void fill_in(CLI::App const& train, train_arguments& a) {
+  gart::preset const& chosen = gart::preset_named(a.preset);
+  auto const set = [&](char const* option, auto& value, auto const& by_preset) {
+    if (train.get_option(option)->count() == 0) value = by_preset;
+  };
+  set("--alpha-min", a.alpha_min, chosen.alpha_min);
+  set("--t-min", a.t_min, chosen.transmittance_min);
+  set("--auto", a.automatic, a.iterations >= gart::measured_from);
+}
+
+void continue_run(train_arguments& a) {
+  for (auto const& file : {a.config_file(), a.checkpoint_file()}) {
+    if (!fs::exists(file)) {
+      throw gart::io_error(file.string(), "is not there: --resume needs the folder of a run that was started",
+                           "give that run's --out, or leave --resume out");
+    }
+  }
+  nlohmann::json const config = read_json(a.config_file());
+  if (!config.is_object() || !config.contains("options") || !config["options"].is_object()) {
+    throw gart::io_error(a.config_file().string(), "has no \"options\"", "start anew without --resume");
+  }
+  a.raised = a.recorded.continue_from(config["options"], a.config_file(), {"iterations", "time-budget"});
+  if (a.dataset.empty()) {
+    if (!config.contains("dataset") || !config["dataset"].is_string()) {
+      throw gart::io_error(a.config_file().string(), "has no \"dataset\"", "name the dataset on the command line");
+    }
+    a.dataset = fs::path(config["dataset"].get<std::string>());
+  }
+}
+
+gart::configuration_request configuration_request_of(train_arguments const& a) {
+  gart::configuration_request wanted;
+  wanted.backend = gart::from_string<gart::backend_kind>(a.backend);
+  wanted.tracer = gart::from_string<gart::tracer_kind>(a.tracer);
+  wanted.backward = a.backward;
+  wanted.sh_degree = a.sh_degree == "auto" ? wanted.sh_degree : std::stoi(a.sh_degree);
+  wanted.kernel_degree = a.kernel_degree;
+  wanted.arithmetic = gart::from_string<gart::arithmetic_kind>(a.arithmetic);
+  wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
+  wanted.tile_size = a.tile_size, wanted.window = a.window, wanted.threads = a.threads;
+  return wanted;
+}
+
+gart::train_options train_options_of(train_arguments const& a) {
+  gart::train_options o = a.defaults;
+  o.iterations = a.iterations;
+  o.max_gaussians = a.max_gaussians;
+  o.random_points = std::min(a.points, a.max_gaussians);
+  o.densify = gart::from_string<gart::densify_kind>(a.densify);
+  o.initial_opacity = a.initial_opacity;
+  o.initial_scale = a.initial_scale;
+  o.exposure = a.exposure == "on";
+  o.mcmc.noise *= a.mcmc_noise;
+  o.mcmc.opacity_penalty *= a.mcmc_penalty, o.mcmc.scale_penalty *= a.mcmc_penalty;
+  o.adam.seen_only = a.adam == "seen";
+  o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
+  o.sh_gain = a.automatic && a.sh_degree == "auto" ? a.sh_gain : 0;
+  // Until it is settled it decides nothing.
+  o.background = gart::from_string(a.background, gart::background_kind::black);
+  o.check_finite = a.check_finite;
+  o.seed = a.seed;
+  o.render.alpha_min = a.alpha_min;
+  o.render.transmittance_min = a.t_min;
+  o.render.max_hits = a.max_hits;
+  o.render.antialias = a.antialias ? gart::usual_antialias : 0;
+  // The other tracers build no tree, and the images are the same.
+  o.render.rebuild_every = a.tracer == gart::to_string(gart::tracer_kind::bvh) ? a.rebuild_every : 1;
+  set_fields(o, a.set);
+  return o;
+}
+
+nlohmann::json config_of(train_arguments const& a, gart::dataset const& data) {
+  return {{"gart", gart::version},
+          {"dataset", fs::absolute(a.dataset).lexically_normal().string()},
+          {"train_views", data.train.size()},
+          {"test_views", data.test.size()},
+          {"options", a.recorded.values()}};
+}
+
+void check_same_dataset(train_arguments const& a, gart::dataset const& data) {
+  nlohmann::json const config = read_json(a.config_file());
+  auto const now = config_of(a, data);
+  for (char const* key : {"train_views", "test_views"}) {
+    if (config.contains(key) && config[key] == now[key]) continue;
+    throw usage_error(a.dataset.string() + ": has " + now[key].dump() + " " + key + ", the run to be resumed had " +
+                      config.value(key, nlohmann::json()).dump() + " (" + a.config_file().string() +
+                      "; name the dataset it was started with)");
+  }
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,81 @@
+#pragma once
+// What `gart train` was asked for, and its way into config.json and back.
+
+#include "options.hpp"
+
+#include <gart/runtime/choose.hpp>
+#include <gart/runtime/session.hpp>
+#include <gart/train/options.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+
+namespace gart_cli {
+
+struct train_arguments {
+  std::filesystem::path dataset, out;
+  bool resume = false, quiet = false, check_finite = false;
+  int threads = 0, stop_at = 0;
+  nlohmann::json raised = nlohmann::json::object();  // options raised by a resuming command line: what they were
+  float checkpoint_minutes = 10;
+
+  // What follows decides the result and is recorded.
+  std::string backend = "auto", tracer = "auto", backward = "auto", densify = "error", background = "auto", start;
+  std::string arithmetic = "exact", lt_format = "auto";
+  std::string preset = "exact";
+  gart::train_options defaults;
+  int iterations = defaults.iterations;
+  double time_budget = 0;  // seconds of training; 0: none
+  gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
+  int kernel_degree = 2, tile_size = 0, window = 0;
+  bool automatic = false;
+  std::string sh_degree = "auto";
+  float sh_gain = gart::usual_sh_gain;
+  int downscale = 1, test_every = 8, eval_every = -1;
+  float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
+  std::string exposure = "auto", adam = "all", set;
+  float mcmc_noise = 1, mcmc_penalty = 1;
+  float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;
+  gart::u32 max_hits = defaults.render.max_hits;
+  bool antialias = false;
+  int rebuild_every = defaults.render.rebuild_every;
+  double lt_budget_gb = 0;
+  gart::u64 seed = defaults.seed;
+  recorded_options recorded;
+
+  std::filesystem::path config_file() const { return out / "config.json"; }
+  std::filesystem::path checkpoint_file() const { return out / "checkpoint.gart"; }
+  std::filesystem::path history_file() const { return out / "history.json"; }
+  std::filesystem::path model_file() const { return out / "model.ply"; }
+  // The share of the run that is done.
+  double progress(int step, double seconds) const {
+    double const by_steps = static_cast<double>(step) / iterations;
+    return std::min(1.0, time_budget > 0 ? std::max(by_steps, seconds / time_budget) : by_steps);
+  }
+  // The length that schedules go by: so many steps that `step` of them are the progress. A run is over where it has
+  // come to it.
+  int length(int step, double seconds) const {
+    double const by_steps = static_cast<double>(step) / iterations, share = progress(step, seconds);
+    return share > by_steps ? std::max(1, static_cast<int>(step / share)) : iterations;
+  }
+  int steps_between_tests() const { return eval_every >= 0 ? eval_every : std::max(1, iterations / 5); }
+};
+
+void add_arguments(CLI::App& train, train_arguments& a);
+// Sets what the command line leaves open: what the preset says, and --auto in runs of gart::measured_from steps or
+// more.
+void fill_in(CLI::App const& train, train_arguments& a);
+// Takes the options of the run in `out`, and its dataset where none was named. io_error where there is no such run.
+void continue_run(train_arguments& a);
+gart::configuration_request configuration_request_of(train_arguments const& a);
+// `background` is a colour's name or "random".
+gart::train_options train_options_of(train_arguments const& a);
+// With "auto" replaced by what it came to, so that a resumed run cannot come to anything else.
+nlohmann::json config_of(train_arguments const& a, gart::dataset const& data);
+// usage_error where the dataset is not the one that config.json tells of.
+void check_same_dataset(train_arguments const& a, gart::dataset const& data);
+
+}  // namespace gart_cli

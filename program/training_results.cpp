@@ -1,0 +1,131 @@
+#include "choices.hpp"
+#include "output.hpp"
+#include "process_memory.hpp"
+#include "report.hpp"
+#include "training_run.hpp"
+
+#include <gart/io/exposure_file.hpp>
+#include <gart/io/file.hpp>
+#include <gart/io/image_file.hpp>
+#include <gart/runtime/model_file.hpp>
+
+#include <cstdio>
+
+namespace gart_cli {
+
+namespace fs = std::filesystem;
+
+gart::scores training_run::score(gart::some_views const& views, gart::keep_view const& keep) {
+  return gart::evaluate(
+      views, eval_background_, session_->exposures(),
+      [this](gart::camera const& c) { return session_->render(c, eval_background_); }, keep);
+}
+
+gart::scores training_run::test(int step, gart::keep_view const& keep) {
+  stopwatch const testing;
+  gart::scores const result = score(gart::all_of(data_.test), keep);
+  if (!result.views.empty()) {
+    course_.test.push_back({step, result.psnr, result.ssim, course_.seconds});
+    say_.note("step " + with_commas(step) + ": test PSNR " + fixed(result.psnr, 2) + " dB, SSIM " +
+              fixed(result.ssim, 4));
+  }
+  test_seconds_ += testing.seconds();
+  return result;
+}
+
+void training_run::save_checkpoint() {
+  course_.close_point();
+  session_->save(a_.checkpoint_file());
+  write_json(a_.history_file(), course_.to_json());
+}
+
+// The model first: where the disk is full, the smaller and more precious one is there.
+void training_run::save() {
+  gart::model_file const file{session_->model(), gart::render_options_of(train_options_of(a_), data_.extent),
+                              configuration_.kernel_degree};
+  gaussians_ = file.model.size();
+  gart::save_model(a_.model_file(), file);
+  if (auto const exposures = session_->exposures(); !exposures.empty())
+    gart::write_exposures(a_.out / "exposures.json", exposures);
+  try {
+    save_checkpoint();
+  } catch (gart::io_error const& e) {
+    throw gart::error(std::string(e.what()) + "; the model is whole: " + a_.model_file().string());
+  }
+}
+
+void training_run::conclude() {
+  remove_results(a_.out);
+  std::vector<report_view> shown;
+  stopwatch const writing;
+  double const tests_before = test_seconds_;
+  gart::scores const result = test(
+      session_->steps_done(),
+      [&](std::size_t i, gart::view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
+        gart::write_png(a_.out / "renders" / (s.name + ".png"), gart::to_8bit(render));
+        gart::write_png(a_.out / "renders" / (s.name + "_truth.png"), gart::to_8bit(truth));
+        if (in_report(i, data_.test.size())) shown.push_back(make_report_view(s.name, s.psnr, s.ssim, render, truth));
+        say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
+                   static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
+      });
+  say_.state("testing on training views", 1);
+  stopwatch const training_views;
+  gart::scores const training = score(gart::evenly_spread(data_.train, data_.test.size()));
+  test_seconds_ += training_views.seconds();
+  write_json(a_.history_file(), course_.to_json());
+  save_seconds_ += writing.seconds() - (test_seconds_ - tests_before);
+  nlohmann::json const metrics = metrics_of(result, training);
+  write_json(a_.out / "metrics.json", metrics);
+  gart::write_file(a_.out / "report.html", report_page(metrics, read_json(a_.config_file()), course_, shown));
+  if (a_.quiet) return;
+  say_.clear();
+  std::printf("trained %s steps in %s, %s Gaussians\n", with_commas(session_->steps_done()).c_str(),
+              as_duration(course_.seconds).c_str(), with_commas(gaussians_).c_str());
+  if (!result.views.empty()) std::fputs(in_words(result, training, data_.train.size()).c_str(), stdout);
+  std::printf("model   %s\nreport  %s\n", a_.model_file().string().c_str(), (a_.out / "report.html").string().c_str());
+}
+
+std::string training_run::image_size() const {
+  auto const& first = data_.train.front().image;
+  std::string const size = std::to_string(first.width) + " x " + std::to_string(first.height);
+  for (auto const& v : data_.train) {
+    if (v.image.width != first.width || v.image.height != first.height) return size + " and other sizes";
+  }
+  return size;
+}
+
+nlohmann::json training_run::metrics_of(gart::scores const& result, gart::scores const& training) {
+  nlohmann::json m = to_json(result, training, data_.train.size());
+  fs::path const named = fs::absolute(a_.dataset).lexically_normal();
+  m["scene"] = (named.has_filename() ? named : named.parent_path()).filename().string();
+  m["format"] = data_.format, m["split"] = data_.split, m["resize_filter"] = data_.resize_filter;
+  m["psnr_over_seconds"] = course_.psnr_over_seconds();
+  m["image_size"] = image_size(), m["notes"] = data_.notes;
+  m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
+  m["exposure"] = a_.exposure == "on";
+  m["iterations"] = session_->steps_done(), m["time_budget"] = a_.time_budget, m["raised"] = raised_;
+  m["gaussians"] = gaussians_, m["sh_degree"] = session_->configuration().sh_degree;
+  m["floats_per_gaussian"] = 11 + 3 * gart::sh_coefficients(session_->configuration().sh_degree);
+  m["chosen"] = chosen_, m["sh_trials"] = trials_of(session_->trials());
+  m["model_bytes"] = fs::file_size(a_.model_file()), m["checkpoint_bytes"] = fs::file_size(a_.checkpoint_file());
+  m["backend"] = a_.backend, m["tracer"] = a_.tracer, m["backward"] = configuration_.backward;
+  m["kernel_degree"] = configuration_.kernel_degree;
+  m["approximations"] = approximations_of(train_options_of(a_).render, configuration_);
+  m["approximations"]["preset"] = a_.preset, m["approximations"]["adam"] = a_.adam;
+  m["finite_steps"] = finite_steps_;
+  if (a_.check_finite) m["skipped_updates"] = skipped_updates_;
+  m["seconds"] = course_.seconds;
+  m["iterations_per_second"] = course_.seconds > 0 ? session_->steps_done() / course_.seconds : 0;
+  m["wall_seconds"] = {
+      {"loading", load_seconds_}, {"training", step_seconds_}, {"testing", test_seconds_}, {"saving", save_seconds_}};
+  m["stages_ms"] = nlohmann::json::object();
+  for (auto const& [label, time] : session_->profile().stages()) {
+    if (profiled_steps_ > 0) m["stages_ms"][label] = time.milliseconds / profiled_steps_;
+  }
+  m["profiled_steps"] = profiled_steps_;
+  m["profiled_step_ms"] = profiled_steps_ > 0 ? 1000 * profiled_seconds_ / profiled_steps_ : 0;
+  m["peak_bytes"] = session_->peak_bytes(), m["peak_process_bytes"] = static_cast<std::uint64_t>(peak_process_bytes());
+  return m;
+}
+
+}  // namespace gart_cli

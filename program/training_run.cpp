@@ -1,0 +1,155 @@
+#include "training_run.hpp"
+
+#include "choices.hpp"
+#include "commands.hpp"
+#include "output.hpp"
+
+#include <gart/runtime/model_file.hpp>
+
+#include <mutex>
+
+namespace gart_cli {
+
+namespace fs = std::filesystem;
+
+int training_run::run() {
+  prepare();
+  std::optional<interrupt_guard> interrupt(std::in_place);  // until a run that it stops is saved
+  bool const finished = train(*interrupt);
+  stopwatch const saving;
+  save();
+  save_seconds_ += saving.seconds();
+  if (!finished) {
+    say_.note("Stopped after step " + with_commas(static_cast<std::uint64_t>(session_->steps_done())) + ". Saved " +
+              a_.checkpoint_file().string() + " and " + a_.model_file().string() +
+              ".\nContinue with: gart train --resume --out " + a_.out.string());
+    return exit_interrupted;
+  }
+  interrupt.reset();  // all is saved, and --resume concludes anew: Ctrl-C may end it at once
+  conclude();
+  return 0;
+}
+
+void training_run::prepare() {
+  stopwatch const loading;
+  if (fs::is_directory(a_.out)) enter();
+  if (a_.resume) continue_run(a_);
+  if (a_.dataset.empty()) throw usage_error("DATASET is missing (see gart train --help)");
+  configuration_ = gart::resolve(configuration_request_of(a_));  // what is not there is known before images are read
+  course_ = course_of(a_);
+  load();
+  chosen_ = choose(a_, data_);
+  configuration_ = gart::resolve(configuration_request_of(a_));
+  a_.backend = to_string(configuration_.backend), a_.tracer = to_string(configuration_.tracer),
+  a_.backward = configuration_.backward;
+  a_.lt_format = to_string(configuration_.lt_format), a_.tile_size = configuration_.tile_size,
+  a_.window = configuration_.window;
+  for (auto& choice : chosen_) {
+    if (choice["option"] == "--tracer") choice["value"] = a_.tracer;
+    if (choice["option"] == "--backward") choice["value"] = a_.backward;
+  }
+  eval_background_ = background_color(a_.background);
+  if (!a_.start.empty()) {
+    std::error_code not_there;
+    if (!a_.resume && fs::equivalent(a_.start, a_.model_file(), not_there)) {
+      throw usage_error("--start " + a_.start +
+                        ": is the model in --out, which the run replaces (choose another --out)");
+    }
+    gart::model_file const file = gart::load_model(a_.start);
+    if (file.kernel_degree != a_.kernel_degree) {
+      throw usage_error("--start " + a_.start + ": is of kernel degree " + std::to_string(file.kernel_degree) +
+                        ", the run of " + std::to_string(a_.kernel_degree) + " (give --kernel-degree " +
+                        std::to_string(file.kernel_degree) + ")");
+    }
+    start_ = gart::with_sh_degree(file.model, configuration_.sh_degree);
+    if (start_.size() > a_.max_gaussians) {
+      throw usage_error("--start " + a_.start + ": has " + with_commas(start_.size()) +
+                        " Gaussians, more than --max-gaussians " + std::to_string(a_.max_gaussians));
+    }
+  }
+  prepare_folder(a_.out);
+  enter();
+  prepare_folder(a_.out / "renders");
+  session_ = gart::make_session(configuration_request_of(a_), train_options_of(a_), data_,
+                                a_.start.empty() ? nullptr : &start_);
+  a_.resume ? go_on() : begin_anew();
+  trials_ = session_->trials().size();
+  say_choices();
+  say_.note(a_.backend + " backend, " + a_.tracer + " tracer, " + configuration_.backward + " backward pass");
+  load_seconds_ = loading.seconds();
+}
+
+void training_run::say_choices() {
+  say_.note("chosen for this capture, each by its option where one is given:");
+  for (auto const& choice : chosen_) {
+    auto const text = [&](char const* key) { return choice.value(key, std::string()); };
+    say_.note("  " + text("option") + " " + text("value") + ": " + text("why"));
+  }
+}
+
+// The folder is this run's from here on.
+void training_run::enter() {
+  if (lock_) return;
+  lock_.emplace(a_.out);
+  if (!a_.resume) refuse_foreign_files(a_.out);
+}
+
+void training_run::load() {
+  std::mutex mutex;  // images are decoded by several threads
+  gart::dataset_options options;
+  options.downscale = a_.downscale;
+  options.test_every = a_.test_every;
+  options.progress = [&](std::size_t done, std::size_t total) {
+    std::lock_guard const lock(mutex);
+    say_.state("loading " + std::to_string(done) + "/" + std::to_string(total) + " images",
+               static_cast<double>(done) / static_cast<double>(std::max<std::size_t>(total, 1)));
+  };
+  data_ = gart::load_dataset(a_.dataset, options);
+  if (data_.train.empty()) {
+    throw gart::io_error(a_.dataset.string(), "has no training views",
+                         "raise --test-every, which keeps views for testing");
+  }
+  say_.note(data_.format + " capture: " + std::to_string(data_.train.size()) + " training views, " +
+            std::to_string(data_.test.size()) + " test views (" + data_.split + "), " + image_size() + ", " +
+            with_commas(data_.points.size()) + " points");
+  for (auto const& note : data_.notes) say_.note("  " + note);
+}
+
+// The first checkpoint is written before the first step: what cannot be saved is then known before it costs anything.
+// An earlier run's results go, lest they be taken for this one's.
+void training_run::begin_anew() {
+  remove_run(a_.out);
+  nlohmann::json config = config_of(a_, data_);
+  config["chosen"] = chosen_;
+  write_json(a_.config_file(), config);
+  session_->save(a_.checkpoint_file());
+}
+
+void training_run::go_on() {
+  check_same_dataset(a_, data_);
+  nlohmann::json config = read_json(a_.config_file());
+  chosen_ = chosen_before(config, chosen_);
+  try {
+    session_->load(a_.checkpoint_file());
+  } catch (gart::io_error const& e) {
+    throw gart::error(std::string(e.what()) + "; without --resume the run starts anew, --out names another");
+  }
+  int const step = session_->steps_done();
+  // It tells how much of a time budget is used.
+  if (a_.time_budget > 0 || fs::exists(a_.history_file())) course_.restore(a_.history_file(), step);
+  say_.note("resuming after step " + with_commas(step));
+  auto const now = a_.recorded.values();
+  for (auto const& [name, before] : a_.raised.items()) {
+    say_.note("--" + name + " " + now[name].dump() + " instead of " + before.dump() +
+              ": rates, degrees and densification follow the new length from here on");
+    config["options"][name] = now[name];
+    config["raised"].push_back({{"option", name}, {"step", step}, {"from", before}, {"to", now[name]}});
+  }
+  if (!a_.raised.empty()) {
+    remove_results(a_.out);
+    write_json(a_.config_file(), config);
+  }
+  raised_ = config.value("raised", nlohmann::json::array());
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,93 @@
+#pragma once
+// A run of `gart train`: from the command line to the results in its folder.
+
+#include "history.hpp"
+#include "interrupt.hpp"
+#include "progress.hpp"
+#include "run_folder.hpp"
+#include "scores.hpp"
+#include "train_arguments.hpp"
+
+#include <gart/runtime/session.hpp>
+
+#include <chrono>
+#include <memory>
+#include <optional>
+
+namespace gart_cli {
+
+class stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(clock::now() - start_).count(); }
+
+ private:
+  using clock = std::chrono::steady_clock;
+  clock::time_point start_ = clock::now();
+};
+
+// The running means that the progress line shows.
+struct recent_steps {
+  double loss = 0, psnr = 0, seconds = 0;
+  void add(gart::step_report const& report, double step_seconds) {
+    double const keep = count_ < 50 ? count_ / (count_ + 1.0) : 0.98;
+    ++count_;
+    loss = keep * loss + (1 - keep) * report.loss;
+    psnr = keep * psnr + (1 - keep) * report.psnr;
+    seconds = keep * seconds + (1 - keep) * step_seconds;
+  }
+
+ private:
+  int count_ = 0;
+};
+
+class training_run {
+ public:
+  explicit training_run(train_arguments& a) : a_(a), say_(a.quiet), course_(course_of(a)) {}
+  int run();  // the exit code
+
+ private:
+  // Before the first step (training_run.cpp).
+  void prepare();
+  void say_choices();
+  void enter();
+  void load();
+  void begin_anew();
+  void go_on();
+
+  // The steps (training_steps.cpp).
+  bool train(interrupt_guard const& interrupt);  // true when all steps are done, false when it was asked to stop
+  static history course_of(train_arguments const& a);
+  double progress_at(int step) const { return a_.progress(step, course_.seconds); }
+  gart::step_report checked_step();
+  void say_new_trials();
+  void show(gart::step_report const& report, recent_steps const& recent);
+
+  // Scores and files (training_results.cpp).
+  gart::scores score(gart::some_views const& views, gart::keep_view const& keep = {});
+  gart::scores test(int step, gart::keep_view const& keep = {});
+  void save_checkpoint();
+  void save();
+  void conclude();
+  std::string image_size() const;
+  nlohmann::json metrics_of(gart::scores const& result, gart::scores const& training);
+
+  train_arguments& a_;
+  std::optional<run_lock> lock_;
+  progress say_;
+  history course_;
+  gart::configuration_info configuration_;
+  bool fell_back_ = false;
+  gart::dataset data_;
+  nlohmann::json chosen_, raised_ = nlohmann::json::array();
+  std::size_t trials_ = 0;  // that have been told of
+  gart::gaussian_model start_;
+  gart::vec3 eval_background_{0.0f};
+  std::unique_ptr<gart::session> session_;
+  std::size_t gaussians_ = 0;
+  int steps_ = 0, profiled_steps_ = 0;
+  int finite_steps_ = 0;               // steps of this process after which everything was finite, by --check-finite
+  std::uint64_t skipped_updates_ = 0;  // numbers that Adam left as they were in them
+  double load_seconds_ = 0, step_seconds_ = 0, test_seconds_ = 0, save_seconds_ = 0, profiled_seconds_ = 0;
+};
+
+}  // namespace gart_cli

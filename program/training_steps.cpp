@@ -1,0 +1,98 @@
+#include "choices.hpp"
+#include "training_run.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace gart_cli {
+
+namespace {
+
+// Timing each launch slows a step a little: one step in so many is timed.
+constexpr int profile_every = 16;
+
+}  // namespace
+
+bool training_run::train(interrupt_guard const& interrupt) {
+  recent_steps recent;
+  stopwatch since_start;
+  double last_checkpoint = 0;
+  for (;;) {
+    int const before = session_->steps_done(), length = a_.length(before, course_.seconds);
+    if (before >= length) return true;
+    // The first steps load images and are no measure of the others.
+    session_->set_iterations(before < 100 ? a_.iterations : length);
+    double const done_before = progress_at(before);
+    if (interrupt.wanted() || (a_.stop_at > 0 && before >= a_.stop_at)) return false;
+    session_->profile().enable(before % profile_every == profile_every - 1);
+    stopwatch const step;
+    gart::step_report const report = checked_step();
+    double const seconds = step.seconds();
+    if (session_->profile().enabled()) ++profiled_steps_, profiled_seconds_ += seconds;
+    session_->profile().enable(false);
+    if (report.backward != configuration_.backward && !fell_back_) {
+      fell_back_ = true;
+      say_.note("step " + with_commas(report.step) +
+                ": the LT buffer would pass --lt-budget or its 2^32 slots, this step and others like it are " +
+                report.backward);
+    }
+    if (!std::isfinite(report.loss)) {
+      throw gart::error("step " + std::to_string(report.step) + ", view " + report.view +
+                        ": the loss is not a number (the last checkpoint is whole: " + a_.checkpoint_file().string() +
+                        ")");
+    }
+    finite_steps_ += a_.check_finite, skipped_updates_ += report.skipped;
+    ++steps_, step_seconds_ += seconds, course_.seconds += seconds, gaussians_ = report.gaussians;
+    if (!report.trial) course_.add(report);
+    say_new_trials();
+    recent.add(report, seconds);
+    show(report, recent);
+    double const done = progress_at(report.step);
+    auto const passes = [&](int parts) { return std::floor(done * parts) > std::floor(done_before * parts); };
+    bool const by_time = a_.time_budget > 0;
+    if (by_time && passes(200)) course_.close_point();
+    int const between = a_.steps_between_tests();
+    bool const due = by_time && a_.eval_every < 0 ? passes(5) : between > 0 && report.step % between == 0;
+    if (!report.trial && due && report.step < a_.length(report.step, course_.seconds)) test(report.step);
+    if (a_.checkpoint_minutes > 0 && since_start.seconds() - last_checkpoint > 60 * a_.checkpoint_minutes) {
+      stopwatch const saving;
+      save_checkpoint();
+      save_seconds_ += saving.seconds();
+      last_checkpoint = since_start.seconds();
+    }
+  }
+}
+
+// Of a run that ends at a time, a point for each two hundredth of it, whatever the number of steps.
+history training_run::course_of(train_arguments const& a) {
+  return history(a.time_budget > 0 ? std::numeric_limits<int>::max() : a.iterations);
+}
+
+gart::step_report training_run::checked_step() {
+  try {
+    return session_->step();
+  } catch (gart::not_finite const& e) {
+    throw gart::error(std::string(e.what()) + "; the last checkpoint is whole: " + a_.checkpoint_file().string());
+  }
+}
+
+void training_run::say_new_trials() {
+  auto const trials = session_->trials();
+  for (; trials_ < trials.size(); ++trials_)
+    say_.note("step " + with_commas(session_->steps_done()) + ": " + in_words(trials[trials_]));
+}
+
+void training_run::show(gart::step_report const& report, recent_steps const& recent) {
+  double const share = progress_at(report.step);
+  if (!say_.due(share)) return;
+  double const rate = recent.seconds > 0 ? 1 / recent.seconds : 0;
+  double const left = (a_.iterations - report.step) * recent.seconds;
+  say_.state(with_commas(report.step) + (a_.time_budget > 0 ? "" : "/" + with_commas(a_.iterations)) + "  " +
+                 fixed(rate, rate < 10 ? 2 : 0) + " it/s  loss " + fixed(recent.loss, 4) + "  PSNR " +
+                 fixed(recent.psnr, 2) + " dB  " + with_commas(report.gaussians) + " Gaussians  " +
+                 as_duration(a_.time_budget > 0 ? std::min(left, a_.time_budget - course_.seconds) : left) + " left" +
+                 (report.trial ? ", a band on trial" : ""),
+             share);
+}
+
+}  // namespace gart_cli
