@@ -1,6 +1,8 @@
 """Compiles every public header alone, included twice: .hpp by the host compiler; by nvcc, where there is one, each .cuh
-and all .hpp together; and the options as a user names some of them. First it shows that a header that is not
-self-contained, one without `#pragma once`, and one that opens the namespace GART_ISA with no such macro, is seen.
+and all .hpp together; the options as a user names some of them; and templates as a user instantiates them. The host
+compiler gives no warning of any kind that a user may ask for (HOST). First it shows that a header that is not
+self-contained, one without `#pragma once`, one that opens the namespace GART_ISA with no such macro, and one that
+converts or shadows in silence, is seen.
 """
 import argparse
 import concurrent.futures
@@ -9,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 
-HOST = ["-std=c++20", "-Wall", "-Wextra", "-Werror", "-fopenmp", "-ffp-contract=off", "-fsyntax-only", "-x", "c++"]
+HOST = ["-std=c++20", "-Wall", "-Wextra", "-Wshadow", "-Wconversion", "-Werror", "-fopenmp", "-ffp-contract=off", "-fsyntax-only", "-x", "c++"]
 # PTX of one architecture: no host compilation and no assembler, because what is looked for is front-end errors.
 CUDA = ["-std=c++20", "--expt-relaxed-constexpr", "-diag-suppress=20012", "-arch=sm_90", "-ptx", "-o", "/dev/null",
         "-x", "cu"]
@@ -36,11 +38,26 @@ def failure(command, include, names, folder):
     return f"{what}: does not compile with {command[0]}\n{done.stdout}{done.stderr}" if done.returncode else ""
 
 
-def options_failure(command, include, folder):
-    source = pathlib.Path(folder) / "options.cc"
-    source.write_text(OPTIONS)
+# What a template warns of is seen where it is instantiated.
+TEMPLATES = """#include <gart/exec/parallel.hpp>
+#include <gart/trace/bvh_tracer.hpp>
+#include <gart/trace/tile_tracer.hpp>
+#include <gart/train/trainer_impl.hpp>
+namespace gart {
+using shape = generalized_gaussian<4>;
+template class trainer<openmp_exec, scene_traits<1>, tile_tracer<openmp_exec>, primitive_strategy>;
+template class trainer<openmp_exec, scene_traits<3, shape>, bvh_tracer<openmp_exec, shape>, hybrid_strategy>;
+template class trainer<serial_exec, scene_traits<0>, tile_tracer<serial_exec>, deterministic_strategy>;
+template class trainer<serial_exec, scene_traits<2>, bvh_tracer<serial_exec>, lane_strategy>;
+}  // namespace gart
+"""
+
+
+def program_failure(what, text, command, include, folder):
+    source = pathlib.Path(folder) / f"{what.split()[0]}.cc"
+    source.write_text(text)
     done = subprocess.run([*command, f"-I{include}", str(source)], capture_output=True, text=True)
-    return f"options as a user names some of them:\n{done.stderr}" if done.returncode else ""
+    return f"{what}:\n{done.stderr}" if done.returncode else ""
 
 
 def self_check(host, folder):
@@ -49,6 +66,9 @@ def self_check(host, folder):
         "alone.hpp": ("#pragma once\ninline std::size_t alone() { return 0; }\n", False),
         "twice.hpp": ("struct twice {};\n", False),
         "name.hpp": ("#pragma once\nnamespace gart::inline GART_ISA {}\n", False),
+        "converts.hpp": ("#pragma once\ninline float converts(int x) { return static_cast<float>(x) + x; }\n", False),
+        "shadows.hpp": ("#pragma once\ninline int shadowed;\ninline int shadows(int shadowed) { return shadowed; }\n",
+                        False),
     }
     for name, (text, compiles) in headers.items():
         (pathlib.Path(folder) / name).write_text(text)
@@ -76,8 +96,10 @@ with tempfile.TemporaryDirectory() as folder:
         if a.nvcc:
             units = [[name] for name in headers if name.endswith(".cuh")]
             jobs += [pool.submit(failure, [a.nvcc, *CUDA], include, unit, folder) for unit in [plain, *units]]
-        jobs += [pool.submit(failure, host, include, [name], folder) for name in plain]
-        jobs.append(pool.submit(options_failure, host, include, folder))
+        jobs += [pool.submit(failure, host, include, unit, folder) for unit in [plain, *([name] for name in plain)]]
+        for what, text in {"options as a user names some of them": OPTIONS,
+                           "templates as a user instantiates them": TEMPLATES}.items():
+            jobs.append(pool.submit(program_failure, what, text, host, include, folder))
     failures = [message for job in jobs if (message := job.result())]
 
 print("\n".join(failures) or f"{len(headers if a.nvcc else plain)} headers compile" +

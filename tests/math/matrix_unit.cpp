@@ -14,7 +14,7 @@ constexpr int rows = 16, depth = 8, columns = 8;
 
 // d += a b, all row by row.
 struct product {
-  static constexpr int block_size = 32;
+  static constexpr int block_size = 32, min_blocks = 1;
   struct scratch {};
   float const *a, *b;
   float* d;

@@ -29,11 +29,11 @@ namespace gart::inline GART_ISA {
 
 namespace detail {
 
-inline void require_sort(std::size_t keys, std::size_t values, int key_bits, int most_bits) {
+inline void require_sort(std::size_t keys, std::size_t values, int key_bits, int max_bits) {
   require_size("sort_pairs", "values", values, keys);
-  if (key_bits < 0 || key_bits > most_bits)
+  if (key_bits < 0 || key_bits > max_bits)
     throw invalid_argument("sort_pairs: `key_bits` is " + std::to_string(key_bits) + ", must be 0 to " +
-                           std::to_string(most_bits) + ", the bits of a key");
+                           std::to_string(max_bits) + ", the bits of a key");
 }
 
 }  // namespace detail

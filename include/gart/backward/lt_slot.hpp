@@ -105,26 +105,28 @@ struct alignas(8) lt_shared_entry : weight_entry {
   GART_HD GART_INLINE static lt_shared_entry of(vec3 const& v, float weight, vec3 const& c) {
     float largest = v.x > v.y ? v.x : v.y;
     largest = largest > v.z ? largest : v.z;
-    largest = largest < most ? largest : most;
+    largest = largest < largest_shared ? largest : largest_shared;
     // The exponent of the largest channel once it is rounded to 9 bits; below 2^-16 all share the least.
-    u32 const rounded = (float_to_bits(largest) + 0x4000u) >> 23, exponent = rounded > least ? rounded : least;
+    u32 const rounded = (float_to_bits(largest) + 0x4000u) >> 23,
+              exponent = rounded > least_exponent ? rounded : least_exponent;
     float const steps = bits_to_float((262u - exponent) << 23);
     lt_shared_entry out;
     out.w = weight_entry::of(v, weight, c).w;
-    out.rgb = in_steps(v.x, steps) | in_steps(v.y, steps) << 9 | in_steps(v.z, steps) << 18 | (exponent - least) << 27;
+    out.rgb = in_steps(v.x, steps) | in_steps(v.y, steps) << 9 | in_steps(v.z, steps) << 18 |
+              (exponent - least_exponent) << 27;
     return out;
   }
   GART_HD GART_INLINE vec3 color() const {
-    float const step = bits_to_float(((rgb >> 27) + least - 8u) << 23);
+    float const step = bits_to_float(((rgb >> 27) + least_exponent - 8u) << 23);
     return {step * static_cast<float>(rgb & 511u), step * static_cast<float>(rgb >> 9 & 511u),
             step * static_cast<float>(rgb >> 18 & 511u)};
   }
 
  private:
-  static constexpr float most = 65408.0f;
-  static constexpr u32 least = 111;
+  static constexpr float largest_shared = 65408.0f;
+  static constexpr u32 least_exponent = 111;
   GART_HD GART_INLINE static u32 in_steps(float x, float steps) {
-    return static_cast<u32>(fma(x < most ? x : most, steps, 0.5f));
+    return static_cast<u32>(fma(x < largest_shared ? x : largest_shared, steps, 0.5f));
   }
 };
 

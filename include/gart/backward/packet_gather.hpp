@@ -51,10 +51,10 @@ struct packet_gather {
     for (int y = area.y0; y < area.y0 + Size; y += packet_block::height)
       for (int x = area.x0; x < area.x0 + Size; x += packet_block::width) load(s.data[p++], area, {x, y});
     u32 const* const list = gather.map.primitives.data();
-    for (u32 k = first; k < last && k < first + prefetch_distance; ++k) expect(area, list[k]);
+    for (u32 k = first; k < last && k < first + prefetch_distance; ++k) prefetch_slots(area, list[k]);
     for (u32 k = first; k < last; ++k) {
       if (k + 2 * prefetch_distance < last) prefetch(&gather.ranges[list[k + 2 * prefetch_distance]]);
-      if (k + prefetch_distance < last) expect(area, list[k + prefetch_distance]);
+      if (k + prefetch_distance < last) prefetch_slots(area, list[k + prefetch_distance]);
       sum(s, area, list[k]);
     }
   }
@@ -85,9 +85,9 @@ struct packet_gather {
 
   static constexpr u32 prefetch_distance = 4;  // Gaussians whose slots are fetched while one is summed up
 
-  // What will be read and added to for a Gaussian: its slots lie anywhere in the buffer. Inlined: to a compiler a call
-  // that does nothing but fetch does nothing.
-  GART_INLINE void expect(pixel_box const& area, u32 id) const {
+  // Prefetches what will be read and added to for a Gaussian: its slots lie anywhere in the buffer. Inlined: to a
+  // compiler a call that does nothing but prefetch does nothing.
+  GART_INLINE void prefetch_slots(pixel_box const& area, u32 id) const {
     footprint_slots const range = gather.ranges[id];
     pixel_box const cell = intersect(range.box, area);
     char const* const slots = reinterpret_cast<char const*>(gather.slots + range.offset + tile_offset(range.box, cell));
@@ -106,7 +106,7 @@ struct packet_gather {
     footprint_slots const range = gather.ranges[id];
     slot_cell const cell(id, range, area);
     ray_gaussian const& g = gather.records[id];
-    lanes sh_sum[2][3][band_groups];  // of even and of odd lanes: additions to one sum wait for each other
+    lanes sh_sum[2][3][band_groups];  // of even and of odd lanes: two chains of additions hide each other's latency
     lanes moment_sum[moment_count];
     for (auto& half : sh_sum)
       for (auto& channel : half)
@@ -114,7 +114,7 @@ struct packet_gather {
 #pragma GCC unroll 16
     for (int k = 0; k < moment_count; ++k) moment_sum[k] = 0.0f;
 
-    // All packets are evaluated before the first is summed up: the steps of one wait for each other.
+    // All packets are evaluated before the first is summed up: one is a chain of steps whose latency the others hide.
     struct {
       ray_peak_of<lanes> r;
       lane_mask hit;
@@ -140,7 +140,7 @@ struct packet_gather {
       lane_mask const hit = found[i].hit;
       ray_peak_of<lanes> const& r = found[i].r;
       packet_entries const e = found[i].slots.template read<C::terms::geometry>(gather.slots, hit);
-      // Geometry first: its steps wait for each other, and those of colour fill the time to the next packet's.
+      // Geometry first: colour's work hides the latency of its chain of steps.
       if constexpr (C::terms::geometry) {
         lanes const alpha = hit_alpha<response_type>(g, r.d2);
         moments_of<lanes> const m =

@@ -88,8 +88,8 @@ class buffer {
   // More than can be addressed is asked for as half of the address space, which no policy has: the product must not
   // wrap to a size that can be had.
   static std::size_t bytes_of(std::size_t n) {
-    std::size_t const most = static_cast<std::size_t>(-1) / 2;
-    return n > most / sizeof(T) ? most : n * sizeof(T);
+    std::size_t const half = static_cast<std::size_t>(-1) / 2;
+    return n > half / sizeof(T) ? half : n * sizeof(T);
   }
   void swap(buffer& other) noexcept {
     std::swap(exec_, other.exec_);

@@ -1,14 +1,16 @@
 #pragma once
 // parallel_for on cuda_exec: one thread an index, one block a tile. Needs nvcc.
-// A kernel may name `static constexpr int block_size` (default 256: the threads of a block of an index kernel, the most
-// lanes of a tile kernel, to which tile_range::lanes is lowered) and, for its registers, `static constexpr int
-// min_blocks` (blocks a multiprocessor, default 1).
+// A kernel may name its launch bounds, both or neither: `static constexpr int block_size` (else 256: the threads of a
+// block of an index kernel, the largest number of lanes of a tile kernel, to which tile_range::lanes is lowered) and
+// `static constexpr int min_blocks` (else 1: blocks that a multiprocessor must have registers for).
 
 #include <gart/exec/cuda.hpp>
 #include <gart/exec/kept_address.hpp>
 #include <gart/exec/stage.hpp>
 
 #include <cuda_runtime.h>
+
+#include <type_traits>
 
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
 #error "gart needs a GPU of compute capability 8.0 or later: set CMAKE_CUDA_ARCHITECTURES to 80 or more"
@@ -18,20 +20,22 @@ namespace gart::inline GART_ISA {
 
 namespace detail {
 
+struct default_bounds {
+  static constexpr int block_size = 256, min_blocks = 1;
+};
+
+// Kernels are aggregates, which a base with defaults would leave without their initialisers. One that names a bound
+// must name both, so that one that is misspelt is found.
 template <class K>
-constexpr int block_size_of() {
-  if constexpr (requires { K::block_size; })
-    return K::block_size;
+constexpr auto launch_bounds() {
+  if constexpr (
+      requires { K::block_size; } || requires { K::min_blocks; })
+    return std::type_identity<K>{};
   else
-    return 256;
+    return std::type_identity<default_bounds>{};
 }
 template <class K>
-constexpr int min_blocks_of() {
-  if constexpr (requires { K::min_blocks; })
-    return K::min_blocks;
-  else
-    return 1;
-}
+using bounds_of = typename decltype(launch_bounds<K>())::type;
 
 template <class Scratch>
 class cuda_team {
@@ -50,13 +54,14 @@ class cuda_team {
 };
 
 template <class K>
-__global__ void __launch_bounds__(block_size_of<K>(), min_blocks_of<K>()) run_index_kernel(index_t n, K const kernel) {
-  u64 const i = u64{blockIdx.x} * block_size_of<K>() + threadIdx.x;
+__global__ void __launch_bounds__(bounds_of<K>::block_size, bounds_of<K>::min_blocks)
+    run_index_kernel(index_t n, K const kernel) {
+  u64 const i = u64{blockIdx.x} * bounds_of<K>::block_size + threadIdx.x;
   if (i < n) kernel(static_cast<index_t>(i));
 }
 
 template <class K>
-__global__ void __launch_bounds__(block_size_of<K>(), min_blocks_of<K>()) run_tile_kernel(K const kernel) {
+__global__ void __launch_bounds__(bounds_of<K>::block_size, bounds_of<K>::min_blocks) run_tile_kernel(K const kernel) {
   static_assert(alignof(typename K::scratch) <= 16);
   extern __shared__ __align__(16) unsigned char memory[];
   cuda_team<typename K::scratch> team(kept_address<typename K::scratch>(memory));
@@ -69,7 +74,7 @@ template <index_kernel K>
 void parallel_for(cuda_exec& exec, char const* label, index_t n, K const& kernel) {
   if (n == 0) return;
   stage_scope scope(exec, label);
-  constexpr int block = detail::block_size_of<K>();
+  constexpr int block = detail::bounds_of<K>::block_size;
   exec.make_current();
   detail::run_index_kernel<K><<<(n - 1) / block + 1, block, 0, static_cast<cudaStream_t>(exec.stream())>>>(n, kernel);
   exec.check_launch(label);
@@ -80,12 +85,12 @@ void parallel_for(cuda_exec& exec, char const* label, tile_range range, K const&
   if (range.tiles == 0) return;
   stage_scope scope(exec, label);
   constexpr std::size_t bytes = sizeof(typename K::scratch);
-  constexpr index_t most = detail::block_size_of<K>();
+  constexpr index_t max_lanes = detail::bounds_of<K>::block_size;
   exec.make_current();
   if constexpr (bytes > 48 * 1024)
     cudaFuncSetAttribute(detail::run_tile_kernel<K>, cudaFuncAttributeMaxDynamicSharedMemorySize,
                          static_cast<int>(bytes));
-  index_t const lanes = range.lanes < most ? range.lanes : most;
+  index_t const lanes = range.lanes < max_lanes ? range.lanes : max_lanes;
   // clang-format off
   detail::run_tile_kernel<K><<<range.tiles, lanes, bytes, static_cast<cudaStream_t>(exec.stream())>>>(kernel);
   // clang-format on

@@ -65,8 +65,8 @@ template <tile_kernel K>
 void parallel_for(openmp_exec& exec, char const* label, tile_range range, K const& kernel) {
   if (range.tiles == 0) return;
   stage_scope scope(exec, label);
-  // Tiles that lie together go to one thread: neighbours write to the same Gaussians, and a line that two cores write
-  // to goes to and fro between them.
+  // Tiles that lie together go to one thread: neighbours write to the same Gaussians, and cache lines shared by cores
+  // (false sharing among them) cost more than an uneven share of the work.
   index_t const chunk = std::max<index_t>(1, range.tiles / static_cast<index_t>(16 * exec.threads()));
 #pragma omp parallel num_threads(exec.threads())
   {

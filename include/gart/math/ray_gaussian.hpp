@@ -180,7 +180,7 @@ GART_HD GART_INLINE auto evaluate(ray_gaussian const& g, Ray const& r) {
   return ray_peak_of_approach(a, Response::reciprocal(a.dd));
 }
 
-// N at once, one beside the other: the steps of each wait for each other. `of(i)` is the i-th approach.
+// N at once, interleaved to hide the latency of each one's chain of steps. `of(i)` is the i-th approach.
 template <class Response, int N, class F>
 GART_HD GART_INLINE void evaluate_all(ray_peak (&out)[N], F&& of) {
   approach a[N];

@@ -25,9 +25,9 @@ struct checkpoint_array {
 class checkpoint_writer {
  public:
   template <class T>
-  void add(std::string const& name, std::vector<T> const& values, u32 version = 1) {
+  void add(std::string const& name, std::vector<T> const& values, u32 layout = 1) {
     auto const* bytes = reinterpret_cast<char const*>(values.data());
-    arrays_[name] = {version, {bytes, bytes + values.size() * sizeof(T)}};
+    arrays_[name] = {layout, {bytes, bytes + values.size() * sizeof(T)}};
   }
   void write(std::filesystem::path const& path) const;
 

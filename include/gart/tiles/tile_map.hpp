@@ -38,7 +38,7 @@ namespace tile_kernels {
 // of magnitude. A host's one lane takes them box by box.
 template <execution E, int Size, tile_order Order>
 struct emit_pairs {
-  static constexpr int block_size = 128;
+  static constexpr int block_size = 128, min_blocks = 1;
   static constexpr u32 share = 128;  // primitives of a team
   struct scratch {
     typename Order::primitive primitive[share];

@@ -27,7 +27,7 @@ struct bound_ellipsoids {
 
 template <class Response, int Capacity, ray_program P>
 struct walk_rays {
-  static constexpr int block_size = 128;
+  static constexpr int block_size = 128, min_blocks = 1;
   bvh_view tree;
   traced_scene scene;
   P program;

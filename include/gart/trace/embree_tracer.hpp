@@ -53,9 +53,9 @@ struct embree_rays {
       tree->intersect(
           origin_of(r), r.direction, visitor.near(), visitor.far(),
           [](void* v, u32 id, float* far) {
-            auto& visitor = *static_cast<visitor_type*>(v);
-            visitor.leaf(id);
-            *far = visitor.far();
+            auto& at_leaf = *static_cast<visitor_type*>(v);
+            at_leaf.leaf(id);
+            *far = at_leaf.far();
           },
           &visitor);
     });
