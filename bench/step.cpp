@@ -26,11 +26,15 @@ void step(benchmark::State& state, E& exec) {
   state.counters["peak_bytes"] = static_cast<double>(exec.memory.peak);
 }
 
-}  // namespace
+template <class By>
+void add_steps(std::string const& tracer) {
+  gart::strategies::for_each([&]<class Strategy>(Strategy) {
+    if constexpr (!Strategy::ordered && Strategy::use == gart::strategy_use::training)
+      gart_bench::add(("step/" + tracer + "/" + Strategy::name).c_str(),
+                      [](benchmark::State& state, auto& exec) { step<By, Strategy>(state, exec); });
+  });
+}
 
-GART_BENCH("step/bvh/pixel", step<gart_bench::by_bvh, gart::pixel_strategy>)
-GART_BENCH("step/bvh/hybrid", step<gart_bench::by_bvh, gart::hybrid_strategy>)
-GART_BENCH("step/bvh/primitive", step<gart_bench::by_bvh, gart::primitive_strategy>)
-GART_BENCH("step/tiles/pixel", step<gart_bench::by_tiles<8>, gart::pixel_strategy>)
-GART_BENCH("step/tiles/hybrid", step<gart_bench::by_tiles<8>, gart::hybrid_strategy>)
-GART_BENCH("step/tiles/primitive", step<gart_bench::by_tiles<8>, gart::primitive_strategy>)
+bool const added = (add_steps<gart_bench::by_bvh>("bvh"), add_steps<gart_bench::by_tiles<8>>("tiles"), true);
+
+}  // namespace

@@ -8,8 +8,9 @@
 
 namespace gart::inline GART_ISA {
 
-// The cell of a program whose hits have no places.
-struct no_cell {};
+// The cell of a program whose hits have no places: a word, so that what lies beside it in shared memory is aligned as it
+// is beside others.
+struct alignas(16) no_cell {};
 
 template <class P>
 concept warp_program = pixel_program<P> &&

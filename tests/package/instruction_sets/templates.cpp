@@ -29,11 +29,10 @@ void train() {
 
 template <class E, class Tracer, int Degree>
 void every_strategy() {
-  train<E, Tracer, gart::pixel_strategy, Degree>();
-#if !defined(__CUDACC__)  // nvcc compiles the gather for devices only
-  train<E, Tracer, gart::hybrid_strategy, Degree>();
-  train<E, Tracer, gart::primitive_strategy, Degree>();
-#endif
+  gart::strategies::for_each([]<class Strategy>(Strategy) {
+    if constexpr (Strategy::use == gart::strategy_use::training && !Strategy::ordered)
+      train<E, Tracer, Strategy, Degree>();
+  });
 }
 
 }  // namespace
