@@ -10,9 +10,20 @@ namespace {
 template <int ShDegree, class Response, class Entry>
 using forward_kernel = walk_tile_warps<Response, 8, composite<ShDegree, record_lt<Entry, 8>>>;
 
+template <int ShDegree, class Response, class Entry, gather_sums Sums>
+struct gather_row {
+  using policy = cuda_exec;
+  using response = Response;
+  using terms = gart::terms<color, geometry>;
+  using entry = Entry;
+  static constexpr int sh_degree = ShDegree, tile_size = 8;
+  static constexpr gather_sums sums = Sums;
+  static constexpr slot_validity validity = slot_validity::recomputed;
+  static constexpr kernel_form form = kernel_form::warp;
+};
+
 template <int ShDegree, class Response, class Entry, gather_sums Sums = gather_sums::atomic>
-using backward_kernel = matrix_gather<
-    gather_kernel<ShDegree, Response, terms<color, geometry>, Entry, 8, Sums, slot_validity::recomputed, cuda_exec>>;
+using backward_kernel = gather_of<gather_row<ShDegree, Response, Entry, Sums>>;
 
 }  // namespace
 

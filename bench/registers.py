@@ -38,7 +38,7 @@ if not names or len(figures) != len(names):
 
 rows = {}
 for name, (stack, stores, loads, registers) in zip(plain, figures):
-    sh = re.search(r"(?:composite|gather_kernel)<(\d)", name).group(1)
+    sh = re.search(r"(?:composite|gather_row)<(\d)", name).group(1)
     response = re.search(r"generalized_gaussian<(\d), \(gart::arithmetic\)(\d)>", name)
     entry = re.search(r"gart::(?:lt_)?(\w*?)_?entry", name).group(1) or "float4"
     ordered = "(gart::gather_sums)1" in name

@@ -7,7 +7,4 @@ namespace {
 using tracer = gart::bvh_tracer<gart::openmp_exec>;
 }  // namespace
 
-GART_REGISTER_CONFIGURATIONS(gart_openmp_configurations,
-                             gart::register_configurations<gart::openmp_exec, tracer, gart::pixel_strategy>(10);
-                             gart::register_configurations<gart::openmp_exec, tracer, gart::hybrid_strategy>(11);
-                             gart::register_configurations<gart::openmp_exec, tracer, gart::primitive_strategy>(12))
+GART_REGISTER_CONFIGURATIONS(gart_openmp_configurations, gart::register_strategies<gart::openmp_exec, tracer>(10))

@@ -7,7 +7,4 @@ namespace {
 using tracer = gart::bvh_tracer<gart::serial_exec>;
 }  // namespace
 
-GART_REGISTER_CONFIGURATIONS(gart_serial_configurations,
-                             gart::register_configurations<gart::serial_exec, tracer, gart::pixel_strategy>(0);
-                             gart::register_configurations<gart::serial_exec, tracer, gart::hybrid_strategy>(1);
-                             gart::register_configurations<gart::serial_exec, tracer, gart::primitive_strategy>(2))
+GART_REGISTER_CONFIGURATIONS(gart_serial_configurations, gart::register_strategies<gart::serial_exec, tracer>(0))

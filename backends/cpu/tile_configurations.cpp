@@ -7,7 +7,4 @@ namespace {
 using tracer = gart::tile_tracer<gart::openmp_exec>;
 }  // namespace
 
-GART_REGISTER_CONFIGURATIONS(gart_openmp_tile_configurations,
-                             gart::register_configurations<gart::openmp_exec, tracer, gart::pixel_strategy>(16);
-                             gart::register_configurations<gart::openmp_exec, tracer, gart::hybrid_strategy>(17);
-                             gart::register_configurations<gart::openmp_exec, tracer, gart::primitive_strategy>(18))
+GART_REGISTER_CONFIGURATIONS(gart_openmp_tile_configurations, gart::register_strategies<gart::openmp_exec, tracer>(16))

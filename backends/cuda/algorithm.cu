@@ -34,7 +34,7 @@ struct add_last {
   u32 const* last_in;
   T const* last_out;
   T* total;
-  GART_HD void operator()(index_t) const { *total = *last_out + *last_in; }
+  GART_KERNEL void operator()(index_t) const { *total = *last_out + *last_in; }
 };
 
 }  // namespace

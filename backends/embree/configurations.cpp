@@ -7,7 +7,4 @@ namespace {
 using tracer = gart::embree_tracer<gart::openmp_exec>;
 }  // namespace
 
-GART_REGISTER_CONFIGURATIONS(gart_embree_configurations,
-                             gart::register_configurations<gart::openmp_exec, tracer, gart::pixel_strategy>(13);
-                             gart::register_configurations<gart::openmp_exec, tracer, gart::hybrid_strategy>(14);
-                             gart::register_configurations<gart::openmp_exec, tracer, gart::primitive_strategy>(15))
+GART_REGISTER_CONFIGURATIONS(gart_embree_configurations, gart::register_strategies<gart::openmp_exec, tracer>(13))

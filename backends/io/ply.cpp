@@ -286,8 +286,7 @@ gaussian_model read_splat_ply(std::filesystem::path const& path, ply_traits* tra
 
 void write_splat_ply(std::filesystem::path const& path, gaussian_model const& model, ply_traits const& traits) {
   std::size_t const n = model.size(), k = static_cast<std::size_t>(sh_coefficients(model.sh_degree));
-  if (model.sh_degree < 0 || model.sh_degree > 3 || model.mean.size() != 3 * n || model.log_scale.size() != 3 * n ||
-      model.quaternion.size() != 4 * n || model.sh.size() != 3 * k * n) {
+  if (model.sh_degree < 0 || model.sh_degree > 3 || !model.arrays_agree()) {
     throw invalid_argument("the arrays of the model to write to " + path.string() + " do not agree in size");
   }
   std::string text = "ply\nformat binary_little_endian 1.0\n";

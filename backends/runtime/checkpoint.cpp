@@ -118,8 +118,7 @@ training_state with_sh_degree(training_state state, int degree) {
 void write_checkpoint(std::filesystem::path const& path, training_state const& state) {
   checkpoint_writer out;
   auto const add = [&](std::string const& prefix, gaussian_model const& m) {
-    out.add(prefix + "mean", m.mean), out.add(prefix + "log_scale", m.log_scale);
-    out.add(prefix + "quaternion", m.quaternion), out.add(prefix + "opacity", m.opacity), out.add(prefix + "sh", m.sh);
+    for_each_array([&](parameter_array const& a, auto const& values) { out.add(prefix + a.name, values); }, m);
   };
   add("", state.scene), add("first/", state.first), add("second/", state.second);
   out.add("step", std::vector<int>{state.step});
@@ -152,13 +151,8 @@ training_state state_of(checkpoint_reader const& in) {
   auto const get = [&](std::string const& prefix) {
     gaussian_model m;
     m.sh_degree = degree[0];
-    m.mean = in.get<float>(prefix + "mean"), m.log_scale = in.get<float>(prefix + "log_scale");
-    m.quaternion = in.get<float>(prefix + "quaternion"), m.opacity = in.get<float>(prefix + "opacity");
-    m.sh = in.get<float>(prefix + "sh");
-    std::size_t const n = m.size();
-    if (m.mean.size() != 3 * n || m.log_scale.size() != 3 * n || m.quaternion.size() != 4 * n ||
-        m.sh.size() != 3 * n * static_cast<std::size_t>(sh_coefficients(m.sh_degree)))
-      in.fail("its arrays " + prefix + "* differ in length");
+    for_each_array([&](parameter_array const& a, auto& values) { values = in.get<float>(prefix + a.name); }, m);
+    if (!m.arrays_agree()) in.fail("its arrays " + prefix + "* differ in length");
     return m;
   };
   s.scene = get(""), s.first = get("first/"), s.second = get("second/");

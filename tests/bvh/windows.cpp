@@ -129,7 +129,7 @@ struct evaluate_all {
   hit* hits;  // t = -1: no hit
   GART_KERNEL void operator()(gart::index_t k) const {
     gart::ray_gaussian const g = scene.gaussians[k];
-    gart::response const r = gart::evaluate(g, ray);
+    gart::ray_peak const r = gart::evaluate(g, ray);
     hits[k] = {gart::is_hit(g, r, scene.near) ? r.t : -1.0f, k, gart::hit_alpha(g, r.d2)};
   }
 };

@@ -76,7 +76,7 @@ TEST_CASE("t, response and alpha against double") {
     exact_response const e = exactly(p, origin, direction);
     gart::ray_gaussian const g = gart::prepare(stored(p), gart::vec3d(0.0), 1.0f / 255);
     gart::ray const r{to_vec3(origin), to_vec3(direction)};
-    gart::response const got = gart::evaluate(g, r);
+    gart::ray_peak const got = gart::evaluate(g, r);
     // t is a quotient of sums in which the thinnest axis weighs most: rounding grows with the aspect ratio.
     double const aspect = std::exp(std::max({p[3], p[4], p[5]}) - std::min({p[3], p[4], p[5]}));
     worst_t = std::max(worst_t, std::fabs(got.t - e.t) / aspect);
@@ -84,7 +84,7 @@ TEST_CASE("t, response and alpha against double") {
     if (e.d2 < 12) worst_alpha = std::max(worst_alpha, std::fabs(gart::hit_alpha(g, got.d2) - std::min(0.99, e.alpha)));
     // The same ray from the frame's own origin.
     gart::ray_gaussian const local = gart::prepare(stored(p), gart::vec3d(r.origin), 1.0f / 255);
-    gart::response const primary = gart::evaluate(local, gart::primary_ray{r.direction});
+    gart::ray_peak const primary = gart::evaluate(local, gart::primary_ray{r.direction});
     worst_primary = std::max(worst_primary, std::fabs(primary.d2 - e.d2) / (1 + e.d2));
   }
   CAPTURE(worst_t);
@@ -102,7 +102,7 @@ TEST_CASE("what is a hit") {
   auto const cutoff_of = [](gart::gaussian_parameters const& p) { return gart::hit_cutoff(p, 1.0f / 255); };
   CHECK(cutoff_of(g) == doctest::Approx(2 * std::log(0.5 * 255)));
   gart::ray_gaussian const record = gart::prepare(g, gart::vec3d(0.0), 1.0f / 255);
-  gart::response const ahead = gart::evaluate(record, gart::primary_ray{{0, 0, 1}});
+  gart::ray_peak const ahead = gart::evaluate(record, gart::primary_ray{{0, 0, 1}});
   CHECK(gart::is_hit(record, ahead, 1.9f));
   CHECK_FALSE(gart::is_hit(record, ahead, 2.0f));
   CHECK_FALSE(gart::is_hit(record, gart::evaluate(record, gart::primary_ray{{0, 0, -1}}), 0.01f));
@@ -171,10 +171,10 @@ TEST_CASE_TEMPLATE("moments become the gradients of a weighted sum of alphas", R
       };
       gart::gaussian_parameters const s = stored(p);
       gart::ray_gaussian const g = gart::prepare<Response>(s, gart::vec3d(0.0), 1e-6f);
-      gart::moments total{};
+      gart::moments_of<float> total{};
       for (int k = 0; k < rays; ++k) {
-        gart::response const r = gart::evaluate<Response>(g, gart::primary_ray{to_vec3(directions[k])});
-        gart::moments const one = gart::hit_moments<Response>(g, r, static_cast<float>(weights[k]));
+        gart::ray_peak const r = gart::evaluate<Response>(g, gart::primary_ray{to_vec3(directions[k])});
+        gart::moments_of<float> const one = gart::hit_moments<Response>(g, r, static_cast<float>(weights[k]));
         for (int i = 0; i < gart::moment_count; ++i) total.v[i] += one.v[i];
       }
       gart::geometry_gradient const got = gart::from_moments(total.v, s, g);
@@ -200,7 +200,7 @@ TEST_CASE("the cusp of degree 1: a gradient of one size from every side, and non
   gart::ray_gaussian const record = gart::prepare<cusp>(g, gart::vec3d(0.0), 1.0f / 255);
   auto const gradient_from = [&](float x, float y) {
     gart::ray const r{{x, y, 0}, {0, 0, 1}};
-    gart::moments const m = gart::hit_moments<cusp>(record, gart::evaluate<cusp>(record, r), 1.0f);
+    gart::moments_of<float> const m = gart::hit_moments<cusp>(record, gart::evaluate<cusp>(record, r), 1.0f);
     return gart::from_moments(m.v, g, record);
   };
   gart::geometry_gradient const centre = gradient_from(0, 0);
@@ -220,7 +220,8 @@ TEST_CASE("the cusp of degree 1: a gradient of one size from every side, and non
 TEST_CASE("no gradient passes a clamp") {
   gart::gaussian_parameters const g{{0, 0, 2}, {0, 0, 0}, {1, 0, 0, 0}, 8};
   gart::ray_gaussian const record = gart::prepare(g, gart::vec3d(0.0), 1.0f / 255);
-  gart::moments const m = gart::hit_moments(record, gart::evaluate(record, gart::primary_ray{{0, 0, 1}}), 1.0f);
+  gart::moments_of<float> const m =
+      gart::hit_moments(record, gart::evaluate(record, gart::primary_ray{{0, 0, 1}}), 1.0f);
   for (float v : m.v) CHECK(v == 0.0f);
   gart::vec3 const c = gart::color_gradient_of({-0.1f, 0.0f, 0.2f}, {1, 1, 1}, 0.5f);
   CHECK(c == gart::vec3(0.0f, 0.0f, 0.5f));

@@ -32,13 +32,13 @@ void compare(std::mt19937_64& random) {
     gart::sh_basis<3, gart::lanes> const basis(d);
     for (int l = 0; l < gart::lane_count; ++l) {
       gart::vec3 const one(d.x.v[l], d.y.v[l], d.z.v[l]);
-      gart::response const expected = gart::evaluate<Response>(g, gart::primary_ray{one});
+      gart::ray_peak const expected = gart::evaluate<Response>(g, gart::primary_ray{one});
       CHECK(same(r.t.v[l], expected.t));
       CHECK(same(r.d2.v[l], expected.d2));
       CHECK(hit[l] == gart::is_hit(g, expected, 0.01f));
       CHECK(((gart::bits_of(hit) >> l & 1) != 0) == hit[l]);
       CHECK(same(alpha.v[l], gart::hit_alpha<Response>(g, expected.d2)));
-      gart::moments const expected_moments = gart::hit_moments<Response>(g, expected, float(gradient.v[l]));
+      gart::moments_of<float> const expected_moments = gart::hit_moments<Response>(g, expected, float(gradient.v[l]));
       for (int i = 0; i < gart::moment_count; ++i) CHECK(same(m.v[i].v[l], expected_moments.v[i]));
       gart::sh_basis<3> const expected_basis(one);
       for (int k = 0; k < 16; ++k) CHECK(same(basis.y[k].v[l], expected_basis.y[k]));

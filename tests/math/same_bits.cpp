@@ -24,7 +24,7 @@ struct outcome {
 
 GART_HD outcome outcome_of(sample const& s, gart::pixel_filter const& filter) {
   gart::ray_gaussian const g = gart::prepare(s.gaussian, gart::vec3d(0.0), 1.0f / 255);
-  gart::response const r = gart::evaluate(g, gart::primary_ray{s.direction});
+  gart::ray_peak const r = gart::evaluate(g, gart::primary_ray{s.direction});
   float const x = s.gaussian.log_scale.x;
   float const e = gart::exponential(x);
   return {e,

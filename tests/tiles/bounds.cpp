@@ -45,7 +45,7 @@ struct tally {
     long out = 0, nearer = 0;
     for (int y = 0, i = 0; y < c.height; ++y)
       for (int x = 0; x < c.width; ++x, ++i) {
-        gart::response const e = gart::evaluate(record, r.primary[i]);
+        gart::ray_peak const e = gart::evaluate(record, r.primary[i]);
         if (!gart::is_hit(record, e, near)) continue;
         x0 = std::min(x0, x), x1 = std::max(x1, x + 1), y0 = std::min(y0, y), y1 = std::max(y1, y + 1);
         out += x < f.box.x0 || x >= f.box.x1 || y < f.box.y0 || y >= f.box.y1;

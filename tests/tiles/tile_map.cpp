@@ -139,7 +139,7 @@ struct pass {
         for (int y = cell.y0; y < cell.y1; ++y)
           for (int x = cell.x0; x < cell.x1; ++x) {
             gart::vec3 const d = gart::pixel_ray(view, {x, y}).direction;
-            gart::response const r = gart::evaluate(gaussians[i], gart::primary_ray{d});
+            gart::ray_peak const r = gart::evaluate(gaussians[i], gart::primary_ray{d});
             if (!gart::is_hit(gaussians[i], r, near)) continue;
             ++hits;
             float const cosine = glm::dot(d, view.rotation[2]) * 1.000002f;  // as the tracer bounds z

@@ -2,16 +2,16 @@
 // How the algorithms split an array over the threads of a host policy: into contiguous blocks, one a thread, walked in
 // any order. What depends on the number of blocks must not reach a result.
 
-#include <gart/exec/openmp.hpp>
-#include <gart/exec/serial.hpp>
+#include <gart/core/isa.hpp>
+#include <gart/exec/concepts.hpp>
 
 #include <algorithm>
 #include <cstddef>
 
 namespace gart::inline GART_ISA::detail {
 
-inline std::size_t host_blocks(serial_exec&, std::size_t) { return 1; }
-inline std::size_t host_blocks(openmp_exec& exec, std::size_t n) {
+template <host_execution E>
+std::size_t host_blocks(E& exec, std::size_t n) {
   // Below this a block costs less than waking a thread for it.
   constexpr std::size_t smallest = 16384;
   return std::clamp<std::size_t>(n / smallest, 1, static_cast<std::size_t>(exec.threads()));
@@ -21,12 +21,8 @@ inline std::size_t block_begin(std::size_t n, std::size_t blocks, std::size_t b)
   return n / blocks * b + std::min(n % blocks, b);
 }
 
-template <class F>
-void for_blocks(serial_exec&, std::size_t blocks, F const& f) {
-  for (std::size_t b = 0; b < blocks; ++b) f(b);
-}
-template <class F>
-void for_blocks(openmp_exec& exec, std::size_t blocks, F const& f) {
+template <host_execution E, class F>
+void for_blocks(E& exec, std::size_t blocks, F const& f) {
   if (blocks == 1) return f(std::size_t{0});
 #pragma omp parallel for schedule(static) num_threads(exec.threads())
   for (std::size_t b = 0; b < blocks; ++b) f(b);

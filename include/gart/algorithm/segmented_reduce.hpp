@@ -29,7 +29,7 @@ struct sum_segments {
   span<O const> offsets;
   span<float> sums;
 
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     index_t const segment = i / columns, column = i % columns;
     u64 const begin = offsets[segment], end = offsets[segment + 1];
     // Four sums, taken in turn, so that four loads are under way at once.

@@ -15,8 +15,7 @@
 // lists of 8 a (primitive, tile) pair.
 
 #include <gart/backward/finish.hpp>
-#include <gart/backward/matrix_gather.hpp>
-#include <gart/backward/packet_gather.hpp>
+#include <gart/backward/gather_form.hpp>
 #include <gart/backward/scatter.hpp>
 #include <gart/backward/strategies.hpp>
 #include <gart/render/frame.hpp>
@@ -176,27 +175,12 @@ class backward_pass {
 
   void gather(Frame const& frame, span<float const> color_gradient, span<float const> error,
               gaussians_view<float> gradients) {
-    constexpr gather_sums sums = ordered ? gather_sums::ordered : gather_sums::atomic;
-    using by_lane = gather_kernel<sh_degree, typename Frame::response, typename Strategy::gather, entry, tile_size,
-                                  sums, validity, execution_type>;
-    auto const launch = [&]<class Kernel>(index_t lanes, std::type_identity<Kernel>) {
-      parallel_for(
-          frame.exec(), "backward/gather", tile_range{grid_.count(), lanes},
-          Kernel{frame.view(), grid_, lists_, prints_->ranges().data(), slots_.data(), frame.gaussians().data(),
-                 frame.active_degree(), color_, color_gradient.data(), error.data(), gradients.sh, moments_.data(),
-                 prints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near});
-    };
-    // A host has packets where its compiler has them; nvcc's takes one lane a team.
-#if defined(__CUDACC__)
-    if constexpr (!execution_type::device)
-      launch(1, std::type_identity<by_lane>{});
-    else if constexpr (matrix_gather<by_lane>::fits && !Strategy::lane_by_lane)
-      launch(matrix_gather<by_lane>::block_size, std::type_identity<matrix_gather<by_lane>>{});
-    else
-      launch(64, std::type_identity<by_lane>{});
-#else
-    launch(1, std::type_identity<packet_gather<by_lane>>{});
-#endif
+    using kernel = gather_of<strategy_gather<execution_type, sh_degree, typename Frame::response, Strategy, tile_size>>;
+    parallel_for(
+        frame.exec(), "backward/gather", tile_range{grid_.count(), kernel::block_size},
+        kernel{frame.view(), grid_, lists_, prints_->ranges().data(), slots_.data(), frame.gaussians().data(),
+               frame.active_degree(), color_, color_gradient.data(), error.data(), gradients.sh, moments_.data(),
+               prints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near});
   }
 
   Frame const* frame_ = nullptr;

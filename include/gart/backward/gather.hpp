@@ -8,8 +8,8 @@
 // Whether a slot is a hit is told by the slot itself (backward/lt_slot.hpp); its t, offset and alpha are evaluated
 // again by the function the forward pass used, so they are the same bits.
 
+#include <gart/backward/gather_configuration.hpp>
 #include <gart/backward/record_lt.hpp>
-#include <gart/backward/strategies.hpp>
 #include <gart/backward/terms.hpp>
 #include <gart/math/hit_gradient.hpp>
 #include <gart/math/sh.hpp>
@@ -19,10 +19,6 @@
 
 namespace gart::inline GART_ISA {
 
-// Where a lane's sums go: added to the Gaussian atomically, or kept as one row a (primitive, tile) pair, in
-// primitive-major order, for sum_pairs to add up in that order: the same bits in every run.
-enum class gather_sums { atomic, ordered };
-
 // A row of the ordered sums: SH gradient, padded to quads, then moments.
 template <int ShDegree>
 struct pair_gradient {
@@ -30,20 +26,21 @@ struct pair_gradient {
   static constexpr int quads = sh_quads + moment_stride / 4;
 };
 
-template <int ShDegree, class Response, class Terms, class Entry, int Size, gather_sums Sums, slot_validity Validity,
-          execution E>
+template <gather_configuration C>
 struct gather_kernel {
-  static constexpr bool recomputed = Validity == slot_validity::recomputed;
-  static constexpr int block_size = 64, min_blocks = Terms::geometry ? 8 : 10;
-  static constexpr int bands = sh_basis<ShDegree>::size;
+  using response_type = typename C::response;
+  using entry_type = typename C::entry;
+  static constexpr bool recomputed = C::validity == slot_validity::recomputed;
+  static constexpr int block_size = 64, min_blocks = C::terms::geometry ? 8 : 10;
+  static constexpr int bands = sh_basis<C::sh_degree>::size;
   static constexpr int sh_stride = 3 * bands;
-  using grid_type = tile_grid<Size>;
+  using grid_type = tile_grid<C::tile_size>;
 
   // What a lane needs of a pixel: direction and (colour . gradient), gradient, SH basis. Records are an odd number of
   // 16-byte words apart where they can be, so that lanes on neighbouring pixels read different banks.
   struct pixel_data {
     // Of degree 0 it is a constant.
-    static constexpr int basis_quads = !Terms::color || ShDegree == 0 ? 0 : (bands + 3) / 4;
+    static constexpr int basis_quads = !C::terms::color || C::sh_degree == 0 ? 0 : (bands + 3) / 4;
     quad direction_total, gradient;
     quad basis[basis_quads];
     quad last;  // t and place of the ray's last hit, where validity is recomputed; and what makes the words odd in
@@ -58,9 +55,9 @@ struct gather_kernel {
   grid_type grid;
   tile_map_view map;
   footprint_slots const* ranges = nullptr;
-  Entry const* slots = nullptr;
+  entry_type const* slots = nullptr;
   ray_gaussian const* records = nullptr;
-  int active_degree = ShDegree;
+  int active_degree = C::sh_degree;
   float const* color = nullptr;           // [H][W][3]
   float const* color_gradient = nullptr;  // [H][W][3]
   float const* error = nullptr;           // [H][W], or null: none is attributed
@@ -71,8 +68,7 @@ struct gather_kernel {
   last_hit const* last = nullptr;         // recomputed: [H][W]
   float near = 0;
 
-  template <class Team>
-  GART_HD void operator()(Team const& team) const {
+  GART_KERNEL void operator()(auto const& team) const {
     u32 const tile = team.tile();
     u32 const first = map.offsets[tile], count = map.offsets[tile + 1] - first;
     if (count == 0) return;
@@ -88,20 +84,21 @@ struct gather_kernel {
   }
 
   // What a primitive's walk of a tile has summed goes to the Gaussian, or to its row.
-  GART_HD GART_INLINE void finish(pixel_box const& box, pixel_box const& area, u32 id, float const (&sh_sum)[sh_stride],
-                                  float const (&moment_sum)[moment_stride]) const {
-    if constexpr (Terms::color) add_color_sums(box, area, id, 0, sh_sum);
-    if constexpr (Terms::geometry) add_moment_sums(box, area, id, moment_sum);
+  GART_KERNEL GART_INLINE void finish(pixel_box const& box, pixel_box const& area, u32 id,
+                                      float const (&sh_sum)[sh_stride],
+                                      float const (&moment_sum)[moment_stride]) const {
+    if constexpr (C::terms::color) add_color_sums(box, area, id, 0, sh_sum);
+    if constexpr (C::terms::geometry) add_moment_sums(box, area, id, moment_sum);
   }
 
  protected:
-  // Floats [first, first + N) of the colour's.
-  template <int N>
-  GART_HD GART_INLINE void add_color_sums(pixel_box const& box, pixel_box const& area, u32 id, int first,
-                                          float const (&sums)[N]) const {
+  // `sums`, an array of N, are floats [first, first + N) of the colour's.
+  GART_KERNEL GART_INLINE void add_color_sums(pixel_box const& box, pixel_box const& area, u32 id, int first,
+                                              auto const& sums) const {
+    constexpr int N = std::extent_v<std::remove_cvref_t<decltype(sums)>>;
     int const active = 3 * sh_coefficients(active_degree) - first;
-    if constexpr (Sums == gather_sums::atomic) {
-      E::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id + first, sums, active);
+    if constexpr (C::sums == gather_sums::atomic) {
+      C::policy::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id + first, sums, active);
     } else if constexpr (N % 4 == 0 || N == sh_stride) {
       quad* const out = row_of(box, area, id) + first / 4;
       GART_UNROLL
@@ -117,12 +114,12 @@ struct gather_kernel {
       for (int i = 0; i < N; ++i) out[i] = i < active ? sums[i] : 0.0f;
     }
   }
-  GART_HD GART_INLINE void add_moment_sums(pixel_box const& box, pixel_box const& area, u32 id,
-                                           float const (&sums)[moment_stride]) const {
-    if constexpr (Sums == gather_sums::atomic) {
-      E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, sums, moment_count);
+  GART_KERNEL GART_INLINE void add_moment_sums(pixel_box const& box, pixel_box const& area, u32 id,
+                                               float const (&sums)[moment_stride]) const {
+    if constexpr (C::sums == gather_sums::atomic) {
+      C::policy::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, sums, moment_count);
     } else {
-      quad* const out = row_of(box, area, id) + pair_gradient<ShDegree>::sh_quads;
+      quad* const out = row_of(box, area, id) + pair_gradient<C::sh_degree>::sh_quads;
       GART_UNROLL
       for (int q = 0; q < moment_stride / 4; ++q)
         out[q] = {{sums[4 * q], sums[4 * q + 1], sums[4 * q + 2], sums[4 * q + 3]}};
@@ -141,35 +138,36 @@ struct gather_kernel {
       out.last = {{end.t, bits_to_float(end.place), 0, 0}};
     }
     if constexpr (pixel_data::basis_quads > 0) {
-      sh_basis<ShDegree> const basis(d);
+      sh_basis<C::sh_degree> const basis(d);
       GART_UNROLL
       for (int k = 0; k < 4 * pixel_data::basis_quads; ++k) out.basis[k / 4].v[k % 4] = k < bands ? basis.y[k] : 0.0f;
     }
   }
 
-  GART_HD void gather(scratch const& s, pixel_box const& area, u32 id) const {
+  GART_KERNEL void gather(scratch const& s, pixel_box const& area, u32 id) const {
     footprint_slots const range = ranges[id];
     float sh_sum[sh_stride] = {};
     float moment_sum[moment_stride] = {};
     lane_data const data(*this, id);
     pixel_box const cell = intersect(range.box, area);
     u32 const first = static_cast<u32>(range.offset) + tile_offset(range.box, cell);
-    Entry const* slot = slots + first;
-    u32 const width = cell.width(), last = cell.area() - 1;
+    entry_type const* slot = slots + first;
+    u32 const width = cell.width(), last_slot = cell.area() - 1;
     u32 const skip = area.width() - width;
     u32 p = (cell.y0 - area.y0) * area.width() + (cell.x0 - area.x0);
     u32 column = 0;
-    Entry next = slot[0], after = slot[last > 0 ? 1 : 0];  // read two ahead: the work between hides the way from memory
-    for (u32 k = 0; k <= last; ++k) {
-      Entry const entry = next;
+    // Read two ahead: the work between hides the latency of memory.
+    entry_type next = slot[0], after = slot[last_slot > 0 ? 1 : 0];
+    for (u32 k = 0; k <= last_slot; ++k) {
+      entry_type const entry = next;
       next = after;
-      after = slot[k + 2 < last ? k + 2 : last];
+      after = slot[k + 2 < last_slot ? k + 2 : last_slot];
       pixel_data const& at = s.pixels[p];
-      response r[1];
-      responses_at(r, data, [&](int) -> pixel_data const& { return at; });
+      ray_peak r[1];
+      peaks_at(r, data, [&](int) -> pixel_data const& { return at; });
       if (holds(at, entry, first + k, r[0], data)) {
-        if constexpr (Terms::color) add_color(at, entry, sh_sum);
-        if constexpr (Terms::geometry) add_moments(at, entry, r[0], data, true, moment_sum);
+        if constexpr (C::terms::color) add_color(at, entry, sh_sum);
+        if constexpr (C::terms::geometry) add_moments(at, entry, r[0], data, true, moment_sum);
       }
       ++p;
       if (++column == width) column = 0, p += skip;
@@ -185,19 +183,19 @@ struct gather_kernel {
     ray_gaussian gaussian;
     GART_HD record_data(gather_kernel const& k, u32 id) : gaussian(k.records[id]) {}
   };
-  using lane_data = std::conditional_t<Terms::geometry || recomputed, record_data, no_data>;
+  using lane_data = std::conditional_t<C::terms::geometry || recomputed, record_data, no_data>;
 
   // What the Gaussian has of the rays of N pixels at once.
   template <int N, class F>
-  GART_HD GART_INLINE void responses_at(response (&out)[N], lane_data const& data, F&& pixel_of) const {
+  GART_HD GART_INLINE void peaks_at(ray_peak (&out)[N], lane_data const& data, F&& pixel_of) const {
     if constexpr (std::is_same_v<lane_data, record_data>)
-      evaluate_all<Response>(out, [&](int i) {
+      evaluate_all<response_type>(out, [&](int i) {
         quad const d = pixel_of(i).direction_total;
         return approach_to(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
       });
   }
   // Whether the slot of that number is a hit.
-  GART_HD GART_INLINE bool holds(pixel_data const& at, Entry const& entry, u32 number, response const& r,
+  GART_HD GART_INLINE bool holds(pixel_data const& at, entry_type const& entry, u32 number, ray_peak const& r,
                                  lane_data const& data) const {
     if constexpr (recomputed)
       return is_hit(data.gaussian, r, near) & !before(at.last.v[0], float_to_bits(at.last.v[1]), r.t, number);
@@ -206,10 +204,10 @@ struct gather_kernel {
   }
 
   // One hit: its pixel, its slot.
-  GART_HD GART_INLINE void add_color(pixel_data const& at, Entry const& entry, float (&sh_sum)[sh_stride]) const {
+  GART_HD GART_INLINE void add_color(pixel_data const& at, entry_type const& entry, float (&sh_sum)[sh_stride]) const {
     quad const g = at.gradient;
-    sh_basis<ShDegree> basis;
-    if constexpr (ShDegree == 0) basis = sh_basis<ShDegree>(vec3(0.0f));
+    sh_basis<C::sh_degree> basis;
+    if constexpr (C::sh_degree == 0) basis = sh_basis<C::sh_degree>(vec3(0.0f));
     GART_UNROLL
     for (int q = 0; q < pixel_data::basis_quads; ++q) {
       quad const four = at.basis[q];
@@ -227,23 +225,24 @@ struct gather_kernel {
       sh_sum[3 * b + 2] += basis.y[b] * cg.z;
     }
   }
-  GART_HD GART_INLINE void add_moments(pixel_data const& at, Entry const& entry, response const& r,
+  GART_HD GART_INLINE void add_moments(pixel_data const& at, entry_type const& entry, ray_peak const& r,
                                        lane_data const& data, bool hit, float (&moment_sum)[moment_stride]) const {
     quad const g = at.gradient;
     vec3 const opaque = entry.color();
     float const opaque_g = opaque.x * g.v[0] + opaque.y * g.v[1] + opaque.z * g.v[2];
-    float const alpha = hit_alpha<Response>(data.gaussian, r.d2);
-    moments const m =
-        hit_moments<Response>(data.gaussian, r, alpha_gradient(opaque_g, at.direction_total.v[3], alpha), hit);
+    float const alpha = hit_alpha<response_type>(data.gaussian, r.d2);
+    moments_of<float> const m =
+        hit_moments<response_type>(data.gaussian, r, alpha_gradient(opaque_g, at.direction_total.v[3], alpha), hit);
     GART_UNROLL
     for (int i = 0; i < error_place; ++i) moment_sum[i] += m.v[i];
     moment_sum[error_place] += hit ? entry.weight() * g.v[3] : 0.0f;
   }
 
   GART_HD GART_INLINE quad* row_of(pixel_box const& box, pixel_box const& area, u32 id) const {
-    pixel_box const tiles = tiles_of<Size>(box);
-    u64 const pair = pair_offsets[id] + (area.y0 / Size - tiles.y0) * tiles.width() + (area.x0 / Size - tiles.x0);
-    return rows + pair * pair_gradient<ShDegree>::quads;
+    pixel_box const tiles = tiles_of<C::tile_size>(box);
+    u64 const pair =
+        pair_offsets[id] + (area.y0 / C::tile_size - tiles.y0) * tiles.width() + (area.x0 / C::tile_size - tiles.x0);
+    return rows + pair * pair_gradient<C::sh_degree>::quads;
   }
 };
 

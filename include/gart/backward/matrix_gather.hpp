@@ -15,24 +15,32 @@
 
 namespace gart::inline GART_ISA {
 
-#if defined(__CUDACC__)
+namespace detail {
 
-template <class Gather>
-struct matrix_gather;
+template <gather_configuration C>
+struct without_color : C {
+  using terms = std::conditional_t<C::terms::geometry, gart::terms<geometry>, gart::terms<>>;
+};
+
+}  // namespace detail
+
+#if !defined(__CUDACC__)
+
+template <gather_configuration C>
+struct matrix_gather;  // a device's compiler has it
+
+#else
 
 // All but the colour's sums is of a gather without colour.
-template <int ShDegree, class Response, class Terms, class Entry, int Size, gather_sums Sums, slot_validity Validity,
-          execution E>
-struct matrix_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums, Validity, E>>
-    : gather_kernel<ShDegree, Response, std::conditional_t<Terms::geometry, terms<geometry>, terms<>>, Entry, Size,
-                    Sums, Validity, E> {
-  using base = gather_kernel<ShDegree, Response, std::conditional_t<Terms::geometry, terms<geometry>, terms<>>, Entry,
-                             Size, Sums, Validity, E>;
+template <gather_configuration C>
+struct matrix_gather : gather_kernel<detail::without_color<C>> {
+  using base = gather_kernel<detail::without_color<C>>;
+  using entry_type = typename C::entry;
   static constexpr int lanes = 32, warps = 4, block_size = warps * lanes, min_blocks = 5;
   static constexpr int bands = base::bands, sh_stride = base::sh_stride;
-  static constexpr u32 share = 2 * block_size;             // primitives that are put in order together
-  static constexpr bool fits = Terms::color && Size == 8;  // else gather_kernel
-  static_assert(bands <= 16);
+  static constexpr int Size = C::tile_size;
+  static constexpr u32 share = 2 * block_size;  // primitives that are put in order together
+  static_assert(C::terms::color && Size == 8 && bands <= 16);
 
   struct scratch {
     typename base::pixel_data pixels[Size * Size];
@@ -43,8 +51,7 @@ struct matrix_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     u32 count[Size * Size];
   };
 
-  template <class Team>
-  __device__ void operator()(Team const& team) const {
+  __device__ void operator()(auto const& team) const {
     u32 const tile = team.tile();
     u32 const first = this->map.offsets[tile], count = this->map.offsets[tile + 1] - first;
     if (count == 0) return;
@@ -60,14 +67,14 @@ struct matrix_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
 
  private:
   static constexpr u32 everyone = 0xffffffffu;
-  static constexpr bool ordered = Sums == gather_sums::ordered;
+  static constexpr bool ordered = C::sums == gather_sums::ordered;
 
   __device__ void load(scratch& s, pixel_box const& area, u32 p) const {
     pixel const at{static_cast<int>(area.x0 + p % Size), static_cast<int>(area.y0 + p / Size)};
     s.pixels[p] = {};
     if (at.x < area.x1 && at.y < area.y1) this->load_pixel(s.pixels[p], at);
     quad const d = s.pixels[p].direction_total;
-    sh_basis<ShDegree> const basis(vec3(d.v[0], d.v[1], d.v[2]));
+    sh_basis<C::sh_degree> const basis(vec3(d.v[0], d.v[1], d.v[2]));
     GART_UNROLL
     for (u32 b = 0; b < 16; ++b) {
       matrix_part<4>::number const y(b < bands ? basis.y[b < bands ? b : 0] : 0.0f);
@@ -78,8 +85,7 @@ struct matrix_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
 
   // Ids and cells of the primitives listed, by the first and the last of the tile's rows that they have: a counting
   // sort.
-  template <class Team>
-  __device__ GART_INLINE void put_in_order(Team const& team, scratch& s, pixel_box const& area, u32 const* list,
+  __device__ GART_INLINE void put_in_order(auto const& team, scratch& s, pixel_box const& area, u32 const* list,
                                            u32 listed) const {
     team.barrier();
     team.for_each(Size * Size, [&](index_t c) { s.count[c] = 0; });
@@ -132,7 +138,7 @@ struct matrix_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     auto const slot_of = [&](u32 row, int i) { return cell.first + (row - from) * cell.width + x + 4 * i - cell.x; };
     struct {
       bool in[2];
-      Entry entry[2];
+      entry_type entry[2];
     } now, next;
     auto const read = [&](u32 row) {
       bool const in_rows = row - from < rows;
@@ -149,19 +155,19 @@ struct matrix_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
       now = next;
       read(row < last ? row + 1 : last);
       matrix_part<2> weights[3];
-      response r[2];
+      ray_peak r[2];
       auto const pixel_of = [&](int i) -> auto const& { return s.pixels[8 * row + column + 4 * i]; };
-      this->responses_at(r, data, pixel_of);
+      this->peaks_at(r, data, pixel_of);
       GART_UNROLL
       for (int i = 0; i < 2; ++i) {
         typename base::pixel_data const& at = pixel_of(i);
-        Entry const& entry = now.entry[i];
+        entry_type const& entry = now.entry[i];
         quad const g = at.gradient;
         bool const hit = now.in[i] & this->holds(at, entry, slot_of(row, i), r[i], data);
         met |= hit;
         GART_UNROLL
         for (int c = 0; c < 3; ++c) weights[c].set(i, hit & !entry.clamped(c) ? entry.weight() * g.v[c] : 0.0f);
-        if constexpr (Terms::geometry) this->add_moments(at, entry, r[i], data, hit, moment_sum);
+        if constexpr (C::terms::geometry) this->add_moments(at, entry, r[i], data, hit, moment_sum);
       }
       matrix_part<4> const y{s.high[row][lane], s.low[row][lane]};
       GART_UNROLL
@@ -170,7 +176,7 @@ struct matrix_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
 
     bool const wanted = exists && (met || ordered);
     u32 const all_wanted = __ballot_sync(everyone, wanted);
-    if constexpr (Terms::geometry) {
+    if constexpr (C::terms::geometry) {
       GART_UNROLL
       for (int j = 0; j < moment_count; ++j)
         for (int other = 1; other < 4; other *= 2) moment_sum[j] += __shfl_xor_sync(everyone, moment_sum[j], other);

@@ -5,20 +5,25 @@
 #include <gart/backward/gather.hpp>
 #include <gart/backward/packet_slots.hpp>
 
-#if !defined(__CUDACC__)
-
 namespace gart::inline GART_ISA {
 
-template <class Gather>
-struct packet_gather;
+#if defined(__CUDACC__)
 
-template <int ShDegree, class Response, class Terms, class Entry, int Size, gather_sums Sums, slot_validity Validity,
-          execution E>
-struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums, Validity, E>> {
-  using gather_type = gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums, Validity, E>;
+// nvcc's host compiler has no lanes: a host policy there takes the plain form.
+template <gather_configuration C>
+struct packet_gather : gather_kernel<C> {};
+
+#else
+
+template <gather_configuration C>
+struct packet_gather {
+  using gather_type = gather_kernel<C>;
+  using response_type = typename C::response;
+  using entry_type = typename C::entry;
+  static constexpr int block_size = 1;  // a host's team has one lane
   static constexpr bool recomputed = gather_type::recomputed;
   static constexpr int bands = gather_type::bands, sh_stride = gather_type::sh_stride;
-  static constexpr int packets = Size * Size / lane_count;
+  static constexpr int Size = C::tile_size, packets = Size * Size / lane_count;
   static constexpr int band_groups = (bands + lane_count - 1) / lane_count;
 
   struct packet_data {
@@ -36,8 +41,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
 
   gather_type gather;
 
-  template <class Team>
-  void operator()(Team const& team) const {
+  void operator()(auto const& team) const {
     u32 const tile = team.tile();
     u32 const first = gather.map.offsets[tile], last = gather.map.offsets[tile + 1];
     if (first == last) return;
@@ -47,10 +51,10 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     for (int y = area.y0; y < area.y0 + Size; y += packet_block::height)
       for (int x = area.x0; x < area.x0 + Size; x += packet_block::width) load(s.data[p++], area, {x, y});
     u32 const* const list = gather.map.primitives.data();
-    for (u32 k = first; k < last && k < first + ahead; ++k) expect(area, list[k]);
+    for (u32 k = first; k < last && k < first + prefetch_distance; ++k) expect(area, list[k]);
     for (u32 k = first; k < last; ++k) {
-      if (k + 2 * ahead < last) prefetch(&gather.ranges[list[k + 2 * ahead]]);
-      if (k + ahead < last) expect(area, list[k + ahead]);
+      if (k + 2 * prefetch_distance < last) prefetch(&gather.ranges[list[k + 2 * prefetch_distance]]);
+      if (k + prefetch_distance < last) expect(area, list[k + prefetch_distance]);
       sum(s, area, list[k]);
     }
   }
@@ -73,13 +77,13 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
       last_hit const end = recomputed && inside ? gather.last[a] : last_hit{};
       out.last_t.v[l] = end.t, out.last_place[l] = end.place;
     }
-    sh_basis<ShDegree, lanes> const basis(out.direction);
+    sh_basis<C::sh_degree, lanes> const basis(out.direction);
     for (int l = 0; l < lane_count; ++l)
       for (int k = 0; k < band_groups * lane_count; ++k)
         out.bands_of[l][k / lane_count].v[k % lane_count] = k < bands ? basis.y[k].v[l] : 0.0f;
   }
 
-  static constexpr u32 ahead = 4;  // Gaussians whose slots are fetched while one is summed up
+  static constexpr u32 prefetch_distance = 4;  // Gaussians whose slots are fetched while one is summed up
 
   // What will be read and added to for a Gaussian: its slots lie anywhere in the buffer. Inlined: to a compiler a call
   // that does nothing but fetch does nothing.
@@ -87,13 +91,13 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     footprint_slots const range = gather.ranges[id];
     pixel_box const cell = intersect(range.box, area);
     char const* const slots = reinterpret_cast<char const*>(gather.slots + range.offset + tile_offset(range.box, cell));
-    for (std::size_t byte = 0; byte < cell.area() * sizeof(Entry); byte += 64) prefetch_to_l2(slots + byte);
+    for (std::size_t byte = 0; byte < cell.area() * sizeof(entry_type); byte += 64) prefetch_to_l2(slots + byte);
     prefetch(&gather.records[id]);
-    if constexpr (Sums == gather_sums::atomic) {
-      if constexpr (Terms::color)
+    if constexpr (C::sums == gather_sums::atomic) {
+      if constexpr (C::terms::color)
         for (int k = 0; k < sh_stride; k += 16)
           prefetch_to_write(gather.sh_gradient + static_cast<std::size_t>(sh_stride) * id + k);
-      if constexpr (Terms::geometry)
+      if constexpr (C::terms::geometry)
         prefetch_to_write(gather.moments_out + static_cast<std::size_t>(moment_stride) * id);
     }
   }
@@ -112,7 +116,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
 
     // All packets are evaluated before the first is summed up: the steps of one wait for each other.
     struct {
-      response_of<lanes> r;
+      ray_peak_of<lanes> r;
       lane_mask hit;
       packet_slots slots;
       packet_data const* at;
@@ -122,7 +126,7 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
       auto& f = found[count];
       f.at = &at, f.slots = packet_slots(cell, at.x, at.y);
       if (!any(f.slots.inside)) continue;
-      f.r = evaluate<Response>(g, primary_ray_of<lanes>{at.direction});
+      f.r = evaluate<response_type>(g, primary_ray_of<lanes>{at.direction});
       f.hit = f.slots.inside;
       if constexpr (recomputed)
         f.hit &= is_hit(g, f.r, gather.near) &
@@ -134,18 +138,18 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
     for (int i = 0; i < count; ++i) {
       packet_data const& at = *found[i].at;
       lane_mask const hit = found[i].hit;
-      response_of<lanes> const& r = found[i].r;
-      packet_entries const e = found[i].slots.template read<Terms::geometry>(gather.slots, hit);
+      ray_peak_of<lanes> const& r = found[i].r;
+      packet_entries const e = found[i].slots.template read<C::terms::geometry>(gather.slots, hit);
       // Geometry first: its steps wait for each other, and those of colour fill the time to the next packet's.
-      if constexpr (Terms::geometry) {
-        lanes const alpha = hit_alpha<Response>(g, r.d2);
+      if constexpr (C::terms::geometry) {
+        lanes const alpha = hit_alpha<response_type>(g, r.d2);
         moments_of<lanes> const m =
-            hit_moments<Response>(g, r, alpha_gradient(dot(e.opaque, at.gradient), at.total, alpha), hit);
+            hit_moments<response_type>(g, r, alpha_gradient(dot(e.opaque, at.gradient), at.total, alpha), hit);
 #pragma GCC unroll 16
         for (int k = 0; k < error_place; ++k) moment_sum[k] += m.v[k];
         moment_sum[error_place] += select(hit, e.weight * at.error, 0.0f);
       }
-      if constexpr (Terms::color) {
+      if constexpr (C::terms::color) {
         alignas(lanes) float cg[3][lane_count];
         for (int c = 0; c < 3; ++c)
           reinterpret_cast<lanes&>(cg[c]) = select(e.clamped[c], 0.0f, e.weight * at.gradient[c]);
@@ -158,30 +162,30 @@ struct packet_gather<gather_kernel<ShDegree, Response, Terms, Entry, Size, Sums,
       }
     }
 
-    float sh[sh_stride], moments[16];
+    float sh[sh_stride], moment_totals[16];
     for (int b = 0; b < band_groups; ++b)
       write_in_turns(sh + 3 * lane_count * b, sh_stride - 3 * lane_count * b, sh_sum[0][0][b] + sh_sum[1][0][b],
                      sh_sum[0][1][b] + sh_sum[1][1][b], sh_sum[0][2][b] + sh_sum[1][2][b]);
-    sums_of(moment_sum, moments);
-    if constexpr (Sums == gather_sums::atomic) {
+    sums_of(moment_sum, moment_totals);
+    if constexpr (C::sums == gather_sums::atomic) {
       // One lock for both rows.
       float* const moments_row = gather.moments_out + static_cast<std::size_t>(moment_stride) * id;
       float* const sh_row = gather.sh_gradient + static_cast<std::size_t>(sh_stride) * id;
       int const active = 3 * sh_coefficients(gather.active_degree);
-      E::exclusively(moments_row, [&] {
-        if constexpr (Terms::color)
+      C::policy::exclusively(moments_row, [&] {
+        if constexpr (C::terms::color)
           for (int i = 0; i < active; ++i) sh_row[i] += sh[i];
-        if constexpr (Terms::geometry)
-          for (int i = 0; i < moment_count; ++i) moments_row[i] += moments[i];
+        if constexpr (C::terms::geometry)
+          for (int i = 0; i < moment_count; ++i) moments_row[i] += moment_totals[i];
       });
     } else {
-      gather.finish(range.box, area, id, sh, reinterpret_cast<float const(&)[moment_stride]>(moments));
+      gather.finish(range.box, area, id, sh, reinterpret_cast<float const(&)[moment_stride]>(moment_totals));
     }
   }
 
   static lanes dot(vec3_of<lanes> const& a, vec3_of<lanes> const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 };
 
-}  // namespace gart::inline GART_ISA
-
 #endif
+
+}  // namespace gart::inline GART_ISA

@@ -75,7 +75,7 @@ struct scatter_program : ray_program_base {
     }
     if constexpr (Terms::geometry) {
       ray_gaussian const g = records[h.id];
-      moments m = hit_moments<Response>(g, evaluate<Response>(g, primary_ray{s.direction}), alpha_gradient);
+      moments_of<float> m = hit_moments<Response>(g, evaluate<Response>(g, primary_ray{s.direction}), alpha_gradient);
       m.v[error_place] = weight * s.error;
       E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * h.id, m.v, moment_count);
     }

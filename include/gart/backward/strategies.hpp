@@ -61,8 +61,8 @@ struct cleared_strategy : primitive_strategy {
   static constexpr strategy_use use = strategy_use::measuring;
 };
 
-// The primitive strategy without matrix units (backward/matrix_gather.hpp): what these are tested and measured against,
-// on a device.
+// The primitive strategy by the plain gather (backward/gather.hpp): what packets and matrix units are tested and
+// measured against.
 struct lane_strategy : primitive_strategy {
   static constexpr char const* name = "lane";
   static constexpr bool lane_by_lane = true;

@@ -21,7 +21,7 @@ enum class strategy_use { training, measuring, testing };
 
 struct strategy_base {
   static constexpr bool ordered = false;       // sums in a fixed order: the same bits in every run
-  static constexpr bool lane_by_lane = false;  // on a device without matrix units (backward/matrix_gather.hpp)
+  static constexpr bool lane_by_lane = false;  // by the plain gather, whatever the policy (backward/gather_form.hpp)
   static constexpr slot_validity validity = slot_validity::cleared;
   static constexpr strategy_use use = strategy_use::training;
   using fallback = void;  // the strategy that a step is done by where the LT buffer has no room

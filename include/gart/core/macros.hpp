@@ -13,8 +13,9 @@
 #define GART_INLINE inline __attribute__((always_inline))
 #endif
 
-// A kernel body that is instantiated for one policy calls that policy's functions only; nvcc cannot see that from a
-// template and would warn on every instantiation.
+// The body of a kernel, and what it calls of its policy: instantiated for one policy it calls that policy's functions
+// only, which nvcc cannot see from a template and would warn of. It stands right before the declaration, not behind
+// `template <...>`: a tile kernel takes `auto const& team`.
 #if defined(__CUDACC__)
 #define GART_KERNEL _Pragma("nv_exec_check_disable") __host__ __device__
 #else

@@ -35,6 +35,7 @@ class cuda_exec {
  public:
   static constexpr char const* name = "cuda";
   static constexpr bool device = true;
+  static constexpr kernel_form form = kernel_form::warp;
   profiler profile;
   memory_use memory;
 
@@ -108,5 +109,6 @@ class cuda_exec {
   int multiprocessors_ = 0;
   std::unique_ptr<resources> resources_;
 };
+static_assert(device_execution<cuda_exec>);
 
 }  // namespace gart

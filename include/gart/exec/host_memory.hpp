@@ -20,6 +20,7 @@ namespace gart::inline GART_ISA {
 class host_memory {
  public:
   static constexpr bool device = false;
+  static constexpr kernel_form form = kernel_form::packet;
   profiler profile;
   memory_use memory;
 

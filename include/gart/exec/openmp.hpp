@@ -51,5 +51,6 @@ class openmp_exec : public host_memory {
   }
   int threads_;
 };
+static_assert(host_execution<openmp_exec>);
 
 }  // namespace gart::inline GART_ISA

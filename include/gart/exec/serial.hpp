@@ -8,6 +8,7 @@ namespace gart::inline GART_ISA {
 class serial_exec : public host_memory {
  public:
   static constexpr char const* name = "serial";
+  static constexpr int threads() { return 1; }
 
   template <class T>
   static T atomic_add(T* p, T v) {
@@ -25,5 +26,6 @@ class serial_exec : public host_memory {
   }
   static void fence() {}
 };
+static_assert(host_execution<serial_exec>);
 
 }  // namespace gart::inline GART_ISA

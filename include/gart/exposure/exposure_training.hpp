@@ -24,7 +24,7 @@ struct expose_kernel {
   exposure const* view;
   float const* image;
   float* exposed;
-  GART_HD void operator()(index_t pixel) const {
+  GART_KERNEL void operator()(index_t pixel) const {
     float const* const x = image + std::size_t{3} * pixel;
     exposure const e = *view;
     for (int c = 0; c < 3; ++c) exposed[std::size_t{3} * pixel + c] = e.channel(c, x[0], x[1], x[2]);
@@ -39,7 +39,7 @@ struct exposure_gradient_kernel {
   index_t pixels, lanes;
   float* sums;  // [lanes][12]
 
-  GART_HD void operator()(index_t lane) const {
+  GART_KERNEL void operator()(index_t lane) const {
     exposure const e = *view;
     float sum[exposure::floats] = {};
     for (index_t pixel = lane; pixel < pixels; pixel += lanes) {
@@ -64,7 +64,7 @@ struct exposure_adam_kernel {
   adam_rule rule;
   float rate;
 
-  GART_HD void operator()(index_t k) const {
+  GART_KERNEL void operator()(index_t k) const {
     auto const to = rule.moved<float>({value[k], first[k], second[k]}, gradient[k], rate);
     if (!is_finite(to.second) || !is_finite(to.parameter)) return;
     value[k] = to.parameter, first[k] = to.first, second[k] = to.second;

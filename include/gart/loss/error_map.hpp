@@ -13,7 +13,7 @@ struct error_map_kernel {
   float const* image;
   truth_view truth;
   float* error;
-  GART_HD void operator()(index_t pixel) const {
+  GART_KERNEL void operator()(index_t pixel) const {
     vec3 const y = truth.color(pixel);
     float sum = 0;
     for (int c = 0; c < 3; ++c) sum += fabsf(image[std::size_t{3} * pixel + c] - y[c]);

@@ -56,7 +56,7 @@ struct difference_kernel {
   float* centred_truth;  // y - 1/2
   float* difference;     // x - y
 
-  GART_HD void operator()(index_t pixel) const {
+  GART_KERNEL void operator()(index_t pixel) const {
     bool const counts = truth.counts(pixel);
     vec3 const y = truth.color(pixel);
     for (int c = 0; c < 3; ++c) {
@@ -161,8 +161,7 @@ struct ssim_kernel {
   float* tile_square;
   float weight;
 
-  template <class Team>
-  GART_HD void operator()(Team const& team) const {
+  GART_KERNEL void operator()(auto const& team) const {
     scratch& s = team.scratch();
     auto const at = grid(team.tile());
     std::size_t const pixels = grid.image.pixels(), plane = at.channel * pixels;
@@ -252,8 +251,7 @@ struct loss_gradient_kernel {
   float* gradient;
   float weight;
 
-  template <class Team>
-  GART_HD void operator()(Team const& team) const {
+  GART_KERNEL void operator()(auto const& team) const {
     scratch& s = team.scratch();
     auto const at = grid(team.tile());
     std::size_t const pixels = grid.image.pixels(), plane = at.channel * pixels;

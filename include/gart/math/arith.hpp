@@ -117,11 +117,21 @@ GART_HD GART_INLINE void reciprocals(float (&a)[N]) {
 // By the exponent bits, so that no fast-math switch can remove it.
 GART_HD GART_INLINE bool is_finite(float f) { return (float_to_bits(f) & 0x7f800000u) != 0x7f800000u; }
 
-// For formulas over floats and over lanes of them (math/lanes.hpp).
+// For formulas over floats and over lanes of them (math/lanes.hpp): what a number's comparisons and counts are, and
+// what they offer.
+template <class F>
+struct number;
+template <>
+struct number<float> {
+  using mask = bool;
+  using words = u32;
+  GART_HD GART_INLINE static words every(u32 x) { return x; }
+};
 GART_HD GART_INLINE bool both(bool a, bool b) { return a && b; }
 GART_HD GART_INLINE bool any(bool a) { return a; }
 GART_HD GART_INLINE float magnitude(float a) { return fabsf(a); }
 GART_HD GART_INLINE float select(bool which, float a, float b) { return which ? a : b; }
+GART_HD GART_INLINE u32 select(bool which, u32 a, u32 b) { return which ? a : b; }
 
 // x 2^n, where `biased` is n + 1.5 * 2^23.
 GART_HD GART_INLINE float scale_by_power(float x, float biased) {

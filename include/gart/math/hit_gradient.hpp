@@ -30,7 +30,6 @@ template <class F>
 struct moments_of {
   F v[moment_stride];
 };
-using moments = moments_of<float>;
 
 // dL/dalpha of a hit: V.g and C.g.
 template <class F>
@@ -58,7 +57,7 @@ struct ray_gradient {
 
 // What a hit adds to the moments; zeros where `hit` is false, whatever the rest is then.
 template <class Response = generalized_gaussian<>, class F, class Mask>
-GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, response_of<F> const& r, F alpha_gradient,
+GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, ray_peak_of<F> const& r, F alpha_gradient,
                                               Mask hit) {
   F const raw = unclamped_alpha<Response>(gaussian, r.d2), zero = 0.0f;
   F const a = select(both(hit, raw < F(alpha_max)), raw * alpha_gradient, zero);
@@ -70,7 +69,7 @@ GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, resp
 }
 
 template <class Response = generalized_gaussian<>, class F>
-GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, response_of<F> const& r, F alpha_gradient) {
+GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, ray_peak_of<F> const& r, F alpha_gradient) {
   return hit_moments<Response>(gaussian, r, alpha_gradient, F(0.0f) <= F(0.0f));
 }
 

@@ -90,6 +90,13 @@ struct lanes {
 
 GART_INLINE lane_words every_lane(u32 x) { return lane_words{} + x; }
 
+template <>
+struct number<lanes> {
+  using mask = lane_mask;
+  using words = lane_words;
+  GART_INLINE static words every(u32 x) { return every_lane(x); }
+};
+
 GART_INLINE lane_mask both(lane_mask a, lane_mask b) { return a & b; }
 #if defined(GART_LANES_AVX512)
 GART_INLINE lanes select(lane_mask m, lanes a, lanes b) {
@@ -259,7 +266,7 @@ GART_INLINE void read_fours(float const* first, std::ptrdiff_t stride, lane_mask
 }
 #endif
 
-// Starts the way from memory of what will be read; of what will be written.
+// Hides the latency of memory: asks for what will be read, or written, some time before.
 GART_INLINE void prefetch(void const* p) { __builtin_prefetch(p); }
 GART_INLINE void prefetch_to_l2(void const* p) { __builtin_prefetch(p, 0, 2); }  // for much at a time
 GART_INLINE void prefetch_to_write(void const* p) { __builtin_prefetch(p, 1); }

@@ -18,6 +18,7 @@
 
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
+#include <gart/math/logit.hpp>
 #include <gart/math/quaternion.hpp>
 #include <gart/math/response.hpp>
 
@@ -62,11 +63,6 @@ struct gaussian_parameters {
   quaternion rotation;
   float opacity;  // logit
 };
-
-GART_HD GART_INLINE float sigmoid(float x) {
-  float const clamped = x < -80.0f ? -80.0f : x;  // below, sigma is under any alpha_min
-  return divide(1.0f, add(1.0f, exponential(-clamped)));
-}
 
 // The mean in the frame.
 GART_HD GART_INLINE vec3 relative_mean(vec3 const& mean, vec3d const& frame) {
@@ -117,15 +113,15 @@ GART_HD GART_INLINE ray_gaussian prepare(gaussian_parameters const& g, vec3d con
   return out;
 }
 
-// Of one ray, or of one a lane.
+// Where along a ray the response is largest; of one ray, or of one a lane.
 template <class F>
-struct response_of {
+struct ray_peak_of {
   F t;           // distance of the largest response along the ray
   F d2;          // |p|^2 there
   vec3_of<F> c;  // o_g x d_g / |d_g|^2
   vec3_of<F> d;  // d_g
 };
-using response = response_of<float>;
+using ray_peak = ray_peak_of<float>;
 
 template <class F>
 GART_HD GART_INLINE F gaussian_origin(ray_gaussian::row const& m, primary_ray_of<F> const&) {
@@ -169,8 +165,8 @@ GART_HD GART_INLINE auto approach_to(ray_gaussian const& g, Ray const& r) {
 
 // inverse: 1 / a.dd
 template <class F>
-GART_HD GART_INLINE response_of<F> response_of_approach(approach_of<F> const& a, F inverse) {
-  response_of<F> out;
+GART_HD GART_INLINE ray_peak_of<F> ray_peak_of_approach(approach_of<F> const& a, F inverse) {
+  ray_peak_of<F> out;
   out.c = {mul(a.c.x, inverse), mul(a.c.y, inverse), mul(a.c.z, inverse)};
   out.d = a.d;
   out.t = mul(-a.od, inverse);
@@ -181,31 +177,31 @@ GART_HD GART_INLINE response_of<F> response_of_approach(approach_of<F> const& a,
 template <class Response = generalized_gaussian<>, class Ray>
 GART_HD GART_INLINE auto evaluate(ray_gaussian const& g, Ray const& r) {
   auto const a = approach_to(g, r);
-  return response_of_approach(a, Response::reciprocal(a.dd));
+  return ray_peak_of_approach(a, Response::reciprocal(a.dd));
 }
 
 // N at once, one beside the other: the steps of each wait for each other. `of(i)` is the i-th approach.
 template <class Response, int N, class F>
-GART_HD GART_INLINE void evaluate_all(response (&out)[N], F&& of) {
+GART_HD GART_INLINE void evaluate_all(ray_peak (&out)[N], F&& of) {
   approach a[N];
   float inverse[N];
   GART_UNROLL
   for (int i = 0; i < N; ++i) a[i] = of(i), inverse[i] = a[i].dd;
   Response::reciprocals(inverse);
   GART_UNROLL
-  for (int i = 0; i < N; ++i) out[i] = response_of_approach(a[i], inverse[i]);
+  for (int i = 0; i < N; ++i) out[i] = ray_peak_of_approach(a[i], inverse[i]);
 }
 
 // p, in standard deviations along the Gaussian's axes. Along the thin axis of a pancake it is all but zero, and M
 // magnifies it in the gradients of mean and rotation: the product has its digits, o_g + t d_g has none.
 template <class F>
-GART_HD GART_INLINE vec3_of<F> offset_of(response_of<F> const& r) {
+GART_HD GART_INLINE vec3_of<F> offset_of(ray_peak_of<F> const& r) {
   return cross_product(r.d, r.c);
 }
 
 // NaN compares false: what cannot be evaluated is no hit.
 template <class F>
-GART_HD GART_INLINE auto is_hit(ray_gaussian const& g, response_of<F> const& r, float near) {
+GART_HD GART_INLINE auto is_hit(ray_gaussian const& g, ray_peak_of<F> const& r, float near) {
   return both(r.d2 <= F(g.cutoff), r.t > F(near));
 }
 

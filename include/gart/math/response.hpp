@@ -9,8 +9,8 @@
 //   cutoff(ratio)  the largest |p|^2 with sigma rho >= alpha_min, ratio = sigma / alpha_min >= 1
 //   slope(d2)      -2 d ln rho / d |p|^2 = n (4.5 / 3^n) |p|^(n-2), what a hit's moments are weighted with
 //                  (math/hit_gradient.hpp); 1 for n = 2
-//   reciprocal(a)  1 / a, for the point of largest response
-// All but cutoff take a float or lanes of them. They decide hits: powers by multiplication and square roots, and by
+//   reciprocal(a)  1 / a, for the point of largest response; reciprocals(array) of all its elements
+// All but cutoff and reciprocals take a float or lanes of them. They decide hits: powers by multiplication and square roots, and by
 // Arithmetic
 //   exact  fixed arithmetic (math/arith.hpp), the same bits on every policy; cutoff is within 4e-7 of exact, relatively
 //   fast   shorter exponential and reciprocal (math/fast_arith.hpp) where hits are evaluated, for what they cost: alpha
@@ -21,7 +21,21 @@
 
 #include <gart/math/fast_arith.hpp>
 
+#include <concepts>
+
 namespace gart::inline GART_ISA {
+
+// What takes the place of generalized_gaussian wherever a Response is asked for.
+template <class R>
+concept response_function = requires(float x, float (&several)[2]) {
+  { R::degree } -> std::convertible_to<int>;  // of the Gaussians it is, for files and for densification
+  { R::fast } -> std::convertible_to<bool>;   // its arithmetic
+  { R::response(x) } -> std::same_as<float>;
+  { R::cutoff(x) } -> std::same_as<float>;
+  { R::slope(x) } -> std::same_as<float>;
+  { R::reciprocal(x) } -> std::same_as<float>;
+  R::reciprocals(several);  // each its reciprocal
+};
 
 enum class arithmetic { exact, fast };
 
@@ -118,5 +132,7 @@ struct generalized_gaussian {
       return mul(mul(d2, d2), mul(d2, d2));
   }
 };
+static_assert(response_function<generalized_gaussian<>> &&
+              response_function<generalized_gaussian<4, arithmetic::fast>>);
 
 }  // namespace gart::inline GART_ISA

@@ -17,6 +17,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <iterator>
 
 namespace gart::inline GART_ISA {
 
@@ -60,6 +61,17 @@ struct adam_rule {
 
 namespace detail {
 
+// The rates of the arrays (scene/parameter_table.hpp): of a Gaussian's first three floats, and of the rest.
+inline constexpr index_t head_columns = 3;
+inline constexpr struct {
+  float learning_rates::*head, learning_rates::*rest;
+} parameter_rates[] = {{&learning_rates::mean, &learning_rates::mean},
+                       {&learning_rates::log_scale, &learning_rates::log_scale},
+                       {&learning_rates::quaternion, &learning_rates::quaternion},
+                       {&learning_rates::opacity, &learning_rates::opacity},
+                       {&learning_rates::sh_dc, &learning_rates::sh_rest}};
+static_assert(std::size(parameter_rates) == parameter_arrays, "a rate for each array");
+
 struct adam_group {
   float* parameter;
   float const* gradient;
@@ -76,13 +88,14 @@ template <execution E, bool SeenOnly>
 struct adam_kernel {
   static constexpr index_t rows_per_tile = 128;
   struct scratch {};
-  adam_group groups[5];  // the second is of the means
+  adam_group groups[parameter_arrays];  // the table's, from the last: the widest begins first
   index_t group_tiles, rows;
   adam_rule rule;  // the rates carry 1 / (1 - b1^t)
   u64* skipped;
 
-  template <class Team>
-  GART_HD void operator()(Team const& team) const {
+  GART_HD static constexpr int group_of(int array) { return parameter_arrays - 1 - array; }
+
+  GART_KERNEL void operator()(auto const& team) const {
     index_t const group_index = team.tile() / group_tiles;
     index_t const row = (team.tile() - group_index * group_tiles) * rows_per_tile;
     index_t const count = rows - row < rows_per_tile ? rows - row : rows_per_tile;
@@ -97,11 +110,11 @@ struct adam_kernel {
   }
 
   GART_HD bool seen(index_t row) const {
-    float const* const mean = groups[1].gradient + std::size_t{3} * row;
+    float const* const mean = groups[group_of(mean_array)].gradient + std::size_t{3} * row;
     return (mean[0] != 0) | (mean[1] != 0) | (mean[2] != 0);
   }
 
-  GART_HD void update(adam_group const& group, std::size_t i, index_t column) const {
+  GART_KERNEL void update(adam_group const& group, std::size_t i, index_t column) const {
     if (column >= group.active) return;
     float const g = group.gradient[i], rate = column < group.head ? group.rate_head : group.rate_rest;
     auto const to = rule.moved<float>({group.parameter[i], group.first[i], group.second[i]}, g, rate);
@@ -124,8 +137,8 @@ struct adam_kernel {
 
   // Elements a lane each, whatever their columns; where one is not finite, one by one.
   void update_elements(adam_group const& group, index_t row, index_t rows_here) const {
-    constexpr index_t most = 48;  // columns of a group
-    float rates[most + lane_count], trained[most + lane_count];
+    constexpr index_t max_width = 48;  // of an array
+    float rates[max_width + lane_count], trained[max_width + lane_count];
     for (index_t k = 0; k < group.stride + lane_count; ++k) {
       index_t const column = k % group.stride;
       rates[k] = column < group.head ? group.rate_head : group.rate_rest;
@@ -175,23 +188,28 @@ void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optim
   double const correction = adam_rule::first_correction(options, step);
   auto const rate = [&](float r) { return static_cast<float>(r * correction); };
   auto const p = model.view();
-  auto const g = gradient.view();
-  auto const m = state.first.view(), v = state.second.view();
-  index_t const sh = p.sh_stride();
   int const degree = active_sh_degree < p.sh_degree ? active_sh_degree : p.sh_degree;
-  index_t const active_sh = 3 * sh_coefficients(degree);
 
   auto const launch = [&](auto k) {
-    k.groups[0] = {p.sh, g.sh, m.sh, v.sh, sh, active_sh, 3, rate(rates.sh_dc), rate(rates.sh_rest)};
-    k.groups[1] = {p.mean, g.mean, m.mean, v.mean, 3, 3, 3, rate(rates.mean), 0};
-    k.groups[2] = {p.log_scale, g.log_scale, m.log_scale, v.log_scale, 3, 3, 3, rate(rates.log_scale), 0};
-    k.groups[3] = {p.quaternion, g.quaternion, m.quaternion, v.quaternion, 4, 4, 4, rate(rates.quaternion), 0};
-    k.groups[4] = {p.opacity, g.opacity, m.opacity, v.opacity, 1, 1, 1, rate(rates.opacity), 0};
+    for_each_array(
+        [&](parameter_array const& a, float* parameter, float const* slope, float* first, float* second) {
+          auto const [head, rest] = detail::parameter_rates[a.number];
+          k.groups[k.group_of(a.number)] = {parameter,
+                                            slope,
+                                            first,
+                                            second,
+                                            a.width(p.sh_degree),
+                                            a.width(degree),
+                                            detail::head_columns,
+                                            rate(rates.*head),
+                                            rate(rates.*rest)};
+        },
+        p, gradient.view(), state.first.view(), state.second.view());
     k.rows = p.count;
     k.group_tiles = p.count / k.rows_per_tile + (p.count % k.rows_per_tile != 0);
     k.rule = adam_rule(options, step);
     k.skipped = skipped.data();
-    parallel_for(exec, "adam", tile_range{5 * k.group_tiles, 256}, k);
+    parallel_for(exec, "adam", tile_range{parameter_arrays * k.group_tiles, 256}, k);
   };
   if (options.seen_only)
     launch(detail::adam_kernel<E, true>{});

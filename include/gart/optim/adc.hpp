@@ -16,6 +16,8 @@
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>
+#include <gart/math/logit.hpp>
+#include <gart/math/quaternion.hpp>
 #include <gart/optim/adam.hpp>
 #include <gart/optim/options.hpp>
 #include <gart/optim/random.hpp>
@@ -37,7 +39,7 @@ struct adc_accumulate_kernel {
   float* sum;
   u32* touched;
 
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     std::size_t const r = std::size_t{3} * i;
     vec3 const g(gradient.mean[r], gradient.mean[r + 1], gradient.mean[r + 2]);
     if (g.x == 0 && g.y == 0 && g.z == 0 && gradient.opacity[i] == 0) return;
@@ -69,7 +71,7 @@ struct adc_rule {
   GART_HD u32 outcome(index_t i) const {
     bool finite = is_finite(model.opacity[i]);
     for (index_t c = 0; c < geometry_columns; ++c) finite = finite && is_finite(row_element(model, i, c));
-    float const opacity = 1.0f / (1.0f + expf(-model.opacity[i])), scale = largest_scale(i);
+    float const opacity = sigmoid(model.opacity[i]), scale = largest_scale(i);
     if (!finite || !(opacity >= prune_opacity)) return 0;
     bool const grows = statistic(i) >= gradient;
     bool const split = grows && scale > split_scale;
@@ -82,7 +84,7 @@ struct adc_plan_kernel {
   adc_rule rule;
   u32* copies;
   u32* grows;
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     copies[i] = rule.outcome(i);
     grows[i] = copies[i] == 2;
   }
@@ -94,7 +96,7 @@ struct adc_key_kernel {
   u32 const* copies;
   u32* key;
   u32* id;
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     key[i] = copies[i] == 2 ? ~float_to_bits(rule.statistic(i)) : 0xffffffffu;
     id[i] = i;
   }
@@ -104,7 +106,7 @@ struct adc_demote_kernel {
   u32 const* id;
   u32* copies;
   index_t first;
-  GART_HD void operator()(index_t rank) const { copies[id[first + rank]] = 1; }
+  GART_KERNEL void operator()(index_t rank) const { copies[id[first + rank]] = 1; }
 };
 
 // Where a row of the new arrays comes from, with two marks.
@@ -115,7 +117,7 @@ struct adc_place_kernel {
   u32 const* copies;
   u64 const* offset;
   u32* origin;
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     if (copies[i] == 0) return;
     bool const split = copies[i] == 2 && rule.largest_scale(i) > rule.split_scale;
     origin[offset[i]] = split ? i | adc_fresh | adc_split : i;
@@ -128,7 +130,7 @@ struct adc_gather_body {
   gaussians_view<float> to;
   u32 const* origin;
   bool clear_fresh;
-  GART_HD void operator()(index_t row, index_t column) const {
+  GART_KERNEL void operator()(index_t row, index_t column) const {
     u32 const o = origin[row];
     row_element(to, row, column) = clear_fresh && (o & adc_fresh) ? 0.0f : row_element(from, o & adc_row, column);
   }
@@ -138,22 +140,15 @@ struct adc_split_kernel {
   gaussians_view<float> model;
   u32 const* origin;
   random_source random;
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     if (!(origin[i] & adc_split)) return;
     float const* const q = model.quaternion + std::size_t{4} * i;
     float* const mean = model.mean + std::size_t{3} * i;
     float* const log_scale = model.log_scale + std::size_t{3} * i;
     random_normals const n = normals(random.words(i));
-    float const norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    quaternion const turn{q[0], q[1], q[2], q[3]};
     vec3 v(n.v[0] * expf(log_scale[0]), n.v[1] * expf(log_scale[1]), n.v[2] * expf(log_scale[2]));
-    if (norm > 1e-16f) {
-      // v + 2 w (u x v) + 2 u x (u x v), for the unit quaternion (w, u).
-      float const inverse = 1.0f / sqrtf(norm), w = q[0] * inverse;
-      vec3 const u(q[1] * inverse, q[2] * inverse, q[3] * inverse);
-      vec3 const a(u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x);
-      vec3 const b(u.y * a.z - u.z * a.y, u.z * a.x - u.x * a.z, u.x * a.y - u.y * a.x);
-      v = v + 2.0f * (w * a + b);
-    }
+    if (norm2(turn) > quaternion_norm2_min) v = to_matrix(turn) * v;
     mean[0] += v.x, mean[1] += v.y, mean[2] += v.z;
     for (int c = 0; c < 3; ++c) log_scale[c] -= 0.470003629f;  // log 1.6
   }
@@ -161,9 +156,9 @@ struct adc_split_kernel {
 
 struct adc_reset_kernel {
   float* opacity;
-  float most;
-  GART_HD void operator()(index_t i) const {
-    if (opacity[i] > most) opacity[i] = most;
+  float ceiling;
+  GART_KERNEL void operator()(index_t i) const {
+    if (opacity[i] > ceiling) opacity[i] = ceiling;
   }
 };
 
@@ -271,14 +266,14 @@ class adaptive_density {
 
   // Opacities above twice prune_opacity become that.
   void reset_opacity(gaussians<E>& model, optimizer_state<E>& state) {
-    double const most = std::min(2.0 * options_.prune_opacity, 0.99);
+    double const ceiling = std::min(2.0 * static_cast<double>(options_.prune_opacity), 0.99);
     parallel_for(*exec_, "adc_reset", model.size(),
-                 detail::adc_reset_kernel{model.opacity.data(), static_cast<float>(std::log(most / (1 - most)))});
+                 detail::adc_reset_kernel{model.opacity.data(), static_cast<float>(logit_in_double(ceiling))});
     state.first.opacity.zero(), state.second.opacity.zero();
   }
 
  private:
-  bool running(int step) const { return step < options_.until * static_cast<float>(iterations_); }
+  bool running(int step) const { return static_cast<float>(step) < options_.until * static_cast<float>(iterations_); }
 
   void clear_statistic(index_t n) {
     gradient_sum.resize(n), touched.resize(n);

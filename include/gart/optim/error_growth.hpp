@@ -39,14 +39,14 @@ namespace detail {
 struct error_sum_kernel {
   float const* moments;
   float* sum;
-  GART_HD void operator()(index_t i) const { sum[i] += moments[std::size_t{moment_stride} * i + error_place]; }
+  GART_KERNEL void operator()(index_t i) const { sum[i] += moments[std::size_t{moment_stride} * i + error_place]; }
 };
 
 struct error_penalty_kernel {
   float const* opacity;
   float* gradient;
   float share;
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     float const o = sigmoid(opacity[i]);
     gradient[i] += share * o * (1.0f - o);
   }
@@ -62,7 +62,7 @@ struct error_key_kernel {
   u32* drawable;
   u32* key;
   u32* id;
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     bool const lives = is_alive(model, i, dead_opacity);
     float const weight = sum[i];
     bool const fits = lives && weight > 0 && is_finite(weight);
@@ -77,7 +77,7 @@ struct error_target_kernel {
   u32 const* dead;
   u64 const* place;
   u32* target;
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     if (dead[i]) target[place[i]] = i;
   }
 };
@@ -94,7 +94,7 @@ struct error_rows {
 struct error_copy_body {
   gaussians_view<float> model, first, second;
   error_rows rows;
-  GART_HD void operator()(index_t draw, index_t column) const {
+  GART_KERNEL void operator()(index_t draw, index_t column) const {
     index_t const from = rows.from(draw), to = rows.to(draw);
     row_element(model, to, column) = row_element(model, from, column);
     row_element(first, to, column) = row_element(second, to, column) = 0;
@@ -105,7 +105,7 @@ struct error_split_kernel {
   gaussians_view<float> model;
   error_rows rows;
   float least_opacity;
-  GART_HD void operator()(index_t draw) const {
+  GART_KERNEL void operator()(index_t draw) const {
     std::size_t const pair[2] = {rows.from(draw), rows.to(draw)};
     float const* const q = model.quaternion + 4 * pair[0];
     float const* const m = model.mean + 3 * pair[0];
@@ -166,8 +166,8 @@ class error_growth {
   void set_iterations(int iterations) { iterations_ = iterations; }
 
   bool due(int step) const {
-    return options_.every > 0 && step > options_.from && step < options_.until * static_cast<float>(iterations_) &&
-           step % options_.every == 0;
+    return options_.every > 0 && step > options_.from && step % options_.every == 0 &&
+           static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
   }
 
   // The count that a run is to have after a step.

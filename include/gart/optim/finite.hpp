@@ -24,27 +24,17 @@ namespace gart::inline GART_ISA {
 
 namespace detail {
 
-inline constexpr int parameter_groups = 5;
-inline constexpr char const* parameter_group_names[parameter_groups] = {"mean", "log-scale", "quaternion", "opacity",
-                                                                        "SH"};
-
-template <execution E>
-std::array<buffer<float, E> const*, parameter_groups> buffers_of(gaussians<E> const& g) {
-  return {&g.mean, &g.log_scale, &g.quaternion, &g.opacity, &g.sh};
-}
-
 // Group g has tiles [g * group_tiles, (g + 1) * group_tiles), each of `rows_per_tile` Gaussians.
 template <execution E>
 struct count_not_finite_kernel {
   static constexpr index_t rows_per_tile = 128;
   struct scratch {};
-  float const* values[2 * parameter_groups];
-  index_t stride[2 * parameter_groups];  // floats a Gaussian
+  float const* values[2 * parameter_arrays];
+  index_t stride[2 * parameter_arrays];  // floats a Gaussian
   index_t group_tiles, rows;
   u64* counts;
 
-  template <class Team>
-  GART_HD void operator()(Team const& team) const {
+  GART_KERNEL void operator()(auto const& team) const {
     index_t const group = team.tile() / group_tiles;
     index_t const row = (team.tile() - group * group_tiles) * rows_per_tile;
     index_t const count = rows - row < rows_per_tile ? rows - row : rows_per_tile;
@@ -68,7 +58,7 @@ class finite_check {
   // The updates that Adam left out since the last call. `where` begins the error's message: "step 7, view a".
   u64 operator()(gaussians<E> const& model, optimizer_state<E> const& state, std::string const& where) {
     count("finite/parameters", {&model}, 0);
-    count("finite/moments", {&state.first, &state.second}, detail::parameter_groups);
+    count("finite/moments", {&state.first, &state.second}, parameter_arrays);
     std::vector<u64> const counts = counts_.to_host();
     for (u64 const c : counts) {
       if (c == 0) continue;
@@ -77,12 +67,12 @@ class finite_check {
     }
     std::array<gaussians<E> const*, 3> const all{&model, &state.first, &state.second};
     for (int kind = 0; kind < kinds; ++kind)
-      if (counts[kind]) fail(*all[kind / detail::parameter_groups], kind, counts[kind], where);
+      if (counts[kind]) fail(*all[kind / parameter_arrays], kind, counts[kind], where);
     return counts[kinds];
   }
 
  private:
-  static constexpr int kinds = 3 * detail::parameter_groups;  // of the parameters, the first and the second moments
+  static constexpr int kinds = 3 * parameter_arrays;  // of the parameters, the first and the second moments
 
   void count(char const* label, std::initializer_list<gaussians<E> const*> sets, int first_kind) {
     index_t const rows = (*sets.begin())->size();
@@ -90,12 +80,13 @@ class finite_check {
     using kernel = detail::count_not_finite_kernel<E>;
     kernel k{};
     index_t groups = 0;
-    for (gaussians<E> const* set : sets) {
-      for (buffer<float, E> const* values : detail::buffers_of(*set)) {
-        k.values[groups] = values->data();
-        k.stride[groups++] = static_cast<index_t>(values->size() / rows);
-      }
-    }
+    for (gaussians<E> const* set : sets)
+      for_each_array(
+          [&](parameter_array const& a, float const* values) {
+            k.values[groups] = values;
+            k.stride[groups++] = a.width(set->sh_degree());
+          },
+          set->view());
     k.rows = rows;
     k.group_tiles = rows / kernel::rows_per_tile + (rows % kernel::rows_per_tile != 0);
     k.counts = counts_.data() + first_kind;
@@ -103,14 +94,20 @@ class finite_check {
   }
 
   [[noreturn]] void fail(gaussians<E> const& set, int kind, u64 count, std::string const& where) const {
-    int const group = kind % detail::parameter_groups, moment = kind / detail::parameter_groups;
-    std::vector<float> const values = detail::buffers_of(set)[group]->to_host();
+    int const group = kind % parameter_arrays, moment = kind / parameter_arrays;
+    std::vector<float> values;
+    char const* title = "";
+    for_each_array(
+        [&](parameter_array const& a, buffer<float, E> const& array) {
+          if (a.number == group) values = array.to_host(), title = a.title;
+        },
+        set);
     std::size_t const stride = values.size() / set.size();
     std::size_t at = 0;
     while (at + 1 < values.size() && is_finite(values[at])) ++at;
     std::size_t const gaussian = at / stride;
     static constexpr char const* sets[] = {"", "Adam's first moment of ", "Adam's second moment of "};
-    std::string const name = std::string(sets[moment]) + detail::parameter_group_names[group];
+    std::string const name = std::string(sets[moment]) + title;
     std::string const numbers =
         count == 1 ? "1 number of " + name + " is not finite, that of Gaussian "
                    : std::to_string(count) + " numbers of " + name + " are not finite, the first that of Gaussian ";

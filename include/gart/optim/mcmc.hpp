@@ -20,6 +20,8 @@
 // is relocated or grown. Cost: one host read and O(N) work a densification; a step in between is two small launches.
 
 #include <gart/algorithm/exclusive_scan.hpp>
+#include <gart/math/logit.hpp>
+#include <gart/math/quaternion.hpp>
 #include <gart/optim/adam.hpp>
 #include <gart/optim/options.hpp>
 #include <gart/optim/random.hpp>
@@ -55,7 +57,7 @@ struct mcmc_weight_kernel {
   u32* weight;  // 0 for the dead
   u32* dead;
 
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     float const o = sigmoid(model.opacity[i]);
     bool const alive = is_alive(model, i, dead_opacity);
     dead[i] = !alive;
@@ -68,7 +70,7 @@ struct mcmc_list_kernel {
   u32 const* dead;
   u64 const* place;
   u32* target;
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     if (dead[i]) target[place[i]] = i;
   }
 };
@@ -76,7 +78,7 @@ struct mcmc_list_kernel {
 struct mcmc_append_kernel {
   u32* target;
   index_t first;
-  GART_HD void operator()(index_t i) const { target[i] = first + i; }
+  GART_KERNEL void operator()(index_t i) const { target[i] = first + i; }
 };
 
 template <execution E>
@@ -88,7 +90,7 @@ struct mcmc_draw_kernel {
   u32* source;
   u32* copies;
 
-  GART_HD void operator()(index_t draw) const {
+  GART_KERNEL void operator()(index_t draw) const {
     random_words const w = random.words(draw);
     u64 const at = below(w.v[0], w.v[1], *total);
     // The last Gaussian whose sum is at most `at`: its weight is not zero.
@@ -108,12 +110,12 @@ struct mcmc_share_kernel {
   float least_opacity;
   int kernel_degree;
 
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     if (copies[i] == 0) return;
-    double const o = fmin(1 / (1 + exp(-static_cast<double>(model.opacity[i]))), 1 - 1e-7);
+    double const o = fmin(sigmoid_in_double(static_cast<double>(model.opacity[i])), 1 - 1e-7);
     relocated_shape const shape = relocation(o, copies[i] + 1, kernel_degree);
     double const opacity = fmin(fmax(shape.opacity, static_cast<double>(least_opacity)), 1 - 1e-7);
-    model.opacity[i] = static_cast<float>(log(opacity / (1 - opacity)));
+    model.opacity[i] = static_cast<float>(logit_in_double(opacity));
     float const shift = static_cast<float>(log(shape.scale_factor));
     for (int c = 0; c < 3; ++c) model.log_scale[i * std::size_t{3} + c] += shift;
   }
@@ -125,7 +127,7 @@ struct mcmc_copy_body {
   u32 const* target;
   bool grows;  // else it relocates
 
-  GART_HD void operator()(index_t draw, index_t column) const {
+  GART_KERNEL void operator()(index_t draw, index_t column) const {
     index_t const from = source[draw], to = target[draw], cleared = grows ? to : from;
     row_element(model, to, column) = row_element(model, from, column);
     row_element(first, cleared, column) = row_element(second, cleared, column) = 0;
@@ -137,29 +139,24 @@ struct mcmc_noise_kernel {
   random_source random;
   float amount, dead_opacity;
 
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     float const o = sigmoid(model.opacity[i]);
-    float const gate = amount / (1.0f + expf(100.0f * (o - dead_opacity)));
+    float const gate = amount * sigmoid(-100.0f * (o - dead_opacity));
     float const* const q = model.quaternion + std::size_t{4} * i;
-    float const norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-    if (!(gate > 0) || !(norm > 1e-16f)) return;
-    float const inverse = 1.0f / sqrtf(norm), w = q[0] * inverse, x = q[1] * inverse, y = q[2] * inverse,
-                z = q[3] * inverse;
-    float const r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-                           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-                           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+    quaternion const turn{q[0], q[1], q[2], q[3]};
+    if (!(gate > 0) || !(norm2(turn) > quaternion_norm2_min)) return;
+    mat3 const rotation = to_matrix(turn);
     random_normals const n = normals(random.words(i));
-    float local[3], moved[3];
-    for (int c = 0; c < 3; ++c)
-      local[c] =
-          (r[0][c] * n.v[0] + r[1][c] * n.v[1] + r[2][c] * n.v[2]) * expf(2 * model.log_scale[std::size_t{3} * i + c]);
-    bool finite = true;
+    vec3 moved(0.0f);  // the covariance times n, axis by axis
     for (int c = 0; c < 3; ++c) {
-      moved[c] =
-          model.mean[std::size_t{3} * i + c] + gate * (r[c][0] * local[0] + r[c][1] * local[1] + r[c][2] * local[2]);
-      finite = finite && is_finite(moved[c]);
+      vec3 const axis = rotation[c];
+      float const along = axis.x * n.v[0] + axis.y * n.v[1] + axis.z * n.v[2];
+      moved += axis * (along * expf(2 * model.log_scale[std::size_t{3} * i + c]));
     }
-    for (int c = 0; c < 3 && finite; ++c) model.mean[std::size_t{3} * i + c] = moved[c];
+    float* const mean = model.mean + std::size_t{3} * i;
+    moved = vec3(mean[0], mean[1], mean[2]) + gate * moved;
+    if (!is_finite(moved.x) || !is_finite(moved.y) || !is_finite(moved.z)) return;
+    mean[0] = moved.x, mean[1] = moved.y, mean[2] = moved.z;
   }
 };
 
@@ -168,7 +165,7 @@ struct mcmc_penalty_kernel {
   gaussians_view<float> gradient;
   float opacity_share, scale_share;
 
-  GART_HD void operator()(index_t i) const {
+  GART_KERNEL void operator()(index_t i) const {
     float const o = sigmoid(model.opacity[i]);
     gradient.opacity[i] += opacity_share * o * (1.0f - o);
     for (std::size_t c = 3 * std::size_t{i}; c < 3 * std::size_t{i} + 3; ++c)
@@ -181,11 +178,13 @@ struct mcmc_penalty_kernel {
 // The growth of a run that starts from `count` Gaussians: options.growth, or what reaches the budget within the first
 // two fifths of the densification steps where that is more, but no more than 1.2.
 inline float growth_for(mcmc_options const& options, index_t count, index_t max_gaussians, int iterations) {
-  double const rounds = 0.4 * (options.until * iterations - options.from) / (options.every > 0 ? options.every : 1);
+  constexpr double steepest = 1.2;
+  float const steps = options.until * static_cast<float>(iterations) - static_cast<float>(options.from);
+  double const rounds = 0.4 * static_cast<double>(steps) / (options.every > 0 ? options.every : 1);
   if (count == 0 || count >= max_gaussians || rounds < 1) return options.growth;
   double const needed = std::pow(static_cast<double>(max_gaussians) / count, 1 / rounds);
-  double const most = options.growth > 1.2 ? options.growth : 1.2;
-  return static_cast<float>(needed < options.growth ? options.growth : needed > most ? most : needed);
+  double const given = static_cast<double>(options.growth), limit = given > steepest ? given : steepest;
+  return static_cast<float>(needed < given ? given : needed > limit ? limit : needed);
 }
 
 // It has no state: what it draws depends on the seed and the step only. Steps count from 1.
@@ -224,8 +223,8 @@ class mcmc {
   }
 
   bool due(int step) const {
-    return options_.every > 0 && step > options_.from && step < options_.until * static_cast<float>(iterations_) &&
-           step % options_.every == 0;
+    return options_.every > 0 && step > options_.from && step % options_.every == 0 &&
+           static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
   }
 
   // After the optimizer's step: relocation and growth where they are due, and the noise. `mean_rate` is the rate the

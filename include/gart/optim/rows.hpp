@@ -1,7 +1,7 @@
 #pragma once
-// A Gaussian as one row of floats across the parameter arrays: columns 0-2 mean, 3-5 log_scale, 6-9 quaternion,
-// 10 opacity, 11.. sh. What moves, copies or clears whole Gaussians is one launch over (row, column), coalesced on a
-// device.
+// A Gaussian as one row of floats across the parameter arrays, in the order of their table
+// (scene/parameter_table.hpp): columns 0-2 mean, 3-5 log_scale, 6-9 quaternion, 10 opacity, 11.. sh. What moves, copies
+// or clears whole Gaussians is one launch over (row, column), coalesced on a device.
 
 #include <gart/exec/concepts.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -12,16 +12,25 @@ namespace gart::inline GART_ISA {
 // mean, log_scale and quaternion: what places and shapes a Gaussian, and comes first in a row.
 inline constexpr index_t geometry_columns = 10;
 
-GART_HD constexpr index_t row_width(int sh_degree) { return 11 + 3 * sh_coefficients(sh_degree); }
+inline index_t row_width(int sh_degree) {
+  index_t sum = 0;
+  for_each_array([&](parameter_array const& a, float const*) { sum += a.width(sh_degree); },
+                 gaussians_view<float const>{});
+  return sum;
+}
 
 template <class T>
 GART_HD GART_INLINE T& row_element(gaussians_view<T> const& g, index_t row, index_t column) {
-  std::size_t const r = row;
-  if (column >= 11) return g.sh[r * g.sh_stride() + (column - 11)];
-  if (column < 3) return g.mean[r * 3 + column];
-  if (column < 6) return g.log_scale[r * 3 + (column - 3)];
-  if (column < 10) return g.quaternion[r * 4 + (column - 6)];
-  return g.opacity[r];
+  T* element = nullptr;
+  index_t first = 0;  // column of an array
+  for_each_array(
+      [&](parameter_array const& a, T* values) {
+        index_t const width = a.width(g.sh_degree);
+        if (column >= first) element = values + std::size_t{row} * width + (column - first);
+        first += width;
+      },
+      g);
+  return *element;
 }
 
 // Whether a Gaussian is of use: its opacity above the least, and it and the geometry finite.
@@ -40,8 +49,7 @@ struct row_kernel {
   Body body;
   index_t rows, width;
 
-  template <class Team>
-  GART_HD void operator()(Team const& team) const {
+  GART_KERNEL void operator()(auto const& team) const {
     index_t const first = team.tile() * rows_per_tile;
     index_t const count = rows - first < rows_per_tile ? rows - first : rows_per_tile;
     team.for_each(count * width, [&](index_t e) { body(first + e / width, e % width); });

@@ -3,13 +3,16 @@
 //   C += T alpha c,  T *= 1 - alpha,
 // colour from spherical harmonics on the ray's direction, until T < transmittance_min (the hit that crosses counts), or
 // until max_hits of them where there is such a cap.
-// The background is added with what transmittance is left.
+// The background is added with what transmittance is left. What a hit does to a ray is a template over the number:
+// render/packet_composite.hpp does it to a packet of rays.
 
 #include <gart/math/blend.hpp>
 #include <gart/math/sh.hpp>
 #include <gart/render/options.hpp>
 #include <gart/render/record.hpp>
 #include <gart/scene/gaussians.hpp>
+
+#include <type_traits>
 
 namespace gart::inline GART_ISA {
 
@@ -29,19 +32,26 @@ struct image_targets {
   last_hit* last = nullptr;        // the hit that the ray ended with
 };
 
+// What the hits of a ray have added up to, or those of a ray a lane (math/lanes.hpp).
+template <class F>
+struct composited_hits {
+  using words = typename number<F>::words;
+  vec3_of<F> color{F(0.0f), F(0.0f), F(0.0f)};
+  F transmittance = 1.0f;
+  F depth = 0.0f;
+  words hits{};
+  F last_t = last_hit{}.t;
+  words last_place{};
+};
+
 template <int ShDegree, hit_record Record>
 struct composite : ray_program_base {
   static constexpr bool has_packets = true, has_warps = true;
   using ray_type = primary_ray;
-  struct state {
+  struct state : composited_hits<float> {
     pixel at;
     vec3 direction;
     sh_basis<ShDegree> basis;
-    vec3 color{0.0f};
-    float transmittance = 1;
-    float depth = 0;
-    u32 hits = 0;
-    last_hit last;
   };
 
   camera view;
@@ -78,17 +88,34 @@ struct composite : ray_program_base {
     return s.basis.unclamped(*reinterpret_cast<float const(*)[row_floats]>(row));
   }
   GART_HD GART_INLINE bool add(state& s, float t, float alpha, vec3 const& unclamped, u32 place) const {
-    vec3 const c = clamped_color(unclamped);
-    [[maybe_unused]] vec3 const opaque = opaque_color(c, s.color, s.transmittance);
-    float const weight = blend(alpha, t, c, s.color, s.depth, s.transmittance);
-    record(place, opaque, weight, unclamped);
-    ++s.hits;
-    s.last = {t, place};
-    return s.transmittance >= options.transmittance_min && s.hits != options.max_hits;
+    return blend_hit(s, true, t, alpha, unclamped, place) && s.hits != options.max_hits;
   }
 
-  GART_HD void end(index_t, state const& s) const {
-    std::size_t const a = order.address(s.at);
+  // A hit with the rays of a mask, or with the one ray there is. `place` is what the record knows it by. The rays that
+  // let through enough to go on, whatever the cap.
+  template <class F, class Place>
+  GART_HD GART_INLINE auto blend_hit(composited_hits<F>& s, typename number<F>::mask now, F t, F alpha,
+                                     vec3_of<F> const& unclamped, Place const& place) const {
+    using words = typename number<F>::words;
+    F const zero = 0.0f;
+    vec3_of<F> const c = clamped_color(unclamped);
+    [[maybe_unused]] vec3_of<F> const opaque = opaque_color(c, s.color, s.transmittance);
+    // A hit of no alpha leaves a ray as it is.
+    F const weight = blend(select(now, alpha, zero), select(now, t, zero), c, s.color, s.depth, s.transmittance);
+    words places;
+    if constexpr (std::is_same_v<F, float>)
+      record(place, opaque, weight, unclamped), places = place;
+    else
+      places = record(place, now, opaque, weight, unclamped);
+    s.hits += select(now, number<F>::every(1), number<F>::every(0));
+    s.last_t = select(now, t, s.last_t), s.last_place = select(now, places, s.last_place);
+    return s.transmittance >= F(options.transmittance_min);
+  }
+
+  GART_HD void end(index_t, state const& s) const { write(s.at, s); }
+
+  GART_HD void write(pixel at, composited_hits<float> const& s) const {
+    std::size_t const a = order.address(at);
     if (out.color) {
       vec3 const c = s.color + s.transmittance * options.background;
       out.color[3 * a] = c.x, out.color[3 * a + 1] = c.y, out.color[3 * a + 2] = c.z;
@@ -96,7 +123,7 @@ struct composite : ray_program_base {
     if (out.transmittance) out.transmittance[a] = s.transmittance;
     if (out.depth) out.depth[a] = s.depth;
     if (out.hits) out.hits[a] = s.hits;
-    if (out.last) out.last[a] = s.last;
+    if (out.last) out.last[a] = {s.last_t, s.last_place};
   }
 };
 static_assert(warp_program<composite<3, record_none>>);

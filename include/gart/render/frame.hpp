@@ -37,7 +37,7 @@ struct prepare_gaussians {
 
 }  // namespace render_kernels
 
-template <execution E, class Traits, class Tracer>
+template <execution E, scene_requirements Traits, class Tracer>
 requires tracer<Tracer, E>
 class frame {
  public:

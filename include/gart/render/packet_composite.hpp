@@ -13,26 +13,22 @@ struct packet_composite {
   using cell = typename Record::packet_cell;
   using note = typename Record::note;
   using shaded = vec3_of<lanes>;  // colour before the clamp
-  using scalar = composite<ShDegree, Record>;
-  struct state {
+  struct state : composited_hits<lanes> {
     packet_block block;
     lane_mask inside;
     vec3_of<lanes> directions;
     sh_basis<ShDegree, lanes> basis;
-    vec3_of<lanes> color;
-    lanes transmittance, depth, last_t;
-    lane_words hits, last_place;
   };
 
-  scalar program;
+  composite<ShDegree, Record> program;
 
   static pixel pixel_of(packet_block const& b, int lane) {
     return {b.x + packet_block::column(lane), b.y + packet_block::row(lane)};
   }
 
   state begin(packet_block const& block) const {
-    last_hit const none;
-    state s{block, {}, {}, {}, {0.0f, 0.0f, 0.0f}, 1.0f, 0.0f, none.t, {}, {}};
+    state s;
+    s.block = block;
     u32 inside = 0;
     for (int l = 0; l < lane_count; ++l) {
       inside |= (program.order.inside(pixel_of(block, l)) ? 1u : 0u) << l;
@@ -57,13 +53,7 @@ struct packet_composite {
 
   GART_INLINE lane_mask on_hit(state& s, lane_mask now, lanes t, lanes alpha, shaded const& unclamped,
                                note const& at) const {
-    vec3_of<lanes> const c = clamped_color(unclamped), opaque = opaque_color(c, s.color, s.transmittance);
-    // A hit of no alpha leaves a ray as it is.
-    lanes const weight = blend(select(now, alpha, 0.0f), select(now, t, 0.0f), c, s.color, s.depth, s.transmittance);
-    lane_words const places = program.record(at, now, opaque, weight, unclamped);
-    s.hits += select(now, every_lane(1), every_lane(0));
-    s.last_t = select(now, t, s.last_t), s.last_place = select(now, places, s.last_place);
-    lane_mask on = s.transmittance >= lanes(program.options.transmittance_min);
+    lane_mask on = program.blend_hit(s, now, t, alpha, unclamped, at);
     if (program.options.max_hits > 0) on &= ~equal(s.hits, every_lane(program.options.max_hits));
     return on;
   }
@@ -71,12 +61,12 @@ struct packet_composite {
   void end(state const& s) const {
     for (int l = 0; l < lane_count; ++l) {
       if (!s.inside[l]) continue;
-      typename scalar::state one;
-      one.at = pixel_of(s.block, l);
-      one.color = {s.color.x.v[l], s.color.y.v[l], s.color.z.v[l]};
-      one.transmittance = s.transmittance.v[l], one.depth = s.depth.v[l], one.hits = s.hits[l];
-      one.last = {s.last_t.v[l], s.last_place[l]};
-      program.end(0, one);
+      program.write(pixel_of(s.block, l), {{s.color.x.v[l], s.color.y.v[l], s.color.z.v[l]},
+                                           s.transmittance.v[l],
+                                           s.depth.v[l],
+                                           s.hits[l],
+                                           s.last_t.v[l],
+                                           s.last_place[l]});
     }
   }
 };

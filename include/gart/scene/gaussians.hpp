@@ -6,11 +6,13 @@
 //   opacity     [N]        logit
 //   sh          [N][K][3]  coefficient-major, colours interleaved (splat files are channel-major; io converts)
 // gaussian_model holds them on the host, gaussians<E> in a policy's memory; gradients and Adam's moments have the same
-// shape. Errors: invalid_argument for more Gaussians than 32-bit indices can serve; out_of_memory.
+// shape, and what is done to all five arrays walks scene/parameter_table.hpp. Errors: invalid_argument for more
+// Gaussians than 32-bit indices can serve; out_of_memory.
 
 #include <gart/core/error.hpp>
 #include <gart/core/span.hpp>
 #include <gart/exec/buffer.hpp>
+#include <gart/scene/parameter_table.hpp>
 
 #include <algorithm>
 #include <string>
@@ -27,8 +29,6 @@ inline void require_count(std::size_t n) {
                            " that a scene can hold: lower train_options.max_gaussians");
 }
 
-GART_HD constexpr int sh_coefficients(int degree) { return (degree + 1) * (degree + 1); }
-
 struct gaussian_model {
   int sh_degree = 0;
   std::vector<float> mean, log_scale, quaternion, opacity, sh;
@@ -36,8 +36,15 @@ struct gaussian_model {
   std::size_t size() const { return opacity.size(); }
   void resize(std::size_t n, int degree) {
     sh_degree = degree;
-    mean.resize(n * 3), log_scale.resize(n * 3), quaternion.resize(n * 4), opacity.resize(n);
-    sh.resize(n * 3 * sh_coefficients(degree));
+    for_each_array([&](parameter_array const& a, auto& values) { values.resize(n * a.width(degree)); }, *this);
+  }
+  // Whether all arrays are of size() Gaussians.
+  bool arrays_agree() const {
+    bool agree = true;
+    for_each_array([&](parameter_array const& a,
+                       auto const& values) { agree = agree && values.size() == size() * a.width(sh_degree); },
+                   *this);
+    return agree;
   }
 };
 
@@ -93,22 +100,20 @@ class gaussians {
   // Existing Gaussians stay; new ones are undefined.
   void resize_keep(std::size_t n) {
     require_count(n);
-    mean.resize_keep(3 * n), log_scale.resize_keep(3 * n);
-    quaternion.resize_keep(4 * n), opacity.resize_keep(n);
-    sh.resize_keep(std::size_t{3} * sh_coefficients(degree_) * n);
+    for_each_array([&](parameter_array const& a, auto& values) { values.resize_keep(n * a.width(degree_)); }, *this);
   }
-  void zero() { mean.zero(), log_scale.zero(), quaternion.zero(), opacity.zero(), sh.zero(); }
+  void zero() {
+    for_each_array([](parameter_array const&, auto& values) { values.zero(); }, *this);
+  }
   void assign(gaussian_model const& m) {
     require_count(m.size());
     degree_ = m.sh_degree;
-    mean.assign(m.mean), log_scale.assign(m.log_scale), quaternion.assign(m.quaternion);
-    opacity.assign(m.opacity), sh.assign(m.sh);
+    for_each_array([](parameter_array const&, auto& to, auto const& from) { to.assign(from); }, *this, m);
   }
   gaussian_model to_host() const {
     gaussian_model m;
     m.sh_degree = degree_;
-    m.mean = mean.to_host(), m.log_scale = log_scale.to_host(), m.quaternion = quaternion.to_host();
-    m.opacity = opacity.to_host(), m.sh = sh.to_host();
+    for_each_array([](parameter_array const&, auto& to, auto const& from) { to = from.to_host(); }, m, *this);
     return m;
   }
 

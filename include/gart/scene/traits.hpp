@@ -7,12 +7,19 @@
 
 namespace gart::inline GART_ISA {
 
+template <class T>
+concept scene_requirements = requires {
+  { T::sh_degree } -> std::convertible_to<int>;  // 0 to 3, that the coefficients are stored with
+  typename T::response;                          // how a Gaussian falls from its centre (math/response.hpp)
+} && response_function<typename T::response>;
+
 // Response: how a Gaussian falls from its centre, and in which arithmetic (math/response.hpp).
-template <int ShDegree = 3, class Response = generalized_gaussian<>>
+template <int ShDegree = 3, response_function Response = generalized_gaussian<>>
 struct scene_traits {
   static_assert(ShDegree >= 0 && ShDegree <= 3, "spherical harmonics go to degree 3");
   static constexpr int sh_degree = ShDegree;
   using response = Response;
 };
+static_assert(scene_requirements<scene_traits<>>);
 
 }  // namespace gart::inline GART_ISA

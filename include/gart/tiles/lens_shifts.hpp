@@ -26,8 +26,8 @@ struct lens_shifts {
   span<lens_shift> shifts;
 
   GART_KERNEL void operator()(index_t tile) const {
-    float const a = ((tile % grid.columns() + 0.5f) * Size - view.cx) / view.fx;
-    float const b = ((tile / grid.columns() + 0.5f) * Size - view.cy) / view.fy;
+    float const a = ((static_cast<float>(tile % grid.columns()) + 0.5f) * Size - view.cx) / view.fx;
+    float const b = ((static_cast<float>(tile / grid.columns()) + 0.5f) * Size - view.cy) / view.fy;
     vec2 const p = undistort(view.lens, {a, b});
     // What p is the exact answer for; the tile's corners are so far from there.
     double u, v;

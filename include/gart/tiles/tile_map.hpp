@@ -36,7 +36,7 @@ namespace tile_kernels {
 
 // A team takes some primitives; its lanes take the pairs of all of them in turn, since boxes differ in size by orders
 // of magnitude. A host's one lane takes them box by box.
-template <execution E, int Size, class Order>
+template <execution E, int Size, tile_order Order>
 struct emit_pairs {
   static constexpr int block_size = 128;
   static constexpr u32 share = 128;  // primitives of a team
@@ -54,8 +54,7 @@ struct emit_pairs {
   int order_bits;
   span<u32> keys, primitives;
 
-  template <class Team>
-  GART_HD void operator()(Team const& team) const {
+  GART_KERNEL void operator()(auto const& team) const {
     u32 const begin = team.tile() * share, left = static_cast<u32>(ranges.size()) - begin;
     u32 const n = left < share ? left : share;
     u64 const at = offsets[begin];
@@ -128,7 +127,7 @@ class tile_map {
  public:
   explicit tile_map(E& exec) : keys_(exec), primitives_(exec), offsets_(exec), ranks_(exec), longest_first_(exec) {}
 
-  template <class Order>
+  template <tile_order Order>
   void build(E& exec, tile_grid<Size> const& grid, footprints<E, Size> const& prints, Order order) {
     stage_scope stage(exec, "map");
     u64 const pairs = prints.pairs();

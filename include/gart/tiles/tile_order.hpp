@@ -2,6 +2,7 @@
 // The orders of a tile's list. An order turns a (primitive, tile) pair into the low bits of its key:
 //   take(free_bits)   how many of the key's free bits it uses, asked once, before anything else
 //   of(i)             what it needs of primitive i, for all its tiles
+//   shift()           of a depth, how many low bits keys leave out; 0 where they hold none
 //   key(p, cell, tile)  of the pair whose pixels are `cell`, the primitive's box cut by the tile of this number
 
 #include <gart/math/rectangle_depth.hpp>
@@ -9,7 +10,19 @@
 #include <gart/tiles/grid.hpp>
 #include <gart/tiles/lens_shifts.hpp>
 
+#include <concepts>
+#include <type_traits>
+
 namespace gart::inline GART_ISA {
+
+template <class O>
+concept tile_order = std::is_trivially_copyable_v<O> &&
+    requires(O order, O const& k, typename O::primitive const& p, index_t i, pixel_box const& cell, u32 tile) {
+  { order.take(32) } -> std::same_as<int>;
+  { k.shift() } -> std::same_as<int>;  // of a depth: the bits that keys leave out
+  { k.of(i) } -> std::same_as<typename O::primitive>;
+  { k.key(p, cell, tile) } -> std::same_as<u32>;
+};
 
 // A depth (not negative) as an integer of the same order, `shift` low bits dropped; and the depth it stands for, which
 // is not larger.
@@ -82,5 +95,6 @@ struct number_order {
   GART_HD primitive of(index_t) const { return {}; }
   GART_HD u32 key(primitive, pixel_box const& /*cell*/, u32 /*tile*/) const { return 0; }
 };
+static_assert(tile_order<depth_order> && tile_order<number_order>);
 
 }  // namespace gart::inline GART_ISA

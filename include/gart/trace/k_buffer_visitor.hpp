@@ -22,7 +22,7 @@ struct k_buffer_visitor {
   GART_HD GART_INLINE float far() const { return window.far(); }
   GART_HD GART_INLINE void leaf(u32 id) {
     ray_gaussian const g = scene.gaussians[id];
-    response const r = evaluate<Response>(g, ray);
+    ray_peak const r = evaluate<Response>(g, ray);
     if (is_hit(g, r, scene.near) && before(last_t, last_id, r.t, id) && window.wants(r.t, id))
       window.insert({r.t, id, hit_alpha<Response>(g, r.d2)});
   }

@@ -17,7 +17,7 @@ struct packet_cell {
   u32 id;
 
   packet_cell() = default;
-  GART_INLINE packet_cell(u32 id, footprint_slots const& range, pixel_box const& tile) : id(id) {
+  GART_INLINE packet_cell(u32 gaussian, footprint_slots const& range, pixel_box const& tile) : id(gaussian) {
     pixel_box const cell = intersect(range.box, tile);
     u32 const x = u32{cell.x0} - tile.x0, y = u32{cell.y0} - tile.y0;
     columns = ((u32{1} << cell.width()) - 1) << x;

@@ -213,11 +213,11 @@ class walk_tile_warps {
     __device__ GART_INLINE bool evaluate(candidate const (&from)[group], int first, int count) {
       float t[group], d2[group];
       u32 found = 0, tied = 0;
-      response two[2];
+      ray_peak two[2];
       GART_UNROLL
       for (int c = 0; c < group; ++c) {
         if (c % 2 == 0) evaluate_all<Response>(two, [&](int k) { return approach_to(from[c + k].gaussian, ray_); });
-        response const& r = two[c % 2];
+        ray_peak const& r = two[c % 2];
         t[c] = r.t, d2[c] = r.d2;
         bool const is_new = is_hit(from[c].gaussian, r, last_t_), exists = first + c < count;
         found |= (exists & is_new ? 1u : 0u) << c;

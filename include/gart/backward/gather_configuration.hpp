@@ -1,0 +1,54 @@
+#pragma once
+// What a gather (backward/gather.hpp) is compiled for, one struct of these members:
+//   policy     the execution policy on which it runs
+//   response   how the Gaussians fall from their centres (math/response.hpp)
+//   terms      what it sums up: terms<color>, terms<geometry> or both
+//   entry      what a slot of the LT buffer holds of a hit (backward/lt_slot.hpp)
+//   sh_degree  that the coefficients are stored with
+//   tile_size  side of a tile, in pixels
+//   sums       where a pair's sums go
+//   validity   how a slot that is a hit is told from one that is none (backward/strategies.hpp)
+//   form       which form of the kernel runs (exec/concepts.hpp): the policy's, unless a strategy asks for the plain
+//   one
+// strategy_gather makes one of a strategy; a struct of a program's own does as well (bench/registers.cu).
+
+#include <gart/backward/strategies.hpp>
+#include <gart/exec/concepts.hpp>
+#include <gart/math/response.hpp>
+
+#include <concepts>
+
+namespace gart::inline GART_ISA {
+
+// Where a lane's sums go: added to the Gaussian atomically, or kept as one row a (primitive, tile) pair, in
+// primitive-major order, for sum_pairs to add up in that order: the same bits in every run.
+enum class gather_sums { atomic, ordered };
+
+template <class C>
+concept gather_configuration = requires {
+  typename C::policy;
+  typename C::response;
+  { C::terms::color } -> std::convertible_to<bool>;
+  { C::terms::geometry } -> std::convertible_to<bool>;
+  typename C::entry;
+  { C::sh_degree } -> std::convertible_to<int>;
+  { C::tile_size } -> std::convertible_to<int>;
+  { C::sums } -> std::convertible_to<gather_sums>;
+  { C::validity } -> std::convertible_to<slot_validity>;
+  { C::form } -> std::convertible_to<kernel_form>;
+}
+&&execution<typename C::policy>&& response_function<typename C::response>;
+
+template <execution E, int ShDegree, response_function Response, strategy Strategy, int TileSize>
+struct strategy_gather {
+  using policy = E;
+  using response = Response;
+  using terms = typename Strategy::gather;
+  using entry = typename Strategy::template record<TileSize>::entry;
+  static constexpr int sh_degree = ShDegree, tile_size = TileSize;
+  static constexpr gather_sums sums = Strategy::ordered ? gather_sums::ordered : gather_sums::atomic;
+  static constexpr slot_validity validity = Strategy::validity;
+  static constexpr kernel_form form = Strategy::lane_by_lane ? kernel_form::plain : E::form;
+};
+
+}  // namespace gart::inline GART_ISA
