@@ -61,7 +61,7 @@ int run_bench(bench_arguments const& a) {
   options.densify = gart::densify_kind::none;
   options.iterations = 1;  // the full SH degree from the first step
   options.sh_every = 1;
-  options.render = file.render;
+  options.render = file.render.approximations();
   // Rates of zero keep the model as it is; Adam's work is the same.
   options.rates = {0, 0, 0, 0, 0, 0, 0};
 
@@ -149,7 +149,7 @@ void add_bench(CLI::App& app, command& selected) {
                    "cleared (primitive\nwith its LT buffer cleared)")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(strategy_names());
+      ->check(one_of_strategies());
   bench->add_option("--views", a->views, "The first so many cameras")
       ->type_name("N")
       ->capture_default_str()

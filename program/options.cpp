@@ -49,7 +49,11 @@ nlohmann::json recorded_options::continue_from(nlohmann::json const& saved, std:
   return raised;
 }
 
-CLI::Validator strategy_names() { return one_of({"auto", "pixel", "hybrid", "primitive", "deterministic", "cleared"}); }
+CLI::Validator one_of_strategies(gart::strategy_use use) {
+  std::vector<std::string> names = gart::strategy_names(use);
+  names.insert(names.begin(), "auto");
+  return one_of(names);
+}
 
 CLI::Validator kernel_degree_names() {
   std::vector<std::string> names;

@@ -3,6 +3,7 @@
 
 #include "help.hpp"
 
+#include <gart/backward/strategies.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
@@ -68,7 +69,8 @@ template <gart::named E>
 CLI::Validator name_of_a() {
   return one_of(gart::list_of_names<E>());
 }
-CLI::Validator strategy_names();
+// "auto", or a strategy of that use.
+CLI::Validator one_of_strategies(gart::strategy_use use = gart::strategy_use::measuring);
 CLI::Validator kernel_degree_names();
 
 gart::vec3 background_color(std::string const& name);

@@ -81,7 +81,7 @@ int run_render(render_arguments const& a) {
   nlohmann::json timings = {{"backend", gart::to_string(configuration.backend)},
                             {"tracer", gart::to_string(configuration.tracer)},
                             {"gaussians", file.model.size()},
-                            {"approximations", approximations_of(options, configuration)},
+                            {"approximations", approximations_of(options.approximations(), configuration)},
                             {"samples", a.samples},
                             {"views", nlohmann::json::array()}};
   renderer->profile().enable(!a.json.empty());

@@ -242,7 +242,7 @@ class tradeoff_run {
             {"kernel_degree", configuration.kernel_degree},
             {"tile_size", configuration.tile_size},
             {"window", configuration.window},
-            {"approximations", approximations_of(s.use.render, configuration)},
+            {"approximations", approximations_of(s.use.render.approximations(), configuration)},
             {"rebuild_every", s.use.render.rebuild_every},
             {"shrink", s.use.shrink},
             {"image", {{"max", errors.image_max()}, {"rms", errors.image_rms()}, {"psnr", errors.psnr()}}},
@@ -319,7 +319,7 @@ void add_tradeoff(CLI::App& app, command& selected) {
                    "deterministic or cleared")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(strategy_names());
+      ->check(one_of_strategies());
   tradeoff
       ->add_option("--reference-alpha-min", a->reference_alpha_min,
                    "Opacity below which the reference sees no hit, 0: the\nmodel's own, with which it was trained; "

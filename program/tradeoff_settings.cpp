@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <gart/backward/strategies.hpp>
 #include <gart/runtime/presets.hpp>
 #include <iterator>
 
@@ -85,7 +86,7 @@ std::vector<setting> settings_of(configuration const& exact) {
       "window", [](c& x) -> int& { return x.configuration.window; }, std::vector<int>{16, 64});
   t.sweep(
       "backward", [](c& x) -> std::string& { return x.configuration.backward; },
-      std::vector<std::string>{"pixel", "hybrid", "primitive", "cleared", "deterministic"});
+      gart::strategy_names(gart::strategy_use::measuring));
   t.sweep(
       "tracer", [](c & x) -> auto& { return x.configuration.tracer; },
       std::vector{gart::tracer_kind::tiles, gart::tracer_kind::bvh, gart::tracer_kind::embree});

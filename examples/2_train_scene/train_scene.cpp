@@ -1,5 +1,6 @@
 // Trains on a capture (COLMAP, Blender, nerfstudio) and writes the scene: train_scene DATASET MODEL.ply [ITERATIONS]
-#include <gart/io/ply.hpp>
+#include <gart/runtime/choose.hpp>
+#include <gart/runtime/model_file.hpp>
 #include <gart/runtime/session.hpp>
 
 #include <cstdio>
@@ -14,15 +15,16 @@ int main(int argc, char** argv) try {
   gart::train_options options;
   options.iterations = argc > 3 ? std::atoi(argv[3]) : 2000;
   options.max_gaussians = 20'000;
-  options.background = data.alpha ? gart::background_kind::white : gart::background_kind::black;
 
-  auto const training = gart::make_session({}, options, data);
+  // Background, exposures and the like as they suit the capture; what should be otherwise is set after this.
+  auto const use = gart::recommended(options, data);
+  auto const training = gart::make_session(use.request, use.options, data);
   while (training->steps_done() < options.iterations) {
     gart::step_report const done = training->step();
     if (done.step % 100 == 0)
       std::printf("%5d  loss %.4f  psnr %.2f dB  %u Gaussians\n", done.step, done.loss, done.psnr, done.gaussians);
   }
-  gart::write_splat_ply(argv[2], training->model());
+  gart::save_model(argv[2], {training->model(), gart::render_options_of(use.options, data.extent)});
   return 0;
 } catch (std::exception const& e) {
   return std::fprintf(stderr, "train_scene: %s\n", e.what()), 1;

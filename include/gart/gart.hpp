@@ -17,7 +17,10 @@
 #include <gart/render/frame.hpp>
 #include <gart/runtime/choose.hpp>
 #include <gart/runtime/degree_selection.hpp>
+#include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/initial.hpp>
+#include <gart/runtime/model_file.hpp>
+#include <gart/runtime/presets.hpp>
 #include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
 #include <gart/trace/bvh_tracer.hpp>

@@ -22,7 +22,7 @@ OPTIONS = """#include <gart/gart.hpp>
 gart::dataset_options const loading{.downscale = 4};
 gart::train_options const training{.iterations = 2000};
 gart::render_options const rendering{.near = 0.1f};
-gart::configuration_request const request{.backend = "openmp"};
+gart::configuration_request const request{.backend = gart::backend_kind::openmp};
 """
 
 

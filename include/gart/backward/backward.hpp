@@ -109,8 +109,7 @@ class backward_pass {
 
  private:
   template <class F, strategy S>
-  friend void differentiate(F&, backward_pass<F, S>&, span<float const>, gaussians<typename F::execution_type>&,
-                            span<float const>);
+  friend void differentiate(F&, backward_pass<F, S>&, span<float const>, gaussians_view<float>, span<float const>);
   using entry = typename record_type::entry;
   enum standing { nothing, prepared, rendered };
 
@@ -118,8 +117,7 @@ class backward_pass {
     if (stands_at_ < least || frame_ != &frame || preparation_ != frame.preparation()) throw invalid_argument(what);
   }
 
-  void run(Frame& frame, span<float const> color_gradient, gaussians<execution_type>& gradients,
-           span<float const> error) {
+  void run(Frame& frame, span<float const> color_gradient, gaussians_view<float> gradients, span<float const> error) {
     using response = typename Frame::response;
     require(frame, rendered, "differentiate: call backward_pass.render first, after frame.prepare");
     execution_type& exec = frame.exec();
@@ -131,21 +129,21 @@ class backward_pass {
       throw invalid_argument("differentiate: the image's gradient must have three values for each pixel of the view");
     if (!error.empty() && error.size() != pixels)
       throw invalid_argument("differentiate: the error must have a value for each pixel of the view");
-    if (gradients.size() != scene.count || gradients.sh_degree() != sh_degree)
+    if (gradients.count != scene.count || gradients.sh_degree != sh_degree)
       throw invalid_argument("differentiate: the gradients must have the number and the SH degree of the Gaussians");
     stage_scope stage(exec, "backward");
     moments_.resize(std::size_t{moment_stride} * scene.count);
     // The ordered sums write every Gaussian themselves.
     if constexpr (!(ordered && Strategy::gather::geometry)) moments_.zero();
-    if constexpr (!(ordered && Strategy::gather::color)) gradients.sh.zero();
+    if constexpr (!(ordered && Strategy::gather::color))
+      exec.zero(gradients.sh, sizeof(float) * scene.count * static_cast<std::size_t>(gradients.sh_stride()));
     if constexpr (records) {
       if constexpr (ordered) rows_.resize(prints_->pairs() * pair_gradient<sh_degree>::quads);
       gather(frame, color_gradient, error, gradients);
       if constexpr (ordered)
-        parallel_for(
-            exec, "backward/sum", scene.count * pair_gradient<sh_degree>::quads,
-            sum_pairs<sh_degree, typename Strategy::gather>{prints_->pair_offsets(), prints_->pairs(), rows_.data(),
-                                                            gradients.sh.data(), moments_.data()});
+        parallel_for(exec, "backward/sum", scene.count * pair_gradient<sh_degree>::quads,
+                     sum_pairs<sh_degree, typename Strategy::gather>{prints_->pair_offsets(), prints_->pairs(),
+                                                                     rows_.data(), gradients.sh, moments_.data()});
     }
     if constexpr (Strategy::scatter::any) {
       pixel_order const order{view.width, view.height};
@@ -162,12 +160,12 @@ class backward_pass {
                       color_,
                       color_gradient.data(),
                       error.data(),
-                      gradients.sh.data(),
+                      gradients.sh,
                       moments_.data()});
     }
     auto const finish = [&]<class Filter>(Filter const& filter) {
       parallel_for(exec, "backward/finish", scene.count,
-                   backward_kernels::finish<Filter>{scene, frame.gaussians(), moments_, gradients.view(), filter});
+                   backward_kernels::finish<Filter>{scene, frame.gaussians(), moments_, gradients, filter});
     };
     if (frame.options().antialias > 0)
       visit_camera(view, [&](auto const& model) { finish(model.filter(frame.options().antialias)); });
@@ -176,12 +174,12 @@ class backward_pass {
   }
 
   void gather(Frame const& frame, span<float const> color_gradient, span<float const> error,
-              gaussians<execution_type>& gradients) {
+              gaussians_view<float> gradients) {
     using kernel = gather_of<strategy_gather<execution_type, sh_degree, typename Frame::response, Strategy, tile_size>>;
     parallel_for(
         frame.exec(), "backward/gather", tile_range{grid_.count(), kernel::block_size},
         kernel{frame.rays(), grid_, lists_, prints_->ranges().data(), slots_.data(), frame.gaussians().data(),
-               frame.active_degree(), color_, color_gradient.data(), error.data(), gradients.sh.data(), moments_.data(),
+               frame.active_degree(), color_, color_gradient.data(), error.data(), gradients.sh, moments_.data(),
                prints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near});
   }
 
@@ -205,8 +203,14 @@ class backward_pass {
 // over a Gaussian's hits of weight times error (backward_pass.moments).
 template <class Frame, strategy Strategy>
 void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, span<float const> color_gradient,
-                   gaussians<typename Frame::execution_type>& gradients, span<float const> error = {}) {
+                   gaussians_view<float> gradients, span<float const> error = {}) {
   pass.run(frame, color_gradient, gradients, error);
+}
+
+template <class Frame, strategy Strategy>
+void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, span<float const> color_gradient,
+                   gaussians<typename Frame::execution_type>& gradients, span<float const> error = {}) {
+  differentiate(frame, pass, color_gradient, gradients.view(), error);
 }
 
 }  // namespace gart::inline GART_ISA

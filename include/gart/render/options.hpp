@@ -21,9 +21,18 @@ struct approximation_options {
   int rebuild_every = 1;
 };
 
-struct render_options : approximation_options {
+struct render_options {
+  float alpha_min = approximation_options{}.alpha_min;
+  float transmittance_min = approximation_options{}.transmittance_min;
   float near = 0.01f;  // hits lie at t > near, world units along the ray
+  u32 max_hits = approximation_options{}.max_hits;
+  float antialias = approximation_options{}.antialias;
+  int rebuild_every = approximation_options{}.rebuild_every;
   vec3 background{0.0f};
+
+  approximation_options approximations() const {
+    return {alpha_min, transmittance_min, max_hits, antialias, rebuild_every};
+  }
 };
 
 // The filter of models that are antialiased: a square pixel has a standard deviation of 0.29.

@@ -8,38 +8,11 @@
 //                                                                gart::tile_tracer<gart::openmp_exec, 8, response>,
 //                                                                gart::primitive_strategy>(-1))
 
+#include <gart/runtime/compiled_renderer.hpp>
 #include <gart/runtime/registry.hpp>
 #include <gart/train/trainer.hpp>
 
 namespace gart::inline GART_ISA {
-
-template <execution E, class Traits, class Tracer, strategy Strategy>
-configuration_info configuration_of() {
-  using response = typename Traits::response;
-  configuration_info configuration;
-  configuration.backend = from_string(E::name, backend_kind::automatic);
-  configuration.tracer = from_string(Tracer::name, tracer_kind::own);
-  configuration.backward = Strategy::name;
-  configuration.sh_degree = Traits::sh_degree, configuration.kernel_degree = response::degree;
-  configuration.arithmetic = response::fast ? arithmetic_kind::fast : arithmetic_kind::exact;
-  configuration.lt_format =
-      from_string(Strategy::template record<Tracer::tile_size>::entry::name, lt_format_kind::none);
-  configuration.tile_size = Tracer::tile_size;
-  configuration.window = Tracer::window;
-  if constexpr (!E::device) configuration.instruction_set = instruction_set;
-  return configuration;
-}
-
-// The policy that a request asks for.
-template <execution E>
-E policy_of(configuration_request const& request) {
-  if constexpr (E::device)
-    return E(request.device, request.stream);
-  else if constexpr (std::is_constructible_v<E, int>)
-    return E(request.threads);
-  else
-    return E();
-}
 
 template <execution E, class Traits, class Tracer, strategy Strategy>
 class compiled_session final : public session {
@@ -68,60 +41,6 @@ class compiled_session final : public session {
  private:
   E exec_;
   trainer<E, Traits, Tracer, Strategy> trainer_;
-};
-
-template <execution E, class Traits, class Tracer, strategy Strategy>
-class compiled_renderer final : public renderer {
- public:
-  static constexpr int sh_degree = Traits::sh_degree;
-
-  explicit compiled_renderer(configuration_request const& request)
-      : exec_(policy_of<E>(request)),
-        frame_(exec_),
-        pass_(exec_),
-        scene_(exec_, 0, sh_degree),
-        gradients_(exec_, 0, sh_degree),
-        color_(exec_),
-        color_gradient_(exec_) {}
-  void set_model(gaussian_model const& model) override {
-    if (model.sh_degree != Traits::sh_degree) throw invalid_argument("renderer: the model has another SH degree");
-    scene_.assign(model);
-  }
-  rendered render(camera const& view, render_options const& options) override {
-    require_tree(options.rebuild_every, configuration().tracer);
-    frame_.prepare(std::as_const(scene_).view(), view, options);
-    return render_image(frame_);
-  }
-  void differentiate(camera const& view, render_options const& options, image_float const& color_gradient) override {
-    require_tree(options.rebuild_every, configuration().tracer);
-    std::size_t const floats = std::size_t{3} * view.width * view.height;
-    if (color_gradient.data.size() != floats)
-      throw invalid_argument("renderer: the colour's gradient must have three values for each pixel of the view");
-    color_.resize(floats), color_gradient_.assign(color_gradient.data);
-    gradients_.resize_keep(scene_.size());
-    stage_scope stage(exec_, "gradients");
-    frame_.prepare(std::as_const(scene_).view(), view, options);
-    if (!pass_.prepare(frame_)) throw pass_.no_room();
-    image_targets targets;
-    targets.color = color_.data();
-    pass_.render(frame_, targets);
-    gart::differentiate(frame_, pass_, color_gradient_, gradients_);
-  }
-  gaussian_model gradients() const override { return gradients_.to_host(); }
-  profiler& profile() override {
-    exec_.synchronize();
-    return exec_.profile;
-  }
-  std::size_t peak_bytes() const override { return exec_.memory.peak; }
-  std::size_t lt_bytes() const override { return pass_.lt_bytes(); }
-  configuration_info configuration() const override { return configuration_of<E, Traits, Tracer, Strategy>(); }
-
- private:
-  E exec_;
-  frame<E, Traits, Tracer> frame_;
-  backward_pass<frame<E, Traits, Tracer>, Strategy> pass_;
-  gaussians<E> scene_, gradients_;
-  buffer<float, E> color_, color_gradient_;
 };
 
 template <execution E, class Traits, class Tracer, strategy Strategy>

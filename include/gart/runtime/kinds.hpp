@@ -31,8 +31,12 @@ constexpr auto names_of(arithmetic_kind) {
 enum class lt_format_kind { automatic, float4, half, shared, weight, none };
 constexpr auto names_of(lt_format_kind) {
   using enum lt_format_kind;
-  return std::array<name_of<lt_format_kind>, 6>{
-      {{automatic, "auto"}, {float4, "float4"}, {half, "half"}, {shared, "shared"}, {weight, "weight"}, {none, "none"}}};
+  return std::array<name_of<lt_format_kind>, 6>{{{automatic, "auto"},
+                                                 {float4, "float4"},
+                                                 {half, "half"},
+                                                 {shared, "shared"},
+                                                 {weight, "weight"},
+                                                 {none, "none"}}};
 }
 
 // The degrees of the generalised Gaussians that math/response.hpp has.

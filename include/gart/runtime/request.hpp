@@ -1,7 +1,7 @@
 #pragma once
 // Which of the compiled configurations computes, and where: what make_session and make_renderer take.
-// Errors: resolve throws unsupported, naming the configurations there are and how to compile one, for a request that none
-// meets.
+// Errors: resolve throws unsupported, naming the configurations there are and how to compile one, for a request that
+// none meets.
 
 #include <gart/runtime/kinds.hpp>
 
@@ -16,15 +16,15 @@ struct configuration_request {
   tracer_kind tracer = tracer_kind::automatic;
   std::string backward = "auto";  // a strategy by its name (backward/strategies.hpp), or one of a program's own
   int sh_degree = 3;              // of the spherical harmonics of colour that are stored, 0 to 3
-  int kernel_degree = 2;  // of the generalised Gaussians (math/response.hpp)
+  int kernel_degree = 2;          // of the generalised Gaussians (math/response.hpp)
   arithmetic_kind arithmetic = arithmetic_kind::exact;
   lt_format_kind lt_format = lt_format_kind::automatic;
-  int tile_size = 0;       // pixels a side
-  int window = 0;          // hits that a ray keeps in order before it goes over the scene again
-  int threads = 0;         // of the openmp policy; 0: as many as OpenMP gives
-  int device = 0;          // of the cuda policy
-  // Of the cuda policy: a cudaStream_t of the caller's that all work goes to (cudaStreamLegacy for the default one); null:
-  // one of its own.
+  int tile_size = 0;  // pixels a side
+  int window = 0;     // hits that a ray keeps in order before it goes over the scene again
+  int threads = 0;    // of the openmp policy; 0: as many as OpenMP gives
+  int device = 0;     // of the cuda policy
+  // Of the cuda policy: a cudaStream_t of the caller's that all work goes to (cudaStreamLegacy for the default one);
+  // null: one of its own.
   void* stream = nullptr;
 };
 

@@ -56,11 +56,9 @@ struct train_options {
 
 // What a scene of that extent is traced with.
 inline render_options render_options_of(train_options const& options, float extent, vec3 background = vec3(0.0f)) {
-  render_options render;
-  static_cast<approximation_options&>(render) = options.render;
-  render.near = options.near * extent;
-  render.background = background;
-  return render;
+  approximation_options const& a = options.render;
+  return {a.alpha_min,     a.transmittance_min, options.near * extent, a.max_hits, a.antialias,
+          a.rebuild_every, background};
 }
 
 }  // namespace gart

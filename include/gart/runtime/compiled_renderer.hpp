@@ -1,0 +1,107 @@
+#pragma once
+// The renderer (runtime/renderer.hpp) of a policy, traits, a tracer and a strategy: a frame, a backward pass, and the
+// memory that a caller does not bring.
+
+#include <gart/backward/backward.hpp>
+#include <gart/render/bytes.hpp>
+#include <gart/render/render_image.hpp>
+#include <gart/runtime/configuration_of.hpp>
+#include <gart/runtime/registry.hpp>
+
+#include <utility>
+
+namespace gart::inline GART_ISA {
+
+template <execution E, class Traits, class Tracer, strategy Strategy>
+class compiled_renderer final : public renderer {
+ public:
+  static constexpr int sh_degree = Traits::sh_degree;
+
+  explicit compiled_renderer(configuration_request const& request)
+      : exec_(policy_of<E>(request)),
+        frame_(exec_),
+        pass_(exec_),
+        model_(exec_, 0, sh_degree),
+        gradients_(exec_, 0, sh_degree),
+        color_(exec_),
+        color_gradient_(exec_) {}
+
+  void set_model(gaussian_model const& model) override {
+    require_degree(model.sh_degree);
+    model_.assign(model);
+    scene_ = std::as_const(model_).view();
+  }
+  void bind(gaussians_view<float const> parameters) override {
+    require_degree(parameters.sh_degree);
+    scene_ = parameters;
+  }
+
+  rendered render(camera const& view, render_options const& options) override {
+    prepare(view, options);
+    return render_image(frame_);
+  }
+  void render_to(camera const& view, render_options const& options, render_targets const& targets) override {
+    prepare(view, options);
+    image_targets const images = images_of(targets, targets.rgba != nullptr);
+    frame_.render(images);
+    if (targets.rgba) color_to_bytes(exec_, images.color, pixels_of(view), targets.rgba);
+  }
+
+  void differentiate(camera const& view, render_options const& options, image_float const& color_gradient) override {
+    if (color_gradient.data.size() != std::size_t{3} * pixels_of(view))
+      throw invalid_argument("renderer: the colour's gradient must have three values for each pixel of the view");
+    color_gradient_.assign(color_gradient.data);
+    gradients_.resize_keep(scene_.count);
+    differentiate_into(view, options, color_gradient_.data(), gradients_.view(), {});
+  }
+  void differentiate_into(camera const& view, render_options const& options, float const* color_gradient,
+                          gaussians_view<float> gradients, render_targets const& targets) override {
+    stage_scope stage(exec_, "gradients");
+    prepare(view, options);
+    if (!pass_.prepare(frame_)) throw pass_.no_room();
+    image_targets const images = images_of(targets, true);
+    pass_.render(frame_, images);
+    gart::differentiate(frame_, pass_, {color_gradient, std::size_t{3} * pixels_of(view)}, gradients);
+    if (targets.rgba) color_to_bytes(exec_, images.color, pixels_of(view), targets.rgba);
+  }
+  gaussian_model gradients() const override { return gradients_.to_host(); }
+  void wait() override { exec_.synchronize(); }
+
+  profiler& profile() override {
+    exec_.synchronize();
+    return exec_.profile;
+  }
+  std::size_t peak_bytes() const override { return exec_.memory.peak; }
+  std::size_t lt_bytes() const override { return pass_.lt_bytes(); }
+  configuration_info configuration() const override { return configuration_of<E, Traits, Tracer, Strategy>(); }
+
+ private:
+  static index_t pixels_of(camera const& view) { return static_cast<index_t>(view.width) * view.height; }
+  static void require_degree(int degree) {
+    if (degree != sh_degree) throw invalid_argument("renderer: the model has another SH degree");
+  }
+  void prepare(camera const& view, render_options const& options) {
+    require_tree(options.rebuild_every, from_string(Tracer::name, tracer_kind::own));
+    frame_.prepare(scene_, view, options);
+  }
+  // The colour that something else is made of needs room, where the caller wants none.
+  image_targets images_of(render_targets const& targets, bool needs_color) {
+    image_targets images;
+    images.color = targets.color, images.transmittance = targets.transmittance;
+    images.depth = targets.depth, images.hits = targets.hits;
+    if (needs_color && !images.color) {
+      color_.resize(std::size_t{3} * pixels_of(frame_.view()));
+      images.color = color_.data();
+    }
+    return images;
+  }
+
+  E exec_;
+  frame<E, Traits, Tracer> frame_;
+  backward_pass<frame<E, Traits, Tracer>, Strategy> pass_;
+  gaussians<E> model_, gradients_;
+  gaussians_view<float const> scene_{.sh_degree = sh_degree};
+  buffer<float, E> color_, color_gradient_;
+};
+
+}  // namespace gart::inline GART_ISA

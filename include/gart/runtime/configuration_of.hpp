@@ -1,0 +1,41 @@
+#pragma once
+// What templates are as a configuration, and the policy that a request asks for.
+
+#include <gart/backward/strategy.hpp>
+#include <gart/core/isa.hpp>
+#include <gart/exec/concepts.hpp>
+#include <gart/runtime/request.hpp>
+
+#include <type_traits>
+
+namespace gart::inline GART_ISA {
+
+template <execution E, class Traits, class Tracer, strategy Strategy>
+configuration_info configuration_of() {
+  using response = typename Traits::response;
+  configuration_info configuration;
+  configuration.backend = from_string(E::name, backend_kind::automatic);
+  configuration.tracer = from_string(Tracer::name, tracer_kind::own);
+  configuration.backward = Strategy::name;
+  configuration.sh_degree = Traits::sh_degree, configuration.kernel_degree = response::degree;
+  configuration.arithmetic = response::fast ? arithmetic_kind::fast : arithmetic_kind::exact;
+  configuration.lt_format =
+      from_string(Strategy::template record<Tracer::tile_size>::entry::name, lt_format_kind::none);
+  configuration.tile_size = Tracer::tile_size;
+  configuration.window = Tracer::window;
+  if constexpr (!E::device) configuration.instruction_set = instruction_set;
+  return configuration;
+}
+
+// The policy that a request asks for.
+template <execution E>
+E policy_of(configuration_request const& request) {
+  if constexpr (E::device)
+    return E(request.device, request.stream);
+  else if constexpr (std::is_constructible_v<E, int>)
+    return E(request.threads);
+  else
+    return E();
+}
+
+}  // namespace gart::inline GART_ISA
