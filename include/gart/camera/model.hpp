@@ -148,16 +148,17 @@ GART_HD GART_INLINE primary_ray_of<F> unit_ray(vec3_of<F> const& d) {
 // The ray of each lane, by a function of one image point to a direction.
 template <class F, class One>
 GART_HD GART_INLINE primary_ray_of<F> each_lane(F u, F v, One const& one) {
-  if constexpr (std::is_same_v<F, float>) {
-    return {one(u, v)};
-  } else {
+#if !defined(__CUDACC__)
+  if constexpr (std::is_same_v<F, lanes>) {
     primary_ray_of<F> out;
     for (int l = 0; l < lane_count; ++l) {
       vec3 const d = one(u.v[l], v.v[l]);
       for (int k = 0; k < 3; ++k) out.direction[k].v[l] = d[k];
     }
     return out;
-  }
+  } else
+#endif
+    return {one(u, v)};
 }
 
 }  // namespace gart::inline GART_ISA
