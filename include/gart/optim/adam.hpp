@@ -1,4 +1,5 @@
 #pragma once
+#include <gart/render/forward.hpp>
 // Adam (Kingma and Ba, 2015) over every parameter of every Gaussian in one launch, with a rate per group; the colour's
 // constant term has a rate of its own. With g the gradient and t the step, counted from 1,
 //   m = b1 m + (1 - b1) g,  v = b2 v + (1 - b2) g^2,  p -= rate * m / (1 - b1^t) / (sqrt(v / (1 - b2^t)) + epsilon).
@@ -68,7 +69,7 @@ struct adam_group {
   index_t stride;  // floats a Gaussian
   index_t active;  // of these, the first so many are trained
   index_t head;    // of these, the first so many have rate_head
-  float rate_head, rate_rest;
+  float rate_head, rate_rest, decay = 0;
 };
 
 // Group g has tiles [g * group_tiles, (g + 1) * group_tiles), each of `rows_per_tile` Gaussians.
@@ -109,7 +110,7 @@ struct adam_kernel {
       if (skipped) E::atomic_add(skipped, u64{1});
       return;
     }
-    group.parameter[i] = to.parameter, group.first[i] = to.first, group.second[i] = to.second;
+    group.parameter[i] = column < group.head ? to.parameter : to.parameter - group.decay * group.parameter[i], group.first[i] = to.first, group.second[i] = to.second;
   }
 
 #if !defined(__CUDACC__)
@@ -125,10 +126,11 @@ struct adam_kernel {
   // Elements a lane each, whatever their columns; where one is not finite, one by one.
   void update_elements(adam_group const& group, index_t row, index_t rows_here) const {
     constexpr index_t most = 48;  // columns of a group
-    float rates[most + lane_count], trained[most + lane_count];
+    float rates[most + lane_count], trained[most + lane_count], decays[most + lane_count];
     for (index_t k = 0; k < group.stride + lane_count; ++k) {
       index_t const column = k % group.stride;
       rates[k] = column < group.head ? group.rate_head : group.rate_rest;
+      decays[k] = column < group.head ? 0.0f : group.decay;
       trained[k] = column < group.active ? 1.0f : 0.0f;
     }
     auto const read = [](float const* p) {
@@ -152,7 +154,7 @@ struct adam_kernel {
       if (any(wanted & ~finite)) {
         for (index_t k = 0; k < lane_count; ++k) update(group, i + k, (column + k) % group.stride);
       } else {
-        write(group.parameter + i, select(wanted, to.parameter, from.parameter));
+        write(group.parameter + i, select(wanted, to.parameter - read(decays + column) * from.parameter, from.parameter));
         write(group.first + i, select(wanted, to.first, from.first));
         write(group.second + i, select(wanted, to.second, from.second));
       }
@@ -182,7 +184,7 @@ void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optim
   index_t const active_sh = 3 * sh_coefficients(degree);
 
   auto const launch = [&](auto k) {
-    k.groups[0] = {p.sh, g.sh, m.sh, v.sh, sh, active_sh, 3, rate(rates.sh_dc), rate(rates.sh_rest)};
+    k.groups[0] = {p.sh, g.sh, m.sh, v.sh, sh, active_sh, 3, rate(rates.sh_dc), rate(rates.sh_rest), rates.sh_rest * try_of("shdecay", 0)};
     k.groups[1] = {p.mean, g.mean, m.mean, v.mean, 3, 3, 3, rate(rates.mean), 0};
     k.groups[2] = {p.log_scale, g.log_scale, m.log_scale, v.log_scale, 3, 3, 3, rate(rates.log_scale), 0};
     k.groups[3] = {p.quaternion, g.quaternion, m.quaternion, v.quaternion, 4, 4, 4, rate(rates.quaternion), 0};

@@ -28,9 +28,12 @@
 #include <gart/optim/options.hpp>
 #include <gart/optim/random.hpp>
 #include <gart/optim/rows.hpp>
+#include <gart/render/forward.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <cstring>
 
 namespace gart::inline GART_ISA {
 
@@ -62,9 +65,10 @@ struct error_key_kernel {
   u32* drawable;
   u32* key;
   u32* id;
+  float by_opacity, power;
   GART_HD void operator()(index_t i) const {
     bool const lives = is_alive(model, i, dead_opacity);
-    float const weight = sum[i];
+    float const weight = (sum[i] > 0 ? powf(sum[i], power) : 0.0f) * powf(sigmoid(model.opacity[i]), by_opacity);
     bool const fits = lives && weight > 0 && is_finite(weight);
     float const u = (static_cast<float>(random.words(i).v[0] >> 8) + 0.5f) * 0x1p-24f;
     dead[i] = !lives, drawable[i] = fits;

@@ -227,7 +227,8 @@ class walk_tile_warps {
       GART_UNROLL
       for (int c = 0; c < group; ++c) {
         if (c % 2 == 0) evaluate_all<Response>(two, [&](int k) { return approach_to(from[c + k].gaussian, ray_); });
-        response const& r = two[c % 2];
+        response r = two[c % 2];
+        if (from[c].gaussian.unused[0] > -1e29f) r.t = from[c].gaussian.unused[0] / cosine_;
         t[c] = r.t, d2[c] = r.d2;
         bool const is_new = is_hit(from[c].gaussian, r, last_t_), exists = first + c < count;
         found |= (exists & is_new ? 1u : 0u) << c;

@@ -84,7 +84,7 @@ class compiled_renderer final : public renderer {
     auto const scene = std::as_const(scene_).view();
     stage_scope stage(exec_, "gradients");
     auto const seen = filter_.of(exec_, scene, view, options.antialias);
-    records_.template prepare<typename Traits::response>(exec_, seen, view.position, options.alpha_min);
+    records_.template prepare<typename Traits::response>(exec_, seen, view, options.alpha_min);
     configure(tracer_, options);
     tracer_.prepare(exec_, seen, records_.view(), view, options.alpha_min, options.near);
     if (!pass_.prepare(exec_, tracer_, seen, view, options.alpha_min, options.near)) throw pass_.no_room();

@@ -15,7 +15,7 @@ rendered render_image(E& exec, Tracer& tracer, frame_records<E>& records, gaussi
   buffer<u32, E> hits(exec, pixels);
   antialiased<E> filter(exec);
   auto const seen = filter.of(exec, scene, view, options.antialias);
-  records.template prepare<typename Tracer::response_type>(exec, seen, view.position, options.alpha_min);
+  records.template prepare<typename Tracer::response_type>(exec, seen, view, options.alpha_min);
   configure(tracer, options);
   tracer.prepare(exec, seen, records.view(), view, options.alpha_min, options.near);
   forward<ShDegree>(exec, tracer, scene, view, options, ShDegree,

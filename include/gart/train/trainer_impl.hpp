@@ -29,7 +29,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       order_(data.train.size(), options.held_out, options.seed),
       error_(exec, error_options_of(options), options.max_gaussians, options.iterations, options.seed),
       error_map_(exec),
-      mcmc_(exec, mcmc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
+      mcmc_(exec, [&] { auto m = mcmc_options_of(options); if (options.densify == densify_kind::error) m.opacity_penalty = 0, m.scale_penalty *= try_of("scale", 0); return m; }(), options.max_gaussians, options.iterations, data.extent, options.seed),
       adc_(exec, adc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
       color_(exec),
       color_gradient_(exec),
@@ -74,7 +74,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   color_.resize(floats), color_gradient_.resize(floats);
 
   auto const seen = filter_.of(exec_, constant, view.view, render.antialias);
-  records_.template prepare<typename Traits::response>(exec_, seen, view.view.position, render.alpha_min);
+  records_.template prepare<typename Traits::response>(exec_, seen, view.view, render.alpha_min, step_ + 1);
   configure(tracer_, render);
   tracer_.prepare(exec_, seen, records_.view(), view.view, render.alpha_min, render.near);
   span<float const> moments;
@@ -121,7 +121,15 @@ void trainer<E, Traits, Tracer, Strategy>::differentiate(Pass& pass, Loss&& loss
     span<float const> const image = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
     truth_view const truth = images_.get(exec_, index, render.background);
     loss(loss_input<E>{exec_, view, truth, view.view.width, view.view.height, image, color_gradient_, value_});
-    if (grows_by_error()) error_map(exec_, image, truth, error_map_);
+    if (grows_by_error()) {
+      static int const affine = static_cast<int>(try_of("affine", 0));
+      if (affine) {
+        static buffer<float, E> sums(exec_);
+        affine_error_map(exec_, image, truth, error_map_, sums, affine - 1);
+      } else {
+        error_map(exec_, image, truth, error_map_);
+      }
+    }
     if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }
   pass.template run<sh_degree>(exec_, tracer_, constant, records_.view(), view.view, render, degree, color_,
@@ -133,13 +141,16 @@ template <execution E, class Traits, class Tracer, class Strategy>
 void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, learning_rates const& rates, int degree,
                                                   span<float const> moments) {
   bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
+  static float const scale_p = try_of("scale", 0), noise = try_of("noise", 0);
   if (grows_by_error()) error_.accumulate(scene_, moments, gradients_);
+  if (grows_by_error() && scale_p > 0) mcmc_.add_penalties(scene_, gradients_);
   if (use_mcmc) mcmc_.add_penalties(scene_, gradients_);
   if (use_adc) adc_.accumulate(scene_, gradients_, view.view);
   adam_step(exec_, scene_, gradients_, state_, rates, step_, degree, finite_ ? finite_->skipped() : span<u64>{},
             options_.adam);
   density_change change;
   if (grows_by_error()) change = error_.after_step(scene_, state_, step_);
+  if (grows_by_error() && noise > 0) mcmc_.add_noise(scene_, step_, rates.mean * noise);
   if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean);
   if (use_adc) change = adc_.after_step(scene_, state_, step_);
   if (change.added || change.removed) gradients_.resize_keep(scene_.size());
