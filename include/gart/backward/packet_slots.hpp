@@ -25,7 +25,8 @@ struct slot_cell : packet_cell {
   u32 width;             // from a slot to that of the pixel below
 
   slot_cell() = default;
-  GART_INLINE slot_cell(u32 id, footprint_slots const& range, pixel_box const& tile) : packet_cell(id, range, tile) {
+  GART_INLINE slot_cell(u32 gaussian, footprint_slots const& range, pixel_box const& tile)
+      : packet_cell(gaussian, range, tile) {
     pixel_box const cell = intersect(range.box, tile);
     u32 const x = u32{cell.x0} - tile.x0, y = u32{cell.y0} - tile.y0;
     width = cell.width();

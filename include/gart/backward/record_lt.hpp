@@ -32,8 +32,8 @@ struct record_lt {
 #if !defined(__CUDACC__)
   using packet_cell = slot_cell;
   using note = packet_slots;
-  GART_INLINE note expect(slot_cell const& cell, packet_block const& block) const {
-    packet_slots const at(cell, block.x % Size, block.y % Size);
+  GART_INLINE note expect(slot_cell const& from, packet_block const& block) const {
+    packet_slots const at(from, block.x % Size, block.y % Size);
     at.fetch_to_write(slots);
     return at;
   }

@@ -21,7 +21,9 @@ struct name_of {
 };
 
 template <class E>
-concept named = requires(E value) { names_of(value)[0].name; };
+concept named = requires(E value) {
+  names_of(value)[0].name;
+};
 
 template <named E>
 constexpr char const* to_string(E value) {

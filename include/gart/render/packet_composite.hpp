@@ -39,7 +39,7 @@ struct packet_composite {
     return s;
   }
 
-  GART_INLINE note expect(state const& s, cell const& cell) const { return program.record.expect(cell, s.block); }
+  GART_INLINE note expect(state const& s, cell const& from) const { return program.record.expect(from, s.block); }
   GART_INLINE void fetch(u32 id) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
     float const* const row = program.sh + stride * id;

@@ -104,8 +104,10 @@ class any_depth_order : public detail::depth_bits {
     tile_plane const plane = planes_[tile];
     if (!(plane.reach > 0)) return depth_key(p.depth, shift_);
     constexpr float inset = tile_plane::inset;
-    float const x0 = cell.x0 % Size + inset - plane.widen_x, x1 = (cell.x1 - 1) % Size + 1 - inset + plane.widen_x;
-    float const y0 = cell.y0 % Size + inset - plane.widen_y, y1 = (cell.y1 - 1) % Size + 1 - inset + plane.widen_y;
+    float const x0 = static_cast<float>(cell.x0 % Size) + inset - plane.widen_x;
+    float const x1 = static_cast<float>((cell.x1 - 1) % Size + 1) - inset + plane.widen_x;
+    float const y0 = static_cast<float>(cell.y0 % Size) + inset - plane.widen_y;
+    float const y1 = static_cast<float>((cell.y1 - 1) % Size + 1) - inset + plane.widen_y;
     rectangle_depth const in(p.gaussian, mat3(plane.dx, plane.dy, plane.origin), plane.reach);
     return key_of(in(x0, x1, y0, y1), p.depth);
   }
