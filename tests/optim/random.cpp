@@ -80,6 +80,9 @@ TEST_CASE("the rate of the means decays exponentially") {
   CHECK(rates_at(usual, 3.0f, 0, quarter).sh_dc == usual.sh_dc);
   CHECK(rates_at(usual, 3.0f, quarter, quarter).log_scale ==
         doctest::Approx(2 * usual.log_scale * std::pow(0.1, 0.25)).epsilon(1e-3));
+  CHECK(rates_at(usual, 3.0f, 0, quarter).sh_rest == doctest::Approx(usual.sh_rest / 4).epsilon(1e-3));
+  CHECK(rates_at(usual, 3.0f, 0, 2 * usual.long_run).sh_rest == usual.sh_rest);
+  CHECK(rates_at(usual, 3.0f, 0, 10).sh_rest == doctest::Approx(usual.sh_rest / 20));
   CHECK(rates_at(usual, 3.0f, 0, 10).opacity == doctest::Approx(4 * usual.opacity));
 }
 

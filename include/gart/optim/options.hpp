@@ -13,13 +13,14 @@ struct learning_rates {
   float quaternion = 1e-3f;
   float opacity = 2.5e-2f;
   float sh_dc = 2.5e-3f;
-  float sh_rest = 2.5e-3f / 20;
+  float sh_rest = 2.5e-3f;
   // All rates but those of the means and exposures stay as they are for a share of the run, then decay exponentially
   // to `settled` of it.
   float settled = 0.1f, settle_from = 0.5f;
   // The rates are those of a run of at least so many steps. A shorter one has less time to go as far: its rates of
   // mean, scale and opacity are sqrt(long_run / steps) times as large, at most four times, and it settles by less,
-  // settled^(steps / long_run).
+  // settled^(steps / long_run). Its sh_rest is steps / long_run of the usual, at least a twentieth: colours that follow
+  // the view before there is geometry take its place.
   int long_run = 15000;
   float exposure = 0.05f, exposure_final = 0.005f;  // a visit of the view; decays like the means'
 };
