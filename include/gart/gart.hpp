@@ -5,6 +5,7 @@
 
 #include <gart/backward/backward.hpp>
 #include <gart/bvh/walk.hpp>
+#include <gart/camera/models.hpp>
 #include <gart/core/version.hpp>
 #include <gart/exec/cuda.hpp>
 #include <gart/exec/parallel.hpp>

@@ -26,6 +26,7 @@ TEST_CASE_TEMPLATE("pinholes and OpenCV lenses are traced through the seam", E, 
     gart::visit_camera(c, [&](auto const& view) {
       gart_test::check_hits(exec, view, model);
       gart_test::check_image(exec, view, model);
+      gart_test::check_gradients(exec, view, model);
     });
   }
 }

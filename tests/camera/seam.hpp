@@ -2,7 +2,7 @@
 // Holds a camera model to what camera/model.hpp asks of it: scenes of random Gaussians around the camera, traced by
 // every tracer through the seam alone, against each pixel's ray and every Gaussian in double.
 
-#include <gart/render/frame.hpp>
+#include <gart/backward/backward.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
 #include <support/policies.hpp>
@@ -177,6 +177,23 @@ class seam_scene {
     return color.to_host();
   }
 
+  // Of the sum of the image's colours, through a filter of so many pixels.
+  template <class Tracer, class Strategy>
+  gart::gaussian_model gradients(float antialias) {
+    frame_by<Tracer> frame(exec_);
+    gart::backward_pass<frame_by<Tracer>, Strategy> pass(exec_);
+    gart::render_options o = options();
+    o.antialias = antialias;
+    std::size_t const floats = std::size_t{3} * view_.width * view_.height;
+    gart::buffer<float, E> color(exec_, floats), by_color(exec_, std::vector<float>(floats, 1.0f));
+    gart::gaussians<E> out(exec_, scene_.size(), 0);
+    frame.prepare(constant(), view_, o);
+    REQUIRE(pass.prepare(frame));
+    pass.render(frame, {color.data()});
+    differentiate(frame, pass, gart::span<float const>(by_color), out);
+    return out.to_host();
+  }
+
   gart::footprint footprint(gart::gaussian_model const& m, gart::u32 i) const {
     gart::gaussians_view<float const> const all{m.mean.data(),    m.log_scale.data(), m.quaternion.data(),
                                                 m.opacity.data(), m.sh.data(),        static_cast<gart::u32>(m.size()),
@@ -279,6 +296,28 @@ void check_image(E& exec, Model const& view, gart::gaussian_model const& model) 
   }
   CAPTURE(worst);
   CHECK(wrong == 0);
+}
+
+// Gradients by primitive on tile lists are those by pixel on the tree, the filter's way back among them.
+template <class E, class Model>
+void check_gradients(E& exec, Model const& view, gart::gaussian_model const& model) {
+  seam_scene<E, Model> scene(exec, model, view);
+  for (float antialias : {0.0f, 0.3f}) {
+    auto const a = scene.template gradients<gart::tile_tracer<E>, gart::primitive_strategy>(antialias);
+    auto const b = scene.template gradients<gart::bvh_tracer<E>, gart::pixel_strategy>(antialias);
+    auto const apart = [](std::vector<float> const& x, std::vector<float> const& y) {
+      double difference = 0, size = 0;
+      for (std::size_t k = 0; k < x.size(); ++k)
+        difference += std::abs(double{x[k]} - y[k]), size += std::abs(double{y[k]});
+      return difference / size;
+    };
+    CAPTURE(antialias);
+    CHECK(apart(a.mean, b.mean) < 1e-4);
+    CHECK(apart(a.log_scale, b.log_scale) < 1e-4);
+    CHECK(apart(a.quaternion, b.quaternion) < 1e-4);
+    CHECK(apart(a.opacity, b.opacity) < 1e-4);
+    CHECK(apart(a.sh, b.sh) < 1e-4);
+  }
 }
 
 }  // namespace gart_test

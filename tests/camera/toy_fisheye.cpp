@@ -18,6 +18,7 @@ TEST_CASE_TEMPLATE("a fisheye of a test's own is traced through the seam", E, GA
     auto const model = gart_test::gaussians_around(c.position, 3, 500, random);
     gart_test::check_hits(exec, view, model);
     gart_test::check_image(exec, view, model);
+    gart_test::check_gradients(exec, view, model);
   }
 }
 

@@ -2,6 +2,7 @@
 // What a camera's image sees, in slopes x / z and y / z: the rectangle about it, by sampling the image's border. For
 // models that project slopes to the image. Host side, in double.
 
+#include <gart/core/isa.hpp>
 #include <gart/math/glm.hpp>
 
 #include <cmath>
