@@ -32,7 +32,6 @@ course train(E& exec, gart::dataset const& data, gart::u64 seed, gart::u64 lt_bu
   gart::train_options options;
   options.lt_budget = lt_budget, options.iterations = 40;
   options.densify = gart::densify_kind::none;
-  options.sh_degree = 1;
   gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy> run(exec, options, data,
                                                                               cloud(seed + 1, 0.7f));
   course out;
