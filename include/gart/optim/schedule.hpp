@@ -4,6 +4,8 @@
 #include <gart/core/isa.hpp>
 #include <gart/optim/options.hpp>
 
+#include <gart/render/forward.hpp>
+
 #include <algorithm>
 #include <cmath>
 
@@ -22,6 +24,8 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
   double const length = static_cast<double>(std::max(steps, 1)) / std::max(rates.long_run, 1);
   float const haste = static_cast<float>(std::clamp(1 / std::sqrt(length), 1.0, 4.0));
   for (float* rate : {&rates.mean, &rates.mean_final, &rates.log_scale, &rates.opacity}) *rate *= haste;
+  if (float const ramp = try_of("ramp", 0); ramp > 0)
+    rates.sh_rest *= static_cast<float>(std::clamp(static_cast<double>(step) / (ramp * rates.long_run), 0.05, 1.0));
   rates.mean = exponential_decay(rates.mean, rates.mean_final, step, steps) * extent;
   rates.exposure = exponential_decay(rates.exposure, rates.exposure_final, step, steps);
   int const from = static_cast<int>(rates.settle_from * static_cast<float>(steps));
