@@ -68,7 +68,8 @@ TEST_CASE("the rate of the means decays exponentially") {
   CHECK(exponential_decay(1e-2f, 1e-4f, 100, 100) == doctest::Approx(1e-4));
   CHECK(exponential_decay(1e-2f, 1e-4f, 1000, 100) == doctest::Approx(1e-4));
   CHECK(exponential_decay(1e-2f, 0, 50, 100) == 1e-2f);
-  learning_rates const usual;
+  learning_rates usual;
+  usual.sh_rest = usual.sh_dc;
   CHECK(rates_at(usual, 3.0f, 0, 20000).mean == doctest::Approx(3 * usual.mean));
   CHECK(rates_at(usual, 3.0f, 20000, 20000).mean == doctest::Approx(3 * usual.mean_final));
   CHECK(rates_at(usual, 3.0f, 10000, 20000).opacity == usual.opacity);
@@ -80,10 +81,19 @@ TEST_CASE("the rate of the means decays exponentially") {
   CHECK(rates_at(usual, 3.0f, 0, quarter).sh_dc == usual.sh_dc);
   CHECK(rates_at(usual, 3.0f, quarter, quarter).log_scale ==
         doctest::Approx(2 * usual.log_scale * std::pow(0.1, 0.25)).epsilon(1e-3));
-  CHECK(rates_at(usual, 3.0f, 0, quarter).sh_rest == doctest::Approx(usual.sh_rest / 4).epsilon(1e-3));
-  CHECK(rates_at(usual, 3.0f, 0, 2 * usual.long_run).sh_rest == usual.sh_rest);
-  CHECK(rates_at(usual, 3.0f, 0, 10).sh_rest == doctest::Approx(usual.sh_rest / 20));
+  CHECK(rates_at(usual, 3.0f, 0, quarter).sh_rest == usual.sh_rest);
   CHECK(rates_at(usual, 3.0f, 0, 10).opacity == doctest::Approx(4 * usual.opacity));
+}
+
+TEST_CASE("the bands' rate is that of the first where a long run starts from points, and a twentieth at least") {
+  learning_rates rates;
+  CHECK(sh_rest_of(rates, true, 2 * rates.long_run) == rates.sh_dc);
+  CHECK(sh_rest_of(rates, true, rates.long_run / 4) == doctest::Approx(rates.sh_dc / 4).epsilon(1e-3));
+  CHECK(sh_rest_of(rates, true, 10) == doctest::Approx(rates.sh_dc / 20));
+  CHECK(sh_rest_of(rates, false, 2 * rates.long_run) == doctest::Approx(rates.sh_dc / 20));
+  rates.sh_rest = 1e-3f;
+  CHECK(sh_rest_of(rates, false, 10) == 1e-3f);
+  CHECK(sh_rest_of(rates, true, 2 * rates.long_run) == 1e-3f);
 }
 
 TEST_CASE("the SH degree rises every so many steps, sooner in short runs") {

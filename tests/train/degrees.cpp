@@ -69,7 +69,7 @@ fixture make(std::uint64_t seed, float view_dependence) {
   f.options.iterations = iterations;
   f.options.densify = gart::densify_kind::none;
   f.options.sh_gain = 0.02f;
-  f.options.rates.sh_rest = 2e-2f;  // of a long run, so that 600 steps are enough to learn a band
+  f.options.rates.sh_rest = 1e-3f;  // so that 600 steps are enough to learn a band
   return f;
 }
 

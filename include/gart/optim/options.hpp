@@ -13,14 +13,16 @@ struct learning_rates {
   float quaternion = 1e-3f;
   float opacity = 2.5e-2f;
   float sh_dc = 2.5e-3f;
-  float sh_rest = 2.5e-3f;
+  // Of the bands above the first; 0: what suits the run (sh_rest_of). A run that starts from a capture's points moves
+  // them as fast as the first, a short one slower; one that starts at random has its geometry to find, and colours that
+  // follow the view would stand in for it.
+  float sh_rest = 0;
   // All rates but those of the means and exposures stay as they are for a share of the run, then decay exponentially
   // to `settled` of it.
   float settled = 0.1f, settle_from = 0.5f;
   // The rates are those of a run of at least so many steps. A shorter one has less time to go as far: its rates of
   // mean, scale and opacity are sqrt(long_run / steps) times as large, at most four times, and it settles by less,
-  // settled^(steps / long_run). Its sh_rest is steps / long_run of the usual, at least a twentieth: colours that follow
-  // the view before there is geometry take its place.
+  // settled^(steps / long_run).
   int long_run = 15000;
   float exposure = 0.05f, exposure_final = 0.005f;  // a visit of the view; decays like the means'
 };

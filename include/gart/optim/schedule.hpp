@@ -17,12 +17,19 @@ inline float exponential_decay(float from, float to, int step, int steps) {
   return static_cast<float>(from * std::pow(static_cast<double>(to) / from, share));
 }
 
-// The rates of one step; `extent` is the scene's.
+// The rate of the bands above the first: what `rates` says, or that of the first times steps / long_run, within
+// [1/20, 1], where the run starts from points; where it does not, a twentieth, as in 3DGS.
+inline float sh_rest_of(learning_rates const& rates, bool has_points, int steps) {
+  if (rates.sh_rest > 0) return rates.sh_rest;
+  double const length = static_cast<double>(steps) / std::max(rates.long_run, 1);
+  return rates.sh_dc * static_cast<float>(has_points ? std::clamp(length, 0.05, 1.0) : 0.05);
+}
+
+// The rates of one step; `extent` is the scene's. sh_rest is what sh_rest_of gave.
 inline learning_rates rates_at(learning_rates rates, float extent, int step, int steps) {
   double const length = static_cast<double>(std::max(steps, 1)) / std::max(rates.long_run, 1);
   float const haste = static_cast<float>(std::clamp(1 / std::sqrt(length), 1.0, 4.0));
   for (float* rate : {&rates.mean, &rates.mean_final, &rates.log_scale, &rates.opacity}) *rate *= haste;
-  rates.sh_rest *= static_cast<float>(std::clamp(length, 0.05, 1.0));
   rates.mean = exponential_decay(rates.mean, rates.mean_final, step, steps) * extent;
   rates.exposure = exponential_decay(rates.exposure, rates.exposure_final, step, steps);
   int const from = static_cast<int>(rates.settle_from * static_cast<float>(steps));

@@ -62,7 +62,9 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   std::size_t const index = order_.at(step_);
   dataset_view const& view = data_.train[index];
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
-  learning_rates const rates = rates_at(options_.rates, data_.extent, step_, options_.iterations);
+  learning_rates rates = options_.rates;
+  rates.sh_rest = sh_rest_of(rates, data_.points.size() > 0, options_.iterations);
+  rates = rates_at(rates, data_.extent, step_, options_.iterations);
   render_options const render = render_options_of(options_, data_.extent, background_of(step_));
   std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
   color_.resize(floats), color_gradient_.resize(floats);
