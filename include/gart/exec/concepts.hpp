@@ -38,8 +38,8 @@
 
 namespace gart {
 
-// The forms of a kernel that has several: the plain one, right everywhere, a lane after another; lanes as the numbers of
-// a host's vector registers (math/lanes.hpp); lanes of a warp, which step together and share its matrix units.
+// The forms of a kernel that has several: the plain one, right everywhere, a lane after another; lanes as the numbers
+// of a host's vector registers (math/lanes.hpp); lanes of a warp, which step together and share its matrix units.
 enum class kernel_form { plain, packet, warp };
 
 template <class E>
@@ -68,7 +68,7 @@ concept execution = requires(E& e, void* p, void const* q, std::size_t n, float*
 };
 
 template <class E>
-concept host_execution = execution<E> && !E::device && requires(E& e, void const* what, std::size_t n, void (&f)()) {
+concept host_execution = execution<E> && !E::device && requires(E & e, void const* what, std::size_t n, void (&f)()) {
   { e.workspace(n) } -> std::same_as<void*>;
   { e.threads() } -> std::convertible_to<int>;
   E::exclusively(what, f);

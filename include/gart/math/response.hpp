@@ -10,8 +10,8 @@
 //   slope(d2)      -2 d ln rho / d |p|^2 = n (4.5 / 3^n) |p|^(n-2), what a hit's moments are weighted with
 //                  (math/hit_gradient.hpp); 1 for n = 2
 //   reciprocal(a)  1 / a, for the point of largest response; reciprocals(array) of all its elements
-// All but cutoff and reciprocals take a float or lanes of them. They decide hits: powers by multiplication and square roots, and by
-// Arithmetic
+// All but cutoff and reciprocals take a float or lanes of them. They decide hits: powers by multiplication and square
+// roots, and by Arithmetic
 //   exact  fixed arithmetic (math/arith.hpp), the same bits on every policy; cutoff is within 4e-7 of exact, relatively
 //   fast   shorter exponential and reciprocal (math/fast_arith.hpp) where hits are evaluated, for what they cost: alpha
 //          is within 1e-4 of exact, relatively; forward and backward still agree bit for bit, policies no more

@@ -8,10 +8,11 @@
 namespace gart::inline GART_ISA {
 
 template <class T>
-concept scene_requirements = requires {
-  { T::sh_degree } -> std::convertible_to<int>;  // 0 to 3, that the coefficients are stored with
-  typename T::response;                          // how a Gaussian falls from its centre (math/response.hpp)
-} && response_function<typename T::response>;
+concept scene_requirements = response_function<typename T::response> &&  // how it falls off (math/response.hpp)
+    requires {
+  // 0 to 3, that the coefficients are stored with
+  { T::sh_degree } -> std::convertible_to<int>;
+};
 
 // Response: how a Gaussian falls from its centre, and in which arithmetic (math/response.hpp).
 template <int ShDegree = 3, response_function Response = generalized_gaussian<>>
