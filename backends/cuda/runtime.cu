@@ -129,6 +129,12 @@ cuda_exec::~cuda_exec() {
 
 void cuda_exec::make_current() const { check_cuda(cudaSetDevice(device_index_), "choosing the device"); }
 
+std::size_t cuda_exec::free_bytes() const {
+  make_current();
+  std::size_t free_now = 0, total = 0;
+  return cudaMemGetInfo(&free_now, &total) == cudaSuccess ? free_now : 0;
+}
+
 void* cuda_exec::allocate(std::size_t bytes) {
   if (bytes == 0) return nullptr;
   make_current();

@@ -17,6 +17,7 @@
 //       to 16 bytes, and no other function adds to it in the same launch
 //   static void fence();                   in kernels: what was written before is seen by who sees what comes after
 //   profiler profile; memory_use memory;
+//   std::size_t free_bytes();              memory that can still be had; 0: not known
 // A policy whose memory is the host's (host_execution) also offers what algorithms and kernels of hosts ask for:
 //   void* workspace(bytes);                a block lent to the algorithm that runs; the next call lends it again
 //   int threads();                         how many an algorithm may split an array over
@@ -65,6 +66,7 @@ concept execution = requires(E& e, void* p, void const* q, std::size_t n, float*
   E::fence();
   { e.profile } -> std::convertible_to<profiler&>;
   { e.memory } -> std::convertible_to<memory_use&>;
+  { e.free_bytes() } -> std::convertible_to<std::size_t>;
 };
 
 template <class E>

@@ -56,6 +56,7 @@ class cuda_exec {
 
   void* stream() const { return stream_; }  // a cudaStream_t
   int multiprocessors() const { return multiprocessors_; }
+  std::size_t free_bytes() const;
   void make_current() const;  // launches go to the calling thread's current device, which must be the stream's
 
   // Brackets of a timed stage; stage_scope calls them. The times, by events, reach `profile` at the next synchronize()

@@ -78,14 +78,15 @@ class host_memory {
     open_.pop_back();
   }
 
+  static std::size_t free_bytes() {
+    long const pages = sysconf(_SC_AVPHYS_PAGES), page = sysconf(_SC_PAGESIZE);
+    return pages > 0 && page > 0 ? static_cast<std::size_t>(pages) * static_cast<std::size_t>(page) : 0;
+  }
+
  private:
   static constexpr std::size_t huge_page = std::size_t{1} << 21, large = 4 * huge_page;
   static std::align_val_t alignment_of(std::size_t bytes) {
     return std::align_val_t{bytes >= large ? huge_page : std::size_t{64}};
-  }
-  static std::size_t free_bytes() {
-    long const pages = sysconf(_SC_AVPHYS_PAGES), page = sysconf(_SC_PAGESIZE);
-    return pages > 0 && page > 0 ? static_cast<std::size_t>(pages) * static_cast<std::size_t>(page) : 0;
   }
   struct open_stage {
     char const* label;

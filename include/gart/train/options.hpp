@@ -40,7 +40,8 @@ struct train_options {
   float initial_scale = 0;
   float ssim_weight = 0.2f;
   bool exposure = false;  // learn an exposure of each training view (exposure/exposure.hpp)
-  u64 lt_budget = 0;      // bytes of the LT buffer above which a step is done with less; 0: no limit
+  // Bytes of the LT buffer above which a step is done with less; 0: half of what is free when the trainer is made.
+  u64 lt_budget = 0;
   // After each step parameters and Adam's moments are searched for what is not finite, and not_finite is thrown at the
   // first (optim/finite.hpp).
   bool check_finite = false;
