@@ -214,6 +214,8 @@ TEST_CASE_TEMPLATE("memory that cannot be had is refused with the bytes asked", 
     CHECK(std::string(e.what()).find("train_options.max_gaussians") != std::string::npos);
   }
   CHECK(exec.memory.current == 0);
+  CHECK(exec.free_bytes() > 0);
+  CHECK(exec.free_bytes() < asked);
   buffer<u32, E> after(exec, numbers(10));
   CHECK(after.to_host() == numbers(10));
 }
