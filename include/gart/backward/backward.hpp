@@ -1,18 +1,19 @@
 #pragma once
-// From the gradient of an image to the gradients of the parameters, by any strategy (backward/strategies.hpp):
-//
-//   backward_pass<frame<E, Traits, Tracer>, primitive_strategy> pass(exec);
-//   frame.prepare(scene, view, options);
-//   pass.prepare(frame);                                       // footprints, lists and LT buffer, where it records
-//   pass.render(frame, {.color = color});                      // the forward pass, with what the strategy records
-//   differentiate(frame, pass, color_gradient, gradients);     // overwrites `gradients`
-//
-// A pass knows which preparation of which frame it stands at: out of this order it throws invalid_argument.
-// backward/fallback.hpp takes a strategy that needs less where there is no room.
-//
-// Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, the LT buffer, 4 or
-// 16 bytes for each pixel of each box, and where the tracer has none to lend, footprints of 36 bytes a Gaussian and
-// lists of 8 a (primitive, tile) pair.
+/// \file
+/// From the gradient of an image to the gradients of the parameters, by any strategy (backward/strategies.hpp):
+/// \code{.cpp}
+/// backward_pass<frame<E, Traits, Tracer>, primitive_strategy> pass(exec);
+/// frame.prepare(scene, view, options);
+/// pass.prepare(frame);                                       // footprints, lists and LT buffer, where it records
+/// pass.render(frame, {.color = color});                      // the forward pass, with what the strategy records
+/// differentiate(frame, pass, color_gradient, gradients);     // overwrites `gradients`
+/// \endcode
+/// A pass knows which preparation of which frame it stands at: out of this order it throws invalid_argument.
+/// backward/fallback.hpp takes a strategy that needs less where there is no room.
+///
+/// Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, the LT buffer, 4 or
+/// 16 bytes for each pixel of each box, and where the tracer has none to lend, footprints of 36 bytes a Gaussian and
+/// lists of 8 a (primitive, tile) pair.
 
 #include <gart/backward/finish.hpp>
 #include <gart/backward/gather_form.hpp>
@@ -25,25 +26,27 @@
 
 namespace gart::inline GART_ISA {
 
+/// The backward pass of one frame by one strategy.
 template <class Frame, strategy Strategy>
 class backward_pass {
  public:
-  using frame_type = Frame;
-  using strategy_type = Strategy;
-  using execution_type = typename Frame::execution_type;
-  static constexpr int sh_degree = Frame::sh_degree;
-  static constexpr int tile_size = Frame::tile_size;
-  using record_type = typename Strategy::template record<tile_size>;
-  static constexpr bool records = Strategy::gather::any;
-  static constexpr bool ordered = records && Strategy::ordered;
-  static constexpr slot_validity validity = Strategy::validity;
+  using frame_type = Frame;                                           ///< whose images it differentiates
+  using strategy_type = Strategy;                                     ///< how
+  using execution_type = typename Frame::execution_type;              ///< the policy
+  static constexpr int sh_degree = Frame::sh_degree;                  ///< of the coefficients that are stored
+  static constexpr int tile_size = Frame::tile_size;                  ///< side of a tile, in pixels
+  using record_type = typename Strategy::template record<tile_size>;  ///< what the forward pass leaves of a hit
+  static constexpr bool records = Strategy::gather::any;              ///< whether it leaves anything
+  static constexpr bool ordered = records && Strategy::ordered;  ///< sums in a fixed order: the same bits in every run
+  static constexpr slot_validity validity = Strategy::validity;  ///< how slots that are hits are told from others
 
+  /// Allocates nothing; `exec` must outlive it.
   explicit backward_pass(execution_type& exec)
       : moments_(exec), own_prints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec) {}
 
-  // After the frame's preparation: a tracer that has the view's footprints lends them. False, and nothing allocated,
-  // where the LT buffer would take more than byte_budget (0: no limit) or have more slots than there are numbers of 32
-  // bits, by which hits know theirs.
+  /// After the frame's preparation: a tracer that has the view's footprints lends them. False, and nothing allocated,
+  /// where the LT buffer would take more than byte_budget (0: no limit) or have more slots than there are numbers of 32
+  /// bits, by which hits know theirs.
   [[nodiscard]] bool prepare(Frame const& frame, u64 byte_budget = 0) {
     stands_at_ = nothing, frame_ = &frame, preparation_ = frame.preparation();
     if constexpr (records) {
@@ -79,8 +82,8 @@ class backward_pass {
     return true;
   }
 
-  // The forward pass, with what the strategy records; `targets.last` is the pass's own. The colour is read again by
-  // differentiate().
+  /// The forward pass, with what the strategy records; `targets.last` is the pass's own. The colour is read again by
+  /// differentiate().
   void render(Frame& frame, image_targets targets) {
     require(frame, prepared, "backward_pass.render: call backward_pass.prepare first, after frame.prepare");
     record_type record{};
@@ -92,13 +95,14 @@ class backward_pass {
     color_ = targets.color, stands_at_ = rendered;
   }
 
-  // Of the last differentiate(), [N][moment_stride]: at error_place the error that is seen through each Gaussian, where
-  // the pixels' errors were given.
+  /// Of the last differentiate(), [N][moment_stride]: at error_place the error that is seen through each Gaussian,
+  /// where the pixels' errors were given.
   span<float const> moments() const { return moments_; }
 
+  /// Bytes of the LT buffer for the view last prepared; 0 where the strategy records nothing.
   std::size_t lt_bytes() const { return records ? slots_.size() * sizeof(entry) : 0; }
 
-  // What to throw where prepare() said no without a budget.
+  /// What to throw where prepare() said no without a budget.
   out_of_memory no_room() const {
     u64 const slots = prints_ ? prints_->slots() : 0;
     return out_of_memory("LT buffer", slots * sizeof(entry), 0,
@@ -198,15 +202,16 @@ class backward_pass {
   buffer<last_hit, execution_type> last_;
 };
 
-// From color_gradient, [H][W][3], the gradient of the image that the pass rendered, to those of the scene's parameters,
-// without the filter of the pixels. Given an error a pixel, [H][W], it also attributes that to the Gaussians: the sum
-// over a Gaussian's hits of weight times error (backward_pass.moments).
+/// From color_gradient, [H][W][3], the gradient of the image that the pass rendered, to those of the scene's
+/// parameters, without the filter of the pixels. Given an error a pixel, [H][W], it also attributes that to the
+/// Gaussians: the sum over a Gaussian's hits of weight times error (backward_pass.moments).
 template <class Frame, strategy Strategy>
 void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, span<float const> color_gradient,
                    gaussians_view<float> gradients, span<float const> error = {}) {
   pass.run(frame, color_gradient, gradients, error);
 }
 
+/// The same into Gaussians that own their memory.
 template <class Frame, strategy Strategy>
 void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, span<float const> color_gradient,
                    gaussians<typename Frame::execution_type>& gradients, span<float const> error = {}) {

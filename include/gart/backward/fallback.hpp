@@ -1,13 +1,16 @@
 #pragma once
-// A strategy and those that it falls back to, so that a step can be done in the memory there is.
-//
-//   backward_passes<frame<E, Traits, Tracer>, primitive_strategy> passes(exec);
-//   passes.with_room(frame, byte_budget, [&](auto& pass) { pass.render(frame, targets); ... });
+/// \file
+/// A strategy and those that it falls back to, so that a step can be done in the memory there is.
+/// \code{.cpp}
+/// backward_passes<frame<E, Traits, Tracer>, primitive_strategy> passes(exec);
+/// passes.with_room(frame, byte_budget, [&](auto& pass) { pass.render(frame, targets); ... });
+/// \endcode
 
 #include <gart/backward/backward.hpp>
 
 namespace gart::inline GART_ISA {
 
+/// The passes of Strategy, of its fallback, of that one's and so on.
 template <class Frame, strategy Strategy>
 class backward_passes {
   using fallback = typename Strategy::fallback;
@@ -21,10 +24,11 @@ class backward_passes {
   };
 
  public:
+  /// Allocates nothing; `exec` must outlive it.
   explicit backward_passes(typename Frame::execution_type& exec) : pass_(exec), rest_(exec) {}
 
-  // Calls f with the first pass whose LT buffer has room (backward_pass.prepare), prepared. Errors: out_of_memory where
-  // none has.
+  /// Calls f with the first pass whose LT buffer has room (backward_pass.prepare), prepared. Errors: out_of_memory
+  /// where none has.
   template <class F>
   void with_room(Frame const& frame, u64 byte_budget, F&& f) {
     if (pass_.prepare(frame, byte_budget))

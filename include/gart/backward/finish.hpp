@@ -1,6 +1,7 @@
 #pragma once
-// The last step of the backward pass: from the moments of each Gaussian to the gradients of its mean, log-scale,
-// quaternion and opacity (math/hit_gradient.hpp), back through the filter of the pixels where there is one.
+/// \file
+/// The last step of the backward pass: from the moments of each Gaussian to the gradients of its mean, log-scale,
+/// quaternion and opacity (math/hit_gradient.hpp), back through the filter of the pixels where there is one.
 
 #include <gart/core/span.hpp>
 #include <gart/math/hit_gradient.hpp>
@@ -12,7 +13,7 @@ namespace gart::inline GART_ISA {
 
 namespace backward_kernels {
 
-// Filter: no_filter, or the camera model's that the Gaussians were made through; `scene` is the stored one.
+/// Filter: no_filter, or the camera model's that the Gaussians were made through; `scene` is the stored one.
 struct no_filter {};
 
 template <class Filter>

@@ -1,12 +1,13 @@
 #pragma once
-// The backward pass by primitive: a team takes a tile, its lanes take the primitives of the tile's list in turn. A lane
-// walks the pixels that the primitive's box and the tile share, reads what the forward pass recorded there, sums the
-// gradient in registers and adds it to the Gaussian once. Rays and their SH bases are computed once a tile, into
-// scratch. This is the plain form, for tiles of any size: what backward/packet_gather.hpp on a host and
-// backward/matrix_gather.hpp on a device compute in theirs.
-//
-// Whether a slot is a hit is told by the slot itself (backward/lt_slot.hpp); its t, offset and alpha are evaluated
-// again by the function the forward pass used, so they are the same bits.
+/// \file
+/// The backward pass by primitive: a team takes a tile, its lanes take the primitives of the tile's list in turn. A
+/// lane walks the pixels that the primitive's box and the tile share, reads what the forward pass recorded there, sums
+/// the gradient in registers and adds it to the Gaussian once. Rays and their SH bases are computed once a tile, into
+/// scratch. This is the plain form, for tiles of any size: what backward/packet_gather.hpp on a host and
+/// backward/matrix_gather.hpp on a device compute in theirs.
+///
+/// Whether a slot is a hit is told by the slot itself (backward/lt_slot.hpp); its t, offset and alpha are evaluated
+/// again by the function the forward pass used, so they are the same bits.
 
 #include <gart/backward/gather_configuration.hpp>
 #include <gart/backward/record_lt.hpp>
@@ -19,55 +20,64 @@
 
 namespace gart::inline GART_ISA {
 
-// A row of the ordered sums: SH gradient, padded to quads, then moments.
+/// A row of the ordered sums: SH gradient, padded to quads, then moments.
 template <int ShDegree>
 struct pair_gradient {
-  static constexpr int sh_quads = (3 * sh_basis<ShDegree>::size + 3) / 4;
-  static constexpr int quads = sh_quads + moment_stride / 4;
+  static constexpr int sh_quads = (3 * sh_basis<ShDegree>::size + 3) / 4;  ///< of the SH gradient
+  static constexpr int quads = sh_quads + moment_stride / 4;               ///< of a row
 };
 
+/// The tile kernel of the gather, in its plain form.
 template <gather_configuration C>
 struct gather_kernel {
-  using response_type = typename C::response;
-  using entry_type = typename C::entry;
-  static constexpr bool recomputed = C::validity == slot_validity::recomputed;
+  using response_type = typename C::response;                                   ///< of the Gaussians
+  using entry_type = typename C::entry;                                         ///< of the LT buffer
+  static constexpr bool recomputed = C::validity == slot_validity::recomputed;  ///< whether hits are decided again
+  /// Lanes of a team, and teams that a multiprocessor should hold.
   static constexpr int block_size = 64, min_blocks = C::terms::geometry ? 8 : 10;
+  /// SH functions.
   static constexpr int bands = sh_basis<C::sh_degree>::size;
-  static constexpr int sh_stride = 3 * bands;
-  using grid_type = tile_grid<C::tile_size>;
+  static constexpr int sh_stride = 3 * bands;  ///< floats of a Gaussian's coefficients
+  using grid_type = tile_grid<C::tile_size>;   ///< the image's tiles
 
-  // What a lane needs of a pixel: direction and (colour . gradient), gradient, SH basis. Records are an odd number of
-  // 16-byte words apart where they can be, so that lanes on neighbouring pixels read different banks.
+  /// What a lane needs of a pixel: direction and (colour . gradient), gradient, SH basis. Records are an odd number of
+  /// 16-byte words apart where they can be, so that lanes on neighbouring pixels read different banks.
   struct pixel_data {
-    // Of degree 0 it is a constant.
+    /// Of degree 0 it is a constant.
     static constexpr int basis_quads = !C::terms::color || C::sh_degree == 0 ? 0 : (bands + 3) / 4;
+    /// Direction, colour . gradient; gradient, error.
     quad direction_total, gradient;
+    /// SH functions of the direction.
     quad basis[basis_quads];
-    quad last;  // t and place of the ray's last hit, where validity is recomputed; and what makes the words odd in
-                // number
-    quad spread[basis_quads % 2 ? 1 : 0];
+    quad last;  ///< t and place of the ray's last hit, where validity is recomputed; and what makes the words odd in
+                /// number
+    quad spread[basis_quads % 2 ? 1 : 0];  ///< room, where the words would be even in number
   };
+  /// What a team shares.
   struct scratch {
-    pixel_data pixels[grid_type::pixels];
+    pixel_data pixels[grid_type::pixels];  ///< of the tile
   };
 
-  pixel_rays rays;
-  grid_type grid;
-  tile_map_view map;
+  pixel_rays rays;    ///< of the view
+  grid_type grid;     ///< of the view
+  tile_map_view map;  ///< the tiles' lists
+  /// [N]: boxes, and where their slots begin.
   footprint_slots const* ranges = nullptr;
-  entry_type const* slots = nullptr;
+  entry_type const* slots = nullptr;  ///< the LT buffer
+  /// [N], in the view's frame.
   ray_gaussian const* records = nullptr;
-  int active_degree = C::sh_degree;
-  float const* color = nullptr;           // [H][W][3]
-  float const* color_gradient = nullptr;  // [H][W][3]
-  float const* error = nullptr;           // [H][W], or null: none is attributed
-  float* sh_gradient = nullptr;           // atomic: [N][K][3]
-  float* moments_out = nullptr;           // atomic: [N][moment_stride]
-  u64 const* pair_offsets = nullptr;      // ordered: first row of each primitive
-  quad* rows = nullptr;                   // ordered: [pairs][pair_gradient::quads]
-  last_hit const* last = nullptr;         // recomputed: [H][W]
-  float near = 0;
+  int active_degree = C::sh_degree;       ///< bands above it have no gradient
+  float const* color = nullptr;           ///< [H][W][3]
+  float const* color_gradient = nullptr;  ///< [H][W][3]
+  float const* error = nullptr;           ///< [H][W], or null: none is attributed
+  float* sh_gradient = nullptr;           ///< atomic: [N][K][3]
+  float* moments_out = nullptr;           ///< atomic: [N][moment_stride]
+  u64 const* pair_offsets = nullptr;      ///< ordered: first row of each primitive
+  quad* rows = nullptr;                   ///< ordered: [pairs][pair_gradient::quads]
+  last_hit const* last = nullptr;         ///< recomputed: [H][W]
+  float near = 0;                         ///< hits lie at t > near
 
+  /// Gathers the tile of a team.
   GART_KERNEL void operator()(auto const& team) const {
     u32 const tile = team.tile();
     u32 const first = map.offsets[tile], count = map.offsets[tile + 1] - first;
@@ -83,7 +93,7 @@ struct gather_kernel {
     team.barrier();
   }
 
-  // What a primitive's walk of a tile has summed goes to the Gaussian, or to its row.
+  /// What a primitive's walk of a tile has summed goes to the Gaussian, or to its row.
   GART_KERNEL GART_INLINE void finish(pixel_box const& box, pixel_box const& area, u32 id,
                                       float const (&sh_sum)[sh_stride],
                                       float const (&moment_sum)[moment_stride]) const {
@@ -92,7 +102,7 @@ struct gather_kernel {
   }
 
  protected:
-  // `sums`, an array of N, are floats [first, first + N) of the colour's.
+  /// `sums`, an array of N, are floats [first, first + N) of the colour's.
   GART_KERNEL GART_INLINE void add_color_sums(pixel_box const& box, pixel_box const& area, u32 id, int first,
                                               auto const& sums) const {
     constexpr int N = std::extent_v<std::remove_cvref_t<decltype(sums)>>;
@@ -114,6 +124,7 @@ struct gather_kernel {
       for (int i = 0; i < N; ++i) out[i] = i < active ? sums[i] : 0.0f;
     }
   }
+  /// The same with the moments.
   GART_KERNEL GART_INLINE void add_moment_sums(pixel_box const& box, pixel_box const& area, u32 id,
                                                float const (&sums)[moment_stride]) const {
     if constexpr (C::sums == gather_sums::atomic) {
@@ -126,6 +137,7 @@ struct gather_kernel {
     }
   }
 
+  /// What the lanes need of pixel `at`.
   GART_HD void load_pixel(pixel_data& out, pixel const& at) const {
     std::size_t const a = 3 * (static_cast<std::size_t>(at.y) * rays.view.width + at.x);
     vec3 const d = pixel_ray(rays, at).direction;
@@ -144,6 +156,7 @@ struct gather_kernel {
     }
   }
 
+  /// A primitive over its cell of a tile.
   GART_KERNEL void gather(scratch const& s, pixel_box const& area, u32 id) const {
     footprint_slots const range = ranges[id];
     float sh_sum[sh_stride] = {};
@@ -175,17 +188,21 @@ struct gather_kernel {
     finish(range.box, area, id, sh_sum, moment_sum);
   }
 
-  // What a lane keeps of its Gaussian: colour alone needs nothing but the slots.
+  /// What a lane keeps of its Gaussian: colour alone needs nothing but the slots.
   struct no_data {
+    /// Reads nothing.
     GART_HD no_data(gather_kernel const&, u32) {}
   };
+  /// The Gaussian in the view's frame.
   struct record_data {
-    ray_gaussian gaussian;
+    ray_gaussian gaussian;  ///< read once a primitive
+    /// Of Gaussian `id`.
     GART_HD record_data(gather_kernel const& k, u32 id) : gaussian(k.records[id]) {}
   };
+  /// Of the two, what the terms need.
   using lane_data = std::conditional_t<C::terms::geometry || recomputed, record_data, no_data>;
 
-  // What the Gaussian has of the rays of N pixels at once.
+  /// What the Gaussian has of the rays of N pixels at once.
   template <int N, class F>
   GART_HD GART_INLINE void peaks_at(ray_peak (&out)[N], lane_data const& data, F&& pixel_of) const {
     if constexpr (std::is_same_v<lane_data, record_data>)
@@ -194,7 +211,7 @@ struct gather_kernel {
         return approach_to(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
       });
   }
-  // Whether the slot of that number is a hit.
+  /// Whether the slot of that number is a hit.
   GART_HD GART_INLINE bool holds(pixel_data const& at, entry_type const& entry, u32 number, ray_peak const& r,
                                  lane_data const& data) const {
     if constexpr (recomputed)
@@ -203,7 +220,7 @@ struct gather_kernel {
       return entry.written();
   }
 
-  // One hit: its pixel, its slot.
+  /// One hit: its pixel, its slot.
   GART_HD GART_INLINE void add_color(pixel_data const& at, entry_type const& entry, float (&sh_sum)[sh_stride]) const {
     quad const g = at.gradient;
     sh_basis<C::sh_degree> basis;
@@ -225,6 +242,7 @@ struct gather_kernel {
       sh_sum[3 * b + 2] += basis.y[b] * cg.z;
     }
   }
+  /// Adds a hit's moments to the sums; nothing where `hit` is false.
   GART_HD GART_INLINE void add_moments(pixel_data const& at, entry_type const& entry, ray_peak const& r,
                                        lane_data const& data, bool hit, float (&moment_sum)[moment_stride]) const {
     quad const g = at.gradient;
@@ -238,6 +256,7 @@ struct gather_kernel {
     moment_sum[error_place] += hit ? entry.weight() * g.v[3] : 0.0f;
   }
 
+  /// The pair's row of the ordered sums.
   GART_HD GART_INLINE quad* row_of(pixel_box const& box, pixel_box const& area, u32 id) const {
     pixel_box const tiles = tiles_of<C::tile_size>(box);
     u64 const pair =
@@ -246,15 +265,20 @@ struct gather_kernel {
   }
 };
 
-// The ordered sums: quad q of primitive i over its rows, in order. One index a quad, quads of a primitive together.
+/// The ordered sums: quad q of primitive i over its rows, in order. One index a quad, quads of a primitive together.
 template <int ShDegree, class Terms>
 struct sum_pairs {
-  using row = pair_gradient<ShDegree>;
+  using row = pair_gradient<ShDegree>;  ///< what is added up
+  /// [N]: first row of each primitive.
   span<u64 const> pair_offsets;
-  u64 pairs;
+  u64 pairs;  ///< rows in all
+  /// [pairs][row::quads].
   quad const* rows;
+  /// [N][K][3], overwritten.
   float* sh_gradient;
+  /// [N][moment_stride], overwritten.
   float* moments_out;
+  /// Index: primitive times row::quads, plus q.
   GART_KERNEL void operator()(index_t index) const {
     index_t const i = index / row::quads, q = index % row::quads;
     bool const is_color = q < row::sh_quads;

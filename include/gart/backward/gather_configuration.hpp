@@ -1,16 +1,19 @@
 #pragma once
-// What a gather (backward/gather.hpp) is compiled for, one struct of these members:
-//   policy     the execution policy on which it runs
-//   response   how the Gaussians fall from their centres (math/response.hpp)
-//   terms      what it sums up: terms<color>, terms<geometry> or both
-//   entry      what a slot of the LT buffer holds of a hit (backward/lt_slot.hpp)
-//   sh_degree  that the coefficients are stored with
-//   tile_size  side of a tile, in pixels
-//   sums       where a pair's sums go
-//   validity   how a slot that is a hit is told from one that is none (backward/strategies.hpp)
-//   form       which form of the kernel runs (exec/concepts.hpp): the policy's, unless a strategy asks for the plain
-//   one
-// strategy_gather makes one of a strategy; a struct of a program's own does as well (bench/registers.cu).
+/// \file
+/// What a gather (backward/gather.hpp) is compiled for, one struct of these members:
+/// \code{.unparsed}
+/// policy     the execution policy on which it runs
+/// response   how the Gaussians fall from their centres (math/response.hpp)
+/// terms      what it sums up: terms<color>, terms<geometry> or both
+/// entry      what a slot of the LT buffer holds of a hit (backward/lt_slot.hpp)
+/// sh_degree  that the coefficients are stored with
+/// tile_size  side of a tile, in pixels
+/// sums       where a pair's sums go
+/// validity   how a slot that is a hit is told from one that is none (backward/strategies.hpp)
+/// form       which form of the kernel runs (exec/concepts.hpp): the policy's, unless a strategy asks for the
+///            plain one
+/// \endcode
+/// strategy_gather makes one of a strategy; a struct of a program's own does as well (bench/registers.cu).
 
 #include <gart/backward/strategies.hpp>
 #include <gart/exec/concepts.hpp>
@@ -20,10 +23,11 @@
 
 namespace gart::inline GART_ISA {
 
-// Where a lane's sums go: added to the Gaussian atomically, or kept as one row a (primitive, tile) pair, in
-// primitive-major order, for sum_pairs to add up in that order: the same bits in every run.
+/// Where a lane's sums go: added to the Gaussian atomically, or kept as one row a (primitive, tile) pair, in
+/// primitive-major order, for sum_pairs to add up in that order: the same bits in every run.
 enum class gather_sums { atomic, ordered };
 
+/// A struct with these members.
 template <class C>
 concept gather_configuration = requires {
   typename C::policy;
@@ -39,16 +43,19 @@ concept gather_configuration = requires {
 }
 &&execution<typename C::policy>&& response_function<typename C::response>;
 
+/// The gather of a strategy on a policy.
 template <execution E, int ShDegree, response_function Response, strategy Strategy, int TileSize>
 struct strategy_gather {
-  using policy = E;
-  using response = Response;
-  using terms = typename Strategy::gather;
-  using entry = typename Strategy::template record<TileSize>::entry;
+  using policy = E;                                                   ///< on which it runs
+  using response = Response;                                          ///< of the Gaussians
+  using terms = typename Strategy::gather;                            ///< what is gathered
+  using entry = typename Strategy::template record<TileSize>::entry;  ///< a slot of the LT buffer
+  /// Of the coefficients; side of a tile, in pixels.
   static constexpr int sh_degree = ShDegree, tile_size = TileSize;
+  /// In an order or atomically.
   static constexpr gather_sums sums = Strategy::ordered ? gather_sums::ordered : gather_sums::atomic;
-  static constexpr slot_validity validity = Strategy::validity;
-  static constexpr kernel_form form = Strategy::lane_by_lane ? kernel_form::plain : E::form;
+  static constexpr slot_validity validity = Strategy::validity;  ///< how slots that are hits are told
+  static constexpr kernel_form form = Strategy::lane_by_lane ? kernel_form::plain : E::form;  ///< of the kernel
 };
 
 }  // namespace gart::inline GART_ISA

@@ -1,6 +1,7 @@
 #pragma once
-// The form of the gather that a configuration asks for: gather_of<C> is a tile kernel that begins with the members of
-// gather_kernel<C> (backward/gather.hpp), to be launched with block_size lanes.
+/// \file
+/// The form of the gather that a configuration asks for: gather_of<C> is a tile kernel that begins with the members of
+/// gather_kernel<C> (backward/gather.hpp), to be launched with block_size lanes.
 
 #include <gart/backward/matrix_gather.hpp>
 #include <gart/backward/packet_gather.hpp>
@@ -24,6 +25,7 @@ constexpr auto gather_form() {
 
 }  // namespace detail
 
+/// The tile kernel of a configuration.
 template <gather_configuration C>
 using gather_of = typename decltype(detail::gather_form<C>())::type;
 

@@ -1,8 +1,12 @@
 #pragma once
-// Where the slot of (primitive, tile, pixel) lies in the LT buffer: primitive-major, then tile, then pixel,
-//   idx(i, t, p) = O_primitive(i) + O_tile(i, t) + O_pixel(i, t, p).
-// O_primitive is a prefix sum of box areas in 64 bits; the rest is a closed form of the box: the tiles of a box are its
-// cells cut by the grid's lines, row by row, and each holds its pixels row by row. A bijection onto [0, sum of areas).
+/// \file
+/// Where the slot of (primitive, tile, pixel) lies in the LT buffer: primitive-major, then tile, then pixel,
+/// \code{.unparsed}
+/// idx(i, t, p) = O_primitive(i) + O_tile(i, t) + O_pixel(i, t, p).
+/// \endcode
+/// O_primitive is a prefix sum of box areas in 64 bits; the rest is a closed form of the box: the tiles of a box are
+/// its cells cut by the grid's lines, row by row, and each holds its pixels row by row. A bijection onto [0, sum of
+/// areas).
 
 #include <gart/tiles/footprint_slots.hpp>
 
@@ -10,38 +14,41 @@
 
 namespace gart::inline GART_ISA {
 
-// Slots of the box before tile cell `cell` (the box cut by the tile): whole rows of cells above, cells to the left.
+/// Slots of the box before tile cell `cell` (the box cut by the tile): whole rows of cells above, cells to the left.
 GART_HD constexpr u32 tile_offset(pixel_box const& box, pixel_box const& cell) {
   return (u32{cell.y0} - box.y0) * box.width() + (u32{cell.x0} - box.x0) * cell.height();
 }
 
+/// Slots of the cell before pixel (x, y): whole rows above, pixels to the left.
 GART_HD constexpr u32 pixel_offset(pixel_box const& cell, u32 x, u32 y) {
   return (y - cell.y0) * cell.width() + (x - cell.x0);
 }
 
-// The cell of a primitive and a tile, one 16-byte word, by which many pixels find their slots. Slots are counted in 32
-// bits.
+/// The cell of a primitive and a tile, one 16-byte word, by which many pixels find their slots. Slots are counted in 32
+/// bits.
 struct alignas(16) tile_slots {
-  u32 first = 0;  // slot of the cell's first pixel
-  u32 width = 0;
+  u32 first = 0;  ///< slot of the cell's first pixel
+  u32 width = 0;  ///< of the cell, in pixels
+  /// The cell: [x, x1) x [y, y1).
   u16 x = 0, y = 0, x1 = 0, y1 = 0;
-  static constexpr u32 none = 0xffffffffu;
+  static constexpr u32 none = 0xffffffffu;  ///< no slot
 
   tile_slots() = default;
+  /// The cell of a primitive's box and the tile whose pixels are `tile`.
   GART_HD GART_INLINE tile_slots(footprint_slots const& range, pixel_box const& tile) {
     pixel_box const cell = intersect(range.box, tile);
     first = static_cast<u32>(range.offset) + tile_offset(range.box, cell);
     width = cell.width();
     x = cell.x0, y = cell.y0, x1 = cell.x1, y1 = cell.y1;
   }
-  // From memory as one word, where fields would be read one after another.
+  /// From memory as one word, where fields would be read one after another.
   GART_HD GART_INLINE static tile_slots read(tile_slots const& from) {
     quad const word = reinterpret_cast<quad const&>(from);
     tile_slots out;
     std::memcpy(static_cast<void*>(&out), &word, sizeof out);
     return out;
   }
-  // Boxes hold every hit; memory stays safe regardless. Without a branch: lanes have not to wait for one another.
+  /// Boxes hold every hit; memory stays safe regardless. Without a branch: lanes have not to wait for one another.
   GART_HD GART_INLINE u32 place_of(int px, int py) const {
     u32 const column = static_cast<u32>(px) - x, row = static_cast<u32>(py) - y;
     bool const inside = (column < width) & (row < static_cast<u32>(y1 - y));
@@ -49,7 +56,7 @@ struct alignas(16) tile_slots {
   }
 };
 
-// The cell of the box that holds pixel (x, y), which must lie in the box.
+/// The cell of the box that holds pixel (x, y), which must lie in the box.
 template <int Size>
 GART_HD constexpr pixel_box cell_of(pixel_box const& box, u32 x, u32 y) {
   u32 const tx = x / Size * Size, ty = y / Size * Size;
@@ -58,6 +65,7 @@ GART_HD constexpr pixel_box cell_of(pixel_box const& box, u32 x, u32 y) {
           static_cast<u16>(ty + Size < box.y1 ? ty + Size : box.y1)};
 }
 
+/// The slot of pixel (x, y), which must lie in the box.
 template <int Size>
 GART_HD constexpr u64 lt_index(footprint_slots const& range, u32 x, u32 y) {
   pixel_box const cell = cell_of<Size>(range.box, x, y);

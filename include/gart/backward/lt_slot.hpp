@@ -1,21 +1,22 @@
 #pragma once
-// What a slot of the LT buffer holds of a hit, one struct a format: the forward pass packs (of), the gather unpacks.
-// V, the colour that the pixel would have if the hit were opaque, is what the gradient of alpha needs
-// (math/hit_gradient.hpp); the weight w = T alpha what the gradient of colour needs, with, for each channel of the
-// hit's colour, whether it was clamped at zero.
-//
-//   float4   16 bytes  V, whose free sign bits hold the clamps; w
-//   half      8 bytes  the same in four halves: V within 2^-11 relatively (2^-25 absolutely), at most 65504; 2^15 w, so
-//                      that a weight keeps its 2^-11 down to 2e-9
-//   shared    8 bytes  V with 9 bits a channel and one exponent: within 0.002 of its largest channel, at most 65408; w,
-//                      whose three lowest bits hold the clamps (a relative error of 2^-20)
-//   weight    4 bytes  w as in shared; no V: enough for the gradient of colour (hybrid)
-//
-// The gradient of alpha is the difference of V and the pixel's colour, over 1 - alpha: an error of V counts by how
-// little of the ray the hit and what lies behind it are. Relative errors of a whole gradient, group by group, against
-// double, at most (tests/traits): float4 5e-4, half 1e-2 and shared 4e-2 on clouds and long rays; on stacks of hits at
-// the clamp 5e-4, 0.15 and 0.6. Slots that no hit wrote hold what the clear left there, all bits set, which `written`
-// tells.
+/// \file
+/// What a slot of the LT buffer holds of a hit, one struct a format: the forward pass packs (of), the gather unpacks.
+/// V, the colour that the pixel would have if the hit were opaque, is what the gradient of alpha needs
+/// (math/hit_gradient.hpp); the weight w = T alpha what the gradient of colour needs, with, for each channel of the
+/// hit's colour, whether it was clamped at zero.
+/// \code{.unparsed}
+/// float4   16 bytes  V, whose free sign bits hold the clamps; w
+/// half      8 bytes  the same in four halves: V within 2^-11 relatively (2^-25 absolutely), at most 65504; 2^15 w, so
+///                    that a weight keeps its 2^-11 down to 2e-9
+/// shared    8 bytes  V with 9 bits a channel and one exponent: within 0.002 of its largest channel, at most 65408; w,
+///                    whose three lowest bits hold the clamps (a relative error of 2^-20)
+/// weight    4 bytes  w as in shared; no V: enough for the gradient of colour (hybrid)
+/// \endcode
+/// The gradient of alpha is the difference of V and the pixel's colour, over 1 - alpha: an error of V counts by how
+/// little of the ray the hit and what lies behind it are. Relative errors of a whole gradient, group by group, against
+/// double, at most (tests/traits): float4 5e-4, half 1e-2 and shared 4e-2 on clouds and long rays; on stacks of hits at
+/// the clamp 5e-4, 0.15 and 0.6. Slots that no hit wrote hold what the clear left there, all bits set, which `written`
+/// tells.
 
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
@@ -42,21 +43,29 @@ GART_HD GART_INLINE float from_half(u32 half) {
 
 }  // namespace detail
 
+/// The format float4: exact.
 struct alignas(16) lt_entry {
-  static constexpr char const* name = "float4";
-  float r, g, b;  // V; negative where the hit's colour was clamped
-  float w;
+  static constexpr char const* name = "float4";  ///< in configurations and reports
+  /// V; negative where the hit's colour was clamped.
+  float r, g, b;
+  float w;  ///< the weight; a NaN: not written
 
+  /// Packs V, the weight and the clamps of the colour `c`, which is that before the clamp.
   GART_HD GART_INLINE static lt_entry of(vec3 const& v, float weight, vec3 const& c) {
     return {signed_by(v.x, c.x), signed_by(v.y, c.y), signed_by(v.z, c.z), weight};
   }
+  /// Whether a hit wrote it, of a buffer that was cleared.
   GART_HD GART_INLINE bool written() const { return w >= 0.0f; }
+  /// The weight, T alpha.
   GART_HD GART_INLINE float weight() const { return w; }
+  /// Whether that channel of the hit's colour was clamped at zero.
   GART_HD GART_INLINE bool clamped(int channel) const {
     return float_to_bits(channel == 0 ? r : channel == 1 ? g : b) >> 31;
   }
+  /// V.
   GART_HD GART_INLINE vec3 color() const { return {fabsf(r), fabsf(g), fabsf(b)}; }
 
+  /// V, negative where c is.
   template <class F>
   GART_HD GART_INLINE static F signed_by(F v, F c) {
     F const size = magnitude(v);
@@ -64,20 +73,27 @@ struct alignas(16) lt_entry {
   }
 };
 
+/// The format half.
 struct alignas(8) lt_half_entry {
-  static constexpr char const* name = "half";
-  u32 rg, bw;  // r in the low half of rg, b in that of bw; sign bits of r, g, b: clamped
+  static constexpr char const* name = "half";  ///< in configurations and reports
+  /// Channel r in the low half of rg, b in that of bw; sign bits of r, g, b: clamped.
+  u32 rg, bw;
 
+  /// As lt_entry::of.
   GART_HD GART_INLINE static lt_half_entry of(vec3 const& v, float weight, vec3 const& c) {
     u32 const clamps = detail::clamps_of(c);
     return {half_of(v.x) | half_of(v.y) << 16 | (clamps & 1u) << 15 | (clamps & 2u) << 30,
             half_of(v.z) | half_of(mul(weight, 32768.0f)) << 16 | (clamps & 4u) << 13};
   }
+  /// Whether a hit wrote it, of a buffer that was cleared.
   GART_HD GART_INLINE bool written() const { return !(bw >> 31); }
+  /// The weight, T alpha.
   GART_HD GART_INLINE float weight() const { return mul(detail::from_half(bw >> 16), 1.0f / 32768.0f); }
+  /// Whether that channel of the hit's colour was clamped at zero.
   GART_HD GART_INLINE bool clamped(int channel) const {
     return (channel == 0 ? rg >> 15 : channel == 1 ? rg >> 31 : bw >> 15) & 1u;
   }
+  /// V.
   GART_HD GART_INLINE vec3 color() const {
     return {detail::from_half(rg & 0x7fffu), detail::from_half(rg >> 16 & 0x7fffu), detail::from_half(bw & 0x7fffu)};
   }
@@ -86,22 +102,29 @@ struct alignas(8) lt_half_entry {
   GART_HD GART_INLINE static u32 half_of(float x) { return detail::to_half(x < 65504.0f ? x : 65504.0f); }
 };
 
+/// The format weight: no V.
 struct weight_entry {
-  static constexpr char const* name = "weight";
-  float w;
+  static constexpr char const* name = "weight";  ///< in configurations and reports
+  float w;                                       ///< the weight, with the clamps in its lowest bits
 
+  /// Packs the weight and the clamps of the colour `c`, which is that before the clamp.
   GART_HD GART_INLINE static weight_entry of(vec3 const&, float weight, vec3 const& c) {
     return {bits_to_float((float_to_bits(weight) & ~7u) | detail::clamps_of(c))};
   }
+  /// Whether a hit wrote it, of a buffer that was cleared.
   GART_HD GART_INLINE bool written() const { return w >= 0.0f; }
+  /// The weight, T alpha.
   GART_HD GART_INLINE float weight() const { return w; }
+  /// Whether that channel of the hit's colour was clamped at zero.
   GART_HD GART_INLINE bool clamped(int channel) const { return float_to_bits(w) >> channel & 1; }
 };
 
+/// The format shared.
 struct alignas(8) lt_shared_entry : weight_entry {
-  static constexpr char const* name = "shared";
-  u32 rgb;  // 9 bits each from the lowest, and the exponent
+  static constexpr char const* name = "shared";  ///< in configurations and reports
+  u32 rgb;                                       ///< 9 bits each from the lowest, and the exponent
 
+  /// As lt_entry::of.
   GART_HD GART_INLINE static lt_shared_entry of(vec3 const& v, float weight, vec3 const& c) {
     float largest = v.x > v.y ? v.x : v.y;
     largest = largest > v.z ? largest : v.z;
@@ -116,6 +139,7 @@ struct alignas(8) lt_shared_entry : weight_entry {
               (exponent - least_exponent) << 27;
     return out;
   }
+  /// V.
   GART_HD GART_INLINE vec3 color() const {
     float const step = bits_to_float(((rgb >> 27) + least_exponent - 8u) << 23);
     return {step * static_cast<float>(rgb & 511u), step * static_cast<float>(rgb >> 9 & 511u),

@@ -1,14 +1,17 @@
 #pragma once
-// The gather on a device: eight primitives a warp, four lanes a primitive, which take the tile's pixels eight at a
-// time, two a lane. What primitives sum up for colour is a product for each channel c,
-//   sum[band][primitive] = Y[band][pixel] (w g_c)[pixel][primitive],   w = 0 where the channel is clamped or no hit is,
-// so it is left to the matrix units (math/matrix_unit.hpp): a lane holds the weights where they want them, and no SH
-// sum of its own. Moments are summed in registers and added up over the four lanes. Neighbouring lanes read
-// neighbouring slots and add to neighbouring floats.
-//
-// A warp takes the rows of the tile that any of its primitives has, so a tile's list is put in order of rows first, 256
-// of it at a time. A pair's sums are of the terms of gather_kernel (backward/gather.hpp) in another order, the same in
-// every run. Device only.
+/// \file
+/// The gather on a device: eight primitives a warp, four lanes a primitive, which take the tile's pixels eight at a
+/// time, two a lane. What primitives sum up for colour is a product for each channel c,
+/// \code{.unparsed}
+/// sum[band][primitive] = Y[band][pixel] (w g_c)[pixel][primitive],   w = 0 where the channel is clamped or no hit is,
+/// \endcode
+/// so it is left to the matrix units (math/matrix_unit.hpp): a lane holds the weights where they want them, and no SH
+/// sum of its own. Moments are summed in registers and added up over the four lanes. Neighbouring lanes read
+/// neighbouring slots and add to neighbouring floats.
+///
+/// A warp takes the rows of the tile that any of its primitives has, so a tile's list is put in order of rows first,
+/// 256 of it at a time. A pair's sums are of the terms of gather_kernel (backward/gather.hpp) in another order, the
+/// same in every run. Device only.
 
 #include <gart/backward/gather.hpp>
 #include <gart/math/matrix_unit.hpp>
@@ -31,7 +34,7 @@ struct matrix_gather;  // a device's compiler has it
 
 #else
 
-// All but the colour's sums is of a gather without colour.
+/// The tile kernel on matrix units. All but the colour's sums is of a gather without colour.
 template <gather_configuration C>
 struct matrix_gather : gather_kernel<detail::without_color<C>> {
   using base = gather_kernel<detail::without_color<C>>;
@@ -39,13 +42,14 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
   static constexpr int lanes = 32, warps = 4, block_size = warps * lanes, min_blocks = 5;
   static constexpr int bands = base::bands, sh_stride = base::sh_stride;
   static constexpr int Size = C::tile_size;
-  static constexpr u32 share = 2 * block_size;  // primitives that are put in order together
+  static constexpr u32 share = 2 * block_size;  ///< primitives that are put in order together
   static_assert(C::terms::color && Size == 8 && bands <= 16);
 
   struct scratch {
     typename base::pixel_data pixels[Size * Size];
-    matrix_part<4>::words high[Size][lanes], low[Size][lanes];  // Y of a row of pixels, as the lanes want it
-    float sums[warps][8][52];  // of colour, a row a primitive; 52: what a warp writes at once lies in 32 banks
+    /// Y of a row of pixels, as the lanes want it.
+    matrix_part<4>::words high[Size][lanes], low[Size][lanes];
+    float sums[warps][8][52];  ///< of colour, a row a primitive; 52: what a warp writes at once lies in 32 banks
     tile_slots cells[share];
     u32 ids[share];
     u32 count[Size * Size];

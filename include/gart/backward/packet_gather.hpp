@@ -1,6 +1,7 @@
 #pragma once
-// The gather on a host: as gather_kernel (backward/gather.hpp), with the pixels of a tile in packets, a lane a pixel
-// (math/lanes.hpp), and a Gaussian's SH sums a lane a band. Sums are of the same terms in another order.
+/// \file
+/// The gather on a host: as gather_kernel (backward/gather.hpp), with the pixels of a tile in packets, a lane a pixel
+/// (math/lanes.hpp), and a Gaussian's SH sums a lane a band. Sums are of the same terms in another order.
 
 #include <gart/backward/gather.hpp>
 #include <gart/backward/packet_slots.hpp>
@@ -9,38 +10,48 @@ namespace gart::inline GART_ISA {
 
 #if defined(__CUDACC__)
 
-// nvcc's host compiler has no lanes: a host policy there takes the plain form.
+/// nvcc's host compiler has no lanes: a host policy there takes the plain form.
 template <gather_configuration C>
 struct packet_gather : gather_kernel<C> {};
 
 #else
 
+/// The tile kernel by packets.
 template <gather_configuration C>
 struct packet_gather {
-  using gather_type = gather_kernel<C>;
-  using response_type = typename C::response;
-  using entry_type = typename C::entry;
-  static constexpr int block_size = 1;  // a host's team has one lane
-  static constexpr bool recomputed = gather_type::recomputed;
+  using gather_type = gather_kernel<C>;                        ///< the plain form, whose members it has
+  using response_type = typename C::response;                  ///< of the Gaussians
+  using entry_type = typename C::entry;                        ///< of the LT buffer
+  static constexpr int block_size = 1;                         ///< a host's team has one lane
+  static constexpr bool recomputed = gather_type::recomputed;  ///< whether hits are decided again
+  /// SH functions, and floats of a Gaussian's coefficients.
   static constexpr int bands = gather_type::bands, sh_stride = gather_type::sh_stride;
+  /// Side of a tile, and packets in it.
   static constexpr int Size = C::tile_size, packets = Size * Size / lane_count;
+  /// Lanes' groups that hold the SH functions.
   static constexpr int band_groups = (bands + lane_count - 1) / lane_count;
 
+  /// What is needed of a packet's pixels.
   struct packet_data {
-    int x, y;  // in the tile
+    /// In the tile.
+    int x, y;
+    /// Of the rays; of the image.
     vec3_of<lanes> direction, gradient;
-    lanes total, error, last_t;  // colour . gradient; of the pixel; the ray's last hit
-    lane_words last_place;
-    lanes bands_of[lane_count][band_groups];  // the SH basis, a pixel after another
+    /// Colour . gradient; of the pixel; t of the ray's last hit.
+    lanes total, error, last_t;
+    lane_words last_place;                    ///< of the ray's last hit
+    lanes bands_of[lane_count][band_groups];  ///< the SH basis, a pixel after another
   };
+  /// What a team shares.
   struct scratch {
-    packet_data data[packets];
+    packet_data data[packets];  ///< of the tile
   };
 
   static_assert(Size <= packet_cell::largest_tile);
 
-  gather_type gather;
+  gather_type gather;  ///< with the arrays
 
+  /// Gathers the tile of a team.
   void operator()(auto const& team) const {
     u32 const tile = team.tile();
     u32 const first = gather.map.offsets[tile], last = gather.map.offsets[tile + 1];

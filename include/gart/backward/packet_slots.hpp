@@ -1,6 +1,7 @@
 #pragma once
-// The slots (backward/lt_slot.hpp) of a Gaussian's hits with a packet's rays (trace/packet_walk.hpp): those of a row of
-// pixels lie one after another, rows the width of the cell apart.
+/// \file
+/// The slots (backward/lt_slot.hpp) of a Gaussian's hits with a packet's rays (trace/packet_walk.hpp): those of a row
+/// of pixels lie one after another, rows the width of the cell apart.
 
 #include <gart/backward/lt_layout.hpp>
 #include <gart/backward/lt_slot.hpp>
@@ -12,19 +13,20 @@
 
 namespace gart::inline GART_ISA {
 
-// What the slots of a packet hold.
+/// What the slots of a packet hold.
 struct packet_entries {
-  vec3_of<lanes> opaque;  // V
-  lanes weight;
-  lane_mask clamped[3];  // channels of the hit's colour
+  vec3_of<lanes> opaque;  ///< V
+  lanes weight;           ///< the weights
+  lane_mask clamped[3];   ///< channels of the hit's colour
 };
 
-// A cell with the place of its slots.
+/// A cell with the place of its slots.
 struct slot_cell : packet_cell {
-  std::ptrdiff_t first;  // number of the slot of the tile's first pixel, had it one: cells may begin behind it
-  u32 width;             // from a slot to that of the pixel below
+  std::ptrdiff_t first;  ///< number of the slot of the tile's first pixel, had it one: cells may begin behind it
+  u32 width;             ///< from a slot to that of the pixel below
 
   slot_cell() = default;
+  /// Of the box of `gaussian` in the tile whose pixels are `tile`.
   GART_INLINE slot_cell(u32 gaussian, footprint_slots const& range, pixel_box const& tile)
       : packet_cell(gaussian, range, tile) {
     pixel_box const cell = intersect(range.box, tile);
@@ -35,22 +37,24 @@ struct slot_cell : packet_cell {
   }
 };
 
+/// Where a packet's pixels lie among the slots of a cell.
 class packet_slots {
  public:
-  lane_mask inside;  // the pixels that have a slot
+  lane_mask inside;  ///< the pixels that have a slot
 
   packet_slots() = default;
-  // Of the packet at (x, y) in the tile.
+  /// Of the packet at (x, y) in the tile.
   GART_INLINE packet_slots(slot_cell const& cell, int x, int y)
       : inside(cell.inside(x, y)),
         width_(static_cast<int>(cell.width)),
         first_(cell.first + static_cast<std::ptrdiff_t>(y) * width_ + x) {}
 
-  // Numbers of the slots, for lanes inside.
+  /// Numbers of the slots, for lanes inside.
   GART_INLINE lane_words places() const {
     return every_lane(static_cast<u32>(first_)) + rows() * static_cast<u32>(width_) + columns();
   }
 
+  /// Asks for the slots' lines, to be written.
   template <class Entry>
   GART_INLINE void fetch_to_write(Entry const* slots) const {
     for (int r = 0; r < packet_block::height; ++r) {
@@ -59,6 +63,7 @@ class packet_slots {
     }
   }
 
+  /// Writes the slots of the hits.
   template <class Entry>
   GART_INLINE void write(Entry* slots, lane_mask hits, vec3_of<lanes> const& opaque, lanes weight,
                          vec3_of<lanes> const& unclamped) const {
@@ -76,7 +81,7 @@ class packet_slots {
     }
   }
 
-  // Zeros where there are no hits. Geometry: whether V is wanted.
+  /// Zeros where there are no hits. Geometry: whether V is wanted.
   template <bool Geometry, class Entry>
   GART_INLINE packet_entries read(Entry const* slots, lane_mask hits) const {
     packet_entries out;
@@ -103,7 +108,7 @@ class packet_slots {
     return out;
   }
 
-  // Whether the hits' slots were written, for entries that say so.
+  /// Whether the hits' slots were written, for entries that say so.
   template <class Entry>
   GART_INLINE lane_mask written(Entry const* slots) const {
     u32 bits = 0;

@@ -1,6 +1,7 @@
 #pragma once
-// What the primitive and hybrid strategies record of a hit: a slot (backward/lt_slot.hpp) at its place in the LT buffer
-// (backward/lt_layout.hpp).
+/// \file
+/// What the primitive and hybrid strategies record of a hit: a slot (backward/lt_slot.hpp) at its place in the LT
+/// buffer (backward/lt_layout.hpp).
 
 #include <gart/backward/lt_layout.hpp>
 #include <gart/backward/lt_slot.hpp>
@@ -9,15 +10,17 @@
 
 namespace gart::inline GART_ISA {
 
+/// The record of an LT buffer with slots of Entry, of tiles of Size pixels a side.
 template <class Entry, int Size>
 struct record_lt {
-  using entry = Entry;
-  using cell = tile_slots;
+  using entry = Entry;      ///< a slot
+  using cell = tile_slots;  ///< finds a pair's slots
+  /// [N]: boxes, and where their slots begin.
   footprint_slots const* ranges = nullptr;
-  Entry* slots = nullptr;
+  Entry* slots = nullptr;  ///< the LT buffer
 
-  static constexpr bool any = true;
-  // The number of the hit's slot. Boxes hold every hit; memory stays safe regardless.
+  static constexpr bool any = true;  ///< something is left
+  /// The number of the hit's slot. Boxes hold every hit; memory stays safe regardless.
   GART_HD GART_INLINE u32 place_of(u32 id, pixel at) const {
     footprint_slots const range = ranges[id];
     pixel_box const& b = range.box;
@@ -25,18 +28,21 @@ struct record_lt {
     if (x < b.x0 || x >= b.x1 || y < b.y0 || y >= b.y1) return tile_slots::none;
     return static_cast<u32>(lt_index<Size>(range, x, y));
   }
+  /// Writes the slot of a hit: the opaque colour V, the weight and the clamps.
   GART_HD GART_INLINE void operator()(u32 place, vec3 const& opaque, float weight, vec3 const& unclamped) const {
     if (place != tile_slots::none) slots[place] = Entry::of(opaque, weight, unclamped);
   }
 
 #if !defined(__CUDACC__)
-  using packet_cell = slot_cell;
-  using note = packet_slots;
+  using packet_cell = slot_cell;  ///< with the place of its slots
+  using note = packet_slots;      ///< a packet's slots
+  /// The slots of a packet's pixels, asked for.
   GART_INLINE note expect(slot_cell const& from, packet_block const& block) const {
     packet_slots const at(from, block.x % Size, block.y % Size);
     at.fetch_to_write(slots);
     return at;
   }
+  /// Writes the slots of the hits; their numbers.
   GART_INLINE lane_words operator()(note const& at, lane_mask hits, vec3_of<lanes> const& opaque, lanes weight,
                                     vec3_of<lanes> const& unclamped) const {
     at.write(slots, hits, opaque, weight, unclamped);

@@ -1,7 +1,8 @@
 #pragma once
-// The backward pass by pixel: every ray is traced again and adds each hit's gradient to its Gaussian, atomically.
-// What it adds is chosen by terms: 3 K floats of colour (K SH coefficients a channel), the 10 moments of geometry
-// (math/hit_gradient.hpp). Cost: a second trace, and a row of atomics a hit and term.
+/// \file
+/// The backward pass by pixel: every ray is traced again and adds each hit's gradient to its Gaussian, atomically.
+/// What it adds is chosen by terms: 3 K floats of colour (K SH coefficients a channel), the 10 moments of geometry
+/// (math/hit_gradient.hpp). Cost: a second trace, and a row of atomics a hit and term.
 
 #include <gart/backward/terms.hpp>
 #include <gart/math/hit_gradient.hpp>
@@ -13,33 +14,41 @@
 
 namespace gart::inline GART_ISA {
 
+/// The ray program of the backward pass by pixel (trace/ray_program.hpp).
 template <int ShDegree, class Response, class Terms, execution E>
 struct scatter_program : ray_program_base {
+  /// Rays from the camera's centre.
   using ray_type = primary_ray;
-  static constexpr int sh_stride = 3 * sh_basis<ShDegree>::size;
+  static constexpr int sh_stride = 3 * sh_basis<ShDegree>::size;  ///< floats of a Gaussian's coefficients
+  /// A ray on its way.
   struct state {
-    vec3 direction;
+    vec3 direction;  ///< of the ray, unit length
+    /// SH functions of the direction.
     sh_basis<ShDegree> basis;
-    ray_gradient gradient;
-    float error;
-    u32 left;  // hits until the cap; from 0, no cap, it counts down past it
+    ray_gradient gradient;  ///< what is left behind the hit
+    float error;            ///< of the pixel
+    u32 left;               ///< hits until the cap; from 0, no cap, it counts down past it
   };
 
-  pixel_rays rays;
-  pixel_order order;
-  float const* sh = nullptr;
-  int active_degree = ShDegree;
-  float transmittance_min = 0;
-  u32 max_hits = 0;
+  pixel_rays rays;               ///< of the view
+  pixel_order order;             ///< of the view
+  float const* sh = nullptr;     ///< coefficients, [N][K][3]
+  int active_degree = ShDegree;  ///< bands above it have no gradient
+  float transmittance_min = 0;   ///< as the forward pass had it
+  u32 max_hits = 0;              ///< as the forward pass had it; 0: no cap
+  /// [N], in the view's frame.
   ray_gaussian const* records = nullptr;
-  float const* color = nullptr;           // [H][W][3], as the forward pass left it, background in it
-  float const* color_gradient = nullptr;  // [H][W][3]
-  float const* error = nullptr;           // [H][W], or null
-  float* sh_gradient = nullptr;           // [N][K][3]
-  float* moments_out = nullptr;           // [N][moment_stride]
+  float const* color = nullptr;           ///< [H][W][3], as the forward pass left it, background in it
+  float const* color_gradient = nullptr;  ///< [H][W][3]
+  float const* error = nullptr;           ///< [H][W], or null
+  float* sh_gradient = nullptr;           ///< [N][K][3]
+  float* moments_out = nullptr;           ///< [N][moment_stride]
 
+  /// Whether ray i is of a pixel of the image.
   GART_HD bool active(index_t i) const { return order.inside(order.at(i)); }
+  /// The pixel of ray i.
   GART_HD pixel at(index_t i) const { return order.at(i); }
+  /// The state before the first hit.
   GART_HD state begin(index_t i) const {
     state s;
     pixel const at = order.at(i);
@@ -53,8 +62,10 @@ struct scatter_program : ray_program_base {
     s.gradient.color_g = c[0] * g[0] + c[1] * g[1] + c[2] * g[2];
     return s;
   }
+  /// Ray i, in the view's frame.
   GART_HD primary_ray ray_of(index_t, state const& s) const { return {s.direction}; }
 
+  /// Adds a hit's gradient to its Gaussian. False: the ray ends.
   GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h) const {
     vec3 const unclamped =
         s.basis.unclamped(sh_row<ShDegree>(sh + static_cast<std::size_t>(sh_stride) * h.id, active_degree).v);
@@ -81,6 +92,7 @@ struct scatter_program : ray_program_base {
     }
     return s.gradient.transmittance >= transmittance_min && --s.left != 0;
   }
+  /// Nothing.
   GART_HD void end(index_t, state const&) const {}
 };
 

@@ -1,5 +1,6 @@
 #pragma once
-// The backward strategies, and the one list of them: the program, the benchmarks and the tests take them from here.
+/// \file
+/// The backward strategies, and the one list of them: the program, the benchmarks and the tests take them from here.
 
 #include <gart/backward/record_lt.hpp>
 #include <gart/backward/strategy.hpp>
@@ -11,85 +12,91 @@
 
 namespace gart::inline GART_ISA {
 
-// Nothing recorded; every ray is traced again and scatters.
+/// Nothing recorded; every ray is traced again and scatters.
 struct pixel_strategy : strategy_base {
-  static constexpr char const* name = "pixel";
+  static constexpr char const* name = "pixel";  ///< as requests have it
+  /// Nothing.
   template <int Size>
   using record = record_none;
-  using gather = terms<>;
-  using scatter = terms<color, geometry>;
+  using gather = terms<>;                  ///< nothing
+  using scatter = terms<color, geometry>;  ///< all
 };
 
-// One channel: the colour gradient of a hit needs only its weight. Geometry by pixel.
+/// One channel: the colour gradient of a hit needs only its weight. Geometry by pixel.
 struct hybrid_strategy : strategy_base {
-  static constexpr char const* name = "hybrid";
+  static constexpr char const* name = "hybrid";  ///< as requests have it
+  /// The weight.
   template <int Size>
   using record = record_lt<weight_entry, Size>;
-  using gather = terms<color>;
-  using scatter = terms<geometry>;
-  using fallback = pixel_strategy;  // it needs no room
+  using gather = terms<color>;      ///< by primitive
+  using scatter = terms<geometry>;  ///< by pixel
+  using fallback = pixel_strategy;  ///< it needs no room
 };
 
-// Four channels; no ray is traced twice.
+/// Four channels; no ray is traced twice.
 struct primitive_strategy : strategy_base {
-  static constexpr char const* name = "primitive";
-  static constexpr slot_validity validity = slot_validity::recomputed;
+  static constexpr char const* name = "primitive";                      ///< as requests have it
+  static constexpr slot_validity validity = slot_validity::recomputed;  ///< nothing is cleared
+  /// V and the weight.
   template <int Size>
   using record = record_lt<lt_entry, Size>;
-  using gather = terms<color, geometry>;
-  using scatter = terms<>;
-  using fallback = hybrid_strategy;  // a quarter of the room
+  using gather = terms<color, geometry>;  ///< all
+  using scatter = terms<>;                ///< nothing
+  using fallback = hybrid_strategy;       ///< a quarter of the room
 };
 
-// The primitive strategy with slots of another format (backward/lt_slot.hpp): less memory for less exact gradients.
+/// The primitive strategy with slots of another format (backward/lt_slot.hpp): less memory for less exact gradients.
 template <class Entry>
 struct primitive_strategy_in : primitive_strategy {
+  /// Of that format.
   template <int Size>
   using record = record_lt<Entry, Size>;
 };
 
-// The primitive strategy with its sums in a fixed order.
+/// The primitive strategy with its sums in a fixed order.
 struct deterministic_strategy : primitive_strategy {
-  static constexpr char const* name = "deterministic";
-  static constexpr bool ordered = true;
+  static constexpr char const* name = "deterministic";  ///< as requests have it
+  static constexpr bool ordered = true;                 ///< by a second launch
 };
 
-// The primitive strategy with the other rule: what recomputing is tested and measured against.
+/// The primitive strategy with the other rule: what recomputing is tested and measured against.
 struct cleared_strategy : primitive_strategy {
-  static constexpr char const* name = "cleared";
+  static constexpr char const* name = "cleared";  ///< as requests have it
+  /// NaN in every slot.
   static constexpr slot_validity validity = slot_validity::cleared;
-  static constexpr strategy_use use = strategy_use::measuring;
+  static constexpr strategy_use use = strategy_use::measuring;  ///< not to train by
 };
 
-// The primitive strategy by the plain gather (backward/gather.hpp): what packets and matrix units are tested and
-// measured against.
+/// The primitive strategy by the plain gather (backward/gather.hpp): what packets and matrix units are tested and
+/// measured against.
 struct lane_strategy : primitive_strategy {
-  static constexpr char const* name = "lane";
-  static constexpr bool lane_by_lane = true;
-  static constexpr strategy_use use = strategy_use::testing;
+  static constexpr char const* name = "lane";                 ///< as requests have it
+  static constexpr bool lane_by_lane = true;                  ///< on every policy
+  static constexpr strategy_use use = strategy_use::testing;  ///< not to train by
 };
 
+/// Strategies by their names.
 template <strategy... S>
 struct strategy_list {
-  static constexpr std::array<char const*, sizeof...(S)> names{S::name...};
+  static constexpr std::array<char const*, sizeof...(S)> names{S::name...};  ///< in the list's order
 
-  // f(S{}) for each, in order.
+  /// f(S{}) for each, in order.
   template <class F>
   static void for_each(F&& f) {
     (f(S{}), ...);
   }
-  // f(S{}) for the one of that name. False where there is none.
+  /// f(S{}) for the one of that name. False where there is none.
   template <class F>
   static bool with(std::string_view name, F&& f) {
     return ((name == S::name && (f(S{}), true)) || ...);
   }
 };
 
-// In the order of preference, the best last.
+/// In the order of preference, the best last.
 using strategies = strategy_list<lane_strategy, cleared_strategy, pixel_strategy, hybrid_strategy,
                                  deterministic_strategy, primitive_strategy>;
 
-// Of those for training, and up to `use`.
+/// Of those for training, and up to `use`.
 inline std::vector<std::string> strategy_names(strategy_use use = strategy_use::training) {
   std::vector<std::string> names;
   strategies::for_each([&]<strategy S>(S) {

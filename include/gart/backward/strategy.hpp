@@ -1,7 +1,8 @@
 #pragma once
-// What a backward strategy is: what the forward pass records of a hit, which terms of the gradient are gathered by
-// primitive and which are scattered by pixel. It derives from strategy_base, which has what most do not say; a program
-// static_asserts strategy<its own> where it defines it, so that a name that is misspelt is found there.
+/// \file
+/// What a backward strategy is: what the forward pass records of a hit, which terms of the gradient are gathered by
+/// primitive and which are scattered by pixel. It derives from strategy_base, which has what most do not say; a program
+/// static_asserts `strategy` of its own where it defines it, so that a name that is misspelt is found there.
 
 #include <gart/backward/terms.hpp>
 #include <gart/render/record.hpp>
@@ -10,23 +11,25 @@
 
 namespace gart::inline GART_ISA {
 
-// How a slot of the LT buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN before
-// every forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held against the
-// last hit of its ray: the same decision, bit for bit, with nothing to clear. It measured better on a device and on a
-// host (docs/backward.md).
+/// How a slot of the LT buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN before
+/// every forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held against the
+/// last hit of its ray: the same decision, bit for bit, with nothing to clear. It measured better on a device and on a
+/// host (docs/backward.md).
 enum class slot_validity { cleared, recomputed };
 
-// What a strategy is there for: to train by, to measure what another way would cost, or to be held against in tests.
+/// What a strategy is there for: to train by, to measure what another way would cost, or to be held against in tests.
 enum class strategy_use { training, measuring, testing };
 
+/// What a strategy has unless it says otherwise.
 struct strategy_base {
-  static constexpr bool ordered = false;       // sums in a fixed order: the same bits in every run
-  static constexpr bool lane_by_lane = false;  // by the plain gather, whatever the policy (backward/gather_form.hpp)
-  static constexpr slot_validity validity = slot_validity::cleared;
-  static constexpr strategy_use use = strategy_use::training;
-  using fallback = void;  // the strategy that a step is done by where the LT buffer has no room
+  static constexpr bool ordered = false;       ///< sums in a fixed order: the same bits in every run
+  static constexpr bool lane_by_lane = false;  ///< by the plain gather, whatever the policy (backward/gather_form.hpp)
+  static constexpr slot_validity validity = slot_validity::cleared;  ///< how slots that are hits are told
+  static constexpr strategy_use use = strategy_use::training;        ///< what it is there for
+  using fallback = void;  ///< the strategy that a step is done by where the LT buffer has no room
 };
 
+/// A backward strategy, by these members.
 template <class S>
 concept strategy = requires {
   { S::name } -> std::convertible_to<char const*>;  // what programs and reports call it

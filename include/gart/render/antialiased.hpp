@@ -1,13 +1,14 @@
 #pragma once
-// A scene as the pixels of one view see it: every Gaussian widened by the filter of its pixels
-// (a camera model's filter, camera/model.hpp), once, before anything is made of it, so that every tracer, footprint and
-// box has the same bits of it. Without a filter it is the scene itself, and nothing is launched.
-// A frame has one (render/frame.hpp); the way back is the backward pass's (backward/finish.hpp).
-//
-//   antialiased<E> seen(exec);
-//   auto const scene = seen.of(exec, stored, view, options.antialias);
-//
-// Memory: 16 bytes a Gaussian where there is a filter. Errors: invalid_argument for a camera no ray can be cast by.
+/// \file
+/// A scene as the pixels of one view see it: every Gaussian widened by the filter of its pixels
+/// (a camera model's filter, camera/model.hpp), once, before anything is made of it, so that every tracer, footprint
+/// and box has the same bits of it. Without a filter it is the scene itself, and nothing is launched. A frame has one
+/// (render/frame.hpp); the way back is the backward pass's (backward/finish.hpp).
+/// \code{.cpp}
+/// antialiased<E> seen(exec);
+/// auto const scene = seen.of(exec, stored, view, options.antialias);
+/// \endcode
+/// Memory: 16 bytes a Gaussian where there is a filter. Errors: invalid_argument for a camera no ray can be cast by.
 
 #include <gart/camera/models.hpp>
 #include <gart/exec/buffer.hpp>
@@ -18,7 +19,7 @@ namespace gart::inline GART_ISA {
 
 namespace render_kernels {
 
-// Filter: of a camera model.
+/// Filter: of a camera model.
 template <class Filter>
 struct filter_gaussians {
   gaussians_view<float const> scene;
@@ -33,12 +34,14 @@ struct filter_gaussians {
 
 }  // namespace render_kernels
 
+/// The Gaussians of a view as seen through the filter of its pixels; its memory outlives a call, of().
 template <execution E>
 class antialiased {
  public:
+  /// Allocates nothing; `exec` must outlive it.
   explicit antialiased(E& exec) : log_scale_(exec), opacity_(exec) {}
 
-  // pixels: the filter's standard deviation, 0 for none. View: a camera or a camera model. Valid until the next call.
+  /// pixels: the filter's standard deviation, 0 for none. View: a camera or a camera model. Valid until the next call.
   template <class View>
   gaussians_view<float const> of(E& exec, gaussians_view<float const> scene, View const& view, float pixels) {
     if (!(pixels > 0)) return scene;

@@ -1,6 +1,8 @@
 #pragma once
-// An image's colour in 8 bits a channel, made where it was rendered: [H][W][3] in floats to [H][W][4], red, green, blue
-// and 255. Clamped and rounded as to_8bit (io/image_file.hpp) does it; NaN becomes 0. Cost: a launch over the pixels.
+/// \file
+/// An image's colour in 8 bits a channel, made where it was rendered: [H][W][3] in floats to [H][W][4], red, green,
+/// blue and 255. Clamped and rounded as to_8bit (io/image_file.hpp) does it; NaN becomes 0. Cost: a launch over the
+/// pixels.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
@@ -25,6 +27,8 @@ struct color_to_bytes {
 
 }  // namespace render_kernels
 
+/// Colours [pixels][3], floats, to `rgba`, [pixels][4]: 0 to 1 becomes 0 to 255, rounded, what lies outside is clamped;
+/// alpha is 255.
 template <execution E>
 void color_to_bytes(E& exec, float const* color, index_t pixels, u8* rgba) {
   parallel_for(exec, "8 bits", pixels, render_kernels::color_to_bytes{color, rgba});

@@ -1,10 +1,12 @@
 #pragma once
-// The forward ray program: front-to-back compositing of the hits of a pixel,
-//   C += T alpha c,  T *= 1 - alpha,
-// colour from spherical harmonics on the ray's direction, until T < transmittance_min (the hit that crosses counts), or
-// until max_hits of them where there is such a cap.
-// The background is added with what transmittance is left. What a hit does to a ray is a template over the number:
-// render/packet_composite.hpp does it to a packet of rays.
+/// \file
+/// The forward ray program: front-to-back compositing of the hits of a pixel,
+/// \code{.unparsed}
+/// C += T alpha c,  T *= 1 - alpha,
+/// \endcode
+/// colour from spherical harmonics on the ray's direction, until T < transmittance_min (the hit that crosses counts),
+/// or until max_hits of them where there is such a cap. The background is added with what transmittance is left. What a
+/// hit does to a ray is a template over the number: render/packet_composite.hpp does it to a packet of rays.
 
 #include <gart/math/blend.hpp>
 #include <gart/math/sh.hpp>
@@ -16,54 +18,61 @@
 
 namespace gart::inline GART_ISA {
 
-// Where a ray's list ends; before every hit where it has none. Places stand for ids: those of the hits of a pixel have
-// the order of their Gaussians.
+/// Where a ray's list ends; before every hit where it has none. Places stand for ids: those of the hits of a pixel have
+/// the order of their Gaussians.
 struct last_hit {
-  float t = -1;
-  u32 place = 0;  // what the record calls it by
+  float t = -1;   ///< distance along the ray
+  u32 place = 0;  ///< what the record calls it by
 };
 
-// Row-major, one entry a pixel; null where not wanted.
+/// Row-major, one entry a pixel; null where not wanted.
 struct image_targets {
-  float* color = nullptr;          // [3], background composited
-  float* transmittance = nullptr;  // after the last hit
-  float* depth = nullptr;          // sum of weight * t
-  u32* hits = nullptr;             // composited
-  last_hit* last = nullptr;        // the hit that the ray ended with
+  float* color = nullptr;          ///< [3], background composited
+  float* transmittance = nullptr;  ///< after the last hit
+  float* depth = nullptr;          ///< sum of weight * t
+  u32* hits = nullptr;             ///< composited
+  last_hit* last = nullptr;        ///< the hit that the ray ended with
 };
 
-// What the hits of a ray have added up to, or those of a ray a lane (math/lanes.hpp).
+/// What the hits of a ray have added up to, or those of a ray a lane (math/lanes.hpp).
 template <class F>
 struct composited_hits {
-  using words = typename number<F>::words;
-  vec3_of<F> color{F(0.0f), F(0.0f), F(0.0f)};
-  F transmittance = 1.0f;
-  F depth = 0.0f;
-  words hits{};
-  F last_t = last_hit{}.t;
-  words last_place{};
+  using words = typename number<F>::words;      ///< whole numbers, one a ray
+  vec3_of<F> color{F(0.0f), F(0.0f), F(0.0f)};  ///< colour so far, without the background
+  F transmittance = 1.0f;                       ///< what the hits so far let through, 1 to 0
+  F depth = 0.0f;                               ///< sum of weight * t
+  words hits{};                                 ///< number of hits
+  F last_t = last_hit{}.t;                      ///< t of the latest hit
+  words last_place{};                           ///< place of the latest hit, as the record has it
 };
 
+/// The pixel program of the forward pass (trace/ray_program.hpp): composites each ray's hits and writes `out`.
 template <int ShDegree, hit_record Record>
 struct composite : ray_program_base {
+  /// On a host it is walked in packets, on a device in warps.
   static constexpr bool has_packets = true, has_warps = true;
+  /// Rays from the camera's centre.
   using ray_type = primary_ray;
+  /// A ray on its way.
   struct state : composited_hits<float> {
-    pixel at;
-    vec3 direction;
-    sh_basis<ShDegree> basis;
+    pixel at;                  ///< whose ray it is
+    vec3 direction;            ///< of the ray, unit length
+    sh_basis<ShDegree> basis;  ///< of that direction
   };
 
-  pixel_rays rays;
-  pixel_order order;
-  float const* sh = nullptr;
-  int active_degree = ShDegree;
-  render_options options;
-  image_targets out;
-  Record record;
+  pixel_rays rays;               ///< of the view
+  pixel_order order;             ///< of the view
+  float const* sh = nullptr;     ///< coefficients, [N][K][3], K of ShDegree
+  int active_degree = ShDegree;  ///< bands above it are not evaluated
+  render_options options;        ///< thresholds, cap and background
+  image_targets out;             ///< where the pixels go
+  Record record;                 ///< what a backward pass wants to find of each hit
 
+  /// Whether ray i is of a pixel of the image.
   GART_HD bool active(index_t i) const { return order.inside(order.at(i)); }
+  /// The pixel of ray i.
   GART_HD pixel at(index_t i) const { return order.at(i); }
+  /// The state before the first hit.
   GART_HD state begin(index_t i) const {
     state s;
     s.at = order.at(i);
@@ -71,28 +80,34 @@ struct composite : ray_program_base {
     s.basis = sh_basis<ShDegree>(s.direction);
     return s;
   }
+  /// Ray i, in the view's frame.
   GART_HD primary_ray ray_of(index_t, state const& s) const { return {s.direction}; }
+  /// Composites a hit. False: the ray ends.
   GART_HD GART_INLINE bool on_hit(state& s, hit const& h) const {
     constexpr std::size_t stride = row_floats;
     vec3 const unclamped = s.basis.unclamped(sh_row<ShDegree>(sh + stride * h.id, active_degree).v);
     return add(s, h.t, h.alpha, unclamped, record.place_of(h.id, s.at));
   }
 
-  // The same in steps, for rays that meet a Gaussian together (trace/warp_walk.hpp).
+  /// The same in steps, for rays that meet a Gaussian together (trace/warp_walk.hpp).
   static constexpr int row_floats = 3 * sh_basis<ShDegree>::size;
-  static constexpr bool places_hits = Record::any;
-  using cell = typename Record::cell;
+  static constexpr bool places_hits = Record::any;  ///< hits are told apart by places
+  using cell = typename Record::cell;               ///< finds them
+  /// Where the rows of coefficients begin.
   GART_HD float const* rows_from() const { return sh; }
+  /// Floats of a row that the active degree needs.
   GART_HD int row_floats_read() const { return 3 * sh_coefficients(active_degree); }
+  /// The colour of a hit before the clamp, from its Gaussian's row.
   GART_HD GART_INLINE vec3 shade(state const& s, float const* row) const {
     return s.basis.unclamped(*reinterpret_cast<float const(*)[row_floats]>(row));
   }
+  /// Composites a hit of that colour. False: the ray ends.
   GART_HD GART_INLINE bool add(state& s, float t, float alpha, vec3 const& unclamped, u32 place) const {
     return blend_hit(s, true, t, alpha, unclamped, place) && s.hits != options.max_hits;
   }
 
-  // A hit with the rays of a mask, or with the one ray there is. `place` is what the record knows it by. The rays that
-  // let through enough to go on, whatever the cap.
+  /// A hit with the rays of a mask, or with the one ray there is. `place` is what the record knows it by. The rays that
+  /// let through enough to go on, whatever the cap.
   template <class F, class Place>
   GART_HD GART_INLINE auto blend_hit(composited_hits<F>& s, typename number<F>::mask now, F t, F alpha,
                                      vec3_of<F> const& unclamped, Place const& place) const {
@@ -112,8 +127,10 @@ struct composite : ray_program_base {
     return s.transmittance >= F(options.transmittance_min);
   }
 
+  /// Writes the pixel.
   GART_HD void end(index_t, state const& s) const { write(s.at, s); }
 
+  /// What the hits have added up to, with the background, to the targets of pixel `at`.
   GART_HD void write(pixel at, composited_hits<float> const& s) const {
     std::size_t const a = order.address(at);
     if (out.color) {

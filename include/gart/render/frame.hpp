@@ -1,15 +1,16 @@
 #pragma once
-// A frame: the Gaussians of a scene as one view sees them, 64 bytes each, and a tracer's structure over them. What
-// comes between a view and its images, and between a view and its gradients (backward/backward.hpp).
-//
-//   frame<E, scene_traits<3>, tile_tracer<E>> frame(exec);
-//   frame.prepare(scene, view, options);   // once a view, and again when scene, view or options change
-//   frame.render({.color = color});        // as often as wanted
-//
-// The scene's arrays and the policy must outlive what is done with the frame. Cost of prepare: a launch over the
-// Gaussians and the tracer's own preparation; of render: a ray a pixel. Memory: 64 bytes a Gaussian, 16 more where the
-// options have a filter of the pixels, and the tracer's. Errors: invalid_argument for a camera or options that no ray
-// can be traced by, and for what needs a frame that was not prepared.
+/// \file
+/// A frame: the Gaussians of a scene as one view sees them, 64 bytes each, and a tracer's structure over them. What
+/// comes between a view and its images, and between a view and its gradients (backward/backward.hpp).
+/// \code{.cpp}
+/// frame<E, scene_traits<3>, tile_tracer<E>> frame(exec);
+/// frame.prepare(scene, view, options);   // once a view, and again when scene, view or options change
+/// frame.render({.color = color});        // as often as wanted
+/// \endcode
+/// The scene's arrays and the policy must outlive what is done with the frame. Cost of prepare: a launch over the
+/// Gaussians and the tracer's own preparation; of render: a ray a pixel. Memory: 64 bytes a Gaussian, 16 more where the
+/// options have a filter of the pixels, and the tracer's. Errors: invalid_argument for a camera or options that no ray
+/// can be traced by, and for what needs a frame that was not prepared.
 
 #include <gart/exec/stage.hpp>
 #include <gart/render/antialiased.hpp>
@@ -38,22 +39,23 @@ struct prepare_gaussians {
 
 }  // namespace render_kernels
 
-// View: a camera, or a model of a program's own (camera/model.hpp).
+/// View: a camera, or a model of a program's own (camera/model.hpp).
 template <execution E, scene_requirements Traits, class Tracer, class View = camera>
 requires tracer<Tracer, E>
 class frame {
  public:
-  using execution_type = E;
-  using tracer_type = Tracer;
-  using response = typename Traits::response;
-  static constexpr int sh_degree = Traits::sh_degree;
-  static constexpr int tile_size = Tracer::tile_size;
+  using execution_type = E;                            ///< the policy
+  using tracer_type = Tracer;                          ///< what finds the hits
+  using response = typename Traits::response;          ///< how the Gaussians fall from their centres
+  static constexpr int sh_degree = Traits::sh_degree;  ///< of the coefficients that are stored
+  static constexpr int tile_size = Tracer::tile_size;  ///< side of the tiles that footprints are cut into, in pixels
   static_assert(std::is_same_v<typename Tracer::response_type, response>,
                 "the tracer finds the hits of another response than the traits name");
 
+  /// Allocates nothing; `exec` must outlive it.
   explicit frame(E& exec) : exec_(&exec), filter_(exec), gaussians_(exec), tracer_(exec) {}
 
-  // The scene's coefficients are of Traits::sh_degree; bands above active_degree are not evaluated.
+  /// The scene's coefficients are of Traits::sh_degree; bands above active_degree are not evaluated.
   void prepare(gaussians_view<float const> scene, View const& view, render_options const& options = {},
                int active_degree = sh_degree) {
     prepared_ = false;
@@ -73,7 +75,7 @@ class frame {
     ++preparations_;
   }
 
-  // The forward pass. `record` takes what a backward pass wants to find of each hit.
+  /// The forward pass. `record` takes what a backward pass wants to find of each hit.
   template <hit_record Record = record_none>
   void render(image_targets const& targets, Record const& record = {}) {
     if constexpr (camera_model<View>) static_assert(central_camera<View>, "images need a camera with one centre");
@@ -83,24 +85,30 @@ class frame {
           composite<sh_degree, Record>{{}, rays(), order, scene_.sh, active_degree_, options_, targets, record});
   }
 
-  // Any other rays through the Gaussians; tracers by tiles take pixel programs alone.
+  /// Any other rays through the Gaussians; tracers by tiles take pixel programs alone.
   template <ray_program P>
   void trace(char const* label, index_t rays, P const& program) {
     require_prepared("trace");
     tracer_.trace(*exec_, label, rays, program);
   }
 
-  // As they were prepared: throw where nothing was.
+  /// As they were prepared: throw where nothing was.
   gaussians_view<float const> scene() const { return require_prepared("scene"), scene_; }
-  gaussians_view<float const> seen() const { return require_prepared("seen"), seen_; }  // through the pixels' filter
+  gaussians_view<float const> seen() const { return require_prepared("seen"), seen_; }  ///< through the pixels' filter
+  /// The camera or camera model.
   View const& view() const { return require_prepared("view"), *view_; }
+  /// What it was prepared with.
   render_options const& options() const { return require_prepared("options"), options_; }
+  /// Bands above it are not evaluated.
   int active_degree() const { return require_prepared("active_degree"), active_degree_; }
-  pixel_rays rays() const { return require_prepared("rays"), tracer_.rays(); }  // of the view's pixels
+  pixel_rays rays() const { return require_prepared("rays"), tracer_.rays(); }  ///< of the view's pixels
+  /// The Gaussians in the view's frame, [N]; empty before the first prepare.
   span<ray_gaussian const> gaussians() const { return gaussians_; }
+  /// With its rays, lists or tree.
   Tracer const& tracer() const { return tracer_; }
+  /// The policy.
   E& exec() const { return *exec_; }
-  // Which preparation it stands at, from 1: what was made from another one does not fit this.
+  /// Which preparation it stands at, from 1: what was made from another one does not fit this.
   u64 preparation() const { return require_prepared("preparation"), preparations_; }
 
  private:

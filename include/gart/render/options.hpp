@@ -1,6 +1,7 @@
 #pragma once
-// What a render leaves out, and what shows where nothing is: the knobs that trade exactness for time.
-// Errors: require_options throws invalid_argument, naming the option; frame.prepare calls it.
+/// \file
+/// What a render leaves out, and what shows where nothing is: the knobs that trade exactness for time.
+/// Errors: require_options throws invalid_argument, naming the option; frame.prepare calls it.
 
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>
@@ -11,36 +12,42 @@
 
 namespace gart {
 
+/// What trades exactness for time, in training and in rendering alike.
 struct approximation_options {
-  float alpha_min = 1.0f / 255.0f;  // a Gaussian is hit where sigma * rho >= alpha_min
-  float transmittance_min = 1e-4f;  // a ray ends after the hit that brings T below this
-  u32 max_hits = 0;                 // a ray ends after so many hits composited; 0: no cap
-  float antialias = 0;              // standard deviation of the pixels' filter, in pixels (camera/model.hpp); 0: none
-  // The BVH tracer builds its tree every so many views, else refits it: exact. Another tracer has no tree: sessions and
-  // renderers refuse what is not 1 there.
+  float alpha_min = 1.0f / 255.0f;  ///< a Gaussian is hit where sigma * rho >= alpha_min
+  float transmittance_min = 1e-4f;  ///< a ray ends after the hit that brings T below this
+  u32 max_hits = 0;                 ///< a ray ends after so many hits composited; 0: no cap
+  float antialias = 0;              ///< standard deviation of the pixels' filter, in pixels (camera/model.hpp); 0: none
+  /// The BVH tracer builds its tree every so many views, else refits it: exact. Another tracer has no tree: sessions
+  /// and renderers refuse what is not 1 there.
   int rebuild_every = 1;
 };
 
+/// How one view is rendered.
 struct render_options {
-  float alpha_min = approximation_options{}.alpha_min;
+  float alpha_min = approximation_options{}.alpha_min;  ///< a Gaussian is hit where sigma * rho >= alpha_min
+  /// A ray ends after the hit that brings T below this.
   float transmittance_min = approximation_options{}.transmittance_min;
-  float near = 0.01f;  // hits lie at t > near, world units along the ray
-  u32 max_hits = approximation_options{}.max_hits;
+  float near = 0.01f;                               ///< hits lie at t > near, world units along the ray
+  u32 max_hits = approximation_options{}.max_hits;  ///< a ray ends after so many hits; 0: no cap
+  /// Standard deviation of the pixels' filter, in pixels; 0: none.
   float antialias = approximation_options{}.antialias;
-  int rebuild_every = approximation_options{}.rebuild_every;
-  vec3 background{0.0f};
+  int rebuild_every = approximation_options{}.rebuild_every;  ///< views between two builds of the bvh tracer's tree
+  vec3 background{0.0f};                                      ///< linear RGB behind the last hit
 
+  /// Those of the options that trade exactness for time.
   approximation_options approximations() const {
     return {alpha_min, transmittance_min, max_hits, antialias, rebuild_every};
   }
 };
 
-// The filter of models that are antialiased: a square pixel has a standard deviation of 0.29.
+/// The filter of models that are antialiased: a square pixel has a standard deviation of 0.29.
 inline constexpr float usual_antialias = 0.3f;
 
-// Below this exp has no digits left, and a hit's alpha would be 0.
+/// Below this exp has no digits left, and a hit's alpha would be 0.
 inline constexpr float least_alpha_min = 1e-30f;
 
+/// Throws invalid_argument, with the option and its value, where one is out of its range.
 inline void require_options(render_options const& o) {
   auto const refuse = [](char const* what, float value) {
     throw invalid_argument(std::string(what) + ", not " + std::to_string(value));

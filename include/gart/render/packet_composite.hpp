@@ -1,5 +1,6 @@
 #pragma once
-// The forward ray program for packets (trace/packet_walk.hpp): composite, a lane a pixel, with the same bits.
+/// \file
+/// The forward ray program for packets (trace/packet_walk.hpp): composite, a lane a pixel, with the same bits.
 
 #include <gart/render/composite.hpp>
 #include <gart/trace/packet_walk.hpp>
@@ -8,24 +9,30 @@
 
 namespace gart::inline GART_ISA {
 
+/// The packet program of composite (trace/packet_program.hpp).
 template <int ShDegree, hit_record Record>
 struct packet_composite {
+  /// A Gaussian's box in the tile, with what the record needs of it.
   using cell = typename Record::packet_cell;
+  /// Where the record writes a Gaussian's hits.
   using note = typename Record::note;
-  using shaded = vec3_of<lanes>;  // colour before the clamp
+  using shaded = vec3_of<lanes>;  ///< colour before the clamp
+  /// The rays of a packet on their way.
   struct state : composited_hits<lanes> {
-    packet_block block;
-    lane_mask inside;
-    vec3_of<lanes> directions;
-    sh_basis<ShDegree, lanes> basis;
+    packet_block block;               ///< whose rays they are
+    lane_mask inside;                 ///< lanes whose pixel is of the image
+    vec3_of<lanes> directions;        ///< of the rays, unit length
+    sh_basis<ShDegree, lanes> basis;  ///< of those directions
   };
 
-  composite<ShDegree, Record> program;
+  composite<ShDegree, Record> program;  ///< the ray program whose packets these are
 
+  /// The pixel of a lane.
   static pixel pixel_of(packet_block const& b, int lane) {
     return {b.x + packet_block::column(lane), b.y + packet_block::row(lane)};
   }
 
+  /// The state before the first hit.
   state begin(packet_block const& block) const {
     state s;
     s.block = block;
@@ -39,18 +46,22 @@ struct packet_composite {
     return s;
   }
 
+  /// Where the record will write what the Gaussian of a cell hits.
   GART_INLINE note expect(state const& s, cell const& from) const { return program.record.expect(from, s.block); }
+  /// Asks for the row of coefficients of Gaussian `id`.
   GART_INLINE void fetch(u32 id) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
     float const* const row = program.sh + stride * id;
     for (std::size_t k = 0; k < stride; k += 16) prefetch(row + k);
   }
 
+  /// The colours of Gaussian `id` along the rays.
   GART_INLINE shaded shade(state const& s, u32 id) const {
     constexpr std::size_t stride = 3 * sh_basis<ShDegree>::size;
     return s.basis.unclamped(program.sh + stride * id, sh_coefficients(program.active_degree));
   }
 
+  /// Composites a Gaussian's hits with the rays of `now`. The rays that go on.
   GART_INLINE lane_mask on_hit(state& s, lane_mask now, lanes t, lanes alpha, shaded const& unclamped,
                                note const& at) const {
     lane_mask on = program.blend_hit(s, now, t, alpha, unclamped, at);
@@ -58,6 +69,7 @@ struct packet_composite {
     return on;
   }
 
+  /// Writes the pixels.
   void end(state const& s) const {
     for (int l = 0; l < lane_count; ++l) {
       if (!s.inside[l]) continue;
@@ -73,7 +85,7 @@ struct packet_composite {
 
 static_assert(packet_program<packet_composite<3, record_none>>);
 
-// The packets of a ray program, for tracers that have a use for them.
+/// The packets of a ray program, for tracers that have a use for them.
 template <int ShDegree, hit_record Record>
 packet_composite<ShDegree, Record> packets_of(composite<ShDegree, Record> const& program) {
   return {program};

@@ -1,5 +1,6 @@
 #pragma once
-// The rays of pixels: through their middles, one at a time or a lane each.
+/// \file
+/// The rays of pixels: through their middles, one at a time or a lane each.
 
 #include <gart/camera/pixel_rays.hpp>
 #include <gart/trace/packet_block.hpp>
@@ -7,15 +8,16 @@
 
 namespace gart::inline GART_ISA {
 
+/// The ray of a pixel of the view that `rays` was made for, in its frame.
 GART_HD GART_INLINE primary_ray pixel_ray(pixel_rays const& rays, pixel p) { return rays.of(p.x, p.y); }
 
-// Host side, of any camera.
+/// Host side, of any camera.
 inline primary_ray pixel_ray(camera const& c, pixel p) {
   return {ray_direction(c, static_cast<float>(p.x) + 0.5f, static_cast<float>(p.y) + 0.5f)};
 }
 
 #if !defined(__CUDACC__)
-// The directions of a packet's rays, the same bits. Beyond the image they are some pixel's.
+/// The directions of a packet's rays, the same bits. Beyond the image they are some pixel's.
 inline vec3_of<lanes> pixel_directions(pixel_rays const& rays, packet_block const& block) {
   if (!rays.directions) return rays.view.ray(block.centres_x(), block.centres_y()).direction;
   vec3_of<lanes> out;

@@ -1,7 +1,8 @@
 #pragma once
-// What the forward pass leaves of each hit for the backward pass to find; part of a strategy (backward/strategy.hpp). A
-// record says where a hit belongs when it is found, and is called once a hit, after it has been composited. On hosts it
-// also takes the hits of one Gaussian with a packet of rays at once (trace/packet_walk.hpp).
+/// \file
+/// What the forward pass leaves of each hit for the backward pass to find; part of a strategy (backward/strategy.hpp).
+/// A record says where a hit belongs when it is found, and is called once a hit, after it has been composited. On hosts
+/// it also takes the hits of one Gaussian with a packet of rays at once (trace/packet_walk.hpp).
 
 #include <gart/render/pixels.hpp>
 #include <gart/trace/hit.hpp>
@@ -32,6 +33,7 @@ concept packet_record = requires(R const& r, packet_block const& block, typename
 
 }  // namespace detail
 
+/// What the forward pass leaves of a hit.
 template <class R>
 concept hit_record = std::is_trivially_copyable_v<R> &&
     requires(R const& r, u32 id, pixel at, u32 place, vec3 const& color, float weight) {
@@ -43,23 +45,28 @@ concept hit_record = std::is_trivially_copyable_v<R> &&
   r(place, color, weight, color);
 } && detail::packet_record<R>;
 
+/// The entry of a record that keeps nothing.
 struct no_entry {
-  static constexpr char const* name = "none";
+  static constexpr char const* name = "none";  ///< in configurations and reports
 };
 
-// Nothing: the backward pass traces again.
+/// Nothing: the backward pass traces again.
 struct record_none {
-  static constexpr bool any = false;
-  using entry = no_entry;
-  using cell = no_cell;
+  static constexpr bool any = false;  ///< nothing is left
+  using entry = no_entry;             ///< nothing
+  using cell = no_cell;               ///< hits have no places
+  /// Always 0.
   GART_HD GART_INLINE u32 place_of(u32 /*id*/, pixel) const { return 0; }
+  /// Does nothing.
   GART_HD GART_INLINE void operator()(u32 /*place*/, vec3 const& /*opaque*/, float /*weight*/,
                                       vec3 const& /*unclamped*/) const {}
 
 #if !defined(__CUDACC__)
-  using packet_cell = gart::packet_cell;
+  using packet_cell = gart::packet_cell;  ///< with nothing to add
   struct note {};
+  /// Nothing.
   note expect(packet_cell const&, packet_block const&) const { return {}; }
+  /// Does nothing; places are 0.
   lane_words operator()(note, lane_mask, vec3_of<lanes> const&, lanes, vec3_of<lanes> const&) const {
     return every_lane(0);
   }

@@ -1,12 +1,13 @@
 #pragma once
-// One image to host memory, with everything a pixel can tell.
+/// \file
+/// One image to host memory, with everything a pixel can tell.
 
 #include <gart/render/frame.hpp>
 #include <gart/render/rendered.hpp>
 
 namespace gart::inline GART_ISA {
 
-// Of a frame that is prepared.
+/// Of a frame that is prepared.
 template <class Frame>
 rendered render_image(Frame& frame) {
   using E = typename Frame::execution_type;

@@ -1,11 +1,12 @@
 #pragma once
-// What a capture asks for, told from its cameras and pixels before training starts: `gart train` and `gart eval` take
-// it where an option does not say otherwise. Each choice comes with its reason in words. What cannot be told before,
-// which bands of spherical harmonics pay, is measured (runtime/degree_selection.hpp).
-//
-// inspect() reads every pixel's alpha, and of at most 64 training images, evenly spread, the outermost pixels: O(bytes
-// of the images). A border is plain where 95% of those pixels lie within 12 of 255 of their median in every channel:
-// what a bounded object in front of a uniform background looks like, and a photograph of a scene never.
+/// \file
+/// What a capture asks for, told from its cameras and pixels before training starts: `gart train` and `gart eval` take
+/// it where an option does not say otherwise. Each choice comes with its reason in words. What cannot be told before,
+/// which bands of spherical harmonics pay, is measured (runtime/degree_selection.hpp).
+///
+/// inspect() reads every pixel's alpha, and of at most 64 training images, evenly spread, the outermost pixels: O(bytes
+/// of the images). A border is plain where 95% of those pixels lie within 12 of 255 of their median in every channel:
+/// what a bounded object in front of a uniform background looks like, and a photograph of a scene never.
 
 #include <gart/io/dataset.hpp>
 #include <gart/runtime/request.hpp>
@@ -15,66 +16,76 @@
 
 namespace gart {
 
+/// What a capture shows of itself, that choices go by.
 struct capture_traits {
-  std::size_t distorted = 0;   // training and test views whose lens is no pinhole
-  std::size_t folding = 0;     // of these, lenses that are not one to one over the image
-  double transparent = 0;      // share of the training images' pixels that are not opaque
-  std::size_t masked = 0;      // training views with a mask
-  bool clear_border = false;   // the images' borders are transparent
-  bool plain_border = false;   // or opaque, and of one colour,
-  u8 border[3] = {0, 0, 0};    // which is this
-  std::size_t views = 0;       // training views
-  double brightness_step = 0;  // median over opaque photographs of |ln| of the mean brightness over the nearest pose's
+  std::size_t distorted = 0;  ///< training and test views whose lens is no pinhole
+  std::size_t folding = 0;    ///< of these, lenses that are not one to one over the image
+  double transparent = 0;     ///< share of the training images' pixels that are not opaque
+  std::size_t masked = 0;     ///< training views with a mask
+  bool clear_border = false;  ///< the images' borders are transparent
+  bool plain_border = false;  ///< or opaque, and of one colour,
+  u8 border[3] = {0, 0, 0};   ///< which is this
+  std::size_t views = 0;      ///< training views
+  double brightness_step =
+      0;  ///< median over opaque photographs of |ln| of the mean brightness over the nearest pose's
 
+  /// Whether its objects stand before a background that is not of the scene.
   bool bounded() const { return clear_border || plain_border; }
 };
 
+/// Reads lenses, poses and pixels of the views. O(pixels).
 capture_traits inspect(dataset const& data);
 
+/// A choice and its reason.
 template <class T>
 struct chosen {
-  T value;
-  std::string why;
+  T value;          ///< what is chosen
+  std::string why;  ///< in words, for reports
 };
 
-// White for transparent images, as published results have it, and for plain white borders; else black.
+/// White for transparent images, as published results have it, and for plain white borders; else black.
 chosen<background_kind> choose_background(capture_traits const& traits);
 
-// Footprints, which the tiles tracer and every strategy but pixel stand on, need a lens that is one to one over the
-// image: where one is not, bvh and pixel; else "auto", the fastest there is.
+/// Footprints, which the tiles tracer and every strategy but pixel stand on, need a lens that is one to one over the
+/// image: where one is not, bvh and pixel; else "auto", the fastest there is.
 chosen<tracer_kind> choose_tracer(capture_traits const& traits);
+/// As choose_tracer has it.
 chosen<std::string> choose_backward(capture_traits const& traits);
 
-// Exposures are learned where photographs of neighbouring poses differ in brightness by more than 3%, the median
-// (exposure/exposure.hpp), and the scene is unbounded (what captures give: bench/results/exposure.json).
+/// Exposures are learned where photographs of neighbouring poses differ in brightness by more than 3%, the median
+/// (exposure/exposure.hpp), and the scene is unbounded (what captures give: bench/results/exposure.json).
 chosen<bool> choose_exposure(capture_traits const& traits);
 
-// The gain that a band of spherical harmonics has to buy to be stored, in dB; 0: nothing is measured. Shorter runs than
-// measured_from would end with a lower score for the views that are held out of their first half (docs/auto.md).
+/// The gain that a band of spherical harmonics has to buy to be stored, in dB; 0: nothing is measured. Shorter runs
+/// than measured_from would end with a lower score for the views that are held out of their first half (docs/auto.md).
 inline constexpr int measured_from = 5000;
-inline constexpr float usual_sh_gain = 0.02f;
+inline constexpr float usual_sh_gain = 0.02f;  ///< in dB
+/// The choice: usual_sh_gain for runs of at least measured_from steps, else 0.
 chosen<float> choose_sh_gain(train_options const& options);
 
-// The capture's points, or random ones in its bounds. A capture's points lie on surfaces, and opacity 0.1 and a scale
-// of 1.0 (times the distance to the neighbours) fill the gaps between them. Random points are mostly in empty space:
-// with MCMC, which moves them, 0.5 and 0.1 let rays through from the first step. What the options say stands.
+/// The capture's points, or random ones in its bounds. A capture's points lie on surfaces, and opacity 0.1 and a scale
+/// of 1.0 (times the distance to the neighbours) fill the gaps between them. Random points are mostly in empty space:
+/// with MCMC, which moves them, 0.5 and 0.1 let rays through from the first step. What the options say stands.
 struct starting_points {
-  bool random = false;
-  index_t count = 0;
+  bool random = false;  ///< else the capture's own
+  index_t count = 0;    ///< of points
+  /// Of the first Gaussians.
   float opacity = 0, scale = 0;
 };
+/// Where training starts; the reason names the numbers.
 chosen<starting_points> choose_start(dataset const& data, train_options const& options);
 
-// All of these, as `gart train` takes them: what `request` leaves to gart's choice, and in the options background,
-// exposure and sh_gain, in place of what they say. A choice that is to be another is set afterwards.
+/// All of these, as `gart train` takes them: what `request` leaves to gart's choice, and in the options background,
+/// exposure and sh_gain, in place of what they say. A choice that is to be another is set afterwards.
 struct recommendation {
-  configuration_request request;
-  train_options options;
+  configuration_request request;  ///< the configuration
+  train_options options;          ///< with the choices in them
 };
+/// All choices for a capture. O(pixels).
 recommendation recommended(train_options const& options, dataset const& data,
                            configuration_request const& request = {});
 
-// Whether undistort() and the lens agree over the whole image, and neighbours stay neighbours.
+/// Whether undistort() and the lens agree over the whole image, and neighbours stay neighbours.
 bool one_to_one(camera const& view);
 
 }  // namespace gart

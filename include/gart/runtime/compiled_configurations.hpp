@@ -1,12 +1,15 @@
 #pragma once
-// Turns templates into configurations: sessions and renderers of a policy, traits, a tracer and a strategy. Include
-// where the kernels of the policy can be compiled, and call from GART_REGISTER_CONFIGURATIONS register_configurations,
-// for every SH degree, or register_configuration_of for one configuration:
-//   using response = gart::generalized_gaussian<4>;
-//   GART_REGISTER_CONFIGURATIONS(my_configurations,
-//                                gart::register_configuration_of<gart::openmp_exec, gart::scene_traits<3, response>,
-//                                                                gart::tile_tracer<gart::openmp_exec, 8, response>,
-//                                                                gart::primitive_strategy>(-1))
+/// \file
+/// Turns templates into configurations: sessions and renderers of a policy, traits, a tracer and a strategy. Include
+/// where the kernels of the policy can be compiled, and call from GART_REGISTER_CONFIGURATIONS register_configurations,
+/// for every SH degree, or register_configuration_of for one configuration:
+/// \code{.cpp}
+/// using response = gart::generalized_gaussian<4>;
+/// GART_REGISTER_CONFIGURATIONS(my_configurations,
+///                              gart::register_configuration_of<gart::openmp_exec, gart::scene_traits<3, response>,
+///                                                              gart::tile_tracer<gart::openmp_exec, 8, response>,
+///                                                              gart::primitive_strategy>(-1))
+/// \endcode
 
 #include <gart/runtime/compiled_renderer.hpp>
 #include <gart/runtime/registry.hpp>
@@ -14,9 +17,11 @@
 
 namespace gart::inline GART_ISA {
 
+/// A session of one configuration.
 template <execution E, class Traits, class Tracer, strategy Strategy>
 class compiled_session final : public session {
  public:
+  /// As make_session has it; `start` is of the configuration's degree.
   compiled_session(configuration_request const& request, train_options const& options, dataset const& data,
                    gaussian_model const& start)
       : exec_(policy_of<E>(request)), trainer_(exec_, options, data, start) {}
@@ -43,6 +48,7 @@ class compiled_session final : public session {
   trainer<E, Traits, Tracer, Strategy> trainer_;
 };
 
+/// One configuration.
 template <execution E, class Traits, class Tracer, strategy Strategy>
 void register_configuration_of(int rank, bool (*available)(std::string*) = always_available) {
   register_configuration({configuration_of<E, Traits, Tracer, Strategy>(), rank, available,
@@ -56,6 +62,7 @@ void register_configuration_of(int rank, bool (*available)(std::string*) = alway
                           }});
 }
 
+/// One for each SH degree, 0 to 3.
 template <execution E, class Tracer, strategy Strategy>
 void register_configurations(int rank, bool (*available)(std::string*) = always_available) {
   register_configuration_of<E, scene_traits<0>, Tracer, Strategy>(rank, available);
@@ -64,15 +71,15 @@ void register_configurations(int rank, bool (*available)(std::string*) = always_
   register_configuration_of<E, scene_traits<3>, Tracer, Strategy>(rank, available);
 }
 
-// Which strategies gart's libraries compile for a policy and a tracer: those to train by, but on hosts none with
-// ordered sums (a variant has it); on a device's tile lists also those to measure.
+/// Which strategies gart's libraries compile for a policy and a tracer: those to train by, but on hosts none with
+/// ordered sums (a variant has it); on a device's tile lists also those to measure.
 template <execution E, class Tracer, strategy Strategy>
 inline constexpr bool is_compiled =
     Strategy::use == strategy_use::training
         ? E::device || !Strategy::ordered
         : Strategy::use == strategy_use::measuring && E::device && Tracer::lends_footprints;
 
-// All of these, ranked from first_rank in the list's order of preference.
+/// All of these, ranked from first_rank in the list's order of preference.
 template <execution E, class Tracer>
 void register_strategies(int first_rank, bool (*available)(std::string*) = always_available) {
   int rank = first_rank;

@@ -1,6 +1,7 @@
 #pragma once
-// The renderer (runtime/renderer.hpp) of a policy, traits, a tracer and a strategy: a frame, a backward pass, and the
-// memory that a caller does not bring.
+/// \file
+/// The renderer (runtime/renderer.hpp) of a policy, traits, a tracer and a strategy: a frame, a backward pass, and the
+/// memory that a caller does not bring.
 
 #include <gart/backward/backward.hpp>
 #include <gart/render/bytes.hpp>
@@ -12,11 +13,13 @@
 
 namespace gart::inline GART_ISA {
 
+/// A renderer of one configuration.
 template <execution E, class Traits, class Tracer, strategy Strategy>
 class compiled_renderer final : public renderer {
  public:
-  static constexpr int sh_degree = Traits::sh_degree;
+  static constexpr int sh_degree = Traits::sh_degree;  ///< of the coefficients that are stored
 
+  /// Makes the policy that the request asks for.
   explicit compiled_renderer(configuration_request const& request)
       : exec_(policy_of<E>(request)),
         frame_(exec_),

@@ -1,5 +1,6 @@
 #pragma once
-// What templates are as a configuration, and the policy that a request asks for.
+/// \file
+/// What templates are as a configuration, and the policy that a request asks for.
 
 #include <gart/backward/strategy.hpp>
 #include <gart/core/isa.hpp>
@@ -10,6 +11,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// What the templates are called at run time.
 template <execution E, class Traits, class Tracer, strategy Strategy>
 configuration_info configuration_of() {
   using response = typename Traits::response;
@@ -27,7 +29,7 @@ configuration_info configuration_of() {
   return configuration;
 }
 
-// The policy that a request asks for.
+/// The policy that a request asks for.
 template <execution E>
 E policy_of(configuration_request const& request) {
   if constexpr (E::device)

@@ -1,7 +1,8 @@
 #pragma once
-// Scores of rendered views against photographs: PSNR and SSIM (gart/loss/metrics.hpp), and as a diagnostic PSNR after
-// each view's best affine colour (gart/loss/affine_color.hpp); the mean over views.
-// Errors: gart::error, naming the view, where the render has another size than the photograph.
+/// \file
+/// Scores of rendered views against photographs: PSNR and SSIM (gart/loss/metrics.hpp), and as a diagnostic PSNR after
+/// each view's best affine colour (gart/loss/affine_color.hpp); the mean over views.
+/// Errors: gart::error, naming the view, where the render has another size than the photograph.
 
 #include <gart/exposure/exposure_field.hpp>
 #include <gart/io/dataset.hpp>
@@ -14,34 +15,38 @@
 
 namespace gart {
 
+/// One view against its photograph.
 struct view_score {
-  std::string name;
+  std::string name;  ///< the view's
+  /// In dB; from 0 to 1.
   double psnr = 0, ssim = 0;
-  double affine_psnr = 0;   // after the affine colour that fits best
-  double own_psnr = 0;      // without an exposure: of the scene's own colours
-  double milliseconds = 0;  // of rendering, to an image in host memory
+  double affine_psnr = 0;   ///< after the affine colour that fits best
+  double own_psnr = 0;      ///< without an exposure: of the scene's own colours
+  double milliseconds = 0;  ///< of rendering, to an image in host memory
 };
 
+/// Means over views.
 struct scores {
-  double psnr = std::numeric_limits<double>::quiet_NaN();  // stays so where there are no views
-  double ssim = std::numeric_limits<double>::quiet_NaN();
-  double affine_psnr = std::numeric_limits<double>::quiet_NaN();
-  double own_psnr = std::numeric_limits<double>::quiet_NaN();
-  bool exposed = false;
-  std::vector<view_score> views;
+  double psnr = std::numeric_limits<double>::quiet_NaN();         ///< stays so where there are no views
+  double ssim = std::numeric_limits<double>::quiet_NaN();         ///< from 0 to 1
+  double affine_psnr = std::numeric_limits<double>::quiet_NaN();  ///< in dB
+  double own_psnr = std::numeric_limits<double>::quiet_NaN();     ///< in dB
+  bool exposed = false;                                           ///< whether views were scored with exposures
+  std::vector<view_score> views;                                  ///< each of them, in order
 };
 
-using some_views = std::vector<dataset_view const*>;
+using some_views = std::vector<dataset_view const*>;  ///< of a dataset, which must outlive it
+/// All views, in order.
 some_views all_of(std::vector<dataset_view> const& views);
-// At most `count` of them, from the middles of as many equal parts: the same in every run.
+/// At most `count` of them, from the middles of as many equal parts: the same in every run.
 some_views evenly_spread(std::vector<dataset_view> const& views, std::size_t count);
 
-using render_view = std::function<rendered(camera const&)>;
-// Sees each view as it was scored, in order.
+using render_view = std::function<rendered(camera const&)>;  ///< one view to host memory
+/// Sees each view as it was scored, in order.
 using keep_view =
     std::function<void(std::size_t index, view_score const&, image_float const& render, image_float const& truth)>;
 
-// Where there are exposures each view is scored with its own, as the field gives it for the camera.
+/// Where there are exposures each view is scored with its own, as the field gives it for the camera.
 scores evaluate(some_views const& views, vec3 background, exposure_field const& exposures, render_view const& render,
                 keep_view const& keep = {});
 

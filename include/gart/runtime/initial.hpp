@@ -1,6 +1,7 @@
 #pragma once
-// Where training starts: a model from points (log-scale = ln sqrt(max(mean squared distance to the 3 nearest
-// neighbours, least_distance^2)), identity rotation, colour in the constant band), or from points at random in a box.
+/// \file
+/// Where training starts: a model from points (log-scale = ln sqrt(max(mean squared distance to the 3 nearest
+/// neighbours, least_distance^2)), identity rotation, colour in the constant band), or from points at random in a box.
 
 #include <gart/io/dataset.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -8,15 +9,16 @@
 
 namespace gart {
 
-// `scale` is times the distance to the neighbours.
+/// `scale` is times the distance to the neighbours.
 gaussian_model model_from_points(point_cloud const& points, int sh_degree, float opacity, float scale,
                                  float least_distance = 3.1622777e-4f);
+/// `count` points, even over the box from lo to hi, of colours at random: the same for the same seed.
 point_cloud random_points(vec3d lo, vec3d hi, index_t count, u64 seed);
 
-// The dataset's points, or random ones in its bounds; at most options.max_gaussians (a random subset beyond).
+/// The dataset's points, or random ones in its bounds; at most options.max_gaussians (a random subset beyond).
 gaussian_model initial_model(dataset const& data, train_options const& options, int sh_degree);
 
-// Mean squared distance of each point to its 3 nearest others. O(n log n).
+/// Mean squared distance of each point to its 3 nearest others. O(n log n).
 std::vector<float> neighbor_distance2(std::vector<float> const& position);
 
 }  // namespace gart

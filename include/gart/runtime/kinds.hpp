@@ -1,34 +1,42 @@
 #pragma once
-// What a configuration is chosen by, by name (core/names.hpp). `automatic` is the best that there is on this machine,
-// `own` a tracer that a program wrote for itself, under
-// whatever name. Backward strategies go by the names that they have (backward/strategies.hpp).
+/// \file
+/// What a configuration is chosen by, by name (core/names.hpp). `automatic` is the best that there is on this machine,
+/// `own` a tracer that a program wrote for itself, under
+/// whatever name. Backward strategies go by the names that they have (backward/strategies.hpp).
 
 #include <gart/core/names.hpp>
 
 namespace gart {
 
+/// Which policy computes; `automatic`: the best that is available.
 enum class backend_kind { automatic, serial, openmp, cuda };
+/// Their names.
 constexpr auto names_of(backend_kind) {
   using enum backend_kind;
   return std::array<name_of<backend_kind>, 4>{
       {{automatic, "auto"}, {serial, "serial"}, {openmp, "openmp"}, {cuda, "cuda"}}};
 }
 
+/// What finds a ray's hits; `own`: a program's own tracer.
 enum class tracer_kind { automatic, bvh, embree, tiles, own };
+/// Their names.
 constexpr auto names_of(tracer_kind) {
   using enum tracer_kind;
   return std::array<name_of<tracer_kind>, 5>{
       {{automatic, "auto"}, {bvh, "bvh"}, {embree, "embree"}, {tiles, "tiles"}, {own, "own"}}};
 }
 
+/// Of the response: exact, or with the shorter exponential and reciprocal of math/fast_arith.hpp.
 enum class arithmetic_kind { exact, fast };
+/// Their names.
 constexpr auto names_of(arithmetic_kind) {
   using enum arithmetic_kind;
   return std::array<name_of<arithmetic_kind>, 2>{{{exact, "exact"}, {fast, "fast"}}};
 }
 
-// What the forward pass leaves of a hit (backward/lt_slot.hpp): nothing for pixel, its weight for hybrid.
+/// What the forward pass leaves of a hit (backward/lt_slot.hpp): nothing for pixel, its weight for hybrid.
 enum class lt_format_kind { automatic, float4, half, shared, weight, none };
+/// Their names.
 constexpr auto names_of(lt_format_kind) {
   using enum lt_format_kind;
   return std::array<name_of<lt_format_kind>, 6>{{{automatic, "auto"},
@@ -39,7 +47,7 @@ constexpr auto names_of(lt_format_kind) {
                                                  {none, "none"}}};
 }
 
-// The degrees of the generalised Gaussians that math/response.hpp has.
+/// The degrees of the generalised Gaussians that math/response.hpp has.
 inline constexpr int kernel_degrees[] = {1, 2, 3, 4, 5, 8};
 
 }  // namespace gart

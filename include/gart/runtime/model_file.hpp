@@ -1,10 +1,11 @@
 #pragma once
-// A model with what it was trained with, as its file says it: a splat PLY whose header carries, in lines
-// "comment gart KEY VALUE", what is not as everywhere: alpha_min, t_min, near, max_hits, antialias, kernel_degree. A
-// model of ordinary Gaussians is byte for byte an ordinary file, and one of another program is read with the defaults.
-//
-// Errors: load_model throws io_error for what is no splat file, or one whose header says what cannot be, naming the
-// file, the key and the remedy; save_model as write_splat_ply (io/ply.hpp).
+/// \file
+/// A model with what it was trained with, as its file says it: a splat PLY whose header carries, in lines
+/// "comment gart KEY VALUE", what is not as everywhere: alpha_min, t_min, near, max_hits, antialias, kernel_degree. A
+/// model of ordinary Gaussians is byte for byte an ordinary file, and one of another program is read with the defaults.
+///
+/// Errors: load_model throws io_error for what is no splat file, or one whose header says what cannot be, naming the
+/// file, the key and the remedy; save_model as write_splat_ply (io/ply.hpp).
 
 #include <gart/io/ply.hpp>
 #include <gart/render/options.hpp>
@@ -14,18 +15,21 @@
 
 namespace gart {
 
+/// A model, and what it was trained to be rendered with.
 struct model_file {
-  gaussian_model model;
-  render_options render;  // the background is in no file
-  int kernel_degree = 2;
+  gaussian_model model;   ///< the Gaussians
+  render_options render;  ///< the background is in no file
+  int kernel_degree = 2;  ///< of the response (math/response.hpp)
 };
 
+/// Errors: io_error naming the file and what is wrong in it.
 model_file load_model(std::filesystem::path const& path);
+/// Written to a temporary name, then renamed. Errors: io_error.
 void save_model(std::filesystem::path const& path, model_file const& file);
 
-// What is not the default of `render` and of kernel degree 2, as the header has it.
+/// What is not the default of `render` and of kernel degree 2, as the header has it.
 ply_traits traits_of(render_options const& render, int kernel_degree);
 
-inline constexpr u32 max_hits_most = 1'000'000'000;
+inline constexpr u32 max_hits_most = 1'000'000'000;  ///< largest cap of hits that a file can have
 
 }  // namespace gart

@@ -1,7 +1,8 @@
 #pragma once
-// Sets of approximations to train and render with, chosen from the front that `gart tradeoff` draws
-// (docs/tradeoffs.md).
-// Errors: preset_named throws invalid_argument, naming those there are.
+/// \file
+/// Sets of approximations to train and render with, chosen from the front that `gart tradeoff` draws
+/// (docs/tradeoffs.md).
+/// Errors: preset_named throws invalid_argument, naming those there are.
 
 #include <gart/render/options.hpp>
 
@@ -10,17 +11,21 @@
 
 namespace gart {
 
+/// A set of approximations.
 struct preset {
-  std::string name;
-  float alpha_min = render_options{}.alpha_min;
-  float transmittance_min = render_options{}.transmittance_min;
+  std::string name;                                              ///< how it is asked for
+  float alpha_min = render_options{}.alpha_min;                  ///< a Gaussian is hit where sigma * rho >= alpha_min
+  float transmittance_min = render_options{}.transmittance_min;  ///< a ray ends after the hit that brings T below this
 
+  /// Sets those of the options that it has.
   void apply(approximation_options& to) const { to.alpha_min = alpha_min, to.transmittance_min = transmittance_min; }
 };
 
-// exact first: the library's defaults.
+/// exact first: the library's defaults.
 std::vector<preset> const& presets();
+/// In the order of presets().
 std::vector<std::string> preset_names();
+/// The one of that name.
 preset const& preset_named(std::string const& name);
 
 }  // namespace gart

@@ -1,7 +1,8 @@
 #pragma once
-// The table of compiled configurations behind make_session and make_renderer. A library that compiles some registers
-// them when it is loaded (GART_REGISTER_CONFIGURATIONS); a program that instantiates its own may do the same
-// (examples/5_own_configuration).
+/// \file
+/// The table of compiled configurations behind make_session and make_renderer. A library that compiles some registers
+/// them when it is loaded (GART_REGISTER_CONFIGURATIONS); a program that instantiates its own may do the same
+/// (examples/5_own_configuration).
 
 #include <gart/core/error.hpp>
 #include <gart/runtime/renderer.hpp>
@@ -12,20 +13,23 @@
 
 namespace gart {
 
+/// One entry of the table of configurations.
 struct compiled_configuration {
-  configuration_info info;
-  int rank = 0;  // "auto" takes the highest that is available; configurations that trade something lie below 0
-  bool (*available)(std::string* reason);  // false: no device, with the reason
-  std::unique_ptr<renderer> (*make_renderer)(configuration_request const&);
+  configuration_info info;  ///< what it is
+  int rank = 0;  ///< "auto" takes the highest that is available; configurations that trade something lie below 0
+  /// A renderer of it.
+  bool (*available)(std::string* reason);
+  std::unique_ptr<renderer> (*make_renderer)(configuration_request const&);  ///< a session of it
   std::unique_ptr<session> (*make_session)(configuration_request const&, train_options const&, dataset const&,
                                            gaussian_model const& start);
 };
 
+/// Adds an entry to the table; before main, from static initialisers.
 void register_configuration(compiled_configuration const& entry);
-// The best that meets a request; unsupported as resolve has it.
+/// The best that meets a request; unsupported as resolve has it.
 compiled_configuration const& find_configuration(configuration_request const& request);
 
-// Only the bvh tracer has a tree to rebuild.
+/// Only the bvh tracer has a tree to rebuild.
 inline void require_tree(int rebuild_every, tracer_kind tracer) {
   if (rebuild_every != 1 && tracer != tracer_kind::bvh && tracer != tracer_kind::own)
     throw invalid_argument(std::string("render_options.rebuild_every is ") + std::to_string(rebuild_every) +
@@ -33,11 +37,14 @@ inline void require_tree(int rebuild_every, tracer_kind tracer) {
                            " builds no tree: leave it at 1, or use configuration_request.tracer = bvh");
 }
 
+/// For policies that every machine has.
 inline bool always_available(std::string*) { return true; }
 
 }  // namespace gart
 
 // `name` becomes a symbol that the linker is told to keep, so that the object with the configurations is not dropped.
+/// Runs the rest of its arguments before main, as registrations ask for. `name` becomes a symbol that the linker is
+/// told to keep, so that the object with the configurations is not dropped.
 #define GART_REGISTER_CONFIGURATIONS(name, ...) \
   extern "C" bool name;                         \
   bool name = [] {                              \

@@ -1,16 +1,17 @@
 #pragma once
-// Rendering and its gradients behind one host-safe interface, by a configuration that is chosen at run time.
-//
-// The Gaussians are the renderer's own copy (set_model), or lie in memory that somebody else owns (bind). Images and
-// gradients come to the host (render, differentiate), or stay where they are computed (render_to, differentiate_into):
-// those calls go to the configuration's queue, the caller's stream where the request names one, and copy nothing. On a
-// device they return before the work is done: wait(), or what the caller puts into the same stream, comes after it.
-//
-// Memory "of the policy" is device memory of the request's device for cuda, host memory for the others.
-//
-// Errors: unsupported, naming the configurations there are and how to compile one, for a configuration that is not;
-// invalid_argument for Gaussians of another SH degree, for options that no view can be rendered by, and for
-// options.rebuild_every where the tracer builds no tree; out_of_memory; whatever the policy throws.
+/// \file
+/// Rendering and its gradients behind one host-safe interface, by a configuration that is chosen at run time.
+///
+/// The Gaussians are the renderer's own copy (set_model), or lie in memory that somebody else owns (bind). Images and
+/// gradients come to the host (render, differentiate), or stay where they are computed (render_to, differentiate_into):
+/// those calls go to the configuration's queue, the caller's stream where the request names one, and copy nothing. On a
+/// device they return before the work is done: wait(), or what the caller puts into the same stream, comes after it.
+///
+/// Memory "of the policy" is device memory of the request's device for cuda, host memory for the others.
+///
+/// Errors: unsupported, naming the configurations there are and how to compile one, for a configuration that is not;
+/// invalid_argument for Gaussians of another SH degree, for options that no view can be rendered by, and for
+/// options.rebuild_every where the tracer builds no tree; out_of_memory; whatever the policy throws.
 
 #include <gart/exec/profile.hpp>
 #include <gart/render/options.hpp>
@@ -23,44 +24,53 @@
 
 namespace gart {
 
-// Where a view goes, in memory of the policy; null where it is not wanted.
+/// Where a view goes, in memory of the policy; null where it is not wanted.
 struct render_targets {
-  float* color = nullptr;          // [H][W][3], background composited
-  float* transmittance = nullptr;  // [H][W]
-  float* depth = nullptr;          // [H][W]: sum of weight * t
-  u32* hits = nullptr;             // [H][W]: hits composited
-  u8* rgba = nullptr;              // [H][W][4]: the colour in 8 bits a channel, for a screen or an encoder
+  float* color = nullptr;          ///< [H][W][3], background composited
+  float* transmittance = nullptr;  ///< [H][W]
+  float* depth = nullptr;          ///< [H][W]: sum of weight * t
+  u32* hits = nullptr;             ///< [H][W]: hits composited
+  u8* rgba = nullptr;              ///< [H][W][4]: the colour in 8 bits a channel, for a screen or an encoder
 };
 
+/// Renders and differentiates views of one model.
 class renderer {
  public:
+  /// The policy's memory goes with it.
   virtual ~renderer() = default;
 
+  /// Copies the model; arrays that were bound are let go.
   virtual void set_model(gaussian_model const& model) = 0;
-  // The arrays, in memory of the policy, must stay until another model is set or bound. What is written to them between
-  // two views counts for the second, on the same stream.
+  /// The arrays, in memory of the policy, must stay until another model is set or bound. What is written to them
+  /// between two views counts for the second, on the same stream.
   virtual void bind(gaussians_view<float const> parameters) = 0;
 
+  /// A view to host memory.
   virtual rendered render(camera const& view, render_options const& options) = 0;
+  /// A view to memory of the policy.
   virtual void render_to(camera const& view, render_options const& options, render_targets const& targets) = 0;
 
-  // The forward and the backward pass of a view by the configuration's strategy, for dL/dcolour [H][W][3]. The
-  // gradients stay where the policy computes until they are fetched. "gradients" is the profiler's stage of both passes
-  // and of what prepares them. Errors: invalid_argument for a gradient of another size than the view.
+  /// The forward and the backward pass of a view by the configuration's strategy, for dL/dcolour [H][W][3]. The
+  /// gradients stay where the policy computes until they are fetched. "gradients" is the profiler's stage of both
+  /// passes and of what prepares them. Errors: invalid_argument for a gradient of another size than the view.
   virtual void differentiate(camera const& view, render_options const& options, image_float const& color_gradient) = 0;
-  virtual gaussian_model gradients() const = 0;  // dL/d every parameter, of the last differentiate
-  // The same from and into memory of the policy: dL/dcolour [H][W][3], and arrays of the number and the SH degree of
-  // the Gaussians, which are overwritten. `targets` takes the view besides.
+  virtual gaussian_model gradients() const = 0;  ///< dL/d every parameter, of the last differentiate
+  /// The same from and into memory of the policy: dL/dcolour [H][W][3], and arrays of the number and the SH degree of
+  /// the Gaussians, which are overwritten. `targets` takes the view besides.
   virtual void differentiate_into(camera const& view, render_options const& options, float const* color_gradient,
                                   gaussians_view<float> gradients, render_targets const& targets = {}) = 0;
-  virtual void wait() = 0;  // until all that was asked for is done
+  virtual void wait() = 0;  ///< until all that was asked for is done
 
+  /// Times of stages; waits for the policy.
   virtual profiler& profile() = 0;
+  /// Most bytes of the policy's memory that were in use at a time.
   virtual std::size_t peak_bytes() const = 0;
-  virtual std::size_t lt_bytes() const = 0;  // of the last differentiate; 0 where the strategy records nothing
+  virtual std::size_t lt_bytes() const = 0;  ///< of the last differentiate; 0 where the strategy records nothing
+  /// What was chosen for the request.
   virtual configuration_info configuration() const = 0;
 };
 
+/// The best configuration that meets the request.
 std::unique_ptr<renderer> make_renderer(configuration_request const& request);
 
 }  // namespace gart

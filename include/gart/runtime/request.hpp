@@ -1,7 +1,8 @@
 #pragma once
-// Which of the compiled configurations computes, and where: what make_session and make_renderer take.
-// Errors: resolve throws unsupported, naming the configurations there are and how to compile one, for a request that
-// none meets.
+/// \file
+/// Which of the compiled configurations computes, and where: what make_session and make_renderer take.
+/// Errors: resolve throws unsupported, naming the configurations there are and how to compile one, for a request that
+/// none meets.
 
 #include <gart/runtime/kinds.hpp>
 
@@ -10,39 +11,41 @@
 
 namespace gart {
 
-// `automatic`, "auto" and 0: the best there is on this machine.
+/// `automatic`, "auto" and 0: the best there is on this machine.
 struct configuration_request {
-  backend_kind backend = backend_kind::automatic;
-  tracer_kind tracer = tracer_kind::automatic;
-  std::string backward = "auto";  // a strategy by its name (backward/strategies.hpp), or one of a program's own
-  int sh_degree = 3;              // of the spherical harmonics of colour that are stored, 0 to 3
-  int kernel_degree = 2;          // of the generalised Gaussians (math/response.hpp)
-  arithmetic_kind arithmetic = arithmetic_kind::exact;
-  lt_format_kind lt_format = lt_format_kind::automatic;
-  int tile_size = 0;  // pixels a side
-  int window = 0;     // hits that a ray keeps in order before it goes over the scene again
-  int threads = 0;    // of the openmp policy; 0: as many as OpenMP gives
-  int device = 0;     // of the cuda policy
-  // Of the cuda policy: a cudaStream_t of the caller's that all work goes to (cudaStreamLegacy for the default one);
-  // null: one of its own.
+  backend_kind backend = backend_kind::automatic;  ///< where it computes
+  tracer_kind tracer = tracer_kind::automatic;     ///< what finds the hits
+  std::string backward = "auto";  ///< a strategy by its name (backward/strategies.hpp), or one of a program's own
+  int sh_degree = 3;              ///< of the spherical harmonics of colour that are stored, 0 to 3
+  int kernel_degree = 2;          ///< of the generalised Gaussians (math/response.hpp)
+  arithmetic_kind arithmetic = arithmetic_kind::exact;   ///< of the response
+  lt_format_kind lt_format = lt_format_kind::automatic;  ///< of the slots of the LT buffer
+  int tile_size = 0;                                     ///< pixels a side
+  int window = 0;   ///< hits that a ray keeps in order before it goes over the scene again
+  int threads = 0;  ///< of the openmp policy; 0: as many as OpenMP gives
+  int device = 0;   ///< of the cuda policy
+  /// Of the cuda policy: a cudaStream_t of the caller's that all work goes to (cudaStreamLegacy for the default one);
+  /// null: one of its own.
   void* stream = nullptr;
 };
 
-// One that was compiled.
+/// One that was compiled.
 struct configuration_info {
-  backend_kind backend = backend_kind::automatic;
-  tracer_kind tracer = tracer_kind::automatic;
-  std::string backward;
-  int sh_degree = 3;
-  int kernel_degree = 2;
-  arithmetic_kind arithmetic = arithmetic_kind::exact;
-  lt_format_kind lt_format = lt_format_kind::none;
+  backend_kind backend = backend_kind::automatic;       ///< where it computes
+  tracer_kind tracer = tracer_kind::automatic;          ///< what finds the hits
+  std::string backward;                                 ///< the strategy's name
+  int sh_degree = 3;                                    ///< of the coefficients that are stored
+  int kernel_degree = 2;                                ///< of the generalised Gaussians
+  arithmetic_kind arithmetic = arithmetic_kind::exact;  ///< of the response
+  lt_format_kind lt_format = lt_format_kind::none;      ///< of the slots of the LT buffer
+  /// Pixels a side; hits of a ray that are kept at a time.
   int tile_size = 8, window = 0;
-  std::string instruction_set = "";  // that a host configuration was compiled for (core/isa.hpp); empty on a device
+  std::string instruction_set = "";  ///< that a host configuration was compiled for (core/isa.hpp); empty on a device
 };
 
-// A request with everything decided.
+/// A request with everything decided.
 configuration_info resolve(configuration_request const& request);
+/// All that were compiled in.
 std::vector<configuration_info> compiled_configurations();
 
 }  // namespace gart

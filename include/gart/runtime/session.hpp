@@ -1,9 +1,10 @@
 #pragma once
-// Training behind one host-safe interface: the configuration (policy, SH degree, tracer, backward strategy) is chosen
-// at run time from those that were compiled. What g++ code, the `gart` program for one, uses.
-//
-// Errors: unsupported, naming the configurations there are and how to compile one, for a configuration that is not;
-// out_of_memory; whatever the policy throws.
+/// \file
+/// Training behind one host-safe interface: the configuration (policy, SH degree, tracer, backward strategy) is chosen
+/// at run time from those that were compiled. What g++ code, the `gart` program for one, uses.
+///
+/// Errors: unsupported, naming the configurations there are and how to compile one, for a configuration that is not;
+/// out_of_memory; whatever the policy throws.
 
 #include <gart/exec/profile.hpp>
 #include <gart/exposure/exposure_field.hpp>
@@ -21,38 +22,49 @@
 
 namespace gart {
 
+/// A training run.
 class session {
  public:
+  /// The policy's memory goes with it.
   virtual ~session() = default;
+  /// One step of training, and what it says of itself.
   virtual step_report step() = 0;
+  /// Steps that count: those of a trial do when it is decided.
   virtual int steps_done() const = 0;
-  // The length of the run that rates, degrees and densification go by from the next step on, in place of
-  // options.iterations: for a run that ends at a time, whose number of steps is not known beforehand. No part of the
-  // state: whoever resumes sets it again.
+  /// The length of the run that rates, degrees and densification go by from the next step on, in place of
+  /// options.iterations: for a run that ends at a time, whose number of steps is not known beforehand. No part of the
+  /// state: whoever resumes sets it again.
   virtual void set_iterations(int iterations) = 0;
+  /// The Gaussians, in host memory.
   virtual gaussian_model model() const = 0;
+  /// A view of the Gaussians to host memory.
   virtual rendered render(camera const& view, vec3 background) = 0;
-  // Everything the next step depends on: parameters, Adam's moments, step, random state. Written atomically; resuming
-  // gives the same bits as not having stopped, on the serial policy. load throws io_error for a checkpoint of another
-  // degree, a truncated or foreign file.
+  /// Everything the next step depends on: parameters, Adam's moments, step, random state. Written atomically; resuming
+  /// gives the same bits as not having stopped, on the serial policy. load throws io_error for a checkpoint of another
+  /// degree, a truncated or foreign file.
   virtual void save(std::filesystem::path const& checkpoint) const = 0;
+  /// Takes up the run that was saved.
   virtual void load(std::filesystem::path const& checkpoint) = 0;
-  // The same in memory. set_state throws invalid_argument for a state of another degree.
+  /// The same in memory. set_state throws invalid_argument for a state of another degree.
   virtual training_state state() const = 0;
+  /// Takes up the run that the state is of.
   virtual void set_state(training_state const& state) = 0;
-  // Of the training views so far; empty where none are learned. render() shows the scene's own colours.
+  /// Of the training views so far; empty where none are learned. render() shows the scene's own colours.
   virtual exposure_field exposures() const { return {}; }
-  virtual std::vector<band_trial> trials() const { return {}; }  // that are over
+  virtual std::vector<band_trial> trials() const { return {}; }  ///< that are over
+  /// Times of stages; waits for the policy.
   virtual profiler& profile() = 0;
+  /// Most bytes of the policy's memory that were in use at a time.
   virtual std::size_t peak_bytes() const = 0;
-  virtual std::size_t lt_bytes() const = 0;  // of the last step; 0 where the strategy records nothing
+  virtual std::size_t lt_bytes() const = 0;  ///< of the last step; 0 where the strategy records nothing
+  /// What was chosen for the request.
   virtual configuration_info configuration() const = 0;
 };
 
-// The dataset must outlive the session. `start` seeds the Gaussians where given, else the dataset's points or random
-// ones. With options.sh_gain the session measures which bands of spherical harmonics to store, and its configuration
-// and degree change in its course (runtime/degree_selection.hpp). Errors: invalid_argument for
-// options.render.rebuild_every where the tracer builds no tree.
+/// The dataset must outlive the session. `start` seeds the Gaussians where given, else the dataset's points or random
+/// ones. With options.sh_gain the session measures which bands of spherical harmonics to store, and its configuration
+/// and degree change in its course (runtime/degree_selection.hpp). Errors: invalid_argument for
+/// options.render.rebuild_every where the tracer builds no tree.
 std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,
                                       dataset const& data, gaussian_model const* start = nullptr);
 std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,

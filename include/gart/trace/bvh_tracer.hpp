@@ -1,7 +1,8 @@
 #pragma once
-// The traverser on gart's own BVH, on every policy: one ray a thread, a window of the nearest hits, resumed until the
-// ray ends. prepare() fits the tree to the Gaussians of a frame: built anew, or refitted when their number has not
-// changed and trace_options.rebuild_every says so.
+/// \file
+/// The traverser on gart's own BVH, on every policy: one ray a thread, a window of the nearest hits, resumed until the
+/// ray ends. prepare() fits the tree to the Gaussians of a frame: built anew, or refitted when their number has not
+/// changed and trace_options.rebuild_every says so.
 
 #include <gart/bvh/walk.hpp>
 #include <gart/camera/pixel_rays.hpp>
@@ -40,17 +41,18 @@ struct walk_rays {
 
 }  // namespace trace_kernels
 
-// Response: what the scene's Gaussians are (math/response.hpp).
+/// Response: what the scene's Gaussians are (math/response.hpp).
 template <execution E, class Response = generalized_gaussian<>>
 class bvh_tracer : public tracer_base {
  public:
-  using response_type = Response;
-  static constexpr char const* name = "bvh";
-  static constexpr int window = 16;
+  using response_type = Response;             ///< of the Gaussians
+  static constexpr char const* name = "bvh";  ///< as requests have it
+  static constexpr int window = 16;           ///< hits of a ray that are kept at a time
 
+  /// Allocates nothing; `exec` must outlive it.
   explicit bvh_tracer(E& exec) : rays_(exec), boxes_(exec), tree_(exec) { static_assert(tracer<bvh_tracer, E>); }
 
-  // View: a camera or a camera model.
+  /// View: a camera or a camera model.
   template <class View>
   void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, View const& view,
                trace_options const& options) {
@@ -68,14 +70,16 @@ class bvh_tracer : public tracer_base {
     scene_ = {gaussians.data(), scene.count, options.near};
   }
 
-  // Of the view that it was prepared for.
+  /// Of the view that it was prepared for.
   pixel_rays rays() const { return rays_.view(); }
 
+  /// Feeds `program` the hits of rays 0 to `rays`; `label` names the launch in profiles.
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
     parallel_for(exec, label, rays, trace_kernels::walk_rays<Response, window, P>{tree_.view(), scene_, program});
   }
 
+  /// Over the ellipsoids' boxes, in the view's frame.
   bvh<E> const& tree() const { return tree_; }
 
  private:

@@ -1,7 +1,8 @@
 #pragma once
-// The traverser on Embree, for the host policies: user geometry over the ellipsoids' boxes, a window of the nearest
-// hits a ray, resumed until the ray ends. Embree proposes, math/ray_gaussian.hpp decides: the hits are those of the BVH
-// tracer, bit for bit. Link gart::embree; this header itself needs no Embree.
+/// \file
+/// The traverser on Embree, for the host policies: user geometry over the ellipsoids' boxes, a window of the nearest
+/// hits a ray, resumed until the ray ends. Embree proposes, math/ray_gaussian.hpp decides: the hits are those of the
+/// BVH tracer, bit for bit. Link gart::embree; this header itself needs no Embree.
 
 #include <gart/bvh/box.hpp>
 #include <gart/scene/parameters.hpp>
@@ -13,21 +14,27 @@
 
 namespace gart {
 
-// An Embree scene over boxes. intersect calls `leaf` for every box the ray may cross between near and *far, in no
-// particular order; `leaf` may shorten *far.
+/// An Embree scene over boxes. intersect calls `leaf` for every box the ray may cross between near and *far, in no
+/// particular order; `leaf` may shorten *far.
 class embree_scene {
  public:
+  /// An empty scene, on a device of Embree's own.
   embree_scene();
   ~embree_scene();
+  /// The other is left empty.
   embree_scene(embree_scene&&) noexcept;
+  /// The other is left empty.
   embree_scene& operator=(embree_scene&&) noexcept;
 
-  // The boxes are read until the next build.
+  /// The boxes are read until the next build.
   void build(span<box const> boxes);
 
+  /// Given the visitor, the number of a box and the ray's far end.
   using leaf_function = void (*)(void* visitor, u32 id, float* far);
+  /// Walks the ray origin + t direction, near <= t <= far; `visitor` is handed to `leaf`.
   void intersect(vec3 origin, vec3 direction, float near, float far, leaf_function leaf, void* visitor) const;
 
+  /// Embree's, as "4.3.0".
   static char const* version();
 
  private:
@@ -64,16 +71,18 @@ struct embree_rays {
 
 }  // namespace trace_kernels
 
+/// A tracer (trace/tracer.hpp) by Embree.
 template <host_execution E, class Response = generalized_gaussian<>>
 class embree_tracer : public tracer_base {
  public:
-  using response_type = Response;
-  static constexpr char const* name = "embree";
-  static constexpr int window = 16;
+  using response_type = Response;                ///< of the Gaussians
+  static constexpr char const* name = "embree";  ///< as requests have it
+  static constexpr int window = 16;              ///< hits of a ray that are kept at a time
 
+  /// Allocates nothing of the policy; `exec` must outlive it.
   explicit embree_tracer(E& exec) : rays_(exec), boxes_(exec) { static_assert(tracer<embree_tracer, E>); }
 
-  // View: a camera or a camera model.
+  /// View: a camera or a camera model.
   template <class View>
   void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, View const& view,
                trace_options const& options) {
@@ -86,9 +95,10 @@ class embree_tracer : public tracer_base {
     scene_ = {gaussians.data(), scene.count, options.near};
   }
 
-  // Of the view that it was prepared for.
+  /// Of the view that it was prepared for.
   pixel_rays rays() const { return rays_.view(); }
 
+  /// Feeds `program` the hits of rays 0 to `rays`; `label` names the launch in profiles.
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
     parallel_for(exec, label, rays, trace_kernels::embree_rays<Response, window, P>{&tree_, scene_, program});

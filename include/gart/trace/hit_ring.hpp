@@ -1,33 +1,38 @@
 #pragma once
-// The hits of a ray that have been found and not yet passed on, sorted, in a ring of fixed capacity: the front is taken
-// off as it becomes certain, new ones usually go near the back.
+/// \file
+/// The hits of a ray that have been found and not yet passed on, sorted, in a ring of fixed capacity: the front is
+/// taken off as it becomes certain, new ones usually go near the back.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
 
 namespace gart::inline GART_ISA {
 
+/// A hit that waits for its turn.
 struct pending_hit {
-  float t;
-  u32 place;  // in the tile's list
-  float alpha;
+  float t;      ///< distance along the ray
+  u32 place;    ///< in the tile's list
+  float alpha;  ///< opacity of the hit
 };
 
-// Capacity: a power of two.
+/// Capacity: a power of two.
 template <int Capacity>
 class hit_ring {
   static_assert((Capacity & (Capacity - 1)) == 0);
 
  public:
+  /// Whether no hit waits.
   GART_HD bool empty() const { return count_ == 0; }
+  /// The nearest hit; there must be one.
   GART_HD pending_hit const& front() const { return at(0); }
+  /// Takes the nearest hit off; there must be one.
   GART_HD GART_INLINE pending_hit pop() {
     pending_hit const h = at(0);
     ++head_, --count_;
     return h;
   }
 
-  // `less(a, b)` is the order of hits. True where there was no room: `h` is then the farthest of all and was left out.
+  /// `less(a, b)` is the order of hits. True where there was no room: `h` is then the farthest of all and was left out.
   template <class Less>
   GART_HD GART_INLINE bool insert(pending_hit& h, Less const& less) {
     bool const full = count_ == Capacity;

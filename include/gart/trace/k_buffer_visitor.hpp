@@ -1,25 +1,31 @@
 #pragma once
-// Turns candidates into a window of hits: shared by every traverser that proposes Gaussians one at a time and in no
-// particular order.
+/// \file
+/// Turns candidates into a window of hits: shared by every traverser that proposes Gaussians one at a time and in no
+/// particular order.
 
 #include <gart/trace/k_buffer.hpp>
 #include <gart/trace/tracer.hpp>
 
 namespace gart::inline GART_ISA {
 
+/// Takes the candidates of one ray from a traversal and keeps those that are its next hits.
 template <int Capacity, class Ray, class Response = generalized_gaussian<>>
 struct k_buffer_visitor {
-  traced_scene scene;
-  Ray ray;
-  // The last hit passed on: only hits strictly after it are taken. At first (near, largest id): t > near.
+  traced_scene scene;  ///< what is traced
+  Ray ray;             ///< in the frame of the Gaussians
+  /// The last hit passed on: only hits strictly after it are taken. At first (near, largest id): t > near.
   float last_t;
-  u32 last_id = 0xffffffffu;
-  k_buffer<Capacity> window;
+  u32 last_id = 0xffffffffu;  ///< the Gaussian of that hit
+  k_buffer<Capacity> window;  ///< the next hits
 
+  /// Before the first hit.
   GART_HD GART_INLINE k_buffer_visitor(traced_scene const& s, Ray const& r) : scene(s), ray(r), last_t(s.near) {}
 
+  /// Candidates are wanted whose hits lie at this distance or farther.
   GART_HD GART_INLINE float near() const { return last_t; }
+  /// Candidates are wanted whose hits lie at this distance or nearer; it shrinks as the window fills.
   GART_HD GART_INLINE float far() const { return window.far(); }
+  /// A candidate: its hit is kept if it is one, and of the nearest.
   GART_HD GART_INLINE void leaf(u32 id) {
     ray_gaussian const g = scene.gaussians[id];
     ray_peak const r = evaluate<Response>(g, ray);
@@ -28,8 +34,8 @@ struct k_buffer_visitor {
   }
 };
 
-// Feeds `program` the hits of ray i; `gather` proposes candidates to the visitor (at least all whose hits lie in
-// [near(), far()]) and is called again until a window is not full.
+/// Feeds `program` the hits of ray i; `gather` proposes candidates to the visitor (at least all whose hits lie in
+/// [near(), far()]) and is called again until a window is not full.
 template <int Capacity, class Response = generalized_gaussian<>, ray_program P, class Gather>
 GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& program, index_t i, Gather const& gather) {
   auto state = program.begin(i);

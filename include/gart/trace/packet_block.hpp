@@ -1,5 +1,6 @@
 #pragma once
-// The pixels that a packet's lanes stand for (trace/packet_walk.hpp, backward/packet_gather.hpp).
+/// \file
+/// The pixels that a packet's lanes stand for (trace/packet_walk.hpp, backward/packet_gather.hpp).
 
 #include <gart/math/lanes.hpp>
 
@@ -7,19 +8,24 @@
 
 namespace gart::inline GART_ISA {
 
-// The pixels of a packet: 4 wide, as high as there are lanes for.
+/// The pixels of a packet: 4 wide, as high as there are lanes for.
 struct packet_block {
+  /// In pixels.
   static constexpr int width = 4, height = lane_count / width;
+  /// Its first pixel.
   int x = 0, y = 0;
 
+  /// Of a lane's pixel, from the first.
   static constexpr int column(int lane) { return lane % width; }
+  /// Of a lane's pixel, from the first.
   static constexpr int row(int lane) { return lane / width; }
-  // The middle of each lane's pixel.
+  /// The middle of each lane's pixel.
   lanes centres_x() const {
     lanes r;
     for (int l = 0; l < lane_count; ++l) r.v[l] = static_cast<float>(column(l));
     return lanes(static_cast<float>(x)) + r + lanes(0.5f);
   }
+  /// The same, down the image.
   lanes centres_y() const {
     lanes r;
     for (int l = 0; l < lane_count; ++l) r.v[l] = static_cast<float>(row(l));

@@ -1,7 +1,8 @@
 #pragma once
-// The part of a Gaussian's box that lies in a tile (a cell), as the packets of the tile look at it: which of their
-// pixels are in the box. Worked out once a (tile, Gaussian) pair for all packets of the tile. A packet program adds
-// what it wants to know of the pair by deriving from it.
+/// \file
+/// The part of a Gaussian's box that lies in a tile (a cell), as the packets of the tile look at it: which of their
+/// pixels are in the box. Worked out once a (tile, Gaussian) pair for all packets of the tile. A packet program adds
+/// what it wants to know of the pair by deriving from it.
 
 #include <gart/tiles/footprint_slots.hpp>
 #include <gart/trace/packet_block.hpp>
@@ -10,13 +11,15 @@
 
 namespace gart::inline GART_ISA {
 
+/// A Gaussian's box in a tile.
 struct packet_cell {
-  static constexpr int largest_tile = 16;  // its side
-  u64 rows;                                // of the tile's rows, bit 4 r: whether row r is in the box
-  u32 columns;                             // of its columns, a bit each
-  u32 id;
+  static constexpr int largest_tile = 16;  ///< its side
+  u64 rows;                                ///< of the tile's rows, bit 4 r: whether row r is in the box
+  u32 columns;                             ///< of its columns, a bit each
+  u32 id;                                  ///< the Gaussian
 
   packet_cell() = default;
+  /// Of the box of `gaussian` in the tile whose pixels are `tile`.
   GART_INLINE packet_cell(u32 gaussian, footprint_slots const& range, pixel_box const& tile) : id(gaussian) {
     pixel_box const cell = intersect(range.box, tile);
     u32 const x = u32{cell.x0} - tile.x0, y = u32{cell.y0} - tile.y0;
@@ -24,7 +27,7 @@ struct packet_cell {
     rows = (~u64{0} >> (64 - 4 * cell.height()) << 4 * y) & 0x1111111111111111u;
   }
 
-  // The pixels of the packet at (x, y) in the tile that are in the box.
+  /// The pixels of the packet at (x, y) in the tile that are in the box.
   GART_INLINE lane_mask inside(int x, int y) const {
     constexpr u32 one_a_row = lane_count == 16 ? 0x1111u : lane_count == 8 ? 0x11u : 1u;
     return lanes_of((columns >> x & 15u) * (static_cast<u32>(rows >> 4 * y) & one_a_row));

@@ -1,6 +1,7 @@
 #pragma once
-// A ray program for packets, a lane a pixel (trace/packet_walk.hpp). A pixel program that has packets is turned into
-// its own by a function packets_of(program), found beside it.
+/// \file
+/// A ray program for packets, a lane a pixel (trace/packet_walk.hpp). A pixel program that has packets is turned into
+/// its own by a function packets_of(program), found beside it.
 
 #include <gart/math/glm.hpp>
 #include <gart/trace/packet_cell.hpp>
@@ -10,6 +11,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// A ray program for packets.
 template <class P>
 concept packet_program = requires(P const& p, typename P::state& s, packet_block const& block,
                                   typename P::cell const& cell, typename P::shaded const& shown,

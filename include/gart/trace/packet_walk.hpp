@@ -1,11 +1,12 @@
 #pragma once
-// The walk of tile lists on a host: rays in packets, a lane a pixel (math/lanes.hpp). The same as walk_tiles
-// (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that a candidate is evaluated for all rays of a
-// packet at once, and that its hits stay together: what waits for its turn is a list of groups, each one Gaussian's
-// hits with some of the rays, in an order that sorts the hits of each ray by (t, id). Where rays meet two Gaussians in
-// opposite orders no one place suits all hits of a candidate, and it takes two groups.
-//
-// A packet that has more hits waiting than there are groups for says so, and its rays are traced one by one.
+/// \file
+/// The walk of tile lists on a host: rays in packets, a lane a pixel (math/lanes.hpp). The same as walk_tiles
+/// (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that a candidate is evaluated for all rays of a
+/// packet at once, and that its hits stay together: what waits for its turn is a list of groups, each one Gaussian's
+/// hits with some of the rays, in an order that sorts the hits of each ray by (t, id). Where rays meet two Gaussians in
+/// opposite orders no one place suits all hits of a candidate, and it takes two groups.
+///
+/// A packet that has more hits waiting than there are groups for says so, and its rays are traced one by one.
 
 #include <gart/camera/ray_depth.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -17,18 +18,18 @@
 
 namespace gart::inline GART_ISA {
 
-// Window: what a ray traced alone keeps (tile_tracer). A packet keeps 32 times that in groups: what runs over is
-// traced again from the start, not resumed.
+/// Window: what a ray traced alone keeps (tile_tracer). A packet keeps 32 times that in groups: what runs over is
+/// traced again from the start, not resumed.
 template <class Response, int Window, int Size, packet_program P>
 class packet_walk {
  public:
   static_assert(Size % packet_block::width == 0 && Size % packet_block::height == 0 &&
                 Size <= packet_cell::largest_tile);
 
-  // To be called before the first packet of a tile, whose pixels are `area`.
+  /// To be called before the first packet of a tile, whose pixels are `area`.
   void enter(pixel_box const& area) { area_ = area, loaded_ = ~u32{0}; }
 
-  // False where more hits waited than there is room for; nothing then counts.
+  /// False where more hits waited than there is room for; nothing then counts.
   bool operator()(P const& program, traced_scene const& scene, tile_map_view const& map, footprint_slots const* ranges,
                   ray_depth const& depth, u32 tile, packet_block block) {
     auto state = program.begin(block);

@@ -1,7 +1,8 @@
 #pragma once
-// A ray program says which rays there are and what to do with their hits. A tracer (trace/tracer.hpp) feeds it the hits
-// of each ray in order, (t, id) ascending, until it has had enough. It is copied to where the rays run, by bytes, and
-// derives from ray_program_base.
+/// \file
+/// A ray program says which rays there are and what to do with their hits. A tracer (trace/tracer.hpp) feeds it the
+/// hits of each ray in order, (t, id) ascending, until it has had enough. It is copied to where the rays run, by bytes,
+/// and derives from ray_program_base.
 
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/trace/hit.hpp>
@@ -12,14 +13,15 @@
 
 namespace gart::inline GART_ISA {
 
-// What a ray program is unless it says otherwise.
+/// What a ray program is unless it says otherwise.
 struct ray_program_base {
-  // Its rays can be walked in packets on a host: packets_of(program) is its packet_program (trace/packet_program.hpp).
+  /// Its rays can be walked in packets on a host: packets_of(program) is its packet_program (trace/packet_program.hpp).
   static constexpr bool has_packets = false;
-  // Its rays can be walked in warps on a device: it is a warp_program (trace/warp_program.hpp).
+  /// Its rays can be walked in warps on a device: it is a warp_program (trace/warp_program.hpp).
   static constexpr bool has_warps = false;
 };
 
+/// Rays and what becomes of their hits.
 template <class P>
 concept ray_program = std::is_trivially_copyable_v<P> && requires(P const& p, index_t i, hit h, typename P::state& s) {
   typename P::state;                      // what a ray has gathered so far
@@ -34,7 +36,7 @@ concept ray_program = std::is_trivially_copyable_v<P> && requires(P const& p, in
   { P::has_warps } -> std::convertible_to<bool>;
 };
 
-// A ray program whose rays are those of an image's pixels: what a tracer by tiles can follow.
+/// A ray program whose rays are those of an image's pixels: what a tracer by tiles can follow.
 template <class P>
 concept pixel_program = ray_program<P> && requires(P const& p, index_t i) {
   { p.at(i) } -> std::same_as<pixel>;                      // of ray i

@@ -1,17 +1,18 @@
 #pragma once
-// The traverser on tile lists, for the rays of a camera's pixels: no tree. A tile's list holds every Gaussian that any
-// of its pixels can hit, sorted by how near it can be hit there (tiles/tile_order.hpp). A pixel walks the list and
-// keeps the hits found in a small window sorted by (t, id); the first of them is next as soon as it lies nearer than
-// all that is left of the list can. When the window overflows its nearest are kept, and the ray resumes strictly after
-// its last hit from the first candidate whose hit was dropped: exact for any number of hits. The hits are those of the
-// other tracers, bit for bit.
-//
-// Rays that meet the same Gaussians are walked together where their program can: packets of lanes on a host
-// (trace/packet_walk.hpp), warps on a device (trace/warp_walk.hpp, tiles of a multiple of 8). Other programs' rays are
-// walked one by one.
-//
-// It traces pixel programs (trace/ray_program.hpp). Cost: the footprints, one sort of the (primitive, tile) pairs, and
-// a walk of each tile's list up to where its rays end.
+/// \file
+/// The traverser on tile lists, for the rays of a camera's pixels: no tree. A tile's list holds every Gaussian that any
+/// of its pixels can hit, sorted by how near it can be hit there (tiles/tile_order.hpp). A pixel walks the list and
+/// keeps the hits found in a small window sorted by (t, id); the first of them is next as soon as it lies nearer than
+/// all that is left of the list can. When the window overflows its nearest are kept, and the ray resumes strictly after
+/// its last hit from the first candidate whose hit was dropped: exact for any number of hits. The hits are those of the
+/// other tracers, bit for bit.
+///
+/// Rays that meet the same Gaussians are walked together where their program can: packets of lanes on a host
+/// (trace/packet_walk.hpp), warps on a device (trace/warp_walk.hpp, tiles of a multiple of 8). Other programs' rays are
+/// walked one by one.
+///
+/// It traces pixel programs (trace/ray_program.hpp). Cost: the footprints, one sort of the (primitive, tile) pairs, and
+/// a walk of each tile's list up to where its rays end.
 
 #include <gart/scene/gaussians.hpp>
 #include <gart/tiles/tile_map.hpp>
@@ -27,13 +28,13 @@ namespace trace_kernels {
 template <class Response, int Capacity, int Size, pixel_program P>
 struct walk_tiles {
   static constexpr int block_size = 64, min_blocks = 8;
-  // Candidates between two looks at what has become certain: the rays of a warp then pass on several hits at a time
-  // together, with less divergence.
+  /// Candidates between two looks at what has become certain: the rays of a warp then pass on several hits at a time
+  /// together, with less divergence.
   static constexpr u32 stride = 8;
   tile_grid<Size> grid;
   tile_map_view map;
   traced_scene scene;
-  ray_depth depth;  // that lists are sorted by
+  ray_depth depth;  ///< that lists are sorted by
   P program;
 
   GART_KERNEL void operator()(index_t i) const {
@@ -100,7 +101,7 @@ struct walk_tiles {
 };
 
 #if !defined(__CUDACC__)
-// On a host, programs with packets: a tile's packets one after another; rays of a packet that runs over one by one.
+/// On a host, programs with packets: a tile's packets one after another; rays of a packet that runs over one by one.
 template <class Response, int Window, int Size, pixel_program P>
 struct walk_tile_packets {
   using packets = decltype(packets_of(std::declval<P const&>()));
@@ -131,22 +132,23 @@ struct walk_tile_packets {
 
 }  // namespace trace_kernels
 
-// Size: side of a tile. Window: hits that a ray walked alone keeps at most, a power of two; a smaller one is walked
-// again more often.
+/// Size: side of a tile. Window: hits that a ray walked alone keeps at most, a power of two; a smaller one is walked
+/// again more often.
 template <execution E, int Size = 8, class Response = generalized_gaussian<>, int Window = 32>
 class tile_tracer : public tracer_base {
  public:
-  using response_type = Response;
-  static constexpr char const* name = "tiles";
-  static constexpr int tile_size = Size;
-  static constexpr bool lends_footprints = true;
-  static constexpr int window = Window;
+  using response_type = Response;                 ///< of the Gaussians
+  static constexpr char const* name = "tiles";    ///< as requests have it
+  static constexpr int tile_size = Size;          ///< side of a tile, in pixels
+  static constexpr bool lends_footprints = true;  ///< to the backward pass
+  static constexpr int window = Window;           ///< hits of a ray that are kept at a time
 
+  /// Allocates nothing; `exec` must outlive it.
   explicit tile_tracer(E& exec) : rays_(exec), prints_(exec), map_(exec), orders_(exec), next_(exec), spilled_(exec) {
     static_assert(footprint_tracer<tile_tracer, E>);
   }
 
-  // View: a camera or a camera model.
+  /// View: a camera or a camera model.
   template <class View>
   void prepare(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, View const& view,
                trace_options const& options) {
@@ -163,9 +165,10 @@ class tile_tracer : public tracer_base {
     scene_ = {gaussians.data(), scene.count, options.near};
   }
 
-  // Of the view that it was prepared for.
+  /// Of the view that it was prepared for.
   pixel_rays rays() const { return rays_.view(); }
 
+  /// Feeds `program` the hits of its pixels' rays; `label` names the launch in profiles.
   template <pixel_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
     if constexpr (P::has_warps) static_assert(warp_program<P>, "a ray program that says has_warps is a warp_program");
@@ -193,7 +196,9 @@ class tile_tracer : public tracer_base {
     parallel_for(exec, label, rays, walk);
   }
 
+  /// Boxes and slots of the Gaussians in the view.
   footprints<E, Size> const& prints() const { return prints_; }
+  /// The tiles' lists.
   tile_map_view map() const { return map_.view(); }
 
  private:

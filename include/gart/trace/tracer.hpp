@@ -1,10 +1,11 @@
 #pragma once
-// What a tracer is: it is prepared for the Gaussians of one view, and feeds a ray program the hits of each of its rays
-// in order, until the program has had enough. Its structure yields candidates only: what is a hit, its t and its alpha
-// come from math/ray_gaussian.hpp, so all tracers give the same hits in the same order, bit for bit.
-//
-// A tracer derives from tracer_base and is held to the concept where it is defined. render/frame.hpp has one, and calls
-// it in the right order.
+/// \file
+/// What a tracer is: it is prepared for the Gaussians of one view, and feeds a ray program the hits of each of its rays
+/// in order, until the program has had enough. Its structure yields candidates only: what is a hit, its t and its alpha
+/// come from math/ray_gaussian.hpp, so all tracers give the same hits in the same order, bit for bit.
+///
+/// A tracer derives from tracer_base and is held to the concept where it is defined. render/frame.hpp has one, and
+/// calls it in the right order.
 
 #include <gart/camera/pixel_rays.hpp>
 #include <gart/exec/concepts.hpp>
@@ -14,29 +15,30 @@
 
 namespace gart::inline GART_ISA {
 
-// What a tracer is told of the way to trace.
+/// What a tracer is told of the way to trace.
 struct trace_options {
-  float alpha_min = 1.0f / 255.0f;  // a Gaussian is hit where sigma * rho >= alpha_min
-  float near = 0.01f;               // hits lie at t > near
-  int rebuild_every = 1;            // views between two builds of a structure that can be refitted
+  float alpha_min = 1.0f / 255.0f;  ///< a Gaussian is hit where sigma * rho >= alpha_min
+  float near = 0.01f;               ///< hits lie at t > near
+  int rebuild_every = 1;            ///< views between two builds of a structure that can be refitted
 };
 
-// What every tracer needs of the scene: the Gaussians in one frame, and the distance hits begin at.
+/// What every tracer needs of the scene: the Gaussians in one frame, and the distance hits begin at.
 struct traced_scene {
+  /// [count], in the view's frame.
   ray_gaussian const* gaussians = nullptr;
-  index_t count = 0;
-  float near = 0;
+  index_t count = 0;  ///< of Gaussians
+  float near = 0;     ///< hits lie at t > near
 };
 
-// What a tracer has unless it says otherwise.
+/// What a tracer has unless it says otherwise.
 struct tracer_base {
-  static constexpr int tile_size = 8;              // side of the tiles that footprints are cut into
-  static constexpr bool lends_footprints = false;  // it has the view's footprints and lists, of its own tile_size
+  static constexpr int tile_size = 8;              ///< side of the tiles that footprints are cut into
+  static constexpr bool lends_footprints = false;  ///< it has the view's footprints and lists, of its own tile_size
 };
 
 namespace trace_kernels {
 
-// Stands for every ray program in the concept.
+/// Stands for every ray program in the concept.
 struct no_rays : ray_program_base {
   using ray_type = primary_ray;
   struct state {};
@@ -52,6 +54,7 @@ static_assert(pixel_program<no_rays>);
 
 }  // namespace trace_kernels
 
+/// A tracer on the policy E.
 template <class T, class E>
 concept tracer = execution<E> && std::constructible_from<T, E&> &&
     requires(T& t, T const& prepared, E& e, gaussians_view<float const> scene, span<ray_gaussian const> gaussians,
@@ -69,7 +72,7 @@ concept tracer = execution<E> && std::constructible_from<T, E&> &&
   { T::lends_footprints } -> std::convertible_to<bool>;
 };
 
-// A tracer that lends the backward pass the footprints that it has measured, and its lists.
+/// A tracer that lends the backward pass the footprints that it has measured, and its lists.
 template <class T, class E>
 concept footprint_tracer = tracer<T, E> && requires(T const& t) {
   requires T::lends_footprints;

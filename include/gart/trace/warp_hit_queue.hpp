@@ -1,12 +1,13 @@
 #pragma once
-// The pending hits of one ray of a warp (trace/warp_walk.hpp), in the order (t, id). The latest 16 lie in a window in
-// shared memory, each lane in a bank of its own, their order a register of sixteen 4-bit numbers. A full window is
-// spilled, all but its first hit, as a run, in order, to memory of its own; of each run the next hit's t is in a
-// register. The next hit of all is the window's first or that of a run. So a hit is spilled once at most, and the order
-// of others is never made anew for it.
-//
-// Where all runs are taken a hit is lost: what is passed on from then on lies before the nearest hit that was.
-// Memory: 24 bytes for each of 210 hits a lane. Device only.
+/// \file
+/// The pending hits of one ray of a warp (trace/warp_walk.hpp), in the order (t, id). The latest 16 lie in a window in
+/// shared memory, each lane in a bank of its own, their order a register of sixteen 4-bit numbers. A full window is
+/// spilled, all but its first hit, as a run, in order, to memory of its own; of each run the next hit's t is in a
+/// register. The next hit of all is the window's first or that of a run. So a hit is spilled once at most, and the
+/// order of others is never made anew for it.
+///
+/// Where all runs are taken a hit is lost: what is passed on from then on lies before the nearest hit that was.
+/// Memory: 24 bytes for each of 210 hits a lane. Device only.
 
 #include <gart/core/types.hpp>
 #include <gart/exec/kept_address.hpp>
@@ -20,10 +21,10 @@ namespace gart::inline GART_ISA {
 struct waiting_hit {
   float t, alpha;
   vec3 shown;
-  u32 key;  // a hit's place where hits have places (trace/warp_program.hpp), else its Gaussian's entry in the list
+  u32 key;  ///< a hit's place where hits have places (trace/warp_program.hpp), else its Gaussian's entry in the list
 };
 
-// Order of hits at one t: places of a pixel's hits have the order of their ids; entries are asked for them.
+/// Order of hits at one t: places of a pixel's hits have the order of their ids; entries are asked for them.
 struct place_order {
   GART_HD GART_INLINE bool operator()(u32 a, u32 b) const { return a < b; }
 };
@@ -48,9 +49,9 @@ class warp_hit_queue {
   struct scratch {  // of a warp
     float words[6][window][lanes];
   };
-  static constexpr std::size_t spill_floats_a_lane = std::size_t{6} * runs * run;  // of a lane
+  static constexpr std::size_t spill_floats_a_lane = std::size_t{6} * runs * run;  ///< of a lane
 
-  // spill_memory: of the warp's lanes, on a boundary of 8 bytes.
+  /// spill_memory: of the warp's lanes, on a boundary of 8 bytes.
   __device__ GART_INLINE warp_hit_queue(scratch& s, float* spill_memory, int lane, KeyOrder before)
       : own_(&detail::kept_address<float>(&s.words[0][0][lane])),
         spilled_(reinterpret_cast<pair*>(spill_memory) + 3 * runs * run * lane),
@@ -69,16 +70,16 @@ class warp_hit_queue {
   __device__ GART_INLINE bool full() const { return count_ == window; }
   __device__ GART_INLINE int room() const { return window - count_; }
   __device__ GART_INLINE bool lost() const { return lost_t_ < infinity; }
-  __device__ GART_INLINE float lost_t() const { return lost_t_; }  // infinity: none
+  __device__ GART_INLINE float lost_t() const { return lost_t_; }  ///< infinity: none
 
-  // For a window that is full, and for one that soon will be: lanes that spill do so together, without divergence.
+  /// For a window that is full, and for one that soon will be: lanes that spill do so together, without divergence.
   __device__ GART_INLINE void make_room() {
     if (count_ < window - 3) return;
     int const to = free_run();
     if (to < runs) spill(to);
   }
 
-  // Needs room, where there can be.
+  /// Needs room, where there can be.
   __device__ GART_INLINE void add(waiting_hit const& h) {
     int slot = free_slot();
     if (lost() | full()) {
@@ -88,7 +89,7 @@ class warp_hit_queue {
     put(h, slot);
   }
 
-  // Passes on hits with t * cosine < depth until f(hit) is false.
+  /// Passes on hits with t * cosine < depth until f(hit) is false.
   template <class F>
   __device__ GART_INLINE void pass_on(float depth, float cosine, F&& f) {
     while (true) {

@@ -1,6 +1,8 @@
 #pragma once
-// A pixel program whose rays can meet a Gaussian together (trace/warp_walk.hpp): what a hit shows is asked for where it
-// is found, from a row of floats of the Gaussian that the whole warp has read; it is composited when its turn comes.
+/// \file
+/// A pixel program whose rays can meet a Gaussian together (trace/warp_walk.hpp): what a hit shows is asked for where
+/// it is found, from a row of floats of the Gaussian that the whole warp has read; it is composited when its turn
+/// comes.
 
 #include <gart/math/glm.hpp>
 #include <gart/tiles/footprint_slots.hpp>
@@ -8,10 +10,11 @@
 
 namespace gart::inline GART_ISA {
 
-// The cell of a program whose hits have no places: a word, so that what lies beside it in shared memory is aligned as
-// it is beside others.
+/// The cell of a program whose hits have no places: a word, so that what lies beside it in shared memory is aligned as
+/// it is beside others.
 struct alignas(16) no_cell {};
 
+/// A pixel program for warps.
 template <class P>
 concept warp_program = pixel_program<P> &&
     requires(P const& p, typename P::state& s, float const* row, vec3 const& shown, float x, u32 place) {

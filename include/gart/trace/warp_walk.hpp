@@ -1,12 +1,13 @@
 #pragma once
-// The walk of tile lists on a device: a warp takes a block of 8 x 4 pixels of a tile, a lane a ray. The same as
-// walk_tiles (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that all rays of the warp meet a
-// candidate together. So candidates that miss the block are left out by one vote, the others come through shared
-// memory, read ahead while the ones before are evaluated, and what a hit shows is computed as it is found, where its
-// Gaussian is the same for all lanes. A ray's pending hits are in a queue (trace/warp_hit_queue.hpp). Hits are passed
-// on when the window of some ray's queue is full: many rays then have some to pass on, and do it together. Where a
-// queue loses a hit the ray passes on what lies before it, and walks the list again, strictly after its last hit. The
-// queues take 5 KB of device memory for each ray that the device holds at a time: 298 MB on 132 multiprocessors.
+/// \file
+/// The walk of tile lists on a device: a warp takes a block of 8 x 4 pixels of a tile, a lane a ray. The same as
+/// walk_tiles (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that all rays of the warp meet a
+/// candidate together. So candidates that miss the block are left out by one vote, the others come through shared
+/// memory, read ahead while the ones before are evaluated, and what a hit shows is computed as it is found, where its
+/// Gaussian is the same for all lanes. A ray's pending hits are in a queue (trace/warp_hit_queue.hpp). Hits are passed
+/// on when the window of some ray's queue is full: many rays then have some to pass on, and do it together. Where a
+/// queue loses a hit the ray passes on what lies before it, and walks the list again, strictly after its last hit. The
+/// queues take 5 KB of device memory for each ray that the device holds at a time: 298 MB on 132 multiprocessors.
 
 #include <gart/camera/ray_depth.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -33,16 +34,16 @@ class walk_tile_warps {
   static constexpr u32 tile_parts = tile_blocks;
   using key_order = std::conditional_t<P::places_hits, place_order, entry_order>;
   using queue = warp_hit_queue<key_order>;
-  static constexpr std::size_t spill_floats = queue::spill_floats_a_lane * block_size;  // of a team's rays
+  static constexpr std::size_t spill_floats = queue::spill_floats_a_lane * block_size;  ///< of a team's rays
 
   tile_grid<Size> grid;
   tile_map_view map;
   footprint_slots const* ranges;
   traced_scene scene;
-  ray_depth depth;  // that lists are sorted by
+  ray_depth depth;  ///< that lists are sorted by
   P program;
-  u32* next = nullptr;       // part of a tile that is to be taken next, zero at first
-  float* spilled = nullptr;  // [teams][spill_floats]
+  u32* next = nullptr;       ///< part of a tile that is to be taken next, zero at first
+  float* spilled = nullptr;  ///< [teams][spill_floats]
 
  private:
   static constexpr int group = 4;  // candidates staged at once
@@ -71,8 +72,8 @@ class walk_tile_warps {
     warp_scratch warp[warps];
   };
 
-  // As many teams as the device holds: their warps take parts of tiles, those of the longest lists first, until there
-  // are no more.
+  /// As many teams as the device holds: their warps take parts of tiles, those of the longest lists first, until there
+  /// are no more.
   template <class Team>
   __device__ void operator()(Team const& team) const {
     int const warp = static_cast<int>(threadIdx.x) / lanes;

@@ -1,5 +1,7 @@
 #pragma once
-// Everything a training run is made of besides the data, with the defaults of the literature (3DGS, 3DGS-MCMC, gsplat).
+/// \file
+/// Everything a training run is made of besides the data, with the defaults of the literature (3DGS, 3DGS-MCMC,
+/// gsplat).
 
 #include <gart/core/names.hpp>
 #include <gart/core/types.hpp>
@@ -11,51 +13,57 @@
 
 namespace gart {
 
+/// How the number of Gaussians grows: not at all, where the image's error is (optim/error_growth.hpp), by MCMC
+/// (optim/mcmc.hpp), by adaptive density control (optim/adc.hpp).
 enum class densify_kind { none, error, mcmc, adc };
+/// Their names.
 constexpr auto names_of(densify_kind) {
   using enum densify_kind;
   return std::array<name_of<densify_kind>, 4>{{{error, "error"}, {mcmc, "mcmc"}, {adc, "adc"}, {none, "none"}}};
 }
 
+/// What is behind the scene in training; `random`: another colour in each step.
 enum class background_kind { black, white, random };
+/// Their names.
 constexpr auto names_of(background_kind) {
   using enum background_kind;
   return std::array<name_of<background_kind>, 3>{{{white, "white"}, {black, "black"}, {random, "random"}}};
 }
 
+/// The options of a run.
 struct train_options {
-  int iterations = 30000;
-  index_t max_gaussians = 1'000'000;
-  index_t random_points = 100'000;  // where the capture has no points
-  densify_kind densify = densify_kind::error;
-  int sh_every = 1000;  // a degree more after so many steps (or iterations / (3 * degrees) in shorter runs)
-  // Held-out gain in PSNR, dB, that a band of spherical harmonics must buy to be stored (runtime/degree_selection.hpp);
-  // 0: every band is, without a measurement.
+  int iterations = 30000;                      ///< steps of the run
+  index_t max_gaussians = 1'000'000;           ///< never more than these
+  index_t random_points = 100'000;             ///< where the capture has no points
+  densify_kind densify = densify_kind::error;  ///< how their number grows
+  int sh_every = 1000;  ///< a degree more after so many steps (or iterations / (3 * degrees) in shorter runs)
+  /// Held-out gain in PSNR, dB, that a band of spherical harmonics must buy to be stored
+  /// (runtime/degree_selection.hpp); 0: every band is, without a measurement.
   float sh_gain = 0;
-  std::vector<std::size_t> held_out = {};  // training views, by index, that are not trained on
-  background_kind background = background_kind::black;
-  // Of the first Gaussians; the scale is times the distance to the neighbours. 0: what suits the start
-  // (runtime/choose.hpp).
+  std::vector<std::size_t> held_out = {};               ///< training views, by index, that are not trained on
+  background_kind background = background_kind::black;  ///< behind the scene
+  /// Of the first Gaussians; the scale is times the distance to the neighbours. 0: what suits the start
+  /// (runtime/choose.hpp).
   float initial_opacity = 0;
-  float initial_scale = 0;
-  float ssim_weight = 0.2f;
-  bool exposure = false;  // learn an exposure of each training view (exposure/exposure.hpp)
-  // Bytes of the LT buffer above which a step is done with less; 0: half of what is free when the trainer is made.
+  float initial_scale = 0;   ///< times the distance to the neighbours; 0 as above
+  float ssim_weight = 0.2f;  ///< share of D-SSIM in the loss, the rest is L1
+  bool exposure = false;     ///< learn an exposure of each training view (exposure/exposure.hpp)
+  /// Bytes of the LT buffer above which a step is done with less; 0: half of what is free when the trainer is made.
   u64 lt_budget = 0;
-  // After each step parameters and Adam's moments are searched for what is not finite, and not_finite is thrown at the
-  // first (optim/finite.hpp).
+  /// After each step parameters and Adam's moments are searched for what is not finite, and not_finite is thrown at the
+  /// first (optim/finite.hpp).
   bool check_finite = false;
-  u64 seed = 1;
-  float near = 0.002f;  // hits lie at t > near, times the scene's extent
-  approximation_options render = {};
-  learning_rates rates = {};
-  adam_options adam = {};
-  error_growth_options error = {};
-  mcmc_options mcmc = {};
-  adc_options adc = {};
+  u64 seed = 1;                       ///< of all numbers drawn at random
+  float near = 0.002f;                ///< hits lie at t > near, times the scene's extent
+  approximation_options render = {};  ///< what is traded for time
+  learning_rates rates = {};          ///< of Adam, by group of parameters
+  adam_options adam = {};             ///< of Adam
+  error_growth_options error = {};    ///< of growth by error
+  mcmc_options mcmc = {};             ///< of growth by MCMC
+  adc_options adc = {};               ///< of adaptive density control
 };
 
-// What a scene of that extent is traced with.
+/// What a scene of that extent is traced with.
 inline render_options render_options_of(train_options const& options, float extent, vec3 background = vec3(0.0f)) {
   approximation_options const& a = options.render;
   return {a.alpha_min,     a.transmittance_min, options.near * extent, a.max_hits, a.antialias,

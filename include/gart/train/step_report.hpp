@@ -1,5 +1,6 @@
 #pragma once
-// What a step of training says of itself.
+/// \file
+/// What a step of training says of itself.
 
 #include <gart/core/types.hpp>
 
@@ -7,15 +8,16 @@
 
 namespace gart {
 
+/// The report of one step.
 struct step_report {
-  int step = 0;  // steps done, this one included
-  float loss = 0;
-  float psnr = 0;  // of this step's training view
-  index_t gaussians = 0;
-  std::string view;
-  std::string backward;  // the strategy of this step: not the one asked for where its LT buffer would pass the budget
-  u64 skipped = 0;       // with check_finite: numbers that Adam left as they were, their updates not being finite
-  bool trial = false;    // a step of a trial (runtime/degree_selection.hpp): `step` stands still until it is decided
+  int step = 0;           ///< steps done, this one included
+  float loss = 0;         ///< of this step's training view
+  float psnr = 0;         ///< of this step's training view
+  index_t gaussians = 0;  ///< after the step
+  std::string view;       ///< its name
+  std::string backward;  ///< the strategy of this step: not the one asked for where its LT buffer would pass the budget
+  u64 skipped = 0;       ///< with check_finite: numbers that Adam left as they were, their updates not being finite
+  bool trial = false;    ///< a step of a trial (runtime/degree_selection.hpp): `step` stands still until it is decided
 };
 
 }  // namespace gart

@@ -1,14 +1,15 @@
 #pragma once
-// Training, one step at a time: a view, the forward pass, the loss, the backward pass by the strategy, Adam,
-// densification. Composed from the parts; each can be replaced. A loss of one's own is a callable given to step().
-//
-//   openmp_exec exec;
-//   trainer<openmp_exec, scene_traits<3>, bvh_tracer<openmp_exec>, pixel_strategy> run(exec, options, data, start);
-//   while (run.steps_done() < options.iterations) run.step();
-//   write_splat_ply("model.ply", run.model());
-//
-// The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step),
-// so a state holds parameters, moments and counters only.
+/// \file
+/// Training, one step at a time: a view, the forward pass, the loss, the backward pass by the strategy, Adam,
+/// densification. Composed from the parts; each can be replaced. A loss of one's own is a callable given to step().
+/// \code{.cpp}
+/// openmp_exec exec;
+/// trainer<openmp_exec, scene_traits<3>, bvh_tracer<openmp_exec>, pixel_strategy> run(exec, options, data, start);
+/// while (run.steps_done() < options.iterations) run.step();
+/// write_splat_ply("model.ply", run.model());
+/// \endcode
+/// The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step),
+/// so a state holds parameters, moments and counters only.
 
 #include <gart/backward/fallback.hpp>
 #include <gart/exposure/exposure_field.hpp>
@@ -35,42 +36,58 @@
 
 namespace gart::inline GART_ISA {
 
-// What a loss sees: the rendered image and its view, in the policy's memory. It writes dL/d image and, into
-// value[0..1], the loss and the mean squared error.
+/// What a loss sees: the rendered image and its view, in the policy's memory. It writes dL/d image and, into
+/// value[0..1], the loss and the mean squared error.
 template <execution E>
 struct loss_input {
-  E& exec;
-  dataset_view const& view;
-  truth_view truth;
+  E& exec;                   ///< the policy
+  dataset_view const& view;  ///< of this step
+  truth_view truth;          ///< the photograph, in the policy's memory
+  /// Of the image, in pixels.
   int width, height;
-  span<float const> image;  // [H][W][3]
-  span<float> gradient;     // [H][W][3]
-  span<float> value;        // [2]
+  span<float const> image;  ///< [H][W][3]
+  span<float> gradient;     ///< [H][W][3]
+  span<float> value;        ///< [2]
 };
 
+/// A training run on one policy, by one tracer and one strategy.
 template <execution E, class Traits, class Tracer, strategy Strategy>
 class trainer {
  public:
-  static constexpr int sh_degree = Traits::sh_degree;
+  static constexpr int sh_degree = Traits::sh_degree;  ///< of the coefficients that are stored
 
+  /// Starts from `start`, of that degree. Errors: invalid_argument for another degree, or where no view is left to
+  /// train on; out_of_memory.
   trainer(E& exec, train_options const& options, dataset const& data, gaussian_model const& start);
+  /// The dataset must outlive the trainer.
   trainer(E& exec, train_options const& options, dataset const&& temporary, gaussian_model const& start) = delete;
 
+  /// One step, with the loss of the options.
   step_report step();
+  /// One step, with a loss of one's own, called with a loss_input.
   template <class Loss>
   step_report step(Loss&& loss);
 
+  /// Steps done.
   int steps_done() const { return step_; }
-  void set_iterations(int iterations);  // as session has it
+  void set_iterations(int iterations);  ///< as session has it
+  /// The Gaussians, in host memory.
   gaussian_model model() const { return scene_.to_host(); }
+  /// A view of the Gaussians to host memory.
   rendered render(camera const& view, vec3 background);
+  /// Everything the next step depends on.
   training_state state() const;
+  /// Takes up the run that the state is of. Errors: invalid_argument for another degree.
   void set_state(training_state const& state);
+  /// Writes the state to a checkpoint.
   void save(std::filesystem::path const& path) const { write_checkpoint(path, state()); }
+  /// Takes up the run of a checkpoint.
   void load(std::filesystem::path const& path) { set_state(read_checkpoint(path, sh_degree)); }
-  exposure_field exposures() const;                   // of the views that were trained on; empty where none are learned
-  std::size_t lt_bytes() const { return lt_bytes_; }  // of the last step
+  exposure_field exposures() const;  ///< of the views that were trained on; empty where none are learned
+  std::size_t lt_bytes() const { return lt_bytes_; }  ///< of the last step
+  /// The Gaussians, in the policy's memory.
   gaussians<E>& scene() { return scene_; }
+  /// Of the last step, in their shape.
   gaussians<E> const& gradients() const { return gradients_; }
 
  private:

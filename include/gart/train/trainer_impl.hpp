@@ -1,5 +1,6 @@
 #pragma once
-// Template bodies of trainer.hpp.
+/// \file
+/// Template bodies of trainer.hpp.
 
 #include <gart/train/trainer.hpp>
 

@@ -1,6 +1,7 @@
 #pragma once
-// The true images where kernels can read them: the dataset's own memory on host policies; on a device each is copied at
-// its first use and stays.
+/// \file
+/// The true images where kernels can read them: the dataset's own memory on host policies; on a device each is copied
+/// at its first use and stays.
 
 #include <gart/exec/buffer.hpp>
 #include <gart/io/dataset.hpp>
@@ -10,11 +11,14 @@
 
 namespace gart::inline GART_ISA {
 
+/// The photographs of a dataset's training views, in a policy's memory from their first use on.
 template <execution E>
 class training_images {
  public:
+  /// The dataset must outlive it.
   explicit training_images(dataset const& data) : data_(data), pixels_(data.train.size()), masks_(data.train.size()) {}
 
+  /// The photograph of a training view, by its index, over that background.
   truth_view get(E& exec, std::size_t view, vec3 background) {
     dataset_view const& v = data_.train[view];
     truth_view out;

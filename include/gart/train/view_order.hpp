@@ -1,6 +1,7 @@
 #pragma once
-// Every training view once an epoch, those held out excepted, in an order shuffled by (seed, epoch): a function of the
-// step alone.
+/// \file
+/// Every training view once an epoch, those held out excepted, in an order shuffled by (seed, epoch): a function of the
+/// step alone.
 
 #include <gart/optim/random.hpp>
 
@@ -10,15 +11,19 @@
 
 namespace gart::inline GART_ISA {
 
+/// Which view a step trains on: all in turn, in another order each time round.
 class view_order {
  public:
+  /// Of `views` views, by index, without those held out.
   view_order(std::size_t views, std::vector<std::size_t> const& held_out, u64 seed) : seed_(seed) {
     for (std::size_t i = 0; i < views; ++i)
       if (std::find(held_out.begin(), held_out.end(), i) == held_out.end()) views_.push_back(i);
     order_ = views_;
   }
+  /// Whether no view is left.
   bool empty() const { return views_.empty(); }
 
+  /// The view of a step.
   std::size_t at(int step) {
     int const epoch = step / static_cast<int>(order_.size());
     if (epoch != epoch_) shuffle(epoch);
