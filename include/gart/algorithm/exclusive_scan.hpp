@@ -1,10 +1,11 @@
 #pragma once
-// Counts to offsets: out[i] = in[0] + ... + in[i - 1], and total[0] = the sum of all.
-//
-// in: n counts. out: n offsets, T = u32 or u64; must not overlap `in`. total: one element of the policy's memory, or
-// empty; it may be the element after `out`, which makes the n + 1 offsets of a segmented array. Sums are formed in T:
-// take u64 unless the total is known to fit in 32 bits, as u32 wraps. n = 0 gives total 0; n may pass 2^32.
-// Cost: reads `in` twice (CUDA: once), writes `out` once. Errors: invalid_argument where a span is too short.
+/// \file
+/// Counts to offsets: out[i] = in[0] + ... + in[i - 1], and total[0] = the sum of all.
+///
+/// in: n counts. out: n offsets, T = u32 or u64; must not overlap `in`. total: one element of the policy's memory, or
+/// empty; it may be the element after `out`, which makes the n + 1 offsets of a segmented array. Sums are formed in T:
+/// take u64 unless the total is known to fit in 32 bits, as u32 wraps. n = 0 gives total 0; n may pass 2^32.
+/// Cost: reads `in` twice (CUDA: once), writes `out` once. Errors: invalid_argument where a span is too short.
 
 #include <gart/algorithm/host_blocks.hpp>
 #include <gart/core/error.hpp>
@@ -22,7 +23,7 @@ class cuda_exec;
 template <class T>
 concept scan_sum = std::same_as<T, u32> || std::same_as<T, u64>;
 
-// Compiled into gart::cuda.
+/// Compiled into gart::cuda.
 template <scan_sum T>
 void exclusive_scan(cuda_exec& exec, span<u32 const> in, span<T> out, span<std::type_identity_t<T>> total = {});
 

@@ -1,6 +1,7 @@
 #pragma once
-// How the algorithms split an array over the threads of a host policy: into contiguous blocks, one a thread, walked in
-// any order. What depends on the number of blocks must not reach a result.
+/// \file
+/// How the algorithms split an array over the threads of a host policy: into contiguous blocks, one a thread, walked in
+/// any order. What depends on the number of blocks must not reach a result.
 
 #include <gart/core/isa.hpp>
 #include <gart/exec/concepts.hpp>

@@ -1,11 +1,12 @@
 #pragma once
-// One number of many: out[0] = the sum, minimum or maximum of in[0..n).
-//
-// in: n of float, double, u32 or u64. out: one element of the policy's memory. Sums of float are formed in double and
-// rounded once; integers wrap. The order of additions depends on n only, never on threads, so that a policy gives the
-// same bits at every run (CUDA: on the same device). n = 0 gives the neutral element: 0, or the largest or the lowest
-// value (infinities for floating point). The minimum and maximum of NaN are unspecified.
-// Cost: reads `in` once. Errors: invalid_argument where `out` is empty.
+/// \file
+/// One number of many: out[0] = the sum, minimum or maximum of in[0..n).
+///
+/// in: n of float, double, u32 or u64. out: one element of the policy's memory. Sums of float are formed in double and
+/// rounded once; integers wrap. The order of additions depends on n only, never on threads, so that a policy gives the
+/// same bits at every run (CUDA: on the same device). n = 0 gives the neutral element: 0, or the largest or the lowest
+/// value (infinities for floating point). The minimum and maximum of NaN are unspecified.
+/// Cost: reads `in` once. Errors: invalid_argument where `out` is empty.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 
@@ -18,7 +19,7 @@ enum class reduction { sum, min, max };
 template <class T>
 concept reducible = std::same_as<T, float> || std::same_as<T, double> || std::same_as<T, u32> || std::same_as<T, u64>;
 
-// Compiled into gart::cuda.
+/// Compiled into gart::cuda.
 template <reducible T>
 void reduce(cuda_exec& exec, span<std::type_identity_t<T> const> in, span<T> out, reduction op = reduction::sum);
 

@@ -1,7 +1,8 @@
 #pragma once
-// The binary tree that a wide one is made from (Karras, "Maximizing parallelism in the construction of BVHs, octrees,
-// and k-d trees", HPG 2012): boxes sorted by the Morton codes of their centres, one thread an inner node, boxes fitted
-// from the leaves up. As they are fitted it is also worked out which nodes become wide ones (bvh/shares.hpp).
+/// \file
+/// The binary tree that a wide one is made from (Karras, "Maximizing parallelism in the construction of BVHs, octrees,
+/// and k-d trees", HPG 2012): boxes sorted by the Morton codes of their centres, one thread an inner node, boxes fitted
+/// from the leaves up. As they are fitted it is also worked out which nodes become wide ones (bvh/shares.hpp).
 
 #include <gart/bvh/morton.hpp>
 #include <gart/bvh/shares.hpp>

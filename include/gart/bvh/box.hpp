@@ -1,5 +1,6 @@
 #pragma once
-// Axis-aligned boxes, and the conservative box of a Gaussian's ellipsoid.
+/// \file
+/// Axis-aligned boxes, and the conservative box of a Gaussian's ellipsoid.
 
 #include <gart/math/ray_gaussian.hpp>
 
@@ -13,9 +14,9 @@ struct box {
 
 namespace gart::inline GART_ISA {
 
-inline constexpr float infinity = 3.402823466e38f;  // a finite one: no rounding or product makes it a NaN
+inline constexpr float infinity = 3.402823466e38f;  ///< a finite one: no rounding or product makes it a NaN
 
-// Holds nothing, is the identity of join, and is missed by every ray.
+/// Holds nothing, is the identity of join, and is missed by every ray.
 GART_HD constexpr box empty_box() { return {vec3(infinity), vec3(-infinity)}; }
 
 GART_HD GART_INLINE box join(box const& a, box const& b) {
@@ -27,10 +28,10 @@ GART_HD GART_INLINE box join(box const& a, box const& b) {
   return out;
 }
 
-// The box, in the frame, of all points where the Gaussian can be hit: centre and half-extent
-// h_k = c sqrt(sum_j (R_kj s_j)^2), c^2 the cutoff. Evaluating a hit in float moves it by a few roundings of the
-// distance to the frame, so the box is widened by 32 of them: a candidate is never missed for being just outside its
-// own box.
+/// The box, in the frame, of all points where the Gaussian can be hit: centre and half-extent
+/// h_k = c sqrt(sum_j (R_kj s_j)^2), c^2 the cutoff. Evaluating a hit in float moves it by a few roundings of the
+/// distance to the frame, so the box is widened by 32 of them: a candidate is never missed for being just outside its
+/// own box.
 template <class Response = generalized_gaussian<>>
 GART_HD GART_INLINE box ellipsoid_box(gaussian_parameters const& g, vec3d const& frame, float alpha_min) {
   float const cutoff = hit_cutoff<Response>(g, alpha_min);

@@ -1,11 +1,13 @@
 #pragma once
-// A bounding volume hierarchy over boxes with wide, compressed nodes (bvh/node.hpp), on every policy: a binary tree by
-// Morton codes and the policy's own sort (bvh/binary_tree.hpp), collapsed in one kernel (bvh/collapse.hpp). The same
-// boxes give the same tree on every policy. refit keeps the order of the boxes and fits the tree to where they are now.
-//
-// Shapes: n boxes make at most max(n - 1, 1) nodes, about n / 5 of them in use; node 0 is the root. Cost: O(n) work
-// beside the sort, which refit goes without, and about 120 bytes a box of scratch; nothing waits for the device. Boxes
-// that are empty (empty_box) are never met. Errors: invalid_argument where a refit brings another number of boxes.
+/// \file
+/// A bounding volume hierarchy over boxes with wide, compressed nodes (bvh/node.hpp), on every policy: a binary tree by
+/// Morton codes and the policy's own sort (bvh/binary_tree.hpp), collapsed in one kernel (bvh/collapse.hpp). The same
+/// boxes give the same tree on every policy. refit keeps the order of the boxes and fits the tree to where they are
+/// now.
+///
+/// Shapes: n boxes make at most max(n - 1, 1) nodes, about n / 5 of them in use; node 0 is the root. Cost: O(n) work
+/// beside the sort, which refit goes without, and about 120 bytes a box of scratch; nothing waits for the device. Boxes
+/// that are empty (empty_box) are never met. Errors: invalid_argument where a refit brings another number of boxes.
 
 #include <gart/bvh/binary_tree.hpp>
 #include <gart/exec/buffer.hpp>
@@ -14,7 +16,7 @@ namespace gart::inline GART_ISA {
 
 struct bvh_view {
   bvh_node const* nodes = nullptr;
-  index_t count = 0;  // boxes
+  index_t count = 0;  ///< boxes
 };
 
 template <execution E>
@@ -34,7 +36,7 @@ class bvh {
         bounds_(exec) {}
 
   void build(E& exec, span<box const> boxes);
-  // For the same number of boxes as the last build.
+  /// For the same number of boxes as the last build.
   void refit(E& exec, span<box const> boxes);
   bvh_view view() const { return {nodes_.data(), count_}; }
 

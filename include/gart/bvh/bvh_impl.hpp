@@ -1,5 +1,6 @@
 #pragma once
-// Template bodies of bvh.hpp.
+/// \file
+/// Template bodies of bvh.hpp.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>

@@ -1,5 +1,6 @@
 #pragma once
-// From a binary tree to the wide one: which nodes become wide, then what stands in them. One thread a node for each.
+/// \file
+/// From a binary tree to the wide one: which nodes become wide, then what stands in them. One thread a node for each.
 
 #include <gart/bvh/binary_tree.hpp>
 

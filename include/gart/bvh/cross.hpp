@@ -1,5 +1,6 @@
 #pragma once
-// A ray and a node: which children's boxes it crosses, all of them at once.
+/// \file
+/// A ray and a node: which children's boxes it crosses, all of them at once.
 
 #include <gart/bvh/node.hpp>
 
@@ -9,7 +10,7 @@
 
 namespace gart::inline GART_ISA {
 
-// A finite inverse of every direction, so that 0 * inf never makes a slab test lie.
+/// A finite inverse of every direction, so that 0 * inf never makes a slab test lie.
 GART_HD GART_INLINE float slab_inverse(float d) {
   float const tiny = 1e-20f;
   return 1.0f / (d < tiny && d > -tiny ? (d < 0 ? -tiny : tiny) : d);
@@ -17,8 +18,8 @@ GART_HD GART_INLINE float slab_inverse(float d) {
 
 struct slab_ray {
   vec3 origin, inverse;
-  // Boxes of Gaussians are as wide as rounding needs for rays from the frame (ellipsoid_box). Rays from elsewhere need
-  // 32 roundings of their origin more; here along the ray, and negative: x - 0 is x, and costs primary rays nothing.
+  /// Boxes of Gaussians are as wide as rounding needs for rays from the frame (ellipsoid_box). Rays from elsewhere need
+  /// 32 roundings of their origin more; here along the ray, and negative: x - 0 is x, and costs primary rays nothing.
   vec3 narrower{0.0f};
   template <class Ray>
   GART_HD GART_INLINE explicit slab_ray(Ray const& r)
@@ -31,7 +32,7 @@ struct slab_ray {
   }
 };
 
-// Whether the ray crosses the box somewhere in [near, far].
+/// Whether the ray crosses the box somewhere in [near, far].
 GART_HD GART_INLINE bool crosses(box const& b, slab_ray const& r, float near, float far) {
   for (int k = 0; k < 3; ++k) {
     float const t0 = (b.lo[k] - r.origin[k]) * r.inverse[k], t1 = (b.hi[k] - r.origin[k]) * r.inverse[k];
@@ -40,7 +41,7 @@ GART_HD GART_INLINE bool crosses(box const& b, slab_ray const& r, float near, fl
   return near <= far && b.lo.x <= b.hi.x;
 }
 
-// b where a is not a number.
+/// b where a is not a number.
 GART_HD GART_INLINE float larger(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return fmaxf(a, b);
@@ -56,9 +57,9 @@ GART_HD GART_INLINE float smaller(float a, float b) {
 #endif
 }
 
-// A node's grid along a ray: it crosses plane q of axis k at q * step[k] + enter[k], or + leave[k] on the way out. The
-// two lie apart by more than all roundings of either: a few of the distance to the far end of the grid. What overflows
-// ends as an infinity on the safe side or as no number, and that prunes nothing.
+/// A node's grid along a ray: it crosses plane q of axis k at q * step[k] + enter[k], or + leave[k] on the way out. The
+/// two lie apart by more than all roundings of either: a few of the distance to the far end of the grid. What overflows
+/// ends as an infinity on the safe side or as no number, and that prunes nothing.
 struct grid_crossing {
   float step[3], enter[3], leave[3];
 
@@ -74,7 +75,7 @@ struct grid_crossing {
   }
 };
 
-// What of a node a ray is tested against, in registers: 16 bytes at a time on a device.
+/// What of a node a ray is tested against, in registers: 16 bytes at a time on a device.
 #if defined(__CUDA_ARCH__)
 GART_HD GART_INLINE bvh_node load_bounds(bvh_node const& n) {
   constexpr int quads = static_cast<int>((offsetof(bvh_node, child) + 15) / 16);
@@ -95,9 +96,9 @@ GART_HD GART_INLINE bvh_node load_bounds(bvh_node const& n) {
 GART_HD GART_INLINE bvh_node const& load_bounds(bvh_node const& n) { return n; }
 #endif
 
-// The children that the ray crosses somewhere in [near, far], a bit each; entry: where it enters them, at least near.
+/// The children that the ray crosses somewhere in [near, far], a bit each; entry: where it enters them, at least near.
 #if !defined(__CUDACC__) && defined(__AVX2__)
-// A child is a lane. Intrinsics stand where GCC finds no vector code for the language's words.
+/// A child is a lane. Intrinsics stand where GCC finds no vector code for the language's words.
 GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, float near, float far, float (&entry)[bvh_width]) {
   using floats = float __attribute__((vector_size(4 * bvh_width)));
   using ints = int __attribute__((vector_size(4 * bvh_width)));
@@ -148,7 +149,7 @@ GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, flo
 }
 #endif
 
-// Where the ray enters child c, at least near: what cross_children gave for it, but for a rounding.
+/// Where the ray enters child c, at least near: what cross_children gave for it, but for a rounding.
 GART_HD GART_INLINE float enter_child(bvh_node const& n, int c, slab_ray const& r, float near) {
   grid_crossing const grid(n, r);
   float from = near;

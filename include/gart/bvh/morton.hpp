@@ -1,5 +1,6 @@
 #pragma once
-// Morton codes of 63 bits: 21 bits an axis, interleaved, so that neighbours in the code are neighbours in space.
+/// \file
+/// Morton codes of 63 bits: 21 bits an axis, interleaved, so that neighbours in the code are neighbours in space.
 
 #include <gart/bvh/box.hpp>
 
@@ -17,7 +18,7 @@ GART_HD GART_INLINE u64 spread_bits(u64 x) {
   return x;
 }
 
-// Code of a point in `bounds`; points outside (or not numbers) go to its edge.
+/// Code of a point in `bounds`; points outside (or not numbers) go to its edge.
 GART_HD GART_INLINE u64 morton_code(vec3 const& p, box const& bounds) {
   u64 code = 0;
   for (int k = 0; k < 3; ++k) {

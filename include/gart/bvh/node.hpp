@@ -1,12 +1,13 @@
 #pragma once
-// One node of the wide tree: up to bvh_width children, their boxes held in 8 bits a side on a grid of the node's own
-// (Ylitie, Karras and Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", HPG 2017).
-//
-// Plane q of an axis lies at origin + q * step, step a power of two and origin a multiple of it, such that every plane
-// is a float exactly. Sides are rounded outward: a box lies in its child_box, whatever its size and place. An axis with
-// a side beyond 2^126, or one that is not a number, has planes for "below 0", 0 and "above 0" only.
-//
-// 96 bytes at width 8, three sectors of a GPU's memory; loaded as 16-byte words.
+/// \file
+/// One node of the wide tree: up to bvh_width children, their boxes held in 8 bits a side on a grid of the node's own
+/// (Ylitie, Karras and Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", HPG 2017).
+///
+/// Plane q of an axis lies at origin + q * step, step a power of two and origin a multiple of it, such that every plane
+/// is a float exactly. Sides are rounded outward: a box lies in its child_box, whatever its size and place. An axis
+/// with a side beyond 2^126, or one that is not a number, has planes for "below 0", 0 and "above 0" only.
+///
+/// 96 bytes at width 8, three sectors of a GPU's memory; loaded as 16-byte words.
 
 #include <gart/bvh/box.hpp>
 
@@ -14,32 +15,32 @@
 
 namespace gart::inline GART_ISA {
 
-inline constexpr int bvh_width = 8;  // children of a node, at most
+inline constexpr int bvh_width = 8;  ///< children of a node, at most
 
 static_assert(std::endian::native == std::endian::little);  // child c of a side is byte c of its words
 
-// The grid of one axis.
+/// The grid of one axis.
 struct bvh_axis {
   static constexpr u32 unbounded = 254;
   float origin;
-  u32 exponent;  // of the step, biased by 127: 1 to 254
+  u32 exponent;  ///< of the step, biased by 127: 1 to 254
 
   GART_HD float step() const { return bits_to_float(exponent << 23); }
 };
 
 struct alignas(32) bvh_node {
   float origin[3];
-  u32 shape;                       // a byte an axis: exponents of the steps; then 4 bits each: inner children, leaves
-  u32 plane[2][3][bvh_width / 4];  // lower and upper sides; byte c is child c's
-  u32 child[bvh_width];            // inner children (nodes) from the front, leaves (boxes) from the back
+  u32 shape;                       ///< a byte an axis: exponents of the steps; then 4 bits each: inner children, leaves
+  u32 plane[2][3][bvh_width / 4];  ///< lower and upper sides; byte c is child c's
+  u32 child[bvh_width];            ///< inner children (nodes) from the front, leaves (boxes) from the back
 
   GART_HD bvh_axis axis(int k) const { return {origin[k], shape >> 8 * k & 0xffu}; }
   GART_HD int inner_count() const { return static_cast<int>(shape >> 24 & 0xfu); }
   GART_HD int leaf_count() const { return static_cast<int>(shape >> 28); }
-  // Bit c is child c.
+  /// Bit c is child c.
   GART_HD u32 inner_mask() const { return (1u << inner_count()) - 1u; }
   GART_HD u32 leaf_mask() const { return ((1u << leaf_count()) - 1u) << (bvh_width - leaf_count()); }
-  // What a ray is tested against in place of the child's own box.
+  /// What a ray is tested against in place of the child's own box.
   GART_HD box child_box(int c) const {
     box out;
     for (int k = 0; k < 3; ++k) {
@@ -53,8 +54,8 @@ struct alignas(32) bvh_node {
   }
 };
 
-// Whole steps at or below x; at or above x. Multiplying by a power of two is exact but where it underflows, which the
-// comparison makes up for.
+/// Whole steps at or below x; at or above x. Multiplying by a power of two is exact but where it underflows, which the
+/// comparison makes up for.
 GART_HD GART_INLINE float steps_below(float x, float step, float per_step) {
   float const n = floorf(x * per_step);
   return n * step > x ? n - 1.0f : n;
@@ -64,7 +65,7 @@ GART_HD GART_INLINE float steps_above(float x, float step, float per_step) {
   return n * step < x ? n + 1.0f : n;
 }
 
-// The finest grid that reaches from lo to hi in 255 steps, each plane of it a float.
+/// The finest grid that reaches from lo to hi in 255 steps, each plane of it a float.
 GART_HD GART_INLINE bvh_axis axis_between(float lo, float hi) {
   float const most = bits_to_float((127 + 126) << 23);
   if (!(lo >= -most && lo <= hi && hi <= most)) return {-bits_to_float(254 << 23), bvh_axis::unbounded};
@@ -80,7 +81,7 @@ GART_HD GART_INLINE bvh_axis axis_between(float lo, float hi) {
   }
 }
 
-// The planes that hold [lo, hi], which lies within what the axis was made for; a side that is not a number holds all.
+/// The planes that hold [lo, hi], which lies within what the axis was made for; a side that is not a number holds all.
 GART_HD GART_INLINE u32 plane_below(bvh_axis const& a, float lo) {
   if (a.exponent == bvh_axis::unbounded) return lo >= 0.0f ? 1 : 0;
   float const step = a.step(), per_step = bits_to_float((254 - a.exponent) << 23);

@@ -1,10 +1,11 @@
 #pragma once
-// Visits the leaves of a BVH that a ray may meet between two distances, nearer nodes first. The visitor says what is of
-// interest, and may narrow it as it goes:
-//   float near(), far();    only boxes the ray crosses somewhere in [near, far] are entered; 0 or more
-//   void leaf(u32 box);     every box that the ray crosses there, once, and some that it just misses
-// Any ray type with a unit `direction` and an origin_of(ray). Who asks for the boxes themselves tests what is proposed
-// with crosses(box, ...).
+/// \file
+/// Visits the leaves of a BVH that a ray may meet between two distances, nearer nodes first. The visitor says what is
+/// of interest, and may narrow it as it goes:
+///   float near(), far();    only boxes the ray crosses somewhere in [near, far] are entered; 0 or more
+///   void leaf(u32 box);     every box that the ray crosses there, once, and some that it just misses
+/// Any ray type with a unit `direction` and an origin_of(ray). Who asks for the boxes themselves tests what is proposed
+/// with crosses(box, ...).
 
 #include <gart/bvh/bvh.hpp>
 #include <gart/bvh/cross.hpp>
@@ -19,10 +20,10 @@ GART_HD GART_INLINE int lowest_bit(u32 bits) {
 #endif
 }
 
-// A distance to sort by: its last 3 bits make room for a child's number.
+/// A distance to sort by: its last 3 bits make room for a child's number.
 GART_HD GART_INLINE u32 distance_key(float entry) { return float_to_bits(larger(entry, 0.0f)) & ~7u; }
 
-// The children in `wanted` by distance, nearest in the lowest bits: 4 bits each, 8 + c, so that 0 is none left.
+/// The children in `wanted` by distance, nearest in the lowest bits: 4 bits each, 8 + c, so that 0 is none left.
 GART_HD GART_INLINE u32 near_to_far(u32 wanted, float const (&entry)[bvh_width]) {
   u32 order = 0;
   if (wanted == 0) return order;

@@ -1,32 +1,33 @@
 #pragma once
-// The camera seam: what gart asks of a camera model. A model is a small struct of parameters, one header, and
-// everything else follows from its members: tracers, tile lists, footprints, the backward passes and antialiasing know
-// no model by name. camera/models.hpp goes from the run-time camera (scene/camera.hpp) to its model.
-//
-// A model derives from camera_base and has, F being float or, on hosts, lanes:
-//   template <class F> primary_ray_of<F> ray(F u, F v) const
-//     The ray through the image point (u, v), in pixels; its unit direction is in world axes and decides hits, so its
-//     arithmetic is fixed (math/arith.hpp), the same bits for a lane as for one point. A model without arithmetic for
-//     lanes calls each_lane. A camera whose rays do not share one point returns `ray` for a float, whose origin is
-//     relative to `position`: tracers trace such rays; what composites and differentiates takes cameras with one
-//     centre.
-//   bounds(float near) const
-//     Host side: a trivially copyable footprint operator()(ellipsoid const&) const for kernels, the box of all pixels
-//     whose rays can hit the ellipsoid at t > near, and a lower bound of the depths of these hits. Conservative for
-//     rays in float: math/footprint.hpp says by how much to widen.
-//   ray_depth depth() const
-//     What those depths are measured along (camera/ray_depth.hpp). camera_base has the distance along the ray.
-//   filter(float pixels) const
-//     Host side: how far so many pixels reach, pixels x the root of a pixel's solid angle x distance, at a point
-//     relative to `position`: trivially copyable, float sigma_at(vec3), filter_at at(vec3) with its change, vec3
-//     from_camera(gaussian_parameters). Beside the image it goes on as at the image's nearest border.
-//   camera_fault fault() const
-//     What no ray can be cast by.
-//   bool one_to_one() const
-//     Host side: whether no two pixels see one direction, and each sees one. Footprints need it. camera_base has true.
-//
-// Which pixels of a tile come how near an ellipsoid needs no member: tiles/tile_planes.hpp has it from the rays.
-// Kernels cast a pinhole's rays themselves; those of other models are cast once a view (camera/pixel_rays.hpp).
+/// \file
+/// The camera seam: what gart asks of a camera model. A model is a small struct of parameters, one header, and
+/// everything else follows from its members: tracers, tile lists, footprints, the backward passes and antialiasing know
+/// no model by name. camera/models.hpp goes from the run-time camera (scene/camera.hpp) to its model.
+///
+/// A model derives from camera_base and has, F being float or, on hosts, lanes:
+///   template <class F> primary_ray_of<F> ray(F u, F v) const
+///     The ray through the image point (u, v), in pixels; its unit direction is in world axes and decides hits, so its
+///     arithmetic is fixed (math/arith.hpp), the same bits for a lane as for one point. A model without arithmetic for
+///     lanes calls each_lane. A camera whose rays do not share one point returns `ray` for a float, whose origin is
+///     relative to `position`: tracers trace such rays; what composites and differentiates takes cameras with one
+///     centre.
+///   bounds(float near) const
+///     Host side: a trivially copyable footprint operator()(ellipsoid const&) const for kernels, the box of all pixels
+///     whose rays can hit the ellipsoid at t > near, and a lower bound of the depths of these hits. Conservative for
+///     rays in float: math/footprint.hpp says by how much to widen.
+///   ray_depth depth() const
+///     What those depths are measured along (camera/ray_depth.hpp). camera_base has the distance along the ray.
+///   filter(float pixels) const
+///     Host side: how far so many pixels reach, pixels x the root of a pixel's solid angle x distance, at a point
+///     relative to `position`: trivially copyable, float sigma_at(vec3), filter_at at(vec3) with its change, vec3
+///     from_camera(gaussian_parameters). Beside the image it goes on as at the image's nearest border.
+///   camera_fault fault() const
+///     What no ray can be cast by.
+///   bool one_to_one() const
+///     Host side: whether no two pixels see one direction, and each sees one. Footprints need it. camera_base has true.
+///
+/// Which pixels of a tile come how near an ellipsoid needs no member: tiles/tile_planes.hpp has it from the rays.
+/// Kernels cast a pinhole's rays themselves; those of other models are cast once a view (camera/pixel_rays.hpp).
 
 #include <gart/camera/ray_depth.hpp>
 #include <gart/core/error.hpp>
@@ -42,10 +43,10 @@
 
 namespace gart::inline GART_ISA {
 
-// What all models have.
+/// What all models have.
 struct camera_base {
   int width = 0, height = 0;
-  vec3d position{0.0};  // the frame's origin: all else is relative to it
+  vec3d position{0.0};  ///< the frame's origin: all else is relative to it
 
   GART_HD ray_depth depth() const { return {}; }
   bool one_to_one() const { return true; }
@@ -86,7 +87,7 @@ concept camera_model = std::derived_from<M, camera_base> && std::is_trivially_co
   { m.one_to_one() } -> std::same_as<bool>;
 };
 
-// All rays begin at `position`.
+/// All rays begin at `position`.
 template <class M>
 concept central_camera = camera_model<M> && requires(M const& m, float value) {
   { m.ray(value, value) } -> std::same_as<primary_ray>;
@@ -95,7 +96,7 @@ concept central_camera = camera_model<M> && requires(M const& m, float value) {
 #endif
 };
 
-// A model is its own: what takes a view takes a camera or a model.
+/// A model is its own: what takes a view takes a camera or a model.
 template <camera_model M, class F>
 decltype(auto) visit_camera(M const& model, F&& f) {
   return f(model);
@@ -115,7 +116,7 @@ void require_camera(M const& model) {
   refuse_camera(model.fault());
 }
 
-// Faults that every model may have.
+/// Faults that every model may have.
 inline camera_fault size_fault(camera_base const& c) {
   if (c.width < 1 || c.height < 1) return {"the image size is not positive", "correct the width and height"};
   // Boxes count pixels in 16 bits, launches in 32, padded to blocks of 8 x 4.
@@ -138,14 +139,14 @@ inline void require_near(float near) {
   if (!(near > 0 && is_finite(near))) throw invalid_argument("footprints: near must be positive and finite");
 }
 
-// A direction of any length, made a unit. It decides hits, so its arithmetic is fixed.
+/// A direction of any length, made a unit. It decides hits, so its arithmetic is fixed.
 template <class F>
 GART_HD GART_INLINE primary_ray_of<F> unit_ray(vec3_of<F> const& d) {
   F const inverse = divide(F(1.0f), square_root(fma(d.x, d.x, fma(d.y, d.y, mul(d.z, d.z)))));
   return {{mul(d.x, inverse), mul(d.y, inverse), mul(d.z, inverse)}};
 }
 
-// The ray of each lane, by a function of one image point to a direction.
+/// The ray of each lane, by a function of one image point to a direction.
 template <class F, class One>
 GART_HD GART_INLINE primary_ray_of<F> each_lane(F u, F v, One const& one) {
 #if !defined(__CUDACC__)

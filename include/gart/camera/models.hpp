@@ -1,8 +1,9 @@
 #pragma once
-// The models there are, and the one place that goes from a run-time camera to its model: visit_camera(view, f) calls f
-// with the model. A view that is a model already is taken as it is (camera/model.hpp).
-//
-// Errors: require_camera throws invalid_argument for what no ray can be cast by; everything that renders calls it.
+/// \file
+/// The models there are, and the one place that goes from a run-time camera to its model: visit_camera(view, f) calls f
+/// with the model. A view that is a model already is taken as it is (camera/model.hpp).
+///
+/// Errors: require_camera throws invalid_argument for what no ray can be cast by; everything that renders calls it.
 
 #include <gart/camera/opencv.hpp>
 #include <gart/camera/pinhole.hpp>
@@ -24,7 +25,7 @@ inline camera_fault fault_of(camera const& c) {
 
 inline void require_camera(camera const& c) { refuse_camera(fault_of(c)); }
 
-// Unit direction, in the world, of the ray through an image point. Host side.
+/// Unit direction, in the world, of the ray through an image point. Host side.
 inline vec3 ray_direction(camera const& c, float u, float v) {
   return visit_camera(c, [&](auto const& model) -> vec3 { return model.ray(u, v).direction; });
 }

@@ -1,12 +1,13 @@
 #pragma once
-// A pinhole with radial-tangential distortion (COLMAP's SIMPLE_RADIAL, RADIAL and OPENCV): u = fx x_d + cx with, for
-// the undistorted (x, y) = (X/Z, Y/Z) and r2 = x*x + y*y,
-//   x_d = x (1 + k1 r2 + k2 r2^2) + 2 p1 x y + p2 (r2 + 2 x x),  y_d likewise with p1 and p2 exchanged;
-// a ray inverts it by Newton's method (camera/undistort.hpp).
-//
-// The rectangle of slopes that bounds an ellipsoid is mapped to the image edge by edge: the map is one to one where the
-// image is, so the image of the rectangle lies within the image of its border, which is sampled and widened by what a
-// curved edge can bulge between samples.
+/// \file
+/// A pinhole with radial-tangential distortion (COLMAP's SIMPLE_RADIAL, RADIAL and OPENCV): u = fx x_d + cx with, for
+/// the undistorted (x, y) = (X/Z, Y/Z) and r2 = x*x + y*y,
+///   x_d = x (1 + k1 r2 + k2 r2^2) + 2 p1 x y + p2 (r2 + 2 x x),  y_d likewise with p1 and p2 exchanged;
+/// a ray inverts it by Newton's method (camera/undistort.hpp).
+///
+/// The rectangle of slopes that bounds an ellipsoid is mapped to the image edge by edge: the map is one to one where
+/// the image is, so the image of the rectangle lies within the image of its border, which is sampled and widened by
+/// what a curved edge can bulge between samples.
 
 #include <gart/camera/pinhole.hpp>
 #include <gart/camera/undistort.hpp>
@@ -17,7 +18,7 @@ namespace gart::inline GART_ISA {
 
 class opencv_bounds {
  public:
-  // Host side: the bounds of what the image sees, in slopes, by sampling its border.
+  /// Host side: the bounds of what the image sees, in slopes, by sampling its border.
   opencv_bounds(pinhole const& c, distortion const& lens, seen_slopes const& seen, float near)
       : lens_(lens), near_(near) {
     // The border between samples may bulge a little further.
@@ -74,7 +75,7 @@ class opencv_bounds {
   footprint_view view_;
 };
 
-// What antialiasing asks of the lens.
+/// What antialiasing asks of the lens.
 struct opencv_lens {
   distortion lens;
 
@@ -100,7 +101,7 @@ struct opencv_lens {
 };
 
 struct opencv : camera_base {
-  pinhole flat;  // without the lens
+  pinhole flat;  ///< without the lens
   distortion lens;
 
   opencv() = default;
@@ -126,7 +127,7 @@ struct opencv : camera_base {
     return flat.fault();
   }
 
-  // Whether undistort() and the lens agree over the whole image, and neighbours stay neighbours.
+  /// Whether undistort() and the lens agree over the whole image, and neighbours stay neighbours.
   bool one_to_one() const {
     constexpr int steps = 32;
     std::vector<vec2> slope;

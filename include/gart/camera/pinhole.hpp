@@ -1,6 +1,7 @@
 #pragma once
-// The pinhole: u = fx x / z + cx, v = fy y / z + cy (COLMAP's SIMPLE_PINHOLE and PINHOLE). The one model whose rays
-// kernels cast themselves, and whose tile lists are sorted by z.
+/// \file
+/// The pinhole: u = fx x / z + cx, v = fy y / z + cy (COLMAP's SIMPLE_PINHOLE and PINHOLE). The one model whose rays
+/// kernels cast themselves, and whose tile lists are sorted by z.
 
 #include <gart/camera/model.hpp>
 #include <gart/camera/seen_slopes.hpp>
@@ -19,7 +20,7 @@ struct pinhole_bounds {
   }
 };
 
-// The direction, in world axes, of slopes x / z and y / z. It decides hits, so its arithmetic is fixed.
+/// The direction, in world axes, of slopes x / z and y / z. It decides hits, so its arithmetic is fixed.
 template <class F>
 GART_HD GART_INLINE primary_ray_of<F> ray_of_slopes(mat3 const& rotation, F x, F y) {
   vec3_of<F> d;
@@ -57,7 +58,7 @@ struct pinhole : camera_base {
     return pose_fault(position, rotation);
   }
 
-  // least_z: of a hit.
+  /// least_z: of a hit.
   footprint_view view_of(double least_z) const {
     mat3d world_to_camera(1.0);
     for (int i = 0; i < 3; ++i)

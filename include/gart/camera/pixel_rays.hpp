@@ -1,7 +1,8 @@
 #pragma once
-// The rays of a view's pixels, as kernels take them, whatever the camera. Kernels cast a pinhole's themselves; those of
-// any other model with one centre are cast once a view into a table of directions, 12 bytes a pixel, and read. So a
-// kernel knows one model, and a lens that is dear to invert is inverted once a pixel.
+/// \file
+/// The rays of a view's pixels, as kernels take them, whatever the camera. Kernels cast a pinhole's themselves; those
+/// of any other model with one centre are cast once a view into a table of directions, 12 bytes a pixel, and read. So a
+/// kernel knows one model, and a lens that is dear to invert is inverted once a pixel.
 
 #include <gart/camera/models.hpp>
 #include <gart/exec/buffer.hpp>
@@ -9,12 +10,12 @@
 
 namespace gart::inline GART_ISA {
 
-// Trivially copyable: kernels hold one by value.
+/// Trivially copyable: kernels hold one by value.
 struct pixel_rays {
-  pinhole view;                      // of another model: its size and position
-  vec3 const* directions = nullptr;  // [H][W], of a model that is no pinhole
+  pinhole view;                      ///< of another model: its size and position
+  vec3 const* directions = nullptr;  ///< [H][W], of a model that is no pinhole
 
-  // Through the middle of a pixel of the image.
+  /// Through the middle of a pixel of the image.
   GART_HD GART_INLINE primary_ray of(int x, int y) const {
     if (directions) return {directions[static_cast<std::size_t>(y) * view.width + x]};
     return view.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
@@ -57,13 +58,13 @@ class camera_rays {
  public:
   explicit camera_rays(E& exec) : directions_(exec) {}
 
-  // View: a camera or a camera model.
+  /// View: a camera or a camera model.
   template <class View>
   void cast(E& exec, View const& view) {
     visit_camera(view, [&](auto const& model) { cast_model(exec, model); });
   }
 
-  // Until the next cast. Of a model without one centre there are none.
+  /// Until the next cast. Of a model without one centre there are none.
   pixel_rays view() const { return rays_; }
 
  private:

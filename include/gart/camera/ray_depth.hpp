@@ -1,8 +1,9 @@
 #pragma once
-// How near a hit lies, as tile lists are sorted by it: distance times what a ray's direction says,
-//   depth = t (direction . axis + offset).
-// The default is the distance itself, an order for rays of any directions; a pinhole's is z, which its bounds are
-// tighter in.
+/// \file
+/// How near a hit lies, as tile lists are sorted by it: distance times what a ray's direction says,
+///   depth = t (direction . axis + offset).
+/// The default is the distance itself, an order for rays of any directions; a pinhole's is z, which its bounds are
+/// tighter in.
 
 #include <gart/core/macros.hpp>
 #include <gart/math/glm.hpp>
@@ -13,7 +14,8 @@ struct ray_depth {
   vec3 axis{0.0f};
   float offset = 1;
 
-  // Depth over distance, of one ray or of one a lane; rounded up, so that what is said to lie nearer than a depth does.
+  /// Depth over distance, of one ray or of one a lane; rounded up, so that what is said to lie nearer than a depth
+  /// does.
   template <class F>
   GART_HD GART_INLINE F per_distance(vec3_of<F> const& d) const {
     return (d.x * F(axis.x) + d.y * F(axis.y) + d.z * F(axis.z) + F(offset)) * F(1.000002f);

@@ -1,6 +1,7 @@
 #pragma once
-// What a camera's image sees, in slopes x / z and y / z: the rectangle about it, by sampling the image's border. For
-// models that project slopes to the image. Host side, in double.
+/// \file
+/// What a camera's image sees, in slopes x / z and y / z: the rectangle about it, by sampling the image's border. For
+/// models that project slopes to the image. Host side, in double.
 
 #include <gart/core/isa.hpp>
 #include <gart/math/glm.hpp>
@@ -11,11 +12,11 @@ namespace gart::inline GART_ISA {
 
 struct seen_slopes {
   double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
-  double least_cosine = 1;  // of a border pixel's ray with the camera's axis
+  double least_cosine = 1;  ///< of a border pixel's ray with the camera's axis
 };
 
-// View: size, focal lengths and principal point. slopes_of: from an image point, in units of the focal length about the
-// principal point.
+/// View: size, focal lengths and principal point. slopes_of: from an image point, in units of the focal length about
+/// the principal point.
 template <class View, class F>
 seen_slopes slopes_seen(View const& c, F const& slopes_of) {
   seen_slopes out;

@@ -1,11 +1,12 @@
 #pragma once
-// The filter of the pixels of a camera that projects slopes (render_options.antialias): a Gaussian whose standard
-// deviation at a point is so many pixels, as far as a pixel reaches there,
-//   r = pixels x angle of a pixel x distance,   angle = the square root of a pixel's solid angle,
-// which for slopes x, y through a lens of Jacobian J (1 without one) is
-//   angle^2 = (1 + x^2 + y^2)^-3/2 / (fx fy det J).
-// Means beside the image, and behind the camera, take the slopes of the image's nearest border. What widens a Gaussian
-// by r is math/widened.hpp. Fixed arithmetic where r is made: the same bits on every policy.
+/// \file
+/// The filter of the pixels of a camera that projects slopes (render_options.antialias): a Gaussian whose standard
+/// deviation at a point is so many pixels, as far as a pixel reaches there,
+///   r = pixels x angle of a pixel x distance,   angle = the square root of a pixel's solid angle,
+/// which for slopes x, y through a lens of Jacobian J (1 without one) is
+///   angle^2 = (1 + x^2 + y^2)^-3/2 / (fx fy det J).
+/// Means beside the image, and behind the camera, take the slopes of the image's nearest border. What widens a Gaussian
+/// by r is math/widened.hpp. Fixed arithmetic where r is made: the same bits on every policy.
 
 #include <gart/camera/seen_slopes.hpp>
 #include <gart/math/widened.hpp>
@@ -14,12 +15,12 @@
 
 namespace gart::inline GART_ISA {
 
-// Of the image by the slopes, symmetric.
+/// Of the image by the slopes, symmetric.
 struct lens_jacobian {
   float xx = 1, xy = 0, yy = 1, det = 1;
 };
 
-// Lens: jacobian_at(x, y), and how its determinant changes there.
+/// Lens: jacobian_at(x, y), and how its determinant changes there.
 struct no_lens {
   GART_HD GART_INLINE lens_jacobian jacobian_at(float, float) const { return {}; }
   GART_HD GART_INLINE vec2 slope_of_det(lens_jacobian const&, float, float) const { return {0, 0}; }
@@ -28,7 +29,7 @@ struct no_lens {
 template <class Lens = no_lens>
 class slope_filter {
  public:
-  // Host side. View: position, rotation, focal lengths.
+  /// Host side. View: position, rotation, focal lengths.
   template <class View>
   slope_filter(View const& c, Lens const& lens, seen_slopes const& s, float pixels)
       : position_(c.position),
@@ -44,7 +45,7 @@ class slope_filter {
 
   GART_HD GART_INLINE vec3 from_camera(gaussian_parameters const& g) const { return relative_mean(g.mean, position_); }
 
-  // At a mean relative to the camera.
+  /// At a mean relative to the camera.
   GART_HD GART_INLINE float sigma_at(vec3 const& m) const { return evaluate(m).sigma; }
 
   GART_HD GART_INLINE filter_at at(vec3 const& m) const {
@@ -104,7 +105,7 @@ class slope_filter {
   float x0_ = 0, x1_ = 0, y0_ = 0, y1_ = 0;
 };
 
-// As the pixels of a camera see it. Filter: a camera model's.
+/// As the pixels of a camera see it. Filter: a camera model's.
 template <class Filter>
 GART_HD GART_INLINE gaussian_parameters filtered(gaussian_parameters const& g, Filter const& filter) {
   vec3 const mean = filter.from_camera(g);

@@ -1,5 +1,6 @@
 #pragma once
-// The radial-tangential lens (camera/opencv.hpp), there and back.
+/// \file
+/// The radial-tangential lens (camera/opencv.hpp), there and back.
 
 #include <gart/math/arith.hpp>
 #include <gart/math/lanes.hpp>
@@ -7,15 +8,15 @@
 
 namespace gart::inline GART_ISA {
 
-// The image point, in units of the focal length about the principal point, of the slopes x = X/Z and y = Y/Z.
+/// The image point, in units of the focal length about the principal point, of the slopes x = X/Z and y = Y/Z.
 GART_HD inline void distort(distortion const& lens, double x, double y, double& u, double& v) {
   double const r2 = x * x + y * y, radial = 1 + r2 * (lens.k1 + r2 * lens.k2);
   u = x * radial + 2 * lens.p1 * x * y + lens.p2 * (r2 + 2 * x * x);
   v = y * radial + 2 * lens.p2 * x * y + lens.p1 * (r2 + 2 * y * y);
 }
 
-// Newton's method on the distortion; exact to float after a few steps for lenses that are invertible at the point. F:
-// of one point, or of one a lane.
+/// Newton's method on the distortion; exact to float after a few steps for lenses that are invertible at the point. F:
+/// of one point, or of one a lane.
 template <class F>
 GART_HD GART_INLINE void undistort(distortion const& lens, F u, F v, F& x, F& y) {
   F const k1 = lens.k1, k2 = lens.k2, lens_p1 = lens.p1, lens_p2 = lens.p2;

@@ -1,8 +1,9 @@
 #pragma once
-// The errors gart throws. Each message says what was wrong, where, and what to do about it; the types let a program
-// react without reading the text. A setting is named by its field, `struct.field`, with ` = value` after it where the
-// remedy is a value: "raise dataset_options.downscale", "use configuration_request.backend = openmp". A program whose
-// settings have other names replaces these in what it shows (program/field_names.hpp).
+/// \file
+/// The errors gart throws. Each message says what was wrong, where, and what to do about it; the types let a program
+/// react without reading the text. A setting is named by its field, `struct.field`, with ` = value` after it where the
+/// remedy is a value: "raise dataset_options.downscale", "use configuration_request.backend = openmp". A program whose
+/// settings have other names replaces these in what it shows (program/field_names.hpp).
 
 #include <cstddef>
 #include <stdexcept>
@@ -15,26 +16,26 @@ struct error : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// A file that cannot be read or written as asked. `where` is the path, with the field or line where one is known.
+/// A file that cannot be read or written as asked. `where` is the path, with the field or line where one is known.
 struct io_error : error {
   io_error(std::string where, std::string const& what, std::string const& remedy = {})
       : error(where + ": " + what + (remedy.empty() ? "" : " (" + remedy + ")")), place(std::move(where)) {}
   std::string place;
 };
 
-// A request that this build or this machine cannot serve: a camera model, a backend, a configuration that is not
-// instantiated.
+/// A request that this build or this machine cannot serve: a camera model, a backend, a configuration that is not
+/// instantiated.
 struct unsupported : error {
   using error::error;
 };
 
-// An option or argument out of its range.
+/// An option or argument out of its range.
 struct invalid_argument : error {
   using error::error;
 };
 
-// Memory that could not be had. `advice` names the fields that lower the need. 0 free bytes: not a matter of what is
-// free.
+/// Memory that could not be had. `advice` names the fields that lower the need. 0 free bytes: not a matter of what is
+/// free.
 struct out_of_memory : error {
   out_of_memory(std::string const& where, std::size_t asked_bytes, std::size_t free_bytes, std::string const& advice)
       : error("out of " + where + " memory: asked for " + std::to_string(asked_bytes) + " bytes" +
@@ -44,7 +45,7 @@ struct out_of_memory : error {
   std::size_t asked, available;
 };
 
-// A number of a training that is not finite any more (optim/finite.hpp). `group` as the message names it.
+/// A number of a training that is not finite any more (optim/finite.hpp). `group` as the message names it.
 struct not_finite : error {
   not_finite(std::string const& what, std::string group_name, std::size_t first)
       : error(what), group(std::move(group_name)), gaussian(first) {}

@@ -1,16 +1,17 @@
 #pragma once
-// GART_ISA: the inline namespace of everything whose layout, bits or code follow from the instruction set that a host
-// translation unit is compiled for. The number of lanes (math/lanes.hpp) and whether a*b + c is one rounding
-// (math/arith.hpp) follow from -march; nvcc's host compiler has no lanes. Objects of one program may differ in these,
-// and an inline function, a template or a type of one name is shared among them: all would run it, or lay it out, as
-// one of them has it. With the instruction set in the name there are as many as are needed.
-//
-//   namespace gart::inline GART_ISA {   // formulas, kernels, host policies, tracers, trainers
-//   namespace gart {                    // what the compiled libraries define and take, and link by
-//
-// In the second lie sessions, renderers, data sets, cameras, models, options, errors, files and cuda_exec
-// (cmake/interface.txt has the headers): their layout is the same everywhere, and an inline function there that needs
-// fma or lanes is forced inline. tests/package links objects and libraries of different instruction sets.
+/// \file
+/// GART_ISA: the inline namespace of everything whose layout, bits or code follow from the instruction set that a host
+/// translation unit is compiled for. The number of lanes (math/lanes.hpp) and whether a*b + c is one rounding
+/// (math/arith.hpp) follow from -march; nvcc's host compiler has no lanes. Objects of one program may differ in these,
+/// and an inline function, a template or a type of one name is shared among them: all would run it, or lay it out, as
+/// one of them has it. With the instruction set in the name there are as many as are needed.
+///
+///   namespace gart::inline GART_ISA {   // formulas, kernels, host policies, tracers, trainers
+///   namespace gart {                    // what the compiled libraries define and take, and link by
+///
+/// In the second lie sessions, renderers, data sets, cameras, models, options, errors, files and cuda_exec
+/// (cmake/interface.txt has the headers): their layout is the same everywhere, and an inline function there that needs
+/// fma or lanes is forced inline. tests/package links objects and libraries of different instruction sets.
 
 #if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512VL__) && defined(__FMA__) && defined(__BMI2__)
 #define GART_LANES_AVX512 1
@@ -41,7 +42,7 @@
 
 namespace gart::inline GART_ISA {
 
-inline constexpr char const* instruction_set = GART_TEXT(GART_ISA) + sizeof "isa";  // "avx2_fma"
+inline constexpr char const* instruction_set = GART_TEXT(GART_ISA) + sizeof "isa";  ///< "avx2_fma"
 
 }  // namespace gart::inline GART_ISA
 

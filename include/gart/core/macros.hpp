@@ -1,7 +1,8 @@
 #pragma once
-// Annotations that let one body compile for the host and for a CUDA device.
-// GART_HD marks a function both may call; GART_INLINE forces inlining, so that what decides a hit is compiled into
-// every kernel from one source.
+/// \file
+/// Annotations that let one body compile for the host and for a CUDA device.
+/// GART_HD marks a function both may call; GART_INLINE forces inlining, so that what decides a hit is compiled into
+/// every kernel from one source.
 
 #include <gart/core/isa.hpp>
 

@@ -1,9 +1,10 @@
 #pragma once
-// Enumerations that have names: what a program's options, its files and the library's messages all call a value.
-// An enumeration gets them by a function beside it, in the order in which a user reads them:
-//   enum class fruit { apple, pear };
-//   constexpr auto names_of(fruit) { return std::array<name_of<fruit>, 2>{{{fruit::apple, "apple"}, ...}}; }
-// Errors: from_string throws invalid_argument with the names there are.
+/// \file
+/// Enumerations that have names: what a program's options, its files and the library's messages all call a value.
+/// An enumeration gets them by a function beside it, in the order in which a user reads them:
+///   enum class fruit { apple, pear };
+///   constexpr auto names_of(fruit) { return std::array<name_of<fruit>, 2>{{{fruit::apple, "apple"}, ...}}; }
+/// Errors: from_string throws invalid_argument with the names there are.
 
 #include <gart/core/error.hpp>
 
@@ -32,7 +33,7 @@ constexpr char const* to_string(E value) {
   return "?";
 }
 
-// The value of a name; `otherwise` where no value has it.
+/// The value of a name; `otherwise` where no value has it.
 template <named E>
 constexpr E from_string(std::string_view name, E otherwise) {
   for (auto const& one : names_of(E{}))

@@ -1,5 +1,6 @@
 #pragma once
-// A pointer and a length that device code may hold: what kernels receive of a buffer.
+/// \file
+/// A pointer and a length that device code may hold: what kernels receive of a buffer.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>

@@ -1,6 +1,7 @@
 #pragma once
-// The integer types of every index and count. Rays, Gaussians and tiles count in 32 bits; anything that is a product of
-// two of them (pairs, LT slots, bytes) counts in 64.
+/// \file
+/// The integer types of every index and count. Rays, Gaussians and tiles count in 32 bits; anything that is a product
+/// of two of them (pairs, LT slots, bytes) counts in 64.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +14,7 @@ using u32 = std::uint32_t;
 using u64 = std::uint64_t;
 using index_t = std::uint32_t;
 
-// 16 bytes, moved as one: what wide loads and stores are made of.
+/// 16 bytes, moved as one: what wide loads and stores are made of.
 struct alignas(16) quad {
   float v[4];
 };

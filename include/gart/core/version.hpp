@@ -1,10 +1,12 @@
 #pragma once
-// The library's version; CMakeLists.txt reads it from here.
+/// \file
+/// The library's version; CMakeLists.txt reads it from here.
 
 #define GART_VERSION_MAJOR 0
 #define GART_VERSION_MINOR 1
 #define GART_VERSION_PATCH 0
 
+/// Training and rendering of ray-traced 3D Gaussians; what lies in `detail` is not for users.
 namespace gart {
 
 inline constexpr char version[] = "0.1.0";

@@ -1,9 +1,10 @@
 #pragma once
-// Memory of a policy, owned: move-only, growing only, with slack, so that a size that changes a little every step does
-// not allocate. Its policy must outlive it.
-//
-// A buffer converts to span<T> and span<T const>; where a function deduces T from a span, pass view().
-// Errors: out_of_memory from the policy; the buffer is then empty.
+/// \file
+/// Memory of a policy, owned: move-only, growing only, with slack, so that a size that changes a little every step does
+/// not allocate. Its policy must outlive it.
+///
+/// A buffer converts to span<T> and span<T const>; where a function deduces T from a span, pass view().
+/// Errors: out_of_memory from the policy; the buffer is then empty.
 
 #include <gart/core/span.hpp>
 #include <gart/exec/concepts.hpp>
@@ -40,8 +41,8 @@ class buffer {
   operator span<T const>() const { return {data_, size_}; }
   E& exec() const { return *exec_; }
 
-  // Contents are undefined after a growth. The first allocation is exact, because most sizes never change; growth has
-  // slack.
+  /// Contents are undefined after a growth. The first allocation is exact, because most sizes never change; growth has
+  /// slack.
   void resize(std::size_t n) {
     if (n > capacity_) {
       std::size_t const wanted = capacity_ ? static_cast<std::size_t>(static_cast<double>(n) * slack) : n;
@@ -51,7 +52,7 @@ class buffer {
     }
     size_ = n;
   }
-  // Keeps what there is; the rest is undefined.
+  /// Keeps what there is; the rest is undefined.
   void resize_keep(std::size_t n) {
     if (n > capacity_) {
       buffer grown(*exec_);
@@ -72,7 +73,7 @@ class buffer {
     if (size_) exec_->copy_out(out.data(), data_, size_ * sizeof(T));
     return out;
   }
-  // The first element; the buffer must not be empty.
+  /// The first element; the buffer must not be empty.
   T front() const {
     T value;
     exec_->copy_out(&value, data_, sizeof(T));

@@ -1,35 +1,36 @@
 #pragma once
-// The execution policy: a queue on which kernels run, and the memory they run in.
-//
-// A policy is the first argument of everything that computes. It offers
-//   static constexpr char const* name;   "serial", "openmp", "cuda"
-//   static constexpr bool device;        memory is not the host's
-//   static constexpr kernel_form form;   which form it runs of a kernel that has several
-//   void* allocate(bytes); void deallocate(void*, bytes);      stream-ordered; throws out_of_memory
-//   void copy_in(dst, host_src, bytes); void copy_out(host_dst, src, bytes);
-//   void copy(dst, src, bytes); void zero(p, bytes);
-//   void fill(p, byte, bytes);                                 every byte set to one value
-//   void synchronize();
-//   void begin_stage(label); void end_stage();                 brackets of a timed stage, nested (see stage.hpp)
-//   template <class T> static T atomic_add(T*, T);             in kernels: returns the old value
-//   template <int N> static void atomic_add_row(float* row, float const (&values)[N], int n);
-//       in kernels: row[0..n) += values as one row; values past n are zero; a row of a multiple of 4 floats is aligned
-//       to 16 bytes, and no other function adds to it in the same launch
-//   static void fence();                   in kernels: what was written before is seen by who sees what comes after
-//   profiler profile; memory_use memory;
-//   std::size_t free_bytes();              memory that can still be had; 0: not known
-// A policy whose memory is the host's (host_execution) also offers what algorithms and kernels of hosts ask for:
-//   void* workspace(bytes);                a block lent to the algorithm that runs; the next call lends it again
-//   int threads();                         how many an algorithm may split an array over
-//   template <class F> static void exclusively(void const* what, F f);
-//       in kernels: calls f while no other thread is in a call for the same `what`; in f there is no call of it
-// and one of a device (device_execution)
-//   int multiprocessors();                 by which kernels that stay on the device are launched
-// copy_out waits for the data; all else is ordered on the queue. The source of copy_in may be reused on return.
-// end_stage never throws, because it runs in a destructor.
-//
-// Kernels are named, trivially copyable functors: void operator()(index_t) for an index kernel; a tile kernel names
-// `using scratch = struct {...}` and takes a team (see parallel.hpp). Their bodies are GART_KERNEL (core/macros.hpp).
+/// \file
+/// The execution policy: a queue on which kernels run, and the memory they run in.
+///
+/// A policy is the first argument of everything that computes. It offers
+///   static constexpr char const* name;   "serial", "openmp", "cuda"
+///   static constexpr bool device;        memory is not the host's
+///   static constexpr kernel_form form;   which form it runs of a kernel that has several
+///   void* allocate(bytes); void deallocate(void*, bytes);      stream-ordered; throws out_of_memory
+///   void copy_in(dst, host_src, bytes); void copy_out(host_dst, src, bytes);
+///   void copy(dst, src, bytes); void zero(p, bytes);
+///   void fill(p, byte, bytes);                                 every byte set to one value
+///   void synchronize();
+///   void begin_stage(label); void end_stage();                 brackets of a timed stage, nested (see stage.hpp)
+///   template <class T> static T atomic_add(T*, T);             in kernels: returns the old value
+///   template <int N> static void atomic_add_row(float* row, float const (&values)[N], int n);
+///       in kernels: row[0..n) += values as one row; values past n are zero; a row of a multiple of 4 floats is aligned
+///       to 16 bytes, and no other function adds to it in the same launch
+///   static void fence();                   in kernels: what was written before is seen by who sees what comes after
+///   profiler profile; memory_use memory;
+///   std::size_t free_bytes();              memory that can still be had; 0: not known
+/// A policy whose memory is the host's (host_execution) also offers what algorithms and kernels of hosts ask for:
+///   void* workspace(bytes);                a block lent to the algorithm that runs; the next call lends it again
+///   int threads();                         how many an algorithm may split an array over
+///   template <class F> static void exclusively(void const* what, F f);
+///       in kernels: calls f while no other thread is in a call for the same `what`; in f there is no call of it
+/// and one of a device (device_execution)
+///   int multiprocessors();                 by which kernels that stay on the device are launched
+/// copy_out waits for the data; all else is ordered on the queue. The source of copy_in may be reused on return.
+/// end_stage never throws, because it runs in a destructor.
+///
+/// Kernels are named, trivially copyable functors: void operator()(index_t) for an index kernel; a tile kernel names
+/// `using scratch = struct {...}` and takes a team (see parallel.hpp). Their bodies are GART_KERNEL (core/macros.hpp).
 
 #include <gart/core/types.hpp>
 #include <gart/exec/profile.hpp>
@@ -39,8 +40,8 @@
 
 namespace gart {
 
-// The forms of a kernel that has several: the plain one, right everywhere, a lane after another; lanes as the numbers
-// of a host's vector registers (math/lanes.hpp); lanes of a warp, which step together and share its matrix units.
+/// The forms of a kernel that has several: the plain one, right everywhere, a lane after another; lanes as the numbers
+/// of a host's vector registers (math/lanes.hpp); lanes of a warp, which step together and share its matrix units.
 enum class kernel_form { plain, packet, warp };
 
 template <class E>
@@ -91,8 +92,8 @@ concept index_kernel = std::is_trivially_copyable_v<K> && !tile_kernel<K> && req
   k(i);
 };
 
-// `tiles` teams; each has at most `lanes` lanes on a device (a hint, a multiple of 32; see cuda_launch.cuh for the most
-// that a kernel accepts) and one on a host.
+/// `tiles` teams; each has at most `lanes` lanes on a device (a hint, a multiple of 32; see cuda_launch.cuh for the
+/// most that a kernel accepts) and one on a host.
 struct tile_range {
   index_t tiles = 0;
   index_t lanes = 64;

@@ -1,14 +1,15 @@
 #pragma once
-// One CUDA stream of one device. This header is safe without nvcc: memory and queue are compiled into gart::cuda;
-// kernel launches are templates in cuda_launch.cuh and need nvcc.
-//
-// Memory comes from a pool of the policy's own that keeps what is freed, so that allocation after the first steps is a
-// list operation on the host and never waits for the device. copy_in goes through a ring of pinned blocks: it does not
-// wait for the kernels before it, and its source may be reused on return, pageable or pinned.
-//
-// Errors: unsupported where no device or driver is found; out_of_memory with the bytes asked and free; gart::error for
-// any failed launch, with the label of the launch. A kernel that fails while it runs is noticed by a later call, which
-// cannot know its label: with GART_CUDA_SYNC=1 in the environment every launch is waited for and the label is exact.
+/// \file
+/// One CUDA stream of one device. This header is safe without nvcc: memory and queue are compiled into gart::cuda;
+/// kernel launches are templates in cuda_launch.cuh and need nvcc.
+///
+/// Memory comes from a pool of the policy's own that keeps what is freed, so that allocation after the first steps is a
+/// list operation on the host and never waits for the device. copy_in goes through a ring of pinned blocks: it does not
+/// wait for the kernels before it, and its source may be reused on return, pageable or pinned.
+///
+/// Errors: unsupported where no device or driver is found; out_of_memory with the bytes asked and free; gart::error for
+/// any failed launch, with the label of the launch. A kernel that fails while it runs is noticed by a later call, which
+/// cannot know its label: with GART_CUDA_SYNC=1 in the environment every launch is waited for and the label is exact.
 
 #include <gart/core/error.hpp>
 #include <gart/core/macros.hpp>
@@ -28,7 +29,7 @@ struct cuda_device_info {
   std::size_t total_bytes = 0;
 };
 
-// The devices there are; empty without a driver. `reason` then says why.
+/// The devices there are; empty without a driver. `reason` then says why.
 std::vector<cuda_device_info> cuda_devices(std::string* reason = nullptr);
 
 class cuda_exec {
@@ -39,7 +40,7 @@ class cuda_exec {
   profiler profile;
   memory_use memory;
 
-  // `stream`, a cudaStream_t of that device, stays its owner's and must outlive this; null: one of its own.
+  /// `stream`, a cudaStream_t of that device, stays its owner's and must outlive this; null: one of its own.
   explicit cuda_exec(int device_index = 0, void* stream = nullptr);
   ~cuda_exec();
   cuda_exec(cuda_exec const&) = delete;
@@ -54,13 +55,13 @@ class cuda_exec {
   void fill(void* p, unsigned char byte, std::size_t bytes);
   void synchronize();
 
-  void* stream() const { return stream_; }  // a cudaStream_t
+  void* stream() const { return stream_; }  ///< a cudaStream_t
   int multiprocessors() const { return multiprocessors_; }
   std::size_t free_bytes() const;
-  void make_current() const;  // launches go to the calling thread's current device, which must be the stream's
+  void make_current() const;  ///< launches go to the calling thread's current device, which must be the stream's
 
-  // Brackets of a timed stage; stage_scope calls them. The times, by events, reach `profile` at the next synchronize()
-  // or copy_out().
+  /// Brackets of a timed stage; stage_scope calls them. The times, by events, reach `profile` at the next synchronize()
+  /// or copy_out().
   void begin_stage(char const* label);
   void end_stage() noexcept;
   void check_launch(char const* label);

@@ -1,8 +1,9 @@
 #pragma once
-// parallel_for on cuda_exec: one thread an index, one block a tile. Needs nvcc.
-// A kernel may name its launch bounds, both or neither: `static constexpr int block_size` (else 256: the threads of a
-// block of an index kernel, the largest number of lanes of a tile kernel, to which tile_range::lanes is lowered) and
-// `static constexpr int min_blocks` (else 1: blocks that a multiprocessor must have registers for).
+/// \file
+/// parallel_for on cuda_exec: one thread an index, one block a tile. Needs nvcc.
+/// A kernel may name its launch bounds, both or neither: `static constexpr int block_size` (else 256: the threads of a
+/// block of an index kernel, the largest number of lanes of a tile kernel, to which tile_range::lanes is lowered) and
+/// `static constexpr int min_blocks` (else 1: blocks that a multiprocessor must have registers for).
 
 #include <gart/exec/cuda.hpp>
 #include <gart/exec/kept_address.hpp>

@@ -1,6 +1,7 @@
 #pragma once
-// What the two host policies share: memory is the host's, copies are memcpy, stage times are wall times.
-// A policy is used by one thread at a time; what it runs may use many.
+/// \file
+/// What the two host policies share: memory is the host's, copies are memcpy, stage times are wall times.
+/// A policy is used by one thread at a time; what it runs may use many.
 
 #include <gart/core/error.hpp>
 #include <gart/core/isa.hpp>
@@ -59,8 +60,8 @@ class host_memory {
   }
   void synchronize() {}
 
-  // A block that the policy keeps and lends to the algorithm that is running, so that sorting at every step does not
-  // allocate at every step. The next call lends the same block again; it grows only, and counts in `memory`.
+  /// A block that the policy keeps and lends to the algorithm that is running, so that sorting at every step does not
+  /// allocate at every step. The next call lends the same block again; it grows only, and counts in `memory`.
   void* workspace(std::size_t bytes) {
     if (bytes > workspace_bytes_) {
       deallocate(std::exchange(workspace_, nullptr), std::exchange(workspace_bytes_, 0));

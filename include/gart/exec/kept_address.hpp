@@ -1,6 +1,7 @@
 #pragma once
-// Shared memory by an address that the compiler keeps, where it would work it out again at each use: a block's window,
-// a lane's place in an array. Device only.
+/// \file
+/// Shared memory by an address that the compiler keeps, where it would work it out again at each use: a block's window,
+/// a lane's place in an array. Device only.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>

@@ -1,5 +1,6 @@
 #pragma once
-// All cores through OpenMP. Built without OpenMP it runs on one thread.
+/// \file
+/// All cores through OpenMP. Built without OpenMP it runs on one thread.
 
 #include <gart/exec/host_memory.hpp>
 
@@ -14,7 +15,7 @@ class openmp_exec : public host_memory {
  public:
   static constexpr char const* name = "openmp";
 
-  // threads = 0: as many as OpenMP gives (OMP_NUM_THREADS, or the cores).
+  /// threads = 0: as many as OpenMP gives (OMP_NUM_THREADS, or the cores).
   explicit openmp_exec(int threads = 0) : threads_(threads > 0 ? threads : default_threads()) {}
   int threads() const { return threads_; }
 
@@ -22,8 +23,8 @@ class openmp_exec : public host_memory {
   static T atomic_add(T* p, T v) {
     return std::atomic_ref<T>(*p).fetch_add(v, std::memory_order_relaxed);
   }
-  // Calls f while no other thread is in a call for the same `what`. One lock from a striped table: x86 has no atomic
-  // float add, and a compare-and-swap for each of tens of floats costs more than the rest of a hit.
+  /// Calls f while no other thread is in a call for the same `what`. One lock from a striped table: x86 has no atomic
+  /// float add, and a compare-and-swap for each of tens of floats costs more than the rest of a hit.
   template <class F>
   static void exclusively(void const* what, F&& f) {
     auto& lock = row_locks[(reinterpret_cast<std::uintptr_t>(what) >> 4) * 0x9E3779B97F4A7C15ull >> 52];

@@ -1,12 +1,13 @@
 #pragma once
-// Labelled launches on the host policies: parallel_for over indices and over tiles. The CUDA twins are in
-// cuda_launch.cuh; a tile kernel is the same source on both.
-//
-// A tile kernel is written in phases: team.for_each(n, f) shares f(0..n) out over the team's lanes, team.barrier()
-// makes what was written to team.scratch() visible to all. There is no lane id, so one lane is a correct host mapping.
-// Scratch is undefined when a tile begins. Nothing to do is no launch, on every policy.
-//
-// Kernels run on many threads and must not throw.
+/// \file
+/// Labelled launches on the host policies: parallel_for over indices and over tiles. The CUDA twins are in
+/// cuda_launch.cuh; a tile kernel is the same source on both.
+///
+/// A tile kernel is written in phases: team.for_each(n, f) shares f(0..n) out over the team's lanes, team.barrier()
+/// makes what was written to team.scratch() visible to all. There is no lane id, so one lane is a correct host mapping.
+/// Scratch is undefined when a tile begins. Nothing to do is no launch, on every policy.
+///
+/// Kernels run on many threads and must not throw.
 
 #include <gart/exec/openmp.hpp>
 #include <gart/exec/serial.hpp>

@@ -1,6 +1,7 @@
 #pragma once
-// What a launch cost: wall time (CPU) or device time (events) summed per label. Off by default; when off it costs one
-// branch a launch. Labels are the ones given to parallel_for and to stage scopes.
+/// \file
+/// What a launch cost: wall time (CPU) or device time (events) summed per label. Off by default; when off it costs one
+/// branch a launch. Labels are the ones given to parallel_for and to stage scopes.
 
 #include <cstddef>
 #include <map>
@@ -24,7 +25,7 @@ class profiler {
   }
   std::map<std::string, stage_time> const& stages() const { return stages_; }
   void clear() { stages_.clear(); }
-  // Adds what the other has measured, and leaves it empty.
+  /// Adds what the other has measured, and leaves it empty.
   void take(profiler& other) {
     for (auto const& [label, time] : other.stages_) {
       stages_[label].milliseconds += time.milliseconds;
@@ -38,7 +39,7 @@ class profiler {
   std::map<std::string, stage_time> stages_;
 };
 
-// Bytes that buffers of one policy hold now and held at most.
+/// Bytes that buffers of one policy hold now and held at most.
 struct memory_use {
   std::size_t current = 0, peak = 0;
   void allocated(std::size_t bytes) {

@@ -1,5 +1,6 @@
 #pragma once
-// One thread, in index order: the policy whose results repeat bit for bit.
+/// \file
+/// One thread, in index order: the policy whose results repeat bit for bit.
 
 #include <gart/exec/host_memory.hpp>
 

@@ -1,5 +1,6 @@
 #pragma once
-// Times what runs while it lives under `label`, when the policy's profiler is on.
+/// \file
+/// Times what runs while it lives under `label`, when the policy's profiler is on.
 
 #include <gart/exec/concepts.hpp>
 

@@ -1,7 +1,8 @@
 #pragma once
-// The exposure of a photograph against the scene's own colours: x' = M x + b on the composited colour, M a 3 x 3
-// matrix, as 3DGS compensates it. A camera that sets its exposure and white balance by what it sees takes neighbouring
-// photographs of different brightness. Gaussians alone can only learn that as veils in front of the cameras.
+/// \file
+/// The exposure of a photograph against the scene's own colours: x' = M x + b on the composited colour, M a 3 x 3
+/// matrix, as 3DGS compensates it. A camera that sets its exposure and white balance by what it sees takes neighbouring
+/// photographs of different brightness. Gaussians alone can only learn that as veils in front of the cameras.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
@@ -14,17 +15,17 @@ namespace gart {
 
 struct exposure {
   static constexpr int floats = 12;
-  float m[floats] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  // [3][4]: a row of M, then its offset
+  float m[floats] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  ///< [3][4]: a row of M, then its offset
 
   GART_HD GART_INLINE float channel(int c, float r, float g, float b) const {
     return fma(m[4 * c], r, fma(m[4 * c + 1], g, fma(m[4 * c + 2], b, m[4 * c + 3])));
   }
 };
 
-// The exposures of all training views and their moments, as a checkpoint holds them.
+/// The exposures of all training views and their moments, as a checkpoint holds them.
 struct exposure_state {
-  std::vector<float> value, first, second;  // [views][12]; empty: no exposures are learned
-  std::vector<u32> visits;                  // [views] steps taken; a view without any has no exposure
+  std::vector<float> value, first, second;  ///< [views][12]; empty: no exposures are learned
+  std::vector<u32> visits;                  ///< [views] steps taken; a view without any has no exposure
 };
 
 }  // namespace gart

@@ -1,14 +1,15 @@
 #pragma once
-// The exposure of any view, from those learned of the training views: what the camera saw set its exposure, and from
-// about the same pose it saw about the same. A photograph that is kept for testing is not looked at.
-//
-// Where a view stands is six numbers: the camera's position over the median distance of a training view to its nearest,
-// and its axis over 0.1. Of each of the twelve numbers of the exposure
-//   minimise over a, b:  sum_i w_i (m_i - a - b . d_i)^2 + 0.02 (sum_i w_i) |b|^2 r^2,   w_i = (|d_i|^2 + 1e-4)^-3,
-// where d_i leads to training view i and r^2 is the weighted mean of |d_i|^2: a line through the nearest, since a
-// camera on its way passes between them, and the constant a is what the view gets. (A weighted mean, which b = 0 is,
-// leaves errors a quarter larger where one view is left out of the others.) Far from all views it comes to their mean.
-// Cost: O(views) in double for each call. Without views it is the identity.
+/// \file
+/// The exposure of any view, from those learned of the training views: what the camera saw set its exposure, and from
+/// about the same pose it saw about the same. A photograph that is kept for testing is not looked at.
+///
+/// Where a view stands is six numbers: the camera's position over the median distance of a training view to its
+/// nearest, and its axis over 0.1. Of each of the twelve numbers of the exposure
+///   minimise over a, b:  sum_i w_i (m_i - a - b . d_i)^2 + 0.02 (sum_i w_i) |b|^2 r^2,   w_i = (|d_i|^2 + 1e-4)^-3,
+/// where d_i leads to training view i and r^2 is the weighted mean of |d_i|^2: a line through the nearest, since a
+/// camera on its way passes between them, and the constant a is what the view gets. (A weighted mean, which b = 0 is,
+/// leaves errors a quarter larger where one view is left out of the others.) Far from all views it comes to their mean.
+/// Cost: O(views) in double for each call. Without views it is the identity.
 
 #include <gart/exposure/exposure.hpp>
 #include <gart/math/glm.hpp>
@@ -25,8 +26,8 @@ namespace gart {
 
 struct view_exposure {
   std::string name;
-  vec3d position{0.0};      // of the camera
-  vec3 direction{0, 0, 1};  // its axis, a unit vector
+  vec3d position{0.0};      ///< of the camera
+  vec3 direction{0, 0, 1};  ///< its axis, a unit vector
   exposure value;
 };
 
@@ -54,7 +55,7 @@ class exposure_field {
   bool empty() const { return views_.empty(); }
   std::vector<view_exposure> const& views() const { return views_; }
 
-  // The training view whose pose is nearest to that of another; of at least two.
+  /// The training view whose pose is nearest to that of another; of at least two.
   std::size_t nearest(std::size_t view) const {
     camera pose;
     pose.position = views_[view].position, pose.rotation[2] = views_[view].direction;

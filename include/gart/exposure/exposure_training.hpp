@@ -1,14 +1,15 @@
 #pragma once
-// Exposures of the training views, learned with the Gaussians (exposure.hpp): applied to the rendered image before the
-// loss, and moved by Adam, the twelve numbers of the step's view alone. With x' the exposed image,
-//   dL/dx = M^T dL/dx',   dL/dM = sum over pixels of dL/dx' (x, 1)^T.
-//
-// The scene's own colours are those of an exposure that is the identity; nothing holds the views' mean to it but that
-// they start there.
-//
-// Buffers: 37 words a view, a copy of the image, and a few sums. Cost: two passes over the image and three launches
-// over a few numbers a step; no host read. The order of all sums depends on the image's size only. A number whose
-// gradient is not finite stays as it is.
+/// \file
+/// Exposures of the training views, learned with the Gaussians (exposure.hpp): applied to the rendered image before the
+/// loss, and moved by Adam, the twelve numbers of the step's view alone. With x' the exposed image,
+///   dL/dx = M^T dL/dx',   dL/dM = sum over pixels of dL/dx' (x, 1)^T.
+///
+/// The scene's own colours are those of an exposure that is the identity; nothing holds the views' mean to it but that
+/// they start there.
+///
+/// Buffers: 37 words a view, a copy of the image, and a few sums. Cost: two passes over the image and three launches
+/// over a few numbers a step; no host read. The order of all sums depends on the image's size only. A number whose
+/// gradient is not finite stays as it is.
 
 #include <gart/algorithm/segmented_reduce.hpp>
 #include <gart/exec/buffer.hpp>
@@ -91,7 +92,7 @@ class exposure_training {
     ends_.assign(ends);
   }
 
-  // The image [H][W][3] as the view's photograph would show it; until the next call.
+  /// The image [H][W][3] as the view's photograph would show it; until the next call.
   span<float const> expose(std::size_t view, span<float const> image) {
     exposed_.resize(image.size());
     parallel_for(*exec_, "expose", static_cast<index_t>(image.size() / 3),
@@ -99,7 +100,7 @@ class exposure_training {
     return exposed_;
   }
 
-  // Turns dL/d exposed into dL/d image, and takes Adam's step for the view.
+  /// Turns dL/d exposed into dL/d image, and takes Adam's step for the view.
   void step(std::size_t view, span<float const> image, span<float> gradient, float rate) {
     constexpr index_t lanes = runs * runs;
     sums_.resize(std::size_t{lanes + runs} * exposure::floats);

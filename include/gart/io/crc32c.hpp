@@ -1,7 +1,8 @@
 #pragma once
-// CRC-32C (Castagnoli), the checksum of iSCSI and ext4: reflected polynomial 0x82f63b78, all bits set before and
-// inverted after (RFC 3720, B.4; "123456789" gives 0xe3069283). Eight bytes at a time by eight tables, about a byte a
-// clock cycle on any machine. Finds every change of up to 32 neighbouring bits.
+/// \file
+/// CRC-32C (Castagnoli), the checksum of iSCSI and ext4: reflected polynomial 0x82f63b78, all bits set before and
+/// inverted after (RFC 3720, B.4; "123456789" gives 0xe3069283). Eight bytes at a time by eight tables, about a byte a
+/// clock cycle on any machine. Finds every change of up to 32 neighbouring bits.
 
 #include <gart/core/types.hpp>
 
@@ -29,7 +30,7 @@ inline constexpr auto crc_tables = [] {
 
 }  // namespace detail
 
-// Of `size` bytes; `before` is the checksum of what stands before them, to go on from.
+/// Of `size` bytes; `before` is the checksum of what stands before them, to go on from.
 inline u32 crc32c(void const* data, std::size_t size, u32 before = 0) {
   static_assert(std::endian::native == std::endian::little, "the lowest byte of a word is the first");
   auto const& table = detail::crc_tables;

@@ -1,13 +1,14 @@
 #pragma once
-// A capture in host memory: views with cameras and 8-bit images, a split, starting points where the files have them.
-//
-// load_dataset recognises, in a folder or by the file named: COLMAP (sparse/0, sparse or the folder itself, .bin before
-// .txt; photos in images/), Blender (transforms_train.json and transforms_test.json, points3d.ply where it is there),
-// nerfstudio / instant-ngp (transforms.json). A folder that holds COLMAP and transforms.json is read as COLMAP. Images
-// are decoded in parallel and kept as 8 bits: width * height * channels bytes each. Frames without a photo, points in a
-// camera's centre and points that are not finite are left out, with a note. Errors: io_error naming the file, the field
-// and the remedy; unsupported for a camera model that gart does not trace, by its name; invalid_argument for an option
-// out of its range.
+/// \file
+/// A capture in host memory: views with cameras and 8-bit images, a split, starting points where the files have them.
+///
+/// load_dataset recognises, in a folder or by the file named: COLMAP (sparse/0, sparse or the folder itself, .bin
+/// before .txt; photos in images/), Blender (transforms_train.json and transforms_test.json, points3d.ply where it is
+/// there), nerfstudio / instant-ngp (transforms.json). A folder that holds COLMAP and transforms.json is read as
+/// COLMAP. Images are decoded in parallel and kept as 8 bits: width * height * channels bytes each. Frames without a
+/// photo, points in a camera's centre and points that are not finite are left out, with a note. Errors: io_error naming
+/// the file, the field and the remedy; unsupported for a camera model that gart does not trace, by its name;
+/// invalid_argument for an option out of its range.
 
 #include <gart/scene/camera.hpp>
 #include <gart/scene/image.hpp>
@@ -20,43 +21,43 @@
 namespace gart {
 
 struct dataset_view {
-  std::string name;  // unique in the dataset, fit for a file name: renders/NAME.png
-  camera view;       // for the image as it is held (after dataset_options.downscale)
-  image8 image;      // 3 channels, or 4 with straight alpha
-  image8 mask;       // 1 channel, 0 = ignore; empty where there is none
+  std::string name;  ///< unique in the dataset, fit for a file name: renders/NAME.png
+  camera view;       ///< for the image as it is held (after dataset_options.downscale)
+  image8 image;      ///< 3 channels, or 4 with straight alpha
+  image8 mask;       ///< 1 channel, 0 = ignore; empty where there is none
 };
 
 struct point_cloud {
-  std::vector<float> position;  // [N][3]
-  std::vector<u8> color;        // [N][3]
+  std::vector<float> position;  ///< [N][3]
+  std::vector<u8> color;        ///< [N][3]
   std::size_t size() const { return position.size() / 3; }
 };
 
 struct dataset {
-  std::string format;         // "COLMAP", "Blender", "nerfstudio"
-  std::string split;          // how train and test were told apart, in words
-  std::string resize_filter;  // "none", or "box (1/4)"
+  std::string format;         ///< "COLMAP", "Blender", "nerfstudio"
+  std::string split;          ///< how train and test were told apart, in words
+  std::string resize_filter;  ///< "none", or "box (1/4)"
   std::vector<dataset_view> train, test;
-  point_cloud points;              // empty: start at random
-  std::vector<std::string> notes;  // one line each: what was skipped, scaled or assumed
-  float extent = 1;                // 1.1 x the largest distance of a training camera from their mean
-  bool alpha = false;              // images carry alpha: composited over the background chosen
-  // Random starting points lie in this box; Blender's [-1.3, 1.3]^3, else around the cameras.
+  point_cloud points;              ///< empty: start at random
+  std::vector<std::string> notes;  ///< one line each: what was skipped, scaled or assumed
+  float extent = 1;                ///< 1.1 x the largest distance of a training camera from their mean
+  bool alpha = false;              ///< images carry alpha: composited over the background chosen
+  /// Random starting points lie in this box; Blender's [-1.3, 1.3]^3, else around the cameras.
   vec3d bounds_min{-1.3}, bounds_max{1.3};
 };
 
 struct dataset_options {
-  int downscale = 1;        // integer factor, box filter; a partial last block of pixels is cropped, from cameras too
-  int test_every = 8;       // 0: no test views; ignored where the files have their own split
-  bool load_images = true;  // false: cameras alone, for which photos may all be absent if the files state sizes
-  // Called from the loading threads, one at a time.
+  int downscale = 1;        ///< integer factor, box filter; a partial last block of pixels is cropped, from cameras too
+  int test_every = 8;       ///< 0: no test views; ignored where the files have their own split
+  bool load_images = true;  ///< false: cameras alone, for which photos may all be absent if the files state sizes
+  /// Called from the loading threads, one at a time.
   std::function<void(std::size_t done, std::size_t total)> progress = {};
 };
 
 dataset load_dataset(std::filesystem::path const& path, dataset_options const& options = {});
 
-// The cameras alone: a dataset (all its views, test views first) or a camera JSON, a list of
-// {"name","width","height","fx","fy","cx","cy","c2w"} with c2w camera-to-world in OpenCV axes.
+/// The cameras alone: a dataset (all its views, test views first) or a camera JSON, a list of
+/// {"name","width","height","fx","fy","cx","cy","c2w"} with c2w camera-to-world in OpenCV axes.
 std::vector<named_camera> load_cameras(std::filesystem::path const& path);
 
 }  // namespace gart

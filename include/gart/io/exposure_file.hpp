@@ -1,8 +1,9 @@
 #pragma once
-// Exposures of training views as JSON, to be read by `gart render` and `gart eval`, and by hand:
-//   {"views": [{"name": "00002", "position": [x, y, z], "direction": [x, y, z], "matrix": [12 numbers]}, ...]}
-// position and direction: of the camera and its axis, in the world; matrix: a row of M, then its offset, three times
-// (exposure/exposure.hpp). Written whole or not at all. Errors: io_error naming the file, the view and the field.
+/// \file
+/// Exposures of training views as JSON, to be read by `gart render` and `gart eval`, and by hand:
+///   {"views": [{"name": "00002", "position": [x, y, z], "direction": [x, y, z], "matrix": [12 numbers]}, ...]}
+/// position and direction: of the camera and its axis, in the world; matrix: a row of M, then its offset, three times
+/// (exposure/exposure.hpp). Written whole or not at all. Errors: io_error naming the file, the view and the field.
 
 #include <gart/exposure/exposure_field.hpp>
 

@@ -1,6 +1,7 @@
 #pragma once
-// Files written whole or not at all: to a temporary name beside the target, flushed to the disk, then renamed. A full
-// disk, a folder that is not there or not writable is an io_error naming the target, and leaves nothing half-written.
+/// \file
+/// Files written whole or not at all: to a temporary name beside the target, flushed to the disk, then renamed. A full
+/// disk, a folder that is not there or not writable is an io_error naming the target, and leaves nothing half-written.
 
 #include <gart/core/types.hpp>
 
@@ -15,7 +16,7 @@ namespace gart {
 
 std::vector<u8> read_file(std::filesystem::path const& path);
 void write_file(std::filesystem::path const& path, std::string_view bytes);
-// For what is too large to hold: `body` writes to the stream; it is checked and renamed after.
+/// For what is too large to hold: `body` writes to the stream; it is checked and renamed after.
 void write_file(std::filesystem::path const& path, std::function<void(std::ostream&)> const& body);
 
 }  // namespace gart

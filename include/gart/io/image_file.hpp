@@ -1,6 +1,7 @@
 #pragma once
-// Images in PNG (libpng) and JPEG (libjpeg-turbo), 8 bits a channel; 16-bit PNG is reduced to 8. The kind is told by
-// the file's first bytes, not by its name. Errors: io_error with the file and what the decoder said.
+/// \file
+/// Images in PNG (libpng) and JPEG (libjpeg-turbo), 8 bits a channel; 16-bit PNG is reduced to 8. The kind is told by
+/// the file's first bytes, not by its name. Errors: io_error with the file and what the decoder said.
 
 #include <gart/scene/image.hpp>
 
@@ -10,15 +11,15 @@
 
 namespace gart {
 
-image8 read_image(std::filesystem::path const& path);                    // 1, 3 or 4 channels, as the file has
-void write_png(std::filesystem::path const& path, image8 const& image);  // to a temporary name, then renamed
-std::vector<u8> encode_png(image8 const& image);                         // 1, 3 or 4 channels
-std::vector<u8> encode_jpeg(image8 const& image, int quality = 90);      // 1 or 3: JPEG has no alpha
+image8 read_image(std::filesystem::path const& path);                    ///< 1, 3 or 4 channels, as the file has
+void write_png(std::filesystem::path const& path, image8 const& image);  ///< to a temporary name, then renamed
+std::vector<u8> encode_png(image8 const& image);                         ///< 1, 3 or 4 channels
+std::vector<u8> encode_jpeg(image8 const& image, int quality = 90);      ///< 1 or 3: JPEG has no alpha
 
-// Mean over blocks of factor x factor pixels; a partial last block is dropped. Alpha weights the colours.
+/// Mean over blocks of factor x factor pixels; a partial last block is dropped. Alpha weights the colours.
 image8 box_downscale(image8 const& image, int factor);
 
 image_float to_float(image8 const& image);
-image8 to_8bit(image_float const& image);  // clamped, rounded to nearest
+image8 to_8bit(image_float const& image);  ///< clamped, rounded to nearest
 
 }  // namespace gart

@@ -1,15 +1,16 @@
 #pragma once
-// Splat files in the layout of the INRIA reference: binary little endian, every property a float, in the order
-//   x y z nx ny nz f_dc_0..2 f_rest_0..(3K-4) opacity scale_0..2 rot_0..3
-// f_rest channel-major, opacity a logit, scales logarithms, rot w,x,y,z and not normalised. Written in that order, byte
-// for byte, read by name in any order, ascii or binary of either endianness, without normals and with extra properties.
-// gart's own traits travel as header comments ("comment gart kernel_degree 2"). A model with the trait antialias is
-// also marked as other programs mark theirs, "comment SplatRenderMode: mip"; a file with that mark, or with "comment
-// antialiased 1", and no trait of gart's own is read as one whose antialias has no value.
-//
-// Errors: io_error naming the file, the property and the remedy, for a truncated body, a missing property, a count of
-// f_rest that is no degree from 0 to 3, a 2D Gaussian file (no scale_2), a NaN or infinite value (with its vertex and
-// property), or a rotation that is all zero; invalid_argument for a model whose arrays disagree in size.
+/// \file
+/// Splat files in the layout of the INRIA reference: binary little endian, every property a float, in the order
+///   x y z nx ny nz f_dc_0..2 f_rest_0..(3K-4) opacity scale_0..2 rot_0..3
+/// f_rest channel-major, opacity a logit, scales logarithms, rot w,x,y,z and not normalised. Written in that order,
+/// byte for byte, read by name in any order, ascii or binary of either endianness, without normals and with extra
+/// properties. gart's own traits travel as header comments ("comment gart kernel_degree 2"). A model with the trait
+/// antialias is also marked as other programs mark theirs, "comment SplatRenderMode: mip"; a file with that mark, or
+/// with "comment antialiased 1", and no trait of gart's own is read as one whose antialias has no value.
+///
+/// Errors: io_error naming the file, the property and the remedy, for a truncated body, a missing property, a count of
+/// f_rest that is no degree from 0 to 3, a 2D Gaussian file (no scale_2), a NaN or infinite value (with its vertex and
+/// property), or a rotation that is all zero; invalid_argument for a model whose arrays disagree in size.
 
 #include <gart/io/dataset.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -20,13 +21,13 @@
 
 namespace gart {
 
-// Comments of the header that begin with "gart": key -> value.
+/// Comments of the header that begin with "gart": key -> value.
 using ply_traits = std::map<std::string, std::string>;
 
 gaussian_model read_splat_ply(std::filesystem::path const& path, ply_traits* traits = nullptr);
 void write_splat_ply(std::filesystem::path const& path, gaussian_model const& model, ply_traits const& traits = {});
 
-// A plain point cloud: x y z, and red green blue where present (else grey).
+/// A plain point cloud: x y z, and red green blue where present (else grey).
 point_cloud read_point_ply(std::filesystem::path const& path);
 void write_point_ply(std::filesystem::path const& path, point_cloud const& points);
 

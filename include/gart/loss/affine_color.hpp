@@ -1,10 +1,11 @@
 #pragma once
-// The PSNR that a render would have after the affine map of colours that brings it nearest to its photograph,
-//   minimise over M (3 x 3) and b:  sum over pixels |M render + b - truth|^2,
-// in double on the host's cores. A diagnostic, no score: it looks at the photograph that it is held against, so it says
-// how much of an error is one of exposure and white balance. Renders and mapped colours are clamped to [0, 1], as for
-// PSNR, so that it is never below the PSNR of the same render (the map may be the identity). Pixels that a mask
-// excludes (0) do not count. Three channels. Errors: invalid_argument where the sizes differ or an image is empty.
+/// \file
+/// The PSNR that a render would have after the affine map of colours that brings it nearest to its photograph,
+///   minimise over M (3 x 3) and b:  sum over pixels |M render + b - truth|^2,
+/// in double on the host's cores. A diagnostic, no score: it looks at the photograph that it is held against, so it
+/// says how much of an error is one of exposure and white balance. Renders and mapped colours are clamped to [0, 1], as
+/// for PSNR, so that it is never below the PSNR of the same render (the map may be the identity). Pixels that a mask
+/// excludes (0) do not count. Three channels. Errors: invalid_argument where the sizes differ or an image is empty.
 
 #include <gart/loss/metrics.hpp>
 
@@ -18,7 +19,7 @@
 namespace gart::inline GART_ISA {
 
 struct affine_color {
-  std::array<std::array<double, 3>, 3> matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  // [to][from]
+  std::array<std::array<double, 3>, 3> matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  ///< [to][from]
   std::array<double, 3> offset{};
 };
 
@@ -53,7 +54,7 @@ inline void check_colors(image_float const& render, image_float const& truth, im
 
 }  // namespace detail
 
-// Colours that the render does not vary in, a grey image's for one, leave M open: there it is zero.
+/// Colours that the render does not vary in, a grey image's for one, leave M open: there it is zero.
 inline affine_color fit_affine_color(image_float const& render, image_float const& truth, image8 const& mask = {}) {
   detail::check_colors(render, truth, mask);
   // Means first, so that what is left is small against nothing.
@@ -105,7 +106,7 @@ inline affine_color fit_affine_color(image_float const& render, image_float cons
   return fit;
 }
 
-// dB; infinite where nothing is left of the error.
+/// dB; infinite where nothing is left of the error.
 inline double psnr_affine_color(image_float const& render, image_float const& truth, image8 const& mask = {}) {
   affine_color const fit = fit_affine_color(render, truth, mask);
   auto const sums = detail::sum_pixels<2>(truth, mask, [&](std::size_t at, auto& row) {

@@ -1,18 +1,20 @@
 #pragma once
-// The training loss of an image x against the truth y, and its gradient in x:
-//   L = (1 - w) mean|x - y| + w (1 - mean SSIM(x, y)),
-// means over all pixels and the three channels. The image is taken as it is, not clamped to [0, 1].
-//
-// SSIM is written in d = x - y, because near the optimum x and y agree and their difference is what must not cancel:
-//   SSIM = (1 - m_d^2 / B1) (1 - s_dd / B2),  B1 = m_x^2 + m_y^2 + C1,  B2 = s_xx + s_yy + C2
-// with m the window's means and s its variances, which is the usual formula, as 2ab = a^2 + b^2 - (a - b)^2. Four
-// convolutions are then enough (y, d, x^2 + y^2, d^2), taken of x - 1/2 and y - 1/2 so that the variances of bright
-// flat areas survive float; where x = y in the whole window the gradient is exactly zero. With S = l c the two factors,
-//   dS/dm_x = 2 l (m_d - (1 - c)(m_x - 1/2)) / B2 - 2 c (m_d - (1 - l) m_x) / B1,
-//   dS/de = l (1 - c) / B2,  dS/df = -l / B2  for e, f the windowed means of x^2 + y^2 and d^2,
-// and the gradient at a pixel is the windowed sum of dS/dm_x + 2 (x - 1/2) dS/de + 2 d dS/df.
-//
-// Three launches: differences; SSIM with its three partials; their convolution. Memory: 60 bytes a pixel.
+/// \file
+/// The training loss of an image x against the truth y, and its gradient in x:
+///   L = (1 - w) mean|x - y| + w (1 - mean SSIM(x, y)),
+/// means over all pixels and the three channels. The image is taken as it is, not clamped to [0, 1].
+///
+/// SSIM is written in d = x - y, because near the optimum x and y agree and their difference is what must not cancel:
+///   SSIM = (1 - m_d^2 / B1) (1 - s_dd / B2),  B1 = m_x^2 + m_y^2 + C1,  B2 = s_xx + s_yy + C2
+/// with m the window's means and s its variances, which is the usual formula, as 2ab = a^2 + b^2 - (a - b)^2. Four
+/// convolutions are then enough (y, d, x^2 + y^2, d^2), taken of x - 1/2 and y - 1/2 so that the variances of bright
+/// flat areas survive float; where x = y in the whole window the gradient is exactly zero. With S = l c the two
+/// factors,
+///   dS/dm_x = 2 l (m_d - (1 - c)(m_x - 1/2)) / B2 - 2 c (m_d - (1 - l) m_x) / B1,
+///   dS/de = l (1 - c) / B2,  dS/df = -l / B2  for e, f the windowed means of x^2 + y^2 and d^2,
+/// and the gradient at a pixel is the windowed sum of dS/dm_x + 2 (x - 1/2) dS/de + 2 d dS/df.
+///
+/// Three launches: differences; SSIM with its three partials; their convolution. Memory: 60 bytes a pixel.
 
 #include <gart/algorithm/reduce.hpp>
 #include <gart/exec/buffer.hpp>
@@ -22,12 +24,12 @@
 
 namespace gart::inline GART_ISA {
 
-// The truth in the policy's memory, 8 bits a channel, row-major.
+/// The truth in the policy's memory, 8 bits a channel, row-major.
 struct truth_view {
-  u8 const* pixels = nullptr;  // [H][W][channels]
-  int channels = 3;            // 3, or 4 with straight alpha: rgb * a + background * (1 - a)
-  u8 const* mask = nullptr;    // [H][W], or null; where it is 0 the image counts as equal to the truth: no loss,
-                               // no gradient, and the means still divide by all pixels
+  u8 const* pixels = nullptr;  ///< [H][W][channels]
+  int channels = 3;            ///< 3, or 4 with straight alpha: rgb * a + background * (1 - a)
+  u8 const* mask = nullptr;    ///< [H][W], or null; where it is 0 the image counts as equal to the truth: no loss,
+                               ///< no gradient, and the means still divide by all pixels
   vec3 background{0.0f};
 
   GART_HD bool counts(index_t pixel) const { return !mask || mask[pixel] != 0; }
@@ -298,7 +300,7 @@ class image_loss {
  public:
   explicit image_loss(E& exec) : exec_(&exec), planes_(exec), partials_(exec), sums_(exec) {}
 
-  // `image` and `gradient` are [H][W][3]; `loss` is two floats of the policy's memory: L, and the mean squared error.
+  /// `image` and `gradient` are [H][W][3]; `loss` is two floats of the policy's memory: L, and the mean squared error.
   void evaluate(span<float const> image, truth_view truth, int width, int height, float ssim_weight,
                 span<float> gradient, span<float> loss) {
     E& exec = *exec_;

@@ -1,8 +1,9 @@
 #pragma once
-// How good a render is, against the truth, in double on the host's cores: PSNR and SSIM as papers report them. Renders
-// are clamped to [0, 1] first. Straight alpha of a photograph is composited on the background. Pixels that a mask
-// excludes count in neither sum of PSNR; for SSIM, whose windows need them, they are made to hold the truth.
-// Errors: invalid_argument where the sizes differ or an image is empty.
+/// \file
+/// How good a render is, against the truth, in double on the host's cores: PSNR and SSIM as papers report them. Renders
+/// are clamped to [0, 1] first. Straight alpha of a photograph is composited on the background. Pixels that a mask
+/// excludes count in neither sum of PSNR; for SSIM, whose windows need them, they are made to hold the truth.
+/// Errors: invalid_argument where the sizes differ or an image is empty.
 
 #include <gart/core/error.hpp>
 #include <gart/loss/ssim_window.hpp>
@@ -33,7 +34,7 @@ inline double clamped(float v) { return v > 0 ? (v < 1 ? v : 1.0) : 0.0; }
 
 }  // namespace detail
 
-// The truth that a view is held against.
+/// The truth that a view is held against.
 inline image_float composited(image8 const& image, vec3 background) {
   image_float result(image.width, image.height, 3);
   std::size_t const pixels = static_cast<std::size_t>(image.width) * image.height;
@@ -48,7 +49,7 @@ inline image_float composited(image8 const& image, vec3 background) {
   return result;
 }
 
-// Makes excluded pixels equal to the truth; the share of pixels that count. An empty mask excludes none.
+/// Makes excluded pixels equal to the truth; the share of pixels that count. An empty mask excludes none.
 inline double apply_mask(image8 const& mask, image_float const& truth, image_float& render) {
   if (mask.empty()) return 1;
   detail::check_pair(render, truth, "mask");
@@ -64,7 +65,7 @@ inline double apply_mask(image8 const& mask, image_float const& truth, image_flo
   return static_cast<double>(kept) / static_cast<double>(pixels);
 }
 
-// -10 log10 of the mean squared error; infinite where the images are equal.
+/// -10 log10 of the mean squared error; infinite where the images are equal.
 inline double psnr(image_float const& render, image_float const& truth) {
   detail::check_pair(render, truth, "psnr");
   std::size_t const row_size = static_cast<std::size_t>(truth.width) * truth.channels;
@@ -84,13 +85,13 @@ inline double psnr(image_float const& render, image_float const& truth) {
                  : std::numeric_limits<double>::infinity();
 }
 
-// Of a render whose excluded pixels equal the truth, `share` of the pixels being left: the mean of the squares over all
-// pixels is `share` times the mean over those that count.
+/// Of a render whose excluded pixels equal the truth, `share` of the pixels being left: the mean of the squares over
+/// all pixels is `share` times the mean over those that count.
 inline double masked_psnr(image_float const& render, image_float const& truth, double share) {
   return psnr(render, truth) + 10 * std::log10(share);
 }
 
-// Mean over pixels and channels; 1 where the images are equal.
+/// Mean over pixels and channels; 1 where the images are equal.
 inline double ssim(image_float const& render, image_float const& truth) {
   detail::check_pair(render, truth, "ssim");
   int const w = truth.width, h = truth.height, channels = truth.channels;

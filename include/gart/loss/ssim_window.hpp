@@ -1,7 +1,8 @@
 #pragma once
-// The window and constants of SSIM (Wang et al., Image Quality Assessment: From Error Visibility to Structural
-// Similarity, 2004) as every system gart is compared with takes them: an 11 x 11 Gaussian of deviation 1.5, separable,
-// zeros outside the image, C1 = 0.01^2 and C2 = 0.03^2 for images in [0, 1].
+/// \file
+/// The window and constants of SSIM (Wang et al., Image Quality Assessment: From Error Visibility to Structural
+/// Similarity, 2004) as every system gart is compared with takes them: an 11 x 11 Gaussian of deviation 1.5, separable,
+/// zeros outside the image, C1 = 0.01^2 and C2 = 0.03^2 for images in [0, 1].
 
 #include <gart/core/macros.hpp>
 
@@ -11,7 +12,7 @@ inline constexpr int radius = 5;
 inline constexpr int taps = 2 * radius + 1;
 inline constexpr double c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;
 
-// Weight of tap k: exp(-(k - 5)^2 / (2 * 1.5^2)), normalised to the sum 1.
+/// Weight of tap k: exp(-(k - 5)^2 / (2 * 1.5^2)), normalised to the sum 1.
 GART_HD constexpr double weight(int k) {
   constexpr double half[6] = {0.00102838008447911, 0.007598758135239185, 0.03600077212843083,
                               0.10936068950970002, 0.2130055377112537,   0.26601172486179436};

@@ -1,8 +1,9 @@
 #pragma once
-// Float arithmetic whose rounding is fixed by the source, not by the compiler's choice to contract a*b+c.
-// Whatever decides a hit, an order or an address is written in these, so forward and backward, every traverser and (on
-// hosts with FMA) every policy compute the same bits. Host code that uses gart is built with -ffp-contract=off, which
-// the CMake target carries; on a device the intrinsics are never contracted.
+/// \file
+/// Float arithmetic whose rounding is fixed by the source, not by the compiler's choice to contract a*b+c.
+/// Whatever decides a hit, an order or an address is written in these, so forward and backward, every traverser and (on
+/// hosts with FMA) every policy compute the same bits. Host code that uses gart is built with -ffp-contract=off, which
+/// the CMake target carries; on a device the intrinsics are never contracted.
 
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "gart decides hits by IEEE arithmetic: compile what includes it without -ffast-math and -ffinite-math-only"
@@ -32,7 +33,7 @@ GART_HD GART_INLINE float add(float a, float b) {
 #endif
 }
 
-// a*b + c, in one rounding wherever the machine has it (two on a host built without FMA).
+/// a*b + c, in one rounding wherever the machine has it (two on a host built without FMA).
 GART_HD GART_INLINE float fma(float a, float b, float c) {
 #if defined(__CUDA_ARCH__)
   return __fmaf_rn(a, b, c);
@@ -51,7 +52,7 @@ GART_HD GART_INLINE float divide(float a, float b) {
 #endif
 }
 
-// 1 / a, correctly rounded.
+/// 1 / a, correctly rounded.
 GART_HD GART_INLINE float reciprocal(float a) {
 #if defined(__CUDA_ARCH__)
   return __frcp_rn(a);
@@ -88,9 +89,9 @@ GART_HD GART_INLINE u32 float_to_bits(float f) {
 #endif
 }
 
-// Reciprocals of several numbers, the bits of reciprocal(). A device's is an estimate and a Newton step, and a branch
-// where the number or its reciprocal is not normal, for which everything around it waits. Here the steps are taken for
-// all of them, and one branch is left.
+/// Reciprocals of several numbers, the bits of reciprocal(). A device's is an estimate and a Newton step, and a branch
+/// where the number or its reciprocal is not normal, for which everything around it waits. Here the steps are taken for
+/// all of them, and one branch is left.
 template <int N>
 GART_HD GART_INLINE void reciprocals(float (&a)[N]) {
 #if defined(__CUDA_ARCH__)
@@ -114,11 +115,11 @@ GART_HD GART_INLINE void reciprocals(float (&a)[N]) {
 #endif
 }
 
-// By the exponent bits, so that no fast-math switch can remove it.
+/// By the exponent bits, so that no fast-math switch can remove it.
 GART_HD GART_INLINE bool is_finite(float f) { return (float_to_bits(f) & 0x7f800000u) != 0x7f800000u; }
 
-// For formulas over floats and over lanes of them (math/lanes.hpp): what a number's comparisons and counts are, and
-// what they offer.
+/// For formulas over floats and over lanes of them (math/lanes.hpp): what a number's comparisons and counts are, and
+/// what they offer.
 template <class F>
 struct number;
 template <>
@@ -133,13 +134,13 @@ GART_HD GART_INLINE float magnitude(float a) { return fabsf(a); }
 GART_HD GART_INLINE float select(bool which, float a, float b) { return which ? a : b; }
 GART_HD GART_INLINE u32 select(bool which, u32 a, u32 b) { return which ? a : b; }
 
-// x 2^n, where `biased` is n + 1.5 * 2^23.
+/// x 2^n, where `biased` is n + 1.5 * 2^23.
 GART_HD GART_INLINE float scale_by_power(float x, float biased) {
   return mul(x, bits_to_float((float_to_bits(biased) + 127u) << 23));
 }
 
-// exp(x) for x in [-87, 88]: Cody-Waite reduction and a polynomial of degree 6, the same operations on every policy.
-// Below -87 it is 0. Relative error under 2 ulp (tests/math).
+/// exp(x) for x in [-87, 88]: Cody-Waite reduction and a polynomial of degree 6, the same operations on every policy.
+/// Below -87 it is 0. Relative error under 2 ulp (tests/math).
 template <class F>
 GART_HD GART_INLINE F exponential_of(F x) {
   F const shift = 12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer in the low mantissa bits
@@ -158,8 +159,8 @@ GART_HD GART_INLINE F exponential_of(F x) {
 }
 GART_HD GART_INLINE float exponential(float x) { return exponential_of(x); }
 
-// ln(x) for positive normal x: mantissa in [sqrt(1/2), sqrt(2)) and a polynomial, the same operations on every policy.
-// Relative error under 2 ulp away from 1 (tests/math).
+/// ln(x) for positive normal x: mantissa in [sqrt(1/2), sqrt(2)) and a polynomial, the same operations on every policy.
+/// Relative error under 2 ulp away from 1 (tests/math).
 GART_HD GART_INLINE float logarithm(float x) {
   u32 const bits = float_to_bits(x) - 0x3f3504f3u;
   float const e = static_cast<float>(static_cast<int>(bits) >> 23);

@@ -1,12 +1,13 @@
 #pragma once
-// Front-to-back compositing of one hit: C += T alpha c,  D += T alpha t,  T *= 1 - alpha.
+/// \file
+/// Front-to-back compositing of one hit: C += T alpha c,  D += T alpha t,  T *= 1 - alpha.
 
 #include <gart/core/macros.hpp>
 #include <gart/math/glm.hpp>
 
 namespace gart::inline GART_ISA {
 
-// Adds a hit of colour c to a ray, or to one a lane; returns its weight T alpha.
+/// Adds a hit of colour c to a ray, or to one a lane; returns its weight T alpha.
 template <class F>
 GART_HD GART_INLINE F blend(F alpha, F t, vec3_of<F> const& c, vec3_of<F>& color, F& depth, F& transmittance) {
   F const weight = transmittance * alpha;
@@ -16,8 +17,8 @@ GART_HD GART_INLINE F blend(F alpha, F t, vec3_of<F> const& c, vec3_of<F>& color
   return weight;
 }
 
-// The colour that a ray with these values would have if a hit of colour c were opaque. What the hit's alpha decides is
-// how far the pixel is from it (math/hit_gradient.hpp).
+/// The colour that a ray with these values would have if a hit of colour c were opaque. What the hit's alpha decides is
+/// how far the pixel is from it (math/hit_gradient.hpp).
 template <class F>
 GART_HD GART_INLINE vec3_of<F> opaque_color(vec3_of<F> const& c, vec3_of<F> const& color, F transmittance) {
   return {color.x + transmittance * c.x, color.y + transmittance * c.y, color.z + transmittance * c.z};

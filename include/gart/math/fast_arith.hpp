@@ -1,17 +1,18 @@
 #pragma once
-// The two functions that a hit spends most of its arithmetic on, shorter and less exact: what `arithmetic::fast`
-// (math/response.hpp) is made of. Relative errors, for the arguments of hits (tests/math):
-//   fast_exponential  x in [-87, 0]: 8e-5 on hosts (a cubic), 2^-21 (1 + |x| / 2) on a device (__expf)
-//   fast_reciprocal   2^-23 on a device (rcp.approx); on hosts the exact one, as an estimate with the Newton step it
-//                     needs takes no less time
-// The same bits in the forward and backward pass and for every tracer of one policy, not between policies.
+/// \file
+/// The two functions that a hit spends most of its arithmetic on, shorter and less exact: what `arithmetic::fast`
+/// (math/response.hpp) is made of. Relative errors, for the arguments of hits (tests/math):
+///   fast_exponential  x in [-87, 0]: 8e-5 on hosts (a cubic), 2^-21 (1 + |x| / 2) on a device (__expf)
+///   fast_reciprocal   2^-23 on a device (rcp.approx); on hosts the exact one, as an estimate with the Newton step it
+///                     needs takes no less time
+/// The same bits in the forward and backward pass and for every tracer of one policy, not between policies.
 
 #include <gart/math/arith.hpp>
 #include <gart/math/lanes.hpp>
 
 namespace gart::inline GART_ISA {
 
-// 2^n 2^f, n the nearest integer to x / ln 2, 2^f by a cubic that is least in relative error on [-1/2, 1/2].
+/// 2^n 2^f, n the nearest integer to x / ln 2, 2^f by a cubic that is least in relative error on [-1/2, 1/2].
 template <class F>
 GART_HD GART_INLINE F fast_exponential(F x) {
 #if defined(__CUDA_ARCH__)

@@ -1,16 +1,18 @@
 #pragma once
-// Where on the image a Gaussian can be hit: its ellipsoid |p|^2 <= cutoff, which the bounds of a camera are of
-// (camera/model.hpp), and the perspective-correct bounds of one for a pinhole.
-//
-// In camera space the ellipsoid is m + A s, |s| <= 1, A = c W R S with c^2 the cutoff and rows A_x, A_y, A_z. Planes
-// x = u z through the camera touch it where (m_x - u m_z)^2 = |A_x - u A_z|^2, a quadratic in u: the roots are the
-// bounds of x / z when the ellipsoid lies in front of the camera (the paper's centre p and half-extent h in another
-// form). When it crosses the near plane z = n only the part in front counts: a root is a bound if it touches at z >= n,
-// and the section with the near plane, an ellipse, gives the others. So a Gaussian beside the camera, or around it,
-// gets the box of what can be seen of it, never more than the section demands.
-//
-// All in double: the quadratic of a small far ellipsoid cancels to a few digits in float. Then widened by what float
-// arithmetic can move a hit (32 roundings of the distance) and a hundredth of a pixel: no pixel that hits lies outside.
+/// \file
+/// Where on the image a Gaussian can be hit: its ellipsoid |p|^2 <= cutoff, which the bounds of a camera are of
+/// (camera/model.hpp), and the perspective-correct bounds of one for a pinhole.
+///
+/// In camera space the ellipsoid is m + A s, |s| <= 1, A = c W R S with c^2 the cutoff and rows A_x, A_y, A_z. Planes
+/// x = u z through the camera touch it where (m_x - u m_z)^2 = |A_x - u A_z|^2, a quadratic in u: the roots are the
+/// bounds of x / z when the ellipsoid lies in front of the camera (the paper's centre p and half-extent h in another
+/// form). When it crosses the near plane z = n only the part in front counts: a root is a bound if it touches at z >=
+/// n, and the section with the near plane, an ellipse, gives the others. So a Gaussian beside the camera, or around it,
+/// gets the box of what can be seen of it, never more than the section demands.
+///
+/// All in double: the quadratic of a small far ellipsoid cancels to a few digits in float. Then widened by what float
+/// arithmetic can move a hit (32 roundings of the distance) and a hundredth of a pixel: no pixel that hits lies
+/// outside.
 
 #include <gart/math/ray_gaussian.hpp>
 
@@ -18,7 +20,7 @@
 
 namespace gart::inline GART_ISA {
 
-// Half-open: pixels x0 <= x < x1, y0 <= y < y1. Images go to 65535 a side.
+/// Half-open: pixels x0 <= x < x1, y0 <= y < y1. Images go to 65535 a side.
 struct pixel_box {
   u16 x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   GART_HD constexpr bool empty() const { return x1 <= x0 || y1 <= y0; }
@@ -29,19 +31,19 @@ struct pixel_box {
 
 struct footprint {
   pixel_box box;
-  float depth = 0;  // no hit has a smaller one, along what its camera measures depth: conservative near depth
+  float depth = 0;  ///< no hit has a smaller one, along what its camera measures depth: conservative near depth
 };
 
-// How far float arithmetic may move a hit, by the distance: 32 roundings.
+/// How far float arithmetic may move a hit, by the distance: 32 roundings.
 inline constexpr double rounding_of_hits = 4e-6;
 
-// m + A s, |s| <= 1, in world axes; m relative to the camera's centre.
+/// m + A s, |s| <= 1, in world axes; m relative to the camera's centre.
 struct ellipsoid {
   vec3d center;
   mat3d axes;
 };
 
-// Where the Gaussian can be hit: A = c R S, c^2 the cutoff. False where nowhere.
+/// Where the Gaussian can be hit: A = c R S, c^2 the cutoff. False where nowhere.
 template <class Response = generalized_gaussian<>>
 GART_HD inline bool ellipsoid_of(gaussian_parameters const& g, vec3d const& frame, float alpha_min, ellipsoid& out) {
   float const cutoff = hit_cutoff<Response>(g, alpha_min);
@@ -54,7 +56,7 @@ GART_HD inline bool ellipsoid_of(gaussian_parameters const& g, vec3d const& fram
   return true;
 }
 
-// By the bounds of a camera model.
+/// By the bounds of a camera model.
 template <class Response = generalized_gaussian<>, class Bounds>
 GART_HD inline footprint footprint_of(Bounds const& bounds, gaussian_parameters const& g, vec3d const& frame,
                                       float alpha_min) {
@@ -62,7 +64,7 @@ GART_HD inline footprint footprint_of(Bounds const& bounds, gaussian_parameters 
   return ellipsoid_of<Response>(g, frame, alpha_min, e) ? bounds(e) : footprint{};
 }
 
-// No hit at t > near is nearer to the camera's centre: the ellipsoid lies beyond the plane across its own direction.
+/// No hit at t > near is nearer to the camera's centre: the ellipsoid lies beyond the plane across its own direction.
 GART_HD inline float least_distance(ellipsoid const& e, float near) {
   vec3d const& m = e.center;
   double const distance = sqrt(m.x * m.x + m.y * m.y + m.z * m.z);
@@ -77,12 +79,12 @@ GART_HD inline float least_distance(ellipsoid const& e, float near) {
   return static_cast<float>((least > near ? least : near) * (1 - 1e-6));
 }
 
-// The pinhole a footprint is for.
+/// The pinhole a footprint is for.
 struct footprint_view {
-  mat3d to_camera;  // world to camera rotation
+  mat3d to_camera;  ///< world to camera rotation
   double fx, fy, cx, cy;
   int width, height;
-  double near;  // smallest z of a hit: the ray's near distance times the least cosine of a pixel
+  double near;  ///< smallest z of a hit: the ray's near distance times the least cosine of a pixel
 };
 
 namespace detail {
@@ -142,14 +144,14 @@ GART_HD inline u16 first_pixel(double edge, int size) {
 
 }  // namespace detail
 
-// Bounds in slopes x / z and y / z, with the error to widen them by.
+/// Bounds in slopes x / z and y / z, with the error to widen them by.
 struct slope_box {
   detail::interval u, w;
   double error = 0;
   bool visible = false;
 };
 
-// Sets the footprint's depth only.
+/// Sets the footprint's depth only.
 GART_HD inline footprint project(footprint_view const& v, ellipsoid const& e, slope_box& s) {
   footprint out;
   vec3d const& center = e.center;

@@ -1,5 +1,6 @@
 #pragma once
-// The only place that includes GLM: vectors and matrices, column-major, for host and device.
+/// \file
+/// The only place that includes GLM: vectors and matrices, column-major, for host and device.
 
 #if defined(__CUDACC__)
 #include <cuda.h>  // GLM's CUDA support is an #error unless this comes first
@@ -20,7 +21,7 @@ using vec4 = glm::vec4;
 template <class F>
 using vec3_of = glm::vec<3, F, glm::defaultp>;
 using vec3d = glm::dvec3;
-using mat3 = glm::mat3;  // m[column][row]
+using mat3 = glm::mat3;  ///< m[column][row]
 using mat3d = glm::dmat3;
 
 }  // namespace gart

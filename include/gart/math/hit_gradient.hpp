@@ -1,17 +1,18 @@
 #pragma once
-// Gradients of one hit and of one Gaussian: the only gradient code of the renderer.
-//
-// With w = T alpha, a hit of colour c adds w c to its ray and leaves T (1 - alpha). With L the colour before the hit
-// and V = L + T c the colour the pixel would have if the hit were opaque, C the colour it has, and g the image
-// gradient,
-//   C = alpha V + (1 - alpha) (the colour without the hit),   dL/dalpha = (V - C).g / (1 - alpha),   dL/dc = w g.
-// alpha = sigma rho(|p|^2), so with a = alpha dL/dalpha and b = a times the slope of ln rho (math/response.hpp; b = a
-// for a Gaussian) the geometry needs only ten sums over the hits, the moments, all in the Gaussian's own space:
-//   m0 = sum a,  m1 = sum b p,  m2 = sum b p p^T
-//   dL/d logit = sigmoid(-logit) m0      dL/d mean = M^T m1           dL/d log s_k = m2_kk
-//   dL/d rotation (body frame)_i = m2_jk (s_j / s_k - s_k / s_j), (i, j, k) cyclic
-// for x = mean + R S p is the point of largest response and dL/dM = -(sum b p p^T)(R S)^T. Where a clamp is active
-// (alpha at alpha_max, a colour at 0) the derivative through it is zero.
+/// \file
+/// Gradients of one hit and of one Gaussian: the only gradient code of the renderer.
+///
+/// With w = T alpha, a hit of colour c adds w c to its ray and leaves T (1 - alpha). With L the colour before the hit
+/// and V = L + T c the colour the pixel would have if the hit were opaque, C the colour it has, and g the image
+/// gradient,
+///   C = alpha V + (1 - alpha) (the colour without the hit),   dL/dalpha = (V - C).g / (1 - alpha),   dL/dc = w g.
+/// alpha = sigma rho(|p|^2), so with a = alpha dL/dalpha and b = a times the slope of ln rho (math/response.hpp; b = a
+/// for a Gaussian) the geometry needs only ten sums over the hits, the moments, all in the Gaussian's own space:
+///   m0 = sum a,  m1 = sum b p,  m2 = sum b p p^T
+///   dL/d logit = sigmoid(-logit) m0      dL/d mean = M^T m1           dL/d log s_k = m2_kk
+///   dL/d rotation (body frame)_i = m2_jk (s_j / s_k - s_k / s_j), (i, j, k) cyclic
+/// for x = mean + R S p is the point of largest response and dL/dM = -(sum b p p^T)(R S)^T. Where a clamp is active
+/// (alpha at alpha_max, a colour at 0) the derivative through it is zero.
 
 #include <gart/math/quaternion.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -19,9 +20,9 @@
 
 namespace gart::inline GART_ISA {
 
-// The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy; then the error that is seen through the
-// Gaussian, the sum over its hits of w times the pixel's error, by which densification finds where more are needed; and
-// one of padding (16-byte words).
+/// The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy; then the error that is seen through the
+/// Gaussian, the sum over its hits of w times the pixel's error, by which densification finds where more are needed;
+/// and one of padding (16-byte words).
 inline constexpr int moment_count = 11;
 inline constexpr int error_place = 10;
 inline constexpr int moment_stride = 12;
@@ -31,20 +32,20 @@ struct moments_of {
   F v[moment_stride];
 };
 
-// dL/dalpha of a hit: V.g and C.g.
+/// dL/dalpha of a hit: V.g and C.g.
 template <class F>
 GART_HD GART_INLINE F alpha_gradient(F opaque_g, F color_g, F alpha) {
   return (opaque_g - color_g) * fast_reciprocal(F(1.0f) - alpha);
 }
 
-// The front-to-back walk of a ray's gradient.
+/// The front-to-back walk of a ray's gradient.
 struct ray_gradient {
-  vec3 g;           // dL/d colour of the pixel
-  float color_g;    // C.g, the background in it
-  float front = 0;  // L.g
+  vec3 g;           ///< dL/d colour of the pixel
+  float color_g;    ///< C.g, the background in it
+  float front = 0;  ///< L.g
   float transmittance = 1;
 
-  // dL/dalpha of the hit; moves past it. `weight` returns w.
+  /// dL/dalpha of the hit; moves past it. `weight` returns w.
   GART_HD GART_INLINE float pass(float alpha, vec3 color, float& weight) {
     float const cg = color.x * g.x + color.y * g.y + color.z * g.z;
     float const gradient = alpha_gradient(front + transmittance * cg, color_g, alpha);
@@ -55,7 +56,7 @@ struct ray_gradient {
   }
 };
 
-// What a hit adds to the moments; zeros where `hit` is false, whatever the rest is then.
+/// What a hit adds to the moments; zeros where `hit` is false, whatever the rest is then.
 template <class Response = generalized_gaussian<>, class F, class Mask>
 GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, ray_peak_of<F> const& r, F alpha_gradient,
                                               Mask hit) {
@@ -79,7 +80,7 @@ struct geometry_gradient {
   float opacity;
 };
 
-// From the sums over all hits to the stored parameters.
+/// From the sums over all hits to the stored parameters.
 GART_HD GART_INLINE geometry_gradient from_moments(float const* m, gaussian_parameters const& p,
                                                    ray_gaussian const& g) {
   geometry_gradient out;
@@ -106,7 +107,7 @@ GART_HD GART_INLINE geometry_gradient from_moments(float const* m, gaussian_para
   return out;
 }
 
-// A colour channel passes its gradient where it is not clamped at zero.
+/// A colour channel passes its gradient where it is not clamped at zero.
 GART_HD GART_INLINE vec3 color_gradient_of(vec3 unclamped, vec3 g, float weight) {
   return {shows(unclamped.x) ? weight * g.x : 0.0f, shows(unclamped.y) ? weight * g.y : 0.0f,
           shows(unclamped.z) ? weight * g.z : 0.0f};

@@ -1,11 +1,12 @@
 #pragma once
-// Several floats at a time, one a lane, for the host policies: the formulas of math/ are templates over the number, and
-// give a lane the bits they give a float. As many lanes as the widest registers of the instruction set that is compiled
-// for hold: 16, 8 or 4 (core/isa.hpp has the one with 16).
-//
-// A comparison gives a lane_mask, one bit a lane where the machine has such registers, else all bits of a lane set or
-// none; select takes the place of ?:. The vectors are the compiler's (GCC, Clang); intrinsics stand only where the
-// language has no word: masks, fused multiply-add, and the transposition of four numbers a lane.
+/// \file
+/// Several floats at a time, one a lane, for the host policies: the formulas of math/ are templates over the number,
+/// and give a lane the bits they give a float. As many lanes as the widest registers of the instruction set that is
+/// compiled for hold: 16, 8 or 4 (core/isa.hpp has the one with 16).
+///
+/// A comparison gives a lane_mask, one bit a lane where the machine has such registers, else all bits of a lane set or
+/// none; select takes the place of ?:. The vectors are the compiler's (GCC, Clang); intrinsics stand only where the
+/// language has no word: masks, fused multiply-add, and the transposition of four numbers a lane.
 
 #include <gart/math/arith.hpp>
 
@@ -57,7 +58,7 @@ struct lanes {
   vector v;
 
   lanes() = default;
-  GART_INLINE lanes(float x) : v(x - vector{}) {}  // x - 0 keeps the sign of a zero
+  GART_INLINE lanes(float x) : v(x - vector{}) {}  ///< x - 0 keeps the sign of a zero
   GART_INLINE lanes(vector x) : v(x) {}
 
   GART_INLINE friend lanes operator+(lanes a, lanes b) { return a.v + b.v; }
@@ -107,16 +108,16 @@ GART_INLINE lane_words select(lane_mask m, lane_words a, lane_words b) {
 }
 GART_INLINE lane_mask equal(lane_words a, lane_words b) { return {_mm512_cmpeq_epi32_mask((__m512i)a, (__m512i)b)}; }
 GART_INLINE lane_mask at_most(lane_words a, lane_words b) { return {_mm512_cmple_epu32_mask((__m512i)a, (__m512i)b)}; }
-GART_INLINE lane_mask negative(lanes a) { return {_mm512_movepi32_mask((__m512i)a.v)}; }  // -0 too
+GART_INLINE lane_mask negative(lanes a) { return {_mm512_movepi32_mask((__m512i)a.v)}; }  ///< -0 too
 #else
 GART_INLINE lanes select(lane_mask m, lanes a, lanes b) { return m.m ? a.v : b.v; }
 GART_INLINE lane_words select(lane_mask m, lane_words a, lane_words b) { return m.m ? a : b; }
 GART_INLINE lane_mask equal(lane_words a, lane_words b) { return {(lane_ints)(a == b)}; }
 GART_INLINE lane_mask at_most(lane_words a, lane_words b) { return {(lane_ints)(a <= b)}; }
-GART_INLINE lane_mask negative(lanes a) { return {(lane_ints)a.v < 0}; }  // -0 too
+GART_INLINE lane_mask negative(lanes a) { return {(lane_ints)a.v < 0}; }  ///< -0 too
 #endif
 
-// Bit l is lane l.
+/// Bit l is lane l.
 GART_INLINE u32 bits_of(lane_mask m) {
 #if defined(GART_LANES_AVX512)
   return m.m;
@@ -139,7 +140,7 @@ GART_INLINE lane_mask lanes_of(u32 bits) {
 }
 GART_INLINE bool any(lane_mask m) { return bits_of(m) != 0; }
 
-// out[k]: the sum of all lanes of a[k]; zeros from N on.
+/// out[k]: the sum of all lanes of a[k]; zeros from N on.
 template <int N>
 GART_INLINE void sums_of(lanes const (&a)[N], float (&out)[16]) {
   static_assert(N <= 16);
@@ -172,7 +173,7 @@ GART_INLINE void sums_of(lanes const (&a)[N], float (&out)[16]) {
 #endif
 }
 
-// a[0] b[0] c[0] a[1] and so on: the first n of them, at most three times the lanes.
+/// a[0] b[0] c[0] a[1] and so on: the first n of them, at most three times the lanes.
 GART_INLINE void write_in_turns(float* out, int n, lanes a, lanes b, lanes c) {
 #if defined(GART_LANES_AVX512)
   struct table {
@@ -202,8 +203,8 @@ GART_INLINE void write_in_turns(float* out, int n, lanes a, lanes b, lanes c) {
 #endif
 }
 
-// Four numbers a lane, where they lie together in memory: lanes 4 r to 4 r + 3 one after another from
-// `first` + r `stride` (in floats). Lanes that are not in the mask are not touched, and read as zeros.
+/// Four numbers a lane, where they lie together in memory: lanes 4 r to 4 r + 3 one after another from
+/// `first` + r `stride` (in floats). Lanes that are not in the mask are not touched, and read as zeros.
 #if defined(GART_LANES_AVX512)
 namespace detail {
 // Each of the 4 lanes of a row, four times: a bit a float.
@@ -266,12 +267,12 @@ GART_INLINE void read_fours(float const* first, std::ptrdiff_t stride, lane_mask
 }
 #endif
 
-// Hides the latency of memory: asks for what will be read, or written, some time before.
+/// Hides the latency of memory: asks for what will be read, or written, some time before.
 GART_INLINE void prefetch(void const* p) { __builtin_prefetch(p); }
-GART_INLINE void prefetch_to_l2(void const* p) { __builtin_prefetch(p, 0, 2); }  // for much at a time
+GART_INLINE void prefetch_to_l2(void const* p) { __builtin_prefetch(p, 0, 2); }  ///< for much at a time
 GART_INLINE void prefetch_to_write(void const* p) { __builtin_prefetch(p, 1); }
 
-// The arithmetic of arith.hpp.
+/// The arithmetic of arith.hpp.
 GART_INLINE lanes mul(lanes a, lanes b) { return a * b; }
 GART_INLINE lanes add(lanes a, lanes b) { return a + b; }
 GART_INLINE lanes divide(lanes a, lanes b) { return a / b; }

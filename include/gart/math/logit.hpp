@@ -1,6 +1,7 @@
 #pragma once
-// Opacities as they are stored, logits, and as they are: sigmoid(x) = 1 / (1 + exp(-x)), logit(p) = ln(p / (1 - p)).
-// The float's arithmetic is fixed (math/arith.hpp), because opacities decide hits; the double's is the platform's.
+/// \file
+/// Opacities as they are stored, logits, and as they are: sigmoid(x) = 1 / (1 + exp(-x)), logit(p) = ln(p / (1 - p)).
+/// The float's arithmetic is fixed (math/arith.hpp), because opacities decide hits; the double's is the platform's.
 
 #include <gart/math/arith.hpp>
 

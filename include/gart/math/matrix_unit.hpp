@@ -1,13 +1,14 @@
 #pragma once
-// Products of small matrices by a GPU's matrix units, from floats to floats. A unit takes numbers of 11 significant
-// bits (tf32); a float is the sum of two such and of less than 2^-20 of it, and of the four products of two such sums
-// the least is left out. So a product is within 2^-19 of itself, as good as one of floats where many are summed.
-//
-// A warp multiplies together: with `row` = lane / 4 and `column` = lane % 4, a lane holds
-//   a  16 x 8, elements (row, column), (row + 8, column), (row, column + 4), (row + 8, column + 4)
-//   b   8 x 8, elements (column, row), (column + 4, row)
-//   d  16 x 8, elements (row, 2 column), (row, 2 column + 1), (row + 8, 2 column), (row + 8, 2 column + 1)
-// (PTX ISA, mma.m16n8k8).
+/// \file
+/// Products of small matrices by a GPU's matrix units, from floats to floats. A unit takes numbers of 11 significant
+/// bits (tf32); a float is the sum of two such and of less than 2^-20 of it, and of the four products of two such sums
+/// the least is left out. So a product is within 2^-19 of itself, as good as one of floats where many are summed.
+///
+/// A warp multiplies together: with `row` = lane / 4 and `column` = lane % 4, a lane holds
+///   a  16 x 8, elements (row, column), (row + 8, column), (row, column + 4), (row + 8, column + 4)
+///   b   8 x 8, elements (column, row), (column + 4, row)
+///   d  16 x 8, elements (row, 2 column), (row, 2 column + 1), (row + 8, 2 column), (row + 8, 2 column + 1)
+/// (PTX ISA, mma.m16n8k8).
 
 #include <gart/math/arith.hpp>
 
@@ -15,7 +16,7 @@
 
 namespace gart::inline GART_ISA {
 
-// A lane's N elements of a matrix.
+/// A lane's N elements of a matrix.
 template <int N>
 struct matrix_part {
   struct alignas(4 * N) words {
@@ -37,7 +38,7 @@ struct matrix_part {
   static constexpr u32 kept = 0xffffe000u;
 };
 
-// d += a b
+/// d += a b
 __device__ GART_INLINE void multiply_add(float (&d)[4], matrix_part<4> const& a, matrix_part<2> const& b) {
   auto const add = [&](matrix_part<4>::words const& x, matrix_part<2>::words const& y) {
 #if defined(__CUDA_ARCH__)

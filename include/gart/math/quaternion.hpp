@@ -1,5 +1,6 @@
 #pragma once
-// Rotations as quaternions w, x, y, z of any norm.
+/// \file
+/// Rotations as quaternions w, x, y, z of any norm.
 
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
@@ -14,10 +15,10 @@ GART_HD GART_INLINE float norm2(quaternion const& q) {
   return fma(q.w, q.w, fma(q.x, q.x, fma(q.y, q.y, mul(q.z, q.z))));
 }
 
-// Below this square of the norm a quaternion has no direction in float: its Gaussian is culled.
+/// Below this square of the norm a quaternion has no direction in float: its Gaussian is culled.
 inline constexpr float quaternion_norm2_min = 1e-8f;
 
-// The rotation of the quaternion divided by its norm; columns are the images of the axes.
+/// The rotation of the quaternion divided by its norm; columns are the images of the axes.
 GART_HD GART_INLINE mat3 to_matrix(quaternion const& q) {
   float const s = divide(2.0f, norm2(q));
   float const xx = mul(mul(q.x, q.x), s), yy = mul(mul(q.y, q.y), s), zz = mul(mul(q.z, q.z), s);
@@ -30,8 +31,8 @@ GART_HD GART_INLINE mat3 to_matrix(quaternion const& q) {
   return r;
 }
 
-// Gradient with respect to the raw quaternion of a function whose gradient with respect to a small rotation w in the
-// body's frame (R exp([w]x)) is `body`: 2 q (0, body) / |q|, with q normalised. It has no part along q.
+/// Gradient with respect to the raw quaternion of a function whose gradient with respect to a small rotation w in the
+/// body's frame (R exp([w]x)) is `body`: 2 q (0, body) / |q|, with q normalised. It has no part along q.
 GART_HD GART_INLINE quaternion pull_back(quaternion const& q, vec3 body) {
   float const s = 2.0f / norm2(q);  // one 1/|q| to normalise q, one through the normalisation
   return {s * (-q.x * body.x - q.y * body.y - q.z * body.z), s * (q.w * body.x + q.y * body.z - q.z * body.y),

@@ -1,20 +1,21 @@
 #pragma once
-// A Gaussian as a ray meets it. In the Gaussian's own space (unit sphere, axes of the ellipsoid) a ray o + t d is
-//   o_g = M (o - mu),  d_g = M d,  M = S^-1 R^T;
-// the response is largest at t = -o_g.d_g / d_g.d_g, where p = o_g + t d_g is the offset from the centre; there it is
-// rho(|p|^2), for a Gaussian exp(-|p|^2 / 2), of the Response that the scene is made of (math/response.hpp). The ray
-// hits where sigma * rho >= alpha_min, that is where |p|^2 is at most the cutoff, 2 ln(sigma / alpha_min) for a
-// Gaussian, and t > near.
-//
-// The offset is not computed from t. A rounding of t moves the point along the ray by 6e-8 of |o_g|, the distance over
-// the thinnest axis, which may be 1e8 and more. With c = o_g x d_g, which is the same from any point of the ray,
-//   |p|^2 = |c|^2 / |d_g|^2,   p = d_g x c / |d_g|^2,
-// and each product of c is off by a rounding of the distance over the axes that it is of: in the world the point stays
-// within a few roundings of the distance, however thin the Gaussian, as the ray itself does.
-//
-// Everything is relative to a frame, a point of the world held in double (the camera's centre for primary rays): mu is
-// subtracted from it in double, so that scenes far from the origin lose nothing. This file is the only place that
-// decides what is a hit, at which t and with which alpha; its arithmetic is fixed (arith.hpp).
+/// \file
+/// A Gaussian as a ray meets it. In the Gaussian's own space (unit sphere, axes of the ellipsoid) a ray o + t d is
+///   o_g = M (o - mu),  d_g = M d,  M = S^-1 R^T;
+/// the response is largest at t = -o_g.d_g / d_g.d_g, where p = o_g + t d_g is the offset from the centre; there it is
+/// rho(|p|^2), for a Gaussian exp(-|p|^2 / 2), of the Response that the scene is made of (math/response.hpp). The ray
+/// hits where sigma * rho >= alpha_min, that is where |p|^2 is at most the cutoff, 2 ln(sigma / alpha_min) for a
+/// Gaussian, and t > near.
+///
+/// The offset is not computed from t. A rounding of t moves the point along the ray by 6e-8 of |o_g|, the distance over
+/// the thinnest axis, which may be 1e8 and more. With c = o_g x d_g, which is the same from any point of the ray,
+///   |p|^2 = |c|^2 / |d_g|^2,   p = d_g x c / |d_g|^2,
+/// and each product of c is off by a rounding of the distance over the axes that it is of: in the world the point stays
+/// within a few roundings of the distance, however thin the Gaussian, as the ray itself does.
+///
+/// Everything is relative to a frame, a point of the world held in double (the camera's centre for primary rays): mu is
+/// subtracted from it in double, so that scenes far from the origin lose nothing. This file is the only place that
+/// decides what is a hit, at which t and with which alpha; its arithmetic is fixed (arith.hpp).
 
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
@@ -28,49 +29,49 @@ namespace gart::inline GART_ISA {
 
 inline constexpr float alpha_max = 0.99f;
 
-// From the frame's origin: what a camera casts.
+/// From the frame's origin: what a camera casts.
 template <class F>
 struct primary_ray_of {
-  vec3_of<F> direction;  // unit
+  vec3_of<F> direction;  ///< unit
 };
 using primary_ray = primary_ray_of<float>;
 
-// From anywhere; `origin` relative to the frame.
+/// From anywhere; `origin` relative to the frame.
 struct ray {
   vec3 origin;
-  vec3 direction;  // unit
+  vec3 direction;  ///< unit
 };
 
 GART_HD constexpr vec3 origin_of(primary_ray const&) { return vec3(0.0f); }
 GART_HD constexpr vec3 origin_of(ray const& r) { return r.origin; }
 
-// One Gaussian in one frame, 64 bytes, loaded as four 16-byte words.
+/// One Gaussian in one frame, 64 bytes, loaded as four 16-byte words.
 struct alignas(16) ray_gaussian {
   struct alignas(16) row {
-    float x, y, z;  // of M
-    float o;        // of M (frame - mu)
+    float x, y, z;  ///< of M
+    float o;        ///< of M (frame - mu)
   };
   row m[3];
-  float cutoff = -1;  // largest |p|^2 of a hit; negative: culled, never a hit
+  float cutoff = -1;  ///< largest |p|^2 of a hit; negative: culled, never a hit
   float sigma = 0;
   float unused[2] = {0, 0};
 };
 
-// The parameters of one Gaussian as stored.
+/// The parameters of one Gaussian as stored.
 struct gaussian_parameters {
   vec3 mean;
   vec3 log_scale;
   quaternion rotation;
-  float opacity;  // logit
+  float opacity;  ///< logit
 };
 
-// The mean in the frame.
+/// The mean in the frame.
 GART_HD GART_INLINE vec3 relative_mean(vec3 const& mean, vec3d const& frame) {
   return {static_cast<float>(mean.x - frame.x), static_cast<float>(mean.y - frame.y),
           static_cast<float>(mean.z - frame.z)};
 }
 
-// False where the parameters are not finite or make no ellipsoid in float.
+/// False where the parameters are not finite or make no ellipsoid in float.
 GART_HD GART_INLINE bool is_gaussian(gaussian_parameters const& g) {
   return is_finite(g.mean.x) && is_finite(g.mean.y) && is_finite(g.mean.z) && is_finite(g.opacity) &&
          is_finite(norm2(g.rotation)) && norm2(g.rotation) > quaternion_norm2_min && g.log_scale.x > -40.0f &&
@@ -78,7 +79,7 @@ GART_HD GART_INLINE bool is_gaussian(gaussian_parameters const& g) {
          g.log_scale.z < 40.0f;
 }
 
-// Largest |p|^2 of a hit; negative where the Gaussian is never hit (too weak, or its parameters are not finite).
+/// Largest |p|^2 of a hit; negative where the Gaussian is never hit (too weak, or its parameters are not finite).
 template <class Response = generalized_gaussian<>>
 GART_HD GART_INLINE float hit_cutoff(gaussian_parameters const& g, float alpha_min) {
   float const sigma = sigmoid(g.opacity);
@@ -113,13 +114,13 @@ GART_HD GART_INLINE ray_gaussian prepare(gaussian_parameters const& g, vec3d con
   return out;
 }
 
-// Where along a ray the response is largest; of one ray, or of one a lane.
+/// Where along a ray the response is largest; of one ray, or of one a lane.
 template <class F>
 struct ray_peak_of {
-  F t;           // distance of the largest response along the ray
-  F d2;          // |p|^2 there
-  vec3_of<F> c;  // o_g x d_g / |d_g|^2
-  vec3_of<F> d;  // d_g
+  F t;           ///< distance of the largest response along the ray
+  F d2;          ///< |p|^2 there
+  vec3_of<F> c;  ///< o_g x d_g / |d_g|^2
+  vec3_of<F> d;  ///< d_g
 };
 using ray_peak = ray_peak_of<float>;
 
@@ -136,7 +137,7 @@ GART_HD GART_INLINE vec3_of<F> cross_product(vec3_of<F> const& a, vec3_of<F> con
   return {fma(a.y, b.z, -mul(a.z, b.y)), fma(a.z, b.x, -mul(a.x, b.z)), fma(a.x, b.y, -mul(a.y, b.x))};
 }
 
-// A ray in the Gaussian's own space, before the division.
+/// A ray in the Gaussian's own space, before the division.
 template <class F>
 struct approach_of {
   vec3_of<F> c, d;
@@ -163,7 +164,7 @@ GART_HD GART_INLINE auto approach_to(ray_gaussian const& g, Ray const& r) {
   return a;
 }
 
-// inverse: 1 / a.dd
+/// inverse: 1 / a.dd
 template <class F>
 GART_HD GART_INLINE ray_peak_of<F> ray_peak_of_approach(approach_of<F> const& a, F inverse) {
   ray_peak_of<F> out;
@@ -180,7 +181,7 @@ GART_HD GART_INLINE auto evaluate(ray_gaussian const& g, Ray const& r) {
   return ray_peak_of_approach(a, Response::reciprocal(a.dd));
 }
 
-// N at once, interleaved to hide the latency of each one's chain of steps. `of(i)` is the i-th approach.
+/// N at once, interleaved to hide the latency of each one's chain of steps. `of(i)` is the i-th approach.
 template <class Response, int N, class F>
 GART_HD GART_INLINE void evaluate_all(ray_peak (&out)[N], F&& of) {
   approach a[N];
@@ -192,20 +193,20 @@ GART_HD GART_INLINE void evaluate_all(ray_peak (&out)[N], F&& of) {
   for (int i = 0; i < N; ++i) out[i] = ray_peak_of_approach(a[i], inverse[i]);
 }
 
-// p, in standard deviations along the Gaussian's axes. Along the thin axis of a pancake it is all but zero, and M
-// magnifies it in the gradients of mean and rotation: the product has its digits, o_g + t d_g has none.
+/// p, in standard deviations along the Gaussian's axes. Along the thin axis of a pancake it is all but zero, and M
+/// magnifies it in the gradients of mean and rotation: the product has its digits, o_g + t d_g has none.
 template <class F>
 GART_HD GART_INLINE vec3_of<F> offset_of(ray_peak_of<F> const& r) {
   return cross_product(r.d, r.c);
 }
 
-// NaN compares false: what cannot be evaluated is no hit.
+/// NaN compares false: what cannot be evaluated is no hit.
 template <class F>
 GART_HD GART_INLINE auto is_hit(ray_gaussian const& g, ray_peak_of<F> const& r, float near) {
   return both(r.d2 <= F(g.cutoff), r.t > F(near));
 }
 
-// Of the squared offset at a hit, r.d2.
+/// Of the squared offset at a hit, r.d2.
 template <class Response = generalized_gaussian<>, class F>
 GART_HD GART_INLINE F unclamped_alpha(ray_gaussian const& g, F d2) {
   return mul(F(g.sigma), Response::response(d2));

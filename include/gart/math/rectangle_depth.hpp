@@ -1,13 +1,15 @@
 #pragma once
-// How near rays from one point can hit a Gaussian where they pass through a parallelogram of a plane: of all points
-// d = u x + v y + z of it, u and v of a rectangle, a lower bound of the factor by which the ray reaches the hit from d.
-// For the axes x, y, z of a camera u and v are slopes, and the factor is the hit's depth in camera space.
-//
-// With rows m_k of M the factor at the largest response is
-//   N / Q,  N = -sum_k o_k (m_k . d),  Q = sum_k (m_k . d)^2.
-// N is linear in u and v and Q convex, so {N >= c Q} is convex for c >= 0: N / Q is quasi-concave where it is positive,
-// and its least value over a rectangle lies at a corner. What rounding can move it, at a corner or at a hit, is taken
-// off N and added to |m_k . d| in a way that leaves the one linear and the other convex: the bound holds for every ray.
+/// \file
+/// How near rays from one point can hit a Gaussian where they pass through a parallelogram of a plane: of all points
+/// d = u x + v y + z of it, u and v of a rectangle, a lower bound of the factor by which the ray reaches the hit from
+/// d. For the axes x, y, z of a camera u and v are slopes, and the factor is the hit's depth in camera space.
+///
+/// With rows m_k of M the factor at the largest response is
+///   N / Q,  N = -sum_k o_k (m_k . d),  Q = sum_k (m_k . d)^2.
+/// N is linear in u and v and Q convex, so {N >= c Q} is convex for c >= 0: N / Q is quasi-concave where it is
+/// positive, and its least value over a rectangle lies at a corner. What rounding can move it, at a corner or at a hit,
+/// is taken off N and added to |m_k . d| in a way that leaves the one linear and the other convex: the bound holds for
+/// every ray.
 
 #include <gart/math/ray_gaussian.hpp>
 
@@ -16,8 +18,8 @@ namespace gart::inline GART_ISA {
 class rectangle_depth {
  public:
   rectangle_depth() = default;
-  // `g`: relative to the point. plane: its columns are x, y and z. reach: at least |u| |x| + |v| |y| + |z| of every
-  // point asked for.
+  /// `g`: relative to the point. plane: its columns are x, y and z. reach: at least |u| |x| + |v| |y| + |z| of every
+  /// point asked for.
   GART_HD rectangle_depth(ray_gaussian const& g, mat3 const& plane, float reach) {
     loss_ = 0;
     for (int k = 0; k < 3; ++k) {
@@ -29,7 +31,7 @@ class rectangle_depth {
     }
   }
 
-  // At most the factor of any hit through [u0, u1] x [v0, v1]; not positive, or NaN, where it says nothing.
+  /// At most the factor of any hit through [u0, u1] x [v0, v1]; not positive, or NaN, where it says nothing.
   GART_HD GART_INLINE float operator()(float u0, float u1, float v0, float v1) const {
     float const a = at(u0, v0), b = at(u1, v0), c = at(u0, v1), d = at(u1, v1);
     float const ab = b < a ? b : a, cd = d < c ? d : c;

@@ -1,23 +1,27 @@
 #pragma once
-// How the response of a Gaussian falls from its centre: the generalised Gaussians of 3DGRT (Moenne-Loccoz et al. 2024),
-//   rho = exp(s |p|^n),  s = -4.5 / 3^n,  n in {1, 2, 3, 4, 5, 8},
-// equal at the centre and at three standard deviations. n = 2 is the Gaussian, a larger n flatter inside and steeper
-// at the rim, so that fewer Gaussians cover a surface and rays meet fewer of them; n = 1 has a cusp at its centre.
-// Everything else that asks for a Response takes one of these types. A response offers, all of the squared distance
-// |p|^2:
-//   response(d2)   rho
-//   cutoff(ratio)  the largest |p|^2 with sigma rho >= alpha_min, ratio = sigma / alpha_min >= 1
-//   slope(d2)      -2 d ln rho / d |p|^2 = n (4.5 / 3^n) |p|^(n-2), what a hit's moments are weighted with
-//                  (math/hit_gradient.hpp); 1 for n = 2
-//   reciprocal(a)  1 / a, for the point of largest response; reciprocals(array) of all its elements
-// All but cutoff and reciprocals take a float or lanes of them. They decide hits: powers by multiplication and square
-// roots, and by Arithmetic
-//   exact  fixed arithmetic (math/arith.hpp), the same bits on every policy; cutoff is within 4e-7 of exact, relatively
-//   fast   shorter exponential and reciprocal (math/fast_arith.hpp) where hits are evaluated, for what they cost: alpha
-//          is within 1e-4 of exact, relatively; forward and backward still agree bit for bit, policies no more
-//
-// The cusp of n = 1: towards the centre the gradient's norm goes to a limit, its direction does not. At |p| = 0, where
-// no direction is given, slope is 0 and with it the gradient of mean, scale and rotation: the mean over all directions.
+/// \file
+/// How the response of a Gaussian falls from its centre: the generalised Gaussians of 3DGRT (Moenne-Loccoz et al.
+/// 2024),
+///   rho = exp(s |p|^n),  s = -4.5 / 3^n,  n in {1, 2, 3, 4, 5, 8},
+/// equal at the centre and at three standard deviations. n = 2 is the Gaussian, a larger n flatter inside and steeper
+/// at the rim, so that fewer Gaussians cover a surface and rays meet fewer of them; n = 1 has a cusp at its centre.
+/// Everything else that asks for a Response takes one of these types. A response offers, all of the squared distance
+/// |p|^2:
+///   response(d2)   rho
+///   cutoff(ratio)  the largest |p|^2 with sigma rho >= alpha_min, ratio = sigma / alpha_min >= 1
+///   slope(d2)      -2 d ln rho / d |p|^2 = n (4.5 / 3^n) |p|^(n-2), what a hit's moments are weighted with
+///                  (math/hit_gradient.hpp); 1 for n = 2
+///   reciprocal(a)  1 / a, for the point of largest response; reciprocals(array) of all its elements
+/// All but cutoff and reciprocals take a float or lanes of them. They decide hits: powers by multiplication and square
+/// roots, and by Arithmetic
+///   exact  fixed arithmetic (math/arith.hpp), the same bits on every policy; cutoff is within 4e-7 of exact,
+///   relatively fast   shorter exponential and reciprocal (math/fast_arith.hpp) where hits are evaluated, for what they
+///          cost: alpha is within 1e-4 of exact, relatively; forward and backward still agree bit for bit, policies no
+///                 more
+///
+/// The cusp of n = 1: towards the centre the gradient's norm goes to a limit, its direction does not. At |p| = 0, where
+/// no direction is given, slope is 0 and with it the gradient of mean, scale and rotation: the mean over all
+/// directions.
 
 #include <gart/math/fast_arith.hpp>
 
@@ -25,7 +29,7 @@
 
 namespace gart::inline GART_ISA {
 
-// What takes the place of generalized_gaussian wherever a Response is asked for.
+/// What takes the place of generalized_gaussian wherever a Response is asked for.
 template <class R>
 concept response_function = requires(float x, float (&several)[2]) {
   { R::degree } -> std::convertible_to<int>;  // of the Gaussians it is, for files and for densification

@@ -1,7 +1,8 @@
 #pragma once
-// Real spherical harmonics to degree 3 with the signs and order of the 3DGS files: colour is
-// max(0, 0.5 + sum_k c_k Y_k(d)), d the unit direction of the ray. A sum that is no finite number is as black as a
-// negative one: one broken Gaussian must not spoil every ray that meets it.
+/// \file
+/// Real spherical harmonics to degree 3 with the signs and order of the 3DGS files: colour is
+/// max(0, 0.5 + sum_k c_k Y_k(d)), d the unit direction of the ray. A sum that is no finite number is as black as a
+/// negative one: one broken Gaussian must not spoil every ray that meets it.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
@@ -11,7 +12,7 @@
 
 namespace gart::inline GART_ISA {
 
-// Of one direction, or of one a lane.
+/// Of one direction, or of one a lane.
 template <int Degree, class F = float>
 struct sh_basis {
   static constexpr int size = (Degree + 1) * (Degree + 1);
@@ -44,11 +45,11 @@ struct sh_basis {
     }
   }
 
-  // Before the clamp at zero.
+  /// Before the clamp at zero.
   GART_HD GART_INLINE vec3_of<F> unclamped(float const (&coefficients)[3 * size]) const {
     return unclamped(coefficients, size);
   }
-  // The first bands alone.
+  /// The first bands alone.
   GART_HD GART_INLINE vec3_of<F> unclamped(float const* coefficients, int bands) const {
     F r = 0.5f, g = 0.5f, b = 0.5f;
     GART_UNROLL
@@ -62,8 +63,9 @@ struct sh_basis {
   }
 };
 
-// The coefficients of one Gaussian, [size][3] from `from`; those above the active degree as zero: a schedule raises the
-// degree while the storage stays, and loops over bands stay straight. Rows of a multiple of 16 bytes are read as such.
+/// The coefficients of one Gaussian, [size][3] from `from`; those above the active degree as zero: a schedule raises
+/// the degree while the storage stays, and loops over bands stay straight. Rows of a multiple of 16 bytes are read as
+/// such.
 template <int Degree>
 struct sh_row {
   static constexpr int floats = 3 * sh_basis<Degree>::size;
@@ -86,13 +88,13 @@ struct sh_row {
   }
 };
 
-// Positive and finite.
+/// Positive and finite.
 template <class F>
 GART_HD GART_INLINE auto shows(F channel) {
   return both(channel > F(0.0f), channel <= F(3.402823466e38f));
 }
 
-// The colour a hit shows.
+/// The colour a hit shows.
 template <class F = float>
 GART_HD GART_INLINE vec3_of<F> clamped_color(vec3_of<F> const& c) {
   F const zero = 0.0f;

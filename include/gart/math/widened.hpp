@@ -1,41 +1,42 @@
 #pragma once
-// A Gaussian as a filter of standard deviation r sees it from the frame's origin: every axis widened by r, the response
-// lowered so that what it covers, seen from there, stays the same.
-//   S'^2 = S^2 + r^2,   sigma' = sigma sqrt(F),   F = prod S^2 d^T C^-1 d / (prod S'^2 d^T C'^-1 d),
-// C = R S^2 R^T the covariance in world axes, d the direction of the mean. For the largest response along rays of
-// direction d is a Gaussian of the plane across d whose covariance is what C leaves there, of determinant
-// det C d^T C^-1 d; a filter adds r^2 to it, and F is the ratio of the determinants, the square of that of the areas.
-// With u the direction in the Gaussian's axes and a_k = s_k^2 / r^2 both are sums of positive terms:
-//   F = N / N',   N = sum u_k^2 a_i a_j,   N' = sum u_k^2 (1 + a_i)(1 + a_j)   ({i, j, k} all three axes).
-// Responses of another degree than 2 keep their own shape, and so what they cover, not the filter's.
-//
-// The result is a gaussian_parameters again, so that whatever takes those (records, boxes, footprints) takes one and
-// the same widened Gaussian; its arithmetic is fixed. Where it would be no Gaussian it is left alone, to be culled.
+/// \file
+/// A Gaussian as a filter of standard deviation r sees it from the frame's origin: every axis widened by r, the
+/// response lowered so that what it covers, seen from there, stays the same.
+///   S'^2 = S^2 + r^2,   sigma' = sigma sqrt(F),   F = prod S^2 d^T C^-1 d / (prod S'^2 d^T C'^-1 d),
+/// C = R S^2 R^T the covariance in world axes, d the direction of the mean. For the largest response along rays of
+/// direction d is a Gaussian of the plane across d whose covariance is what C leaves there, of determinant
+/// det C d^T C^-1 d; a filter adds r^2 to it, and F is the ratio of the determinants, the square of that of the areas.
+/// With u the direction in the Gaussian's axes and a_k = s_k^2 / r^2 both are sums of positive terms:
+///   F = N / N',   N = sum u_k^2 a_i a_j,   N' = sum u_k^2 (1 + a_i)(1 + a_j)   ({i, j, k} all three axes).
+/// Responses of another degree than 2 keep their own shape, and so what they cover, not the filter's.
+///
+/// The result is a gaussian_parameters again, so that whatever takes those (records, boxes, footprints) takes one and
+/// the same widened Gaussian; its arithmetic is fixed. Where it would be no Gaussian it is left alone, to be culled.
 
 #include <gart/math/hit_gradient.hpp>
 
 namespace gart::inline GART_ISA {
 
-// The filter where a Gaussian is: its standard deviation, in world units, and how that changes with the mean.
+/// The filter where a Gaussian is: its standard deviation, in world units, and how that changes with the mean.
 struct filter_at {
   float sigma = 0;
-  vec3 log_slope{0.0f};  // d ln sigma / d mean
+  vec3 log_slope{0.0f};  ///< d ln sigma / d mean
 };
 
-// What the direction of the mean makes of a Gaussian under a filter.
+/// What the direction of the mean makes of a Gaussian under a filter.
 struct filtered_area {
   mat3 rotation;
-  vec3 u;               // unit, towards the mean in the Gaussian's axes
-  vec3 ratio;           // s_k / r
-  vec3 a;               // its square
-  float area, widened;  // N, N'
+  vec3 u;               ///< unit, towards the mean in the Gaussian's axes
+  vec3 ratio;           ///< s_k / r
+  vec3 a;               ///< its square
+  float area, widened;  ///< N, N'
   float inverse_distance;
 };
 
-// Beyond it a filter changes no digit of a scale, and products of three stay in range.
+/// Beyond it a filter changes no digit of a scale, and products of three stay in range.
 inline constexpr float largest_filter_ratio = 1048576.0f;
 
-// False where the filter does nothing: the mean is at the frame's origin, or the parameters are not a Gaussian's.
+/// False where the filter does nothing: the mean is at the frame's origin, or the parameters are not a Gaussian's.
 GART_HD GART_INLINE bool filtered_area_of(gaussian_parameters const& g, vec3 const& mean, float r, filtered_area& out) {
   float const distance2 = fma(mean.x, mean.x, fma(mean.y, mean.y, mul(mean.z, mean.z)));
   if (!is_gaussian(g) || !(distance2 > 1e-30f) || !(r > 1e-30f)) return false;
@@ -58,7 +59,7 @@ GART_HD GART_INLINE bool filtered_area_of(gaussian_parameters const& g, vec3 con
   return true;
 }
 
-// `mean` is relative to the frame.
+/// `mean` is relative to the frame.
 GART_HD GART_INLINE gaussian_parameters widened(gaussian_parameters const& g, vec3 const& mean, float r) {
   filtered_area f;
   if (!filtered_area_of(g, mean, r, f)) return g;
@@ -80,11 +81,11 @@ GART_HD GART_INLINE gaussian_parameters widened(gaussian_parameters const& g, ve
   return out;
 }
 
-// From the gradient of the widened parameters to that of the stored ones; by_log_sigma is dL/d ln sigma', the moment
-// m0. Each may depend on the mean by the direction and by r, on the scales and on the rotation by F:
-//   d ln s'_k / d ln s_k = a_k / (1 + a_k), the rest of 1 is d ln s'_k / d ln r;
-//   1/2 d ln F / d ln s_k = a_k (N_k / N - N'_k / N') = h_k, N_k = dN / da_k;   1/2 d ln F / d ln r = -sum h_k;
-//   1/2 d ln F / d u_k = u_k (a_i a_j / N - (1 + a_i)(1 + a_j) / N') = u_k e_k.
+/// From the gradient of the widened parameters to that of the stored ones; by_log_sigma is dL/d ln sigma', the moment
+/// m0. Each may depend on the mean by the direction and by r, on the scales and on the rotation by F:
+///   d ln s'_k / d ln s_k = a_k / (1 + a_k), the rest of 1 is d ln s'_k / d ln r;
+///   1/2 d ln F / d ln s_k = a_k (N_k / N - N'_k / N') = h_k, N_k = dN / da_k;   1/2 d ln F / d ln r = -sum h_k;
+///   1/2 d ln F / d u_k = u_k (a_i a_j / N - (1 + a_i)(1 + a_j) / N') = u_k e_k.
 GART_HD GART_INLINE geometry_gradient pull_back_widened(geometry_gradient const& by, float by_log_sigma,
                                                         gaussian_parameters const& g, vec3 const& mean,
                                                         filter_at const& filter) {

@@ -1,13 +1,14 @@
 #pragma once
-// Adam (Kingma and Ba, 2015) over every parameter of every Gaussian in one launch, with a rate per group; the colour's
-// constant term has a rate of its own. With g the gradient and t the step, counted from 1,
-//   m = b1 m + (1 - b1) g,  v = b2 v + (1 - b2) g^2,  p -= rate * m / (1 - b1^t) / (sqrt(v / (1 - b2^t)) + epsilon).
-// An element whose gradient (or update) is not finite keeps its value and moments, and is counted. Bound by memory:
-// 28 bytes moved an element.
-//
-// With options.seen_only a Gaussian whose mean has no gradient, one that no ray of the step met, keeps its parameters
-// and moments: 12 bytes of it are read for each of five groups, and none written. Its moments wait until it is seen
-// again instead of fading, and so do penalties on it.
+/// \file
+/// Adam (Kingma and Ba, 2015) over every parameter of every Gaussian in one launch, with a rate per group; the colour's
+/// constant term has a rate of its own. With g the gradient and t the step, counted from 1,
+///   m = b1 m + (1 - b1) g,  v = b2 v + (1 - b2) g^2,  p -= rate * m / (1 - b1^t) / (sqrt(v / (1 - b2^t)) + epsilon).
+/// An element whose gradient (or update) is not finite keeps its value and moments, and is counted. Bound by memory:
+/// 28 bytes moved an element.
+///
+/// With options.seen_only a Gaussian whose mean has no gradient, one that no ray of the step met, keeps its parameters
+/// and moments: 12 bytes of it are read for each of five groups, and none written. Its moments wait until it is seen
+/// again instead of fading, and so do penalties on it.
 
 #include <gart/exec/concepts.hpp>
 #include <gart/math/arith.hpp>
@@ -21,7 +22,7 @@
 
 namespace gart::inline GART_ISA {
 
-// Adam's moments, of the parameters' shape.
+/// Adam's moments, of the parameters' shape.
 template <execution E>
 struct optimizer_state {
   gaussians<E> first, second;
@@ -37,9 +38,9 @@ struct adam_element {
   Number parameter, first, second;
 };
 
-// What a step does to an element. `rate` carries first_correction.
+/// What a step does to an element. `rate` carries first_correction.
 struct adam_rule {
-  float beta1 = 0, beta2 = 0, epsilon = 0, second_correction = 1;  // 1 / sqrt(1 - b2^t)
+  float beta1 = 0, beta2 = 0, epsilon = 0, second_correction = 1;  ///< 1 / sqrt(1 - b2^t)
 
   adam_rule() = default;
   adam_rule(adam_options const& o, int step)
@@ -178,8 +179,8 @@ struct adam_kernel {
 
 }  // namespace detail
 
-// Step `step` (from 1). Coefficients above `active_sh_degree` are left alone. `skipped`, one element or empty, counts
-// up by the elements that were not finite.
+/// Step `step` (from 1). Coefficients above `active_sh_degree` are left alone. `skipped`, one element or empty, counts
+/// up by the elements that were not finite.
 template <execution E>
 void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optimizer_state<E>& state,
                learning_rates const& rates, int step, int active_sh_degree, span<u64> skipped = {},

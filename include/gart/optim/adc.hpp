@@ -1,18 +1,19 @@
 #pragma once
-// Adaptive density control (Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023):
-// Gaussians whose image-space gradient is large on average are cloned (small ones) or split in two (large ones);
-// transparent and oversized ones are removed; opacities are reset now and then.
-//
-// The statistic. 3DGS thresholds the gradient of the loss in the mean's place on the screen, in coordinates -1 to 1.
-// Ray tracing has no such variable, but sideways motion acts through it: with the mean at (x, y, z) in the camera,
-// ndc_x = 2 (fx x / z + cx) / W - 1, so dL/dx = dL/dndc_x * 2 fx / (W z), hence
-//   dL/dndc = (dL/dx * z W / (2 fx), dL/dy * z H / (2 fy)),
-// whose length is added up at every step that gives the Gaussian a gradient; the mean over those steps meets the same
-// threshold as in 3DGS. A Gaussian whose mean is behind the camera adds nothing in that step.
-//
-// Past the budget the largest statistics grow and the rest stay as they are. New Gaussians begin with zero moments.
-// Gaussians that are not finite are removed. A split moves its halves by draws from itself. Cost: one small launch a
-// step; a densification is O(N) with one host read, and holds a second copy of the parameters while it runs.
+/// \file
+/// Adaptive density control (Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023):
+/// Gaussians whose image-space gradient is large on average are cloned (small ones) or split in two (large ones);
+/// transparent and oversized ones are removed; opacities are reset now and then.
+///
+/// The statistic. 3DGS thresholds the gradient of the loss in the mean's place on the screen, in coordinates -1 to 1.
+/// Ray tracing has no such variable, but sideways motion acts through it: with the mean at (x, y, z) in the camera,
+/// ndc_x = 2 (fx x / z + cx) / W - 1, so dL/dx = dL/dndc_x * 2 fx / (W z), hence
+///   dL/dndc = (dL/dx * z W / (2 fx), dL/dy * z H / (2 fy)),
+/// whose length is added up at every step that gives the Gaussian a gradient; the mean over those steps meets the same
+/// threshold as in 3DGS. A Gaussian whose mean is behind the camera adds nothing in that step.
+///
+/// Past the budget the largest statistics grow and the rest stay as they are. New Gaussians begin with zero moments.
+/// Gaussians that are not finite are removed. A split moves its halves by draws from itself. Cost: one small launch a
+/// step; a densification is O(N) with one host read, and holds a second copy of the parameters while it runs.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>
@@ -164,15 +165,15 @@ struct adc_reset_kernel {
 
 }  // namespace detail
 
-// Steps count from 1.
+/// Steps count from 1.
 template <execution E>
 class adaptive_density {
  public:
-  // The statistic since the last densification: what a checkpoint must hold. [N] each.
+  /// The statistic since the last densification: what a checkpoint must hold. [N] each.
   buffer<float, E> gradient_sum;
   buffer<u32, E> touched;
 
-  // `extent` is the scene's, in world units.
+  /// `extent` is the scene's, in world units.
   adaptive_density(E& exec, adc_options const& options, index_t max_gaussians, int iterations, float extent, u64 seed)
       : gradient_sum(exec),
         touched(exec),
@@ -190,7 +191,7 @@ class adaptive_density {
 
   void set_iterations(int iterations) { iterations_ = iterations; }
 
-  // Every step, with the gradient of the step's view.
+  /// Every step, with the gradient of the step's view.
   void accumulate(gaussians<E> const& model, gaussians<E> const& gradient, camera const& view) {
     if (touched.size() != model.size()) clear_statistic(model.size());
     parallel_for(*exec_, "adc_accumulate", model.size(),
@@ -204,7 +205,7 @@ class adaptive_density {
     return options_.every > 0 && step > options_.from && running(step) && step % options_.every == 0;
   }
 
-  // After the optimizer's step: densification and the reset of opacities, where they are due.
+  /// After the optimizer's step: densification and the reset of opacities, where they are due.
   density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step) {
     density_change change;
     if (due(step)) change = densify(model, state, step);
@@ -264,7 +265,7 @@ class adaptive_density {
     return change;
   }
 
-  // Opacities above twice prune_opacity become that.
+  /// Opacities above twice prune_opacity become that.
   void reset_opacity(gaussians<E>& model, optimizer_state<E>& state) {
     double const ceiling = std::min(2.0 * static_cast<double>(options_.prune_opacity), 0.99);
     parallel_for(*exec_, "adc_reset", model.size(),

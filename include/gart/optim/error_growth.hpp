@@ -1,24 +1,26 @@
 #pragma once
-// Densification by error: where the image is wrong, the Gaussians that are seen there split.
-//
-// The statistic. A hit of weight w shows its Gaussian with that share of the pixel; the backward pass sums w times the
-// pixel's error over a Gaussian's hits (backward::moments), for any camera, since no projection is in it. The sums of
-// all steps since the last densification are its share of the total error. Not the mean over the views that saw it:
-// that prefers what few views see, veils before single cameras.
-//
-// A densification draws Gaussians without replacement, in proportion to their share (Efraimidis and Spirakis 2006: the
-// least of -ln(u) / weight, u uniform), and splits each along its long axis (long_axis_split.hpp). As many are drawn as
-// there are dead Gaussians, whose rows the second halves take, and as the count is to grow. It grows on a square-root
-// curve, early, to the budget at the share `fill` of the run, and at most doubles at a time. First halves keep Adam's
-// moments, second ones start with none. After `fill` only the dead are replaced, after `until` nothing moves.
-//
-// A small penalty on the mean opacity, paid by all Gaussians, takes those that no view needs; they fade until they are
-// dead. A Gaussian whose opacity or geometry is not finite counts as dead. Where no error is attributed, or none is
-// alive, nothing is moved.
-//
-// It has no state but the statistic, [N] floats, which a checkpoint must hold: what is drawn depends on it, the seed
-// and the step. Equal weights give the same draws on every policy but for the last bits of a logarithm. Cost: one small
-// launch a step; a densification is a sort of N pairs, two scans and one host read.
+/// \file
+/// Densification by error: where the image is wrong, the Gaussians that are seen there split.
+///
+/// The statistic. A hit of weight w shows its Gaussian with that share of the pixel; the backward pass sums w times the
+/// pixel's error over a Gaussian's hits (backward::moments), for any camera, since no projection is in it. The sums of
+/// all steps since the last densification are its share of the total error. Not the mean over the views that saw it:
+/// that prefers what few views see, veils before single cameras.
+///
+/// A densification draws Gaussians without replacement, in proportion to their share (Efraimidis and Spirakis 2006: the
+/// least of -ln(u) / weight, u uniform), and splits each along its long axis (long_axis_split.hpp). As many are drawn
+/// as there are dead Gaussians, whose rows the second halves take, and as the count is to grow. It grows on a
+/// square-root curve, early, to the budget at the share `fill` of the run, and at most doubles at a time. First halves
+/// keep Adam's moments, second ones start with none. After `fill` only the dead are replaced, after `until` nothing
+/// moves.
+///
+/// A small penalty on the mean opacity, paid by all Gaussians, takes those that no view needs; they fade until they are
+/// dead. A Gaussian whose opacity or geometry is not finite counts as dead. Where no error is attributed, or none is
+/// alive, nothing is moved.
+///
+/// It has no state but the statistic, [N] floats, which a checkpoint must hold: what is drawn depends on it, the seed
+/// and the step. Equal weights give the same draws on every policy but for the last bits of a logarithm. Cost: one
+/// small launch a step; a densification is a sort of N pairs, two scans and one host read.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>
@@ -127,11 +129,11 @@ struct error_split_kernel {
 
 }  // namespace detail
 
-// Steps count from 1.
+/// Steps count from 1.
 template <execution E>
 class error_growth {
  public:
-  // The error seen through each Gaussian since the last densification, [N]: what a checkpoint must hold.
+  /// The error seen through each Gaussian since the last densification, [N]: what a checkpoint must hold.
   buffer<float, E> error_sum;
 
   error_growth(E& exec, error_growth_options const& options, index_t max_gaussians, int iterations, u64 seed)
@@ -149,8 +151,8 @@ class error_growth {
         place_(exec),
         totals_(exec, 2) {}
 
-  // Every step, with the moments that the step's backward pass left ([N][moment_stride]), before the optimizer's step:
-  // adds to the statistic, and to `gradient` that of the penalty.
+  /// Every step, with the moments that the step's backward pass left ([N][moment_stride]), before the optimizer's step:
+  /// adds to the statistic, and to `gradient` that of the penalty.
   void accumulate(gaussians<E> const& model, span<float const> moments, gaussians<E>& gradient) {
     index_t const n = model.size();
     if (n == 0) return;
@@ -162,7 +164,7 @@ class error_growth {
                                                 options_.opacity_penalty / static_cast<float>(n)});
   }
 
-  // From the next step on the schedules are those of a run of so many steps.
+  /// From the next step on the schedules are those of a run of so many steps.
   void set_iterations(int iterations) { iterations_ = iterations; }
 
   bool due(int step) const {
@@ -170,14 +172,14 @@ class error_growth {
            static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
   }
 
-  // The count that a run is to have after a step.
+  /// The count that a run is to have after a step.
   index_t budget_at(int step) const {
     double const filled = static_cast<double>(options_.fill) * iterations_ - options_.from;
     double const share = filled > 0 ? std::clamp((step - options_.from) / filled, 0.0, 1.0) : 1.0;
     return static_cast<index_t>(std::sqrt(share) * max_gaussians_);
   }
 
-  // After the optimizer's step.
+  /// After the optimizer's step.
   density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step) {
     return due(step) ? densify(model, state, step) : density_change{};
   }

@@ -1,13 +1,14 @@
 #pragma once
-// Whether a training is still made of numbers: one launch over all parameters and one over Adam's moments count what is
-// not finite, and one read brings the counts to the host.
-//
-// Adam leaves updates out that are not finite, so that a gradient never gets as far as a parameter; what is found here
-// was there at the start, came out of a checkpoint or of densification, or is a bug. How many updates Adam left out is
-// counted beside it (adam_step's `skipped`), and is no error.
-//
-// Cost: reads 12 bytes of each parameter (708 a Gaussian at SH degree 3, where Adam moves 1,652) and waits for the
-// queue. Errors: not_finite, which names the group, how many numbers of it, the first Gaussian and what to look at.
+/// \file
+/// Whether a training is still made of numbers: one launch over all parameters and one over Adam's moments count what
+/// is not finite, and one read brings the counts to the host.
+///
+/// Adam leaves updates out that are not finite, so that a gradient never gets as far as a parameter; what is found here
+/// was there at the start, came out of a checkpoint or of densification, or is a bug. How many updates Adam left out is
+/// counted beside it (adam_step's `skipped`), and is no error.
+///
+/// Cost: reads 12 bytes of each parameter (708 a Gaussian at SH degree 3, where Adam moves 1,652) and waits for the
+/// queue. Errors: not_finite, which names the group, how many numbers of it, the first Gaussian and what to look at.
 
 #include <gart/core/error.hpp>
 #include <gart/exec/concepts.hpp>
@@ -52,10 +53,10 @@ class finite_check {
  public:
   explicit finite_check(E& exec) : exec_(exec), counts_(exec, kinds + 1) { counts_.zero(); }
 
-  // For adam_step.
+  /// For adam_step.
   span<u64> skipped() const { return {counts_.data() + kinds, 1}; }
 
-  // The updates that Adam left out since the last call. `where` begins the error's message: "step 7, view a".
+  /// The updates that Adam left out since the last call. `where` begins the error's message: "step 7, view a".
   u64 operator()(gaussians<E> const& model, optimizer_state<E> const& state, std::string const& where) {
     count("finite/parameters", {&model}, 0);
     count("finite/moments", {&state.first, &state.second}, parameter_arrays);

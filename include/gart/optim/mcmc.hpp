@@ -1,23 +1,25 @@
 #pragma once
-// Densification as Markov chain Monte Carlo (Kheradmand et al., 3D Gaussian Splatting as Markov Chain Monte Carlo,
-// 2024; constants as in gsplat): dead Gaussians move onto live ones, drawn in proportion to opacity; the count grows to
-// a budget in the same way; the means take a random step every step; opacity and size carry a small penalty.
-//
-// A Gaussian of opacity o that becomes N in one place (its copies and itself; N is cut at 51) keeps what they render:
-//   o' = 1 - (1 - o)^(1/N),  scale' = scale * o / sum_{j=1..N} C(N, j) (-1)^(j-1) o'^j / sqrt(j),
-// which keeps the integral of the composited opacity across a line through the centre. (The paper's double sum, with
-// sum_i C(i-1, j-1) = C(N, j).) For a generalised Gaussian of degree n (math/response.hpp) it is the n-th root of j.
-// Moments as in gsplat: growth leaves its sources' and gives copies none; relocation clears its sources' and leaves the
-// moved ones theirs. A first moment fills up in 10 steps and a second one in 1,000, so a cleared pair steps up to 6.5
-// times its rate for a hundred steps: were growth to clear its sources', the best Gaussians of a scene would be at it
-// all the time, and those that the next views do not show would follow the penalties alone (docs/training.md).
-//
-// Noise and the penalty on size are stated in the extent of the scene, so that a capture in other units trains to the
-// same result.
-//
-// Weights are 32-bit fixed point and their sums 64-bit integers, so the draws are exact for any count and have the same
-// bits on every policy. A Gaussian whose opacity or geometry is not finite counts as dead. Where none is alive nothing
-// is relocated or grown. Cost: one host read and O(N) work a densification; a step in between is two small launches.
+/// \file
+/// Densification as Markov chain Monte Carlo (Kheradmand et al., 3D Gaussian Splatting as Markov Chain Monte Carlo,
+/// 2024; constants as in gsplat): dead Gaussians move onto live ones, drawn in proportion to opacity; the count grows
+/// to a budget in the same way; the means take a random step every step; opacity and size carry a small penalty.
+///
+/// A Gaussian of opacity o that becomes N in one place (its copies and itself; N is cut at 51) keeps what they render:
+///   o' = 1 - (1 - o)^(1/N),  scale' = scale * o / sum_{j=1..N} C(N, j) (-1)^(j-1) o'^j / sqrt(j),
+/// which keeps the integral of the composited opacity across a line through the centre. (The paper's double sum, with
+/// sum_i C(i-1, j-1) = C(N, j).) For a generalised Gaussian of degree n (math/response.hpp) it is the n-th root of j.
+/// Moments as in gsplat: growth leaves its sources' and gives copies none; relocation clears its sources' and leaves
+/// the moved ones theirs. A first moment fills up in 10 steps and a second one in 1,000, so a cleared pair steps up to
+/// 6.5 times its rate for a hundred steps: were growth to clear its sources', the best Gaussians of a scene would be at
+/// it all the time, and those that the next views do not show would follow the penalties alone (docs/training.md).
+///
+/// Noise and the penalty on size are stated in the extent of the scene, so that a capture in other units trains to the
+/// same result.
+///
+/// Weights are 32-bit fixed point and their sums 64-bit integers, so the draws are exact for any count and have the
+/// same bits on every policy. A Gaussian whose opacity or geometry is not finite counts as dead. Where none is alive
+/// nothing is relocated or grown. Cost: one host read and O(N) work a densification; a step in between is two small
+/// launches.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/math/logit.hpp>
@@ -36,7 +38,7 @@ struct relocated_shape {
   double opacity, scale_factor;
 };
 
-// Of each of `copies` Gaussians that replace one of opacity `o`. In double: the sum alternates.
+/// Of each of `copies` Gaussians that replace one of opacity `o`. In double: the sum alternates.
 GART_HD inline relocated_shape relocation(double o, u32 copies, int kernel_degree = 2) {
   double const n = copies < 51 ? copies : 51;
   double const p = -expm1(log1p(-o) / n);
@@ -175,8 +177,8 @@ struct mcmc_penalty_kernel {
 
 }  // namespace detail
 
-// The growth of a run that starts from `count` Gaussians: options.growth, or what reaches the budget within the first
-// two fifths of the densification steps where that is more, but no more than 1.2.
+/// The growth of a run that starts from `count` Gaussians: options.growth, or what reaches the budget within the first
+/// two fifths of the densification steps where that is more, but no more than 1.2.
 inline float growth_for(mcmc_options const& options, index_t count, index_t max_gaussians, int iterations) {
   constexpr double steepest = 1.2;
   float const steps = options.until * static_cast<float>(iterations) - static_cast<float>(options.from);
@@ -187,11 +189,11 @@ inline float growth_for(mcmc_options const& options, index_t count, index_t max_
   return static_cast<float>(needed < given ? given : needed > limit ? limit : needed);
 }
 
-// It has no state: what it draws depends on the seed and the step only. Steps count from 1.
+/// It has no state: what it draws depends on the seed and the step only. Steps count from 1.
 template <execution E>
 class mcmc {
  public:
-  // `extent` is the scene's, in world units.
+  /// `extent` is the scene's, in world units.
   mcmc(E& exec, mcmc_options const& options, index_t max_gaussians, int iterations, float extent, u64 seed,
        int kernel_degree = 2)
       : exec_(&exec),
@@ -212,8 +214,8 @@ class mcmc {
   void set_growth(float growth) { options_.growth = growth; }
   void set_iterations(int iterations) { iterations_ = iterations; }
 
-  // Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale) / extent; before the optimizer's
-  // step.
+  /// Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale) / extent; before the
+  /// optimizer's step.
   void add_penalties(gaussians<E> const& model, gaussians<E>& gradient) {
     if (model.size() == 0) return;
     float const n = static_cast<float>(model.size());
@@ -227,8 +229,8 @@ class mcmc {
            static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
   }
 
-  // After the optimizer's step: relocation and growth where they are due, and the noise. `mean_rate` is the rate the
-  // means had in this step.
+  /// After the optimizer's step: relocation and growth where they are due, and the noise. `mean_rate` is the rate the
+  /// means had in this step.
   density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, float mean_rate) {
     density_change change;
     if (due(step)) change = densify(model, state, step);
@@ -267,7 +269,7 @@ class mcmc {
     return change;
   }
 
-  // mean += noise * mean_rate / extent^2 * sigmoid(-100 (opacity - dead_opacity)) * covariance * normal.
+  /// mean += noise * mean_rate / extent^2 * sigmoid(-100 (opacity - dead_opacity)) * covariance * normal.
   void add_noise(gaussians<E>& model, int step, float mean_rate) {
     if (options_.noise == 0) return;
     parallel_for(*exec_, "mcmc_noise", model.size(),

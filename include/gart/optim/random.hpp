@@ -1,8 +1,9 @@
 #pragma once
-// Random numbers without state: Philox4x32-10 (Salmon et al., Parallel Random Numbers: As Easy as 1, 2, 3, SC 2011).
-// A number is a function of (seed, step, use, index), so kernels draw in any order, a checkpoint carries nothing, and
-// the integers and uniforms have the same bits on every policy. Normals go through log, cos and sin, which policies may
-// round differently. About 40 integer instructions for four words.
+/// \file
+/// Random numbers without state: Philox4x32-10 (Salmon et al., Parallel Random Numbers: As Easy as 1, 2, 3, SC 2011).
+/// A number is a function of (seed, step, use, index), so kernels draw in any order, a checkpoint carries nothing, and
+/// the integers and uniforms have the same bits on every policy. Normals go through log, cos and sin, which policies
+/// may round differently. About 40 integer instructions for four words.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
@@ -11,7 +12,7 @@
 
 namespace gart::inline GART_ISA {
 
-// What a number is drawn for: draws for different purposes are independent.
+/// What a number is drawn for: draws for different purposes are independent.
 enum class random_use : u32 { relocation = 1, growth, noise, split, user = 0x10000 };
 
 struct random_words {
@@ -28,7 +29,7 @@ GART_HD inline random_words philox4x32(random_words counter, u32 key0, u32 key1)
   return counter;
 }
 
-// Trivially copyable: kernels hold one by value.
+/// Trivially copyable: kernels hold one by value.
 struct random_source {
   u64 seed = 0;
   u32 step = 0;
@@ -40,10 +41,10 @@ struct random_source {
   }
 };
 
-// [0, 1), 24 bits: every value is a float.
+/// [0, 1), 24 bits: every value is a float.
 GART_HD inline float uniform(u32 word) { return static_cast<float>(word >> 8) * 0x1p-24f; }
 
-// [0, bound) from two words, by the high half of a 128-bit product; the bias is below bound / 2^64.
+/// [0, bound) from two words, by the high half of a 128-bit product; the bias is below bound / 2^64.
 GART_HD inline u64 below(u32 high, u32 low, u64 bound) {
   u64 const b_high = bound >> 32, b_low = bound & 0xffffffffu;
   u64 const middle = u64{high} * b_low + ((u64{low} * b_low) >> 32);
@@ -51,7 +52,7 @@ GART_HD inline u64 below(u32 high, u32 low, u64 bound) {
   return u64{high} * b_high + (middle >> 32) + (cross >> 32);
 }
 
-// Four independent standard normals (Box-Muller); at most 5.77 in size.
+/// Four independent standard normals (Box-Muller); at most 5.77 in size.
 struct random_normals {
   float v[4];
 };

@@ -1,7 +1,8 @@
 #pragma once
-// A Gaussian as one row of floats across the parameter arrays, in the order of their table
-// (scene/parameter_table.hpp): columns 0-2 mean, 3-5 log_scale, 6-9 quaternion, 10 opacity, 11.. sh. What moves, copies
-// or clears whole Gaussians is one launch over (row, column), coalesced on a device.
+/// \file
+/// A Gaussian as one row of floats across the parameter arrays, in the order of their table
+/// (scene/parameter_table.hpp): columns 0-2 mean, 3-5 log_scale, 6-9 quaternion, 10 opacity, 11.. sh. What moves,
+/// copies or clears whole Gaussians is one launch over (row, column), coalesced on a device.
 
 #include <gart/exec/concepts.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -9,7 +10,7 @@
 
 namespace gart::inline GART_ISA {
 
-// mean, log_scale and quaternion: what places and shapes a Gaussian, and comes first in a row.
+/// mean, log_scale and quaternion: what places and shapes a Gaussian, and comes first in a row.
 inline constexpr index_t geometry_columns = 10;
 
 inline index_t row_width(int sh_degree) {
@@ -33,7 +34,7 @@ GART_HD GART_INLINE T& row_element(gaussians_view<T> const& g, index_t row, inde
   return *element;
 }
 
-// Whether a Gaussian is of use: its opacity above the least, and it and the geometry finite.
+/// Whether a Gaussian is of use: its opacity above the least, and it and the geometry finite.
 GART_HD inline bool is_alive(gaussians_view<float const> const& g, index_t row, float least_opacity) {
   bool alive = is_finite(g.opacity[row]) && sigmoid(g.opacity[row]) > least_opacity;
   for (index_t c = 0; c < geometry_columns; ++c) alive = alive && is_finite(row_element(g, row, c));
@@ -58,8 +59,8 @@ struct row_kernel {
 
 }  // namespace detail
 
-// body(row, column) for every element of `rows` rows; a tile of rows at a time, so that the count of elements may pass
-// 2^32.
+/// body(row, column) for every element of `rows` rows; a tile of rows at a time, so that the count of elements may pass
+/// 2^32.
 template <execution E, class Body>
 void for_each_element(E& exec, char const* label, index_t rows, int sh_degree, Body const& body) {
   if (rows == 0) return;
@@ -68,7 +69,7 @@ void for_each_element(E& exec, char const* label, index_t rows, int sh_degree, B
   parallel_for(exec, label, tile_range{tiles, 256}, kernel{body, rows, row_width(sh_degree)});
 }
 
-// What a densification did. Where the count changed, gradients and other per-Gaussian buffers have a new size.
+/// What a densification did. Where the count changed, gradients and other per-Gaussian buffers have a new size.
 struct density_change {
   index_t relocated = 0, added = 0, removed = 0;
   bool any() const { return relocated || added || removed; }

@@ -1,5 +1,6 @@
 #pragma once
-// What changes with the step: the learning rates and the SH degree in use. Steps count from 0, before the step runs.
+/// \file
+/// What changes with the step: the learning rates and the SH degree in use. Steps count from 0, before the step runs.
 
 #include <gart/core/isa.hpp>
 #include <gart/optim/options.hpp>
@@ -9,23 +10,23 @@
 
 namespace gart::inline GART_ISA {
 
-// from * (to / from)^(step / steps): log-linear, `to` at and after `steps`. Both must be positive; where one is not,
-// the rate stays at `from`.
+/// from * (to / from)^(step / steps): log-linear, `to` at and after `steps`. Both must be positive; where one is not,
+/// the rate stays at `from`.
 inline float exponential_decay(float from, float to, int step, int steps) {
   if (!(from > 0) || !(to > 0) || steps <= 0) return from;
   double const share = std::clamp(static_cast<double>(step) / steps, 0.0, 1.0);
   return static_cast<float>(from * std::pow(static_cast<double>(to) / from, share));
 }
 
-// The rate of the bands above the first: what `rates` says, or that of the first times steps / long_run, within
-// [1/20, 1], where the run starts from points; where it does not, a twentieth, as in 3DGS.
+/// The rate of the bands above the first: what `rates` says, or that of the first times steps / long_run, within
+/// [1/20, 1], where the run starts from points; where it does not, a twentieth, as in 3DGS.
 inline float sh_rest_of(learning_rates const& rates, bool has_points, int steps) {
   if (rates.sh_rest > 0) return rates.sh_rest;
   double const length = static_cast<double>(steps) / std::max(rates.long_run, 1);
   return rates.sh_dc * static_cast<float>(has_points ? std::clamp(length, 0.05, 1.0) : 0.05);
 }
 
-// The rates of one step; `extent` is the scene's. sh_rest is what sh_rest_of gave.
+/// The rates of one step; `extent` is the scene's. sh_rest is what sh_rest_of gave.
 inline learning_rates rates_at(learning_rates rates, float extent, int step, int steps) {
   double const length = static_cast<double>(std::max(steps, 1)) / std::max(rates.long_run, 1);
   float const haste = static_cast<float>(std::clamp(1 / std::sqrt(length), 1.0, 4.0));
@@ -40,8 +41,8 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
   return rates;
 }
 
-// One degree more every `every` steps, sooner where the run is too short for that: the full degree is reached within
-// the first third of any run.
+/// One degree more every `every` steps, sooner where the run is too short for that: the full degree is reached within
+/// the first third of any run.
 inline int sh_interval(int degree, int every, int steps) { return std::max(1, std::min(every, steps / (3 * degree))); }
 inline int sh_degree_at(int step, int degree, int every, int steps) {
   return degree <= 0 ? 0 : std::min(degree, step / sh_interval(degree, every, steps));

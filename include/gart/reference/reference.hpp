@@ -1,24 +1,25 @@
 #pragma once
-// What the renderer is held against: the definition of an image and of its gradients, evaluated in double with nothing
-// that makes it fast but one test that leaves out what cannot be met. It shares no code with the kernels.
-//
-// For a ray o + t d, |d| = 1, and a Gaussian with M = S^-1 R^T:
-//   o_g = M (o - mean), d_g = M d, t = -o_g.d_g / d_g.d_g, p = o_g + t d_g,
-//   alpha = min(0.99, sigmoid(opacity) exp(-4.5 (|p| / 3)^n)), n the kernel's degree (2: a Gaussian),
-//   a hit where alpha >= alpha_min and t > near,
-//   colour = sum_i T_i alpha_i c_i + T background, T_(i+1) = T_i (1 - alpha_i), hits in the order (t, id), until
-//   T < transmittance_min (the hit that crosses counts) or max_hits of them.
-// With options.antialias, the standard deviation of the pixels' filter, a Gaussian is first widened as in
-// math/widened.hpp, by the definition there.
-// Backwards, with g = dL/dcolour and B_i what is seen behind hit i with T = 1,
-//   dL/dalpha_i = T_i g.(c_i - B_i),
-// and a clamp that holds (alpha at 0.99, a colour at 0) passes nothing. Gaussians that the renderer culls (parameters
-// that are not finite, a quaternion without direction, a log-scale outside (-40, 40)) are none here either.
-//
-// Pixels are traced in blocks of 16 x 16. A Gaussian is left out of a block only where the sphere around its ellipsoid
-// misses the cone around the block's rays. Cost: Gaussians x blocks for that test, and a sort and about 100 operations
-// for each Gaussian that stays, a pixel; on all cores. Memory: 112 bytes a Gaussian, and the gradients. The sums are
-// added in the order of the blocks, so that the same call gives the same bits.
+/// \file
+/// What the renderer is held against: the definition of an image and of its gradients, evaluated in double with nothing
+/// that makes it fast but one test that leaves out what cannot be met. It shares no code with the kernels.
+///
+/// For a ray o + t d, |d| = 1, and a Gaussian with M = S^-1 R^T:
+///   o_g = M (o - mean), d_g = M d, t = -o_g.d_g / d_g.d_g, p = o_g + t d_g,
+///   alpha = min(0.99, sigmoid(opacity) exp(-4.5 (|p| / 3)^n)), n the kernel's degree (2: a Gaussian),
+///   a hit where alpha >= alpha_min and t > near,
+///   colour = sum_i T_i alpha_i c_i + T background, T_(i+1) = T_i (1 - alpha_i), hits in the order (t, id), until
+///   T < transmittance_min (the hit that crosses counts) or max_hits of them.
+/// With options.antialias, the standard deviation of the pixels' filter, a Gaussian is first widened as in
+/// math/widened.hpp, by the definition there.
+/// Backwards, with g = dL/dcolour and B_i what is seen behind hit i with T = 1,
+///   dL/dalpha_i = T_i g.(c_i - B_i),
+/// and a clamp that holds (alpha at 0.99, a colour at 0) passes nothing. Gaussians that the renderer culls (parameters
+/// that are not finite, a quaternion without direction, a log-scale outside (-40, 40)) are none here either.
+///
+/// Pixels are traced in blocks of 16 x 16. A Gaussian is left out of a block only where the sphere around its ellipsoid
+/// misses the cone around the block's rays. Cost: Gaussians x blocks for that test, and a sort and about 100 operations
+/// for each Gaussian that stays, a pixel; on all cores. Memory: 112 bytes a Gaussian, and the gradients. The sums are
+/// added in the order of the blocks, so that the same call gives the same bits.
 
 #include <gart/core/span.hpp>
 #include <gart/render/options.hpp>
@@ -29,27 +30,27 @@
 
 namespace gart {
 
-// The shapes of gaussian_model, in double.
+/// The shapes of gaussian_model, in double.
 struct reference_gradients {
   int sh_degree = 0;
   std::vector<double> mean, log_scale, quaternion, opacity, sh;
 };
 
-// One entry for each pixel that was asked for, in that order.
+/// One entry for each pixel that was asked for, in that order.
 struct reference_image {
-  std::vector<double> color;                 // [n][3], background composited
-  std::vector<double> transmittance, depth;  // [n]; depth: sum of weight * t
-  std::vector<u32> hits;                     // [n]
-  reference_gradients gradients;             // empty where no gradient was asked for
+  std::vector<double> color;                 ///< [n][3], background composited
+  std::vector<double> transmittance, depth;  ///< [n]; depth: sum of weight * t
+  std::vector<u32> hits;                     ///< [n]
+  reference_gradients gradients;             ///< empty where no gradient was asked for
 };
 
-// y * width + x of every pixel of a camera.
+/// y * width + x of every pixel of a camera.
 std::vector<u32> all_pixels(camera const& view);
 
-// The pixels `pixels` of a view, each at most once; bands above `active_degree` are not evaluated. With a
-// `color_gradient`, dL/dcolour as [n][3], also the gradient of every parameter, summed over these pixels. Errors:
-// invalid_argument for a pixel outside the image or named twice, a gradient of another size, a degree the model does
-// not have, and a pixel at which the lens cannot be inverted.
+/// The pixels `pixels` of a view, each at most once; bands above `active_degree` are not evaluated. With a
+/// `color_gradient`, dL/dcolour as [n][3], also the gradient of every parameter, summed over these pixels. Errors:
+/// invalid_argument for a pixel outside the image or named twice, a gradient of another size, a degree the model does
+/// not have, and a pixel at which the lens cannot be inverted.
 reference_image trace_reference(gaussian_model const& model, camera const& view, render_options const& options,
                                 int active_degree, std::vector<u32> const& pixels,
                                 std::vector<double> const& color_gradient = {}, int kernel_degree = 2);

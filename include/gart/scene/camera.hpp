@@ -1,9 +1,10 @@
 #pragma once
-// A camera as a program fills it in and files hold it: which model it is and that model's parameters. What a model
-// makes of them is in camera/ (camera/model.hpp); camera/models.hpp goes from here to there.
-//
-// Axes are OpenCV's: x right, y down, z forward. Pixel (0, 0) is the top-left corner of the image, the ray of pixel
-// (i, j) goes through (i + 0.5, j + 0.5).
+/// \file
+/// A camera as a program fills it in and files hold it: which model it is and that model's parameters. What a model
+/// makes of them is in camera/ (camera/model.hpp); camera/models.hpp goes from here to there.
+///
+/// Axes are OpenCV's: x right, y down, z forward. Pixel (0, 0) is the top-left corner of the image, the ray of pixel
+/// (i, j) goes through (i + 0.5, j + 0.5).
 
 #include <gart/core/macros.hpp>
 #include <gart/math/glm.hpp>
@@ -13,21 +14,21 @@
 namespace gart {
 
 enum class camera_kind {
-  perspective,  // camera/pinhole.hpp, and camera/opencv.hpp where the lens is distorted
+  perspective,  ///< camera/pinhole.hpp, and camera/opencv.hpp where the lens is distorted
 };
 
-// Coefficients of a lens; none is used where all are zero.
+/// Coefficients of a lens; none is used where all are zero.
 struct distortion {
   float k1 = 0, k2 = 0, p1 = 0, p2 = 0;
   GART_HD bool any() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0; }
 };
 
 struct camera {
-  int width = 0, height = 0;             // pixels
-  float fx = 0, fy = 0, cx = 0, cy = 0;  // focal lengths and principal point, pixels
+  int width = 0, height = 0;             ///< pixels
+  float fx = 0, fy = 0, cx = 0, cy = 0;  ///< focal lengths and principal point, pixels
   distortion lens;
-  mat3 rotation{1.0f};  // camera to world; columns are the camera's axes in the world
-  vec3d position{0.0};  // the centre in the world, in double: everything else is relative to it
+  mat3 rotation{1.0f};  ///< camera to world; columns are the camera's axes in the world
+  vec3d position{0.0};  ///< the centre in the world, in double: everything else is relative to it
   camera_kind kind = camera_kind::perspective;
 };
 
@@ -36,7 +37,7 @@ struct named_camera {
   camera view;
 };
 
-// What is wrong with a camera, and what to correct; null where nothing is.
+/// What is wrong with a camera, and what to correct; null where nothing is.
 struct camera_fault {
   char const* what = nullptr;
   char const* remedy = nullptr;
@@ -46,7 +47,7 @@ struct camera_fault {
 
 namespace gart::inline GART_ISA {
 
-// The same camera for an image of another size: intrinsics scale per axis.
+/// The same camera for an image of another size: intrinsics scale per axis.
 inline camera resized(camera c, int width, int height) {
   float const sx = static_cast<float>(width) / static_cast<float>(c.width);
   float const sy = static_cast<float>(height) / static_cast<float>(c.height);

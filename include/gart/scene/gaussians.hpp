@@ -1,13 +1,14 @@
 #pragma once
-// A scene's parameters, structure of arrays, N Gaussians of SH degree D with K = (D + 1)^2 coefficients a channel:
-//   mean        [N][3]     world units
-//   log_scale   [N][3]     natural logarithm of the standard deviations
-//   quaternion  [N][4]     w, x, y, z; any norm, normalised where it is used
-//   opacity     [N]        logit
-//   sh          [N][K][3]  coefficient-major, colours interleaved (splat files are channel-major; io converts)
-// gaussian_model holds them on the host, gaussians<E> in a policy's memory; gradients and Adam's moments have the same
-// shape, and what is done to all five arrays walks scene/parameter_table.hpp. Errors: invalid_argument for more
-// Gaussians than 32-bit indices can serve; out_of_memory.
+/// \file
+/// A scene's parameters, structure of arrays, N Gaussians of SH degree D with K = (D + 1)^2 coefficients a channel:
+///   mean        [N][3]     world units
+///   log_scale   [N][3]     natural logarithm of the standard deviations
+///   quaternion  [N][4]     w, x, y, z; any norm, normalised where it is used
+///   opacity     [N]        logit
+///   sh          [N][K][3]  coefficient-major, colours interleaved (splat files are channel-major; io converts)
+/// gaussian_model holds them on the host, gaussians<E> in a policy's memory; gradients and Adam's moments have the same
+/// shape, and what is done to all five arrays walks scene/parameter_table.hpp. Errors: invalid_argument for more
+/// Gaussians than 32-bit indices can serve; out_of_memory.
 
 #include <gart/core/error.hpp>
 #include <gart/core/span.hpp>
@@ -20,7 +21,7 @@
 
 namespace gart {
 
-// Indices have 32 bits, and a launch may take up to 15 of them a Gaussian.
+/// Indices have 32 bits, and a launch may take up to 15 of them a Gaussian.
 inline constexpr std::size_t most_gaussians = std::size_t{1} << 28;
 
 inline void require_count(std::size_t n) {
@@ -38,7 +39,7 @@ struct gaussian_model {
     sh_degree = degree;
     for_each_array([&](parameter_array const& a, auto& values) { values.resize(n * a.width(degree)); }, *this);
   }
-  // Whether all arrays are of size() Gaussians.
+  /// Whether all arrays are of size() Gaussians.
   bool arrays_agree() const {
     bool agree = true;
     for_each_array([&](parameter_array const& a,
@@ -48,7 +49,7 @@ struct gaussian_model {
   }
 };
 
-// The same Gaussians with other storage: coefficients past `degree` are dropped, missing ones are zero.
+/// The same Gaussians with other storage: coefficients past `degree` are dropped, missing ones are zero.
 inline gaussian_model with_sh_degree(gaussian_model model, int degree) {
   if (degree == model.sh_degree) return model;
   std::size_t const from = std::size_t{3} * sh_coefficients(model.sh_degree),
@@ -60,7 +61,7 @@ inline gaussian_model with_sh_degree(gaussian_model model, int degree) {
   return model;
 }
 
-// T is float or float const.
+/// T is float or float const.
 template <class T>
 struct gaussians_view {
   T* mean = nullptr;
@@ -97,7 +98,7 @@ class gaussians {
   gaussians_view<float const> view() const {
     return {mean.data(), log_scale.data(), quaternion.data(), opacity.data(), sh.data(), size(), degree_};
   }
-  // Existing Gaussians stay; new ones are undefined.
+  /// Existing Gaussians stay; new ones are undefined.
   void resize_keep(std::size_t n) {
     require_count(n);
     for_each_array([&](parameter_array const& a, auto& values) { values.resize_keep(n * a.width(degree_)); }, *this);

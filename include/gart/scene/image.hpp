@@ -1,5 +1,6 @@
 #pragma once
-// Images in host memory, row-major, channels interleaved: pixel (x, y), channel c at (y * width + x) * channels + c.
+/// \file
+/// Images in host memory, row-major, channels interleaved: pixel (x, y), channel c at (y * width + x) * channels + c.
 
 #include <gart/core/types.hpp>
 
@@ -20,7 +21,7 @@ struct basic_image {
   bool empty() const { return data.empty(); }
 };
 
-using image8 = basic_image<u8>;          // as files hold it: 8 bits, 0..255
-using image_float = basic_image<float>;  // [0, 1]
+using image8 = basic_image<u8>;          ///< as files hold it: 8 bits, 0..255
+using image_float = basic_image<float>;  ///< [0, 1]
 
 }  // namespace gart

@@ -1,7 +1,8 @@
 #pragma once
-// The table of a scene's parameter arrays (scene/gaussians.hpp). What is done to all of them walks it: sizes, Adam and
-// its rates, checks, rows, checkpoints. An array that a scene gains is a line here, a member of the types that hold
-// them, and a rate (optim/adam.hpp).
+/// \file
+/// The table of a scene's parameter arrays (scene/gaussians.hpp). What is done to all of them walks it: sizes, Adam and
+/// its rates, checks, rows, checkpoints. An array that a scene gains is a line here, a member of the types that hold
+/// them, and a rate (optim/adam.hpp).
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
@@ -11,10 +12,10 @@ namespace gart {
 GART_HD constexpr int sh_coefficients(int degree) { return (degree + 1) * (degree + 1); }
 
 struct parameter_array {
-  char const* name;   // of the member, and in checkpoints
-  char const* title;  // in messages
-  int number;         // in the table
-  index_t floats;     // a Gaussian; 0: three for each coefficient of the spherical harmonics
+  char const* name;   ///< of the member, and in checkpoints
+  char const* title;  ///< in messages
+  int number;         ///< in the table
+  index_t floats;     ///< a Gaussian; 0: three for each coefficient of the spherical harmonics
 
   GART_HD constexpr index_t width(int sh_degree) const {
     return floats ? floats : 3 * static_cast<index_t>(sh_coefficients(sh_degree));
@@ -24,8 +25,8 @@ struct parameter_array {
 inline constexpr int parameter_arrays = 5;
 inline constexpr int mean_array = 0;
 
-// Calls f(parameter_array, set.member...) for each array, in order, with that member of every set: of anything that
-// has the members mean, log_scale, quaternion, opacity and sh.
+/// Calls f(parameter_array, set.member...) for each array, in order, with that member of every set: of anything that
+/// has the members mean, log_scale, quaternion, opacity and sh.
 GART_KERNEL constexpr void for_each_array(auto&& f, auto&&... sets) {
   f(parameter_array{"mean", "mean", mean_array, 3}, sets.mean...);
   f(parameter_array{"log_scale", "log-scale", 1, 3}, sets.log_scale...);

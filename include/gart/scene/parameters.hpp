@@ -1,5 +1,6 @@
 #pragma once
-// One Gaussian out of the arrays.
+/// \file
+/// One Gaussian out of the arrays.
 
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/scene/gaussians.hpp>

@@ -1,7 +1,8 @@
 #pragma once
-// What a scene requires, at compile time. Kernels choose code by it, so that what a scene does not need has no
-// registers, no fields and no bytes. The rows that gart's libraries compile are listed by `gart info`;
-// runtime/registry.hpp is how a program compiles its own (examples/5_own_configuration).
+/// \file
+/// What a scene requires, at compile time. Kernels choose code by it, so that what a scene does not need has no
+/// registers, no fields and no bytes. The rows that gart's libraries compile are listed by `gart info`;
+/// runtime/registry.hpp is how a program compiles its own (examples/5_own_configuration).
 
 #include <gart/math/response.hpp>
 
@@ -14,7 +15,7 @@ concept scene_requirements = response_function<typename T::response> &&  // how 
   { T::sh_degree } -> std::convertible_to<int>;
 };
 
-// Response: how a Gaussian falls from its centre, and in which arithmetic (math/response.hpp).
+/// Response: how a Gaussian falls from its centre, and in which arithmetic (math/response.hpp).
 template <int ShDegree = 3, response_function Response = generalized_gaussian<>>
 struct scene_traits {
   static_assert(ShDegree >= 0 && ShDegree <= 3, "spherical harmonics go to degree 3");

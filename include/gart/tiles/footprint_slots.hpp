@@ -1,12 +1,13 @@
 #pragma once
-// The footprint of a Gaussian in a view: its box of pixels, and how many pixels the boxes before it have, which is
-// where its own begin in a buffer with a slot for each (backward/lt_layout.hpp).
+/// \file
+/// The footprint of a Gaussian in a view: its box of pixels, and how many pixels the boxes before it have, which is
+/// where its own begin in a buffer with a slot for each (backward/lt_layout.hpp).
 
 #include <gart/tiles/grid.hpp>
 
 namespace gart::inline GART_ISA {
 
-// One 16-byte word.
+/// One 16-byte word.
 struct alignas(16) footprint_slots {
   u64 offset = 0;
   pixel_box box;

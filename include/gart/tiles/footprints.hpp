@@ -1,7 +1,8 @@
 #pragma once
-// The footprints of all Gaussians in one view: boxes with their place in the LT buffer, near depths, and how many
-// (primitive, tile) pairs they make. Cost: one launch of double arithmetic over the Gaussians, two prefix sums, and one
-// read of two totals by the host, from which buffers are sized.
+/// \file
+/// The footprints of all Gaussians in one view: boxes with their place in the LT buffer, near depths, and how many
+/// (primitive, tile) pairs they make. Cost: one launch of double arithmetic over the Gaussians, two prefix sums, and
+/// one read of two totals by the host, from which buffers are sized.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/camera/models.hpp>
@@ -52,8 +53,8 @@ class footprints {
         pair_offsets_(exec),
         totals_(exec, 2) {}
 
-  // View: a camera or a camera model. invalid_argument for one that no ray can be cast by, or a near distance that is
-  // not positive.
+  /// View: a camera or a camera model. invalid_argument for one that no ray can be cast by, or a near distance that is
+  /// not positive.
   template <class Response = generalized_gaussian<>, class View>
   void measure(E& exec, gaussians_view<float const> scene, View const& view, float alpha_min, float near) {
     require_camera(view);
@@ -82,8 +83,8 @@ class footprints {
     slots_ = totals[0], pairs_ = totals[1];
   }
 
-  u64 slots() const { return slots_; }  // sum of box areas
-  u64 pairs() const { return pairs_; }  // (primitive, tile) overlaps
+  u64 slots() const { return slots_; }  ///< sum of box areas
+  u64 pairs() const { return pairs_; }  ///< (primitive, tile) overlaps
   span<footprint_slots const> ranges() const { return ranges_; }
   span<float const> depths() const { return depths_; }
   span<u64 const> pair_offsets() const { return pair_offsets_; }

@@ -1,5 +1,6 @@
 #pragma once
-// The image cut into square tiles, row by row. The tile's side is a compile-time parameter.
+/// \file
+/// The image cut into square tiles, row by row. The tile's side is a compile-time parameter.
 
 #include <gart/math/footprint.hpp>
 
@@ -15,7 +16,7 @@ struct tile_grid {
   GART_HD u32 rows() const { return static_cast<u32>((height + Size - 1) / Size); }
   GART_HD u32 count() const { return columns() * rows(); }
 
-  // The pixels of a tile, cut off at the image's edge.
+  /// The pixels of a tile, cut off at the image's edge.
   GART_HD pixel_box tile(u32 index) const { return tile(index % columns(), index / columns()); }
   GART_HD pixel_box tile(u32 column, u32 row) const {
     u32 const x = column * Size, y = row * Size;
@@ -25,7 +26,7 @@ struct tile_grid {
   }
 };
 
-// The tiles a box of pixels overlaps, in tile coordinates.
+/// The tiles a box of pixels overlaps, in tile coordinates.
 template <int Size>
 GART_HD constexpr pixel_box tiles_of(pixel_box const& b) {
   if (b.empty()) return {};

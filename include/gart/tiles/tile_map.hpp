@@ -1,10 +1,11 @@
 #pragma once
-// The tile-primitive map: for every tile, the primitives whose boxes overlap it. One pair for each overlap is emitted
-// in primitive order and radix sorted by tile; a tile's list begins where its number first stands in a key.
-//
-// One 32-bit key sorts both by tile and within it, in the bits that the tile's number leaves free, by an order
-// (tiles/tile_order.hpp).
-// Ties stay in primitive order (the sort is stable).
+/// \file
+/// The tile-primitive map: for every tile, the primitives whose boxes overlap it. One pair for each overlap is emitted
+/// in primitive order and radix sorted by tile; a tile's list begins where its number first stands in a key.
+///
+/// One 32-bit key sorts both by tile and within it, in the bits that the tile's number leaves free, by an order
+/// (tiles/tile_order.hpp).
+/// Ties stay in primitive order (the sort is stable).
 
 #include <gart/algorithm/sort_pairs.hpp>
 #include <gart/tiles/footprints.hpp>
@@ -13,14 +14,14 @@
 namespace gart::inline GART_ISA {
 
 struct tile_map_view {
-  span<u32 const> primitives;     // all lists, tile after tile
-  span<u32 const> offsets;        // [tiles + 1]
-  span<u32 const> keys;           // of all lists, sorted
-  int order_bits = 0;             // low bits of a key: the order's
-  int depth_shift = 0;            // of depth_order: bits of a depth that keys leave out
-  span<u32 const> longest_first;  // the tiles, if asked for (rank_tiles)
+  span<u32 const> primitives;     ///< all lists, tile after tile
+  span<u32 const> offsets;        ///< [tiles + 1]
+  span<u32 const> keys;           ///< of all lists, sorted
+  int order_bits = 0;             ///< low bits of a key: the order's
+  int depth_shift = 0;            ///< of depth_order: bits of a depth that keys leave out
+  span<u32 const> longest_first;  ///< the tiles, if asked for (rank_tiles)
 
-  // In lists sorted by depth_order: no hit of entry k, or of any after it in its list, has a smaller z.
+  /// In lists sorted by depth_order: no hit of entry k, or of any after it in its list, has a smaller z.
   GART_HD GART_INLINE float depth(u32 k) const {
     return near_depth(keys[k] & ((u32{1} << order_bits) - 1), depth_shift);
   }
@@ -151,8 +152,8 @@ class tile_map {
                  tile_kernels::begin_lists{keys_, order_bits_, offsets_});
   }
 
-  // After build: the tiles by the length of their lists, longest first, in 255 steps of 16. Lists differ by orders of
-  // magnitude, and a long one begun last would keep the whole device waiting.
+  /// After build: the tiles by the length of their lists, longest first, in 255 steps of 16. Lists differ by orders of
+  /// magnitude, and a long one begun last would keep the whole device waiting.
   void rank_tiles(E& exec) {
     stage_scope stage(exec, "map");
     index_t const tiles = static_cast<index_t>(offsets_.size() - 1);

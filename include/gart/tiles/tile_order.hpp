@@ -1,9 +1,10 @@
 #pragma once
-// The orders of a tile's list. An order turns a (primitive, tile) pair into the low bits of its key:
-//   take(free_bits)   how many of the key's free bits it uses, asked once, before anything else
-//   of(i)             what it needs of primitive i, for all its tiles
-//   shift()           of a depth, how many low bits keys leave out; 0 where they hold none
-//   key(p, cell, tile)  of the pair whose pixels are `cell`, the primitive's box cut by the tile of this number
+/// \file
+/// The orders of a tile's list. An order turns a (primitive, tile) pair into the low bits of its key:
+///   take(free_bits)   how many of the key's free bits it uses, asked once, before anything else
+///   of(i)             what it needs of primitive i, for all its tiles
+///   shift()           of a depth, how many low bits keys leave out; 0 where they hold none
+///   key(p, cell, tile)  of the pair whose pixels are `cell`, the primitive's box cut by the tile of this number
 
 #include <gart/camera/models.hpp>
 #include <gart/math/rectangle_depth.hpp>
@@ -24,8 +25,8 @@ concept tile_order = std::is_trivially_copyable_v<O> &&
   { k.key(p, cell, tile) } -> std::same_as<u32>;
 };
 
-// A depth (not negative) as an integer of the same order, `shift` low bits dropped; and the depth it stands for, which
-// is not larger.
+/// A depth (not negative) as an integer of the same order, `shift` low bits dropped; and the depth it stands for, which
+/// is not larger.
 GART_HD GART_INLINE u32 depth_key(float depth, int shift) { return float_to_bits(depth) >> shift; }
 GART_HD GART_INLINE float near_depth(u32 key, int shift) { return bits_to_float(key << shift); }
 
@@ -50,13 +51,13 @@ class depth_bits {
 
 }  // namespace detail
 
-// By how near the pair's pixels can hit the primitive: what the tile-list tracer reads. No hit of the pair has a
-// smaller depth, as the camera measures it, than its key stands for. This one is a pinhole's, whose rays all lie on one
-// plane's grid; others are of any_depth_order.
+/// By how near the pair's pixels can hit the primitive: what the tile-list tracer reads. No hit of the pair has a
+/// smaller depth, as the camera measures it, than its key stands for. This one is a pinhole's, whose rays all lie on
+/// one plane's grid; others are of any_depth_order.
 class depth_order : public detail::depth_bits {
  public:
-  // depths: of each primitive, anywhere. gaussians: null where that is all there is to go by; else the depth is bounded
-  // in each tile (math/rectangle_depth.hpp).
+  /// depths: of each primitive, anywhere. gaussians: null where that is all there is to go by; else the depth is
+  /// bounded in each tile (math/rectangle_depth.hpp).
   depth_order(float const* depths, ray_gaussian const* gaussians, pinhole const& view)
       : depths_(depths), gaussians_(gaussians), rotation_(view.rotation) {
     to_u_ = 1 / view.fx, to_v_ = 1 / view.fy, cx_ = view.cx, cy_ = view.cy;
@@ -87,7 +88,7 @@ class depth_order : public detail::depth_bits {
   float to_u_, to_v_, cx_, cy_, reach_;
 };
 
-// The same for any camera, by distance along the ray: bounded by the tile's plane where there are planes.
+/// The same for any camera, by distance along the ray: bounded by the tile's plane where there are planes.
 template <int Size>
 class any_depth_order : public detail::depth_bits {
  public:
@@ -118,13 +119,13 @@ class any_depth_order : public detail::depth_bits {
   tile_plane const* planes_;
 };
 
-// The order that a camera's tile lists are sorted by.
+/// The order that a camera's tile lists are sorted by.
 template <execution E, int Size>
 class depth_orders {
  public:
   explicit depth_orders(E& exec) : planes_(exec) {}
 
-  // rays: of the model, where they have one centre. The order is valid until the next call.
+  /// rays: of the model, where they have one centre. The order is valid until the next call.
   depth_order of(E&, pinhole const& model, pixel_rays const&, float const* depths, ray_gaussian const* gaussians) {
     return {depths, gaussians, model};
   }
@@ -145,7 +146,7 @@ class depth_orders {
   buffer<tile_plane, E> planes_;
 };
 
-// By the primitives' numbers, in which the pairs come.
+/// By the primitives' numbers, in which the pairs come.
 struct number_order {
   int take(int) const { return 0; }
   int shift() const { return 0; }

@@ -1,11 +1,12 @@
 #pragma once
-// Where the rays of a tile pass, for cameras whose rays are no plane's grid: a plane across the tile's middle ray, a
-// grid of pixels on it, and how far any ray of the tile lies from its place there. Found from the rays themselves, each
-// of them looked at: whatever the lens, every ray through pixels [x0, x1) x [y0, y1) of the tile passes through
-//   origin + x dx + y dy,   x0 + inset - widen_x <= x <= x1 - inset + widen_x, y likewise, pixels counted from the
-//   tile's,
-// whose part along the middle ray is 1: what a hit's distance is at least is a bound of math/rectangle_depth.hpp. Tiles
-// that see more than some 100 degrees, or a line, have no plane. Cost: one launch, two readings of every ray.
+/// \file
+/// Where the rays of a tile pass, for cameras whose rays are no plane's grid: a plane across the tile's middle ray, a
+/// grid of pixels on it, and how far any ray of the tile lies from its place there. Found from the rays themselves,
+/// each of them looked at: whatever the lens, every ray through pixels [x0, x1) x [y0, y1) of the tile passes through
+///   origin + x dx + y dy,   x0 + inset - widen_x <= x <= x1 - inset + widen_x, y likewise, pixels counted from the
+///   tile's,
+/// whose part along the middle ray is 1: what a hit's distance is at least is a bound of math/rectangle_depth.hpp.
+/// Tiles that see more than some 100 degrees, or a line, have no plane. Cost: one launch, two readings of every ray.
 
 #include <gart/camera/pixel_rays.hpp>
 #include <gart/tiles/grid.hpp>
@@ -13,14 +14,14 @@
 namespace gart::inline GART_ISA {
 
 struct alignas(16) tile_plane {
-  vec3 origin;  // of the grid, at the tile's corner
+  vec3 origin;  ///< of the grid, at the tile's corner
   float widen_x;
-  vec3 dx;  // from pixel to pixel
+  vec3 dx;  ///< from pixel to pixel
   float widen_y;
   vec3 dy;
-  float reach;  // of math/rectangle_depth.hpp; 0 where there is no plane
+  float reach;  ///< of math/rectangle_depth.hpp; 0 where there is no plane
 
-  // Rays go through the middle of pixels, 0.5; the rest is for the rounding of their directions.
+  /// Rays go through the middle of pixels, 0.5; the rest is for the rounding of their directions.
   static constexpr float inset = 0.45f;
 };
 
