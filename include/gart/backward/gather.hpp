@@ -33,8 +33,8 @@ struct gather_kernel {
   using response_type = typename C::response;                                   ///< of the Gaussians
   using entry_type = typename C::entry;                                         ///< of the LT buffer
   static constexpr bool recomputed = C::validity == slot_validity::recomputed;  ///< whether hits are decided again
-  /// Lanes of a team, and teams that a multiprocessor should hold.
-  static constexpr int block_size = 64, min_blocks = C::terms::geometry ? 8 : 10;
+  static constexpr int block_size = 64,                                         ///< lanes of a team
+      min_blocks = C::terms::geometry ? 8 : 10;                                 ///< teams a multiprocessor holds
   /// SH functions.
   static constexpr int bands = sh_basis<C::sh_degree>::size;
   static constexpr int sh_stride = 3 * bands;  ///< floats of a Gaussian's coefficients
@@ -45,8 +45,8 @@ struct gather_kernel {
   struct pixel_data {
     /// Of degree 0 it is a constant.
     static constexpr int basis_quads = !C::terms::color || C::sh_degree == 0 ? 0 : (bands + 3) / 4;
-    /// Direction, colour . gradient; gradient, error.
-    quad direction_total, gradient;
+    quad direction_total,  ///< direction, colour . gradient
+        gradient;          ///< gradient, error
     /// SH functions of the direction.
     quad basis[basis_quads];
     quad last;  ///< t and place of the ray's last hit, where validity is recomputed; and what makes the words odd in

@@ -1,18 +1,16 @@
 #pragma once
 /// \file
 /// What a gather (backward/gather.hpp) is compiled for, one struct of these members:
-/// \code{.unparsed}
-/// policy     the execution policy on which it runs
-/// response   how the Gaussians fall from their centres (math/response.hpp)
-/// terms      what it sums up: terms<color>, terms<geometry> or both
-/// entry      what a slot of the LT buffer holds of a hit (backward/lt_slot.hpp)
-/// sh_degree  that the coefficients are stored with
-/// tile_size  side of a tile, in pixels
-/// sums       where a pair's sums go
-/// validity   how a slot that is a hit is told from one that is none (backward/strategies.hpp)
-/// form       which form of the kernel runs (exec/concepts.hpp): the policy's, unless a strategy asks for the
-///            plain one
-/// \endcode
+///   policy     the execution policy on which it runs
+///   response   how the Gaussians fall from their centres (math/response.hpp)
+///   terms      what it sums up: terms<color>, terms<geometry> or both
+///   entry      what a slot of the LT buffer holds of a hit (backward/lt_slot.hpp)
+///   sh_degree  that the coefficients are stored with
+///   tile_size  side of a tile, in pixels
+///   sums       where a pair's sums go
+///   validity   how a slot that is a hit is told from one that is none (backward/strategies.hpp)
+///   form       which form of the kernel runs (exec/concepts.hpp): the policy's, unless a strategy asks for the
+///              plain one
 /// strategy_gather makes one of a strategy; a struct of a program's own does as well (bench/registers.cu).
 
 #include <gart/backward/strategies.hpp>
@@ -50,8 +48,8 @@ struct strategy_gather {
   using response = Response;                                          ///< of the Gaussians
   using terms = typename Strategy::gather;                            ///< what is gathered
   using entry = typename Strategy::template record<TileSize>::entry;  ///< a slot of the LT buffer
-  /// Of the coefficients; side of a tile, in pixels.
-  static constexpr int sh_degree = ShDegree, tile_size = TileSize;
+  static constexpr int sh_degree = ShDegree,                          ///< of the coefficients
+      tile_size = TileSize;                                           ///< side of a tile, in pixels
   /// In an order or atomically.
   static constexpr gather_sums sums = Strategy::ordered ? gather_sums::ordered : gather_sums::atomic;
   static constexpr slot_validity validity = Strategy::validity;  ///< how slots that are hits are told

@@ -1,9 +1,7 @@
 #pragma once
 /// \file
 /// Where the slot of (primitive, tile, pixel) lies in the LT buffer: primitive-major, then tile, then pixel,
-/// \code{.unparsed}
-/// idx(i, t, p) = O_primitive(i) + O_tile(i, t) + O_pixel(i, t, p).
-/// \endcode
+///   idx(i, t, p) = O_primitive(i) + O_tile(i, t) + O_pixel(i, t, p).
 /// O_primitive is a prefix sum of box areas in 64 bits; the rest is a closed form of the box: the tiles of a box are
 /// its cells cut by the grid's lines, row by row, and each holds its pixels row by row. A bijection onto [0, sum of
 /// areas).
@@ -27,10 +25,12 @@ GART_HD constexpr u32 pixel_offset(pixel_box const& cell, u32 x, u32 y) {
 /// The cell of a primitive and a tile, one 16-byte word, by which many pixels find their slots. Slots are counted in 32
 /// bits.
 struct alignas(16) tile_slots {
-  u32 first = 0;  ///< slot of the cell's first pixel
-  u32 width = 0;  ///< of the cell, in pixels
-  /// The cell: [x, x1) x [y, y1).
-  u16 x = 0, y = 0, x1 = 0, y1 = 0;
+  u32 first = 0;                            ///< slot of the cell's first pixel
+  u32 width = 0;                            ///< of the cell, in pixels
+  u16 x = 0,                                ///< the cell's first column
+      y = 0,                                ///< its first row
+      x1 = 0,                               ///< past its last column
+      y1 = 0;                               ///< past its last row
   static constexpr u32 none = 0xffffffffu;  ///< no slot
 
   tile_slots() = default;

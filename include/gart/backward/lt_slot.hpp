@@ -4,14 +4,12 @@
 /// V, the colour that the pixel would have if the hit were opaque, is what the gradient of alpha needs
 /// (math/hit_gradient.hpp); the weight w = T alpha what the gradient of colour needs, with, for each channel of the
 /// hit's colour, whether it was clamped at zero.
-/// \code{.unparsed}
-/// float4   16 bytes  V, whose free sign bits hold the clamps; w
-/// half      8 bytes  the same in four halves: V within 2^-11 relatively (2^-25 absolutely), at most 65504; 2^15 w, so
-///                    that a weight keeps its 2^-11 down to 2e-9
-/// shared    8 bytes  V with 9 bits a channel and one exponent: within 0.002 of its largest channel, at most 65408; w,
-///                    whose three lowest bits hold the clamps (a relative error of 2^-20)
-/// weight    4 bytes  w as in shared; no V: enough for the gradient of colour (hybrid)
-/// \endcode
+///   float4   16 bytes  V, whose free sign bits hold the clamps; w
+///   half      8 bytes  the same in four halves: V within 2^-11 relatively (2^-25 absolutely), at most 65504; 2^15 w,
+///                      so that a weight keeps its 2^-11 down to 2e-9
+///   shared    8 bytes  V with 9 bits a channel and one exponent: within 0.002 of its largest channel, at most 65408;
+///                      w, whose three lowest bits hold the clamps (a relative error of 2^-20)
+///   weight    4 bytes  w as in shared; no V: enough for the gradient of colour (hybrid)
 /// The gradient of alpha is the difference of V and the pixel's colour, over 1 - alpha: an error of V counts by how
 /// little of the ray the hit and what lies behind it are. Relative errors of a whole gradient, group by group, against
 /// double, at most (tests/traits): float4 5e-4, half 1e-2 and shared 4e-2 on clouds and long rays; on stacks of hits at
@@ -46,9 +44,10 @@ GART_HD GART_INLINE float from_half(u32 half) {
 /// The format float4: exact.
 struct alignas(16) lt_entry {
   static constexpr char const* name = "float4";  ///< in configurations and reports
-  /// V; negative where the hit's colour was clamped.
-  float r, g, b;
-  float w;  ///< the weight; a NaN: not written
+  float r,                                       ///< V; negative where the hit's colour was clamped
+      g,                                         ///< as r
+      b;                                         ///< as r
+  float w;                                       ///< the weight; a NaN: not written
 
   /// Packs V, the weight and the clamps of the colour `c`, which is that before the clamp.
   GART_HD GART_INLINE static lt_entry of(vec3 const& v, float weight, vec3 const& c) {
@@ -76,8 +75,8 @@ struct alignas(16) lt_entry {
 /// The format half.
 struct alignas(8) lt_half_entry {
   static constexpr char const* name = "half";  ///< in configurations and reports
-  /// Channel r in the low half of rg, b in that of bw; sign bits of r, g, b: clamped.
-  u32 rg, bw;
+  u32 rg,                                      ///< r in the low half, g; sign bits: clamped
+      bw;                                      ///< b in the low half, then the weight
 
   /// As lt_entry::of.
   GART_HD GART_INLINE static lt_half_entry of(vec3 const& v, float weight, vec3 const& c) {

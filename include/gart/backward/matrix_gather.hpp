@@ -2,9 +2,8 @@
 /// \file
 /// The gather on a device: eight primitives a warp, four lanes a primitive, which take the tile's pixels eight at a
 /// time, two a lane. What primitives sum up for colour is a product for each channel c,
-/// \code{.unparsed}
-/// sum[band][primitive] = Y[band][pixel] (w g_c)[pixel][primitive],   w = 0 where the channel is clamped or no hit is,
-/// \endcode
+///   sum[band][primitive] = Y[band][pixel] (w g_c)[pixel][primitive],
+///   w = 0 where the channel is clamped or no hit is,
 /// so it is left to the matrix units (math/matrix_unit.hpp): a lane holds the weights where they want them, and no SH
 /// sum of its own. Moments are summed in registers and added up over the four lanes. Neighbouring lanes read
 /// neighbouring slots and add to neighbouring floats.

@@ -24,21 +24,22 @@ struct packet_gather {
   using entry_type = typename C::entry;                        ///< of the LT buffer
   static constexpr int block_size = 1;                         ///< a host's team has one lane
   static constexpr bool recomputed = gather_type::recomputed;  ///< whether hits are decided again
-  /// SH functions, and floats of a Gaussian's coefficients.
-  static constexpr int bands = gather_type::bands, sh_stride = gather_type::sh_stride;
-  /// Side of a tile, and packets in it.
-  static constexpr int Size = C::tile_size, packets = Size * Size / lane_count;
+  static constexpr int bands = gather_type::bands,             ///< SH functions
+      sh_stride = gather_type::sh_stride;                      ///< floats of a Gaussian's coefficients
+  static constexpr int Size = C::tile_size,                    ///< side of a tile, in pixels
+      packets = Size * Size / lane_count;                      ///< packets of a tile
   /// Lanes' groups that hold the SH functions.
   static constexpr int band_groups = (bands + lane_count - 1) / lane_count;
 
   /// What is needed of a packet's pixels.
   struct packet_data {
-    /// In the tile.
-    int x, y;
-    /// Of the rays; of the image.
-    vec3_of<lanes> direction, gradient;
-    /// Colour . gradient; of the pixel; t of the ray's last hit.
-    lanes total, error, last_t;
+    int x,                                    ///< in the tile
+        y;                                    ///< in the tile
+    vec3_of<lanes> direction,                 ///< of the rays, unit length
+        gradient;                             ///< of the image
+    lanes total,                              ///< colour . gradient
+        error,                                ///< of the pixel
+        last_t;                               ///< t of the ray's last hit
     lane_words last_place;                    ///< of the ray's last hit
     lanes bands_of[lane_count][band_groups];  ///< the SH basis, a pixel after another
   };

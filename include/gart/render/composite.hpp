@@ -1,9 +1,7 @@
 #pragma once
 /// \file
 /// The forward ray program: front-to-back compositing of the hits of a pixel,
-/// \code{.unparsed}
-/// C += T alpha c,  T *= 1 - alpha,
-/// \endcode
+///   C += T alpha c,  T *= 1 - alpha,
 /// colour from spherical harmonics on the ray's direction, until T < transmittance_min (the hit that crosses counts),
 /// or until max_hits of them where there is such a cap. The background is added with what transmittance is left. What a
 /// hit does to a ray is a template over the number: render/packet_composite.hpp does it to a packet of rays.
@@ -49,8 +47,8 @@ struct composited_hits {
 /// The pixel program of the forward pass (trace/ray_program.hpp): composites each ray's hits and writes `out`.
 template <int ShDegree, hit_record Record>
 struct composite : ray_program_base {
-  /// On a host it is walked in packets, on a device in warps.
-  static constexpr bool has_packets = true, has_warps = true;
+  static constexpr bool has_packets = true,  ///< it is walked in packets on a host
+      has_warps = true;                      ///< and in warps on a device
   /// Rays from the camera's centre.
   using ray_type = primary_ray;
   /// A ray on its way.

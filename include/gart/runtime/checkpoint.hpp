@@ -2,9 +2,7 @@
 /// \file
 /// The file format of checkpoints: "gart checkpoint 2\\n", then named arrays, the last one named "end", and nothing
 /// after it. An array is, little endian:
-/// \code{.unparsed}
-/// u64 length of the name, the name, u32 version of what the array holds, u64 bytes, the bytes, u32 checksum
-/// \endcode
+///   u64 length of the name, the name, u32 version of what the array holds, u64 bytes, the bytes, u32 checksum
 /// with CRC-32C (io/crc32c.hpp) over all of the array before it, so that one flipped bit is found. Files of the format
 /// "gart checkpoint 1\\n", whose arrays have neither version nor checksum, are read too. Written whole or not at all.
 /// Errors: io_error naming the file and the array that is missing, truncated, damaged, of another size, or of a version

@@ -69,8 +69,8 @@ chosen<float> choose_sh_gain(train_options const& options);
 struct starting_points {
   bool random = false;  ///< else the capture's own
   index_t count = 0;    ///< of points
-  /// Of the first Gaussians.
-  float opacity = 0, scale = 0;
+  float opacity = 0,    ///< of the first Gaussians
+      scale = 0;        ///< times the distance to the neighbours
 };
 /// Where training starts; the reason names the numbers.
 chosen<starting_points> choose_start(dataset const& data, train_options const& options);

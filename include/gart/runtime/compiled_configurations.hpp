@@ -3,13 +3,11 @@
 /// Turns templates into configurations: sessions and renderers of a policy, traits, a tracer and a strategy. Include
 /// where the kernels of the policy can be compiled, and call from GART_REGISTER_CONFIGURATIONS register_configurations,
 /// for every SH degree, or register_configuration_of for one configuration:
-/// \code{.cpp}
-/// using response = gart::generalized_gaussian<4>;
-/// GART_REGISTER_CONFIGURATIONS(my_configurations,
-///                              gart::register_configuration_of<gart::openmp_exec, gart::scene_traits<3, response>,
-///                                                              gart::tile_tracer<gart::openmp_exec, 8, response>,
-///                                                              gart::primitive_strategy>(-1))
-/// \endcode
+///   using response = gart::generalized_gaussian<4>;
+///   GART_REGISTER_CONFIGURATIONS(my_configurations,
+///                                gart::register_configuration_of<gart::openmp_exec, gart::scene_traits<3, response>,
+///                                                                gart::tile_tracer<gart::openmp_exec, 8, response>,
+///                                                                gart::primitive_strategy>(-1))
 
 #include <gart/runtime/compiled_renderer.hpp>
 #include <gart/runtime/registry.hpp>

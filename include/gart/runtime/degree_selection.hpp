@@ -13,18 +13,18 @@
 /// many without, on the same views, random numbers and rates, and the mean PSNR of the held-out views is compared where
 /// both end. The winner's steps are the run's, the loser's are the price: 2% of the run a trial, at most three.
 /// - Not before against after a band is switched on: everything else is trained meanwhile, and gains more than the
-///   band. Not with the coefficients against with zeros in their place: the others have arranged themselves around
-///   them, and a band that only shifts what the constant term could as well say would seem to pay.
+/// band. Not with the coefficients against with zeros in their place: the others have arranged themselves around
+/// them, and a band that only shifts what the constant term could as well say would seem to pay.
 /// - The branch without starts behind, by just that, and is not always level when it ends: what is left over counts for
-///   the band. The error is on the side of keeping.
+/// the band. The error is on the side of keeping.
 /// - The gain now is not the gain in the end. Adam moves a coefficient by about its rate a step, so the band's share of
-///   what it will come to rises at first as the steps it has had and then levels off, and with it the gain. Hence
-///   forecast = gain (iterations - first) / (now - first), first the step the band was first used in: an upper bound
-///   for a gain of that course; the band stays if forecast >= sh_gain. A gain that is not positive has no future. (It
-///   also covers the others' errors shrinking, against which the same share weighs more in dB.)
+/// what it will come to rises at first as the steps it has had and then levels off, and with it the gain. Hence
+/// forecast = gain (iterations - first) / (now - first), first the step the band was first used in: an upper bound
+/// for a gain of that course; the band stays if forecast >= sh_gain. A gain that is not positive has no future. (It
+/// also covers the others' errors shrinking, against which the same share weighs more in dB.)
 /// - A few views may differ by more than a band is worth: where a part of the scene is seen by few cameras, chance
-///   alone sets two branches a dB apart in a view. The standard error of the gain over the views says so; where it is
-///   over 0.05 dB, and over sh_gain, nothing can be told and the band stays.
+/// alone sets two branches a dB apart in a view. The standard error of the gain over the views says so; where it is
+/// over 0.05 dB, and over sh_gain, nothing can be told and the band stays.
 ///
 /// Per Gaussian degrees are not chosen: rows of one length keep loads aligned and the kernels' loops straight.
 ///

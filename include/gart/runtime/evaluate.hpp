@@ -17,9 +17,9 @@ namespace gart {
 
 /// One view against its photograph.
 struct view_score {
-  std::string name;  ///< the view's
-  /// In dB; from 0 to 1.
-  double psnr = 0, ssim = 0;
+  std::string name;         ///< the view's
+  double psnr = 0,          ///< in dB
+      ssim = 0;             ///< at most 1
   double affine_psnr = 0;   ///< after the affine colour that fits best
   double own_psnr = 0;      ///< without an exposure: of the scene's own colours
   double milliseconds = 0;  ///< of rendering, to an image in host memory

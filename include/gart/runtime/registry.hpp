@@ -20,6 +20,7 @@ struct compiled_configuration {
   /// A renderer of it.
   bool (*available)(std::string* reason);
   std::unique_ptr<renderer> (*make_renderer)(configuration_request const&);  ///< a session of it
+  /// A session of it.
   std::unique_ptr<session> (*make_session)(configuration_request const&, train_options const&, dataset const&,
                                            gaussian_model const& start);
 };

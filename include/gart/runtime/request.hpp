@@ -38,8 +38,8 @@ struct configuration_info {
   int kernel_degree = 2;                                ///< of the generalised Gaussians
   arithmetic_kind arithmetic = arithmetic_kind::exact;  ///< of the response
   lt_format_kind lt_format = lt_format_kind::none;      ///< of the slots of the LT buffer
-  /// Pixels a side; hits of a ray that are kept at a time.
-  int tile_size = 8, window = 0;
+  int tile_size = 8,                                    ///< pixels a side
+      window = 0;                                       ///< hits of a ray that are kept at a time
   std::string instruction_set = "";  ///< that a host configuration was compiled for (core/isa.hpp); empty on a device
 };
 

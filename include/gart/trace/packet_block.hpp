@@ -10,10 +10,10 @@ namespace gart::inline GART_ISA {
 
 /// The pixels of a packet: 4 wide, as high as there are lanes for.
 struct packet_block {
-  /// In pixels.
-  static constexpr int width = 4, height = lane_count / width;
-  /// Its first pixel.
-  int x = 0, y = 0;
+  static constexpr int width = 4,   ///< in pixels
+      height = lane_count / width;  ///< in pixels
+  /// Column of its first pixel.
+  int x = 0, y = 0;  ///< and its row
 
   /// Of a lane's pixel, from the first.
   static constexpr int column(int lane) { return lane % width; }

@@ -36,8 +36,9 @@ struct band_trial {
 
 /// A run between two steps.
 struct training_state {
-  /// Parameters, and Adam's moments in their shape.
-  gaussian_model scene, first, second;
+  gaussian_model scene,             ///< the parameters
+      first,                        ///< Adam's first moment of each
+      second;                       ///< and its second
   int step = 0;                     ///< steps done
   float growth = 1;                 ///< of MCMC, a densification
   u64 seed = 1;                     ///< of all numbers drawn at random

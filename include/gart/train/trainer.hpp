@@ -2,12 +2,10 @@
 /// \file
 /// Training, one step at a time: a view, the forward pass, the loss, the backward pass by the strategy, Adam,
 /// densification. Composed from the parts; each can be replaced. A loss of one's own is a callable given to step().
-/// \code{.cpp}
-/// openmp_exec exec;
-/// trainer<openmp_exec, scene_traits<3>, bvh_tracer<openmp_exec>, pixel_strategy> run(exec, options, data, start);
-/// while (run.steps_done() < options.iterations) run.step();
-/// write_splat_ply("model.ply", run.model());
-/// \endcode
+///   openmp_exec exec;
+///   trainer<openmp_exec, scene_traits<3>, bvh_tracer<openmp_exec>, pixel_strategy> run(exec, options, data, start);
+///   while (run.steps_done() < options.iterations) run.step();
+///   write_splat_ply("model.ply", run.model());
 /// The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step),
 /// so a state holds parameters, moments and counters only.
 
@@ -43,11 +41,11 @@ struct loss_input {
   E& exec;                   ///< the policy
   dataset_view const& view;  ///< of this step
   truth_view truth;          ///< the photograph, in the policy's memory
-  /// Of the image, in pixels.
-  int width, height;
-  span<float const> image;  ///< [H][W][3]
-  span<float> gradient;     ///< [H][W][3]
-  span<float> value;        ///< [2]
+  int width,                 ///< of the image, in pixels
+      height;                ///< of the image, in pixels
+  span<float const> image;   ///< [H][W][3]
+  span<float> gradient;      ///< [H][W][3]
+  span<float> value;         ///< [2]
 };
 
 /// A training run on one policy, by one tracer and one strategy.
