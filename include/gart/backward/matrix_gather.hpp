@@ -36,24 +36,30 @@ struct matrix_gather;  // a device's compiler has it
 /// The tile kernel on matrix units. All but the colour's sums is of a gather without colour.
 template <gather_configuration C>
 struct matrix_gather : gather_kernel<detail::without_color<C>> {
-  using base = gather_kernel<detail::without_color<C>>;
-  using entry_type = typename C::entry;
-  static constexpr int lanes = 32, warps = 4, block_size = warps * lanes, min_blocks = 5;
-  static constexpr int bands = base::bands, sh_stride = base::sh_stride;
-  static constexpr int Size = C::tile_size;
-  static constexpr u32 share = 2 * block_size;  ///< primitives that are put in order together
+  using base = gather_kernel<detail::without_color<C>>;  ///< with everything but colour
+  using entry_type = typename C::entry;                  ///< of the LT buffer
+  static constexpr int lanes = 32,                       ///< of a warp
+      warps = 4,                                         ///< of a team
+      block_size = warps * lanes,                        ///< lanes of a team
+      min_blocks = 5;                                    ///< teams a multiprocessor holds
+  static constexpr int bands = base::bands,              ///< SH functions
+      sh_stride = base::sh_stride;                       ///< floats of a Gaussian's coefficients
+  static constexpr int Size = C::tile_size;              ///< side of a tile, in pixels
+  static constexpr u32 share = 2 * block_size;           ///< primitives that are put in order together
   static_assert(C::terms::color && Size == 8 && bands <= 16);
 
+  /// What a team shares.
   struct scratch {
-    typename base::pixel_data pixels[Size * Size];
-    /// Y of a row of pixels, as the lanes want it.
-    matrix_part<4>::words high[Size][lanes], low[Size][lanes];
+    typename base::pixel_data pixels[Size * Size];  ///< of the tile
+    matrix_part<4>::words high[Size][lanes],        ///< Y of a row of pixels, as the lanes want it
+        low[Size][lanes];                           ///< and what the first part leaves
     float sums[warps][8][52];  ///< of colour, a row a primitive; 52: what a warp writes at once lies in 32 banks
-    tile_slots cells[share];
-    u32 ids[share];
-    u32 count[Size * Size];
+    tile_slots cells[share];   ///< of the primitives put in order
+    u32 ids[share];            ///< their Gaussians
+    u32 count[Size * Size];    ///< of the counting sort
   };
 
+  /// Gathers the tile of a team.
   __device__ void operator()(auto const& team) const {
     u32 const tile = team.tile();
     u32 const first = this->map.offsets[tile], count = this->map.offsets[tile + 1] - first;

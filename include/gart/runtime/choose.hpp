@@ -53,7 +53,7 @@ chosen<tracer_kind> choose_tracer(capture_traits const& traits);
 chosen<std::string> choose_backward(capture_traits const& traits);
 
 /// Exposures are learned where photographs of neighbouring poses differ in brightness by more than 3%, the median
-/// (exposure/exposure.hpp), and the scene is unbounded (what captures give: bench/results/exposure.json).
+/// (exposure/exposure.hpp), and the scene is unbounded (docs/exposure.md says what captures give).
 chosen<bool> choose_exposure(capture_traits const& traits);
 
 /// The gain that a band of spherical harmonics has to buy to be stored, in dB; 0: nothing is measured. Shorter runs

@@ -18,21 +18,27 @@
 
 namespace gart::inline GART_ISA {
 
+/// A hit that waits for its turn.
 struct waiting_hit {
-  float t, alpha;
-  vec3 shown;
-  u32 key;  ///< a hit's place where hits have places (trace/warp_program.hpp), else its Gaussian's entry in the list
+  float t,     ///< distance along the ray
+      alpha;   ///< opacity of the hit
+  vec3 shown;  ///< what it shows (trace/warp_program.hpp)
+  u32 key;     ///< a hit's place where hits have places (trace/warp_program.hpp), else its Gaussian's entry in the list
 };
 
 /// Order of hits at one t: places of a pixel's hits have the order of their ids; entries are asked for them.
 struct place_order {
+  /// By number.
   GART_HD GART_INLINE bool operator()(u32 a, u32 b) const { return a < b; }
 };
+/// The ids that entries of the list stand for.
 struct entry_order {
-  u32 const* ids;
+  u32 const* ids;  ///< the list
+  /// By id.
   GART_HD GART_INLINE bool operator()(u32 a, u32 b) const { return ids[a] < ids[b]; }
 };
 
+/// The queue of one ray, a lane a ray.
 template <class KeyOrder>
 class warp_hit_queue {
   static constexpr int lanes = 32;
@@ -46,8 +52,9 @@ class warp_hit_queue {
   };
 
  public:
-  struct scratch {  // of a warp
-    float words[6][window][lanes];
+  /// What a warp shares.
+  struct scratch {
+    float words[6][window][lanes];  ///< of the waiting hits, a bank a lane
   };
   static constexpr std::size_t spill_floats_a_lane = std::size_t{6} * runs * run;  ///< of a lane
 
@@ -59,6 +66,7 @@ class warp_hit_queue {
     clear();
   }
 
+  /// Empties it.
   __device__ GART_INLINE void clear() {
     order_ = 0, free_ = (1u << window) - 1, count_ = 0;
     left_ = 0, next_t_ = infinity, next_run_ = 0;
@@ -67,8 +75,11 @@ class warp_hit_queue {
     for (int r = 0; r < runs; ++r) first_t_[r] = infinity;
   }
 
+  /// Whether the window has no room left.
   __device__ GART_INLINE bool full() const { return count_ == window; }
+  /// Hits that the window still has room for.
   __device__ GART_INLINE int room() const { return window - count_; }
+  /// Whether a hit was lost since clear().
   __device__ GART_INLINE bool lost() const { return lost_t_ < infinity; }
   __device__ GART_INLINE float lost_t() const { return lost_t_; }  ///< infinity: none
 

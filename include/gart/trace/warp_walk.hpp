@@ -22,6 +22,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// The tile kernel of the walk.
 template <class Response, int Size, warp_program P>
 class walk_tile_warps {
   static constexpr int lanes = 32, warps = 2;
@@ -30,18 +31,20 @@ class walk_tile_warps {
   static_assert(Size % block_width == 0);
 
  public:
-  static constexpr int block_size = warps * lanes, min_blocks = 7;
-  static constexpr u32 tile_parts = tile_blocks;
-  using key_order = std::conditional_t<P::places_hits, place_order, entry_order>;
-  using queue = warp_hit_queue<key_order>;
+  static constexpr int block_size = warps * lanes,                                 ///< lanes of a team
+      min_blocks = 7;                                                              ///< teams a multiprocessor holds
+  static constexpr u32 tile_parts = tile_blocks;                                   ///< parts of a tile, a warp each
+  using key_order = std::conditional_t<P::places_hits, place_order, entry_order>;  ///< the order of hits at one t
+  using queue = warp_hit_queue<key_order>;                                         ///< of a lane's ray
   static constexpr std::size_t spill_floats = queue::spill_floats_a_lane * block_size;  ///< of a team's rays
 
-  tile_grid<Size> grid;
-  tile_map_view map;
+  tile_grid<Size> grid;  ///< of the view
+  tile_map_view map;     ///< the tiles' lists
+  /// [N]: boxes, and where their slots begin.
   footprint_slots const* ranges;
-  traced_scene scene;
-  ray_depth depth;  ///< that lists are sorted by
-  P program;
+  traced_scene scene;        ///< what is traced
+  ray_depth depth;           ///< that lists are sorted by
+  P program;                 ///< whose rays they are
   u32* next = nullptr;       ///< part of a tile that is to be taken next, zero at first
   float* spilled = nullptr;  ///< [teams][spill_floats]
 
@@ -68,8 +71,9 @@ class walk_tile_warps {
   };
 
  public:
+  /// What a team shares.
   struct scratch {
-    warp_scratch warp[warps];
+    warp_scratch warp[warps];  ///< of each
   };
 
   /// As many teams as the device holds: their warps take parts of tiles, those of the longest lists first, until there
