@@ -20,6 +20,7 @@ namespace gart {
 
 class cuda_exec;
 
+/// What sums are formed in.
 template <class T>
 concept scan_sum = std::same_as<T, u32> || std::same_as<T, u64>;
 
@@ -41,6 +42,7 @@ inline void require_size(char const* algorithm, char const* field, std::size_t s
 
 }  // namespace detail
 
+/// On a host.
 template <host_execution E, scan_sum T>
 void exclusive_scan(E& exec, span<u32 const> in, span<T> out, span<std::type_identity_t<T>> total = {}) {
   detail::require_size("exclusive_scan", "out", out.size(), in.size());

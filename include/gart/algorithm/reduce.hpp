@@ -14,8 +14,10 @@
 
 namespace gart {
 
+/// What a reduction makes of the elements: their sum, the least or the largest of them.
 enum class reduction { sum, min, max };
 
+/// The numbers that can be reduced.
 template <class T>
 concept reducible = std::same_as<T, float> || std::same_as<T, double> || std::same_as<T, u32> || std::same_as<T, u64>;
 
@@ -80,6 +82,7 @@ A host_reduce(E& exec, span<T const> in, A neutral, Op op) {
 
 }  // namespace detail
 
+/// On a host.
 template <host_execution E, reducible T>
 void reduce(E& exec, span<std::type_identity_t<T> const> in, span<T> out, reduction op = reduction::sum) {
   detail::require_size("reduce", "out", out.size(), 1);

@@ -15,6 +15,7 @@ namespace gart {
 
 /// Compiled into gart::cuda.
 void segmented_reduce(cuda_exec& exec, span<float const> rows, u32 columns, span<u32 const> offsets, span<float> sums);
+/// Compiled into gart::cuda; offsets past 32 bits.
 void segmented_reduce(cuda_exec& exec, span<float const> rows, u32 columns, span<u64 const> offsets, span<float> sums);
 
 }  // namespace gart
@@ -56,10 +57,12 @@ void segmented_reduce(E& exec, span<float const> rows, u32 columns, span<O const
 
 }  // namespace detail
 
+/// On a host.
 template <host_execution E>
 void segmented_reduce(E& exec, span<float const> rows, u32 columns, span<u32 const> offsets, span<float> sums) {
   detail::segmented_reduce(exec, rows, columns, offsets, sums);
 }
+/// On a host; offsets past 32 bits.
 template <host_execution E>
 void segmented_reduce(E& exec, span<float const> rows, u32 columns, span<u64 const> offsets, span<float> sums) {
   detail::segmented_reduce(exec, rows, columns, offsets, sums);

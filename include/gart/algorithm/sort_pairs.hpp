@@ -17,6 +17,7 @@
 
 namespace gart {
 
+/// What keys may be.
 template <class K>
 concept sort_key = std::same_as<K, u32> || std::same_as<K, u64>;
 
@@ -39,6 +40,7 @@ inline void require_sort(std::size_t keys, std::size_t values, int key_bits, int
 
 }  // namespace detail
 
+/// On a host.
 template <host_execution E, sort_key K>
 void sort_pairs(E& exec, span<K> keys, span<u32> values, int key_bits) {
   constexpr int digit_bits = 8;

@@ -6,8 +6,9 @@
 
 namespace gart {
 
+/// Axis-aligned, in the frame's units.
 struct box {
-  vec3 lo, hi;
+  vec3 lo, hi;  ///< the least and the largest corner
 };
 
 }  // namespace gart
@@ -19,6 +20,7 @@ inline constexpr float infinity = 3.402823466e38f;  ///< a finite one: no roundi
 /// Holds nothing, is the identity of join, and is missed by every ray.
 GART_HD constexpr box empty_box() { return {vec3(infinity), vec3(-infinity)}; }
 
+/// The least box that holds both.
 GART_HD GART_INLINE box join(box const& a, box const& b) {
   box out;
   for (int k = 0; k < 3; ++k) {

@@ -14,14 +14,18 @@
 
 namespace gart::inline GART_ISA {
 
+/// The tree as kernels hold it.
 struct bvh_view {
-  bvh_node const* nodes = nullptr;
-  index_t count = 0;  ///< boxes
+  bvh_node const* nodes = nullptr;  ///< [nodes], the root first
+  index_t count = 0;                ///< boxes
 };
 
+/// The tree and its scratch, in the policy's memory.
 template <execution E>
 class bvh {
  public:
+  ///@{
+  /// Over no boxes.
   bvh() = default;
   explicit bvh(E& exec)
       : nodes_(exec),
@@ -34,10 +38,13 @@ class bvh {
         codes_(exec),
         order_(exec),
         bounds_(exec) {}
+  ///@}
 
+  /// A new tree over [n] boxes.
   void build(E& exec, span<box const> boxes);
   /// For the same number of boxes as the last build.
   void refit(E& exec, span<box const> boxes);
+  /// Until the next build or refit.
   bvh_view view() const { return {nodes_.data(), count_}; }
 
  private:

@@ -16,11 +16,13 @@ GART_HD GART_INLINE float slab_inverse(float d) {
   return 1.0f / (d < tiny && d > -tiny ? (d < 0 ? -tiny : tiny) : d);
 }
 
+/// A ray as boxes are tested against it.
 struct slab_ray {
-  vec3 origin, inverse;
+  vec3 origin, inverse;  ///< and one over each part of the direction
   /// Boxes of Gaussians are as wide as rounding needs for rays from the frame (ellipsoid_box). Rays from elsewhere need
   /// 32 roundings of their origin more; here along the ray, and negative: x - 0 is x, and costs primary rays nothing.
   vec3 narrower{0.0f};
+  /// Of a ray of the frame (primary_ray) or of one from anywhere (ray).
   template <class Ray>
   GART_HD GART_INLINE explicit slab_ray(Ray const& r)
       : origin(origin_of(r)),
@@ -49,6 +51,7 @@ GART_HD GART_INLINE float larger(float a, float b) {
   return a > b ? a : b;
 #endif
 }
+/// b where a is not a number.
 GART_HD GART_INLINE float smaller(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return fminf(a, b);
@@ -61,8 +64,9 @@ GART_HD GART_INLINE float smaller(float a, float b) {
 /// two lie apart by more than all roundings of either: a few of the distance to the far end of the grid. What overflows
 /// ends as an infinity on the safe side or as no number, and that prunes nothing.
 struct grid_crossing {
-  float step[3], enter[3], leave[3];
+  float step[3], enter[3], leave[3];  ///< a number an axis
 
+  /// Of a node and a ray.
   GART_HD GART_INLINE grid_crossing(bvh_node const& n, slab_ray const& r) {
     GART_UNROLL
     for (int k = 0; k < 3; ++k) {

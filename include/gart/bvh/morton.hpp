@@ -6,8 +6,10 @@
 
 namespace gart::inline GART_ISA {
 
+/// Of a code: 21 an axis.
 inline constexpr int morton_bits = 63;
 
+/// The low 21 bits of x, two bits of zero after each.
 GART_HD GART_INLINE u64 spread_bits(u64 x) {
   x &= 0x1fffff;
   x = (x | x << 32) & 0x001f00000000ffffull;

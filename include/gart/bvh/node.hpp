@@ -21,24 +21,32 @@ static_assert(std::endian::native == std::endian::little);  // child c of a side
 
 /// The grid of one axis.
 struct bvh_axis {
+  /// The exponent of an axis whose planes are "below 0", 0 and "above 0".
   static constexpr u32 unbounded = 254;
-  float origin;
+  float origin;  ///< of plane 0
   u32 exponent;  ///< of the step, biased by 127: 1 to 254
 
+  /// From plane to plane.
   GART_HD float step() const { return bits_to_float(exponent << 23); }
 };
 
+/// A node, in three sectors of a GPU's memory.
 struct alignas(32) bvh_node {
-  float origin[3];
+  float origin[3];                 ///< of plane 0, an axis each
   u32 shape;                       ///< a byte an axis: exponents of the steps; then 4 bits each: inner children, leaves
   u32 plane[2][3][bvh_width / 4];  ///< lower and upper sides; byte c is child c's
   u32 child[bvh_width];            ///< inner children (nodes) from the front, leaves (boxes) from the back
 
+  /// The grid of axis k.
   GART_HD bvh_axis axis(int k) const { return {origin[k], shape >> 8 * k & 0xffu}; }
+  ///@{
+  /// Children of the kind.
   GART_HD int inner_count() const { return static_cast<int>(shape >> 24 & 0xfu); }
   GART_HD int leaf_count() const { return static_cast<int>(shape >> 28); }
+  ///@}
   /// Bit c is child c.
   GART_HD u32 inner_mask() const { return (1u << inner_count()) - 1u; }
+  /// Bit c is child c.
   GART_HD u32 leaf_mask() const { return ((1u << leaf_count()) - 1u) << (bvh_width - leaf_count()); }
   /// What a ray is tested against in place of the child's own box.
   GART_HD box child_box(int c) const {
@@ -60,6 +68,7 @@ GART_HD GART_INLINE float steps_below(float x, float step, float per_step) {
   float const n = floorf(x * per_step);
   return n * step > x ? n - 1.0f : n;
 }
+/// Whole steps at or above x.
 GART_HD GART_INLINE float steps_above(float x, float step, float per_step) {
   float const n = ceilf(x * per_step);
   return n * step < x ? n + 1.0f : n;
@@ -88,6 +97,7 @@ GART_HD GART_INLINE u32 plane_below(bvh_axis const& a, float lo) {
   float const q = steps_below(lo, step, per_step) - a.origin * per_step;
   return q > 0.0f ? static_cast<u32>(q) : 0;
 }
+/// The plane above: at or above hi.
 GART_HD GART_INLINE u32 plane_above(bvh_axis const& a, float hi) {
   if (a.exponent == bvh_axis::unbounded) return hi <= 0.0f ? 1 : 255;
   float const step = a.step(), per_step = bits_to_float((254 - a.exponent) << 23);

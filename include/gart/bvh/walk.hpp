@@ -12,6 +12,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// The place of the lowest bit that is set; of a word that is not zero.
 GART_HD GART_INLINE int lowest_bit(u32 bits) {
 #if defined(__CUDA_ARCH__)
   return __ffs(static_cast<int>(bits)) - 1;
@@ -63,6 +64,7 @@ GART_HD GART_INLINE u32 near_to_far(u32 wanted, float const (&entry)[bvh_width])
   return order;
 }
 
+/// Walks the tree along a ray; the visitor is told of leaves.
 template <class Ray, class Visitor>
 GART_HD GART_INLINE void walk(bvh_view const& tree, Ray const& r, Visitor& visitor) {
   if (tree.count == 0) return;

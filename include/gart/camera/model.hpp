@@ -45,15 +45,20 @@ namespace gart::inline GART_ISA {
 
 /// What all models have.
 struct camera_base {
-  int width = 0, height = 0;
-  vec3d position{0.0};  ///< the frame's origin: all else is relative to it
+  int width = 0, height = 0;  ///< pixels
+  vec3d position{0.0};        ///< the frame's origin: all else is relative to it
 
+  /// Distance along the ray.
   GART_HD ray_depth depth() const { return {}; }
+  /// True: a model that may see one direction twice says otherwise.
   bool one_to_one() const { return true; }
 
  protected:
+  ///@{
+  /// Size and position.
   camera_base() = default;
   GART_HD explicit camera_base(camera const& c) : width(c.width), height(c.height), position(c.position) {}
+  ///@}
 };
 
 namespace detail {
@@ -76,6 +81,7 @@ concept camera_filter = std::is_trivially_copyable_v<T> &&
 
 }  // namespace detail
 
+/// A model: it has the members that are listed above.
 template <class M>
 concept camera_model = std::derived_from<M, camera_base> && std::is_trivially_copyable_v<M> &&
     requires(M const& m, float value) {
@@ -102,15 +108,18 @@ decltype(auto) visit_camera(M const& model, F&& f) {
   return f(model);
 }
 
+/// What no ray can be cast by.
 template <camera_model M>
 camera_fault fault_of(M const& model) {
   return model.fault();
 }
 
+/// Throws invalid_argument where there is a fault.
 inline void refuse_camera(camera_fault const& fault) {
   if (fault.what) throw invalid_argument(std::string("camera: ") + fault.what + " (" + fault.remedy + ")");
 }
 
+/// Throws invalid_argument for a model by which no ray can be cast.
 template <camera_model M>
 void require_camera(M const& model) {
   refuse_camera(model.fault());
@@ -126,6 +135,7 @@ inline camera_fault size_fault(camera_base const& c) {
   return {};
 }
 
+/// A position or rotation that is not finite.
 inline camera_fault pose_fault(vec3d const& position, mat3 const& rotation) {
   for (int k = 0; k < 3; ++k) {
     bool finite = is_finite(static_cast<float>(position[k]));
@@ -135,6 +145,7 @@ inline camera_fault pose_fault(vec3d const& position, mat3 const& rotation) {
   return {};
 }
 
+/// Throws invalid_argument for a near distance that is not positive and finite.
 inline void require_near(float near) {
   if (!(near > 0 && is_finite(near))) throw invalid_argument("footprints: near must be positive and finite");
 }

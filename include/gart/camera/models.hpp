@@ -10,6 +10,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// Calls f with the model that the camera is of, and returns what f does.
 template <class F>
 decltype(auto) visit_camera(camera const& c, F&& f) {
   switch (c.kind) {
@@ -19,10 +20,12 @@ decltype(auto) visit_camera(camera const& c, F&& f) {
   return c.lens.any() ? f(opencv(c)) : f(pinhole(c));
 }
 
+/// What no ray can be cast by.
 inline camera_fault fault_of(camera const& c) {
   return visit_camera(c, [](auto const& model) { return model.fault(); });
 }
 
+/// Throws invalid_argument for a camera by which no ray can be cast.
 inline void require_camera(camera const& c) { refuse_camera(fault_of(c)); }
 
 /// Unit direction, in the world, of the ray through an image point. Host side.

@@ -16,6 +16,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// Boxes of ellipsoids through the lens.
 class opencv_bounds {
  public:
   /// Host side: the bounds of what the image sees, in slopes, by sampling its border.
@@ -28,6 +29,7 @@ class opencv_bounds {
     view_ = c.view_of(near * seen.least_cosine * (1 - margin));
   }
 
+  /// The pixels that can hit it, and its near depth; empty where none can.
   GART_HD footprint operator()(ellipsoid const& e) const {
     slope_box s;
     footprint out = project(view_, e, s);
@@ -77,8 +79,9 @@ class opencv_bounds {
 
 /// What antialiasing asks of the lens.
 struct opencv_lens {
-  distortion lens;
+  distortion lens;  ///< its coefficients
 
+  /// How the image moves with the slopes there.
   GART_HD GART_INLINE lens_jacobian jacobian_at(float x, float y) const {
     float const r2 = fma(x, x, mul(y, y));
     float const radial = fma(r2, fma(r2, lens.k2, lens.k1), 1.0f);
@@ -91,6 +94,7 @@ struct opencv_lens {
     return j;
   }
 
+  /// How the Jacobian's determinant j.det changes with the slopes.
   GART_HD GART_INLINE vec2 slope_of_det(lens_jacobian const& j, float x, float y) const {
     float const r2 = x * x + y * y;
     float const slope = 2 * lens.k1 + 4 * lens.k2 * r2, bend = 8 * lens.k2;
@@ -100,13 +104,18 @@ struct opencv_lens {
   }
 };
 
+/// A pinhole behind a radial-tangential lens.
 struct opencv : camera_base {
-  pinhole flat;  ///< without the lens
-  distortion lens;
+  pinhole flat;     ///< without the lens
+  distortion lens;  ///< coefficients
 
+  ///@{
+  /// From the run-time camera.
   opencv() = default;
   GART_HD explicit opencv(camera const& c) : camera_base(c), flat(c), lens(c.lens) {}
+  ///@}
 
+  /// Through the image point (u, v), in pixels.
   template <class F>
   GART_HD GART_INLINE primary_ray_of<F> ray(F u, F v) const {
     F x = divide(add(u, F(-flat.cx)), F(flat.fx)), y = divide(add(v, F(-flat.cy)), F(flat.fy));
@@ -114,13 +123,16 @@ struct opencv : camera_base {
     return ray_of_slopes(flat.rotation, x, y);
   }
 
+  /// For hits at t > near.
   opencv_bounds bounds(float near) const {
     require_near(near);
     return {flat, lens, seen(), near};
   }
 
+  /// Of so many pixels.
   slope_filter<opencv_lens> filter(float pixels) const { return {flat, opencv_lens{lens}, seen(), pixels}; }
 
+  /// Of the lens, or of the pinhole behind it.
   camera_fault fault() const {
     if (!(is_finite(lens.k1) && is_finite(lens.k2) && is_finite(lens.p1) && is_finite(lens.p2)))
       return {"the lens distortion is not finite", "correct k1, k2, p1 and p2"};

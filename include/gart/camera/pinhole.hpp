@@ -9,8 +9,10 @@
 
 namespace gart::inline GART_ISA {
 
+/// Boxes of ellipsoids, perspective-correct.
 struct pinhole_bounds {
-  footprint_view view;
+  footprint_view view;  ///< the camera, in double
+  /// The pixels that can hit it, and its near depth; empty where none can.
   GART_HD footprint operator()(ellipsoid const& e) const {
     slope_box s;
     footprint out = project(view, e, s);
@@ -28,28 +30,37 @@ GART_HD GART_INLINE primary_ray_of<F> ray_of_slopes(mat3 const& rotation, F x, F
   return unit_ray(d);
 }
 
+/// A camera without a lens.
 struct pinhole : camera_base {
-  float fx = 0, fy = 0, cx = 0, cy = 0;
-  mat3 rotation{1.0f};
+  float fx = 0, fy = 0, cx = 0, cy = 0;  ///< focal lengths and principal point, pixels
+  mat3 rotation{1.0f};                   ///< camera to world; columns are the camera's axes
 
+  ///@{
+  /// From the run-time camera.
   pinhole() = default;
   GART_HD explicit pinhole(camera const& c)
       : camera_base(c), fx(c.fx), fy(c.fy), cx(c.cx), cy(c.cy), rotation(c.rotation) {}
+  ///@}
 
+  /// Through the image point (u, v), in pixels.
   template <class F>
   GART_HD GART_INLINE primary_ray_of<F> ray(F u, F v) const {
     return ray_of_slopes(rotation, divide(add(u, F(-cx)), F(fx)), divide(add(v, F(-cy)), F(fy)));
   }
 
+  /// z: along the camera's axis.
   GART_HD ray_depth depth() const { return {rotation[2], 0}; }
 
+  /// For hits at t > near.
   pinhole_bounds bounds(float near) const {
     require_near(near);
     return {view_of(near * slopes_seen(*this).least_cosine)};
   }
 
+  /// Of so many pixels.
   slope_filter<> filter(float pixels) const { return {*this, no_lens{}, slopes_seen(*this), pixels}; }
 
+  /// Size, focal lengths, principal point or pose.
   camera_fault fault() const {
     if (camera_fault const size = size_fault(*this); size.what) return size;
     if (!(fx > 0 && fy > 0 && is_finite(fx) && is_finite(fy)))

@@ -53,9 +53,11 @@ struct cast_rays {
 
 }  // namespace camera_kernels
 
+/// Casts the rays of a view, and holds their table.
 template <execution E>
 class camera_rays {
  public:
+  /// No rays yet.
   explicit camera_rays(E& exec) : directions_(exec) {}
 
   /// View: a camera or a camera model.

@@ -10,9 +10,10 @@
 
 namespace gart::inline GART_ISA {
 
+/// What depth is measured along.
 struct ray_depth {
-  vec3 axis{0.0f};
-  float offset = 1;
+  vec3 axis{0.0f};   ///< world axes; zero: the distance itself
+  float offset = 1;  ///< of all directions
 
   /// Depth over distance, of one ray or of one a lane; rounded up, so that what is said to lie nearer than a depth
   /// does.

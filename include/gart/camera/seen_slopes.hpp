@@ -10,9 +10,10 @@
 
 namespace gart::inline GART_ISA {
 
+/// The rectangle.
 struct seen_slopes {
-  double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
-  double least_cosine = 1;  ///< of a border pixel's ray with the camera's axis
+  double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;  ///< least and largest slopes
+  double least_cosine = 1;                                  ///< of a border pixel's ray with the camera's axis
 };
 
 /// View: size, focal lengths and principal point. slopes_of: from an image point, in units of the focal length about
@@ -37,6 +38,7 @@ seen_slopes slopes_seen(View const& c, F const& slopes_of) {
   return out;
 }
 
+/// Without a lens.
 template <class View>
 seen_slopes slopes_seen(View const& c) {
   return slopes_seen(c, [](vec2 const& p) { return p; });

@@ -17,15 +17,18 @@ namespace gart::inline GART_ISA {
 
 /// Of the image by the slopes, symmetric.
 struct lens_jacobian {
-  float xx = 1, xy = 0, yy = 1, det = 1;
+  float xx = 1, xy = 0, yy = 1, det = 1;  ///< and its determinant
 };
 
 /// Lens: jacobian_at(x, y), and how its determinant changes there.
 struct no_lens {
+  /// The identity.
   GART_HD GART_INLINE lens_jacobian jacobian_at(float, float) const { return {}; }
+  /// It does not change.
   GART_HD GART_INLINE vec2 slope_of_det(lens_jacobian const&, float, float) const { return {0, 0}; }
 };
 
+/// The filter: where it stands, and how wide it is there.
 template <class Lens = no_lens>
 class slope_filter {
  public:
@@ -43,11 +46,13 @@ class slope_filter {
         y0_(static_cast<float>(s.y0)),
         y1_(static_cast<float>(s.y1)) {}
 
+  /// The mean relative to the camera.
   GART_HD GART_INLINE vec3 from_camera(gaussian_parameters const& g) const { return relative_mean(g.mean, position_); }
 
   /// At a mean relative to the camera.
   GART_HD GART_INLINE float sigma_at(vec3 const& m) const { return evaluate(m).sigma; }
 
+  /// The same, and how it changes with the mean.
   GART_HD GART_INLINE filter_at at(vec3 const& m) const {
     point const p = evaluate(m);
     float const square = p.distance * p.distance;

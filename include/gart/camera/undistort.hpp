@@ -44,6 +44,7 @@ GART_HD GART_INLINE void undistort(distortion const& lens, F u, F v, F& x, F& y)
   }
 }
 
+/// The slopes of one image point.
 GART_HD inline vec2 undistort(distortion const& lens, vec2 distorted) {
   vec2 p;
   undistort(lens, distorted.x, distorted.y, p.x, p.y);

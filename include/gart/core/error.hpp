@@ -18,9 +18,10 @@ struct error : std::runtime_error {
 
 /// A file that cannot be read or written as asked. `where` is the path, with the field or line where one is known.
 struct io_error : error {
+  /// The message names place, cause and remedy.
   io_error(std::string where, std::string const& what, std::string const& remedy = {})
       : error(where + ": " + what + (remedy.empty() ? "" : " (" + remedy + ")")), place(std::move(where)) {}
-  std::string place;
+  std::string place;  ///< the path, with the field or line
 };
 
 /// A request that this build or this machine cannot serve: a camera model, a backend, a configuration that is not
@@ -37,20 +38,22 @@ struct invalid_argument : error {
 /// Memory that could not be had. `advice` names the fields that lower the need. 0 free bytes: not a matter of what is
 /// free.
 struct out_of_memory : error {
+  /// In bytes; `where` is whose memory, "host" for one.
   out_of_memory(std::string const& where, std::size_t asked_bytes, std::size_t free_bytes, std::string const& advice)
       : error("out of " + where + " memory: asked for " + std::to_string(asked_bytes) + " bytes" +
               (free_bytes ? ", " + std::to_string(free_bytes) + " bytes free" : "") + " (" + advice + ")"),
         asked(asked_bytes),
         available(free_bytes) {}
-  std::size_t asked, available;
+  std::size_t asked, available;  ///< bytes
 };
 
 /// A number of a training that is not finite any more (optim/finite.hpp). `group` as the message names it.
 struct not_finite : error {
+  /// `first` is the first Gaussian that has one.
   not_finite(std::string const& what, std::string group_name, std::size_t first)
       : error(what), group(std::move(group_name)), gaussian(first) {}
-  std::string group;
-  std::size_t gaussian;
+  std::string group;     ///< as in the message
+  std::size_t gaussian;  ///< its number
 };
 
 }  // namespace gart

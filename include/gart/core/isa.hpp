@@ -34,10 +34,13 @@
 #elif defined(GART_FUSED)
 #define GART_ISA isa_fma
 #else
+/// The inline namespace of the instruction set that this file is compiled for.
 #define GART_ISA isa_base
 #endif
 
+/// As they stand; undefined below.
 #define GART_TEXT_OF(...) #__VA_ARGS__
+/// The macro's value, as text; undefined below.
 #define GART_TEXT(macro) GART_TEXT_OF(macro)
 
 namespace gart::inline GART_ISA {

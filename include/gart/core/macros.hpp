@@ -10,7 +10,9 @@
 #define GART_HD __host__ __device__
 #define GART_INLINE __forceinline__
 #else
+/// Both hosts and devices may call it.
 #define GART_HD
+/// Inlined, whatever the compiler would choose.
 #define GART_INLINE inline __attribute__((always_inline))
 #endif
 
@@ -20,6 +22,7 @@
 #if defined(__CUDACC__)
 #define GART_KERNEL _Pragma("nv_exec_check_disable") __host__ __device__
 #else
+/// A body of a kernel.
 #define GART_KERNEL
 #endif
 
@@ -27,6 +30,8 @@
 #define GART_UNROLL _Pragma("unroll")
 #define GART_NO_UNROLL _Pragma("unroll 1")
 #else
+/// Before a loop: unrolled on a device.
 #define GART_UNROLL
+/// Before a loop: left as it is on a device.
 #define GART_NO_UNROLL
 #endif

@@ -15,17 +15,20 @@
 
 namespace gart {
 
+/// A value of an enumeration and what it is called.
 template <class E>
 struct name_of {
-  E value;
-  char const* name;
+  E value;           ///< of the enumeration
+  char const* name;  ///< as users read it
 };
 
+/// An enumeration with names_of.
 template <class E>
 concept named = requires(E value) {
   names_of(value)[0].name;
 };
 
+/// The name of a value; "?" where it has none.
 template <named E>
 constexpr char const* to_string(E value) {
   for (auto const& one : names_of(value))
@@ -41,6 +44,7 @@ constexpr E from_string(std::string_view name, E otherwise) {
   return otherwise;
 }
 
+/// All names, in their order.
 template <named E>
 std::vector<std::string> list_of_names() {
   std::vector<std::string> all;
@@ -48,6 +52,7 @@ std::vector<std::string> list_of_names() {
   return all;
 }
 
+/// The value of a name; invalid_argument where no value has it.
 template <named E>
 E from_string(std::string_view name) {
   std::string all;

@@ -15,30 +15,45 @@
 
 namespace gart {
 
+/// [size] elements in the memory of a policy.
 template <class T, execution E>
 class buffer {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
+  /// What growth allocates, times what was asked for.
   static constexpr double slack = 1.25;
 
   buffer() = default;
+  /// Of n elements, undefined.
   explicit buffer(E& exec, std::size_t n = 0) : exec_(&exec) { resize(n); }
+  /// A copy of the host's elements.
   buffer(E& exec, std::vector<T> const& host) : exec_(&exec) { assign(host); }
+  ///@{
+  /// The other is left empty.
   buffer(buffer&& other) noexcept { swap(other); }
   buffer& operator=(buffer&& other) noexcept {
     buffer moved(std::move(other));
     swap(moved);
     return *this;
   }
+  ///@}
   ~buffer() { release(); }
 
+  /// Elements.
   std::size_t size() const { return size_; }
+  /// Elements that there is memory for.
   std::size_t capacity() const { return capacity_; }
+  /// In the policy's memory; null where nothing was allocated.
   T* data() const { return data_; }
+  /// All elements.
   span<T> view() const { return {data_, size_}; }
+  ///@{
+  /// All elements, where a function asks for a span.
   operator span<T>() const { return view(); }
   operator span<T const>() const { return {data_, size_}; }
+  ///@}
+  /// The policy whose memory it is.
   E& exec() const { return *exec_; }
 
   /// Contents are undefined after a growth. The first allocation is exact, because most sizes never change; growth has
@@ -62,12 +77,17 @@ class buffer {
     }
     size_ = n;
   }
+  /// Sets every byte to 0.
   void zero() { exec_->zero(data_, size_ * sizeof(T)); }
+  ///@{
+  /// A copy of the host's elements takes the place of all.
   void assign(span<T const> host) {
     resize(host.size());
     exec_->copy_in(data_, host.data(), host.size() * sizeof(T));
   }
   void assign(std::vector<T> const& host) { assign(span<T const>(host)); }
+  ///@}
+  /// A copy for the host; waits for it.
   std::vector<T> to_host() const {
     std::vector<T> out(size_);
     if (size_) exec_->copy_out(out.data(), data_, size_ * sizeof(T));
@@ -79,6 +99,7 @@ class buffer {
     exec_->copy_out(&value, data_, sizeof(T));
     return value;
   }
+  /// Gives the memory back.
   void release() {
     if (data_) exec_->deallocate(data_, capacity_ * sizeof(T));
     data_ = nullptr;

@@ -44,6 +44,7 @@ namespace gart {
 /// of a host's vector registers (math/lanes.hpp); lanes of a warp, which step together and share its matrix units.
 enum class kernel_form { plain, packet, warp };
 
+/// A policy.
 template <class E>
 concept execution = requires(E& e, void* p, void const* q, std::size_t n, float* f, float const (&row)[4], u32* words,
                              u64* counts) {
@@ -70,6 +71,7 @@ concept execution = requires(E& e, void* p, void const* q, std::size_t n, float*
   { e.free_bytes() } -> std::convertible_to<std::size_t>;
 };
 
+/// A policy whose memory is the host's.
 template <class E>
 concept host_execution = execution<E> && !E::device && requires(E & e, void const* what, std::size_t n, void (&f)()) {
   { e.workspace(n) } -> std::same_as<void*>;
@@ -77,16 +79,19 @@ concept host_execution = execution<E> && !E::device && requires(E & e, void cons
   E::exclusively(what, f);
 };
 
+/// A policy of a device.
 template <class E>
 concept device_execution = execution<E> && E::device && requires(E& e) {
   { e.multiprocessors() } -> std::convertible_to<int>;
 };
 
+/// A kernel over tiles.
 template <class K>
 concept tile_kernel = std::is_trivially_copyable_v<K> && requires {
   typename K::scratch;
 };
 
+/// A kernel over indices.
 template <class K>
 concept index_kernel = std::is_trivially_copyable_v<K> && !tile_kernel<K> && requires(K const& k, index_t i) {
   k(i);
@@ -95,8 +100,8 @@ concept index_kernel = std::is_trivially_copyable_v<K> && !tile_kernel<K> && req
 /// `tiles` teams; each has at most `lanes` lanes on a device (a hint, a multiple of 32; see cuda_launch.cuh for the
 /// most that a kernel accepts) and one on a host.
 struct tile_range {
-  index_t tiles = 0;
-  index_t lanes = 64;
+  index_t tiles = 0;   ///< teams
+  index_t lanes = 64;  ///< of a team, at most
 };
 
 }  // namespace gart

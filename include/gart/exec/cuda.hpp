@@ -22,23 +22,25 @@
 
 namespace gart {
 
+/// A device, as the driver describes it.
 struct cuda_device_info {
-  std::string name;
-  int multiprocessors = 0;
-  int compute_major = 0, compute_minor = 0;
-  std::size_t total_bytes = 0;
+  std::string name;                          ///< of the vendor
+  int multiprocessors = 0;                   ///< that it has
+  int compute_major = 0, compute_minor = 0;  ///< compute capability
+  std::size_t total_bytes = 0;               ///< of its memory
 };
 
 /// The devices there are; empty without a driver. `reason` then says why.
 std::vector<cuda_device_info> cuda_devices(std::string* reason = nullptr);
 
+/// A policy: a stream and its pool of memory.
 class cuda_exec {
  public:
-  static constexpr char const* name = "cuda";
-  static constexpr bool device = true;
-  static constexpr kernel_form form = kernel_form::warp;
-  profiler profile;
-  memory_use memory;
+  static constexpr char const* name = "cuda";             ///< of the policy
+  static constexpr bool device = true;                    ///< memory is not the host's
+  static constexpr kernel_form form = kernel_form::warp;  ///< kernels step as warps
+  profiler profile;                                       ///< times of stages
+  memory_use memory;                                      ///< bytes of buffers
 
   /// `stream`, a cudaStream_t of that device, stays its owner's and must outlive this; null: one of its own.
   explicit cuda_exec(int device_index = 0, void* stream = nullptr);
@@ -46,26 +48,39 @@ class cuda_exec {
   cuda_exec(cuda_exec const&) = delete;
   cuda_exec& operator=(cuda_exec const&) = delete;
 
+  /// Bytes of the device's memory, from the pool; out_of_memory.
   void* allocate(std::size_t bytes);
+  /// Back to the pool, after what is queued.
   void deallocate(void* p, std::size_t bytes);
+  /// From the host.
   void copy_in(void* dst, void const* src, std::size_t bytes);
+  /// To the host; waits for the data.
   void copy_out(void* dst, void const* src, std::size_t bytes);
+  /// From device to device.
   void copy(void* dst, void const* src, std::size_t bytes);
+  /// Sets every byte to 0.
   void zero(void* p, std::size_t bytes);
+  /// Sets every byte to one value.
   void fill(void* p, unsigned char byte, std::size_t bytes);
+  /// Waits for all that is queued.
   void synchronize();
 
   void* stream() const { return stream_; }  ///< a cudaStream_t
+  /// Of the device.
   int multiprocessors() const { return multiprocessors_; }
+  /// Bytes that can still be had.
   std::size_t free_bytes() const;
   void make_current() const;  ///< launches go to the calling thread's current device, which must be the stream's
 
   /// Brackets of a timed stage; stage_scope calls them. The times, by events, reach `profile` at the next synchronize()
   /// or copy_out().
   void begin_stage(char const* label);
+  /// The end of the innermost stage.
   void end_stage() noexcept;
+  /// Throws gart::error where the launch before it failed; `label` is named.
   void check_launch(char const* label);
 
+  /// In kernels: adds v, returns the old value.
   template <class T>
   GART_HD static T atomic_add(T* p, T v) {
 #if defined(__CUDA_ARCH__)
@@ -79,6 +94,7 @@ class cuda_exec {
     return old;
 #endif
   }
+  /// In kernels: row[0..n) += values.
   template <int N>
   GART_HD static void atomic_add_row(float* row, float const (&values)[N], int n) {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
@@ -96,6 +112,7 @@ class cuda_exec {
         if (i < n) atomic_add(row + i, values[i]);
     }
   }
+  /// In kernels: what was written before is seen by who sees what comes after.
   GART_HD static void fence() {
 #if defined(__CUDA_ARCH__)
     __threadfence();

@@ -71,6 +71,7 @@ __global__ void __launch_bounds__(bounds_of<K>::block_size, bounds_of<K>::min_bl
 
 }  // namespace detail
 
+/// kernel(i) for i in [0, n).
 template <index_kernel K>
 void parallel_for(cuda_exec& exec, char const* label, index_t n, K const& kernel) {
   if (n == 0) return;
@@ -81,6 +82,7 @@ void parallel_for(cuda_exec& exec, char const* label, index_t n, K const& kernel
   exec.check_launch(label);
 }
 
+/// kernel(team) for each tile.
 template <tile_kernel K>
 void parallel_for(cuda_exec& exec, char const* label, tile_range range, K const& kernel) {
   if (range.tiles == 0) return;

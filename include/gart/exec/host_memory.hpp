@@ -18,18 +18,23 @@
 
 namespace gart::inline GART_ISA {
 
+/// The base of a host's policy: all but its threads and atomics.
 class host_memory {
  public:
-  static constexpr bool device = false;
-  static constexpr kernel_form form = kernel_form::packet;
-  profiler profile;
-  memory_use memory;
+  static constexpr bool device = false;                     ///< memory is the host's
+  static constexpr kernel_form form = kernel_form::packet;  ///< lanes are vector registers
+  profiler profile;                                         ///< times of stages
+  memory_use memory;                                        ///< bytes of buffers
 
+  ///@{
+  /// A policy is not copied: buffers hold its address.
   host_memory() = default;
   host_memory(host_memory const&) = delete;
   host_memory& operator=(host_memory const&) = delete;
+  ///@}
   ~host_memory() { deallocate(workspace_, workspace_bytes_); }
 
+  /// Bytes, aligned to 64, or to a huge page from 8 MiB on; out_of_memory.
   void* allocate(std::size_t bytes) {
     void* p = ::operator new(bytes, alignment_of(bytes), std::nothrow);
     if (!p)
@@ -42,22 +47,29 @@ class host_memory {
     memory.allocated(bytes);
     return p;
   }
+  /// Of as many bytes as were allocated.
   void deallocate(void* p, std::size_t bytes) {
     if (!p) return;
     ::operator delete(p, alignment_of(bytes));
     memory.released(bytes);
   }
+  ///@{
+  /// A memcpy.
   void copy_in(void* dst, void const* src, std::size_t bytes) { copy(dst, src, bytes); }
   void copy_out(void* dst, void const* src, std::size_t bytes) { copy(dst, src, bytes); }
   void copy(void* dst, void const* src, std::size_t bytes) {
     if (bytes) std::memcpy(dst, src, bytes);
   }
+  ///@}
+  /// Sets every byte to 0.
   void zero(void* p, std::size_t bytes) {
     if (bytes) std::memset(p, 0, bytes);
   }
+  /// Sets every byte to one value.
   void fill(void* p, unsigned char byte, std::size_t bytes) {
     if (bytes) std::memset(p, byte, bytes);
   }
+  /// Nothing is queued.
   void synchronize() {}
 
   /// A block that the policy keeps and lends to the algorithm that is running, so that sorting at every step does not
@@ -72,13 +84,16 @@ class host_memory {
     return workspace_;
   }
 
+  /// A stage begins, in the one that is open.
   void begin_stage(char const* label) { open_.push_back({label, std::chrono::steady_clock::now()}); }
+  /// The innermost stage ends.
   void end_stage() {
     std::chrono::duration<double, std::milli> const elapsed = std::chrono::steady_clock::now() - open_.back().start;
     profile.add(open_.back().label, elapsed.count());
     open_.pop_back();
   }
 
+  /// Bytes that the system can still give; 0: not known.
   static std::size_t free_bytes() {
     long const pages = sysconf(_SC_AVPHYS_PAGES), page = sysconf(_SC_PAGESIZE);
     return pages > 0 && page > 0 ? static_cast<std::size_t>(pages) * static_cast<std::size_t>(page) : 0;

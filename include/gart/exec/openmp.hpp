@@ -11,14 +11,17 @@
 
 namespace gart::inline GART_ISA {
 
+/// A policy: all cores.
 class openmp_exec : public host_memory {
  public:
-  static constexpr char const* name = "openmp";
+  static constexpr char const* name = "openmp";  ///< of the policy
 
   /// threads = 0: as many as OpenMP gives (OMP_NUM_THREADS, or the cores).
   explicit openmp_exec(int threads = 0) : threads_(threads > 0 ? threads : default_threads()) {}
+  /// How many threads it runs on.
   int threads() const { return threads_; }
 
+  /// Adds v, returns the old value.
   template <class T>
   static T atomic_add(T* p, T v) {
     return std::atomic_ref<T>(*p).fetch_add(v, std::memory_order_relaxed);
@@ -33,12 +36,14 @@ class openmp_exec : public host_memory {
     f();
     lock.clear(std::memory_order_release);
   }
+  /// row[0..n) += values, as one row.
   template <int N>
   static void atomic_add_row(float* row, float const (&values)[N], int n) {
     exclusively(row, [&] {
       for (int i = 0; i < n; ++i) row[i] += values[i];
     });
   }
+  /// What was written before is seen by who sees what comes after.
   static void fence() { std::atomic_thread_fence(std::memory_order_seq_cst); }
 
  private:

@@ -18,13 +18,19 @@
 
 namespace gart::inline GART_ISA {
 
+/// The team of a tile on a host: one lane.
 template <class Scratch>
 class host_team {
  public:
+  /// Of a tile, with the scratch that it works in.
   host_team(index_t tile, Scratch& scratch) : tile_(tile), scratch_(scratch) {}
+  /// Its number.
   index_t tile() const { return tile_; }
+  /// The scratch, which all lanes share.
   Scratch& scratch() const { return scratch_; }
+  /// All lanes have come here; on a host the one has.
   void barrier() const {}
+  /// f(0) to f(n - 1), shared out over the lanes.
   template <class F>
   void for_each(index_t n, F&& f) const {
     for (index_t i = 0; i < n; ++i) f(i);
@@ -35,6 +41,8 @@ class host_team {
   Scratch& scratch_;
 };
 
+///@{
+/// kernel(i) for i in [0, n).
 template <index_kernel K>
 void parallel_for(serial_exec& exec, char const* label, index_t n, K const& kernel) {
   if (n == 0) return;
@@ -50,7 +58,10 @@ void parallel_for(openmp_exec& exec, char const* label, index_t n, K const& kern
 #pragma omp parallel for schedule(dynamic, 256) num_threads(exec.threads())
   for (index_t i = 0; i < n; ++i) kernel(i);
 }
+///@}
 
+///@{
+/// kernel(team) for each tile.
 template <tile_kernel K>
 void parallel_for(serial_exec& exec, char const* label, tile_range range, K const& kernel) {
   if (range.tiles == 0) return;
@@ -79,5 +90,6 @@ void parallel_for(openmp_exec& exec, char const* label, tile_range range, K cons
     }
   }
 }
+///@}
 
 }  // namespace gart::inline GART_ISA

@@ -9,21 +9,28 @@
 
 namespace gart {
 
+/// Of one label.
 struct stage_time {
-  double milliseconds = 0;
-  long launches = 0;
+  double milliseconds = 0;  ///< in all
+  long launches = 0;        ///< how many
 };
 
+/// The times of a policy, by label.
 class profiler {
  public:
+  /// On or off.
   void enable(bool on) { enabled_ = on; }
+  /// Whether it is on.
   bool enabled() const { return enabled_; }
+  /// One launch more of a label.
   void add(std::string const& label, double milliseconds) {
     auto& stage = stages_[label];
     stage.milliseconds += milliseconds;
     ++stage.launches;
   }
+  /// All that was measured.
   std::map<std::string, stage_time> const& stages() const { return stages_; }
+  /// Forgets all that was measured.
   void clear() { stages_.clear(); }
   /// Adds what the other has measured, and leaves it empty.
   void take(profiler& other) {
@@ -41,11 +48,13 @@ class profiler {
 
 /// Bytes that buffers of one policy hold now and held at most.
 struct memory_use {
-  std::size_t current = 0, peak = 0;
+  std::size_t current = 0, peak = 0;  ///< bytes
+  /// So many bytes more.
   void allocated(std::size_t bytes) {
     current += bytes;
     if (current > peak) peak = current;
   }
+  /// So many bytes less.
   void released(std::size_t bytes) { current -= bytes; }
 };
 

@@ -6,9 +6,11 @@
 
 namespace gart {
 
+/// A stage, from its construction to its end.
 template <execution E>
 class stage_scope {
  public:
+  /// `label` is kept by its address.
   stage_scope(E& exec, char const* label) : exec_(exec), timed_(exec.profile.enabled()) {
     if (timed_) exec_.begin_stage(label);
   }

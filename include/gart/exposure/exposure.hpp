@@ -13,10 +13,12 @@
 
 namespace gart {
 
+/// An affine map of colours.
 struct exposure {
-  static constexpr int floats = 12;
+  static constexpr int floats = 12;                        ///< numbers of a map
   float m[floats] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  ///< [3][4]: a row of M, then its offset
 
+  /// Channel c of the colour (r, g, b), exposed.
   GART_HD GART_INLINE float channel(int c, float r, float g, float b) const {
     return fma(m[4 * c], r, fma(m[4 * c + 1], g, fma(m[4 * c + 2], b, m[4 * c + 3])));
   }
@@ -32,6 +34,7 @@ struct exposure_state {
 
 namespace gart::inline GART_ISA {
 
+/// Exposes every pixel of an image of three channels.
 inline void apply(exposure const& e, image_float& image) {
   for (std::size_t p = 0; p + 3 <= image.data.size(); p += 3) {
     float const r = image.data[p], g = image.data[p + 1], b = image.data[p + 2];

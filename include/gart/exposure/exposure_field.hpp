@@ -24,16 +24,19 @@
 
 namespace gart {
 
+/// The exposure of a training view, and where it stands.
 struct view_exposure {
-  std::string name;
+  std::string name;         ///< of the view
   vec3d position{0.0};      ///< of the camera
   vec3 direction{0, 0, 1};  ///< its axis, a unit vector
-  exposure value;
+  exposure value;           ///< its exposure
 };
 
+/// The exposures of all training views.
 class exposure_field {
  public:
   exposure_field() = default;
+  /// Of these views.
   explicit exposure_field(std::vector<view_exposure> views) : views_(std::move(views)) {
     std::vector<double> nearest;
     double farthest = 0;
@@ -52,7 +55,9 @@ class exposure_field {
     spacing_ = std::max(*middle, 1e-12 * farthest);
   }
 
+  /// Whether there is no view.
   bool empty() const { return views_.empty(); }
+  /// As they were given.
   std::vector<view_exposure> const& views() const { return views_; }
 
   /// The training view whose pose is nearest to that of another; of at least two.
@@ -68,6 +73,7 @@ class exposure_field {
     return best;
   }
 
+  /// The exposure of a view.
   exposure at(camera const& view) const {
     exposure out;
     if (views_.empty()) return out;

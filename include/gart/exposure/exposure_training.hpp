@@ -74,9 +74,11 @@ struct exposure_adam_kernel {
 
 }  // namespace detail
 
+/// The exposures of a run, and Adam's moments of them.
 template <execution E>
 class exposure_training {
  public:
+  /// As many identities as there are views.
   exposure_training(E& exec, std::size_t views)
       : exec_(&exec),
         value_(exec, identities(views)),
@@ -121,7 +123,9 @@ class exposure_training {
                                               static_cast<float>(rate * adam_rule::first_correction(adam, visit))});
   }
 
+  /// For a checkpoint.
   exposure_state state() const { return {value_.to_host(), first_.to_host(), second_.to_host(), visits_}; }
+  /// From a checkpoint.
   void set_state(exposure_state const& s) {
     value_.assign(s.value), first_.assign(s.first), second_.assign(s.second), visits_ = s.visits;
   }

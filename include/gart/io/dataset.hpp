@@ -20,6 +20,7 @@
 
 namespace gart {
 
+/// A photograph and its camera.
 struct dataset_view {
   std::string name;  ///< unique in the dataset, fit for a file name: renders/NAME.png
   camera view;       ///< for the image as it is held (after dataset_options.downscale)
@@ -27,25 +28,29 @@ struct dataset_view {
   image8 mask;       ///< 1 channel, 0 = ignore; empty where there is none
 };
 
+/// Points with colours.
 struct point_cloud {
   std::vector<float> position;  ///< [N][3]
   std::vector<u8> color;        ///< [N][3]
+  /// Points.
   std::size_t size() const { return position.size() / 3; }
 };
 
+/// A capture.
 struct dataset {
-  std::string format;         ///< "COLMAP", "Blender", "nerfstudio"
-  std::string split;          ///< how train and test were told apart, in words
-  std::string resize_filter;  ///< "none", or "box (1/4)"
-  std::vector<dataset_view> train, test;
-  point_cloud points;              ///< empty: start at random
-  std::vector<std::string> notes;  ///< one line each: what was skipped, scaled or assumed
-  float extent = 1;                ///< 1.1 x the largest distance of a training camera from their mean
-  bool alpha = false;              ///< images carry alpha: composited over the background chosen
+  std::string format;                     ///< "COLMAP", "Blender", "nerfstudio"
+  std::string split;                      ///< how train and test were told apart, in words
+  std::string resize_filter;              ///< "none", or "box (1/4)"
+  std::vector<dataset_view> train, test;  ///< views
+  point_cloud points;                     ///< empty: start at random
+  std::vector<std::string> notes;         ///< one line each: what was skipped, scaled or assumed
+  float extent = 1;                       ///< 1.1 x the largest distance of a training camera from their mean
+  bool alpha = false;                     ///< images carry alpha: composited over the background chosen
   /// Random starting points lie in this box; Blender's [-1.3, 1.3]^3, else around the cameras.
-  vec3d bounds_min{-1.3}, bounds_max{1.3};
+  vec3d bounds_min{-1.3}, bounds_max{1.3};  ///< corners
 };
 
+/// What to read of a capture, and how.
 struct dataset_options {
   int downscale = 1;        ///< integer factor, box filter; a partial last block of pixels is cropped, from cameras too
   int test_every = 8;       ///< 0: no test views; ignored where the files have their own split
@@ -54,6 +59,7 @@ struct dataset_options {
   std::function<void(std::size_t done, std::size_t total)> progress = {};
 };
 
+/// Reads a capture from a folder, or by the file named.
 dataset load_dataset(std::filesystem::path const& path, dataset_options const& options = {});
 
 /// The cameras alone: a dataset (all its views, test views first) or a camera JSON, a list of

@@ -11,7 +11,9 @@
 
 namespace gart {
 
+/// Writes all views of a field.
 void write_exposures(std::filesystem::path const& path, exposure_field const& field);
+/// Reads what write_exposures wrote.
 exposure_field read_exposures(std::filesystem::path const& path);
 
 }  // namespace gart

@@ -19,6 +19,7 @@ std::vector<u8> encode_jpeg(image8 const& image, int quality = 90);      ///< 1 
 /// Mean over blocks of factor x factor pixels; a partial last block is dropped. Alpha weights the colours.
 image8 box_downscale(image8 const& image, int factor);
 
+/// From 0..255 to [0, 1].
 image_float to_float(image8 const& image);
 image8 to_8bit(image_float const& image);  ///< clamped, rounded to nearest
 

@@ -24,11 +24,14 @@ namespace gart {
 /// Comments of the header that begin with "gart": key -> value.
 using ply_traits = std::map<std::string, std::string>;
 
+/// Reads a splat file; its traits into `traits`, where that is not null.
 gaussian_model read_splat_ply(std::filesystem::path const& path, ply_traits* traits = nullptr);
+/// Writes a splat file, with these traits.
 void write_splat_ply(std::filesystem::path const& path, gaussian_model const& model, ply_traits const& traits = {});
 
 /// A plain point cloud: x y z, and red green blue where present (else grey).
 point_cloud read_point_ply(std::filesystem::path const& path);
+/// Writes x y z and red green blue, binary.
 void write_point_ply(std::filesystem::path const& path, point_cloud const& points);
 
 }  // namespace gart

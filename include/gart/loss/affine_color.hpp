@@ -18,9 +18,10 @@
 
 namespace gart::inline GART_ISA {
 
+/// The map: matrix and offset, of colours in [0, 1].
 struct affine_color {
   std::array<std::array<double, 3>, 3> matrix{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  ///< [to][from]
-  std::array<double, 3> offset{};
+  std::array<double, 3> offset{};                                                  ///< [to]
 };
 
 namespace detail {

@@ -24,6 +24,7 @@ struct error_map_kernel {
 
 }  // namespace detail
 
+/// Queues the launch that fills `error`.
 template <execution E>
 void error_map(E& exec, span<float const> image, truth_view const& truth, buffer<float, E>& error) {
   error.resize(image.size() / 3);

@@ -30,9 +30,11 @@ struct truth_view {
   int channels = 3;            ///< 3, or 4 with straight alpha: rgb * a + background * (1 - a)
   u8 const* mask = nullptr;    ///< [H][W], or null; where it is 0 the image counts as equal to the truth: no loss,
                                ///< no gradient, and the means still divide by all pixels
-  vec3 background{0.0f};
+  vec3 background{0.0f};       ///< where alpha is not 1, [0, 1]
 
+  /// Whether the pixel is not excluded by the mask.
   GART_HD bool counts(index_t pixel) const { return !mask || mask[pixel] != 0; }
+  /// Of a pixel, over the background, in [0, 1].
   GART_HD vec3 color(index_t pixel) const {
     u8 const* const t = pixels + std::size_t{pixel} * channels;
     float const alpha = channels == 4 ? static_cast<float>(t[3]) * (1.0f / 255.0f) : 1.0f;
@@ -295,9 +297,11 @@ struct loss_gradient_kernel {
 
 }  // namespace detail
 
+/// The loss, with the buffers that it needs.
 template <execution E>
 class image_loss {
  public:
+  /// No buffer is allocated yet.
   explicit image_loss(E& exec) : exec_(&exec), planes_(exec), partials_(exec), sums_(exec) {}
 
   /// `image` and `gradient` are [H][W][3]; `loss` is two floats of the policy's memory: L, and the mean squared error.

@@ -6,11 +6,12 @@
 
 #include <gart/core/macros.hpp>
 
+/// The window of SSIM.
 namespace gart::inline GART_ISA::ssim_window {
 
-inline constexpr int radius = 5;
-inline constexpr int taps = 2 * radius + 1;
-inline constexpr double c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;
+inline constexpr int radius = 5;                             ///< pixels
+inline constexpr int taps = 2 * radius + 1;                  ///< of a row or column of the window
+inline constexpr double c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;  ///< the constants
 
 /// Weight of tap k: exp(-(k - 5)^2 / (2 * 1.5^2)), normalised to the sum 1.
 GART_HD constexpr double weight(int k) {

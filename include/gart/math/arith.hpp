@@ -17,6 +17,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// a * b, rounded once.
 GART_HD GART_INLINE float mul(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return __fmul_rn(a, b);
@@ -25,6 +26,7 @@ GART_HD GART_INLINE float mul(float a, float b) {
 #endif
 }
 
+/// a + b.
 GART_HD GART_INLINE float add(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return __fadd_rn(a, b);
@@ -44,6 +46,7 @@ GART_HD GART_INLINE float fma(float a, float b, float c) {
 #endif
 }
 
+/// a / b, correctly rounded.
 GART_HD GART_INLINE float divide(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return __fdiv_rn(a, b);
@@ -61,6 +64,7 @@ GART_HD GART_INLINE float reciprocal(float a) {
 #endif
 }
 
+/// The square root, correctly rounded.
 GART_HD GART_INLINE float square_root(float a) {
 #if defined(__CUDA_ARCH__)
   return __fsqrt_rn(a);
@@ -69,6 +73,7 @@ GART_HD GART_INLINE float square_root(float a) {
 #endif
 }
 
+/// The float of these bits.
 GART_HD GART_INLINE float bits_to_float(u32 bits) {
 #if defined(__CUDA_ARCH__)
   return __uint_as_float(bits);
@@ -79,6 +84,7 @@ GART_HD GART_INLINE float bits_to_float(u32 bits) {
 #endif
 }
 
+/// The bits of a float.
 GART_HD GART_INLINE u32 float_to_bits(float f) {
 #if defined(__CUDA_ARCH__)
   return __float_as_uint(f);
@@ -122,17 +128,25 @@ GART_HD GART_INLINE bool is_finite(float f) { return (float_to_bits(f) & 0x7f800
 /// what they offer.
 template <class F>
 struct number;
+/// One float.
 template <>
 struct number<float> {
-  using mask = bool;
-  using words = u32;
+  using mask = bool;  ///< what a comparison gives
+  using words = u32;  ///< a count or a place
+  /// That count.
   GART_HD GART_INLINE static words every(u32 x) { return x; }
 };
+/// Whether both are true; with lanes, of each lane.
 GART_HD GART_INLINE bool both(bool a, bool b) { return a && b; }
+/// Whether any lane is.
 GART_HD GART_INLINE bool any(bool a) { return a; }
+/// |a|.
 GART_HD GART_INLINE float magnitude(float a) { return fabsf(a); }
+///@{
+/// a where `which` is true, else b; with lanes, of each lane.
 GART_HD GART_INLINE float select(bool which, float a, float b) { return which ? a : b; }
 GART_HD GART_INLINE u32 select(bool which, u32 a, u32 b) { return which ? a : b; }
+///@}
 
 /// x 2^n, where `biased` is n + 1.5 * 2^23.
 GART_HD GART_INLINE float scale_by_power(float x, float biased) {
@@ -157,6 +171,7 @@ GART_HD GART_INLINE F exponential_of(F x) {
   p = add(fma(mul(r, r), p, r), F(1.0f));
   return select(x < F(-87.0f), F(0.0f), scale_by_power(p, biased));
 }
+/// exp(x) of one float.
 GART_HD GART_INLINE float exponential(float x) { return exponential_of(x); }
 
 /// ln(x) for positive normal x: mantissa in [sqrt(1/2), sqrt(2)) and a polynomial, the same operations on every policy.

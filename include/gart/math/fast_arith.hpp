@@ -29,6 +29,7 @@ GART_HD GART_INLINE F fast_exponential(F x) {
 #endif
 }
 
+/// 1 / a, to the error above.
 template <class F>
 GART_HD GART_INLINE F fast_reciprocal(F a) {
 #if defined(__CUDA_ARCH__)

@@ -22,15 +22,20 @@ namespace gart::inline GART_ISA {
 
 /// Half-open: pixels x0 <= x < x1, y0 <= y < y1. Images go to 65535 a side.
 struct pixel_box {
-  u16 x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  u16 x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< pixels
+  /// Whether no pixel lies in it.
   GART_HD constexpr bool empty() const { return x1 <= x0 || y1 <= y0; }
+  /// In pixels.
   GART_HD constexpr u32 width() const { return empty() ? 0u : u32{x1} - x0; }
+  /// In pixels.
   GART_HD constexpr u32 height() const { return empty() ? 0u : u32{y1} - y0; }
+  /// How many pixels lie in it.
   GART_HD constexpr u32 area() const { return width() * height(); }
 };
 
+/// Where a Gaussian can be hit.
 struct footprint {
-  pixel_box box;
+  pixel_box box;    ///< empty where it cannot be
   float depth = 0;  ///< no hit has a smaller one, along what its camera measures depth: conservative near depth
 };
 
@@ -39,8 +44,8 @@ inline constexpr double rounding_of_hits = 4e-6;
 
 /// m + A s, |s| <= 1, in world axes; m relative to the camera's centre.
 struct ellipsoid {
-  vec3d center;
-  mat3d axes;
+  vec3d center;  ///< m
+  mat3d axes;    ///< A
 };
 
 /// Where the Gaussian can be hit: A = c R S, c^2 the cutoff. False where nowhere.
@@ -81,10 +86,10 @@ GART_HD inline float least_distance(ellipsoid const& e, float near) {
 
 /// The pinhole a footprint is for.
 struct footprint_view {
-  mat3d to_camera;  ///< world to camera rotation
-  double fx, fy, cx, cy;
-  int width, height;
-  double near;  ///< smallest z of a hit: the ray's near distance times the least cosine of a pixel
+  mat3d to_camera;        ///< world to camera rotation
+  double fx, fy, cx, cy;  ///< focal lengths and principal point, pixels
+  int width, height;      ///< pixels
+  double near;            ///< smallest z of a hit: the ray's near distance times the least cosine of a pixel
 };
 
 namespace detail {
@@ -146,9 +151,9 @@ GART_HD inline u16 first_pixel(double edge, int size) {
 
 /// Bounds in slopes x / z and y / z, with the error to widen them by.
 struct slope_box {
-  detail::interval u, w;
-  double error = 0;
-  bool visible = false;
+  detail::interval u, w;  ///< x / z and y / z
+  double error = 0;       ///< in slopes
+  bool visible = false;   ///< whether any of it can be hit
 };
 
 /// Sets the footprint's depth only.
@@ -172,6 +177,7 @@ GART_HD inline footprint project(footprint_view const& v, ellipsoid const& e, sl
   return out;
 }
 
+/// The pixels between these slopes, of the image.
 GART_HD inline pixel_box pixels_of(footprint_view const& v, slope_box const& s) {
   double const pad_x = 0.01 + v.fx * s.error, pad_y = 0.01 + v.fy * s.error;
   pixel_box const out{detail::first_pixel(v.fx * s.u.lo + v.cx - pad_x, v.width),

@@ -15,13 +15,14 @@
 
 namespace gart {
 
-using vec2 = glm::vec2;
-using vec3 = glm::vec3;
-using vec4 = glm::vec4;
+using vec2 = glm::vec2;  ///< floats
+using vec3 = glm::vec3;  ///< floats
+using vec4 = glm::vec4;  ///< floats
+/// Of three floats, or of three times a float a lane.
 template <class F>
 using vec3_of = glm::vec<3, F, glm::defaultp>;
-using vec3d = glm::dvec3;
-using mat3 = glm::mat3;  ///< m[column][row]
-using mat3d = glm::dmat3;
+using vec3d = glm::dvec3;  ///< doubles
+using mat3 = glm::mat3;    ///< m[column][row]
+using mat3d = glm::dmat3;  ///< doubles
 
 }  // namespace gart

@@ -24,12 +24,13 @@ namespace gart::inline GART_ISA {
 /// Gaussian, the sum over its hits of w times the pixel's error, by which densification finds where more are needed;
 /// and one of padding (16-byte words).
 inline constexpr int moment_count = 11;
-inline constexpr int error_place = 10;
-inline constexpr int moment_stride = 12;
+inline constexpr int error_place = 10;    ///< the place of the error
+inline constexpr int moment_stride = 12;  ///< floats a Gaussian
 
+/// What one hit adds; of one hit, or of one a lane.
 template <class F>
 struct moments_of {
-  F v[moment_stride];
+  F v[moment_stride];  ///< as above
 };
 
 /// dL/dalpha of a hit: V.g and C.g.
@@ -40,10 +41,10 @@ GART_HD GART_INLINE F alpha_gradient(F opaque_g, F color_g, F alpha) {
 
 /// The front-to-back walk of a ray's gradient.
 struct ray_gradient {
-  vec3 g;           ///< dL/d colour of the pixel
-  float color_g;    ///< C.g, the background in it
-  float front = 0;  ///< L.g
-  float transmittance = 1;
+  vec3 g;                   ///< dL/d colour of the pixel
+  float color_g;            ///< C.g, the background in it
+  float front = 0;          ///< L.g
+  float transmittance = 1;  ///< T before the hit
 
   /// dL/dalpha of the hit; moves past it. `weight` returns w.
   GART_HD GART_INLINE float pass(float alpha, vec3 color, float& weight) {
@@ -69,15 +70,17 @@ GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, ray_
   return {{a, bp.x, bp.y, bp.z, bp.x * p.x, bp.y * p.y, bp.z * p.z, bp.y * p.z, bp.x * p.z, bp.x * p.y, 0.0f, 0.0f}};
 }
 
+/// Of a hit that is one.
 template <class Response = generalized_gaussian<>, class F>
 GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, ray_peak_of<F> const& r, F alpha_gradient) {
   return hit_moments<Response>(gaussian, r, alpha_gradient, F(0.0f) <= F(0.0f));
 }
 
+/// Of a Gaussian's stored parameters.
 struct geometry_gradient {
-  vec3 mean, log_scale;
-  quaternion rotation;
-  float opacity;
+  vec3 mean, log_scale;  ///< [3] each
+  quaternion rotation;   ///< of the raw quaternion
+  float opacity;         ///< of the logit
 };
 
 /// From the sums over all hits to the stored parameters.

@@ -25,20 +25,25 @@ inline constexpr int lane_count = 16;
 #elif defined(__AVX2__)
 inline constexpr int lane_count = 8;
 #else
+/// Floats in a register.
 inline constexpr int lane_count = 4;
 #endif
 
+/// An integer a lane.
 using lane_ints = int __attribute__((vector_size(4 * lane_count)));
+/// A word a lane.
 using lane_words = u32 __attribute__((vector_size(4 * lane_count)));
 
+/// A truth a lane.
 struct lane_mask {
 #if defined(GART_LANES_AVX512)
   using storage = __mmask16;
 #else
-  using storage = lane_ints;
+  using storage = lane_ints;  ///< a bit a lane, or all bits of a lane
 #endif
-  storage m;
+  storage m;  ///< the lanes'
 
+  /// Of one lane.
   GART_INLINE bool operator[](int lane) const {
 #if defined(GART_LANES_AVX512)
     return m >> lane & 1;
@@ -46,21 +51,29 @@ struct lane_mask {
     return m[lane] != 0;
 #endif
   }
+  ///@{
+  /// Lane by lane.
   GART_INLINE friend lane_mask operator&(lane_mask a, lane_mask b) { return {static_cast<storage>(a.m & b.m)}; }
   GART_INLINE friend lane_mask operator|(lane_mask a, lane_mask b) { return {static_cast<storage>(a.m | b.m)}; }
   GART_INLINE friend lane_mask operator~(lane_mask a) { return {static_cast<storage>(~a.m)}; }
   GART_INLINE lane_mask& operator&=(lane_mask b) { return *this = *this & b; }
   GART_INLINE lane_mask& operator|=(lane_mask b) { return *this = *this | b; }
+  ///@}
 };
 
+/// A float a lane.
 struct lanes {
-  using vector = float __attribute__((vector_size(4 * lane_count)));
-  vector v;
+  using vector = float __attribute__((vector_size(4 * lane_count)));  ///< the compiler's
+  vector v;                                                           ///< the lanes'
 
   lanes() = default;
+  /// The same in every lane.
   GART_INLINE lanes(float x) : v(x - vector{}) {}  ///< x - 0 keeps the sign of a zero
+  /// As the compiler has them.
   GART_INLINE lanes(vector x) : v(x) {}
 
+  ///@{
+  /// Lane by lane.
   GART_INLINE friend lanes operator+(lanes a, lanes b) { return a.v + b.v; }
   GART_INLINE friend lanes operator-(lanes a, lanes b) { return a.v - b.v; }
   GART_INLINE friend lanes operator*(lanes a, lanes b) { return a.v * b.v; }
@@ -68,6 +81,7 @@ struct lanes {
   GART_INLINE friend lanes operator-(lanes a) { return -a.v; }
   GART_INLINE lanes& operator+=(lanes b) { return v += b.v, *this; }
   GART_INLINE lanes& operator*=(lanes b) { return v *= b.v, *this; }
+  ///@}
 #if defined(GART_LANES_AVX512)
   GART_INLINE friend lane_mask operator<(lanes a, lanes b) { return compare<_CMP_LT_OQ>(a, b); }
   GART_INLINE friend lane_mask operator<=(lanes a, lanes b) { return compare<_CMP_LE_OQ>(a, b); }
@@ -81,23 +95,30 @@ struct lanes {
     return {_mm512_cmp_ps_mask((__m512)a.v, (__m512)b.v, How)};
   }
 #else
+  ///@{
+  /// Lane by lane; false where either is not a number.
   GART_INLINE friend lane_mask operator<(lanes a, lanes b) { return {a.v < b.v}; }
   GART_INLINE friend lane_mask operator<=(lanes a, lanes b) { return {a.v <= b.v}; }
   GART_INLINE friend lane_mask operator>(lanes a, lanes b) { return {a.v > b.v}; }
   GART_INLINE friend lane_mask operator>=(lanes a, lanes b) { return {a.v >= b.v}; }
   GART_INLINE friend lane_mask operator==(lanes a, lanes b) { return {a.v == b.v}; }
+  ///@}
 #endif
 };
 
+/// The same in every lane.
 GART_INLINE lane_words every_lane(u32 x) { return lane_words{} + x; }
 
+/// A float a lane.
 template <>
 struct number<lanes> {
-  using mask = lane_mask;
-  using words = lane_words;
+  using mask = lane_mask;    ///< what a comparison gives
+  using words = lane_words;  ///< counts or places
+  /// That count in every lane.
   GART_INLINE static words every(u32 x) { return every_lane(x); }
 };
 
+/// Lane by lane.
 GART_INLINE lane_mask both(lane_mask a, lane_mask b) { return a & b; }
 #if defined(GART_LANES_AVX512)
 GART_INLINE lanes select(lane_mask m, lanes a, lanes b) {
@@ -110,9 +131,14 @@ GART_INLINE lane_mask equal(lane_words a, lane_words b) { return {_mm512_cmpeq_e
 GART_INLINE lane_mask at_most(lane_words a, lane_words b) { return {_mm512_cmple_epu32_mask((__m512i)a, (__m512i)b)}; }
 GART_INLINE lane_mask negative(lanes a) { return {_mm512_movepi32_mask((__m512i)a.v)}; }  ///< -0 too
 #else
+///@{
+/// a where the mask is set, else b.
 GART_INLINE lanes select(lane_mask m, lanes a, lanes b) { return m.m ? a.v : b.v; }
 GART_INLINE lane_words select(lane_mask m, lane_words a, lane_words b) { return m.m ? a : b; }
+///@}
+/// Which lanes are equal.
 GART_INLINE lane_mask equal(lane_words a, lane_words b) { return {(lane_ints)(a == b)}; }
+/// Where a <= b, without a sign.
 GART_INLINE lane_mask at_most(lane_words a, lane_words b) { return {(lane_ints)(a <= b)}; }
 GART_INLINE lane_mask negative(lanes a) { return {(lane_ints)a.v < 0}; }  ///< -0 too
 #endif
@@ -129,6 +155,7 @@ GART_INLINE u32 bits_of(lane_mask m) {
   return bits;
 #endif
 }
+/// The mask of these bits.
 GART_INLINE lane_mask lanes_of(u32 bits) {
 #if defined(GART_LANES_AVX512)
   return {static_cast<__mmask16>(bits)};
@@ -138,6 +165,7 @@ GART_INLINE lane_mask lanes_of(u32 bits) {
   return {(lane_ints)((own & bits) != 0)};
 #endif
 }
+/// Whether any lane is set.
 GART_INLINE bool any(lane_mask m) { return bits_of(m) != 0; }
 
 /// out[k]: the sum of all lanes of a[k]; zeros from N on.
@@ -257,6 +285,7 @@ GART_INLINE void write_fours(float* first, std::ptrdiff_t stride, lane_mask m, l
   }
 }
 
+/// Reads them back.
 GART_INLINE void read_fours(float const* first, std::ptrdiff_t stride, lane_mask m, lanes (&to)[4]) {
   for (lanes& one : to) one = 0.0f;
   for (u32 left = bits_of(m); left; left &= left - 1) {
@@ -270,16 +299,20 @@ GART_INLINE void read_fours(float const* first, std::ptrdiff_t stride, lane_mask
 /// Hides the latency of memory: asks for what will be read, or written, some time before.
 GART_INLINE void prefetch(void const* p) { __builtin_prefetch(p); }
 GART_INLINE void prefetch_to_l2(void const* p) { __builtin_prefetch(p, 0, 2); }  ///< for much at a time
+/// For what will be written.
 GART_INLINE void prefetch_to_write(void const* p) { __builtin_prefetch(p, 1); }
 
 /// The arithmetic of arith.hpp.
 GART_INLINE lanes mul(lanes a, lanes b) { return a * b; }
+///@{
+/// The arithmetic of arith.hpp.
 GART_INLINE lanes add(lanes a, lanes b) { return a + b; }
 GART_INLINE lanes divide(lanes a, lanes b) { return a / b; }
 GART_INLINE lanes reciprocal(lanes a) { return lanes(1.0f) / a; }
 GART_INLINE lanes fma(lanes a, lanes b, lanes c) {
 #if defined(GART_LANES_AVX512)
   return (lanes::vector)_mm512_fmadd_ps((__m512)a.v, (__m512)b.v, (__m512)c.v);
+///@}
 #elif defined(__AVX2__) && defined(GART_FUSED)
   return (lanes::vector)_mm256_fmadd_ps((__m256)a.v, (__m256)b.v, (__m256)c.v);
 #else
@@ -288,6 +321,7 @@ GART_INLINE lanes fma(lanes a, lanes b, lanes c) {
   return r;
 #endif
 }
+/// Lane by lane.
 GART_INLINE lanes square_root(lanes a) {
 #if defined(GART_LANES_AVX512)
   return (lanes::vector)_mm512_maskz_sqrt_ps(0xffff, (__m512)a.v);
@@ -297,10 +331,13 @@ GART_INLINE lanes square_root(lanes a) {
   return r;
 #endif
 }
+/// |a|.
 GART_INLINE lanes magnitude(lanes a) { return (lanes::vector)((lane_words)a.v & 0x7fffffffu); }
+/// x 2^n, where `biased` is n + 1.5 * 2^23.
 GART_INLINE lanes scale_by_power(lanes x, lanes biased) {
   return x * lanes((lanes::vector)(((lane_words)biased.v + 127u) << 23));
 }
+/// exp(x), lane by lane.
 GART_INLINE lanes exponential(lanes x) { return exponential_of(x); }
 
 }  // namespace gart::inline GART_ISA

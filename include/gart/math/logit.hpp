@@ -9,12 +9,15 @@
 
 namespace gart::inline GART_ISA {
 
+/// 1 / (1 + exp(-x)).
 GART_HD GART_INLINE float sigmoid(float x) {
   float const clamped = x < -80.0f ? -80.0f : x;  // below, sigma is under any alpha_min
   return divide(1.0f, add(1.0f, exponential(-clamped)));
 }
 
+/// 1 / (1 + exp(-x)).
 GART_HD inline double sigmoid_in_double(double x) { return 1 / (1 + exp(-x)); }
+/// ln(p / (1 - p)).
 GART_HD inline double logit_in_double(double p) { return log(p / (1 - p)); }
 
 }  // namespace gart::inline GART_ISA

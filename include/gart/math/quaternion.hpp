@@ -7,10 +7,12 @@
 
 namespace gart::inline GART_ISA {
 
+/// A rotation; of any norm.
 struct quaternion {
-  float w = 1, x = 0, y = 0, z = 0;
+  float w = 1, x = 0, y = 0, z = 0;  ///< real part first
 };
 
+/// |q|^2.
 GART_HD GART_INLINE float norm2(quaternion const& q) {
   return fma(q.w, q.w, fma(q.x, q.x, fma(q.y, q.y, mul(q.z, q.z))));
 }

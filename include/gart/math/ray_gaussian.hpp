@@ -27,6 +27,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// The largest alpha of a hit: above it alpha is clamped.
 inline constexpr float alpha_max = 0.99f;
 
 /// From the frame's origin: what a camera casts.
@@ -34,35 +35,40 @@ template <class F>
 struct primary_ray_of {
   vec3_of<F> direction;  ///< unit
 };
+/// Of one ray.
 using primary_ray = primary_ray_of<float>;
 
 /// From anywhere; `origin` relative to the frame.
 struct ray {
-  vec3 origin;
+  vec3 origin;     ///< relative to the frame
   vec3 direction;  ///< unit
 };
 
+///@{
+/// Where the ray begins, relative to the frame.
 GART_HD constexpr vec3 origin_of(primary_ray const&) { return vec3(0.0f); }
 GART_HD constexpr vec3 origin_of(ray const& r) { return r.origin; }
+///@}
 
 /// One Gaussian in one frame, 64 bytes, loaded as four 16-byte words.
 struct alignas(16) ray_gaussian {
+  /// A row of M.
   struct alignas(16) row {
     float x, y, z;  ///< of M
     float o;        ///< of M (frame - mu)
   };
-  row m[3];
-  float cutoff = -1;  ///< largest |p|^2 of a hit; negative: culled, never a hit
-  float sigma = 0;
-  float unused[2] = {0, 0};
+  row m[3];                  ///< the rows, an axis of the ellipsoid each
+  float cutoff = -1;         ///< largest |p|^2 of a hit; negative: culled, never a hit
+  float sigma = 0;           ///< opacity at the centre, (0, 1)
+  float unused[2] = {0, 0};  ///< to 64 bytes
 };
 
 /// The parameters of one Gaussian as stored.
 struct gaussian_parameters {
-  vec3 mean;
-  vec3 log_scale;
-  quaternion rotation;
-  float opacity;  ///< logit
+  vec3 mean;            ///< world units
+  vec3 log_scale;       ///< natural logarithms of the standard deviations
+  quaternion rotation;  ///< of any norm
+  float opacity;        ///< logit
 };
 
 /// The mean in the frame.
@@ -87,10 +93,12 @@ GART_HD GART_INLINE float hit_cutoff(gaussian_parameters const& g, float alpha_m
   return Response::cutoff(divide(sigma, alpha_min));
 }
 
+/// Standard deviations along the axes, world units.
 GART_HD GART_INLINE vec3 scale_of(gaussian_parameters const& g) {
   return {exponential(g.log_scale.x), exponential(g.log_scale.y), exponential(g.log_scale.z)};
 }
 
+/// What rays meet of a Gaussian in a frame; culled where no hit reaches alpha_min.
 template <class Response = generalized_gaussian<>>
 GART_HD GART_INLINE ray_gaussian prepare(gaussian_parameters const& g, vec3d const& frame, float alpha_min) {
   ray_gaussian out;
@@ -122,8 +130,11 @@ struct ray_peak_of {
   vec3_of<F> c;  ///< o_g x d_g / |d_g|^2
   vec3_of<F> d;  ///< d_g
 };
+/// Of one ray.
 using ray_peak = ray_peak_of<float>;
 
+///@{
+/// One row of o_g.
 template <class F>
 GART_HD GART_INLINE F gaussian_origin(ray_gaussian::row const& m, primary_ray_of<F> const&) {
   return m.o;
@@ -131,7 +142,9 @@ GART_HD GART_INLINE F gaussian_origin(ray_gaussian::row const& m, primary_ray_of
 GART_HD GART_INLINE float gaussian_origin(ray_gaussian::row const& m, ray const& r) {
   return fma(m.x, r.origin.x, fma(m.y, r.origin.y, fma(m.z, r.origin.z, m.o)));
 }
+///@}
 
+/// a x b.
 template <class F>
 GART_HD GART_INLINE vec3_of<F> cross_product(vec3_of<F> const& a, vec3_of<F> const& b) {
   return {fma(a.y, b.z, -mul(a.z, b.y)), fma(a.z, b.x, -mul(a.x, b.z)), fma(a.x, b.y, -mul(a.y, b.x))};
@@ -140,11 +153,13 @@ GART_HD GART_INLINE vec3_of<F> cross_product(vec3_of<F> const& a, vec3_of<F> con
 /// A ray in the Gaussian's own space, before the division.
 template <class F>
 struct approach_of {
-  vec3_of<F> c, d;
-  F od, cc, dd;
+  vec3_of<F> c, d;  ///< o_g x d_g and d_g
+  F od, cc, dd;     ///< o_g.d_g, |c|^2 and |d_g|^2
 };
+/// Of one ray.
 using approach = approach_of<float>;
 
+/// Of a ray, or of one a lane.
 template <class Ray>
 GART_HD GART_INLINE auto approach_to(ray_gaussian const& g, Ray const& r) {
   using F = std::remove_cvref_t<decltype(r.direction.x)>;
@@ -175,6 +190,7 @@ GART_HD GART_INLINE ray_peak_of<F> ray_peak_of_approach(approach_of<F> const& a,
   return out;
 }
 
+/// Where along the ray the response is largest.
 template <class Response = generalized_gaussian<>, class Ray>
 GART_HD GART_INLINE auto evaluate(ray_gaussian const& g, Ray const& r) {
   auto const a = approach_to(g, r);
@@ -212,6 +228,7 @@ GART_HD GART_INLINE F unclamped_alpha(ray_gaussian const& g, F d2) {
   return mul(F(g.sigma), Response::response(d2));
 }
 
+/// What a hit blends with: at most alpha_max.
 template <class Response = generalized_gaussian<>, class F>
 GART_HD GART_INLINE F hit_alpha(ray_gaussian const& g, F d2) {
   F const a = unclamped_alpha<Response>(g, d2);

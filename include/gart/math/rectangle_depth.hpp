@@ -15,6 +15,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// The bound, of one Gaussian.
 class rectangle_depth {
  public:
   rectangle_depth() = default;

@@ -41,15 +41,18 @@ concept response_function = requires(float x, float (&several)[2]) {
   R::reciprocals(several);  // each its reciprocal
 };
 
+/// How hits are evaluated; above.
 enum class arithmetic { exact, fast };
 
+/// A response: exp(s |p|^n), n the degree.
 template <int Degree = 2, arithmetic Arithmetic = arithmetic::exact>
 struct generalized_gaussian {
   static_assert(Degree == 1 || Degree == 2 || Degree == 3 || Degree == 4 || Degree == 5 || Degree == 8,
                 "generalised Gaussians have degree 1, 2, 3, 4, 5 or 8");
-  static constexpr int degree = Degree;
-  static constexpr bool fast = Arithmetic == arithmetic::fast;
+  static constexpr int degree = Degree;                         ///< n
+  static constexpr bool fast = Arithmetic == arithmetic::fast;  ///< whether its arithmetic is
 
+  /// rho at the squared distance d2.
   template <class F>
   GART_HD GART_INLINE static F response(F d2) {
     F const exponent = mul(F(-scale), power(d2));
@@ -59,6 +62,7 @@ struct generalized_gaussian {
       return exponential(exponent);
   }
 
+  /// The largest |p|^2 of a hit; ratio: sigma / alpha_min.
   GART_HD GART_INLINE static float cutoff(float ratio) {
     float const level = mul(inverse_scale, logarithm(ratio));  // |p|^n
     if constexpr (Degree == 1)
@@ -78,6 +82,7 @@ struct generalized_gaussian {
     }
   }
 
+  /// -2 d ln rho / d |p|^2.
   template <class F>
   GART_HD GART_INLINE static F slope(F d2) {
     F const factor = Degree * scale;
@@ -95,6 +100,7 @@ struct generalized_gaussian {
       return factor * d2 * d2 * d2;
   }
 
+  /// 1 / a.
   template <class F>
   GART_HD GART_INLINE static F reciprocal(F a) {
     if constexpr (fast)
@@ -102,6 +108,7 @@ struct generalized_gaussian {
     else
       return gart::reciprocal(a);
   }
+  /// Of each element, in its place.
   template <int N>
   GART_HD GART_INLINE static void reciprocals(float (&a)[N]) {
     if constexpr (fast)

@@ -15,10 +15,11 @@ namespace gart::inline GART_ISA {
 /// Of one direction, or of one a lane.
 template <int Degree, class F = float>
 struct sh_basis {
-  static constexpr int size = (Degree + 1) * (Degree + 1);
-  F y[size];
+  static constexpr int size = (Degree + 1) * (Degree + 1);  ///< functions
+  F y[size];                                                ///< their values
 
   sh_basis() = default;
+  /// At a unit direction.
   GART_HD GART_INLINE explicit sh_basis(vec3_of<F> const& d) {
     y[0] = 0.28209479177387814f;
     if constexpr (Degree >= 1) {
@@ -68,9 +69,10 @@ struct sh_basis {
 /// such.
 template <int Degree>
 struct sh_row {
-  static constexpr int floats = 3 * sh_basis<Degree>::size;
-  float v[floats];
+  static constexpr int floats = 3 * sh_basis<Degree>::size;  ///< of a Gaussian
+  float v[floats];                                           ///< the coefficients
 
+  /// Reads the bands up to a degree.
   GART_HD GART_INLINE sh_row(float const* from, int active_degree) {
     int const active = 3 * (active_degree + 1) * (active_degree + 1);
     if constexpr (floats % 4 == 0) {

@@ -19,18 +19,18 @@ namespace gart::inline GART_ISA {
 
 /// The filter where a Gaussian is: its standard deviation, in world units, and how that changes with the mean.
 struct filter_at {
-  float sigma = 0;
+  float sigma = 0;       ///< world units
   vec3 log_slope{0.0f};  ///< d ln sigma / d mean
 };
 
 /// What the direction of the mean makes of a Gaussian under a filter.
 struct filtered_area {
-  mat3 rotation;
-  vec3 u;               ///< unit, towards the mean in the Gaussian's axes
-  vec3 ratio;           ///< s_k / r
-  vec3 a;               ///< its square
-  float area, widened;  ///< N, N'
-  float inverse_distance;
+  mat3 rotation;           ///< to the Gaussian's axes
+  vec3 u;                  ///< unit, towards the mean in the Gaussian's axes
+  vec3 ratio;              ///< s_k / r
+  vec3 a;                  ///< its square
+  float area, widened;     ///< N, N'
+  float inverse_distance;  ///< of the mean to the frame's origin, over world units
 };
 
 /// Beyond it a filter changes no digit of a scale, and products of three stay in range.

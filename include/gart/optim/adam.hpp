@@ -25,33 +25,42 @@ namespace gart::inline GART_ISA {
 /// Adam's moments, of the parameters' shape.
 template <execution E>
 struct optimizer_state {
-  gaussians<E> first, second;
+  gaussians<E> first, second;  ///< m and v
 
+  ///@{
+  /// Zeros.
   optimizer_state() = default;
   optimizer_state(E& exec, index_t n, int sh_degree) : first(exec, n, sh_degree), second(exec, n, sh_degree) {
     first.zero(), second.zero();
   }
+  ///@}
 };
 
+/// A number and its moments.
 template <class Number>
 struct adam_element {
-  Number parameter, first, second;
+  Number parameter, first, second;  ///< with m and v
 };
 
 /// What a step does to an element. `rate` carries first_correction.
 struct adam_rule {
   float beta1 = 0, beta2 = 0, epsilon = 0, second_correction = 1;  ///< 1 / sqrt(1 - b2^t)
 
+  ///@{
+  /// Of a step, counted from 1.
   adam_rule() = default;
   adam_rule(adam_options const& o, int step)
       : beta1(o.beta1),
         beta2(o.beta2),
         epsilon(o.epsilon),
         second_correction(static_cast<float>(1.0 / std::sqrt(1.0 - std::pow(static_cast<double>(o.beta2), step)))) {}
+  ///@}
+  /// 1 / (1 - b1^t), which the rates carry.
   static double first_correction(adam_options const& o, int step) {
     return 1.0 / (1.0 - std::pow(static_cast<double>(o.beta1), step));
   }
 
+  /// The element after a step by the gradient g.
   template <class Number>
   GART_HD GART_INLINE adam_element<Number> moved(adam_element<Number> const& e, Number g, Number rate) const {
     Number const m = fma(Number(beta1), e.first, mul(Number(1.0f - beta1), g));

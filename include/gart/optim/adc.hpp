@@ -171,7 +171,7 @@ class adaptive_density {
  public:
   /// The statistic since the last densification: what a checkpoint must hold. [N] each.
   buffer<float, E> gradient_sum;
-  buffer<u32, E> touched;
+  buffer<u32, E> touched;  ///< steps that met it
 
   /// `extent` is the scene's, in world units.
   adaptive_density(E& exec, adc_options const& options, index_t max_gaussians, int iterations, float extent, u64 seed)
@@ -189,6 +189,7 @@ class adaptive_density {
         offset_(exec),
         totals_(exec, 2) {}
 
+  /// From the next step on the schedules are those of a run of so many steps.
   void set_iterations(int iterations) { iterations_ = iterations; }
 
   /// Every step, with the gradient of the step's view.
@@ -201,6 +202,7 @@ class adaptive_density {
                      0.5f * static_cast<float>(view.height) / view.fy, gradient_sum.data(), touched.data()});
   }
 
+  /// Whether the step densifies.
   bool due(int step) const {
     return options_.every > 0 && step > options_.from && running(step) && step % options_.every == 0;
   }
@@ -214,6 +216,7 @@ class adaptive_density {
     return change;
   }
 
+  /// Clones, splits and prunes.
   density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step) {
     stage_scope stage(*exec_, "densify");
     density_change change;

@@ -136,6 +136,7 @@ class error_growth {
   /// The error seen through each Gaussian since the last densification, [N]: what a checkpoint must hold.
   buffer<float, E> error_sum;
 
+  /// For a run of so many steps, up to so many Gaussians.
   error_growth(E& exec, error_growth_options const& options, index_t max_gaussians, int iterations, u64 seed)
       : error_sum(exec),
         exec_(&exec),
@@ -167,6 +168,7 @@ class error_growth {
   /// From the next step on the schedules are those of a run of so many steps.
   void set_iterations(int iterations) { iterations_ = iterations; }
 
+  /// Whether the step densifies.
   bool due(int step) const {
     return options_.every > 0 && step > options_.from && step % options_.every == 0 &&
            static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
@@ -184,6 +186,7 @@ class error_growth {
     return due(step) ? densify(model, state, step) : density_change{};
   }
 
+  /// Splits those with the most error, and moves the dead.
   density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step) {
     stage_scope stage(*exec_, "densify");
     density_change change;

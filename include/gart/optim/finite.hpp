@@ -48,9 +48,11 @@ struct count_not_finite_kernel {
 
 }  // namespace detail
 
+/// Looks at a whole model and its moments.
 template <execution E>
 class finite_check {
  public:
+  /// Nothing is counted yet.
   explicit finite_check(E& exec) : exec_(exec), counts_(exec, kinds + 1) { counts_.zero(); }
 
   /// For adam_step.

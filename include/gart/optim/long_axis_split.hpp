@@ -14,14 +14,17 @@
 
 namespace gart::inline GART_ISA {
 
+/// What the two halves are.
 struct split_half {
   vec3 offset;     ///< of one half's centre from the old one; the other's is its negative
   vec3 log_scale;  ///< of both
-  float opacity;
+  float opacity;   ///< of each
 };
 
-inline constexpr float split_share = 0.45f, split_opacity = 0.6f;
+/// q: the halves' centres lie at +-q 3 s.
+inline constexpr float split_share = 0.45f, split_opacity = 0.6f;  ///< what opacity is multiplied by
 
+/// The halves of a Gaussian of this opacity, in (0, 1).
 GART_HD inline split_half split_long_axis(vec3 const& log_scale, quaternion const& rotation, float opacity) {
   int const axis = log_scale.x >= log_scale.y   ? (log_scale.x >= log_scale.z ? 0 : 2)
                    : log_scale.y >= log_scale.z ? 1

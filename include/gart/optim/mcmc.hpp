@@ -34,8 +34,9 @@
 
 namespace gart::inline GART_ISA {
 
+/// o', and scale' / scale.
 struct relocated_shape {
-  double opacity, scale_factor;
+  double opacity, scale_factor;  ///< as above
 };
 
 /// Of each of `copies` Gaussians that replace one of opacity `o`. In double: the sum alternates.
@@ -211,7 +212,9 @@ class mcmc {
         dead_before_(exec),
         totals_(exec, 2) {}
 
+  /// Growth of each densification from the next on.
   void set_growth(float growth) { options_.growth = growth; }
+  /// From the next step on the schedules are those of a run of so many steps.
   void set_iterations(int iterations) { iterations_ = iterations; }
 
   /// Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale) / extent; before the
@@ -224,6 +227,7 @@ class mcmc {
                                              options_.scale_penalty / (3 * n * extent_)});
   }
 
+  /// Whether the step densifies.
   bool due(int step) const {
     return options_.every > 0 && step > options_.from && step % options_.every == 0 &&
            static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
@@ -238,6 +242,7 @@ class mcmc {
     return change;
   }
 
+  /// Relocates and grows.
   density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step) {
     stage_scope stage(*exec_, "densify");
     density_change change;

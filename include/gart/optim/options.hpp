@@ -7,20 +7,21 @@
 
 namespace gart {
 
+/// Adam's rates, by parameter.
 struct learning_rates {
-  float mean = 0.8e-4f;  ///< times the scene's extent; decays exponentially to mean_final over the run
-  float mean_final = 0.8e-6f;
-  float log_scale = 5e-3f;
-  float quaternion = 1e-3f;
-  float opacity = 2.5e-2f;
-  float sh_dc = 2.5e-3f;
+  float mean = 0.8e-4f;        ///< times the scene's extent; decays exponentially to mean_final over the run
+  float mean_final = 0.8e-6f;  ///< where the mean's rate ends
+  float log_scale = 5e-3f;     ///< of the logarithms
+  float quaternion = 1e-3f;    ///< of the raw quaternion
+  float opacity = 2.5e-2f;     ///< of the logit
+  float sh_dc = 2.5e-3f;       ///< of the first band
   /// Of the bands above the first; 0: what suits the run (sh_rest_of). A run that starts from a capture's points moves
   /// them as fast as the first, a short one slower; one that starts at random has its geometry to find, and colours
   /// that follow the view would stand in for it.
   float sh_rest = 0;
   /// All rates but those of the means and exposures stay as they are for a share of the run, then decay exponentially
   /// to `settled` of it.
-  float settled = 0.1f, settle_from = 0.5f;
+  float settled = 0.1f, settle_from = 0.5f;  ///< the share
   /// The rates are those of a run of at least so many steps. A shorter one has less time to go as far: its rates of
   /// mean, scale and opacity are sqrt(long_run / steps) times as large, at most four times, and it settles by less,
   /// settled^(steps / long_run).
@@ -28,8 +29,9 @@ struct learning_rates {
   float exposure = 0.05f, exposure_final = 0.005f;  ///< a visit of the view; decays like the means'
 };
 
+/// Adam's constants.
 struct adam_options {
-  float beta1 = 0.9f, beta2 = 0.999f, epsilon = 1e-15f;
+  float beta1 = 0.9f, beta2 = 0.999f, epsilon = 1e-15f;  ///< as in adam.hpp
   bool seen_only = false;  ///< Gaussians that the step's view did not show stay as they are (adam.hpp)
 };
 
@@ -37,8 +39,9 @@ struct adam_options {
 /// What is fainter than alpha_min is never hit and gets no gradient, so that it would stay as it is for good.
 inline float least_opacity(float usual, float alpha_min) { return std::max(usual, 255 * usual * alpha_min); }
 
+/// Of Markov chain Monte Carlo (optim/mcmc.hpp).
 struct mcmc_options {
-  int from = 500, every = 100;
+  int from = 500, every = 100;  ///< steps: the first, and from one to the next
   float until = 5.0f / 6;       ///< share of the run
   float growth = 1.05f;         ///< a step of growth, up to max_gaussians; more in runs too short for it (growth_for)
   float dead_opacity = 0.005f;  ///< as least_opacity has it for the alpha_min traced with
@@ -46,17 +49,19 @@ struct mcmc_options {
   float opacity_penalty = 0.01f, scale_penalty = 0.014f;  ///< the scale in units of the extent
 };
 
+/// Of growth by error (optim/error_growth.hpp).
 struct error_growth_options {
-  int from = 500, every = 100;
+  int from = 500, every = 100;     ///< steps: the first, and from one to the next
   float fill = 0.5f;               ///< share of the run at which the count has reached its budget
   float until = 5.0f / 6;          ///< share of the run after which the dead stay where they are
   float dead_opacity = 0.005f;     ///< as least_opacity has it for the alpha_min traced with
   float opacity_penalty = 0.003f;  ///< times the mean opacity
 };
 
+/// Of adaptive density control (optim/adc.hpp).
 struct adc_options {
-  int from = 500, every = 100, opacity_reset_every = 3000;
-  float until = 0.5f;
+  int from = 500, every = 100, opacity_reset_every = 3000;  ///< steps: the first, and from one to the next
+  float until = 0.5f;                                       ///< share of the run
   float gradient = 2e-4f;        ///< mean length of the mean's gradient in the image that makes a Gaussian grow
   float dense = 0.01f;           ///< times the extent: larger ones split, smaller ones are cloned
   float prune_opacity = 0.005f;  ///< as least_opacity has it for the alpha_min traced with

@@ -15,10 +15,12 @@ namespace gart::inline GART_ISA {
 /// What a number is drawn for: draws for different purposes are independent.
 enum class random_use : u32 { relocation = 1, growth, noise, split, user = 0x10000 };
 
+/// 128 random bits.
 struct random_words {
-  u32 v[4];
+  u32 v[4];  ///< 32 bits each
 };
 
+/// The words of a counter under a key.
 GART_HD inline random_words philox4x32(random_words counter, u32 key0, u32 key1) {
   for (int round = 0; round < 10; ++round) {
     u64 const a = u64{0xD2511F53u} * counter.v[0], b = u64{0xCD9E8D57u} * counter.v[2];
@@ -31,10 +33,11 @@ GART_HD inline random_words philox4x32(random_words counter, u32 key0, u32 key1)
 
 /// Trivially copyable: kernels hold one by value.
 struct random_source {
-  u64 seed = 0;
-  u32 step = 0;
-  random_use use = random_use::user;
+  u64 seed = 0;                       ///< of the run
+  u32 step = 0;                       ///< of the training
+  random_use use = random_use::user;  ///< purpose
 
+  /// The words of an index.
   GART_HD random_words words(u64 index) const {
     return philox4x32({{static_cast<u32>(index), static_cast<u32>(index >> 32), step, static_cast<u32>(use)}},
                       static_cast<u32>(seed), static_cast<u32>(seed >> 32));
@@ -54,8 +57,9 @@ GART_HD inline u64 below(u32 high, u32 low, u64 bound) {
 
 /// Four independent standard normals (Box-Muller); at most 5.77 in size.
 struct random_normals {
-  float v[4];
+  float v[4];  ///< the normals
 };
+/// Of four words.
 GART_HD inline random_normals normals(random_words const& words) {
   random_normals out;
   for (int pair = 0; pair < 2; ++pair) {

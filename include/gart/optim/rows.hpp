@@ -13,6 +13,7 @@ namespace gart::inline GART_ISA {
 /// mean, log_scale and quaternion: what places and shapes a Gaussian, and comes first in a row.
 inline constexpr index_t geometry_columns = 10;
 
+/// Floats of a Gaussian.
 inline index_t row_width(int sh_degree) {
   index_t sum = 0;
   for_each_array([&](parameter_array const& a, float const*) { sum += a.width(sh_degree); },
@@ -20,6 +21,7 @@ inline index_t row_width(int sh_degree) {
   return sum;
 }
 
+/// An element of a row.
 template <class T>
 GART_HD GART_INLINE T& row_element(gaussians_view<T> const& g, index_t row, index_t column) {
   T* element = nullptr;
@@ -71,7 +73,8 @@ void for_each_element(E& exec, char const* label, index_t rows, int sh_degree, B
 
 /// What a densification did. Where the count changed, gradients and other per-Gaussian buffers have a new size.
 struct density_change {
-  index_t relocated = 0, added = 0, removed = 0;
+  index_t relocated = 0, added = 0, removed = 0;  ///< Gaussians
+  /// Whether anything was done.
   bool any() const { return relocated || added || removed; }
 };
 

@@ -44,6 +44,7 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
 /// One degree more every `every` steps, sooner where the run is too short for that: the full degree is reached within
 /// the first third of any run.
 inline int sh_interval(int degree, int every, int steps) { return std::max(1, std::min(every, steps / (3 * degree))); }
+/// The degree in use at a step.
 inline int sh_degree_at(int step, int degree, int every, int steps) {
   return degree <= 0 ? 0 : std::min(degree, step / sh_interval(degree, every, steps));
 }

@@ -32,8 +32,8 @@ namespace gart {
 
 /// The shapes of gaussian_model, in double.
 struct reference_gradients {
-  int sh_degree = 0;
-  std::vector<double> mean, log_scale, quaternion, opacity, sh;
+  int sh_degree = 0;                                             ///< of the model
+  std::vector<double> mean, log_scale, quaternion, opacity, sh;  ///< as in gaussian_model
 };
 
 /// One entry for each pixel that was asked for, in that order.

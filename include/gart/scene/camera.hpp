@@ -13,34 +13,38 @@
 
 namespace gart {
 
+/// The models.
 enum class camera_kind {
   perspective,  ///< camera/pinhole.hpp, and camera/opencv.hpp where the lens is distorted
 };
 
 /// Coefficients of a lens; none is used where all are zero.
 struct distortion {
-  float k1 = 0, k2 = 0, p1 = 0, p2 = 0;
+  float k1 = 0, k2 = 0, p1 = 0, p2 = 0;  ///< radial, then tangential
+  /// Whether any is not zero.
   GART_HD bool any() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0; }
 };
 
+/// A view's camera.
 struct camera {
   int width = 0, height = 0;             ///< pixels
   float fx = 0, fy = 0, cx = 0, cy = 0;  ///< focal lengths and principal point, pixels
-  distortion lens;
-  mat3 rotation{1.0f};  ///< camera to world; columns are the camera's axes in the world
-  vec3d position{0.0};  ///< the centre in the world, in double: everything else is relative to it
-  camera_kind kind = camera_kind::perspective;
+  distortion lens;                       ///< none where zero
+  mat3 rotation{1.0f};                   ///< camera to world; columns are the camera's axes in the world
+  vec3d position{0.0};                   ///< the centre in the world, in double: everything else is relative to it
+  camera_kind kind = camera_kind::perspective;  ///< its model
 };
 
+/// A camera of a file.
 struct named_camera {
-  std::string name;
-  camera view;
+  std::string name;  ///< unique in the file
+  camera view;       ///< the camera
 };
 
 /// What is wrong with a camera, and what to correct; null where nothing is.
 struct camera_fault {
-  char const* what = nullptr;
-  char const* remedy = nullptr;
+  char const* what = nullptr;    ///< null: nothing
+  char const* remedy = nullptr;  ///< what to correct
 };
 
 }  // namespace gart

@@ -24,17 +24,21 @@ namespace gart {
 /// Indices have 32 bits, and a launch may take up to 15 of them a Gaussian.
 inline constexpr std::size_t most_gaussians = std::size_t{1} << 28;
 
+/// Throws invalid_argument for more Gaussians than that.
 inline void require_count(std::size_t n) {
   if (n > most_gaussians)
     throw invalid_argument(std::to_string(n) + " Gaussians are more than the " + std::to_string(most_gaussians) +
                            " that a scene can hold: lower train_options.max_gaussians");
 }
 
+/// Gaussians on the host.
 struct gaussian_model {
-  int sh_degree = 0;
-  std::vector<float> mean, log_scale, quaternion, opacity, sh;
+  int sh_degree = 0;                                            ///< D
+  std::vector<float> mean, log_scale, quaternion, opacity, sh;  ///< as above
 
+  /// N.
   std::size_t size() const { return opacity.size(); }
+  /// To n Gaussians of a degree; new numbers are zero.
   void resize(std::size_t n, int degree) {
     sh_degree = degree;
     for_each_array([&](parameter_array const& a, auto& values) { values.resize(n * a.width(degree)); }, *this);
@@ -64,53 +68,66 @@ inline gaussian_model with_sh_degree(gaussian_model model, int degree) {
 /// T is float or float const.
 template <class T>
 struct gaussians_view {
-  T* mean = nullptr;
-  T* log_scale = nullptr;
-  T* quaternion = nullptr;
-  T* opacity = nullptr;
-  T* sh = nullptr;
-  index_t count = 0;
-  int sh_degree = 0;
+  T* mean = nullptr;        ///< [N][3]
+  T* log_scale = nullptr;   ///< [N][3]
+  T* quaternion = nullptr;  ///< [N][4]
+  T* opacity = nullptr;     ///< [N]
+  T* sh = nullptr;          ///< [N][K][3]
+  index_t count = 0;        ///< N
+  int sh_degree = 0;        ///< D
 
+  /// Coefficients of a Gaussian, 3 K.
   GART_HD int sh_stride() const { return 3 * sh_coefficients(sh_degree); }
+  /// The same, which can be read alone.
   GART_HD operator gaussians_view<T const>() const requires(!std::is_const_v<T>) {
     return {mean, log_scale, quaternion, opacity, sh, count, sh_degree};
   }
 };
 
+/// Gaussians in a policy's memory.
 template <execution E>
 class gaussians {
  public:
   gaussians() = default;
+  /// Of n Gaussians, undefined.
   gaussians(E& exec, std::size_t n, int sh_degree)
       : mean(exec), log_scale(exec), quaternion(exec), opacity(exec), sh(exec), degree_(sh_degree) {
     resize_keep(n);
   }
+  /// A copy of the host's.
   gaussians(E& exec, gaussian_model const& m) : gaussians(exec, 0, m.sh_degree) { assign(m); }
 
-  buffer<float, E> mean, log_scale, quaternion, opacity, sh;
+  buffer<float, E> mean, log_scale, quaternion, opacity, sh;  ///< as above
 
+  /// N.
   index_t size() const { return static_cast<index_t>(opacity.size()); }
+  /// D.
   int sh_degree() const { return degree_; }
+  ///@{
+  /// All arrays, for kernels.
   gaussians_view<float> view() {
     return {mean.data(), log_scale.data(), quaternion.data(), opacity.data(), sh.data(), size(), degree_};
   }
   gaussians_view<float const> view() const {
     return {mean.data(), log_scale.data(), quaternion.data(), opacity.data(), sh.data(), size(), degree_};
   }
+  ///@}
   /// Existing Gaussians stay; new ones are undefined.
   void resize_keep(std::size_t n) {
     require_count(n);
     for_each_array([&](parameter_array const& a, auto& values) { values.resize_keep(n * a.width(degree_)); }, *this);
   }
+  /// Sets all numbers to 0.
   void zero() {
     for_each_array([](parameter_array const&, auto& values) { values.zero(); }, *this);
   }
+  /// A copy of the host's takes the place of all.
   void assign(gaussian_model const& m) {
     require_count(m.size());
     degree_ = m.sh_degree;
     for_each_array([](parameter_array const&, auto& to, auto const& from) { to.assign(from); }, *this, m);
   }
+  /// A copy for the host; waits for it.
   gaussian_model to_host() const {
     gaussian_model m;
     m.sh_degree = degree_;

@@ -9,20 +9,25 @@
 
 namespace gart {
 
+/// K: coefficients a channel of spherical harmonics to this degree.
 GART_HD constexpr int sh_coefficients(int degree) { return (degree + 1) * (degree + 1); }
 
+/// A line of the table.
 struct parameter_array {
   char const* name;   ///< of the member, and in checkpoints
   char const* title;  ///< in messages
   int number;         ///< in the table
   index_t floats;     ///< a Gaussian; 0: three for each coefficient of the spherical harmonics
 
+  /// Floats a Gaussian.
   GART_HD constexpr index_t width(int sh_degree) const {
     return floats ? floats : 3 * static_cast<index_t>(sh_coefficients(sh_degree));
   }
 };
 
+/// Lines of the table.
 inline constexpr int parameter_arrays = 5;
+/// The line of the means.
 inline constexpr int mean_array = 0;
 
 /// Calls f(parameter_array, set.member...) for each array, in order, with that member of every set: of anything that

@@ -7,6 +7,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// Gaussian i.
 GART_HD GART_INLINE gaussian_parameters load_parameters(gaussians_view<float const> const& g, index_t i) {
   float const* m = g.mean + std::size_t{3} * i;
   float const* s = g.log_scale + std::size_t{3} * i;

@@ -8,6 +8,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// What traits must have.
 template <class T>
 concept scene_requirements = response_function<typename T::response> &&  // how it falls off (math/response.hpp)
     requires {
@@ -19,8 +20,8 @@ concept scene_requirements = response_function<typename T::response> &&  // how 
 template <int ShDegree = 3, response_function Response = generalized_gaussian<>>
 struct scene_traits {
   static_assert(ShDegree >= 0 && ShDegree <= 3, "spherical harmonics go to degree 3");
-  static constexpr int sh_degree = ShDegree;
-  using response = Response;
+  static constexpr int sh_degree = ShDegree;  ///< that coefficients are stored with, 0 to 3
+  using response = Response;                  ///< its fall-off
 };
 static_assert(scene_requirements<scene_traits<>>);
 

@@ -9,8 +9,8 @@ namespace gart::inline GART_ISA {
 
 /// One 16-byte word.
 struct alignas(16) footprint_slots {
-  u64 offset = 0;
-  pixel_box box;
+  u64 offset = 0;  ///< slots before its own
+  pixel_box box;   ///< its pixels
 };
 
 }  // namespace gart::inline GART_ISA

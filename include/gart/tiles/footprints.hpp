@@ -41,9 +41,11 @@ struct place {
 
 }  // namespace tile_kernels
 
+/// The footprints of a view, for tiles of Size pixels a side.
 template <execution E, int Size>
 class footprints {
  public:
+  /// None yet.
   explicit footprints(E& exec)
       : ranges_(exec),
         depths_(exec),
@@ -85,8 +87,11 @@ class footprints {
 
   u64 slots() const { return slots_; }  ///< sum of box areas
   u64 pairs() const { return pairs_; }  ///< (primitive, tile) overlaps
+  /// Of each Gaussian, [N].
   span<footprint_slots const> ranges() const { return ranges_; }
+  /// Near depths, [N].
   span<float const> depths() const { return depths_; }
+  /// Of each Gaussian's first pair, [N].
   span<u64 const> pair_offsets() const { return pair_offsets_; }
 
  private:

@@ -6,18 +6,24 @@
 
 namespace gart::inline GART_ISA {
 
+/// The tiles of an image.
 template <int Size>
 struct tile_grid {
-  static constexpr int size = Size;
-  static constexpr int pixels = Size * Size;
-  int width = 0, height = 0;
+  static constexpr int size = Size;           ///< pixels a side
+  static constexpr int pixels = Size * Size;  ///< of a whole tile
+  int width = 0, height = 0;                  ///< of the image, pixels
 
+  ///@{
+  /// Tiles.
   GART_HD u32 columns() const { return static_cast<u32>((width + Size - 1) / Size); }
   GART_HD u32 rows() const { return static_cast<u32>((height + Size - 1) / Size); }
+  ///@}
+  /// Tiles in all.
   GART_HD u32 count() const { return columns() * rows(); }
 
   /// The pixels of a tile, cut off at the image's edge.
   GART_HD pixel_box tile(u32 index) const { return tile(index % columns(), index / columns()); }
+  /// By column and row.
   GART_HD pixel_box tile(u32 column, u32 row) const {
     u32 const x = column * Size, y = row * Size;
     u32 const w = static_cast<u32>(width), h = static_cast<u32>(height);
@@ -34,6 +40,7 @@ GART_HD constexpr pixel_box tiles_of(pixel_box const& b) {
           static_cast<u16>((b.y1 - 1) / Size + 1)};
 }
 
+/// What lies in both.
 GART_HD constexpr pixel_box intersect(pixel_box const& a, pixel_box const& b) {
   return {a.x0 > b.x0 ? a.x0 : b.x0, a.y0 > b.y0 ? a.y0 : b.y0, a.x1 < b.x1 ? a.x1 : b.x1, a.y1 < b.y1 ? a.y1 : b.y1};
 }

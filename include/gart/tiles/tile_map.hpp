@@ -13,6 +13,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// The map as kernels hold it.
 struct tile_map_view {
   span<u32 const> primitives;     ///< all lists, tile after tile
   span<u32 const> offsets;        ///< [tiles + 1]
@@ -27,6 +28,7 @@ struct tile_map_view {
   }
 };
 
+/// Bits that tell so many numbers apart; at least 1.
 inline int bits_for(u32 count) {
   int bits = 1;
   while (bits < 32 && (u64{1} << bits) < count) ++bits;
@@ -123,11 +125,14 @@ struct rank_tiles {
 
 }  // namespace tile_kernels
 
+/// The map of a view, and its buffers.
 template <execution E, int Size>
 class tile_map {
  public:
+  /// No map yet.
   explicit tile_map(E& exec) : keys_(exec), primitives_(exec), offsets_(exec), ranks_(exec), longest_first_(exec) {}
 
+  /// A new map of a view's footprints; out_of_memory for 2^31 pairs or more.
   template <tile_order Order>
   void build(E& exec, tile_grid<Size> const& grid, footprints<E, Size> const& prints, Order order) {
     stage_scope stage(exec, "map");
@@ -162,6 +167,7 @@ class tile_map {
     sort_pairs(exec, ranks_.view(), longest_first_.view(), 8);
   }
 
+  /// Until the next build.
   tile_map_view view() const { return {primitives_, offsets_, keys_, order_bits_, depth_shift_, longest_first_}; }
 
  private:

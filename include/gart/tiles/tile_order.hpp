@@ -16,6 +16,7 @@
 
 namespace gart::inline GART_ISA {
 
+/// An order: it has the members that are listed above.
 template <class O>
 concept tile_order = std::is_trivially_copyable_v<O> &&
     requires(O order, O const& k, typename O::primitive const& p, index_t i, pixel_box const& cell, u32 tile) {
@@ -28,6 +29,7 @@ concept tile_order = std::is_trivially_copyable_v<O> &&
 /// A depth (not negative) as an integer of the same order, `shift` low bits dropped; and the depth it stands for, which
 /// is not larger.
 GART_HD GART_INLINE u32 depth_key(float depth, int shift) { return float_to_bits(depth) >> shift; }
+/// The depth that a key stands for.
 GART_HD GART_INLINE float near_depth(u32 key, int shift) { return bits_to_float(key << shift); }
 
 namespace detail {
@@ -66,13 +68,16 @@ class depth_order : public detail::depth_bits {
     reach_ = 1.01f + u + v;
   }
 
+  /// What it needs of a primitive.
   struct primitive {
-    rectangle_depth in;
-    float depth;
+    rectangle_depth in;  ///< its bound; unused without Gaussians
+    float depth;         ///< anywhere
   };
+  /// Of primitive i.
   GART_HD primitive of(index_t i) const {
     return {rectangle_depth(gaussians_ ? gaussians_[i] : ray_gaussian{}, rotation_, reach_), depths_[i]};
   }
+  /// Of a pair.
   GART_HD u32 key(primitive const& p, pixel_box const& cell, u32 /*tile*/) const {
     if (!gaussians_) return depth_key(p.depth, shift_);
     constexpr float inset = tile_plane::inset;
@@ -92,14 +97,18 @@ class depth_order : public detail::depth_bits {
 template <int Size>
 class any_depth_order : public detail::depth_bits {
  public:
+  /// As depth_order's; planes: a tile each, null where there are none.
   any_depth_order(float const* depths, ray_gaussian const* gaussians, tile_plane const* planes)
       : depths_(depths), gaussians_(gaussians), planes_(planes) {}
 
+  /// What it needs of a primitive.
   struct primitive {
-    ray_gaussian gaussian;
-    float depth;
+    ray_gaussian gaussian;  ///< unused without planes
+    float depth;            ///< anywhere
   };
+  /// Of primitive i.
   GART_HD primitive of(index_t i) const { return {planes_ ? gaussians_[i] : ray_gaussian{}, depths_[i]}; }
+  /// Of a pair.
   GART_HD u32 key(primitive const& p, pixel_box const& cell, u32 tile) const {
     if (!planes_) return depth_key(p.depth, shift_);
     tile_plane const plane = planes_[tile];
@@ -123,9 +132,12 @@ class any_depth_order : public detail::depth_bits {
 template <execution E, int Size>
 class depth_orders {
  public:
+  /// No planes yet.
   explicit depth_orders(E& exec) : planes_(exec) {}
 
   /// rays: of the model, where they have one centre. The order is valid until the next call.
+  ///@{
+  /// The order of a view; rays: of the model, where they have one centre. It is valid until the next call.
   depth_order of(E&, pinhole const& model, pixel_rays const&, float const* depths, ray_gaussian const* gaussians) {
     return {depths, gaussians, model};
   }
@@ -141,6 +153,7 @@ class depth_orders {
       return {depths, gaussians, nullptr};
     }
   }
+  ///@}
 
  private:
   buffer<tile_plane, E> planes_;
@@ -148,11 +161,15 @@ class depth_orders {
 
 /// By the primitives' numbers, in which the pairs come.
 struct number_order {
+  /// None of the bits.
   int take(int) const { return 0; }
+  /// Keys hold no depth.
   int shift() const { return 0; }
 
   struct primitive {};
+  /// Of any primitive.
   GART_HD primitive of(index_t) const { return {}; }
+  /// Of any pair.
   GART_HD u32 key(primitive, pixel_box const& /*cell*/, u32 /*tile*/) const { return 0; }
 };
 static_assert(tile_order<depth_order> && tile_order<number_order>);

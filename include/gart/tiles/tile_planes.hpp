@@ -13,24 +13,27 @@
 
 namespace gart::inline GART_ISA {
 
+/// The grid of a tile's rays.
 struct alignas(16) tile_plane {
-  vec3 origin;  ///< of the grid, at the tile's corner
-  float widen_x;
-  vec3 dx;  ///< from pixel to pixel
-  float widen_y;
-  vec3 dy;
-  float reach;  ///< of math/rectangle_depth.hpp; 0 where there is no plane
+  vec3 origin;    ///< of the grid, at the tile's corner
+  float widen_x;  ///< pixels by which rays lie beside the grid
+  vec3 dx;        ///< from pixel to pixel
+  float widen_y;  ///< the same, down
+  vec3 dy;        ///< from pixel to pixel, down
+  float reach;    ///< of math/rectangle_depth.hpp; 0 where there is no plane
 
   /// Rays go through the middle of pixels, 0.5; the rest is for the rounding of their directions.
   static constexpr float inset = 0.45f;
 };
 
+/// Kernel over tiles: finds the plane of each.
 template <int Size>
 struct tile_planes {
-  pixel_rays rays;
-  tile_grid<Size> grid;
-  span<tile_plane> planes;
+  pixel_rays rays;          ///< of the view
+  tile_grid<Size> grid;     ///< of the view
+  span<tile_plane> planes;  ///< [tiles]
 
+  /// Of one tile.
   GART_KERNEL void operator()(index_t tile) const { planes[tile] = plane_of(grid.tile(tile)); }
 
  private:
