@@ -27,10 +27,7 @@ GART_HD constexpr u32 pixel_offset(pixel_box const& cell, u32 x, u32 y) {
 struct alignas(16) tile_slots {
   u32 first = 0;                            ///< slot of the cell's first pixel
   u32 width = 0;                            ///< of the cell, in pixels
-  u16 x = 0,                                ///< the cell's first column
-      y = 0,                                ///< its first row
-      x1 = 0,                               ///< past its last column
-      y1 = 0;                               ///< past its last row
+  u16 x = 0, y = 0, x1 = 0, y1 = 0;         ///< the cell: [x, x1) x [y, y1)
   static constexpr u32 none = 0xffffffffu;  ///< no slot
 
   tile_slots() = default;

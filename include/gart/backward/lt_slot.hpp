@@ -44,9 +44,7 @@ GART_HD GART_INLINE float from_half(u32 half) {
 /// The format float4: exact.
 struct alignas(16) lt_entry {
   static constexpr char const* name = "float4";  ///< in configurations and reports
-  float r,                                       ///< V; negative where the hit's colour was clamped
-      g,                                         ///< as r
-      b;                                         ///< as r
+  float r, g, b;                                 ///< V; negative where the hit's colour was clamped
   float w;                                       ///< the weight; a NaN: not written
 
   /// Packs V, the weight and the clamps of the colour `c`, which is that before the clamp.
@@ -75,8 +73,7 @@ struct alignas(16) lt_entry {
 /// The format half.
 struct alignas(8) lt_half_entry {
   static constexpr char const* name = "half";  ///< in configurations and reports
-  u32 rg,                                      ///< r in the low half, g; sign bits: clamped
-      bw;                                      ///< b in the low half, then the weight
+  u32 rg, bw;  ///< r in the low half of rg, b in that of bw, the weight in its high half; sign bits of r, g, b: clamped
 
   /// As lt_entry::of.
   GART_HD GART_INLINE static lt_half_entry of(vec3 const& v, float weight, vec3 const& c) {

@@ -33,8 +33,7 @@ struct packet_gather {
 
   /// What is needed of a packet's pixels.
   struct packet_data {
-    int x,                                    ///< in the tile
-        y;                                    ///< in the tile
+    int x, y;                                 ///< in the tile
     vec3_of<lanes> direction,                 ///< of the rays, unit length
         gradient;                             ///< of the image
     lanes total,                              ///< colour . gradient

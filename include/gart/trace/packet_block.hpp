@@ -10,10 +10,8 @@ namespace gart::inline GART_ISA {
 
 /// The pixels of a packet: 4 wide, as high as there are lanes for.
 struct packet_block {
-  static constexpr int width = 4,   ///< in pixels
-      height = lane_count / width;  ///< in pixels
-  /// Column of its first pixel.
-  int x = 0, y = 0;  ///< and its row
+  static constexpr int width = 4, height = lane_count / width;  ///< in pixels
+  int x = 0, y = 0;                                             ///< column and row of its first pixel
 
   /// Of a lane's pixel, from the first.
   static constexpr int column(int lane) { return lane % width; }

@@ -13,16 +13,13 @@ namespace gart::inline GART_ISA {
 
 /// A pixel, (0, 0) at the upper left.
 struct pixel {
-  int x,  ///< column
-      y;  ///< row
+  int x, y;  ///< column and row
 };
 
 /// Ray i of a launch over an image is at(i).
 struct pixel_order {
-  static constexpr int block_width = 8,  ///< in pixels
-      block_height = 4;                  ///< in pixels
-  int width = 0,                         ///< of the image, in pixels
-      height = 0;                        ///< of the image, in pixels
+  static constexpr int block_width = 8, block_height = 4;  ///< in pixels
+  int width = 0, height = 0;                               ///< of the image, in pixels
 
   /// Blocks across the image, the last one cut.
   GART_HD int blocks_x() const { return (width + block_width - 1) / block_width; }

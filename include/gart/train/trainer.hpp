@@ -41,8 +41,7 @@ struct loss_input {
   E& exec;                   ///< the policy
   dataset_view const& view;  ///< of this step
   truth_view truth;          ///< the photograph, in the policy's memory
-  int width,                 ///< of the image, in pixels
-      height;                ///< of the image, in pixels
+  int width, height;         ///< of the image, in pixels
   span<float const> image;   ///< [H][W][3]
   span<float> gradient;      ///< [H][W][3]
   span<float> value;         ///< [2]
