@@ -1,11 +1,13 @@
 #pragma once
 /// \file
 /// From the gradient of an image to the gradients of the parameters, by any strategy (backward/strategies.hpp):
+///
 ///   backward_pass<frame<E, Traits, Tracer>, primitive_strategy> pass(exec);
 ///   frame.prepare(scene, view, options);
 ///   pass.prepare(frame);                                       // footprints, lists and LT buffer, where it records
 ///   pass.render(frame, {.color = color});                      // the forward pass, with what the strategy records
 ///   differentiate(frame, pass, color_gradient, gradients);     // overwrites `gradients`
+///
 /// A pass knows which preparation of which frame it stands at: out of this order it throws invalid_argument.
 /// backward/fallback.hpp takes a strategy that needs less where there is no room.
 ///

@@ -1,6 +1,7 @@
 #pragma once
 /// \file
 /// A strategy and those that it falls back to, so that a step can be done in the memory there is.
+///
 ///   backward_passes<frame<E, Traits, Tracer>, primitive_strategy> passes(exec);
 ///   passes.with_room(frame, byte_budget, [&](auto& pass) { pass.render(frame, targets); ... });
 

@@ -4,8 +4,10 @@
 /// (a camera model's filter, camera/model.hpp), once, before anything is made of it, so that every tracer, footprint
 /// and box has the same bits of it. Without a filter it is the scene itself, and nothing is launched. A frame has one
 /// (render/frame.hpp); the way back is the backward pass's (backward/finish.hpp).
+///
 ///   antialiased<E> seen(exec);
 ///   auto const scene = seen.of(exec, stored, view, options.antialias);
+///
 /// Memory: 16 bytes a Gaussian where there is a filter. Errors: invalid_argument for a camera no ray can be cast by.
 
 #include <gart/camera/models.hpp>

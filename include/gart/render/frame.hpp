@@ -2,9 +2,11 @@
 /// \file
 /// A frame: the Gaussians of a scene as one view sees them, 64 bytes each, and a tracer's structure over them. What
 /// comes between a view and its images, and between a view and its gradients (backward/backward.hpp).
+///
 ///   frame<E, scene_traits<3>, tile_tracer<E>> frame(exec);
 ///   frame.prepare(scene, view, options);   // once a view, and again when scene, view or options change
 ///   frame.render({.color = color});        // as often as wanted
+///
 /// The scene's arrays and the policy must outlive what is done with the frame. Cost of prepare: a launch over the
 /// Gaussians and the tracer's own preparation; of render: a ray a pixel. Memory: 64 bytes a Gaussian, 16 more where the
 /// options have a filter of the pixels, and the tracer's. Errors: invalid_argument for a camera or options that no ray

@@ -26,8 +26,8 @@ struct capture_traits {
   bool plain_border = false;  ///< or opaque, and of one colour,
   u8 border[3] = {0, 0, 0};   ///< which is this
   std::size_t views = 0;      ///< training views
-  double brightness_step =
-      0;  ///< median over opaque photographs of |ln| of the mean brightness over the nearest pose's
+  /// Median over opaque photographs of |ln| of the mean brightness over the nearest pose's.
+  double brightness_step = 0;
 
   /// Whether its objects stand before a background that is not of the scene.
   bool bounded() const { return clear_border || plain_border; }

@@ -17,9 +17,9 @@ namespace gart {
 struct compiled_configuration {
   configuration_info info;  ///< what it is
   int rank = 0;  ///< "auto" takes the highest that is available; configurations that trade something lie below 0
-  /// A renderer of it.
+  /// False: no device, with the reason.
   bool (*available)(std::string* reason);
-  std::unique_ptr<renderer> (*make_renderer)(configuration_request const&);  ///< a session of it
+  std::unique_ptr<renderer> (*make_renderer)(configuration_request const&);  ///< a renderer of it
   /// A session of it.
   std::unique_ptr<session> (*make_session)(configuration_request const&, train_options const&, dataset const&,
                                            gaussian_model const& start);
@@ -43,7 +43,6 @@ inline bool always_available(std::string*) { return true; }
 
 }  // namespace gart
 
-// `name` becomes a symbol that the linker is told to keep, so that the object with the configurations is not dropped.
 /// Runs the rest of its arguments before main, as registrations ask for. `name` becomes a symbol that the linker is
 /// told to keep, so that the object with the configurations is not dropped.
 #define GART_REGISTER_CONFIGURATIONS(name, ...) \

@@ -2,10 +2,12 @@
 /// \file
 /// Training, one step at a time: a view, the forward pass, the loss, the backward pass by the strategy, Adam,
 /// densification. Composed from the parts; each can be replaced. A loss of one's own is a callable given to step().
+///
 ///   openmp_exec exec;
 ///   trainer<openmp_exec, scene_traits<3>, bvh_tracer<openmp_exec>, pixel_strategy> run(exec, options, data, start);
 ///   while (run.steps_done() < options.iterations) run.step();
 ///   write_splat_ply("model.ply", run.model());
+///
 /// The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step),
 /// so a state holds parameters, moments and counters only.
 
