@@ -302,17 +302,15 @@ GART_INLINE void prefetch_to_l2(void const* p) { __builtin_prefetch(p, 0, 2); } 
 /// For what will be written.
 GART_INLINE void prefetch_to_write(void const* p) { __builtin_prefetch(p, 1); }
 
-/// The arithmetic of arith.hpp.
-GART_INLINE lanes mul(lanes a, lanes b) { return a * b; }
 ///@{
 /// The arithmetic of arith.hpp.
+GART_INLINE lanes mul(lanes a, lanes b) { return a * b; }
 GART_INLINE lanes add(lanes a, lanes b) { return a + b; }
 GART_INLINE lanes divide(lanes a, lanes b) { return a / b; }
 GART_INLINE lanes reciprocal(lanes a) { return lanes(1.0f) / a; }
 GART_INLINE lanes fma(lanes a, lanes b, lanes c) {
 #if defined(GART_LANES_AVX512)
   return (lanes::vector)_mm512_fmadd_ps((__m512)a.v, (__m512)b.v, (__m512)c.v);
-///@}
 #elif defined(__AVX2__) && defined(GART_FUSED)
   return (lanes::vector)_mm256_fmadd_ps((__m256)a.v, (__m256)b.v, (__m256)c.v);
 #else
@@ -321,6 +319,7 @@ GART_INLINE lanes fma(lanes a, lanes b, lanes c) {
   return r;
 #endif
 }
+///@}
 /// Lane by lane.
 GART_INLINE lanes square_root(lanes a) {
 #if defined(GART_LANES_AVX512)
