@@ -27,8 +27,8 @@ function each_its_comment(line,    at, code, text, i, c, depth, n, part, type, o
 
 function show(next_line) {
   if (NR > 1) {
-    if (!indented(line) && line ~ /^ *\/\/\/( |$)/ && indented(next_line)) line = line " @verbatim"
-    else if (indented(line) && !indented(next_line)) line = line " @endverbatim"
+    if (!indented(line) && line ~ /^ *\/\/\/( |$)/ && indented(next_line)) line = line " @code{.unparsed}"
+    else if (indented(line) && !indented(next_line)) line = line " @endcode"
     print line
   }
   line = next_line
