@@ -3,6 +3,7 @@
 #include <support/policies.hpp>
 
 #include <gart/backward/backward.hpp>
+#include <gart/exec/serial.hpp>
 #include <gart/trace/tile_tracer.hpp>
 
 #include <functional>
