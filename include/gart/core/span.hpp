@@ -33,7 +33,7 @@ class span {
   span(std::vector<value_type> const& v) requires(std::is_const_v<T>) : data_(v.data()), size_(v.size()) {}
   ///@}
 
-  /// The first element's address; null where there is none, perhaps.
+  /// The address of the first element.
   GART_HD constexpr T* data() const { return data_; }
   /// How many elements.
   GART_HD constexpr std::size_t size() const { return size_; }

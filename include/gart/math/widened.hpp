@@ -25,12 +25,12 @@ struct filter_at {
 
 /// What the direction of the mean makes of a Gaussian under a filter.
 struct filtered_area {
-  mat3 rotation;           ///< to the Gaussian's axes
+  mat3 rotation;           ///< columns are the Gaussian's axes
   vec3 u;                  ///< unit, towards the mean in the Gaussian's axes
   vec3 ratio;              ///< s_k / r
   vec3 a;                  ///< its square
   float area, widened;     ///< N, N'
-  float inverse_distance;  ///< of the mean to the frame's origin, over world units
+  float inverse_distance;  ///< 1 / distance of the mean, in world units
 };
 
 /// Beyond it a filter changes no digit of a scale, and products of three stay in range.
