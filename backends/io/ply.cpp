@@ -252,7 +252,7 @@ constexpr std::size_t chunk = std::size_t{1} << 20;
 
 }  // namespace
 
-gaussian_model read_splat_ply(std::filesystem::path const& path, ply_traits* traits) {
+gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* traits) {
   ply_file const file = open(path);
   element const& e = vertices(file);
   if (!find(e, "f_dc_0") && (find(e, "red") || !find(e, "opacity"))) {
@@ -284,7 +284,7 @@ gaussian_model read_splat_ply(std::filesystem::path const& path, ply_traits* tra
   return model;
 }
 
-void write_splat_ply(std::filesystem::path const& path, gaussian_model const& model, ply_traits const& traits) {
+void write_splat_ply(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits) {
   std::size_t const n = model.size(), k = static_cast<std::size_t>(sh_coefficients(model.sh_degree));
   if (model.sh_degree < 0 || model.sh_degree > 3 || !model.arrays_agree()) {
     throw invalid_argument("the arrays of the model to write to " + path.string() + " do not agree in size");
@@ -354,5 +354,10 @@ void write_point_ply(std::filesystem::path const& path, point_cloud const& point
     drain(out, text, 0);
   });
 }
+
+extern splat_format const ply_format;
+splat_format const ply_format = {
+    "PLY", ".ply", [](std::string_view first) { return first.starts_with("ply\n") || first.starts_with("ply\r"); },
+    read_splat_ply, write_splat_ply};
 
 }  // namespace gart

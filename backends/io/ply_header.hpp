@@ -43,7 +43,7 @@ struct element {
 struct header {
   encoding format = encoding::little;
   std::vector<element> elements;
-  ply_traits traits;
+  splat_traits traits;
   std::size_t size = 0;  // bytes
 };
 

@@ -11,9 +11,9 @@
 namespace gart {
 
 model_file load_model(std::filesystem::path const& path) {
-  ply_traits traits;
+  splat_traits traits;
   model_file file;
-  file.model = read_splat_ply(path, &traits);
+  file.model = read_splats(path, &traits);
   if (auto const kernel = traits.find("kernel_degree"); kernel != traits.end()) {
     bool const known = std::any_of(std::begin(kernel_degrees), std::end(kernel_degrees),
                                    [&](int degree) { return std::to_string(degree) == kernel->second; });
@@ -54,9 +54,9 @@ model_file load_model(std::filesystem::path const& path) {
   return file;
 }
 
-ply_traits traits_of(render_options const& render, int kernel_degree) {
+splat_traits traits_of(render_options const& render, int kernel_degree) {
   render_options const usual;
-  ply_traits traits;
+  splat_traits traits;
   auto const put = [&](char const* key, float value, float otherwise) {
     if (value == otherwise) return;
     char text[32];
@@ -73,7 +73,7 @@ ply_traits traits_of(render_options const& render, int kernel_degree) {
 }
 
 void save_model(std::filesystem::path const& path, model_file const& file) {
-  write_splat_ply(path, file.model, traits_of(file.render, file.kernel_degree));
+  write_splats(path, file.model, traits_of(file.render, file.kernel_degree));
 }
 
 }  // namespace gart

@@ -13,6 +13,7 @@
 #include <gart/io/dataset.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
+#include <gart/io/splat_file.hpp>
 #include <gart/loss/affine_color.hpp>
 #include <gart/loss/metrics.hpp>
 #include <gart/reference/reference.hpp>

@@ -125,7 +125,7 @@ bool splat_ply(std::string_view input) {
   static scratch_folder const folder("splat_ply");
   fs::path const file = folder.put("model.ply", input), again = folder.path() / "again.ply";
   return accepted(folder, [&] {
-    gart::ply_traits traits;
+    gart::splat_traits traits;
     gart::gaussian_model const m = gart::read_splat_ply(file, &traits);
     gart::gaussian_model shape;
     shape.resize(m.size(), m.sh_degree);

@@ -13,21 +13,17 @@
 /// property), or a rotation that is all zero; invalid_argument for a model whose arrays disagree in size.
 
 #include <gart/io/dataset.hpp>
+#include <gart/io/splat_file.hpp>
 #include <gart/scene/gaussians.hpp>
 
 #include <filesystem>
-#include <map>
-#include <string>
 
 namespace gart {
 
-/// Comments of the header that begin with "gart": key -> value.
-using ply_traits = std::map<std::string, std::string>;
-
-/// Reads a splat file; its traits into `traits`, where that is not null.
-gaussian_model read_splat_ply(std::filesystem::path const& path, ply_traits* traits = nullptr);
+/// Reads a splat file; the comments of its header that begin with "gart" into `traits`, where that is not null.
+gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* traits = nullptr);
 /// Writes a splat file, with these traits.
-void write_splat_ply(std::filesystem::path const& path, gaussian_model const& model, ply_traits const& traits = {});
+void write_splat_ply(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits = {});
 
 /// A plain point cloud: x y z, and red green blue where present (else grey).
 point_cloud read_point_ply(std::filesystem::path const& path);

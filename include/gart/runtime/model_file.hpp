@@ -1,13 +1,14 @@
 #pragma once
 /// \file
-/// A model with what it was trained with, as its file says it: a splat PLY whose header carries, in lines
-/// "comment gart KEY VALUE", what is not as everywhere: alpha_min, t_min, near, max_hits, antialias, kernel_degree. A
-/// model of ordinary Gaussians is byte for byte an ordinary file, and one of another program is read with the defaults.
+/// A model with what it was trained with, as its file says it, in any format of io/splat_file.hpp. A splat PLY's header
+/// carries, in lines "comment gart KEY VALUE", what is not as everywhere: alpha_min, t_min, near, max_hits, antialias,
+/// kernel_degree. A model of ordinary Gaussians is byte for byte an ordinary file, and one of another program is read
+/// with the defaults.
 ///
 /// Errors: load_model throws io_error for what is no splat file, or one whose header says what cannot be, naming the
-/// file, the key and the remedy; save_model as write_splat_ply (io/ply.hpp).
+/// file, the key and the remedy; save_model as write_splats (io/splat_file.hpp).
 
-#include <gart/io/ply.hpp>
+#include <gart/io/splat_file.hpp>
 #include <gart/render/options.hpp>
 #include <gart/scene/gaussians.hpp>
 
@@ -28,7 +29,7 @@ model_file load_model(std::filesystem::path const& path);
 void save_model(std::filesystem::path const& path, model_file const& file);
 
 /// What is not the default of `render` and of kernel degree 2, as the header has it.
-ply_traits traits_of(render_options const& render, int kernel_degree);
+splat_traits traits_of(render_options const& render, int kernel_degree);
 
 inline constexpr u32 max_hits_most = 1'000'000'000;  ///< largest cap of hits that a file can have
 

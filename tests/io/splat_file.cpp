@@ -1,0 +1,63 @@
+#include <gart/io/ply.hpp>
+#include <gart/io/splat_file.hpp>
+
+#include "support.hpp"
+
+namespace {
+
+using namespace gart_test;
+
+gart::gaussian_model one() {
+  gart::gaussian_model m;
+  m.resize(1, 0);
+  m.mean = {1, 2, 3}, m.log_scale = {-1, -2, -3}, m.quaternion = {1, 0, 0, 0}, m.opacity = {0.5f}, m.sh = {1, 2, 3};
+  return m;
+}
+
+TEST_CASE("a file of Gaussians is known by its first bytes, whatever its name") {
+  scratch_folder const folder;
+  gart::write_splats(folder.path / "model.PLY", one(), {{"kernel_degree", "4"}});
+  for (char const* name : {"model.bin", "model", "model.jpg"}) {
+    CAPTURE(name);
+    fs::copy_file(folder.path / "model.PLY", folder.path / name);
+    gart::splat_traits traits;
+    auto const back = gart::read_splats(folder.path / name, &traits);
+    CHECK(back.mean == one().mean);
+    CHECK(back.sh == one().sh);
+    CHECK(traits == gart::splat_traits{{"kernel_degree", "4"}});
+    CHECK(gart::read_splats(folder.path / name).size() == 1);
+  }
+}
+
+TEST_CASE("what is in no format is refused with the list of formats") {
+  scratch_folder const folder;
+  for (char const* bytes : {"", "p", "glTF and more than 16 bytes"}) {
+    auto const path = folder.put("model.xyz", bytes);
+    std::string const said = error_of([&] { gart::read_splats(path); });
+    CHECK(holds(said, "model.xyz"));
+    CHECK(holds(said, "PLY (.ply)"));
+  }
+  // The name decides where the bytes say nothing: the format's own reader says what is wrong.
+  CHECK(holds(error_of([&] { gart::read_splats(folder.put("damaged.ply", "pl")); }), "ply"));
+  CHECK(holds(error_of([&] { gart::read_splats(folder.path / "none.xyz"); }), "no such file"));
+  CHECK(holds(error_of([&] { gart::write_splats(folder.path / "model.xyz", one()); }), "PLY (.ply)"));
+}
+
+TEST_CASE("the formats have a name, an ending and a reader, and each knows what it writes") {
+  CHECK(gart::splat_formats().size() >= 1);
+  scratch_folder const folder;
+  for (gart::splat_format const* format : gart::splat_formats()) {
+    CAPTURE(format->name);
+    bool const reads = format->read != nullptr;
+    REQUIRE(reads);
+    CHECK(format->extension[0] == '.');
+    if (!format->write) continue;
+    auto const path = folder.path / (std::string("model") + format->extension);
+    gart::write_splats(path, one());
+    auto const bytes = gart::read_file(path);
+    CHECK(format->begins({reinterpret_cast<char const*>(bytes.data()), std::min<std::size_t>(16, bytes.size())}));
+    CHECK(gart::read_splats(path).size() == 1);
+  }
+}
+
+}  // namespace
