@@ -10,7 +10,7 @@ trap 'fail "line $LINENO failed: $BASH_COMMAND"' ERR
 
 # What gart is built and tested with, by the names of Debian 12 and Ubuntu 24.04.
 packages=(cmake ninja-build g++ pkg-config git python3 libembree-dev libglm-dev libpng-dev libturbojpeg0-dev
-  nlohmann-json3-dev libcli11-dev libeigen3-dev doctest-dev libbenchmark-dev clang-format-14)
+  nlohmann-json3-dev libcli11-dev libeigen3-dev doctest-dev libbenchmark-dev)
 
 missing_packages() {
   local package
@@ -37,6 +37,15 @@ install_packages() {
   # shellcheck disable=SC2086  # one word a package
   "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends $missing ||
     fail "apt-get could not install $missing: see above"
+}
+
+# What a test is skipped without.
+wish_for() {
+  local package=$1 root=()
+  [[ $(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null) == installed ]] && return
+  [[ $(id -u) == 0 ]] || root=(sudo)
+  "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "$package" ||
+    say "no $package here: the test that needs it is skipped"
 }
 
 # The options that both builds share; the compiler cache where there is one.
