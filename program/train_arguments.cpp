@@ -137,7 +137,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(
       r.add(train, "--lt-budget", a.lt_budget_gb, "GB",
             "Memory for what the forward pass records; a step that\nneeds more is done by hybrid, which needs a "
-            "quarter, and where\nthat is too much by pixel, which needs none. 0: half of what\nis free at the start"))
+            "quarter, and where\nthat is too much by pixel, which needs none. 0: half of what\nis free at the start (deterministic: no limit)"))
       ->check(between(0, 1e6));
   in_group(r.add(train, "--rebuild-every", a.rebuild_every, "N",
                  "Steps between builds of the bvh tracer's tree, which is\nrefitted in between; the images are the "

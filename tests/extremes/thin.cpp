@@ -63,19 +63,6 @@ gart::gaussian_model thin_ones(number_source& random, gart::camera const& view, 
   return m;
 }
 
-std::vector<double> oracle::parameters::*const oracle_groups[] = {
-    &oracle::parameters::mean, &oracle::parameters::log_scale, &oracle::parameters::quaternion,
-    &oracle::parameters::opacity, &oracle::parameters::sh};
-
-double relative_error(std::vector<float> const& got, std::vector<double> const& expected) {
-  double error = 0, norm = 0;
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    error += (got[i] - expected[i]) * (got[i] - expected[i]);
-    norm += expected[i] * expected[i];
-  }
-  return std::sqrt(error / norm);
-}
-
 }  // namespace
 
 // Prints what docs/accuracy.md quotes: GART_TEST_SEED=1 test_extremes --test-case=*thin*

@@ -3,9 +3,11 @@
 // pass. Strategies that change the gather alone, which does not know the tracer, run on tile lists. SH degree 1, the
 // least that has a direction.
 
+#include <extremes/scenes.hpp>
 #include <support/policies.hpp>
 #include <support/trace_scene.hpp>
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -74,5 +76,26 @@ inline constexpr parameter_group parameter_groups[] = {{"mean", &gart::gaussian_
                                                        {"quaternion", &gart::gaussian_model::quaternion, 4},
                                                        {"opacity", &gart::gaussian_model::opacity, 1},
                                                        {"sh", &gart::gaussian_model::sh, 12}};
+
+// The same of the oracle, in that order.
+inline std::vector<double> oracle::parameters::*const oracle_groups[] = {
+    &oracle::parameters::mean, &oracle::parameters::log_scale, &oracle::parameters::quaternion,
+    &oracle::parameters::opacity, &oracle::parameters::sh};
+
+// Of all of a group, as one vector.
+inline double relative_error(std::vector<float> const& got, std::vector<double> const& expected) {
+  double error = 0, norm = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    error += (got[i] - expected[i]) * (got[i] - expected[i]);
+    norm += expected[i] * expected[i];
+  }
+  return error == 0 ? 0 : std::sqrt(error / norm);
+}
+
+inline std::vector<float> random_gradient(number_source& random, gart::camera const& view) {
+  std::vector<float> g(std::size_t{3} * view.width * view.height);
+  for (float& x : g) x = static_cast<float>(random.uniform(-1, 1));
+  return g;
+}
 
 }  // namespace gart_test

@@ -9,7 +9,9 @@
 
 #include <chrono>
 #include <cstring>
+#include <fstream>
 #include <new>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -93,8 +95,12 @@ class host_memory {
     open_.pop_back();
   }
 
-  /// Bytes that the system can still give; 0: not known.
+  /// Bytes that the system can still give, with those of files' caches, which it drops when asked; 0: not known.
   static std::size_t free_bytes() {
+    std::ifstream info("/proc/meminfo");
+    std::string key;
+    for (std::size_t kilobytes = 0; info >> key >> kilobytes; info.ignore(256, '\n'))
+      if (key == "MemAvailable:") return 1024 * kilobytes;
     long const pages = sysconf(_SC_AVPHYS_PAGES), page = sysconf(_SC_PAGESIZE);
     return pages > 0 && page > 0 ? static_cast<std::size_t>(pages) * static_cast<std::size_t>(page) : 0;
   }

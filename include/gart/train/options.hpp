@@ -48,7 +48,8 @@ struct train_options {
   float initial_scale = 0;   ///< times the distance to the neighbours; 0 as above
   float ssim_weight = 0.2f;  ///< share of D-SSIM in the loss, the rest is L1
   bool exposure = false;     ///< learn an exposure of each training view (exposure/exposure.hpp)
-  /// Bytes of the LT buffer above which a step is done with less; 0: half of what is free when the trainer is made.
+  /// Bytes of the LT buffer above which a step is done with less; 0: half of what is free when the trainer is made,
+  /// and no limit where sums are to be in a fixed order.
   u64 lt_budget = 0;
   /// After each step parameters and Adam's moments are searched for what is not finite, and not_finite is thrown at the
   /// first (optim/finite.hpp).

@@ -36,7 +36,8 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
   if (options.check_finite) finite_.emplace(exec);
-  if (options.lt_budget == 0) options_.lt_budget = exec.free_bytes() / 2;
+  // Sums in a fixed order were asked for: no budget of our own takes them away.
+  if (options.lt_budget == 0 && !Strategy::ordered) options_.lt_budget = exec.free_bytes() / 2;
   if (options.exposure) exposures_.emplace(exec, data.train.size());
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);

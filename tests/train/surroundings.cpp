@@ -1,0 +1,69 @@
+// What a trainer takes from its surroundings where the options say nothing: the LT buffer's budget from the memory that
+// is free, and the rate of the bands from whether the capture has points.
+#include "capture.hpp"
+
+#include <gart/exec/serial.hpp>
+#include <gart/train/trainer.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+using namespace gart_test;
+
+namespace {
+
+// All but out of memory.
+struct poor_exec : gart::serial_exec {
+  static std::size_t free_bytes() { return 2; }
+};
+static_assert(gart::host_execution<poor_exec>);
+
+template <class Strategy, class E>
+std::string taken_by(E& exec, gart::dataset const& data, gart::u64 lt_budget) {
+  gart::train_options options;
+  options.lt_budget = lt_budget, options.densify = gart::densify_kind::none;
+  gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy> run(exec, options, data, cloud(5, 0.7f));
+  return run.step().backward;
+}
+
+// The farthest that a coefficient above the first band has moved in a few steps of a long run.
+float moved(gart::dataset const& data) {
+  gart::serial_exec exec;
+  gart::train_options options;
+  options.densify = gart::densify_kind::none, options.sh_every = 1;
+  gart::gaussian_model const start = cloud(5, 0.7f);
+  gart::trainer<gart::serial_exec, gart::scene_traits<1>, gart::tile_tracer<gart::serial_exec>,
+                gart::primitive_strategy>
+      run(exec, options, data, start);
+  for (int i = 0; i < 3; ++i) run.step();
+  gart::gaussian_model const model = run.model();
+  float most = 0;
+  for (std::size_t i = 0; i < model.sh.size(); ++i)
+    if (i % 12 >= 3) most = std::max(most, std::abs(model.sh[i] - start.sh[i]));
+  return most;
+}
+
+}  // namespace
+
+TEST_CASE("without a budget the LT buffer takes no more than half of what is free, but for sums in a fixed order") {
+  gart::serial_exec exec;
+  auto const data = capture(exec, 3);
+  CHECK(taken_by<gart::primitive_strategy>(exec, data, 0) == "primitive");
+  poor_exec poor;
+  CHECK(taken_by<gart::primitive_strategy>(poor, data, 0) == "pixel");
+  CHECK(taken_by<gart::primitive_strategy>(poor, data, gart::u64{1} << 40) == "primitive");
+  CHECK(taken_by<gart::deterministic_strategy>(poor, data, 0) == "deterministic");
+}
+
+TEST_CASE("bands move fast from a capture's points, and at a twentieth of that from random ones") {
+  gart::serial_exec exec;
+  auto data = capture(exec, 3);
+  data.extent = 1;
+  float const random = moved(data);
+  data.points.position = {0, 0, 0}, data.points.color = {9, 9, 9};
+  REQUIRE(data.points.size() == 1);
+  float const from_points = moved(data);
+  CHECK(random > 0);
+  CHECK(from_points / random == doctest::Approx(20).epsilon(0.2));
+}
