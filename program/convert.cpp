@@ -92,7 +92,7 @@ int run_convert(convert_arguments const& a) {
   if (!a.sh_bits.empty()) {
     auto const bits = numbers("--sh-bits", a.sh_bits);
     if (bits.size() != 2 || bits[0] < 1 || bits[0] > 8 || bits[1] < 1 || bits[1] > 8)
-      throw usage_error("--sh-bits: two numbers from 1 to 8 belong there, as in 5,4");
+      throw usage_error("--sh-bits: two numbers from 1 to 8 belong there, as in 5,5");
     packing.sh1_bits = static_cast<int>(bits[0]), packing.sh_bits = static_cast<int>(bits[1]);
   }
   prepare_file(a.out);
@@ -158,11 +158,11 @@ void add_convert(CLI::App& app, command& selected) {
       ->type_name("NUMBERS");
   convert
       ->add_option("--sh-bits", a->sh_bits,
-                   "SPZ: bits of a coefficient of degree 1, and of those above, 1 to 8\n(default: 5,4)")
+                   "SPZ: bits of a coefficient of degree 1, and of those above, 1 to 8\n(default: 5,5)")
       ->type_name("A,B");
   convert
       ->add_option("--palette", a->packing.palette,
-                   "SOG: rows of coefficients that all Gaussians share, to 65536\n(default: a sixteenth of their "
+                   "SOG: rows of coefficients that all Gaussians share, to 65536\n(default: a twelfth of their "
                    "number)")
       ->type_name("N")
       ->check(between(1, 65536));

@@ -72,7 +72,8 @@ u8 codebook::nearest(float value) const {
   return static_cast<u8>((value - *below <= *above - value ? below : above) - numbers_.begin());
 }
 
-palette shared_rows(std::vector<float> const& rows, std::size_t width, std::size_t count) {
+palette shared_rows(std::vector<float> const& rows, std::vector<float> const& weights, std::size_t width,
+                    std::size_t count) {
   palette p;
   p.width = width;
   std::size_t const n = width ? rows.size() / width : 0;
@@ -81,13 +82,16 @@ palette shared_rows(std::vector<float> const& rows, std::size_t width, std::size
   std::iota(order.begin(), order.end(), 0u);
   auto const measured = [&](std::size_t first, std::size_t last) {
     std::vector<double> sum(width), squares(width);
-    for (std::size_t i = first; i < last; ++i)
+    double size = 0;
+    for (std::size_t i = first; i < last; ++i) {
+      double const weight = static_cast<double>(weights[order[i]]);
+      size += weight;
       for (std::size_t c = 0; c < width; ++c) {
         double const v = static_cast<double>(rows[order[i] * width + c]);
-        sum[c] += v, squares[c] += v * v;
+        sum[c] += weight * v, squares[c] += weight * v * v;
       }
+    }
     row_set s{first, last, 0, 0, 0};
-    double const size = static_cast<double>(last - first);
     double widest = -1;
     for (std::size_t c = 0; c < width; ++c) {
       double const error = squares[c] - sum[c] * sum[c] / size;
@@ -122,8 +126,10 @@ palette shared_rows(std::vector<float> const& rows, std::size_t width, std::size
   auto const to_means = [&] {
     std::vector<double> sum(p.rows.size()), size(p.count());
     for (std::size_t i = 0; i < n; ++i) {
-      ++size[p.of[i]];
-      for (std::size_t c = 0; c < width; ++c) sum[p.of[i] * width + c] += static_cast<double>(rows[i * width + c]);
+      double const weight = static_cast<double>(weights[i]);
+      size[p.of[i]] += weight;
+      for (std::size_t c = 0; c < width; ++c)
+        sum[p.of[i] * width + c] += weight * static_cast<double>(rows[i * width + c]);
     }
     for (std::size_t k = 0; k < p.count(); ++k)
       for (std::size_t c = 0; size[k] > 0 && c < width; ++c)

@@ -27,9 +27,10 @@ struct palette {
   std::size_t count() const { return width ? rows.size() / width : 0; }
 };
 
-// `count` rows, or fewer, near the given ones [n][width]: the set with the largest squared error is halved at its mean,
-// along the column that varies most, until there are as many sets as rows; then, where that is a matter of seconds,
-// each row goes to the nearest mean and the means follow, a few times.
-palette shared_rows(std::vector<float> const& rows, std::size_t width, std::size_t count);
+// `count` rows, or fewer, near the given ones [n][width], nearer where the weight [n] is more: the set with the largest
+// squared error is halved at its mean, along the column that varies most, until there are as many sets as rows; then,
+// where that is a matter of seconds, each row goes to the nearest mean and the means follow, a few times.
+palette shared_rows(std::vector<float> const& rows, std::vector<float> const& weights, std::size_t width,
+                    std::size_t count);
 
 }  // namespace gart::io

@@ -20,7 +20,7 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr double root = 1.41421356237309504880;
-constexpr std::size_t palette_columns = 64, most_rows = 65536, gaussians_a_row = 16;
+constexpr std::size_t palette_columns = 64, most_rows = 65536, gaussians_a_row = 12;
 constexpr u8 first_tag = 252;  // of the largest component w; then x, y, z
 
 double squeezed(double x) { return x < 0 ? -std::log1p(-x) : std::log1p(x); }
@@ -117,8 +117,8 @@ class sog_reader {
     if (degree > 0) harmonics(meta["shN"], m, most);
     require_finite(name_, m);
     if (traits) {
-      for (auto const& [key, value] : meta.value("gart", json::object()).items())
-        (*traits)[key] = value.get<std::string>();
+      if (meta.contains("gart"))
+        for (auto const& [key, value] : meta["gart"].items()) (*traits)[key] = value.get<std::string>();
       if (meta.value("antialias", false)) traits->try_emplace("antialias", "");
     }
     return m;
@@ -224,6 +224,13 @@ class sog_writer {
     return {{"mins", mins}, {"maxs", maxs}, {"files", {put("means_l.webp", low), put("means_u.webp", high)}}};
   }
 
+  // What is hardly ever seen still has a hundredth of what hides all behind it.
+  std::vector<float> weights() const {
+    std::vector<float> all(m_.size());
+    for (std::size_t i = 0; i < m_.size(); ++i) all[i] = std::max(0.01f, opacity_byte(m_.opacity[i]) / 255.0f);
+    return all;
+  }
+
   json harmonics(splat_packing const& packing) {
     std::size_t const n = m_.size(), k = static_cast<std::size_t>(sh_coefficients(m_.sh_degree)), rest = k - 1;
     std::vector<float> rows;
@@ -231,7 +238,7 @@ class sog_writer {
     for (std::size_t i = 0; i < n; ++i) rows.insert(rows.end(), &m_.sh[3 * k * i] + 3, &m_.sh[3 * k * i] + 3 * k);
     std::size_t const usual = std::max(palette_columns, n / gaussians_a_row / palette_columns * palette_columns);
     std::size_t const count = std::min(packing.palette ? static_cast<std::size_t>(packing.palette) : usual, most_rows);
-    palette const p = shared_rows(rows, 3 * rest, count);
+    palette const p = shared_rows(rows, weights(), 3 * rest, count);
     codebook const value(p.rows);
     std::size_t const lines = std::max<std::size_t>(1, (p.count() + palette_columns - 1) / palette_columns);
     texture table(static_cast<int>(palette_columns * rest), static_cast<int>(lines)), labels = blank();
