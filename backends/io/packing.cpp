@@ -18,11 +18,11 @@ constexpr double sh_0 = 0.28209479177387814;
 // What half a turn about an axis does to each function of the basis: it changes its sign or leaves it, as any one
 // direction in no plane of symmetry shows.
 std::array<float, 16> signs_of_half_turn(int axis) {
-  vec3_of<double> d{0.48, 0.36, 0.8};
-  sh_basis<3, double> const before(d);
+  vec3 d(0.48f, 0.36f, 0.8f);
+  sh_basis<3> const before(d);
   for (int k = 0; k < 3; ++k)
     if (k != axis) d[k] = -d[k];
-  sh_basis<3, double> const after(d);
+  sh_basis<3> const after(d);
   std::array<float, 16> signs;
   for (std::size_t k = 0; k < signs.size(); ++k) signs[k] = before.y[k] * after.y[k] < 0 ? -1.0f : 1.0f;
   return signs;

@@ -3,7 +3,7 @@
 /// Spherical harmonics turned: the coefficients c' of the function that in direction R d has what those of c have in
 /// d, for any rotation R. A band of degree l goes to itself by a matrix of 2 l + 1 rows; an entry is the integral over
 /// the sphere of Y_j(d) Y_k(R^-1 d), taken by a quadrature that is exact for polynomials of degree 7, from the basis of
-/// math/sh.hpp itself. Making one takes a few thousand operations, applying it 249 at degree 3.
+/// math/sh.hpp itself, to its roundings. Making one takes a few thousand operations, applying it 249 at degree 3.
 
 #include <gart/math/glm.hpp>
 #include <gart/math/sh.hpp>
@@ -28,11 +28,12 @@ class sh_rotation {
       double const around = std::sqrt(1 - heights[z] * heights[z]);
       for (int a = 0; a < 8; ++a) {
         vec3d const d(around * std::cos(a * pi / 4), around * std::sin(a * pi / 4), heights[z]);
-        sh_basis<3, double> const here(d), there(back * d);
+        sh_basis<3> const here{vec3(d)}, there{vec3(back * d)};
         for (int l = 1; l <= 3; ++l)
           for (int j = 0; j <= 2 * l; ++j)
             for (int k = 0; k <= 2 * l; ++k)
-              band_[l][j][k] += weights[z] * pi / 4 * here.y[l * l + j] * there.y[l * l + k];
+              band_[l][j][k] += weights[z] * pi / 4 * static_cast<double>(here.y[l * l + j]) *
+                                static_cast<double>(there.y[l * l + k]);
       }
     }
   }
