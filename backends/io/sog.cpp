@@ -165,7 +165,7 @@ class sog_writer {
     height_ = std::max<std::size_t>(4, ((m.size() + width_ - 1) / width_ + 3) / 4 * 4);
     if (width_ > 16383)
       throw io_error(path.string(), "SOG has no room for " + std::to_string(m.size()) + " Gaussians, past 268 million",
-                     "keep fewer, with gart convert --prune or --crop");
+                     "keep fewer of them");
   }
 
   void write(splat_traits const& traits, splat_packing const& packing) {

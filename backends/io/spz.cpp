@@ -243,7 +243,7 @@ int fraction_bits(fs::path const& path, gaussian_model const& m) {
   while (bits >= 0 && std::ldexp(extent, bits) > 8388607.0) --bits;
   if (bits < 0)
     throw io_error(path.string(), "SPZ has no room for positions of " + std::to_string(extent) + ", past 8,388,607",
-                   "scale the model down with gart convert --transform");
+                   "scale the model down");
   return bits;
 }
 

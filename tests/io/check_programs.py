@@ -79,8 +79,10 @@ def compare(what, ours, theirs, turn):
             if abs(x - y) > 1e-5 * max(1, abs(x)):
                 sys.exit(f"{what}: Gaussian {i}, {name} is {g[name]} and {h[name]}")
         p, q = unit(g), unit(h)
-        sign = 1 if sum(x * y for x, y in zip(p, q)) > 0 else -1
-        if max(abs(x - sign * y) for x, y in zip(p, q)) > turn:
+        # Half a turn about an axis of its own leaves a Gaussian what it is.
+        w, x, y, z = q
+        same = ((w, x, y, z), (-x, w, z, -y), (-y, -z, w, x), (-z, y, -x, w))
+        if min(max(abs(u - sign * v) for u, v in zip(p, r)) for r in same for sign in (1, -1)) > turn:
             sys.exit(f"{what}: Gaussian {i} is turned by {p} and {q}")
     print(f"{what}: {len(a)} Gaussians, the same")
 
