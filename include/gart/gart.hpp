@@ -26,6 +26,7 @@
 #include <gart/runtime/presets.hpp>
 #include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
+#include <gart/scene/similarity.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
 #include <gart/train/trainer.hpp>
