@@ -1,0 +1,158 @@
+// Gradients of poses against central differences of the oracle's images, which is turned and shifted in double.
+#include <gart/pose/differentiate_pose.hpp>
+#include <oracle/oracle.hpp>
+#include <oracle/scenes.hpp>
+#include <support/policies.hpp>
+#include <support/trace_scene.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+using namespace gart_test;
+
+namespace {
+
+// A scene, the gradient of a loss by its image, zero where a difference crosses a step, and the loss's derivatives.
+struct expectation {
+  oracle::scene scene;
+  std::vector<float> weights;
+  double translation[3], rotation[3];
+};
+
+bool same_branches(oracle::pixel const& a, oracle::pixel const& b) {
+  return std::equal(a.list.begin(), a.list.end(), b.list.begin(), b.list.end(), [](auto const& x, auto const& y) {
+    return x.id == y.id && x.clamps == y.clamps && x.counted == y.counted;
+  });
+}
+
+expectation expect(oracle::scene s, std::mt19937_64& random) {
+  s.options.near = 1e-3f;  // what it cuts off is a step, and left out as steps are
+  expectation out{s, {}, {}, {}};
+  oracle::parameters const m(s.model);
+  double smallest = 1;
+  for (double l : m.log_scale) smallest = std::min(smallest, std::exp(l));
+  double const h = 2e-4 * smallest;
+  auto const render = [&](oracle::motion const& by) {
+    return oracle::render(m, s.view, s.options, s.active_degree, by);
+  };
+  auto const base = render({});
+  std::size_t const pixels = base.pixels.size();
+  std::vector<bool> usable(pixels, true);
+  std::vector<oracle::picture> moved;  // shifts, then turns; plus and minus, by h and 2 h
+  for (int k = 0; k < 6; ++k)
+    for (double const step : {h, -h, 2 * h, -2 * h}) {
+      oracle::motion by;
+      (k < 3 ? by.shift[k] : by.turn[k - 3]) = step;
+      moved.push_back(render(by));
+      for (std::size_t p = 0; p < pixels; ++p)
+        usable[p] = usable[p] && !base.pixels[p].edge && !base.pixels[p].kink &&
+                    same_branches(base.pixels[p], moved.back().pixels[p]);
+    }
+  REQUIRE(std::count(usable.begin(), usable.end(), true) > static_cast<long>(pixels / 2));
+  // Half the squared distance from the image of another pose has the difference for its gradient.
+  std::normal_distribution<double> normal(0, 0.05);
+  oracle::motion away;
+  for (int k = 0; k < 3; ++k) away.shift[k] = normal(random), away.turn[k] = normal(random);
+  auto const there = render(away);
+  for (std::size_t p = 0; p < pixels; ++p)
+    for (int c = 0; c < 3; ++c) {
+      double const difference = base.pixels[p].color[c] - there.pixels[p].color[c];
+      out.weights.push_back(usable[p] ? static_cast<float>(difference) : 0.0f);
+    }
+  for (int k = 0; k < 6; ++k) {
+    double sum = 0;
+    for (std::size_t p = 0; p < pixels; ++p)
+      for (int c = 0; c < 3; ++c) {
+        auto const at = [&](int step) { return moved[static_cast<std::size_t>(4 * k + step)].pixels[p].color[c]; };
+        sum += double{out.weights[3 * p + c]} * (8 * (at(0) - at(1)) - (at(2) - at(3))) / (12 * h);
+      }
+    (k < 3 ? out.translation[k] : out.rotation[k - 3]) = sum;
+  }
+  return out;
+}
+
+double relative(gart::vec3d const& got, double const (&expected)[3]) {
+  double error = 0, norm = 0;
+  for (int k = 0; k < 3; ++k)
+    error += (got[k] - expected[k]) * (got[k] - expected[k]), norm += expected[k] * expected[k];
+  REQUIRE(norm > 0);
+  return std::isfinite(error) ? std::sqrt(error / norm) : HUGE_VAL;
+}
+
+template <int Degree, class Strategy, class Tracer, class E>
+gart::pose_gradient pose_by(E& exec, expectation const& e) {
+  auto const& s = e.scene;
+  using frame_type = frame_by<Degree, Tracer, E>;
+  gart::gaussians<E> const scene(exec, s.model);
+  gart::gaussians<E> gradients(exec, scene.size(), Degree);
+  frame_type frame(exec);
+  gart::backward_pass<frame_type, Strategy> pass(exec);
+  gart::buffer<float, E> color(exec, e.weights.size()), weights(exec, e.weights);
+  frame.prepare(scene.view(), s.view, s.options, s.active_degree);
+  REQUIRE(pass.prepare(frame));
+  pass.render(frame, {color.data()});
+  gart::differentiate(frame, pass, weights, gradients);
+  return gart::differentiate_pose(frame, std::as_const(gradients).view());
+}
+
+template <class E, class F>
+void by_all(expectation const& e, F const& check) {
+  E exec;
+  detail::with_degree(e.scene.model.sh_degree, [&](auto degree) {
+    auto const by = [&]<tracer_kind Kind, class Tracer>(std::integral_constant<tracer_kind, Kind>,
+                                                        std::type_identity<Tracer>) {
+      gart::strategies::for_each([&]<class Strategy>(Strategy) {
+        if constexpr (compiled_for<Strategy>(Kind, degree)) {
+          CAPTURE(std::string(Strategy::name));
+          check(pose_by<degree, Strategy, Tracer>(exec, e));
+        }
+      });
+    };
+    by(std::integral_constant<tracer_kind, tracer_kind::bvh>{}, std::type_identity<gart::bvh_tracer<E>>{});
+    by(std::integral_constant<tracer_kind, tracer_kind::tiles>{}, std::type_identity<gart::tile_tracer<E>>{});
+  });
+}
+
+std::vector<expectation> const& expectations() {
+  static std::vector<expectation> const all = [] {
+    std::vector<expectation> out;
+    std::mt19937_64 random(seed());
+    for (int degree = 0; degree <= 3; ++degree) {
+      oracle::scene s = oracle::smooth_scene(seed() + static_cast<std::uint64_t>(degree), degree, 2.0f);
+      out.push_back(expect(s, random));
+      s.options.antialias = 0.7f;
+      s.name = "smooth, through the filter of the pixels";
+      out.push_back(expect(s, random));
+    }
+    oracle::scene low = oracle::smooth_scene(seed(), 3, 8.0f);
+    low.name = "smooth, the first two bands", low.active_degree = 1;
+    out.push_back(expect(low, random));
+    low.view.lens = {}, low.name = "smooth, a pinhole";
+    out.push_back(expect(low, random));
+    return out;
+  }();
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("gradients of poses agree with differences of the oracle's images", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  double worst = 0;
+  for (expectation const& e : expectations()) {
+    CAPTURE(e.scene.name);
+    CAPTURE(e.scene.model.sh_degree);
+    by_all<E>(e, [&](gart::pose_gradient const& got) {
+      double const t = relative(got.translation, e.translation), r = relative(got.rotation, e.rotation);
+      worst = std::max({worst, t, r});
+      CHECK(t <= 1e-5);
+      CHECK(r <= 1e-5);
+    });
+  }
+  MESSAGE("worst relative error " << worst);
+}
