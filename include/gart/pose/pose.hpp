@@ -5,12 +5,14 @@
 /// t in a unit of length, of a training the scene's extent, and w in radians; and the gradient of a function of the
 /// image by a pose, in world axes. In double: a step of a training may move a pose by less than a float tells.
 
+#include <gart/core/isa.hpp>
 #include <gart/core/types.hpp>
 #include <gart/math/glm.hpp>
 #include <gart/scene/camera.hpp>
 
 #include <array>
 #include <cmath>
+#include <vector>
 
 namespace gart {
 
@@ -18,7 +20,7 @@ namespace gart {
 struct pose_gradient {
   static constexpr int floats = 6;  ///< numbers
   vec3d translation{0.0};           ///< by the position, in world units
-  vec3d rotation{0.0};              ///< by a small turn w of the camera about its position: a direction d becomes d + w x d
+  vec3d rotation{0.0};  ///< by a small turn w of the camera about its position: a direction d becomes d + w x d
 
   ///@{
   /// Zero, or from six numbers in this order.
@@ -29,6 +31,18 @@ struct pose_gradient {
 
 /// Six numbers of a pose: t, then w.
 using pose_numbers = std::array<double, 6>;
+
+/// The poses of all training views as they are learned, and Adam's moments of them, as a checkpoint holds them.
+struct pose_state {
+  std::vector<double> value;          ///< [views][6]: what `moved` is given; empty: no poses are learned
+  std::vector<double> first, second;  ///< [views][6]: in the numbers of the metric
+  std::vector<double> metric;         ///< [views][6][6] (pose/pose_metric.hpp), zeros before the first visit
+  std::vector<u32> visits;            ///< [views] steps that moved the view
+};
+
+}  // namespace gart
+
+namespace gart::inline GART_ISA {
 
 /// exp([w]x), the turn by |w| about w.
 inline mat3d turn_of(vec3d const& w) {
@@ -97,4 +111,4 @@ inline pose_numbers pull_back(camera const& from, pose_numbers const& at, double
   return {t.x, t.y, t.z, r.x, r.y, r.z};
 }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
