@@ -91,9 +91,7 @@ TEST_CASE("gradients by a pose's numbers are those of the function, at any dista
     gart::vec3d const t = some(random, size), w = some(random, size), point = some(random, 1), along = some(random, 1);
     gart::pose_numbers const at{t.x, t.y, t.z, w.x, w.y, w.z};
     // f = along . R R_at^T point + along . position, whose gradient by a turn is R_at^T point x along where it stands.
-    auto const axes = [&](gart::pose_numbers const& x) {
-      return gart::axes_of(c) * gart::turn_of({x[3], x[4], x[5]});
-    };
+    auto const axes = [&](gart::pose_numbers const& x) { return gart::axes_of(c) * gart::turn_of({x[3], x[4], x[5]}); };
     gart::mat3d const back = glm::transpose(axes(at));
     auto const f = [&](gart::pose_numbers const& x) {
       gart::vec3d const position = c.position + gart::axes_of(c) * gart::vec3d(x[0], x[1], x[2]) * 1.7;

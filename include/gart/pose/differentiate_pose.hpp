@@ -159,7 +159,8 @@ class pose_differentiation {
   void operator()(Frame const& frame, gaussians_view<float const> gradients, span<float> out) {
     gaussians_view<float const> const scene = frame.scene();
     if (gradients.count != scene.count || gradients.sh_degree != scene.sh_degree)
-      throw invalid_argument("differentiate_pose: the gradients must have the number and the SH degree of the Gaussians");
+      throw invalid_argument(
+          "differentiate_pose: the gradients must have the number and the SH degree of the Gaussians");
     if (out.size() < pose_gradient::floats)
       throw invalid_argument("differentiate_pose: the gradient of a pose has six numbers");
     using kernel = pose_kernels::sum_gaussians<Frame::sh_degree>;
