@@ -6,6 +6,7 @@
 /// the derivative of a function of colours by w needs what its gradient by the coefficients holds already:
 ///   dL/dw_a = sum_kl c_k G^a_kl dL/dc_l,   since dL/dc_l is a sum of Y_l over the hits.
 
+#include <gart/core/macros.hpp>
 #include <gart/math/glm.hpp>
 
 namespace gart::inline GART_ISA {
