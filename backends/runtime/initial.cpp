@@ -105,8 +105,10 @@ gaussian_model model_from_points(point_cloud const& points, int sh_degree, float
     for (int a = 0; a < 3; ++a) m.log_scale[3 * i + a] = s;
     m.quaternion[4 * i] = 1;
     m.opacity[i] = std::log(o / (1 - o));
+    // Black is a little more than none: a channel at the clamp has no gradient and would stay there.
     for (int c = 0; c < 3; ++c)
-      m.sh[stride * i + c] = (static_cast<float>(points.color[3 * i + c]) / 255.0f - 0.5f) / sh_constant;
+      m.sh[stride * i + c] =
+          (std::max(static_cast<float>(points.color[3 * i + c]), 0.5f) / 255.0f - 0.5f) / sh_constant;
   }
   return m;
 }

@@ -68,6 +68,18 @@ TEST_CASE("starting points in one place are found in time, and make Gaussians of
   for (float const s : m.log_scale) REQUIRE(s == doctest::Approx(0.5 * std::log(1e-7)));
 }
 
+TEST_CASE("black points start where their colour has a gradient") {
+  gart::point_cloud points;
+  points.position = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  points.color = {0, 0, 0, 0, 255, 1, 0, 0, 0, 7, 0, 9};
+  gart::gaussian_model const m = gart::model_from_points(points, 0, 0.1f, 1.0f);
+  for (std::size_t i = 0; i < m.sh.size(); ++i) {
+    double const shown = 0.5 + 0.28209479177387814 * static_cast<double>(m.sh[i]);
+    CHECK(shown > 1e-3);
+    CHECK(shown == doctest::Approx(points.color[i] / 255.0).epsilon(0.0021));
+  }
+}
+
 TEST_CASE("nothing is stored in less than 32 bits but the place of boxes") {
   using namespace gart;
   static_assert(std::is_same_v<decltype(gaussian_model::mean)::value_type, float>);

@@ -1,7 +1,8 @@
 #pragma once
 /// \file
 /// Where training starts: a model from points (log-scale = ln sqrt(max(mean squared distance to the 3 nearest
-/// neighbours, least_distance^2)), identity rotation, colour in the constant band), or from points at random in a box.
+/// neighbours, least_distance^2)), identity rotation, colour in the constant band, no channel under half a step of 8
+/// bits, where it would have no gradient), or from points at random in a box.
 
 #include <gart/io/dataset.hpp>
 #include <gart/scene/gaussians.hpp>
