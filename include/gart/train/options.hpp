@@ -47,7 +47,10 @@ struct train_options {
   float initial_opacity = 0;
   float initial_scale = 0;   ///< times the distance to the neighbours; 0 as above
   float ssim_weight = 0.2f;  ///< share of D-SSIM in the loss, the rest is L1
-  bool exposure = false;     ///< learn an exposure of each training view (exposure/exposure.hpp)
+  /// Of the depth's loss beside the colours', in units of the scene's extent (loss/depth_loss.hpp); 0: depth is not
+  /// looked at. The dataset must have maps (dataset_options.depth).
+  float depth_weight = 0;
+  bool exposure = false;  ///< learn an exposure of each training view (exposure/exposure.hpp)
   /// Bytes of the LT buffer above which a step is done with less; 0: half of what is free when the trainer is made,
   /// and no limit where sums are to be in a fixed order.
   u64 lt_budget = 0;

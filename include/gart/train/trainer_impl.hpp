@@ -32,9 +32,16 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       color_(exec),
       color_gradient_(exec),
       value_(exec, 2),
+      depth_(exec, data, options.depth_weight),
       started_with_(static_cast<index_t>(start.size())) {
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
+  if (options.depth_weight > 0) {
+    bool mapped = false;
+    for (dataset_view const& v : data.train) mapped = mapped || !v.depth.empty();
+    if (!mapped)
+      throw invalid_argument("train_options.depth_weight: no training view has a depth map (dataset_options.depth)");
+  }
   if (options.check_finite) finite_.emplace(exec);
   // Sums in a fixed order were asked for: no budget of our own takes them away.
   if (options.lt_budget == 0 && !Strategy::ordered) options_.lt_budget = exec.free_bytes() / 2;
@@ -91,6 +98,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   report.backward = used;
   std::vector<float> const value = value_.to_host();
   report.loss = value[0];
+  if constexpr (has_depth<Strategy>) report.loss += depth_.value();
   report.psnr = value[1] > 0 ? -10.0f * std::log10(value[1]) : 99.0f;
   return report;
 }
@@ -102,16 +110,22 @@ void trainer<E, Traits, Tracer, Strategy>::differentiate_by(Pass& pass, Loss&& l
   dataset_view const& view = data_.train[index];
   image_targets targets;
   targets.color = color_.data();
+  if constexpr (has_depth<Strategy>) depth_.begin(targets, color_.size() / 3);
   pass.render(frame_, targets);
   {
     stage_scope stage(exec_, "loss");
     span<float const> const image = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
     truth_view const truth = images_.get(exec_, index, frame_.options().background);
-    loss(loss_input<E>{exec_, view, truth, view.view.width, view.view.height, image, color_gradient_, value_});
+    depth_pixels depth;
+    if constexpr (has_depth<Strategy>) depth_.evaluate(index, truth), depth = depth_.pixels();
+    loss(loss_input<E>{exec_, view, truth, view.view.width, view.view.height, image, color_gradient_, value_, depth});
     if (grows_by_error()) error_map(exec_, image, truth, error_map_);
     if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }
-  differentiate(frame_, pass, color_gradient_, gradients_, error_map_);
+  if constexpr (has_depth<Strategy>)
+    differentiate(frame_, pass, depth_.gradients(color_gradient_), gradients_, error_map_);
+  else
+    differentiate(frame_, pass, color_gradient_, gradients_, error_map_);
 }
 
 // The optimizer's step and what grows, moves and prunes the Gaussians.
