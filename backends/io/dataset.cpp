@@ -356,7 +356,7 @@ std::vector<dataset_view> load_views(capture& c, dataset_options const& options,
 dataset load(fs::path const& path, dataset_options const& options) {
   if (options.downscale < 1) throw invalid_argument("dataset_options.downscale must be at least 1");
   if (options.test_every < 0) throw invalid_argument("dataset_options.test_every must be 0 (no test views) or more");
-  if (!(options.depth.unit >= 0)) throw invalid_argument("dataset_options.depth.unit must not be negative");
+  if (!(options.depth.unit >= 0)) throw invalid_argument("dataset_options.depth: its unit must not be negative");
   capture c = read_capture(path);
   drop_frames_without_photo(c, options.load_images);
   dataset data;
