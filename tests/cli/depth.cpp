@@ -3,6 +3,7 @@
 
 #include <render_images.hpp>
 
+#include <gart/camera/models.hpp>
 #include <gart/io/depth_file.hpp>
 
 #include <support/policies.hpp>
