@@ -45,6 +45,11 @@ class depth_supervision {
   depth_pixels pixels() { return {depth_, transmittance_, by_depth_, by_transmittance_}; }
   /// With the gradient of the colour.
   image_gradients gradients(span<float const> color) const { return {color, by_depth_, by_transmittance_}; }
+  ///@{
+  /// Of the image of the step, [H][W], in host memory.
+  std::vector<float> depth() const { return depth_.to_host(); }
+  std::vector<float> transmittance() const { return transmittance_.to_host(); }
+  ///@}
   /// The loss of the step.
   float value() const { return value_.to_host()[0]; }
 
