@@ -10,18 +10,21 @@ struct backward_frame {
   gart_bench::frame<E, By> frame;
   gart::backward_pass<typename gart_bench::frame<E, By>::traced_type, Strategy> pass;
   gart::gaussians<E> gradients;
-  gart::buffer<float, E> color, color_gradient;
+  gart::buffer<float, E> color, color_gradient, depth, depth_gradient;
 
   explicit backward_frame(E& exec)
       : frame(exec),
         pass(exec),
         gradients(exec, frame.gaussians.size(), gart_bench::sh_degree),
         color(exec, 3 * frame.pixels()),
-        color_gradient(exec, gart_bench::noise(3 * frame.pixels(), 1e-6f)) {
+        color_gradient(exec, gart_bench::noise(3 * frame.pixels(), 1e-6f)),
+        depth(exec, of_depth ? frame.pixels() : 0),
+        depth_gradient(exec, gart_bench::noise(of_depth ? frame.pixels() : 0, 1e-6f)) {
     frame.prepare();
     prepare();
-    pass.render(frame.traced, {color.data()});
+    pass.render(frame.traced, {.color = color.data(), .depth = of_depth ? depth.data() : nullptr});
   }
+  static constexpr bool of_depth = gart::has_depth<Strategy>;
   void prepare() {
     if (!pass.prepare(frame.traced)) throw pass.no_room();
   }
@@ -30,7 +33,9 @@ struct backward_frame {
 template <class By, class Strategy, gart::execution E>
 void backward(benchmark::State& state, E& exec) {
   backward_frame<E, By, Strategy> f(exec);
-  gart_bench::measure(state, exec, [&] { gart::differentiate(f.frame.traced, f.pass, f.color_gradient, f.gradients); });
+  gart_bench::measure(state, exec, [&] {
+    gart::differentiate(f.frame.traced, f.pass, {f.color_gradient, f.depth_gradient}, f.gradients);
+  });
   state.counters["lt_bytes"] = static_cast<double>(f.pass.lt_bytes());
 }
 
@@ -65,6 +70,7 @@ bool const added = [] {
 }  // namespace
 
 GART_BENCH("backward/tiles/primitive/4", backward<by_tiles<4>, gart::primitive_strategy>)
+GART_BENCH("backward/tiles/primitive_depth/8", backward<by_tiles<8>, gart::with_depth<gart::primitive_strategy>>)
 GART_BENCH("backward/tiles/primitive/16", backward<by_tiles<16>, gart::primitive_strategy>)
 GART_BENCH("prepare/bvh/primitive/8", prepare<by_bvh, gart::primitive_strategy>)
 GART_BENCH("prepare/tiles/primitive/8", prepare<by_tiles<8>, gart::primitive_strategy>)

@@ -24,3 +24,5 @@ GART_BENCH("forward/bvh/record_lt", forward<gart_bench::by_bvh, gart::primitive_
 GART_BENCH("forward/tiles/record_none", forward<gart_bench::by_tiles<8>, gart::pixel_strategy>)
 GART_BENCH("forward/tiles/record_w", forward<gart_bench::by_tiles<8>, gart::hybrid_strategy>)
 GART_BENCH("forward/tiles/record_lt", forward<gart_bench::by_tiles<8>, gart::primitive_strategy>)
+GART_BENCH("forward/tiles/record_lt_depth",
+           forward<gart_bench::by_tiles<8>, gart::with_depth<gart::primitive_strategy>>)

@@ -10,11 +10,14 @@ namespace {
 template <int ShDegree, class Response, class Entry>
 using forward_kernel = walk_tile_warps<Response, 8, composite<ShDegree, record_lt<Entry, 8>>>;
 
-template <int ShDegree, class Response, class Entry, gather_sums Sums>
+template <int ShDegree, class Response, class Entry>
+using forward_depth_kernel = walk_tile_warps<Response, 8, composite<ShDegree, record_with_depth<record_lt<Entry, 8>>>>;
+
+template <int ShDegree, class Response, class Entry, gather_sums Sums, class Terms>
 struct gather_row {
   using policy = cuda_exec;
   using response = Response;
-  using terms = gart::terms<color, geometry>;
+  using terms = Terms;
   using entry = Entry;
   static constexpr int sh_degree = ShDegree, tile_size = 8;
   static constexpr gather_sums sums = Sums;
@@ -22,8 +25,13 @@ struct gather_row {
   static constexpr kernel_form form = kernel_form::warp;
 };
 
-template <int ShDegree, class Response, class Entry, gather_sums Sums = gather_sums::atomic>
-using backward_kernel = gather_of<gather_row<ShDegree, Response, Entry, Sums>>;
+template <int ShDegree, class Response, class Entry, gather_sums Sums = gather_sums::atomic,
+          class Terms = terms<color, geometry>>
+using backward_kernel = gather_of<gather_row<ShDegree, Response, Entry, Sums, Terms>>;
+
+template <int ShDegree, class Response, class Entry>
+using backward_depth_kernel =
+    backward_kernel<ShDegree, Response, Entry, gather_sums::atomic, terms<color, geometry>::with_depth>;
 
 }  // namespace
 
@@ -31,6 +39,11 @@ using backward_kernel = gather_of<gather_row<ShDegree, Response, Entry, Sums>>;
   template __global__ void detail::run_tile_kernel<forward_kernel<__VA_ARGS__>>(forward_kernel<__VA_ARGS__> const);
 #define BACKWARD(...) \
   template __global__ void detail::run_tile_kernel<backward_kernel<__VA_ARGS__>>(backward_kernel<__VA_ARGS__> const);
+#define DEPTH(...)                                                                      \
+  template __global__ void detail::run_tile_kernel<forward_depth_kernel<__VA_ARGS__>>(  \
+      forward_depth_kernel<__VA_ARGS__> const);                                         \
+  template __global__ void detail::run_tile_kernel<backward_depth_kernel<__VA_ARGS__>>( \
+      backward_depth_kernel<__VA_ARGS__> const);
 #define ROW(degree, response, entry) \
   FORWARD(degree, response, entry)   \
   BACKWARD(degree, response, entry)
@@ -51,3 +64,5 @@ ROW(3, fast, lt_entry)
 ROW(3, plain, lt_half_entry)
 ROW(3, plain, lt_shared_entry)
 BACKWARD(3, plain, lt_entry, gather_sums::ordered)
+DEPTH(0, plain, lt_entry)
+DEPTH(3, plain, lt_entry)

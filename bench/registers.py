@@ -44,7 +44,7 @@ for name, (stack, stores, loads, registers) in zip(plain, figures):
     ordered = "(gart::gather_sums)1" in name
     row = (f"SH {sh}" + (f", kernel degree {response.group(1)}" if response.group(1) != "2" else "") +
            (", fast" if response.group(2) == "1" else "") +
-           (f", LT {entry}" if entry in ("half", "shared") else "") + (", ordered" if ordered else ""))
+           (f", LT {entry}" if entry in ("half", "shared") else "") + (", ordered" if ordered else "") + (", depth" if "depth" in name else ""))
     kernel = "forward" if "walk_tile_warps" in name else "gather"
     rows.setdefault(row, {})[kernel] = {"registers": int(registers), "stack": int(stack),
                                         "spilled": int(stores) + int(loads)}

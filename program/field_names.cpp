@@ -21,6 +21,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(train_options, initial_opacity), "--init-opacity"},
       {GART_CLI_FIELD(train_options, initial_scale), "--init-scale"},
       {GART_CLI_FIELD(train_options, exposure), "--exposure"},
+      {GART_CLI_FIELD(train_options, depth_weight), "--depth-weight"},
       {GART_CLI_FIELD(train_options, refine_poses), "--refine-poses"},
       {GART_CLI_FIELD(train_options, lt_budget), "--lt-budget"},
       {GART_CLI_FIELD(train_options, check_finite), "--check-finite"},
@@ -34,6 +35,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(render_options, background), "--background"},
       {GART_CLI_FIELD(dataset_options, downscale), "--downscale"},
       {GART_CLI_FIELD(dataset_options, test_every), "--test-every"},
+      {GART_CLI_FIELD(dataset_options, depth), "--depth-weight"},
       {GART_CLI_FIELD(configuration_request, backend), "--backend"},
       {GART_CLI_FIELD(configuration_request, tracer), "--tracer"},
       {GART_CLI_FIELD(configuration_request, backward), "--backward"},
@@ -43,6 +45,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(configuration_request, lt_format), "--lt-format"},
       {GART_CLI_FIELD(configuration_request, tile_size), "--tile-size"},
       {GART_CLI_FIELD(configuration_request, window), "--window"},
+      {GART_CLI_FIELD(configuration_request, depth), "--depth-weight"},
   };
   return names;
 }

@@ -2,6 +2,7 @@
 #include "options.hpp"
 #include "output.hpp"
 #include "progress.hpp"
+#include "render_images.hpp"
 #include "samples.hpp"
 
 #include <gart/io/dataset.hpp>
@@ -28,37 +29,16 @@ struct render_arguments {
   int downscale = 1, samples = 1;
   float alpha_min = -1, t_min = -1;
   int max_hits = -1;
+  image_choice images;
   bool depth = false, quiet = false;
 };
 
-struct depth_picture {
-  gart::image8 image;
-  float nearest = 0, farthest = 0;
-};
-
-// The mean distance of what a pixel sees, nearest white and farthest dark; black where it sees less than half.
-depth_picture picture_depth(gart::rendered const& r) {
-  depth_picture result;
-  result.image = gart::image8(r.depth.width, r.depth.height, 1);
-  float nearest = std::numeric_limits<float>::max(), farthest = 0;
-  std::vector<float> mean(r.depth.data.size(), -1.0f);
-  for (std::size_t p = 0; p < mean.size(); ++p) {
-    float const seen = 1 - r.transmittance.data[p];
-    if (seen < 0.5f) continue;
-    mean[p] = r.depth.data[p] / seen;
-    nearest = std::min(nearest, mean[p]), farthest = std::max(farthest, mean[p]);
-  }
-  if (farthest == 0) return result;
-  float const range = std::max(farthest - nearest, 1e-6f * farthest);
-  for (std::size_t p = 0; p < mean.size(); ++p) {
-    if (mean[p] >= 0)
-      result.image.data[p] = static_cast<gart::u8>(std::lround(255 - 215 * (mean[p] - nearest) / range));
-  }
-  result.nearest = nearest, result.farthest = farthest;
-  return result;
-}
-
 int run_render(render_arguments const& a) {
+  image_choice images = a.images;
+  if (a.depth && !images.has("depth")) images.images += ",depth";
+  check_images(images);
+  if (images.has("hits") && a.samples > 1)
+    throw usage_error("--images hits: a mean over --samples counts no hits (leave one of them out)");
   gart::model_file file = gart::load_model(a.model);
   auto cameras = gart::load_cameras(a.cameras);
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
@@ -95,13 +75,9 @@ int run_render(render_arguments const& a) {
     if (!exposures.empty()) apply(exposures.at(view), image.color);
     double const ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     total += ms;
-    gart::write_png(a.out / (name + ".png"), gart::to_8bit(image.color));
+    if (images.has("colour")) gart::write_png(a.out / (name + ".png"), gart::to_8bit(image.color));
     nlohmann::json entry = {{"name", name}, {"width", view.width}, {"height", view.height}, {"milliseconds", ms}};
-    if (a.depth) {
-      auto const depth = picture_depth(image);
-      gart::write_png(a.out / (name + "_depth.png"), depth.image);
-      entry["depth_nearest"] = depth.nearest, entry["depth_farthest"] = depth.farthest;
-    }
+    write_images(a.out, name, image, view, images, entry);
     timings["views"].push_back(entry);
     double const share = static_cast<double>(i + 1) / static_cast<double>(cameras.size());
     say.state("rendered " + std::to_string(i + 1) + "/" + std::to_string(cameras.size()) + "  " + fixed(ms, 1) + " ms",
@@ -165,7 +141,23 @@ void add_render(CLI::App& app, command& selected) {
       ->type_name("T")
       ->check(between(0, 0.99));
   add_max_hits(*render, a->max_hits);
-  render->add_flag("--depth", a->depth, "Also the depth of each view, nearest white, as NAME_depth.png");
+  render
+      ->add_option("--images", a->images.images,
+                   "Which images, by commas: colour (NAME.png), depth (mean distance\nalong the ray, 0 where less than "
+                   "half is seen), normal (of the\ndepth, in the world's axes, (n + 1) / 2), alpha, hits (Gaussians "
+                   "met):\nNAME_depth.png and so on; depth and hits of 16 bits, with a\nNAME_depth_preview.png in "
+                   "colours")
+      ->type_name("LIST")
+      ->capture_default_str();
+  render->add_option("--format", a->images.format, "Of all but colour: png, or npy (float32 as they are)")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(one_of({"png", "npy"}));
+  render->add_option("--depth-unit", a->images.depth_unit, "Distance of a step of NAME_depth.png")
+      ->type_name("U")
+      ->capture_default_str()
+      ->check(between(1e-9, 1e9));
+  render->add_flag("--depth", a->depth, "The depth too: adds it to --images");
   render->add_option("--json", a->json, "Write timings of each view and stage in milliseconds")->type_name("FILE");
   render->add_flag("--quiet", a->quiet, "Say nothing but errors");
   add_configuration_options(*render, a->configuration);
@@ -173,7 +165,7 @@ void add_render(CLI::App& app, command& selected) {
       "\nWrites DIR/NAME.png for each camera, NAME as the dataset or file has it. The first view pays for the start.\n"
       "\nExamples:\n"
       "  gart render run/model.ply lego --out images --background white\n"
-      "  gart render scene.ply path.json --out frames --depth --json timings.json");
+      "  gart render scene.ply path.json --out frames --images colour,depth,normal --json timings.json");
   render->callback([a, &selected] { selected = [a] { return run_render(*a); }; });
 }
 

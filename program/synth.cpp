@@ -74,6 +74,9 @@ void add_synth(CLI::App& app, command& selected) {
       ->type_name("N")
       ->check(whole_number())
       ->capture_default_str();
+  synth->add_flag("--depth", options->depth,
+                  "Also a depth map of each view, r_N_depth.png: distances along\nthe rays, for gart train "
+                  "--depth-weight");
   synth->add_flag("--quiet", *quiet, "Print nothing but errors");
   synth->footer(
       "Writes DIR/transforms_train.json and DIR/transforms_test.json (Blender's layout), DIR/train/r_N.png and\n"

@@ -4,6 +4,7 @@
 #include "synth_trace.hpp"
 
 #include <gart/core/error.hpp>
+#include <gart/io/depth_file.hpp>
 #include <gart/io/file.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
@@ -19,8 +20,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double angle_x = 0.69;  // horizontal field of view, radians: NeRF-Synthetic's
-constexpr double distance = 3.7;  // the scene's bounding sphere just fits the view
+constexpr double angle_x = 0.69;     // horizontal field of view, radians: NeRF-Synthetic's
+constexpr double distance = 3.7;     // the scene's bounding sphere just fits the view
+constexpr double depth_step = 1e-4;  // of the maps: 65535 of them reach past the scene
 constexpr char mark[] = "\"generator\": \"gart synth\"";
 
 void check_range(char const* option, int value, synth_limits limits) {
@@ -55,13 +57,22 @@ void prepare_folder(fs::path const& out) {
   for (char const* split : {"train", "test"}) fs::remove(out / (std::string("transforms_") + split + ".json"), failed);
 }
 
-std::string transforms_json(std::vector<gart::camera> const& cameras, std::string const& split) {
+std::string transforms_json(std::vector<gart::camera> const& cameras, std::string const& split, bool depth) {
   char text[256];
-  std::snprintf(text, sizeof text, "{\n  %s,\n  \"camera_angle_x\": %.17g,\n  \"frames\": [", mark, angle_x);
+  std::snprintf(text, sizeof text, "{\n  %s,\n  \"camera_angle_x\": %.17g,\n", mark, angle_x);
   std::string json = text;
+  if (depth) {
+    std::snprintf(text, sizeof text, "  \"depth_kind\": \"distance\",\n  \"depth_unit_scale_factor\": %g,\n",
+                  depth_step);
+    json += text;
+  }
+  json += "  \"frames\": [";
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     json += i == 0 ? "\n" : ",\n";
-    json += "    {\"file_path\": \"./" + split + "/r_" + std::to_string(i) + "\", \"transform_matrix\": [";
+    std::string const file = "./" + split + "/r_" + std::to_string(i);
+    json += "    {\"file_path\": \"" + file + "\", ";
+    if (depth) json += "\"depth_file_path\": \"" + file + "_depth.png\", ";
+    json += "\"transform_matrix\": [";
     for (int row = 0; row < 3; ++row) {
       gart::mat3 const& r = cameras[i].rotation;
       // OpenGL's y and z are the negatives of OpenCV's.
@@ -116,14 +127,17 @@ void write_synth_capture(synth_options const& options, std::function<void(int do
     fs::path const folder = options.out / (cameras == &train ? "train" : "test");
     for (std::size_t i = 0; i < cameras->size(); ++i) {
       auto const image = renderer.render((*cameras)[i], options.samples, hash(options.seed, done));
-      gart::write_png(folder / ("r_" + std::to_string(i) + ".png"), image);
+      std::string const name = "r_" + std::to_string(i);
+      gart::write_png(folder / (name + ".png"), image);
+      if (options.depth)
+        gart::write_depth_png(folder / (name + "_depth.png"), renderer.distances((*cameras)[i]), depth_step);
       ++done;
       if (progress) progress(done, total);
     }
   }
   gart::write_point_ply(options.out / "points3d.ply", renderer.points(train, options.points, options.seed));
-  gart::write_file(options.out / "transforms_test.json", transforms_json(test, "test"));
-  gart::write_file(options.out / "transforms_train.json", transforms_json(train, "train"));
+  gart::write_file(options.out / "transforms_test.json", transforms_json(test, "test", options.depth));
+  gart::write_file(options.out / "transforms_train.json", transforms_json(train, "train", options.depth));
   std::error_code ignored;
   fs::remove(options.out / ".gart-synth", ignored);
 }

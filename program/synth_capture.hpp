@@ -2,6 +2,7 @@
 // What `gart synth` writes: a capture in the layout of NeRF-Synthetic (Blender).
 //   DIR/transforms_train.json, DIR/transforms_test.json   camera_angle_x; camera to world, OpenGL axes
 //   DIR/train/r_N.png, DIR/test/r_N.png                   RGBA, straight alpha
+//   DIR/train/r_N_depth.png and so on                     where asked for: distances along the rays, 16 bits
 //   DIR/points3d.ply                                      starting points on the surfaces, coloured
 // The transforms are written last, each file whole: a capture that was interrupted is not taken for one.
 
@@ -23,6 +24,7 @@ struct synth_options {
   int points = 10000;
   u64 seed = 1;
   int threads = 0;  // 0: all
+  bool depth = false;
 };
 
 struct synth_limits {

@@ -235,6 +235,20 @@ gart::image8 synth_renderer::render(gart::camera const& view, int samples, u64 s
   return image;
 }
 
+gart::image_float synth_renderer::distances(gart::camera const& view) const {
+  implementation const& tracer = *implementation_;
+  gart::image_float map(view.width, view.height, 1);
+  vec3 const origin(view.position);
+  tracer.for_each(view.height, [&](int y) {
+    for (int x = 0; x < view.width; ++x) {
+      synth_hit hit;
+      vec3 const direction = gart::ray_direction(view, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+      if (tracer.tracer.intersect(origin, direction, 0, hit)) map.at(x, y, 0) = hit.t;
+    }
+  });
+  return map;
+}
+
 gart::point_cloud synth_renderer::points(std::vector<gart::camera> const& cameras, std::size_t count, u64 seed) const {
   implementation const& tracer = *implementation_;
   struct triangle {

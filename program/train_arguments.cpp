@@ -127,6 +127,22 @@ void add_arguments(CLI::App& train, train_arguments& a) {
             "Keep each Nth view for testing, 0: none; for captures that do\nnot say themselves which are for testing"))
       ->check(between(0, 1e6));
 
+  in_group(r.add(train, "--depth-weight", a.depth_weight, "X",
+                 "Train by the capture's depth maps too: weight of their mean\nerror, in units of the scene's extent, "
+                 "beside the colours' loss;\n0: none. Maps are depths/NAME.png (16 bits) or NAME.npy\n(float32) beside "
+                 "images/, or what 'depth_file_path' of a\ntransforms.json names (docs/depth.md)"))
+      ->check(between(0, 1e6));
+  in_group(
+      r.add(train, "--depth-kind", a.depth_kind, "NAME",
+            "What the maps measure: z, along the camera's axis, or\ndistance, along the ray; auto: what the capture "
+            "says, else z"))
+      ->check(name_of_a<gart::depth_kind>());
+  in_group(
+      r.add(train, "--depth-unit", a.depth_unit, "U",
+            "Length of a step of the maps, in units of the cameras'\npositions; 0: what the capture says, else 0.001 "
+            "for a PNG and 1\nfor a .npy"))
+      ->check(between(0, 1e9));
+
   group = "Machine";
   in_group(r.add(train, "--backend", a.backend, "NAME",
                  "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is"))
@@ -230,6 +246,7 @@ gart::configuration_request configuration_request_of(train_arguments const& a) {
   wanted.arithmetic = gart::from_string<gart::arithmetic_kind>(a.arithmetic);
   wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
   wanted.tile_size = a.tile_size, wanted.window = a.window, wanted.threads = a.threads;
+  wanted.depth = a.depth_weight > 0;
   return wanted;
 }
 
@@ -242,6 +259,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.initial_opacity = a.initial_opacity;
   o.initial_scale = a.initial_scale;
   o.exposure = a.exposure == "on";
+  o.depth_weight = a.depth_weight;
   o.refine_poses = a.refine_poses;
   o.mcmc.noise *= a.mcmc_noise;
   o.mcmc.opacity_penalty *= a.mcmc_penalty, o.mcmc.scale_penalty *= a.mcmc_penalty;

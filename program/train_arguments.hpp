@@ -35,6 +35,9 @@ struct train_arguments {
   std::string sh_degree = "auto";
   float sh_gain = gart::usual_sh_gain;
   int downscale = 1, test_every = 8, eval_every = -1;
+  float depth_weight = defaults.depth_weight;
+  std::string depth_kind = "auto";
+  double depth_unit = 0;
   float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
   std::string exposure = "auto", adam = "all", set;
   float mcmc_noise = 1, mcmc_penalty = 1;

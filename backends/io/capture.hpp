@@ -13,9 +13,12 @@ namespace gart::io {
 enum class part { unassigned, train, test, left_out };
 
 struct frame {
-  std::string name;                         // as in the files: a relative path
-  std::filesystem::path photo;              // empty where the readers found none
-  std::filesystem::path mask;               // empty where the capture names none
+  std::string name;             // as in the files: a relative path
+  std::filesystem::path photo;  // empty where the readers found none
+  std::filesystem::path mask;   // empty where the capture names none
+  std::filesystem::path depth;  // empty where the capture names none
+  double depth_unit = 0;        // of its maps; 0: not said
+  depth_kind depth_is = depth_kind::automatic;
   camera view;                              // width 0: the files do not say, the photo's size decides
   double angle_x = 0, angle_y = 0;          // radians; 0: fx, fy are given
   bool center_x = false, center_y = false;  // cx, cy are the middle of the image

@@ -19,6 +19,9 @@ bool is_png(std::vector<u8> const& bytes);
 bool is_jpeg(std::vector<u8> const& bytes);
 
 image8 decode_png(std::vector<u8> const& bytes, std::string const& where);
+// One channel of 16 bits, for depth maps; any other kind is refused.
+basic_image<u16> decode_png16(std::vector<u8> const& bytes, std::string const& where);
+std::vector<u8> encode_png16(basic_image<u16> const& image);
 image8 decode_jpeg(std::vector<u8> const& bytes, std::string const& where);
 
 image_size png_size(std::vector<u8> const& bytes, std::string const& where);

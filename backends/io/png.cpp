@@ -92,19 +92,59 @@ bool decode(png_structp png, png_infop info, png_state& state, image8& image) {
   return true;
 }
 
-bool encode(png_structp png, png_infop info, png_state& state, image8 const& image) {
+// As decode, of one channel of 16 bits.
+bool decode16(png_structp png, png_infop info, png_state& state, basic_image<u16>& image) {
+  if (setjmp(png_jmpbuf(png))) return false;
+  png_set_read_fn(png, &state, pull);
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
+  png_read_info(png, info);
+  if (png_get_color_type(png, info) != PNG_COLOR_TYPE_GRAY || png_get_bit_depth(png, info) != 16)
+    png_error(png, "it is not one channel of 16 bits");
+  if (png_get_rowbytes(png, info) > (state.source->size() * 1040 + 4096) / png_get_image_height(png, info)) {
+    png_error(png, "the size in its header is larger than its data can hold");
+  }
+  png_set_swap(png);  // little-endian
+  int const passes = png_set_interlace_handling(png);
+  png_read_update_info(png, info);
+  image.width = static_cast<int>(png_get_image_width(png, info));
+  image.height = static_cast<int>(png_get_image_height(png, info));
+  image.channels = 1;
+  std::size_t const row = static_cast<std::size_t>(image.width);
+  image.data.resize(row * static_cast<std::size_t>(image.height));
+  for (int pass = 0; pass < passes; ++pass) {
+    for (int y = 0; y < image.height; ++y)
+      png_read_row(png, reinterpret_cast<png_bytep>(image.data.data() + row * static_cast<std::size_t>(y)), nullptr);
+  }
+  png_read_end(png, nullptr);
+  return true;
+}
+
+// bits: of a channel, whose rows follow each other at `data`; 16 are little-endian.
+bool encode(png_structp png, png_infop info, png_state& state, int width, int height, int channels, int bits,
+            u8 const* data) {
   if (setjmp(png_jmpbuf(png))) return false;
   png_set_write_fn(png, &state, push, flush);
-  int const kind = image.channels == 1   ? PNG_COLOR_TYPE_GRAY
-                   : image.channels == 3 ? PNG_COLOR_TYPE_RGB
-                                         : PNG_COLOR_TYPE_RGB_ALPHA;
-  png_set_IHDR(png, info, static_cast<png_uint_32>(image.width), static_cast<png_uint_32>(image.height), 8, kind,
+  int const kind = channels == 1 ? PNG_COLOR_TYPE_GRAY : channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_RGB_ALPHA;
+  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bits, kind,
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_write_info(png, info);
-  std::size_t const row = static_cast<std::size_t>(image.width) * image.channels;
-  for (int y = 0; y < image.height; ++y) png_write_row(png, image.data.data() + row * static_cast<std::size_t>(y));
+  if (bits == 16) png_set_swap(png);
+  std::size_t const row = static_cast<std::size_t>(width) * static_cast<std::size_t>(channels * bits / 8);
+  for (int y = 0; y < height; ++y) png_write_row(png, data + row * static_cast<std::size_t>(y));
   png_write_end(png, nullptr);
   return true;
+}
+
+std::vector<u8> encoded(int width, int height, int channels, int bits, u8 const* data) {
+  std::vector<u8> bytes;
+  png_state state;
+  state.sink = &bytes;
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &state, on_error, on_warning);
+  png_infop info = png ? png_create_info_struct(png) : nullptr;
+  bool const done = info && encode(png, info, state, width, height, channels, bits, data);
+  png_destroy_write_struct(&png, &info);
+  if (!done) throw error(std::string("libpng could not encode an image: ") + state.message);
+  return bytes;
 }
 
 }  // namespace
@@ -119,6 +159,21 @@ image8 decode_png(std::vector<u8> const& bytes, std::string const& where) {
   if (!reader.info || !decode(reader.png, reader.info, state, image))
     throw io_error(where, std::string("is not a readable PNG: ") + state.message, "replace the file");
   return image;
+}
+
+basic_image<u16> decode_png16(std::vector<u8> const& bytes, std::string const& where) {
+  png_state state;
+  state.source = &bytes;
+  basic_image<u16> image;
+  png_reader const reader(state);
+  if (!reader.info || !decode16(reader.png, reader.info, state, image))
+    throw io_error(where, std::string("is not a depth map in PNG: ") + state.message,
+                   "store one channel of 16 bits, 0 where nothing was measured");
+  return image;
+}
+
+std::vector<u8> encode_png16(basic_image<u16> const& image) {
+  return encoded(image.width, image.height, 1, 16, reinterpret_cast<u8 const*>(image.data.data()));
 }
 
 image_size png_size(std::vector<u8> const& bytes, std::string const& where) {
@@ -140,15 +195,7 @@ std::vector<u8> encode_png(image8 const& image) {
       image.data.size() != static_cast<std::size_t>(image.width) * image.height * image.channels) {
     throw invalid_argument("a PNG needs an image of 1, 3 or 4 channels that is not empty");
   }
-  std::vector<u8> bytes;
-  io::png_state state;
-  state.sink = &bytes;
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &state, io::on_error, io::on_warning);
-  png_infop info = png ? png_create_info_struct(png) : nullptr;
-  bool const done = info && io::encode(png, info, state, image);
-  png_destroy_write_struct(&png, &info);
-  if (!done) throw error(std::string("libpng could not encode an image: ") + state.message);
-  return bytes;
+  return io::encoded(image.width, image.height, image.channels, 8, image.data.data());
 }
 
 }  // namespace gart

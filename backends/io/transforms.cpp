@@ -159,6 +159,22 @@ void read_lens(record const& r, frame& f) {
   if (r.has("w")) f.set_size(r.size("w"), r.size("h"));
 }
 
+// Of a frame or the whole file: the map's file, the length of a step of it, and what it measures.
+void read_depth_fields(record const& r, fs::path const& folder, frame& f) {
+  if (r.own.contains("depth_file_path") && !r.own["depth_file_path"].is_null())
+    f.depth = from_text(folder, r.text("depth_file_path"));
+  if (r.has("depth_unit_scale_factor")) {
+    f.depth_unit = r.number("depth_unit_scale_factor");
+    if (!(f.depth_unit > 0))
+      throw io_error(r.where, "'depth_unit_scale_factor' is not positive", "write the length of a step of the maps");
+  }
+  if (r.has("depth_kind")) {
+    f.depth_is = from_string(r.text("depth_kind"), depth_kind::automatic);
+    if (f.depth_is == depth_kind::automatic)
+      throw io_error(r.where, "'depth_kind' is neither 'z' nor 'distance'", "write one of them");
+  }
+}
+
 std::set<std::string> name_list(record const& r, char const* key) {
   std::set<std::string> names;
   if (!r.has(key)) return names;
@@ -197,6 +213,7 @@ void read_frames(fs::path const& file, part role, capture& result) {
     f.role = role;
     if (own_split) f.role = train.count(path) ? part::train : test.count(path) ? part::test : part::left_out;
     if (r.own.contains("mask_path") && !r.own["mask_path"].is_null()) f.mask = from_text(folder, r.text("mask_path"));
+    read_depth_fields(r, folder, f);
     read_lens(r, f);
     read_pose(r, "transform_matrix", true, f.view);
     if (f.view.width) check_camera(f.view, r.where);

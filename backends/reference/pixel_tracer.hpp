@@ -163,8 +163,9 @@ class pixel_tracer {
   // Adds the gradient of one pixel; slots of `sums` are the places of Gaussians in `slot`.
   template <class Sums>
   void differentiate(std::vector<reference_hit> const& list, vec3d const& d, harmonics const& basis, vec3d const& g,
-                     Sums&& sums) const {
+                     double by_depth, Sums&& sums) const {
     vec3d behind(options_.background);
+    double depth_behind = 0;
     for (std::size_t i = list.size(); i-- > 0;) {
       reference_hit const& h = list[i];
       double* const to = sums(h.id);
@@ -173,8 +174,10 @@ class pixel_tracer {
         if (h.clamped >> c & 1) continue;
         for (std::size_t k = 0; k < active_; ++k) to[11 + 3 * k + c] += weight * g[c] * basis.y[k];
       }
-      double const by_alpha = h.transmittance * dot(g, h.color - behind);
+      double const by_alpha = h.transmittance * (dot(g, h.color - behind) + by_depth * (h.t - depth_behind));
       if (h.raw < opaque) add_geometry(bodies_[h.id], h, d, h.raw * by_alpha, to);
+      if (by_depth != 0) add_distance(bodies_[h.id], h, d, weight * by_depth, to);
+      depth_behind = h.alpha * h.t + (1 - h.alpha) * depth_behind;
       behind = h.alpha * h.color + (1 - h.alpha) * behind;
     }
   }
@@ -199,15 +202,29 @@ class pixel_tracer {
     vec3d const by_body = -b * h.p * g.inverse_scale;  // dL by R^T (t d - mean)
     vec3d const by_point = g.rotate(by_body), x = h.t * d - g.mean;
     for (int k = 0; k < 3; ++k) to[k] -= by_point[k], to[3 + k] += b * h.p[k] * h.p[k];
-    // x . R v with R v = v + 2 w u x v + 2 u x (u x v), by (w, u); then through the division by the norm.
-    vec3d const &u = g.axis, &v = by_body;
+    add_rotation(g, x, by_body, to);
+    to[10] += a * (1 - g.sigma);
+  }
+
+  // t = -o_g.d_g / d_g.d_g with o_g = S^-1 R^T (-mean) and d_g = S^-1 R^T d, by both. `a` is dL/dt.
+  void add_distance(body const& g, reference_hit const& h, vec3d const& d, double a, double* to) const {
+    vec3d const d_g = g.to_unit(d), moved = h.p + h.t * d_g;
+    double const e = -a / dot(d_g, d_g);
+    vec3d const by_origin = e * d_g * g.inverse_scale, by_direction = e * moved * g.inverse_scale;
+    vec3d const by_camera = g.rotate(by_origin);
+    for (int k = 0; k < 3; ++k) to[k] -= by_camera[k], to[3 + k] -= e * (g.origin[k] + moved[k]) * d_g[k];
+    add_rotation(g, -g.mean, by_origin, to), add_rotation(g, d, by_direction, to);
+  }
+
+  // x . R v with R v = v + 2 w u x v + 2 u x (u x v), by (w, u); then through the division by the norm.
+  static void add_rotation(body const& g, vec3d const& x, vec3d const& v, double* to) {
+    vec3d const& u = g.axis;
     double by_w = 2 * dot(x, cross(u, v));
     vec3d by_u = 2 * g.w * cross(v, x) + 2.0 * (x * dot(u, v) + v * dot(u, x) - 2.0 * u * dot(x, v));
     double const along = by_w * g.w + dot(by_u, u);
     by_w -= along * g.w, by_u -= along * u;
     to[6] += by_w / g.norm;
     for (int k = 0; k < 3; ++k) to[7 + k] += by_u[k] / g.norm;
-    to[10] += a * (1 - g.sigma);
   }
 
   gaussian_model const& model_;

@@ -221,13 +221,16 @@ std::vector<std::vector<u32>> blocks_of(camera const& view, std::vector<u32> con
 }
 
 void check(gaussian_model const& model, camera const& view, render_options const& options, int active_degree,
-           std::vector<u32> const& pixels, std::vector<double> const& color_gradient, int kernel_degree) {
+           std::vector<u32> const& pixels, std::vector<double> const& color_gradient, int kernel_degree,
+           std::vector<double> const& depth_gradient) {
   if (active_degree < 0 || active_degree > model.sh_degree || model.sh_degree > 3)
     throw invalid_argument("reference: the active SH degree must lie between 0 and the model's, and that be at most 3");
   if (kernel_degree < 1) throw invalid_argument("reference: the kernel's degree must be at least 1");
   if (!(options.alpha_min > 0)) throw invalid_argument("reference: alpha_min must be positive");
   if (!color_gradient.empty() && color_gradient.size() != 3 * pixels.size())
     throw invalid_argument("reference: the colour's gradient must have three values a pixel");
+  if (!depth_gradient.empty() && (depth_gradient.size() != pixels.size() || color_gradient.empty()))
+    throw invalid_argument("reference: the depth's gradient must have a value a pixel, beside the colour's");
   std::vector<bool> seen(static_cast<std::size_t>(view.width) * view.height);
   for (u32 const p : pixels) {
     if (p >= seen.size() || seen[p])
@@ -246,8 +249,9 @@ std::vector<u32> all_pixels(camera const& view) {
 
 reference_image trace_reference(gaussian_model const& model, camera const& view, render_options const& options,
                                 int active_degree, std::vector<u32> const& pixels,
-                                std::vector<double> const& color_gradient, int kernel_degree) {
-  check(model, view, options, active_degree, pixels, color_gradient, kernel_degree);
+                                std::vector<double> const& color_gradient, int kernel_degree,
+                                std::vector<double> const& depth_gradient) {
+  check(model, view, options, active_degree, pixels, color_gradient, kernel_degree, depth_gradient);
   kernel const falloff{kernel_degree};
   std::size_t const n = model.size();
   bool const backwards = !color_gradient.empty();
@@ -285,7 +289,8 @@ reference_image trace_reference(gaussian_model const& model, camera const& view,
       tracer.composite(list, k, out);
       if (!backwards) continue;
       vec3d const g(color_gradient[3 * k], color_gradient[3 * k + 1], color_gradient[3 * k + 2]);
-      tracer.differentiate(list, rays[k], basis, g, [&](u32 id) {
+      double const by_depth = depth_gradient.empty() ? 0.0 : depth_gradient[k];
+      tracer.differentiate(list, rays[k], basis, g, by_depth, [&](u32 id) {
         return sums.at(
             static_cast<std::size_t>(std::lower_bound(candidates.begin(), candidates.end(), id) - candidates.begin()));
       });

@@ -9,8 +9,10 @@ std::unique_ptr<renderer> make_renderer(configuration_request const& request) {
   return find_configuration(request).make_renderer(request);
 }
 
-std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,
+std::unique_ptr<session> make_session(configuration_request const& wanted, train_options const& options,
                                       dataset const& data, gaussian_model const* start) {
+  configuration_request request = wanted;
+  request.depth = wanted.depth || options.depth_weight > 0;
   compiled_configuration const& found = find_configuration(request);
   require_tree(options.render.rebuild_every, found.info.tracer);
   trial_plan const plan = plan_trials(request, options, data.train.size());

@@ -3,6 +3,7 @@
 #include "fuzz/support.hpp"
 
 #include <gart/io/dataset.hpp>
+#include <gart/io/depth_file.hpp>
 #include <gart/io/exposure_file.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
@@ -242,6 +243,20 @@ bool exposures(std::string_view input) {
     gart::exposure_field const back = gart::read_exposures(again);
     promise(back.views().size() == field.views().size() && back.views()[0].position == field.views()[0].position,
             "exposures that are others when written and read again");
+  });
+}
+
+bool depth(std::string_view input) {
+  static scratch_folder const folder("depth");
+  fs::path const file = folder.put("map", input), again = folder.path() / "again.npy";
+  return accepted(folder, [&] {
+    gart::image_float const map = gart::read_depth(file);
+    promise(map.width >= 1 && map.height >= 1 && map.channels == 1, "a map of no pixels");
+    promise(map.data.size() == static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height),
+            "a map whose data do not fit its size");
+    promise(finite(map.data), "a depth that is not finite");
+    gart::write_npy(again, map);
+    promise(gart::read_depth(again).data == map.data, "a map that is another when written and read again");
   });
 }
 

@@ -23,6 +23,7 @@ bool transforms(std::string_view input);  // nerfstudio's and instant-ngp's tran
 bool blender(std::string_view input);     // transforms_train.json and transforms_test.json, between them a line "===="
 bool camera_json(std::string_view input);
 bool exposures(std::string_view input);  // asked for a view, written and read again
+bool depth(std::string_view input);      // and written again as .npy
 bool png(std::string_view input);
 bool jpeg(std::string_view input);
 bool checkpoint(std::string_view input);      // loaded by a session, which then takes a step

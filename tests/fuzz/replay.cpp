@@ -38,6 +38,7 @@ constexpr reader readers[] = {
     {"blender", gart_fuzz::blender},
     {"camera_json", gart_fuzz::camera_json},
     {"exposures", gart_fuzz::exposures},
+    {"depth", gart_fuzz::depth},
     {"png", gart_fuzz::png},
     {"jpeg", gart_fuzz::jpeg},
     {"checkpoint", gart_fuzz::checkpoint},

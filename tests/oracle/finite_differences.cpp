@@ -30,7 +30,7 @@ bool same_branches(oracle::pixel const& a, oracle::pixel const& b) {
 }
 
 struct difference {
-  doubles color, transmittance;  // per pixel, by one parameter
+  doubles color, transmittance, depth;  // per pixel, by one parameter
 };
 
 void check(oracle::scene const& s, int kernel_degree = 2, double tolerance = 1e-6) {
@@ -56,11 +56,12 @@ void check(oracle::scene const& s, int kernel_degree = 2, double tolerance = 1e-
       x = kept - h;
       auto const minus = render();
       x = kept;
-      difference d{doubles(3 * pixels), doubles(pixels)};
+      difference d{doubles(3 * pixels), doubles(pixels), doubles(pixels)};
       for (std::size_t p = 0; p < pixels; ++p) {
         usable[p] = usable[p] && same_branches(base.pixels[p], plus.pixels[p]) &&
                     same_branches(base.pixels[p], minus.pixels[p]);
         for (int c = 0; c < 3; ++c) d.color[3 * p + c] = (plus.pixels[p].color[c] - minus.pixels[p].color[c]) / (2 * h);
+        d.depth[p] = (plus.pixels[p].depth - minus.pixels[p].depth) / (2 * h);
         d.transmittance[p] = (plus.pixels[p].transmittance - minus.pixels[p].transmittance) / (2 * h);
       }
       differences[g].push_back(std::move(d));
@@ -70,12 +71,13 @@ void check(oracle::scene const& s, int kernel_degree = 2, double tolerance = 1e-
 
   std::mt19937_64 engine(gart_test::seed());
   std::normal_distribution<double> normal;
-  doubles by_color(3 * pixels), by_transmittance(pixels);
+  doubles by_color(3 * pixels), by_transmittance(pixels), by_depth(pixels);
   for (std::size_t p = 0; p < pixels; ++p) {
     for (int c = 0; c < 3; ++c) by_color[3 * p + c] = usable[p] ? normal(engine) : 0;
     by_transmittance[p] = usable[p] ? normal(engine) : 0;
+    by_depth[p] = usable[p] ? normal(engine) : 0;
   }
-  auto const exact = oracle::gradients(m, s.view, s.options, s.active_degree, by_color, by_transmittance);
+  auto const exact = oracle::gradients(m, s.view, s.options, s.active_degree, by_color, by_transmittance, by_depth);
   for (std::size_t g = 0; g < std::size(groups); ++g) {
     CAPTURE(groups[g].name);
     double error = 0, norm = 0;
@@ -83,6 +85,7 @@ void check(oracle::scene const& s, int kernel_degree = 2, double tolerance = 1e-
       double expected = 0;
       for (std::size_t k = 0; k < 3 * pixels; ++k) expected += by_color[k] * differences[g][i].color[k];
       for (std::size_t k = 0; k < pixels; ++k) expected += by_transmittance[k] * differences[g][i].transmittance[k];
+      for (std::size_t k = 0; k < pixels; ++k) expected += by_depth[k] * differences[g][i].depth[k];
       double const got = (exact.*groups[g].values)[i];
       error += (got - expected) * (got - expected), norm += expected * expected;
     }

@@ -248,6 +248,7 @@ struct step {
   double transmittance;  // before it
   Vector3d behind;       // the colour of all that follows, background included, seen with T = 1
   double clear_behind;   // the transmittance of all that follows
+  double depth_behind;   // the depth of all that follows, seen with T = 1
 };
 
 // Hits past the end of the ray are cut from `list`.
@@ -263,7 +264,7 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
     hit& h = list[end];
     shaded const s = shade(m, h.id, y, active_degree);
     h.clamps |= s.clamps;
-    steps.push_back({h, s.color, transmittance, Vector3d::Zero(), 0});
+    steps.push_back({h, s.color, transmittance, Vector3d::Zero(), 0, 0});
     brightest = std::max(brightest, s.color.maxCoeff());
     out.edge |= h.marginal;
     out.kink |= s.kink || h.at_cusp || h.at_clamp;
@@ -293,11 +294,11 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
   list.resize(end);
   out.transmittance = transmittance;
   Vector3d behind = background;
-  double clear_behind = 1;
+  double clear_behind = 1, depth_behind = 0;
   double alpha_rounding = 0, clear_rounding = 0, slope_squared = 0;  // sums of squares: roundings are independent
   for (std::size_t i = steps.size(); i-- > 0;) {
     step& s = steps[i];
-    s.behind = behind, s.clear_behind = clear_behind;
+    s.behind = behind, s.clear_behind = clear_behind, s.depth_behind = depth_behind;
     double const weight = s.transmittance * s.h.alpha;
     double const contrast = weight * (s.color - behind).cwiseAbs().maxCoeff();
     slope_squared += contrast * contrast;
@@ -311,6 +312,7 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
     clear_rounding += cleared * cleared;
     behind = s.h.alpha * s.color + (1 - s.h.alpha) * behind;
     clear_behind *= 1 - s.h.alpha;
+    depth_behind = s.h.alpha * s.h.t + (1 - s.h.alpha) * depth_behind;
     out.depth += weight * s.h.t;
     ++out.hits;
   }
@@ -349,12 +351,16 @@ std::vector<step> composite(parameters const& m, std::vector<hit>& list, double 
   return steps;
 }
 
-// alpha below its clamp and its derivatives by mean, log-scale, quaternion and opacity, by forward differentiation of
-// the definition.
+// alpha below its clamp, t, and their derivatives by mean, log-scale, quaternion and opacity, by forward
+// differentiation of the definition.
 using dual = Eigen::AutoDiffScalar<Eigen::Matrix<double, 11, 1>>;
 
-dual response_of(parameters const& m, std::size_t i, Vector3d const& origin, Vector3d const& d,
-                 pixels_filter const& filter) {
+struct dual_hit {
+  dual alpha, t;
+};
+
+dual_hit response_of(parameters const& m, std::size_t i, Vector3d const& origin, Vector3d const& d,
+                     pixels_filter const& filter) {
   using Vector = Eigen::Matrix<dual, 3, 1>;
   Vector mean, scale;
   for (int a = 0; a < 3; ++a) {
@@ -383,8 +389,8 @@ dual response_of(parameters const& m, std::size_t i, Vector3d const& origin, Vec
     pp += dual(p * p);
   }
   // |p|^n as a power of |p|^2; at its centre the response has no slope, or for degree 1 none that has a direction.
-  if (pp.value() == 0) return sigma;
-  return sigma * exp(dual(-4.5 * pow(dual(pp / 9.0), 0.5 * m.kernel_degree)));
+  if (pp.value() == 0) return {sigma, t};
+  return {sigma * exp(dual(-4.5 * pow(dual(pp / 9.0), 0.5 * m.kernel_degree))), t};
 }
 
 void check_degree(parameters const& m, int active_degree) {
@@ -431,11 +437,13 @@ picture render(parameters const& m, gart::camera const& c, gart::render_options 
 }
 
 parameters gradients(parameters const& m, gart::camera const& c, gart::render_options const& options, int active_degree,
-                     std::vector<double> const& color_gradient, std::vector<double> const& transmittance_gradient) {
+                     std::vector<double> const& color_gradient, std::vector<double> const& transmittance_gradient,
+                     std::vector<double> const& depth_gradient) {
   check_degree(m, active_degree);
   std::size_t const pixels = std::size_t(c.width) * c.height;
   if (color_gradient.size() != 3 * pixels ||
-      (!transmittance_gradient.empty() && transmittance_gradient.size() != pixels))
+      (!transmittance_gradient.empty() && transmittance_gradient.size() != pixels) ||
+      (!depth_gradient.empty() && depth_gradient.size() != pixels))
     throw std::invalid_argument("oracle: a gradient image must have the size of the camera's image");
   parameters g = m;
   for (auto* group : {&g.mean, &g.log_scale, &g.quaternion, &g.opacity, &g.sh})
@@ -449,7 +457,8 @@ parameters gradients(parameters const& m, gart::camera const& c, gart::render_op
   for (std::size_t at = 0; at < pixels; ++at) {
     Vector3d const by_color(color_gradient[3 * at], color_gradient[3 * at + 1], color_gradient[3 * at + 2]);
     double const by_transmittance = transmittance_gradient.empty() ? 0.0 : transmittance_gradient[at];
-    if (by_color.isZero(0) && by_transmittance == 0) continue;
+    double const by_depth = depth_gradient.empty() ? 0.0 : depth_gradient[at];
+    if (by_color.isZero(0) && by_transmittance == 0 && by_depth == 0) continue;
     Vector3d const d = world_direction(c, int(at % c.width), int(at / c.width));
     double y[16];
     harmonics(d, y);
@@ -462,9 +471,13 @@ parameters gradients(parameters const& m, gart::camera const& c, gart::render_op
         if (!(s.h.clamps >> channel & 1))
           for (std::size_t k = 0; k < active; ++k)
             g.sh[3 * (all * i + k) + channel] += by_color[channel] * weight * y[k];
-      if (s.h.clamps & 8) continue;
-      double const by_alpha = s.transmittance * (by_color.dot(s.color - s.behind) - by_transmittance * s.clear_behind);
-      auto const slope = (by_alpha * response_of(m, i, origin, d, filter).derivatives()).eval();
+      bool const held = (s.h.clamps & 8) != 0;
+      if (held && by_depth == 0) continue;
+      double const by_alpha = s.transmittance * (by_color.dot(s.color - s.behind) - by_transmittance * s.clear_behind +
+                                                 by_depth * (s.h.t - s.depth_behind));
+      dual_hit const h = response_of(m, i, origin, d, filter);
+      auto const slope =
+          ((held ? 0.0 : by_alpha) * h.alpha.derivatives() + by_depth * weight * h.t.derivatives()).eval();
       for (int a = 0; a < 3; ++a) g.mean[3 * i + a] += slope[a], g.log_scale[3 * i + a] += slope[3 + a];
       for (int a = 0; a < 4; ++a) g.quaternion[4 * i + a] += slope[6 + a];
       g.opacity[i] += slope[10];

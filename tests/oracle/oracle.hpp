@@ -74,10 +74,11 @@ struct motion {
 picture render(parameters const&, gart::camera const&, gart::render_options const&, int active_degree,
                motion const& = {});
 
-// Gradient of L given dL/dcolour [height][width][3] and, where not empty, dL/dtransmittance [height][width]. A clamp
-// that holds has derivative zero.
+// Gradient of L given dL/dcolour [height][width][3] and, where not empty, dL/dtransmittance and dL/ddepth
+// [height][width]. A clamp that holds has derivative zero.
 parameters gradients(parameters const&, gart::camera const&, gart::render_options const&, int active_degree,
-                     std::vector<double> const& color_gradient, std::vector<double> const& transmittance_gradient = {});
+                     std::vector<double> const& color_gradient, std::vector<double> const& transmittance_gradient = {},
+                     std::vector<double> const& depth_gradient = {});
 
 // Unit direction, in the world, of the ray through the centre of pixel (i, j). Throws where the lens has no inverse.
 struct direction {

@@ -101,6 +101,12 @@ TEST_CASE("images and gradients are the oracle's") {
     CHECK(worst < 1e-12);
     CHECK(aside <= 2);
     check_gradients(got.gradients, oracle::gradients(m, s.view, s.options, s.active_degree, gradient));
+    // Of the same random numbers, the first of each pixel as the depth's.
+    doubles by_depth(expected.pixels.size());
+    for (std::size_t p = 0; p < by_depth.size(); ++p) by_depth[p] = gradient[3 * p];
+    auto const deep = gart::trace_reference(s.model, s.view, s.options, s.active_degree, gart::all_pixels(s.view),
+                                            gradient, kernel_degree, by_depth);
+    check_gradients(deep.gradients, oracle::gradients(m, s.view, s.options, s.active_degree, gradient, {}, by_depth));
   }
 }
 

@@ -144,6 +144,28 @@ gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, ga
   return gradients.to_host();
 }
 
+// The gradients by color_gradient, [H][W][3], and by those of depth and transmittance, [H][W] each.
+template <int Degree, class Strategy, class Tracer, class E>
+gart::gaussian_model depth_gradients_by(E& exec, gart::gaussian_model const& model, gart::camera const& view,
+                                        gart::render_options const& options, int active_degree,
+                                        std::vector<float> const& color_gradient,
+                                        std::vector<float> const& depth_gradient,
+                                        std::vector<float> const& transmittance_gradient) {
+  gart::gaussians<E> const scene(exec, model);
+  gart::gaussians<E> gradients(exec, scene.size(), model.sh_degree);
+  frame_by<Degree, Tracer, E> frame(exec);
+  gart::backward_pass<frame_by<Degree, Tracer, E>, gart::with_depth<Strategy>> pass(exec);
+  std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
+  gart::buffer<float, E> color(exec, 3 * pixels), transmittance(exec, pixels), depth(exec, pixels);
+  gart::buffer<float, E> const by_color(exec, color_gradient), by_depth(exec, depth_gradient),
+      by_transmittance(exec, transmittance_gradient);
+  frame.prepare(scene.view(), view, options, active_degree);
+  if (!pass.prepare(frame)) throw pass.no_room();
+  pass.render(frame, {.color = color.data(), .transmittance = transmittance.data(), .depth = depth.data()});
+  gart::differentiate(frame, pass, {by_color, by_depth, by_transmittance}, gradients);
+  return gradients.to_host();
+}
+
 // Whether a strategy is compiled here for a tracer and a degree: at degree 3 all for tile lists, for a BVH those that
 // record or scatter otherwise (others differ in the gather alone, which does not know the tracer); at other degrees one
 // for each tracer, for the sake of the compiler's time.

@@ -159,6 +159,40 @@ TEST_CASE("many samples agree with few: no bias that one would see, and little n
   CHECK(std::abs(sum) / count < 5e-3);
 }
 
+TEST_CASE("depth maps are distances to the surfaces that the pictures show") {
+  if (!has_embree()) return;
+  scratch_folder folder;
+  synth_options options = small(folder.path);
+  options.depth = true;
+  write_synth_capture(options);
+  gart::dataset_options load;
+  load.depth.load = true;
+  gart::dataset const data = gart::load_dataset(folder.path, load);
+  synth_scene const scene = make_synth_scene(options.seed);
+  double worst = 0;
+  int measured = 0, differ = 0;
+  for (gart::dataset_view const& v : data.train) {
+    REQUIRE(v.depth.width == 24);
+    for (int y = 0; y < 24; ++y) {
+      for (int x = 0; x < 24; ++x) {
+        float const distance = v.depth.at(x, y, 0);
+        int const alpha = v.image.at(x, y, 3);
+        differ += alpha == 255 && distance == 0, differ += alpha == 0 && distance > 0;  // four samples, and the middle
+        if (!(distance > 0) || (x + y) % 5 != 0) continue;
+        ++measured;
+        gart::vec3 const d = gart::ray_direction(v.view, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+        gart::vec3d const p = v.view.position + static_cast<double>(distance) * gart::vec3d(d);
+        if (std::abs(p.z + 0.42) < 1e-3) continue;  // the top of the disc, as below
+        worst = std::max(worst, distance_to_scene(scene, p));
+      }
+    }
+  }
+  CHECK(measured > 50);
+  CHECK(differ < 5 * 24 * 24 / 50);
+  CHECK(worst < 1e-4);  // a step of the maps
+  CHECK(data.test[0].depth.empty());
+}
+
 TEST_CASE("a capture loads, with its split, its alpha, its cameras and its points") {
   if (!has_embree()) return;
   scratch_folder folder;

@@ -8,12 +8,16 @@
 ///   pass.render(frame, {.color = color});                      // the forward pass, with what the strategy records
 ///   differentiate(frame, pass, color_gradient, gradients);     // overwrites `gradients`
 ///
+/// By with_depth<primitive_strategy> the gradient is of the image's depth and transmittance too:
+///   pass.render(frame, {.color = color, .transmittance = transmittance, .depth = depth});
+///   differentiate(frame, pass, {color_gradient, depth_gradient}, gradients);
+///
 /// A pass knows which preparation of which frame it stands at: out of this order it throws invalid_argument.
 /// backward/fallback.hpp takes a strategy that needs less where there is no room.
 ///
 /// Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, the LT buffer, 4 or
-/// 16 bytes for each pixel of each box, and where the tracer has none to lend, footprints of 36 bytes a Gaussian and
-/// lists of 8 a (primitive, tile) pair.
+/// 16 bytes for each pixel of each box (4 more with depth), and where the tracer has none to lend, footprints of 36
+/// bytes a Gaussian and lists of 8 a (primitive, tile) pair.
 
 #include <gart/backward/finish.hpp>
 #include <gart/backward/gather_form.hpp>
@@ -25,6 +29,13 @@
 #include <string>
 
 namespace gart::inline GART_ISA {
+
+/// dL/d an image: [H][W][3] by colour, and where wanted [H][W] by depth and by transmittance.
+struct image_gradients {
+  span<float const> color;               ///< [H][W][3]
+  span<float const> depth = {};          ///< [H][W], or empty: zero
+  span<float const> transmittance = {};  ///< [H][W], or empty: zero
+};
 
 /// The backward pass of one frame by one strategy.
 template <class Frame, strategy Strategy>
@@ -39,10 +50,12 @@ class backward_pass {
   static constexpr bool records = Strategy::gather::any;              ///< whether it leaves anything
   static constexpr bool ordered = records && Strategy::ordered;  ///< sums in a fixed order: the same bits in every run
   static constexpr slot_validity validity = Strategy::validity;  ///< how slots that are hits are told from others
+  static constexpr bool of_depth = has_depth<Strategy>;          ///< whether depth has a gradient
+  static constexpr bool records_depths = Strategy::gather::depth;  ///< whether the forward pass leaves a depth a hit
 
   /// Allocates nothing; `exec` must outlive it.
   explicit backward_pass(execution_type& exec)
-      : moments_(exec), own_prints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec) {}
+      : moments_(exec), own_prints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec), depths_(exec) {}
 
   /// After the frame's preparation: a tracer that has the view's footprints lends them. False, and nothing allocated,
   /// where the LT buffer would take more than byte_budget (0: no limit) or have more slots than there are numbers of 32
@@ -62,7 +75,7 @@ class backward_pass {
                                                                frame.options().near);
         prints_ = &own_prints_;
       }
-      if (byte_budget && prints_->slots() * sizeof(entry) > byte_budget) return false;
+      if (byte_budget && prints_->slots() * slot_bytes > byte_budget) return false;
       if (prints_->slots() >= tile_slots::none) return false;
       if constexpr (tracer_type::lends_footprints) {
         lists_ = frame.tracer().map();
@@ -71,6 +84,7 @@ class backward_pass {
         lists_ = map_.view();
       }
       slots_.resize(prints_->slots());
+      if constexpr (records_depths) depths_.resize(prints_->slots());
       if constexpr (validity == slot_validity::recomputed) {
         last_.resize(static_cast<std::size_t>(view.width) * view.height);
       } else {
@@ -83,16 +97,18 @@ class backward_pass {
   }
 
   /// The forward pass, with what the strategy records; `targets.last` is the pass's own. The colour is read again by
-  /// differentiate().
+  /// differentiate(), and so are depth and transmittance where there is a gradient by them.
   void render(Frame& frame, image_targets targets) {
     require(frame, prepared, "backward_pass.render: call backward_pass.prepare first, after frame.prepare");
     record_type record{};
     if constexpr (records) {
       record = {prints_->ranges().data(), slots_.data()};
+      if constexpr (records_depths) record.depths = depths_.data();
       if constexpr (validity == slot_validity::recomputed) targets.last = last_.data();
     }
     frame.render(targets, record);
     color_ = targets.color, stands_at_ = rendered;
+    if constexpr (of_depth) depth_.depth = targets.depth, depth_.transmittance = targets.transmittance;
   }
 
   /// Of the last differentiate(), [N][moment_stride]: at error_place the error that is seen through each Gaussian,
@@ -100,12 +116,12 @@ class backward_pass {
   span<float const> moments() const { return moments_; }
 
   /// Bytes of the LT buffer for the view last prepared; 0 where the strategy records nothing.
-  std::size_t lt_bytes() const { return records ? slots_.size() * sizeof(entry) : 0; }
+  std::size_t lt_bytes() const { return records ? slots_.size() * slot_bytes : 0; }
 
   /// What to throw where prepare() said no without a budget.
   out_of_memory no_room() const {
     u64 const slots = prints_ ? prints_->slots() : 0;
-    return out_of_memory("LT buffer", slots * sizeof(entry), 0,
+    return out_of_memory("LT buffer", slots * slot_bytes, 0,
                          std::to_string(slots) +
                              " slots, and there are numbers for 2^32: render smaller, with fewer Gaussians, or take "
                              "configuration_request.backward = pixel, which needs none");
@@ -113,15 +129,16 @@ class backward_pass {
 
  private:
   template <class F, strategy S>
-  friend void differentiate(F&, backward_pass<F, S>&, span<float const>, gaussians_view<float>, span<float const>);
+  friend void differentiate(F&, backward_pass<F, S>&, image_gradients const&, gaussians_view<float>, span<float const>);
   using entry = typename record_type::entry;
+  static constexpr std::size_t slot_bytes = sizeof(entry) + (records_depths ? sizeof(float) : 0);
   enum standing { nothing, prepared, rendered };
 
   void require(Frame const& frame, standing least, char const* what) const {
     if (stands_at_ < least || frame_ != &frame || preparation_ != frame.preparation()) throw invalid_argument(what);
   }
 
-  void run(Frame& frame, span<float const> color_gradient, gaussians_view<float> gradients, span<float const> error) {
+  void run(Frame& frame, image_gradients const& image, gaussians_view<float> gradients, span<float const> error) {
     using response = typename Frame::response;
     require(frame, rendered, "differentiate: call backward_pass.render first, after frame.prepare");
     execution_type& exec = frame.exec();
@@ -129,8 +146,9 @@ class backward_pass {
     auto const& view = frame.view();
     std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
     if (!color_) throw invalid_argument("differentiate needs the image's colour: give backward_pass.render its target");
-    if (color_gradient.size() != 3 * pixels)
+    if (image.color.size() != 3 * pixels)
       throw invalid_argument("differentiate: the image's gradient must have three values for each pixel of the view");
+    take_depth(image, pixels);
     if (!error.empty() && error.size() != pixels)
       throw invalid_argument("differentiate: the error must have a value for each pixel of the view");
     if (gradients.count != scene.count || gradients.sh_degree != sh_degree)
@@ -143,7 +161,7 @@ class backward_pass {
       exec.zero(gradients.sh, sizeof(float) * scene.count * static_cast<std::size_t>(gradients.sh_stride()));
     if constexpr (records) {
       if constexpr (ordered) rows_.resize(prints_->pairs() * pair_gradient<sh_degree>::quads);
-      gather(frame, color_gradient, error, gradients);
+      gather(frame, image.color, error, gradients);
       if constexpr (ordered)
         parallel_for(exec, "backward/sum", scene.count * pair_gradient<sh_degree>::quads,
                      sum_pairs<sh_degree, typename Strategy::gather>{prints_->pair_offsets(), prints_->pairs(),
@@ -162,10 +180,11 @@ class backward_pass {
                       frame.options().max_hits,
                       frame.gaussians().data(),
                       color_,
-                      color_gradient.data(),
+                      image.color.data(),
                       error.data(),
                       gradients.sh,
-                      moments_.data()});
+                      moments_.data(),
+                      depth_});
     }
     auto const finish = [&]<class Filter>(Filter const& filter) {
       parallel_for(exec, "backward/finish", scene.count,
@@ -177,6 +196,23 @@ class backward_pass {
       finish(backward_kernels::no_filter{});
   }
 
+  // The gradients by depth and transmittance, where there are any.
+  void take_depth(image_gradients const& image, std::size_t pixels) {
+    for (span<float const> const& one : {image.depth, image.transmittance}) {
+      if (one.empty()) continue;
+      if (!of_depth)
+        throw invalid_argument("differentiate: the strategy has no gradient of depth: take with_depth<strategy>");
+      if (one.size() != pixels)
+        throw invalid_argument("differentiate: a gradient by depth or transmittance must have a value for each pixel");
+    }
+    if constexpr (of_depth) {
+      if ((!image.depth.empty() && !depth_.depth) || (!image.transmittance.empty() && !depth_.transmittance))
+        throw invalid_argument(
+            "differentiate needs the image's depth or transmittance: give backward_pass.render its target");
+      depth_.depth_gradient = image.depth.data(), depth_.transmittance_gradient = image.transmittance.data();
+    }
+  }
+
   void gather(Frame const& frame, span<float const> color_gradient, span<float const> error,
               gaussians_view<float> gradients) {
     using kernel = gather_of<strategy_gather<execution_type, sh_degree, typename Frame::response, Strategy, tile_size>>;
@@ -184,7 +220,13 @@ class backward_pass {
         frame.exec(), "backward/gather", tile_range{grid_.count(), kernel::block_size},
         kernel{frame.rays(), grid_, lists_, prints_->ranges().data(), slots_.data(), frame.gaussians().data(),
                frame.active_degree(), color_, color_gradient.data(), error.data(), gradients.sh, moments_.data(),
-               prints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near});
+               prints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near, gathered()});
+  }
+  auto gathered() const {
+    if constexpr (records_depths)
+      return gathered_depth{depths_.data(), depth_};
+    else
+      return no_depth{};
   }
 
   Frame const* frame_ = nullptr;
@@ -200,22 +242,38 @@ class backward_pass {
   buffer<entry, execution_type> slots_;
   buffer<quad, execution_type> rows_;
   buffer<last_hit, execution_type> last_;
+  buffer<float, execution_type> depths_;
+  std::conditional_t<of_depth, depth_image, no_depth> depth_;
 };
 
-/// From color_gradient, [H][W][3], the gradient of the image that the pass rendered, to those of the scene's
-/// parameters, without the filter of the pixels. Given an error a pixel, [H][W], it also attributes that to the
-/// Gaussians: the sum over a Gaussian's hits of weight times error (backward_pass.moments).
+/// From the gradients of the image that the pass rendered to those of the scene's parameters, without the filter of the
+/// pixels. Given an error a pixel, [H][W], it also attributes that to the Gaussians: the sum over a Gaussian's hits of
+/// weight times error (backward_pass.moments).
+template <class Frame, strategy Strategy>
+void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, image_gradients const& image,
+                   gaussians_view<float> gradients, span<float const> error = {}) {
+  pass.run(frame, image, gradients, error);
+}
+
+/// The same by colour alone, [H][W][3].
 template <class Frame, strategy Strategy>
 void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, span<float const> color_gradient,
                    gaussians_view<float> gradients, span<float const> error = {}) {
-  pass.run(frame, color_gradient, gradients, error);
+  differentiate(frame, pass, image_gradients{color_gradient}, gradients, error);
 }
 
+///@{
 /// The same into Gaussians that own their memory.
+template <class Frame, strategy Strategy>
+void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, image_gradients const& image,
+                   gaussians<typename Frame::execution_type>& gradients, span<float const> error = {}) {
+  differentiate(frame, pass, image, gradients.view(), error);
+}
 template <class Frame, strategy Strategy>
 void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, span<float const> color_gradient,
                    gaussians<typename Frame::execution_type>& gradients, span<float const> error = {}) {
   differentiate(frame, pass, color_gradient, gradients.view(), error);
 }
+///@}
 
 }  // namespace gart::inline GART_ISA

@@ -9,6 +9,7 @@
 /// Whether a slot is a hit is told by the slot itself (backward/lt_slot.hpp); its t, offset and alpha are evaluated
 /// again by the function the forward pass used, so they are the same bits.
 
+#include <gart/backward/depth.hpp>
 #include <gart/backward/gather_configuration.hpp>
 #include <gart/backward/record_lt.hpp>
 #include <gart/backward/terms.hpp>
@@ -39,6 +40,8 @@ struct gather_kernel {
   static constexpr int bands = sh_basis<C::sh_degree>::size;
   static constexpr int sh_stride = 3 * bands;  ///< floats of a Gaussian's coefficients
   using grid_type = tile_grid<C::tile_size>;   ///< the image's tiles
+  /// A slot as it is read.
+  using slot_type = std::conditional_t<C::terms::depth, entry_with_depth<entry_type>, entry_type>;
 
   /// What a lane needs of a pixel: direction and (colour . gradient), gradient, SH basis. Records are an odd number of
   /// 16-byte words apart where they can be, so that lanes on neighbouring pixels read different banks.
@@ -49,8 +52,8 @@ struct gather_kernel {
         gradient;          ///< gradient, error
     /// SH functions of the direction.
     quad basis[basis_quads];
-    quad last;  ///< t and place of the ray's last hit, where validity is recomputed; and what makes the words odd in
-                /// number
+    quad last;  ///< t and place of the ray's last hit, where validity is recomputed; the depth's gradient, where there
+                /// is one; and what makes the words odd in number
     quad spread[basis_quads % 2 ? 1 : 0];  ///< room, where the words would be even in number
   };
   /// What a team shares.
@@ -76,6 +79,8 @@ struct gather_kernel {
   quad* rows = nullptr;                   ///< ordered: [pairs][pair_gradient::quads]
   last_hit const* last = nullptr;         ///< recomputed: [H][W]
   float near = 0;                         ///< hits lie at t > near
+  /// What depth needs, where it has a gradient.
+  std::conditional_t<C::terms::depth, gathered_depth, no_depth> depth;
 
   /// Gathers the tile of a team.
   GART_KERNEL void operator()(auto const& team) const {
@@ -149,6 +154,10 @@ struct gather_kernel {
       last_hit const end = last[a / 3];
       out.last = {{end.t, bits_to_float(end.place), 0, 0}};
     }
+    if constexpr (C::terms::depth) {
+      out.direction_total.v[3] += depth.image.total(a / 3);
+      out.last.v[2] = depth.image.gradient(a / 3);
+    }
     if constexpr (pixel_data::basis_quads > 0) {
       sh_basis<C::sh_degree> const basis(d);
       GART_UNROLL
@@ -164,15 +173,15 @@ struct gather_kernel {
     lane_data const data(*this, id);
     pixel_box const cell = intersect(range.box, area);
     u32 const first = static_cast<u32>(range.offset) + tile_offset(range.box, cell);
-    entry_type const* slot = slots + first;
+    auto const slot = slots_from(first);
     u32 const width = cell.width(), last_slot = cell.area() - 1;
     u32 const skip = area.width() - width;
     u32 p = (cell.y0 - area.y0) * area.width() + (cell.x0 - area.x0);
     u32 column = 0;
     // Read two ahead: the work between hides the latency of memory.
-    entry_type next = slot[0], after = slot[last_slot > 0 ? 1 : 0];
+    slot_type next = slot[0], after = slot[last_slot > 0 ? 1 : 0];
     for (u32 k = 0; k <= last_slot; ++k) {
-      entry_type const entry = next;
+      slot_type const entry = next;
       next = after;
       after = slot[k + 2 < last_slot ? k + 2 : last_slot];
       pixel_data const& at = s.pixels[p];
@@ -186,6 +195,14 @@ struct gather_kernel {
       if (++column == width) column = 0, p += skip;
     }
     finish(range.box, area, id, sh_sum, moment_sum);
+  }
+
+  /// The slots from that number on.
+  GART_HD GART_INLINE auto slots_from(std::size_t first) const {
+    if constexpr (C::terms::depth)
+      return slots_with_depth<entry_type>{slots + first, depth.slots + first};
+    else
+      return slots + first;
   }
 
   /// What a lane keeps of its Gaussian: colour alone needs nothing but the slots.
@@ -243,14 +260,16 @@ struct gather_kernel {
     }
   }
   /// Adds a hit's moments to the sums; nothing where `hit` is false.
-  GART_HD GART_INLINE void add_moments(pixel_data const& at, entry_type const& entry, ray_peak const& r,
+  GART_HD GART_INLINE void add_moments(pixel_data const& at, slot_type const& entry, ray_peak const& r,
                                        lane_data const& data, bool hit, float (&moment_sum)[moment_stride]) const {
     quad const g = at.gradient;
     vec3 const opaque = entry.color();
-    float const opaque_g = opaque.x * g.v[0] + opaque.y * g.v[1] + opaque.z * g.v[2];
+    float opaque_g = opaque.x * g.v[0] + opaque.y * g.v[1] + opaque.z * g.v[2];
+    if constexpr (C::terms::depth) opaque_g += entry.depth * at.last.v[2];
     float const alpha = hit_alpha<response_type>(data.gaussian, r.d2);
-    moments_of<float> const m =
+    moments_of<float> m =
         hit_moments<response_type>(data.gaussian, r, alpha_gradient(opaque_g, at.direction_total.v[3], alpha), hit);
+    if constexpr (C::terms::depth) add_depth_moments(m, r, entry.weight() * at.last.v[2], hit);
     GART_UNROLL
     for (int i = 0; i < error_place; ++i) moment_sum[i] += m.v[i];
     moment_sum[error_place] += hit ? entry.weight() * g.v[3] : 0.0f;

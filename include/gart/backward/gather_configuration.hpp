@@ -3,7 +3,8 @@
 /// What a gather (backward/gather.hpp) is compiled for, one struct of these members:
 ///   policy     the execution policy on which it runs
 ///   response   how the Gaussians fall from their centres (math/response.hpp)
-///   terms      what it sums up: terms<color>, terms<geometry> or both
+///   terms      what it sums up: terms<color>, terms<geometry> or both, terms<geometry, depth> where depth has a
+///              gradient
 ///   entry      what a slot of the LT buffer holds of a hit (backward/lt_slot.hpp)
 ///   sh_degree  that the coefficients are stored with
 ///   tile_size  side of a tile, in pixels
@@ -32,6 +33,7 @@ concept gather_configuration = requires {
   typename C::response;
   { C::terms::color } -> std::convertible_to<bool>;
   { C::terms::geometry } -> std::convertible_to<bool>;
+  { C::terms::depth } -> std::convertible_to<bool>;
   typename C::entry;
   { C::sh_degree } -> std::convertible_to<int>;
   { C::tile_size } -> std::convertible_to<int>;

@@ -21,7 +21,8 @@ namespace detail {
 
 template <gather_configuration C>
 struct without_color : C {
-  using terms = std::conditional_t<C::terms::geometry, gart::terms<geometry>, gart::terms<>>;
+  using geometry_terms = std::conditional_t<C::terms::depth, gart::terms<geometry, depth>, gart::terms<geometry>>;
+  using terms = std::conditional_t<C::terms::geometry, geometry_terms, gart::terms<>>;
 };
 
 }  // namespace detail
@@ -37,7 +38,7 @@ struct matrix_gather;  // a device's compiler has it
 template <gather_configuration C>
 struct matrix_gather : gather_kernel<detail::without_color<C>> {
   using base = gather_kernel<detail::without_color<C>>;  ///< with everything but colour
-  using entry_type = typename C::entry;                  ///< of the LT buffer
+  using slot_type = typename base::slot_type;            ///< a slot as it is read
   static constexpr int lanes = 32,                       ///< of a warp
       warps = 4,                                         ///< of a team
       block_size = warps * lanes,                        ///< lanes of a team
@@ -147,14 +148,14 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
     auto const slot_of = [&](u32 row, int i) { return cell.first + (row - from) * cell.width + x + 4 * i - cell.x; };
     struct {
       bool in[2];
-      entry_type entry[2];
+      slot_type entry[2];
     } now, next;
     auto const read = [&](u32 row) {
       bool const in_rows = row - from < rows;
       GART_UNROLL
       for (int i = 0; i < 2; ++i) {
         next.in[i] = has[i] & in_rows;
-        next.entry[i] = this->slots[next.in[i] ? slot_of(row, i) : cell.first];
+        next.entry[i] = this->slots_from(0)[next.in[i] ? slot_of(row, i) : cell.first];
       }
     };
     u32 const first = __reduce_min_sync(everyone, from), last = __reduce_max_sync(everyone, from + rows - 1);
@@ -170,7 +171,7 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
       GART_UNROLL
       for (int i = 0; i < 2; ++i) {
         typename base::pixel_data const& at = pixel_of(i);
-        entry_type const& entry = now.entry[i];
+        slot_type const& entry = now.entry[i];
         quad const g = at.gradient;
         bool const hit = now.in[i] & this->holds(at, entry, slot_of(row, i), r[i], data);
         met |= hit;

@@ -33,14 +33,15 @@ struct packet_gather {
 
   /// What is needed of a packet's pixels.
   struct packet_data {
-    int x, y;                                 ///< in the tile
-    vec3_of<lanes> direction,                 ///< of the rays, unit length
-        gradient;                             ///< of the image
-    lanes total,                              ///< colour . gradient
-        error,                                ///< of the pixel
-        last_t;                               ///< t of the ray's last hit
-    lane_words last_place;                    ///< of the ray's last hit
-    lanes bands_of[lane_count][band_groups];  ///< the SH basis, a pixel after another
+    int x, y;                                       ///< in the tile
+    vec3_of<lanes> direction,                       ///< of the rays, unit length
+        gradient;                                   ///< of the image
+    lanes total,                                    ///< colour . gradient
+        error,                                      ///< of the pixel
+        last_t;                                     ///< t of the ray's last hit
+    lanes depth_gradient[C::terms::depth ? 1 : 0];  ///< of the image, where there is one
+    lane_words last_place;                          ///< of the ray's last hit
+    lanes bands_of[lane_count][band_groups];        ///< the SH basis, a pixel after another
   };
   /// What a team shares.
   struct scratch {
@@ -85,6 +86,10 @@ struct packet_gather {
         out.gradient[k].v[l] = g;
       }
       out.total.v[l] = total, out.error.v[l] = inside && gather.error ? gather.error[a] : 0.0f;
+      if constexpr (C::terms::depth) {
+        out.depth_gradient[0].v[l] = inside ? gather.depth.image.gradient(a) : 0.0f;
+        out.total.v[l] += inside ? gather.depth.image.total(a) : 0.0f;
+      }
       last_hit const end = recomputed && inside ? gather.last[a] : last_hit{};
       out.last_t.v[l] = end.t, out.last_place[l] = end.place;
     }
@@ -154,8 +159,11 @@ struct packet_gather {
       // Geometry first: colour's work hides the latency of its chain of steps.
       if constexpr (C::terms::geometry) {
         lanes const alpha = hit_alpha<response_type>(g, r.d2);
-        moments_of<lanes> const m =
-            hit_moments<response_type>(g, r, alpha_gradient(dot(e.opaque, at.gradient), at.total, alpha), hit);
+        lanes opaque_g = dot(e.opaque, at.gradient);
+        if constexpr (C::terms::depth)
+          opaque_g += found[i].slots.read_depths(gather.depth.slots, hit) * at.depth_gradient[0];
+        moments_of<lanes> m = hit_moments<response_type>(g, r, alpha_gradient(opaque_g, at.total, alpha), hit);
+        if constexpr (C::terms::depth) add_depth_moments(m, r, e.weight * at.depth_gradient[0], hit);
 #pragma GCC unroll 16
         for (int k = 0; k < error_place; ++k) moment_sum[k] += m.v[k];
         moment_sum[error_place] += select(hit, e.weight * at.error, 0.0f);

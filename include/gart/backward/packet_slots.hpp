@@ -81,6 +81,23 @@ class packet_slots {
     }
   }
 
+  /// Writes the hits' floats of an array of one a slot.
+  GART_INLINE void write_depths(float* depths, lane_mask hits, lanes depth) const {
+    for (u32 left = bits_of(hits & inside); left; left &= left - 1) {
+      int const l = __builtin_ctz(left);
+      depths[first_of(l)] = depth.v[l];
+    }
+  }
+  /// Reads them back; zeros where there are no hits.
+  GART_INLINE lanes read_depths(float const* depths, lane_mask hits) const {
+    lanes out = 0.0f;
+    for (u32 left = bits_of(hits); left; left &= left - 1) {
+      int const l = __builtin_ctz(left);
+      out.v[l] = depths[first_of(l)];
+    }
+    return out;
+  }
+
   /// Zeros where there are no hits. Geometry: whether V is wanted.
   template <bool Geometry, class Entry>
   GART_INLINE packet_entries read(Entry const* slots, lane_mask hits) const {

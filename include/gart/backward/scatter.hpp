@@ -4,6 +4,7 @@
 /// What it adds is chosen by terms: 3 K floats of colour (K SH coefficients a channel), the 10 moments of geometry
 /// (math/hit_gradient.hpp). Cost: a second trace, and a row of atomics a hit and term.
 
+#include <gart/backward/depth.hpp>
 #include <gart/backward/terms.hpp>
 #include <gart/math/hit_gradient.hpp>
 #include <gart/math/sh.hpp>
@@ -25,9 +26,10 @@ struct scatter_program : ray_program_base {
     vec3 direction;  ///< of the ray, unit length
     /// SH functions of the direction.
     sh_basis<ShDegree> basis;
-    ray_gradient gradient;  ///< what is left behind the hit
-    float error;            ///< of the pixel
-    u32 left;               ///< hits until the cap; from 0, no cap, it counts down past it
+    ray_gradient gradient;                       ///< what is left behind the hit
+    float error;                                 ///< of the pixel
+    u32 left;                                    ///< hits until the cap; from 0, no cap, it counts down past it
+    float depth_gradient[Terms::depth ? 1 : 0];  ///< of the pixel, where there is one
   };
 
   pixel_rays rays;               ///< of the view
@@ -43,6 +45,8 @@ struct scatter_program : ray_program_base {
   float const* error = nullptr;           ///< [H][W], or null
   float* sh_gradient = nullptr;           ///< [N][K][3]
   float* moments_out = nullptr;           ///< [N][moment_stride]
+  /// What depth needs, where it has a gradient.
+  std::conditional_t<Terms::depth, depth_image, no_depth> depth;
 
   /// Whether ray i is of a pixel of the image.
   GART_HD bool active(index_t i) const { return order.inside(order.at(i)); }
@@ -60,6 +64,10 @@ struct scatter_program : ray_program_base {
     s.error = error ? error[order.address(at)] : 0.0f;
     s.left = max_hits;
     s.gradient.color_g = c[0] * g[0] + c[1] * g[1] + c[2] * g[2];
+    if constexpr (Terms::depth) {
+      s.depth_gradient[0] = depth.gradient(order.address(at));
+      s.gradient.color_g += depth.total(order.address(at));
+    }
     return s;
   }
   /// Ray i, in the view's frame.
@@ -69,8 +77,9 @@ struct scatter_program : ray_program_base {
   GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h) const {
     vec3 const unclamped =
         s.basis.unclamped(sh_row<ShDegree>(sh + static_cast<std::size_t>(sh_stride) * h.id, active_degree).v);
-    float weight;
-    float const alpha_gradient = s.gradient.pass(h.alpha, clamped_color(unclamped), weight);
+    float weight, hit_g = s.gradient.of(clamped_color(unclamped));
+    if constexpr (Terms::depth) hit_g += h.t * s.depth_gradient[0];
+    float const alpha_gradient = s.gradient.pass(h.alpha, hit_g, weight);
     if constexpr (Terms::color) {
       vec3 const g = color_gradient_of(unclamped, s.gradient.g, weight);
       float row[sh_stride] = {};
@@ -86,7 +95,9 @@ struct scatter_program : ray_program_base {
     }
     if constexpr (Terms::geometry) {
       ray_gaussian const g = records[h.id];
-      moments_of<float> m = hit_moments<Response>(g, evaluate<Response>(g, primary_ray{s.direction}), alpha_gradient);
+      ray_peak const r = evaluate<Response>(g, primary_ray{s.direction});
+      moments_of<float> m = hit_moments<Response>(g, r, alpha_gradient);
+      if constexpr (Terms::depth) add_depth_moments(m, r, weight * s.depth_gradient[0], true);
       m.v[error_place] = weight * s.error;
       E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * h.id, m.v, moment_count);
     }

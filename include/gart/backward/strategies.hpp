@@ -2,6 +2,7 @@
 /// \file
 /// The backward strategies, and the one list of them: the program, the benchmarks and the tests take them from here.
 
+#include <gart/backward/depth.hpp>
 #include <gart/backward/record_lt.hpp>
 #include <gart/backward/strategy.hpp>
 
@@ -74,6 +75,39 @@ struct lane_strategy : primitive_strategy {
   static constexpr bool lane_by_lane = true;                  ///< on every policy
   static constexpr strategy_use use = strategy_use::testing;  ///< not to train by
 };
+
+template <strategy Strategy>
+struct with_depth;
+
+namespace detail {
+
+template <class Strategy>
+struct depth_too {
+  using type = with_depth<Strategy>;
+};
+template <>
+struct depth_too<void> {
+  using type = void;
+};
+
+}  // namespace detail
+
+/// A strategy whose gradient is of the image's depth too, and of its transmittance (backward/depth.hpp): a float a slot
+/// more, where geometry is gathered.
+template <strategy Strategy>
+struct with_depth : Strategy {
+  /// With the depth beside each slot.
+  template <int Size>
+  using record =
+      std::conditional_t<Strategy::gather::geometry, record_with_depth<typename Strategy::template record<Size>>,
+                         typename Strategy::template record<Size>>;
+  using gather = typename Strategy::gather::with_depth;                            ///< its geometry of depth too
+  using scatter = typename Strategy::scatter::with_depth;                          ///< its geometry of depth too
+  using fallback = typename detail::depth_too<typename Strategy::fallback>::type;  ///< with depth too
+};
+/// Whether a strategy's gradient is of depth too.
+template <strategy Strategy>
+inline constexpr bool has_depth = Strategy::gather::depth || Strategy::scatter::depth;
 
 /// Strategies by their names.
 template <strategy... S>

@@ -10,6 +10,7 @@
 /// the file, the field and the remedy; unsupported for a camera model that gart does not trace, by its name;
 /// invalid_argument for an option out of its range.
 
+#include <gart/io/depth_file.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/scene/image.hpp>
 
@@ -22,10 +23,11 @@ namespace gart {
 
 /// A photograph and its camera.
 struct dataset_view {
-  std::string name;  ///< unique in the dataset, fit for a file name: renders/NAME.png
-  camera view;       ///< for the image as it is held (after dataset_options.downscale)
-  image8 image;      ///< 3 channels, or 4 with straight alpha
-  image8 mask;       ///< 1 channel, 0 = ignore; empty where there is none
+  std::string name;   ///< unique in the dataset, fit for a file name: renders/NAME.png
+  camera view;        ///< for the image as it is held (after dataset_options.downscale)
+  image8 image;       ///< 3 channels, or 4 with straight alpha
+  image8 mask;        ///< 1 channel, 0 = ignore; empty where there is none
+  image_float depth;  ///< distance along the ray, 0 = not measured; empty where none was asked for
 };
 
 /// Points with colours.
@@ -50,11 +52,23 @@ struct dataset {
   vec3d bounds_min{-1.3}, bounds_max{1.3};  ///< corners
 };
 
+/// Which depth maps to read of a capture, and what their values are. A frame's map is what `depth_file_path` of a
+/// transforms.json names, else NAME.png or NAME.npy in a folder `depths` beside the photo's `images` (of any such
+/// name).
+struct depth_map_options {
+  bool load = false;  ///< whether to read those of the training views; then all must be there
+  depth_kind kind =
+      depth_kind::automatic;  ///< what they measure; automatic: what 'depth_kind' of the file says, else z
+  /// Length of a step; 0: what 'depth_unit_scale_factor' of the file says, else 0.001 for a PNG and 1 for a .npy.
+  double unit = 0;
+};
+
 /// What to read of a capture, and how.
 struct dataset_options {
   int downscale = 1;        ///< integer factor, box filter; a partial last block of pixels is cropped, from cameras too
   int test_every = 8;       ///< 0: no test views; ignored where the files have their own split
   bool load_images = true;  ///< false: cameras alone, for which photos may all be absent if the files state sizes
+  depth_map_options depth = {};  ///< maps of depth
   /// Called from the loading threads, one at a time.
   std::function<void(std::size_t done, std::size_t total)> progress = {};
 };

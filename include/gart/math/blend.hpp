@@ -24,4 +24,10 @@ GART_HD GART_INLINE vec3_of<F> opaque_color(vec3_of<F> const& c, vec3_of<F> cons
   return {color.x + transmittance * c.x, color.y + transmittance * c.y, color.z + transmittance * c.z};
 }
 
+/// The depth that it would have: the same with t for the colour.
+template <class F>
+GART_HD GART_INLINE F opaque_depth(F t, F depth, F transmittance) {
+  return depth + transmittance * t;
+}
+
 }  // namespace gart::inline GART_ISA

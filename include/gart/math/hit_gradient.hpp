@@ -13,6 +13,10 @@
 ///   dL/d rotation (body frame)_i = m2_jk (s_j / s_k - s_k / s_j), (i, j, k) cyclic
 /// for x = mean + R S p is the point of largest response and dL/dM = -(sum b p p^T)(R S)^T. Where a clamp is active
 /// (alpha at alpha_max, a colour at 0) the derivative through it is zero.
+///
+/// The depth sum w t is composited as a channel of colour t, and t has a gradient of its own: at the point of largest
+/// response d_g.p = 0, so with e = w dL/d depth / |d_g|^2 the same sums take it in,
+///   m1 += e d_g,  m2 += e (p d_g^T + d_g p^T).
 
 #include <gart/math/quaternion.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -46,9 +50,12 @@ struct ray_gradient {
   float front = 0;          ///< L.g
   float transmittance = 1;  ///< T before the hit
 
+  /// c.g of a hit.
+  GART_HD GART_INLINE float of(vec3 color) const { return color.x * g.x + color.y * g.y + color.z * g.z; }
   /// dL/dalpha of the hit; moves past it. `weight` returns w.
-  GART_HD GART_INLINE float pass(float alpha, vec3 color, float& weight) {
-    float const cg = color.x * g.x + color.y * g.y + color.z * g.z;
+  GART_HD GART_INLINE float pass(float alpha, vec3 color, float& weight) { return pass(alpha, of(color), weight); }
+  /// The same by c.g, that of all channels there are.
+  GART_HD GART_INLINE float pass(float alpha, float cg, float& weight) {
     float const gradient = alpha_gradient(front + transmittance * cg, color_g, alpha);
     weight = transmittance * alpha;
     front += weight * cg;
@@ -74,6 +81,19 @@ GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, ray_
 template <class Response = generalized_gaussian<>, class F>
 GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, ray_peak_of<F> const& r, F alpha_gradient) {
   return hit_moments<Response>(gaussian, r, alpha_gradient, F(0.0f) <= F(0.0f));
+}
+
+/// What its t adds to a hit's moments; `gradient` is w dL/d depth. Nothing where `hit` is false, whatever the rest is.
+template <class F, class Mask>
+GART_HD GART_INLINE void add_depth_moments(moments_of<F>& m, ray_peak_of<F> const& r, F gradient, Mask hit) {
+  F const zero = 0.0f;
+  F const e = gradient * fast_reciprocal(r.d.x * r.d.x + r.d.y * r.d.y + r.d.z * r.d.z);
+  vec3_of<F> const offset = offset_of(r);
+  vec3_of<F> const p = {select(hit, offset.x, zero), select(hit, offset.y, zero), select(hit, offset.z, zero)};
+  vec3_of<F> const ed = {select(hit, e * r.d.x, zero), select(hit, e * r.d.y, zero), select(hit, e * r.d.z, zero)};
+  m.v[1] += ed.x, m.v[2] += ed.y, m.v[3] += ed.z;
+  m.v[4] += F(2.0f) * p.x * ed.x, m.v[5] += F(2.0f) * p.y * ed.y, m.v[6] += F(2.0f) * p.z * ed.z;
+  m.v[7] += p.y * ed.z + p.z * ed.y, m.v[8] += p.x * ed.z + p.z * ed.x, m.v[9] += p.x * ed.y + p.y * ed.x;
 }
 
 /// Of a Gaussian's stored parameters.

@@ -13,6 +13,7 @@
 /// math/widened.hpp, by the definition there.
 /// Backwards, with g = dL/dcolour and B_i what is seen behind hit i with T = 1,
 ///   dL/dalpha_i = T_i g.(c_i - B_i),
+/// the depth sum_i T_i alpha_i t_i likewise with t_i for c_i, where dL/dt_i = T_i alpha_i dL/ddepth besides,
 /// and a clamp that holds (alpha at 0.99, a colour at 0) passes nothing. Gaussians that the renderer culls (parameters
 /// that are not finite, a quaternion without direction, a log-scale outside (-40, 40)) are none here either.
 ///
@@ -48,11 +49,13 @@ struct reference_image {
 std::vector<u32> all_pixels(camera const& view);
 
 /// The pixels `pixels` of a view, each at most once; bands above `active_degree` are not evaluated. With a
-/// `color_gradient`, dL/dcolour as [n][3], also the gradient of every parameter, summed over these pixels. Errors:
+/// `color_gradient`, dL/dcolour as [n][3], also the gradient of every parameter, summed over these pixels; with a
+/// `depth_gradient`, dL/ddepth as [n], that of the depth besides. Errors:
 /// invalid_argument for a pixel outside the image or named twice, a gradient of another size, a degree the model does
 /// not have, and a pixel at which the lens cannot be inverted.
 reference_image trace_reference(gaussian_model const& model, camera const& view, render_options const& options,
                                 int active_degree, std::vector<u32> const& pixels,
-                                std::vector<double> const& color_gradient = {}, int kernel_degree = 2);
+                                std::vector<double> const& color_gradient = {}, int kernel_degree = 2,
+                                std::vector<double> const& depth_gradient = {});
 
 }  // namespace gart

@@ -113,13 +113,20 @@ struct composite : ray_program_base {
     F const zero = 0.0f;
     vec3_of<F> const c = clamped_color(unclamped);
     [[maybe_unused]] vec3_of<F> const opaque = opaque_color(c, s.color, s.transmittance);
+    [[maybe_unused]] F const depth = opaque_depth(t, s.depth, s.transmittance);
     // A hit of no alpha leaves a ray as it is.
     F const weight = blend(select(now, alpha, zero), select(now, t, zero), c, s.color, s.depth, s.transmittance);
+    auto const note = [&](auto const&... where) {
+      if constexpr (records_depth<Record>)
+        return record(where..., opaque, weight, unclamped, depth);
+      else
+        return record(where..., opaque, weight, unclamped);
+    };
     words places;
     if constexpr (std::is_same_v<F, float>)
-      record(place, opaque, weight, unclamped), places = place;
+      note(place), places = place;
     else
-      places = record(place, now, opaque, weight, unclamped);
+      places = note(place, now);
     s.hits += select(now, number<F>::every(1), number<F>::every(0));
     s.last_t = select(now, t, s.last_t), s.last_place = select(now, places, s.last_place);
     return s.transmittance >= F(options.transmittance_min);

@@ -45,6 +45,12 @@ concept hit_record = std::is_trivially_copyable_v<R> &&
   r(place, color, weight, color);
 } && detail::packet_record<R>;
 
+/// Whether a record also takes the depth that the pixel would have if the hit were opaque, as a last argument.
+template <class R>
+inline constexpr bool records_depth = requires {
+  requires R::depth;
+};
+
 /// The entry of a record that keeps nothing.
 struct no_entry {
   static constexpr char const* name = "none";  ///< in configurations and reports

@@ -70,6 +70,12 @@ void register_configurations(int rank, bool (*available)(std::string*) = always_
   register_configuration_of<E, scene_traits<3>, Tracer, Strategy>(rank, available);
 }
 
+/// Those with gradients of depth: the primitive strategy for each SH degree.
+template <execution E, class Tracer>
+void register_depth(int rank, bool (*available)(std::string*) = always_available) {
+  register_configurations<E, Tracer, with_depth<primitive_strategy>>(rank, available);
+}
+
 /// Which strategies gart's libraries compile for a policy and a tracer: those to train by, but on hosts none with
 /// ordered sums (a variant has it); on a device's tile lists also those to measure.
 template <execution E, class Tracer, strategy Strategy>

@@ -2,7 +2,7 @@
 /// \file
 /// What templates are as a configuration, and the policy that a request asks for.
 
-#include <gart/backward/strategy.hpp>
+#include <gart/backward/strategies.hpp>
 #include <gart/core/isa.hpp>
 #include <gart/exec/concepts.hpp>
 #include <gart/runtime/request.hpp>
@@ -23,6 +23,7 @@ configuration_info configuration_of() {
   configuration.arithmetic = response::fast ? arithmetic_kind::fast : arithmetic_kind::exact;
   configuration.lt_format =
       from_string(Strategy::template record<Tracer::tile_size>::entry::name, lt_format_kind::none);
+  configuration.depth = has_depth<Strategy>;
   configuration.tile_size = Tracer::tile_size;
   configuration.window = Tracer::window;
   if constexpr (!E::device) configuration.instruction_set = instruction_set;

@@ -21,9 +21,10 @@ struct configuration_request {
   arithmetic_kind arithmetic = arithmetic_kind::exact;   ///< of the response
   lt_format_kind lt_format = lt_format_kind::automatic;  ///< of the slots of the LT buffer
   int tile_size = 0;                                     ///< pixels a side
-  int window = 0;   ///< hits that a ray keeps in order before it goes over the scene again
-  int threads = 0;  ///< of the openmp policy; 0: as many as OpenMP gives
-  int device = 0;   ///< of the cuda policy
+  bool depth = false;  ///< gradients of depth and transmittance too; training by depth_weight asks for it itself
+  int window = 0;      ///< hits that a ray keeps in order before it goes over the scene again
+  int threads = 0;     ///< of the openmp policy; 0: as many as OpenMP gives
+  int device = 0;      ///< of the cuda policy
   /// Of the cuda policy: a cudaStream_t of the caller's that all work goes to (cudaStreamLegacy for the default one);
   /// null: one of its own.
   void* stream = nullptr;
@@ -38,6 +39,7 @@ struct configuration_info {
   int kernel_degree = 2;                                ///< of the generalised Gaussians
   arithmetic_kind arithmetic = arithmetic_kind::exact;  ///< of the response
   lt_format_kind lt_format = lt_format_kind::none;      ///< of the slots of the LT buffer
+  bool depth = false;                                   ///< gradients of depth and transmittance too
   int tile_size = 8,                                    ///< pixels a side
       window = 0;                                       ///< hits of a ray that are kept at a time
   std::string instruction_set = "";  ///< that a host configuration was compiled for (core/isa.hpp); empty on a device

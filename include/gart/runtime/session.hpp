@@ -65,7 +65,8 @@ class session {
 
 /// The dataset must outlive the session. `start` seeds the Gaussians where given, else the dataset's points or random
 /// ones. With options.sh_gain the session measures which bands of spherical harmonics to store, and its configuration
-/// and degree change in its course (runtime/degree_selection.hpp). Errors: invalid_argument for
+/// and degree change in its course (runtime/degree_selection.hpp). options.depth_weight asks for a configuration with
+/// depth. Errors: invalid_argument for
 /// options.render.rebuild_every where the tracer builds no tree.
 std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,
                                       dataset const& data, gaussian_model const* start = nullptr);

@@ -46,8 +46,11 @@ struct train_options {
   /// Of the first Gaussians; the scale is times the distance to the neighbours. 0: what suits the start
   /// (runtime/choose.hpp).
   float initial_opacity = 0;
-  float initial_scale = 0;    ///< times the distance to the neighbours; 0 as above
-  float ssim_weight = 0.2f;   ///< share of D-SSIM in the loss, the rest is L1
+  float initial_scale = 0;   ///< times the distance to the neighbours; 0 as above
+  float ssim_weight = 0.2f;  ///< share of D-SSIM in the loss, the rest is L1
+  /// Of the depth's loss beside the colours', in units of the scene's extent (loss/depth_loss.hpp); 0: depth is not
+  /// looked at. The dataset must have maps (dataset_options.depth).
+  float depth_weight = 0;
   bool exposure = false;      ///< learn an exposure of each training view (exposure/exposure.hpp)
   bool refine_poses = false;  ///< learn the pose of each training view (pose/pose_training.hpp)
   /// Bytes of the LT buffer above which a step is done with less; 0: half of what is free when the trainer is made,

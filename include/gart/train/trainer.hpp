@@ -28,6 +28,7 @@
 #include <gart/render/frame.hpp>
 #include <gart/render/render_image.hpp>
 #include <gart/scene/traits.hpp>
+#include <gart/train/depth_supervision.hpp>
 #include <gart/train/options.hpp>
 #include <gart/train/state.hpp>
 #include <gart/train/step_report.hpp>
@@ -49,6 +50,7 @@ struct loss_input {
   span<float const> image;   ///< [H][W][3]
   span<float> gradient;      ///< [H][W][3]
   span<float> value;         ///< [2]
+  depth_pixels depth;        ///< to add to, of a strategy with_depth; else empty
 };
 
 /// A training run on one policy, by one tracer and one strategy.
@@ -131,6 +133,7 @@ class trainer {
   mcmc<E> mcmc_;
   adaptive_density<E> adc_;
   buffer<float, E> color_, color_gradient_, value_;
+  std::conditional_t<has_depth<Strategy>, depth_supervision<E>, no_depth_supervision> supervision_;
   std::optional<exposure_training<E>> exposures_;  // where options.exposure asks for them
   buffer<float, E> depth_, transmittance_;         // of the step's image, where a pose asks for them
   std::optional<pose_training> poses_;             // where options.refine_poses asks for them

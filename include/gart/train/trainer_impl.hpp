@@ -32,12 +32,19 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       color_(exec),
       color_gradient_(exec),
       value_(exec, 2 + pose_gradient::floats),
+      supervision_(exec, data, options.depth_weight),
       depth_(exec),
       transmittance_(exec),
       by_pose_(exec),
       started_with_(static_cast<index_t>(start.size())) {
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
+  if (options.depth_weight > 0) {
+    bool mapped = false;
+    for (dataset_view const& v : data.train) mapped = mapped || !v.depth.empty();
+    if (!mapped)
+      throw invalid_argument("train_options.depth_weight: no training view has a depth map (dataset_options.depth)");
+  }
   if (options.check_finite) finite_.emplace(exec);
   // Sums in a fixed order were asked for: no budget of our own takes them away.
   if (options.lt_budget == 0 && !Strategy::ordered) options_.lt_budget = exec.free_bytes() / 2;
@@ -103,6 +110,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   std::vector<float> const value = value_.to_host();
   if (moves) poses_->step(index, pose_gradient(value.data() + 2), step_ - 1, options_.iterations);
   report.loss = value[0];
+  if constexpr (has_depth<Strategy>) report.loss += supervision_.value();
   report.psnr = value[1] > 0 ? -10.0f * std::log10(value[1]) : 99.0f;
   return report;
 }
@@ -115,7 +123,9 @@ void trainer<E, Traits, Tracer, Strategy>::differentiate_by(Pass& pass, Loss&& l
   image_targets targets;
   targets.color = color_.data();
   bool const measures = poses_ && poses_->learns(step_, options_.iterations) && poses_->wants_metric(index);
-  if (measures) {
+  if constexpr (has_depth<Strategy>) {
+    supervision_.begin(targets, color_.size() / 3);
+  } else if (measures) {
     depth_.resize(color_.size() / 3), transmittance_.resize(color_.size() / 3);
     targets.depth = depth_.data(), targets.transmittance = transmittance_.data();
   }
@@ -124,14 +134,23 @@ void trainer<E, Traits, Tracer, Strategy>::differentiate_by(Pass& pass, Loss&& l
     stage_scope stage(exec_, "loss");
     span<float const> const image = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
     truth_view const truth = images_.get(exec_, index, frame_.options().background);
+    depth_pixels depth;
+    if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth), depth = supervision_.pixels();
     loss(loss_input<E>{exec_, view, truth, view.view.width, view.view.height, image, color_gradient_,
-                       value_.view().subspan(0, 2)});
+                       value_.view().subspan(0, 2), depth});
     if (grows_by_error()) error_map(exec_, image, truth, error_map_);
     if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }
-  differentiate(frame_, pass, color_gradient_, gradients_, error_map_);
+  if constexpr (has_depth<Strategy>)
+    differentiate(frame_, pass, supervision_.gradients(color_gradient_), gradients_, error_map_);
+  else
+    differentiate(frame_, pass, color_gradient_, gradients_, error_map_);
   if (measures) {
-    std::vector<float> const depth = depth_.to_host(), transmittance = transmittance_.to_host();
+    std::vector<float> depth, transmittance;
+    if constexpr (has_depth<Strategy>)
+      depth = supervision_.depth(), transmittance = supervision_.transmittance();
+    else
+      depth = depth_.to_host(), transmittance = transmittance_.to_host();
     poses_->set_metric(index, {depth.data(), depth.size()}, {transmittance.data(), transmittance.size()});
   }
 }

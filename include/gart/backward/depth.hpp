@@ -1,0 +1,81 @@
+#pragma once
+/// \file
+/// What the gradient of an image's depth needs besides that of its colour (backward/terms.hpp). Depth is composited as
+/// a fourth channel whose colour is a hit's t, so a hit's alpha needs the depth that the pixel would have if the hit
+/// were opaque: one float a slot, in an array beside the LT buffer, written and read at a slot's number. The gradient
+/// by the transmittance comes with it at no cost a hit, as that of a channel that only the background has.
+
+#include <gart/backward/lt_layout.hpp>
+#include <gart/render/record.hpp>
+
+#include <cstddef>
+
+namespace gart::inline GART_ISA {
+
+/// Depth and transmittance of an image and the gradients by them, as kernels read them: [H][W] each, null where there
+/// is no such gradient.
+struct depth_image {
+  float const* depth = nullptr;                   ///< sum of weight * t
+  float const* depth_gradient = nullptr;          ///< dL/d depth
+  float const* transmittance = nullptr;           ///< after the last hit
+  float const* transmittance_gradient = nullptr;  ///< dL/d transmittance
+
+  /// dL/d depth of a pixel.
+  GART_HD GART_INLINE float gradient(std::size_t pixel) const { return depth_gradient ? depth_gradient[pixel] : 0.0f; }
+  /// What a pixel's depth and transmittance add to C.g (math/hit_gradient.hpp).
+  GART_HD GART_INLINE float total(std::size_t pixel) const {
+    float sum = 0;
+    if (depth_gradient) sum += depth[pixel] * depth_gradient[pixel];
+    if (transmittance_gradient) sum += transmittance[pixel] * transmittance_gradient[pixel];
+    return sum;
+  }
+};
+
+/// In its place where the gradient is of colour alone.
+struct no_depth {};
+
+/// An entry of the LT buffer with the depth beside it.
+template <class Entry>
+struct entry_with_depth : Entry {
+  float depth;  ///< that the pixel would have if the hit were opaque
+};
+
+/// The LT buffer with the depths beside it.
+template <class Entry>
+struct slots_with_depth {
+  Entry const* slots;   ///< the LT buffer
+  float const* depths;  ///< a float a slot
+  /// A slot by its number.
+  GART_HD GART_INLINE entry_with_depth<Entry> operator[](std::size_t k) const { return {{slots[k]}, depths[k]}; }
+};
+
+/// What a gather of depth reads besides.
+struct gathered_depth {
+  float const* slots = nullptr;  ///< beside the LT buffer, a float a slot
+  depth_image image;             ///< of the pixels
+};
+
+/// A record of the LT buffer (backward/record_lt.hpp) that also keeps depths.
+template <class Record>
+struct record_with_depth : Record {
+  float* depths = nullptr;             ///< a float a slot
+  static constexpr bool depth = true;  ///< as records_depth has it
+  using Record::operator();
+  /// Writes a slot and its depth.
+  GART_HD GART_INLINE void operator()(u32 place, vec3 const& opaque, float weight, vec3 const& unclamped,
+                                      float opaque_depth) const {
+    Record::operator()(place, opaque, weight, unclamped);
+    if (place != tile_slots::none) depths[place] = opaque_depth;
+  }
+
+#if !defined(__CUDACC__)
+  /// The same for the hits of a packet.
+  GART_INLINE lane_words operator()(typename Record::note const& at, lane_mask hits, vec3_of<lanes> const& opaque,
+                                    lanes weight, vec3_of<lanes> const& unclamped, lanes opaque_depth) const {
+    at.write_depths(depths, hits, opaque_depth);
+    return Record::operator()(at, hits, opaque, weight, unclamped);
+  }
+#endif
+};
+
+}  // namespace gart::inline GART_ISA

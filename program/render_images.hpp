@@ -1,0 +1,38 @@
+#pragma once
+// The images of `gart render --images`: what each is, as files beside NAME.png.
+
+#include <gart/render/rendered.hpp>
+#include <gart/scene/camera.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace gart_cli {
+
+// The mean distance of what each pixel sees, along its ray; 0 where it sees less than half.
+gart::image_float mean_distances(gart::rendered const& r);
+
+// Normals of the surface that the distances make, in the world's axes, towards the camera: [H][W][3], zero where a
+// pixel or both of its neighbours in a direction have no distance.
+gart::image_float normals_of(gart::image_float const& distances, gart::camera const& view);
+
+struct image_choice {
+  std::string images = "colour";  // names, by commas
+  std::string format = "png";     // of all but colour: png or npy
+  double depth_unit = 0.001;      // of a step of 16 bits
+
+  bool has(std::string const& name) const;
+  static std::vector<std::string> const& names();
+};
+// usage_error for a name that there is not.
+void check_images(image_choice const& choice);
+
+// Writes the images that are chosen, colour aside, and adds to `entry` what they say in numbers. usage_error where 16
+// bits do not hold them.
+void write_images(std::filesystem::path const& folder, std::string const& name, gart::rendered const& image,
+                  gart::camera const& view, image_choice const& choice, nlohmann::json& entry);
+
+}  // namespace gart_cli

@@ -1,0 +1,103 @@
+// Training by depth: what is asked for must be there, and the depth comes nearer to the maps than without.
+#include <train/capture.hpp>
+
+#include <gart/core/error.hpp>
+#include <gart/train/trainer.hpp>
+
+using namespace gart_test;
+
+namespace {
+
+// Distances of what the views see, in place of colours: photographs that are grey all over, of which colour learns
+// nothing of the shape.
+template <class E>
+gart::dataset mapped_capture(E& exec) {
+  gart::dataset data = capture(exec, seed());
+  gart::gaussian_model const truth = cloud(seed(), 0.6f);
+  for (gart::dataset_view& v : data.train) {
+    auto const seen = render_scene(exec, truth, v.view, gart::render_options{}, 1, tracer_kind::tiles);
+    v.depth = gart::image_float(v.view.width, v.view.height, 1);
+    for (std::size_t i = 0; i < seen.depth.size(); ++i) {
+      float const alpha = 1 - seen.transmittance[i];
+      v.depth.data[i] = alpha > 0.5f ? seen.depth[i] / alpha : 0;
+    }
+  }
+  return data;
+}
+
+// The mean difference of depth where the maps have one.
+template <class Run>
+double off(Run& run, gart::dataset const& data) {
+  double sum = 0, count = 0;
+  for (gart::dataset_view const& v : data.train) {
+    auto const seen = run.render(v.view, gart::vec3(0.0f));
+    for (std::size_t i = 0; i < v.depth.data.size(); ++i) {
+      float const alpha = 1 - seen.transmittance.data[i];
+      if (v.depth.data[i] > 0 && alpha > 0.1f)
+        sum += std::abs(seen.depth.data[i] / alpha - v.depth.data[i]), count += 1;
+    }
+  }
+  return sum / count;
+}
+
+template <class E, class Strategy>
+using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy>;
+
+gart::train_options options_of(float weight) {
+  gart::train_options options;
+  options.iterations = 60, options.densify = gart::densify_kind::none, options.depth_weight = weight;
+  return options;
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("depth comes nearer to the maps", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  gart::dataset const data = mapped_capture(exec);
+  gart::gaussian_model const start = cloud(seed + 1, 0.8f);
+  auto const after = [&](float weight) {
+    run_of<E, gart::with_depth<gart::primitive_strategy>> run(exec, options_of(weight), data, start);
+    double first = 0, last = 0;
+    for (int i = 0; i < 60; ++i) {
+      last = run.step().loss;
+      if (i == 0) first = last;
+    }
+    CHECK(last < first);
+    return off(run, data);
+  };
+  double const without = after(0), with = after(2);
+  CAPTURE(without);
+  CHECK(with < 0.7 * without);
+}
+
+TEST_CASE_TEMPLATE("a loss of one's own may add to the gradient of depth", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  gart::dataset const data = mapped_capture(exec);
+  run_of<E, gart::with_depth<gart::pixel_strategy>> run(exec, options_of(0), data, cloud(seed + 1, 0.8f));
+  run.step([&](gart::loss_input<E> const& in) {
+    in.exec.zero(in.gradient.data(), in.gradient.size() * sizeof(float));
+    in.exec.zero(in.value.data(), 2 * sizeof(float));
+    std::vector<float> const one(in.depth.depth.size(), 1.0f);
+    in.exec.copy_in(in.depth.depth_gradient.data(), one.data(), one.size() * sizeof(float));
+  });
+  double sum = 0;
+  for (float const g : run.gradients().to_host().opacity) sum += std::abs(g);
+  CHECK(sum > 0);
+}
+
+TEST_CASE_TEMPLATE("a weight of depth without maps or without its gradients is refused", E, GART_TEST_POLICIES) {
+  E exec;
+  gart::dataset data = capture(exec, 1);
+  gart::gaussian_model const start = cloud(2, 0.8f);
+  using deep = run_of<E, gart::with_depth<gart::primitive_strategy>>;
+  using plain = run_of<E, gart::primitive_strategy>;
+  CHECK_THROWS_WITH_AS(deep(exec, options_of(1), data, start),
+                       "train_options.depth_weight: no training view has a depth map (dataset_options.depth)",
+                       gart::invalid_argument);
+  CHECK_THROWS_AS(plain(exec, options_of(1), data, start), gart::invalid_argument);
+  CHECK_NOTHROW(plain(exec, options_of(0), data, start));
+}
