@@ -39,7 +39,7 @@ void check_addresses(std::mt19937_64& random, int trials) {
         for (u32 y = cell.y0; y < cell.y1; ++y)
           for (u32 x = cell.x0; x < cell.x1; ++x) wrong += gart::lt_index<Size>(r, x, y) != next++;
         // What a gather over (primitive, tile) walks.
-        if (!cell.empty()) wrong_walk += r.offset + gart::tile_offset(r.box, cell) != cell_begin;
+        if (!cell.empty()) wrong_walk += r.offset + gart::tile_offset(r, cell) != cell_begin;
         wrong_walk += next - cell_begin != cell.area();
       }
     CHECK(wrong == 0);

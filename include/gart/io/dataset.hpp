@@ -10,6 +10,7 @@
 /// the file, the field and the remedy; unsupported for a camera model that gart does not trace, by its name;
 /// invalid_argument for an option out of its range.
 
+#include <gart/core/span.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/scene/image.hpp>
 
@@ -63,7 +64,11 @@ struct dataset_options {
 dataset load_dataset(std::filesystem::path const& path, dataset_options const& options = {});
 
 /// The cameras alone: a dataset (all its views, test views first) or a camera JSON, a list of
-/// {"name","width","height","fx","fy","cx","cy","c2w"} with c2w camera-to-world in OpenCV axes.
+/// {"name","width","height","fx","fy","cx","cy","c2w"} with c2w camera-to-world in OpenCV axes, and "camera_model" by
+/// COLMAP's name, with the parameters of its lens, where it is no pinhole; EQUIRECTANGULAR has no fx to cy.
 std::vector<named_camera> load_cameras(std::filesystem::path const& path);
+
+/// A camera JSON, as load_cameras reads it. Errors: io_error; unsupported for a lens with terms that no one model has.
+void write_camera_json(std::filesystem::path const& path, span<named_camera const> cameras);
 
 }  // namespace gart
