@@ -15,20 +15,10 @@ using gart_test::sigmoid;
 namespace {
 
 template <class E>
-struct training {
-  E exec;
-  gaussians<E> model;
-  optimizer_state<E> state;
-
-  explicit training(gaussian_model const& m)
-      : model(exec, m), state(exec, static_cast<index_t>(m.size()), m.sh_degree) {
-    gaussian_model ones = m;
-    for (auto* v : {&ones.mean, &ones.log_scale, &ones.quaternion, &ones.opacity, &ones.sh})
-      std::fill(v->begin(), v->end(), 1.0f);
-    state.first.assign(ones), state.second.assign(ones);
-  }
+struct training : gart_test::with_moments<E> {
+  using gart_test::with_moments<E>::with_moments;
   error_growth<E> densifier(index_t most, std::vector<float> const& error, u64 seed = 1) {
-    error_growth<E> out(exec, {}, most, 2000, seed);
+    error_growth<E> out(this->exec, {}, most, 2000, seed);
     out.error_sum.assign(error);
     return out;
   }

@@ -12,26 +12,19 @@ using gart_test::sigmoid;
 
 namespace {
 
+// Second moments of means and scales are the number of the row.
 template <class E>
-struct training {
-  E exec;
-  gaussians<E> model;
-  optimizer_state<E> state;
-
-  explicit training(gaussian_model const& m)
-      : model(exec, m), state(exec, static_cast<index_t>(m.size()), m.sh_degree) {
-    gaussian_model ones = m;
-    for (auto* v : {&ones.mean, &ones.log_scale, &ones.quaternion, &ones.opacity, &ones.sh})
-      std::fill(v->begin(), v->end(), 1.0f);
-    state.first.assign(ones);
+struct training : gart_test::with_moments<E> {
+  explicit training(gaussian_model const& m) : gart_test::with_moments<E>(m) {
+    gaussian_model numbers = this->ones_like(m);
     for (std::size_t i = 0; i < m.size(); ++i)
-      for (int c = 0; c < 3; ++c) ones.mean[3 * i + c] = ones.log_scale[3 * i + c] = static_cast<float>(i + 1);
-    state.second.assign(ones);
+      for (int c = 0; c < 3; ++c) numbers.mean[3 * i + c] = numbers.log_scale[3 * i + c] = static_cast<float>(i + 1);
+    this->state.second.assign(numbers);
   }
   mcmc<E> densifier(index_t most, float growth = 1.05f, u64 seed = 1, int iterations = 1000) {
     mcmc_options options;
     options.growth = growth;
-    return {exec, options, most, iterations, 1.0f, seed};
+    return {this->exec, options, most, iterations, 1.0f, seed};
   }
 };
 

@@ -5,6 +5,7 @@
 #include <gart/optim/rows.hpp>
 #include <gart/scene/gaussians.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -23,6 +24,24 @@ inline gart::gaussian_model random_model(gart::index_t n, int degree, std::mt199
   fill(m.opacity, random, -3, 3), fill(m.sh, random, -1, 1);
   return m;
 }
+
+// A model in a policy's memory, with moments of one.
+template <class E>
+struct with_moments {
+  E exec;
+  gart::gaussians<E> model;
+  gart::optimizer_state<E> state;
+
+  explicit with_moments(gart::gaussian_model const& m)
+      : model(exec, m), state(exec, static_cast<gart::index_t>(m.size()), m.sh_degree) {
+    gart::gaussian_model const ones = ones_like(m);
+    state.first.assign(ones), state.second.assign(ones);
+  }
+  static gart::gaussian_model ones_like(gart::gaussian_model m) {
+    for (auto* v : {&m.mean, &m.log_scale, &m.quaternion, &m.opacity, &m.sh}) std::fill(v->begin(), v->end(), 1.0f);
+    return m;
+  }
+};
 
 inline double sigmoid(double x) { return 1 / (1 + std::exp(-x)); }
 inline double logit(double p) { return std::log(p / (1 - p)); }

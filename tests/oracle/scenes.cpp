@@ -203,6 +203,10 @@ std::vector<scene> scenes(std::uint64_t seed) {
     all.push_back(through_pixels("antialiased through an OPENCV lens", 3, 0.5f));
     all.back().view.lens = {-0.12f, 0.03f, 0.004f, -0.003f};
   }
+  // Bands that are not active end within a word of 16 bytes of the row.
+  all.push_back(cloud(rng, "cloud, degree 0 of 1 active", 1, 0, {0, 0, 0}));
+  all.push_back(cloud(rng, "cloud, degree 0 of 3 active", 3, 0, {0, 0, 0}));
+  all.push_back(cloud(rng, "cloud, degree 2 of 3 active", 3, 2, {0, 0, 0}));
   {
     builder b(rng, 0);
     all.push_back({"nothing", b.model, look_at(rng, {0, 0, 0}, 2.0f, 5, 3, 1.0f), options_of(rng), 0});

@@ -19,30 +19,32 @@ struct sh_basis {
   F y[size];                                                ///< their values
 
   sh_basis() = default;
-  /// At a unit direction.
+  /// At a unit direction. The arithmetic is fixed (math/arith.hpp): a compiler that contracts products and sums does so
+  /// otherwise in each kernel, and tracers would differ in the last bits of a colour.
   GART_HD GART_INLINE explicit sh_basis(vec3_of<F> const& d) {
     y[0] = 0.28209479177387814f;
     if constexpr (Degree >= 1) {
-      y[1] = -0.4886025119029199f * d.y;
-      y[2] = 0.4886025119029199f * d.z;
-      y[3] = -0.4886025119029199f * d.x;
+      y[1] = mul(F(-0.4886025119029199f), d.y);
+      y[2] = mul(F(0.4886025119029199f), d.z);
+      y[3] = mul(F(-0.4886025119029199f), d.x);
     }
-    F const xx = d.x * d.x, yy = d.y * d.y, zz = d.z * d.z;
+    F const xx = mul(d.x, d.x), yy = mul(d.y, d.y), zz = mul(d.z, d.z);
     if constexpr (Degree >= 2) {
-      y[4] = 1.0925484305920792f * d.x * d.y;
-      y[5] = -1.0925484305920792f * d.y * d.z;
-      y[6] = 0.31539156525252005f * (2 * zz - xx - yy);
-      y[7] = -1.0925484305920792f * d.x * d.z;
-      y[8] = 0.5462742152960396f * (xx - yy);
+      y[4] = mul(mul(F(1.0925484305920792f), d.x), d.y);
+      y[5] = mul(mul(F(-1.0925484305920792f), d.y), d.z);
+      y[6] = mul(F(0.31539156525252005f), add(add(mul(F(2.0f), zz), -xx), -yy));
+      y[7] = mul(mul(F(-1.0925484305920792f), d.x), d.z);
+      y[8] = mul(F(0.5462742152960396f), add(xx, -yy));
     }
     if constexpr (Degree >= 3) {
-      y[9] = -0.5900435899266435f * d.y * (3 * xx - yy);
-      y[10] = 2.890611442640554f * d.x * d.y * d.z;
-      y[11] = -0.4570457994644658f * d.y * (4 * zz - xx - yy);
-      y[12] = 0.3731763325901154f * d.z * (2 * zz - 3 * xx - 3 * yy);
-      y[13] = -0.4570457994644658f * d.x * (4 * zz - xx - yy);
-      y[14] = 1.445305721320277f * d.z * (xx - yy);
-      y[15] = -0.5900435899266435f * d.x * (xx - 3 * yy);
+      F const four_zz = add(add(mul(F(4.0f), zz), -xx), -yy);
+      y[9] = mul(mul(F(-0.5900435899266435f), d.y), add(mul(F(3.0f), xx), -yy));
+      y[10] = mul(mul(mul(F(2.890611442640554f), d.x), d.y), d.z);
+      y[11] = mul(mul(F(-0.4570457994644658f), d.y), four_zz);
+      y[12] = mul(mul(F(0.3731763325901154f), d.z), add(add(mul(F(2.0f), zz), -mul(F(3.0f), xx)), -mul(F(3.0f), yy)));
+      y[13] = mul(mul(F(-0.4570457994644658f), d.x), four_zz);
+      y[14] = mul(mul(F(1.445305721320277f), d.z), add(xx, -yy));
+      y[15] = mul(mul(F(-0.5900435899266435f), d.x), add(xx, -mul(F(3.0f), yy)));
     }
   }
 
