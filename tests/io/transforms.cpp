@@ -240,7 +240,7 @@ TEST_CASE("what is missing, of a wrong type or not traced is named") {
     CHECK(holds(what, path.string()));
     return what;
   };
-  std::string const one = frame("a.png", 1);
+  std::string const one = frame("a.png", 1), focal = "\"fl_x\": 20, \"w\": 16, \"h\": 12";
   CHECK(holds(refused("{\"fl_x\": 1}"), "'frames' is missing"));
   CHECK(holds(refused("[1]"), "not a JSON object"));
   CHECK(holds(refused("{\"frames\": 3}"), "'frames' is not a list"));
@@ -275,14 +275,15 @@ TEST_CASE("what is missing, of a wrong type or not traced is named") {
       holds(refused(scene(lens + ", \"camera_model\": \"OMNIDIRECTIONALSTEREO_L\"", one)), "OMNIDIRECTIONALSTEREO_L"));
   CHECK(holds(refused(scene(lens + ", \"k5\": 0.1", one)), "'k5' is not zero"));
   CHECK(holds(refused(scene(lens + ", \"camera_model\": \"FISHEYE\", \"k1\": 0.1", one)), "'k1' is not zero"));
-  CHECK(holds(refused(scene(lens + ", \"camera_model\": \"FOV\"", one)), "'omega' is missing"));
-  CHECK(holds(refused(scene(lens + ", \"camera_model\": \"FOV\", \"omega\": -1, \"w\": 16, \"h\": 12", one)), "omega"));
-  CHECK(holds(refused(scene(lens + ", \"camera_model\": \"EUCM\", \"alpha\": 0.5", one)), "'beta' is missing"));
+  CHECK(holds(refused(scene(focal + ", \"camera_model\": \"FOV\"", one)), "'omega' is missing"));
   CHECK(
-      holds(refused(scene(lens + ", \"camera_model\": \"EUCM\", \"alpha\": 2, \"beta\": 1, \"w\": 16, \"h\": 12", one)),
-            "alpha"));
-  CHECK(holds(refused(scene(lens + ", \"camera_model\": \"DIVISION\"", one)), "'k' is missing"));
-  CHECK(holds(refused(scene(lens + ", \"camera_model\": \"OPENCV_FISHEYE\", \"k1\": -4e4, \"w\": 16, \"h\": 12", one)),
+      holds(refused(scene(focal + ", \"camera_model\": \"FOV\", \"omega\": -1, \"w\": 16, \"h\": 12", one)), "omega"));
+  CHECK(holds(refused(scene(focal + ", \"camera_model\": \"EUCM\", \"alpha\": 0.5", one)), "'beta' is missing"));
+  CHECK(holds(
+      refused(scene(focal + ", \"camera_model\": \"EUCM\", \"alpha\": 2, \"beta\": 1, \"w\": 16, \"h\": 12", one)),
+      "alpha"));
+  CHECK(holds(refused(scene(focal + ", \"camera_model\": \"DIVISION\"", one)), "'k' is missing"));
+  CHECK(holds(refused(scene(focal + ", \"camera_model\": \"OPENCV_FISHEYE\", \"k1\": -4e4, \"w\": 16, \"h\": 12", one)),
               "not one to one"));
   CHECK(holds(refused(scene("\"camera_angle_x\": 1, \"camera_model\": \"FISHEYE\"", one)), "'fl_x' is missing"));
   CHECK(
