@@ -74,6 +74,13 @@ void add_synth(CLI::App& app, command& selected) {
       ->type_name("N")
       ->check(whole_number())
       ->capture_default_str();
+  synth
+      ->add_option("--camera", options->camera,
+                   "Through another camera than a pinhole: COLMAP's name of a model\nand its parameters, as "
+                   "EQUIRECTANGULAR, FISHEYE,angle=200 or\nOPENCV_FISHEYE,k1=0.02; angle is across a view")
+      ->type_name("MODEL");
+  synth->add_flag("--depth", options->depth,
+                  "Also distances, as r_N_depth.npy: floats along the rays of\npixels, 0 where there is nothing");
   synth->add_flag("--quiet", *quiet, "Print nothing but errors");
   synth->footer(
       "Writes DIR/transforms_train.json and DIR/transforms_test.json (Blender's layout), DIR/train/r_N.png and\n"

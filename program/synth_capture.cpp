@@ -4,6 +4,7 @@
 #include "synth_trace.hpp"
 
 #include <gart/core/error.hpp>
+#include <gart/io/dataset.hpp>
 #include <gart/io/file.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
@@ -55,10 +56,37 @@ void prepare_folder(fs::path const& out) {
   for (char const* split : {"train", "test"}) fs::remove(out / (std::string("transforms_") + split + ".json"), failed);
 }
 
+// NumPy's format, version 1: [H][W] floats.
+void write_npy(fs::path const& path, std::vector<float> const& values, gart::camera const& view) {
+  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" + std::to_string(view.height) + ", " +
+                       std::to_string(view.width) + "), }";
+  header.resize((10 + header.size() + 64) / 64 * 64 - 10 - 1, ' ');
+  header += '\n';
+  std::string bytes = "\x93NUMPY";
+  bytes += {'\x01', '\x00', static_cast<char>(header.size() & 0xff), static_cast<char>(header.size() >> 8)};
+  bytes += header;
+  bytes.append(reinterpret_cast<char const*>(values.data()), values.size() * sizeof(float));
+  gart::write_file(path, std::string_view(bytes));
+}
+
 std::string transforms_json(std::vector<gart::camera> const& cameras, std::string const& split) {
   char text[256];
-  std::snprintf(text, sizeof text, "{\n  %s,\n  \"camera_angle_x\": %.17g,\n  \"frames\": [", mark, angle_x);
-  std::string json = text;
+  gart::camera const& first = cameras.front();
+  std::string json = std::string("{\n  ") + mark + ",\n  ";
+  if (auto const lens = gart::fields_of(first); lens.model == "PINHOLE") {
+    std::snprintf(text, sizeof text, "\"camera_angle_x\": %.17g,\n", angle_x);
+    json += text;
+  } else {
+    json += "\"camera_model\": \"" + lens.model + "\",\n  \"w\": " + std::to_string(first.width) +
+            ",\n  \"h\": " + std::to_string(first.height) + ",\n";
+    for (auto const& [name, value] : lens.values) {
+      bool const focal = name == "fx" || name == "fy";
+      std::snprintf(text, sizeof text, "  \"%s\": %.9g,\n", focal ? name == "fx" ? "fl_x" : "fl_y" : name.c_str(),
+                    value);
+      json += text;
+    }
+  }
+  json += "  \"frames\": [";
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     json += i == 0 ? "\n" : ",\n";
     json += "    {\"file_path\": \"./" + split + "/r_" + std::to_string(i) + "\", \"transform_matrix\": [";
@@ -106,17 +134,22 @@ void write_synth_capture(synth_options const& options, std::function<void(int do
   check_range("--points", options.points, synth_points);
   check_range("--threads", options.threads, synth_threads);
 
+  auto train = synth_cameras(options.train, options.size, false);
+  auto test = synth_cameras(options.test, options.size, true);
+  for (auto* cameras : {&train, &test})
+    for (gart::camera& c : *cameras)
+      if (!options.camera.empty()) c = gart::seen_through(c, options.camera);
   synth_renderer const renderer(make_synth_scene(options.seed), options.threads);
   prepare_folder(options.out);
-  auto const train = synth_cameras(options.train, options.size, false);
-  auto const test = synth_cameras(options.test, options.size, true);
   int done = 0;
   int const total = options.train + options.test;
   for (auto const* cameras : {&train, &test}) {
     fs::path const folder = options.out / (cameras == &train ? "train" : "test");
     for (std::size_t i = 0; i < cameras->size(); ++i) {
       auto const image = renderer.render((*cameras)[i], options.samples, hash(options.seed, done));
-      gart::write_png(folder / ("r_" + std::to_string(i) + ".png"), image);
+      std::string const name = "r_" + std::to_string(i);
+      gart::write_png(folder / (name + ".png"), image);
+      if (options.depth) write_npy(folder / (name + "_depth.npy"), renderer.distances((*cameras)[i]), (*cameras)[i]);
       ++done;
       if (progress) progress(done, total);
     }

@@ -3,6 +3,9 @@
 //   DIR/transforms_train.json, DIR/transforms_test.json   camera_angle_x; camera to world, OpenGL axes
 //   DIR/train/r_N.png, DIR/test/r_N.png                   RGBA, straight alpha
 //   DIR/points3d.ply                                      starting points on the surfaces, coloured
+//   DIR/train/r_N_depth.npy, DIR/test/r_N_depth.npy       if asked for: distances along the rays through the middles of
+//                                                         pixels, [H][W] floats, 0 where there is nothing
+// Through another camera than a pinhole the transforms name its model and parameters in place of camera_angle_x.
 // The transforms are written last, each file whole: a capture that was interrupted is not taken for one.
 
 #include "synth_scene.hpp"
@@ -11,6 +14,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <vector>
 
 namespace gart_cli {
@@ -21,6 +25,8 @@ struct synth_options {
   int size = 160;            // pixels a side
   int samples = 32;          // paths a pixel
   int points = 10000;
+  std::string camera;  // as gart::seen_through has it; empty: a pinhole
+  bool depth = false;  // distances too
   u64 seed = 1;
   int threads = 0;  // 0: all
 };

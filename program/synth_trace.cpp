@@ -223,7 +223,8 @@ gart::image8 synth_renderer::render(gart::camera const& view, int samples, u64 s
         sample_sequence random(stream, s);
         vec2 const at = random.next();
         vec3 sample;
-        if (!tracer.radiance(origin, gart::ray_direction(view, x + at.x, y + at.y), random, sample)) continue;
+        vec3 const direction = gart::ray_direction(view, x + at.x, y + at.y);
+        if (direction == vec3(0.0f) || !tracer.radiance(origin, direction, random, sample)) continue;
         sum += sample;
         ++covered;
       }
@@ -233,6 +234,20 @@ gart::image8 synth_renderer::render(gart::camera const& view, int samples, u64 s
     }
   });
   return image;
+}
+
+std::vector<float> synth_renderer::distances(gart::camera const& view) const {
+  implementation const& tracer = *implementation_;
+  std::vector<float> out(static_cast<std::size_t>(view.width) * view.height);
+  tracer.for_each(view.height, [&](int y) {
+    for (int x = 0; x < view.width; ++x) {
+      vec3 const direction = gart::ray_direction(view, x + 0.5f, y + 0.5f);
+      synth_hit hit;
+      if (direction != vec3(0.0f) && tracer.tracer.intersect(vec3(view.position), direction, 0, hit))
+        out[static_cast<std::size_t>(y) * view.width + x] = hit.t;
+    }
+  });
+  return out;
 }
 
 gart::point_cloud synth_renderer::points(std::vector<gart::camera> const& cameras, std::size_t count, u64 seed) const {

@@ -25,6 +25,9 @@ class synth_renderer {
   // RGBA, sRGB with straight alpha; `samples` (1 to 4096) paths a pixel, evenest at powers of two.
   gart::image8 render(gart::camera const& view, int samples, u64 seed) const;
 
+  // Distances along the rays through the middles of pixels, [H][W]; 0 where there is nothing.
+  std::vector<float> distances(gart::camera const& view) const;
+
   // Points on the surfaces, each seen by at least one of the cameras and coloured as that camera sees it: what
   // structure from motion would find.
   gart::point_cloud points(std::vector<gart::camera> const& cameras, std::size_t count, u64 seed) const;

@@ -5,6 +5,8 @@
 #include "capture.hpp"
 #include "json_record.hpp"
 
+#include <algorithm>
+
 namespace gart::io {
 namespace fs = std::filesystem;
 
@@ -73,11 +75,10 @@ std::string camera_json(span<named_camera const> cameras) {
   json out = json::array();
   for (named_camera const& c : cameras) {
     camera const& v = c.view;
-    camera_format const& model = camera_format_for(v);
+    camera_fields const fields = fields_of(v);
     json one = {{"name", c.name}, {"width", v.width}, {"height", v.height}};
-    if (model.name != "PINHOLE") one["camera_model"] = std::string(model.name);
-    for (int k = 0; k < model.parameters(); ++k)
-      if (v.kind != camera_kind::equirectangular) one[std::string(model.field(k))] = member_of(v, model.member(k));
+    if (fields.model != "PINHOLE") one["camera_model"] = fields.model;
+    for (auto const& [key, value] : fields.values) one[key] = value;
     json rows = json::array();
     for (int i = 0; i < 3; ++i) rows.push_back({v.rotation[0][i], v.rotation[1][i], v.rotation[2][i], v.position[i]});
     rows.push_back({0, 0, 0, 1});
@@ -90,6 +91,52 @@ std::string camera_json(span<named_camera const> cameras) {
 }  // namespace gart::io
 
 namespace gart {
+
+camera_fields fields_of(camera const& view) {
+  io::camera_format const& model = io::camera_format_for(view);
+  camera_fields out{std::string(model.name), {}};
+  for (int k = 0; k < model.parameters(); ++k)
+    if (view.kind != camera_kind::equirectangular)
+      out.values.emplace_back(model.field(k), io::member_of(view, model.member(k)));
+  return out;
+}
+
+camera seen_through(camera const& view, std::string const& text) {
+  std::string const name = text.substr(0, text.find(',')), where = "camera " + text;
+  io::camera_format const* const model = io::camera_format_of(name);
+  if (!model || !model->kind) throw unsupported(where + ": gart traces " + io::traced_camera_formats());
+  camera c;
+  c.kind = *model->kind;
+  c.width = view.width, c.height = view.height, c.position = view.position, c.rotation = view.rotation;
+  if (c.kind == camera_kind::equirectangular) c.width = 2 * c.height;
+  bool const wide = c.kind != camera_kind::perspective && c.kind != camera_kind::division;
+  double angle = wide ? 180 : 60;
+  c.cx = 0.5f * static_cast<float>(c.width), c.cy = 0.5f * static_cast<float>(c.height);
+  for (std::size_t at = name.size(); at < text.size();) {
+    std::string const pair = text.substr(at + 1, text.find(',', at + 1) - at - 1);
+    std::string const key = pair.substr(0, pair.find('='));
+    double value = 0;
+    if (pair.find('=') == pair.npos || !io::parse_number(std::string_view(pair).substr(key.size() + 1), value))
+      throw invalid_argument(where + ": '" + pair + "' is not NAME=NUMBER");
+    bool known = key == "angle";
+    if (known) angle = value;
+    for (int k = 0; k < model->parameters(); ++k)
+      if (model->field(k) == key) io::set_member(c, model->member(k), value), known = true;
+    if (!known)
+      throw invalid_argument(where + ": " + name + " has no '" + key + "' (it has " + std::string(model->fields) + ")");
+    at += 1 + pair.size();
+  }
+  if (c.kind != camera_kind::equirectangular && c.fx == 0) {
+    double q, value, ignored;
+    lens_curve const curve(c.kind, c.lens);
+    curve.curve(angle * 3.141592653589793 / 360, q, ignored);
+    curve.radial(q * q, value, ignored);
+    c.fx = static_cast<float>(0.5 * std::min(c.width, c.height) / (q * value));
+  }
+  if (c.fy == 0) c.fy = c.fx;
+  io::check_camera(c, where);
+  return c;
+}
 
 void write_camera_json(std::filesystem::path const& path, span<named_camera const> cameras) {
   write_file(path, io::camera_json(cameras));
