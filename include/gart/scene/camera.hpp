@@ -69,6 +69,12 @@ struct camera_fault {
 
 namespace gart::inline GART_ISA {
 
+/// Across and down, in the middle of the image: the focal lengths, or what the sphere has in their place.
+inline vec2 pixels_per_radian(camera const& c) {
+  if (c.kind != camera_kind::equirectangular) return {c.fx, c.fy};
+  return {static_cast<float>(c.width) / 6.2831853f, static_cast<float>(c.height) / 3.1415927f};
+}
+
 /// The same camera for an image of another size: intrinsics scale per axis.
 inline camera resized(camera c, int width, int height) {
   float const sx = static_cast<float>(width) / static_cast<float>(c.width);
