@@ -13,7 +13,7 @@ import os
 import re
 
 from charts import SOFT, Svg, bars, lines, scatter, stacked
-from tables import clock_of, source, table
+from tables import clock_of, formats, source, table
 from training_pages import TrainingPages
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -202,6 +202,11 @@ class Pages(TrainingPages):
             self.tables["uncut"] = table(["scene", "setting", "alpha_min", "image, max", "PSNR, dB",
                                           "gradient, worst group"], uncut)
 
+    def formats(self):
+        found = sorted(glob.glob(os.path.join(self.results, "formats_*.json")))
+        if found:
+            self.tables["formats"] = formats([self.load(os.path.basename(path)[:-5]) for path in found])
+
     def write_tables(self):
         for path in sorted(glob.glob(os.path.join(self.docs, "*.md"))):
             with open(path) as f:
@@ -235,6 +240,7 @@ def main():
     pages.stages()
     pages.cpu()
     pages.tradeoff()
+    pages.formats()
     pages.presets()
     pages.cutoffs()
     pages.auto()

@@ -14,6 +14,7 @@ What (comma-separated; default tests and paper):
               window, determinism; on --backend, a host by one thread, and bytes a Gaussian. Needs -DGART_VARIANTS=ON
   paper       strategies, memory and stages
   tradeoff    `gart tradeoff` on the first scene and on every --model: what each approximation costs and buys
+  formats     every --model in each format and setting, by its test views: bytes, PSNR, SSIM (bench/formats.py)
   presets     `gart train` with each --preset on every --capture: what they cost in quality
   rules       `gart train` with each rule of docs/training.md changed alone, --seeds of each (3): a file
               rules_NAME.json a capture, written after each rule
@@ -49,10 +50,11 @@ import tempfile
 import time
 
 from common import Failure, commit_of, first_match, last_line, machine, run
+from formats import Formats
 from training import LONG_PARTS, Trainings
 
 TRAININGS = ("presets", "rules", "auto", "curves", "long")
-PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff") + TRAININGS
+PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff", "formats") + TRAININGS
 SKIPPED = 77
 
 # Rows of docs/traits.md: name, SH degree, kernel degree, options of gart bench.
@@ -65,7 +67,7 @@ TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
                ("window 16", 3, 2, {"window": 16}), ("window 64", 3, 2, {"window": 64})])
 
 
-class Bench(Trainings):
+class Bench(Trainings, Formats):
     def __init__(self, a):
         self.a = a
         self.commit = commit_of(a.commit)

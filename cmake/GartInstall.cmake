@@ -17,6 +17,9 @@ set(_package_of_OpenMP::OpenMP_CXX "OpenMP COMPONENTS CXX")
 set(_package_of_Threads::Threads "Threads")
 set(_package_of_PNG::PNG "PNG")
 set(_package_of_TurboJPEG::TurboJPEG "TurboJPEG")
+set(_package_of_ZLIB::ZLIB "ZLIB")
+set(_package_of_ZSTD::ZSTD "ZSTD")
+set(_package_of_WebP::WebP "WebP")
 set(_package_of_embree "embree")
 set(_package_of_CUDA::cudart "CUDAToolkit")
 set(_package_of_CUDA::cudart_static "CUDAToolkit")
@@ -87,5 +90,6 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/gartConfig.cmake.in ${
                               INSTALL_DESTINATION ${_package_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/gartConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/gartConfig.cmake ${PROJECT_BINARY_DIR}/gartConfigVersion.cmake
-              ${PROJECT_SOURCE_DIR}/backends/io/FindTurboJPEG.cmake
+              ${PROJECT_SOURCE_DIR}/backends/io/FindTurboJPEG.cmake ${PROJECT_SOURCE_DIR}/backends/io/FindZSTD.cmake
+              ${PROJECT_SOURCE_DIR}/backends/io/FindWebP.cmake
         DESTINATION ${_package_dir})

@@ -141,7 +141,9 @@ int run_bench(bench_arguments const& a) {
 void add_bench(CLI::App& app, command& selected) {
   auto a = std::make_shared<bench_arguments>();
   CLI::App* bench = app.add_subcommand("bench", "Time every stage of a training step on a model, camera by camera.");
-  bench->add_option("MODEL.ply", a->model, "Gaussians, from gart or another program")->type_name("")->required();
+  bench->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")
+      ->type_name("")
+      ->required();
   bench->add_option("CAMERAS", a->cameras, "A dataset, or a camera JSON as for gart render")->type_name("")->required();
   bench
       ->add_option("--backward", a->backward,

@@ -112,7 +112,9 @@ int run_eval(eval_arguments const& a) {
 void add_eval(CLI::App& app, command& selected) {
   auto a = std::make_shared<eval_arguments>();
   CLI::App* eval = app.add_subcommand("eval", "Score a model against the test views of a capture: PSNR and SSIM.");
-  eval->add_option("MODEL.ply", a->model, "Gaussians, from gart or another program")->type_name("")->required();
+  eval->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")
+      ->type_name("")
+      ->required();
   eval->add_option("DATASET", a->dataset, "The capture, as gart train reads it")->type_name("")->required();
   eval->add_option("--out", a->out, "Where the scores go")->type_name("METRICS.json")->required();
   eval->add_option("--renders", a->renders, "Also keep NAME.png and NAME_truth.png of each view here")

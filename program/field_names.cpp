@@ -21,6 +21,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(train_options, initial_opacity), "--init-opacity"},
       {GART_CLI_FIELD(train_options, initial_scale), "--init-scale"},
       {GART_CLI_FIELD(train_options, exposure), "--exposure"},
+      {GART_CLI_FIELD(train_options, refine_poses), "--refine-poses"},
       {GART_CLI_FIELD(train_options, lt_budget), "--lt-budget"},
       {GART_CLI_FIELD(train_options, check_finite), "--check-finite"},
       {GART_CLI_FIELD(train_options, seed), "--seed"},

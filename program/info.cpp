@@ -2,6 +2,7 @@
 #include "progress.hpp"
 
 #include <gart/core/version.hpp>
+#include <gart/io/splat_file.hpp>
 #include <gart/runtime/session.hpp>
 
 #if defined(GART_WITH_CUDA)
@@ -42,6 +43,9 @@ void print_devices() {
 #else
   std::puts("embree     not in this build");
 #endif
+  std::string formats;
+  for (auto const* format : gart::splat_formats()) formats += std::string(formats.empty() ? "" : ", ") + format->name;
+  std::printf("models     %s\n", formats.c_str());
 }
 
 int run_info() {

@@ -59,6 +59,7 @@ int main(int argc, char** argv) {
   add_bench(app, selected);
   add_tradeoff(app, selected);
   add_synth(app, selected);
+  add_convert(app, selected);
   add_info(app, selected);
 
   try {

@@ -4,6 +4,7 @@
 #include "progress.hpp"
 #include "samples.hpp"
 
+#include <gart/io/camera_file.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/exposure_file.hpp>
 #include <gart/io/image_file.hpp>
@@ -129,7 +130,9 @@ int run_render(render_arguments const& a) {
 void add_render(CLI::App& app, command& selected) {
   auto a = std::make_shared<render_arguments>();
   CLI::App* render = app.add_subcommand("render", "Render a model from every camera of a dataset or a camera file.");
-  render->add_option("MODEL.ply", a->model, "Gaussians, from gart or another program")->type_name("")->required();
+  render->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")
+      ->type_name("")
+      ->required();
   render
       ->add_option("CAMERAS", a->cameras,
                    "A dataset (all its views), or a JSON list of {\"name\", \"width\",\n"

@@ -85,20 +85,21 @@ void refuse_foreign_files(fs::path const& folder) {
     throw gart::io_error(file.string(), "is there, from no run of gart train, and this run would replace it",
                          "choose another --out, or move it away");
   };
-  for (char const* name :
-       {"model.ply", "config.json", "checkpoint.gart", "history.json", "metrics.json", "report.html", "exposures.json"})
+  for (char const* name : {"model.ply", "config.json", "checkpoint.gart", "history.json", "metrics.json", "report.html",
+                           "exposures.json", "poses.json", "poses_test.json"})
     if (fs::exists(folder / name)) refuse(folder / name);
   for (auto const& image : images_in(folder / "renders")) refuse(image);
 }
 
 void remove_results(fs::path const& folder) {
-  for (char const* name : {"metrics.json", "report.html"}) fs::remove(folder / name);
+  for (char const* name : {"metrics.json", "report.html", "poses_test.json"}) fs::remove(folder / name);
   for (auto const& image : images_in(folder / "renders")) fs::remove(image);
 }
 
 void remove_run(fs::path const& folder) {
   remove_results(folder);
-  for (char const* name : {"model.ply", "exposures.json", "checkpoint.gart", "history.json"}) fs::remove(folder / name);
+  for (char const* name : {"model.ply", "exposures.json", "poses.json", "checkpoint.gart", "history.json"})
+    fs::remove(folder / name);
 }
 
 }  // namespace gart_cli

@@ -24,10 +24,10 @@ class run_lock {
 // io_error, naming it, for a file that a run would replace where no run of gart's left it.
 void refuse_foreign_files(std::filesystem::path const& folder);
 
-// What a run leaves at its end: metrics, the report and the images of renders/.
+// What a run leaves at its end: metrics, the report, the test views' poses and the images of renders/.
 void remove_results(std::filesystem::path const& folder);
-// And what it leaves on its way: the model, its exposures, the checkpoint and the history. config.json stays, lest a
-// run that is being replaced leave a folder that is not known for gart's.
+// And what it leaves on its way: the model, its exposures and poses, the checkpoint and the history. config.json stays,
+// lest a run that is being replaced leave a folder that is not known for gart's.
 void remove_run(std::filesystem::path const& folder);
 
 }  // namespace gart_cli

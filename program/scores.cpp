@@ -7,6 +7,7 @@ namespace gart_cli {
 nlohmann::json to_json(gart::scores const& result) {
   nlohmann::json all = {{"psnr", result.psnr}, {"ssim", result.ssim}, {"psnr_affine_colour", result.affine_psnr}};
   if (result.exposed) all["psnr_own_colours"] = result.own_psnr;
+  if (result.placed) all["psnr_capture_poses"] = result.captured_psnr;
   all["views"] = nlohmann::json::array();
   for (auto const& v : result.views) {
     all["views"].push_back({{"name", v.name},
@@ -14,6 +15,7 @@ nlohmann::json to_json(gart::scores const& result) {
                             {"ssim", v.ssim},
                             {"psnr_affine_colour", v.affine_psnr},
                             {"milliseconds", v.milliseconds}});
+    if (result.placed) all["views"].back()["psnr_capture_poses"] = v.captured_psnr;
     if (result.exposed) all["views"].back()["psnr_own_colours"] = v.own_psnr;
   }
   return all;
@@ -32,6 +34,9 @@ std::string in_words(gart::scores const& test, gart::scores const& training, std
   std::string text = "test PSNR " + both(test) + std::to_string(test.views.size()) +
                      " views; after the best affine colour of each " + fixed(test.affine_psnr, 2) +
                      " dB, a diagnostic\n";
+  if (test.placed)
+    text += "test views aligned to their photographs, which they were scored by; at the capture's poses " +
+            fixed(test.captured_psnr, 2) + " dB\n";
   if (training.views.empty()) return text;
   return text + "training PSNR " + both(training) + std::to_string(training.views.size()) + " of " +
          std::to_string(train_views) + " views\n";

@@ -9,8 +9,8 @@
 
 namespace gart_cli {
 
-// "psnr", "ssim", "psnr_affine_colour" and "views", and with exposures "psnr_own_colours"; null where there is no
-// number.
+// "psnr", "ssim", "psnr_affine_colour" and "views", with exposures "psnr_own_colours", and where views were placed at
+// other poses "psnr_capture_poses"; null where there is no number.
 nlohmann::json to_json(gart::scores const& result);
 // "test_views" and the scores of the test views, and under "training_scores" those of the training views that were
 // rendered for comparison, with their number, "scored_views", of "train_views".

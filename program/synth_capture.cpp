@@ -4,7 +4,7 @@
 #include "synth_trace.hpp"
 
 #include <gart/core/error.hpp>
-#include <gart/io/dataset.hpp>
+#include <gart/io/camera_file.hpp>
 #include <gart/io/file.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>

@@ -275,7 +275,9 @@ void add_tradeoff(CLI::App& app, command& selected) {
   CLI::App* tradeoff = app.add_subcommand(
       "tradeoff",
       "Measure what each approximation costs and buys: errors against a reference in double, times, bytes.");
-  tradeoff->add_option("MODEL.ply", a->model, "Gaussians, from gart or another program")->type_name("")->required();
+  tradeoff->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")
+      ->type_name("")
+      ->required();
   tradeoff
       ->add_option("CAMERAS", a->cameras,
                    "A capture, whose photographs give the loss that is\ndifferentiated; or a camera JSON as for gart "

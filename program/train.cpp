@@ -15,6 +15,8 @@ void add_train(CLI::App& app, command& selected) {
       "\nWrites into DIR:\n"
       "  model.ply         the Gaussians, as other viewers read them\n"
       "  exposures.json    with --exposure: of each training view, for gart render and gart eval\n"
+      "  poses.json        with --refine-poses: the training views' cameras as learned, as gart render reads them;\n"
+      "  poses_test.json   and the test views' as they were aligned to their photographs\n"
       "  report.html       one page: scores, curves, test views with their errors, where time and memory went\n"
       "  metrics.json      the same in figures\n"
       "  renders/          each test view: NAME.png, and NAME_truth.png beside it\n"

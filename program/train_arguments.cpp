@@ -113,6 +113,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "on: learn the exposure and white balance of each photograph;\ntest views get theirs from the "
                  "training views about them.\nauto: where neighbouring photographs differ in brightness"))
       ->check(one_of({"auto", "on", "off"}));
+  in_group(
+      r.add_flag(train, "--refine-poses", a.refine_poses,
+                 "Learn the pose of each training view with the Gaussians, for\ncaptures whose poses are a little off; "
+                 "test views are then\naligned to their photographs before they are scored"));
   in_group(r.add(train, "--downscale", a.downscale, "N", "Shrink images by this whole factor"))->check(between(1, 64));
   in_group(r.add(train, "--background", a.background, "NAME",
                  "white, black, or random (another at each step; tests on black);\nauto: white for transparent "
@@ -238,6 +242,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.initial_opacity = a.initial_opacity;
   o.initial_scale = a.initial_scale;
   o.exposure = a.exposure == "on";
+  o.refine_poses = a.refine_poses;
   o.mcmc.noise *= a.mcmc_noise;
   o.mcmc.opacity_penalty *= a.mcmc_penalty, o.mcmc.scale_penalty *= a.mcmc_penalty;
   o.adam.seen_only = a.adam == "seen";

@@ -4,10 +4,13 @@
 #include "report.hpp"
 #include "training_run.hpp"
 
+#include <gart/io/camera_file.hpp>
 #include <gart/io/exposure_file.hpp>
 #include <gart/io/file.hpp>
 #include <gart/io/image_file.hpp>
+#include <gart/loss/metrics.hpp>
 #include <gart/runtime/model_file.hpp>
+#include <gart/runtime/track.hpp>
 
 #include <cstdio>
 
@@ -15,15 +18,48 @@ namespace gart_cli {
 
 namespace fs = std::filesystem;
 
-gart::scores training_run::score(gart::some_views const& views, gart::keep_view const& keep) {
+gart::scores training_run::score(gart::some_views const& views, gart::keep_view const& keep,
+                                 gart::place_view const& place) {
   return gart::evaluate(
       views, eval_background_, session_->exposures(),
-      [this](gart::camera const& c) { return session_->render(c, eval_background_); }, keep);
+      [this](gart::camera const& c) { return session_->render(c, eval_background_); }, keep, place);
 }
 
-gart::scores training_run::test(int step, gart::keep_view const& keep) {
+// Each test view at the pose where the model, which stays as it is, agrees best with its photograph.
+gart::place_view training_run::aligned_to_photographs(std::vector<gart::named_camera>& found) {
+  auto request = configuration_request_of(a_);
+  request.sh_degree = session_->configuration().sh_degree;
+  auto without_buffer = request;
+  without_buffer.backward = "pixel", without_buffer.lt_format = gart::lt_format_kind::automatic;
+  std::shared_ptr<gart::renderer> renderer;
+  try {
+    renderer = gart::make_renderer(without_buffer);
+  } catch (gart::unsupported const&) {
+    renderer = gart::make_renderer(request);
+  }
+  renderer->set_model(session_->model());
+  gart::track_options options;
+  options.render = gart::render_options_of(train_options_of(a_), data_.extent, eval_background_);
+  options.steps = 20, options.blur = 0.01f;
+  return [this, renderer, options, exposures = session_->exposures(), &found](gart::dataset_view const& view) mutable {
+    options.exposed = exposures.at(view.view);
+    found.push_back(
+        {view.name,
+         gart::track(*renderer, gart::composited(view.image, eval_background_), view.view, options, view.mask).view});
+    return found.back().view;
+  };
+}
+
+// Each training view at the pose that was learned for it.
+gart::place_view training_run::as_learned() const {
+  return [this, poses = session_->poses()](gart::dataset_view const& view) {
+    return poses[static_cast<std::size_t>(&view - data_.train.data())].view;
+  };
+}
+
+gart::scores training_run::test(int step, gart::keep_view const& keep, gart::place_view const& place) {
   stopwatch const testing;
-  gart::scores const result = score(gart::all_of(data_.test), keep);
+  gart::scores const result = score(gart::all_of(data_.test), keep, place);
   if (!result.views.empty()) {
     course_.test.push_back({step, result.psnr, result.ssim, course_.seconds});
     say_.note("step " + with_commas(step) + ": test PSNR " + fixed(result.psnr, 2) + " dB, SSIM " +
@@ -47,6 +83,7 @@ void training_run::save() {
   gart::save_model(a_.model_file(), file);
   if (auto const exposures = session_->exposures(); !exposures.empty())
     gart::write_exposures(a_.out / "exposures.json", exposures);
+  if (auto const poses = session_->poses(); !poses.empty()) gart::write_cameras(a_.out / "poses.json", poses);
   try {
     save_checkpoint();
   } catch (gart::io_error const& e) {
@@ -59,6 +96,7 @@ void training_run::conclude() {
   std::vector<report_view> shown;
   stopwatch const writing;
   double const tests_before = test_seconds_;
+  std::vector<gart::named_camera> aligned;
   gart::scores const result = test(
       session_->steps_done(),
       [&](std::size_t i, gart::view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
@@ -67,10 +105,13 @@ void training_run::conclude() {
         if (in_report(i, data_.test.size())) shown.push_back(make_report_view(s.name, s.psnr, s.ssim, render, truth));
         say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
                    static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
-      });
+      },
+      a_.refine_poses ? aligned_to_photographs(aligned) : gart::place_view());
+  if (!aligned.empty()) gart::write_cameras(a_.out / "poses_test.json", aligned);
   say_.state("testing on training views", 1);
   stopwatch const training_views;
-  gart::scores const training = score(gart::evenly_spread(data_.train, data_.test.size()));
+  gart::scores const training = score(gart::evenly_spread(data_.train, data_.test.size()), {},
+                                      a_.refine_poses ? as_learned() : gart::place_view());
   test_seconds_ += training_views.seconds();
   write_json(a_.history_file(), course_.to_json());
   save_seconds_ += writing.seconds() - (test_seconds_ - tests_before);
@@ -102,7 +143,7 @@ nlohmann::json training_run::metrics_of(gart::scores const& result, gart::scores
   m["psnr_over_seconds"] = course_.psnr_over_seconds();
   m["image_size"] = image_size(), m["notes"] = data_.notes;
   m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
-  m["exposure"] = a_.exposure == "on";
+  m["exposure"] = a_.exposure == "on", m["refine_poses"] = a_.refine_poses;
   m["iterations"] = session_->steps_done(), m["time_budget"] = a_.time_budget, m["raised"] = raised_;
   m["gaussians"] = gaussians_, m["sh_degree"] = session_->configuration().sh_degree;
   m["floats_per_gaussian"] = 11 + 3 * gart::sh_coefficients(session_->configuration().sh_degree);

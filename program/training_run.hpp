@@ -63,8 +63,11 @@ class training_run {
   void show(gart::step_report const& report, recent_steps const& recent);
 
   // Scores and files (training_results.cpp).
-  gart::scores score(gart::some_views const& views, gart::keep_view const& keep = {});
-  gart::scores test(int step, gart::keep_view const& keep = {});
+  gart::scores score(gart::some_views const& views, gart::keep_view const& keep = {},
+                     gart::place_view const& place = {});
+  gart::scores test(int step, gart::keep_view const& keep = {}, gart::place_view const& place = {});
+  gart::place_view aligned_to_photographs(std::vector<gart::named_camera>& found);
+  gart::place_view as_learned() const;
   void save_checkpoint();
   void save();
   void conclude();

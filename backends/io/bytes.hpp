@@ -65,6 +65,14 @@ class byte_reader {
   std::size_t position_ = 0;
 };
 
+// The bytes of a number at the end of the text.
+template <class T>
+void put(std::string& out, T value) {
+  char raw[sizeof value];
+  std::memcpy(raw, &value, sizeof value);
+  out.append(raw, sizeof raw);
+}
+
 inline bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\v' || c == '\f'; }
 
 // Takes the next word off the front of `text`; empty at the end.

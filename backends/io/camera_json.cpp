@@ -5,6 +5,8 @@
 #include "capture.hpp"
 #include "json_record.hpp"
 
+#include <gart/io/camera_file.hpp>
+
 #include <algorithm>
 
 namespace gart::io {
@@ -71,23 +73,6 @@ std::vector<named_camera> read_camera_json(fs::path const& file) {
   return cameras;
 }
 
-std::string camera_json(span<named_camera const> cameras) {
-  json out = json::array();
-  for (named_camera const& c : cameras) {
-    camera const& v = c.view;
-    camera_fields const fields = fields_of(v);
-    json one = {{"name", c.name}, {"width", v.width}, {"height", v.height}};
-    if (fields.model != "PINHOLE") one["camera_model"] = fields.model;
-    for (auto const& [key, value] : fields.values) one[key] = value;
-    json rows = json::array();
-    for (int i = 0; i < 3; ++i) rows.push_back({v.rotation[0][i], v.rotation[1][i], v.rotation[2][i], v.position[i]});
-    rows.push_back({0, 0, 0, 1});
-    one["c2w"] = rows;
-    out.push_back(one);
-  }
-  return out.dump(1) + "\n";
-}
-
 }  // namespace gart::io
 
 namespace gart {
@@ -138,8 +123,22 @@ camera seen_through(camera const& view, std::string const& text) {
   return c;
 }
 
-void write_camera_json(std::filesystem::path const& path, span<named_camera const> cameras) {
-  write_file(path, io::camera_json(cameras));
+void write_cameras(std::filesystem::path const& path, std::vector<named_camera> const& cameras) {
+  using nlohmann::json;
+  json out = json::array();
+  for (named_camera const& c : cameras) {
+    camera const& v = c.view;
+    camera_fields const fields = fields_of(v);
+    json one = {{"name", c.name}, {"width", v.width}, {"height", v.height}};
+    if (fields.model != "PINHOLE") one["camera_model"] = fields.model;
+    for (auto const& [key, value] : fields.values) one[key] = value;
+    json rows = json::array();
+    for (int i = 0; i < 3; ++i) rows.push_back({v.rotation[0][i], v.rotation[1][i], v.rotation[2][i], v.position[i]});
+    rows.push_back({0, 0, 0, 1});
+    one["c2w"] = rows;
+    out.push_back(one);
+  }
+  write_file(path, out.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace gart

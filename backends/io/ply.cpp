@@ -21,6 +21,7 @@ namespace {
 using namespace io::ply;
 using io::next_word;
 using io::parse_number;
+using io::put;
 
 // The values of the body one after the other, whatever their encoding.
 class body_reader {
@@ -236,11 +237,6 @@ struct point_store {
   }
 };
 
-void put(std::string& out, float value) {
-  auto const raw = std::bit_cast<std::array<char, sizeof value>>(value);
-  out.append(raw.data(), raw.size());
-}
-
 // Hands the text to the stream now and then, so that it stays small.
 void drain(std::ostream& out, std::string& text, std::size_t limit) {
   if (text.size() < limit) return;
@@ -289,15 +285,7 @@ void write_splat_ply(std::filesystem::path const& path, gaussian_model const& mo
   if (model.sh_degree < 0 || model.sh_degree > 3 || !model.arrays_agree()) {
     throw invalid_argument("the arrays of the model to write to " + path.string() + " do not agree in size");
   }
-  std::string text = "ply\nformat binary_little_endian 1.0\n";
-  for (auto const& [key, value] : traits) {
-    bool const word = !key.empty() && std::none_of(key.begin(), key.end(), io::is_space);
-    if (!word || value.find_first_of("\r\n") != std::string::npos) {
-      throw invalid_argument("the trait '" + key + "' does not fit on a comment line of " + path.string());
-    }
-    text += "comment gart " + key + " " + value + "\n";
-  }
-  if (traits.count("antialias")) text += "comment SplatRenderMode: mip\n";
+  std::string text = header_start(path, traits);
   text += "element vertex " + std::to_string(n) + "\n";
   for (std::string const& name : splat_columns(model.sh_degree, true)) text += "property float " + name + "\n";
   text += "end_header\n";
@@ -357,7 +345,12 @@ void write_point_ply(std::filesystem::path const& path, point_cloud const& point
 
 extern splat_format const ply_format;
 splat_format const ply_format = {
-    "PLY", ".ply", [](std::string_view first) { return first.starts_with("ply\n") || first.starts_with("ply\r"); },
-    read_splat_ply, write_splat_ply};
+    "PLY",
+    ".ply",
+    {.traits = true, .kernel = true},
+    [](std::string_view first) { return first.starts_with("ply\n") || first.starts_with("ply\r"); },
+    read_splat_ply,
+    [](std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits,
+       splat_packing const&) { write_splat_ply(path, model, traits); }};
 
 }  // namespace gart

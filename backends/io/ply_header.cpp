@@ -4,6 +4,7 @@
 
 #include <gart/io/file.hpp>
 
+#include <algorithm>
 #include <string_view>
 #include <utility>
 
@@ -94,6 +95,19 @@ ply_file open(std::filesystem::path const& path) {
   ply_file file{path.string(), read_file(path), {}};
   parse_header(file);
   return file;
+}
+
+std::string header_start(std::filesystem::path const& path, splat_traits const& traits) {
+  std::string text = "ply\nformat binary_little_endian 1.0\n";
+  for (auto const& [key, value] : traits) {
+    bool const word = !key.empty() && std::none_of(key.begin(), key.end(), is_space);
+    if (!word || value.find_first_of("\r\n") != std::string::npos) {
+      throw invalid_argument("the trait '" + key + "' does not fit on a comment line of " + path.string());
+    }
+    text += "comment gart " + key + " " + value + "\n";
+  }
+  if (traits.count("antialias")) text += "comment SplatRenderMode: mip\n";
+  return text;
 }
 
 }  // namespace gart::io::ply

@@ -59,4 +59,7 @@ struct ply_file {
 
 ply_file open(std::filesystem::path const& path);
 
+// The first lines of a binary splat file of these traits, as comments. invalid_argument for one that is no line.
+std::string header_start(std::filesystem::path const& path, splat_traits const& traits);
+
 }  // namespace gart::io::ply

@@ -9,11 +9,12 @@
 namespace gart {
 
 // Each format is defined with its reader.
-extern splat_format const ply_format;
+extern splat_format const ply_format, compressed_ply_format, spz_format, sog_format, splat_bytes_format, glb_format;
 
 namespace {
 
-splat_format const* const formats[] = {&ply_format};
+splat_format const* const formats[] = {&compressed_ply_format, &ply_format, &spz_format, &sog_format,
+                                       &splat_bytes_format,    &glb_format};
 
 std::string listed(bool written) {
   std::string all;
@@ -24,24 +25,42 @@ std::string listed(bool written) {
 }
 
 splat_format const* by_name(std::filesystem::path const& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
+  std::string name = path.filename().string();
+  std::transform(name.begin(), name.end(), name.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   for (auto const* format : formats)
-    if (ending == format->extension) return format;
+    if (name.ends_with(format->extension)) return format;
   return nullptr;
 }
 
 // The name decides where the bytes say nothing, so that a damaged file is refused by its own format's reader.
 splat_format const* format_of(std::filesystem::path const& path) {
   std::ifstream file(path, std::ios::binary);
-  char first[16] = {};
+  char first[4096] = {};
   file.read(first, sizeof first);
   std::string_view const seen(first, static_cast<std::size_t>(file.gcount()));
   for (auto const* format : formats)
-    if (format->begins(seen)) return format;
+    if (format->begins && format->begins(seen)) return format;
   if (auto const* named = by_name(path)) return named;
-  return file.is_open() ? nullptr : formats[0];  // whose reader says what is wrong with the path
+  return file.is_open() ? nullptr : &ply_format;  // whose reader says what is wrong with the path
+}
+
+splat_format const& written_as(std::filesystem::path const& path) {
+  splat_format const* const format = by_name(path);
+  if (!format || !format->write)
+    throw io_error(path.string(), "has the ending of no format of Gaussians that gart writes",
+                   "it writes " + listed(true));
+  return *format;
+}
+
+// Whether the trait stays, whole or as a mark.
+bool keeps(splat_room const& room, std::string const& trait) {
+  return room.traits || (room.kernel && trait == "kernel_degree") || (room.antialias && trait == "antialias");
+}
+
+bool another_kernel(splat_traits const& traits) {
+  auto const kernel = traits.find("kernel_degree");
+  return kernel != traits.end() && kernel->second != "2";
 }
 
 }  // namespace
@@ -55,12 +74,42 @@ gaussian_model read_splats(std::filesystem::path const& path, splat_traits* trai
   return format->read(path, traits);
 }
 
-void write_splats(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits) {
-  splat_format const* const format = by_name(path);
-  if (!format || !format->write)
-    throw io_error(path.string(), "has the ending of no format of Gaussians that gart writes",
-                   "it writes " + listed(true));
-  format->write(path, model, traits);
+void write_splats(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits,
+                  splat_packing const& packing) {
+  splat_format const& format = written_as(path);
+  if (model.sh_degree < 0 || model.sh_degree > 3 || !model.arrays_agree())
+    throw invalid_argument("the arrays of the model to write to " + path.string() + " do not agree in size");
+  auto const bits = [](int n) { return n >= 1 && n <= 8; };
+  if (!bits(packing.sh1_bits) || !bits(packing.sh_bits) || packing.palette < 0 || packing.palette > 65536)
+    throw invalid_argument("splat_packing: bits are 1 to 8, and a palette has 65536 rows at the most");
+  if (another_kernel(traits) && !format.room.kernel)
+    throw io_error(path.string(),
+                   std::string(format.name) + " has no word for the kernel degree " + traits.at("kernel_degree") +
+                       " that the model was trained with, and would show Gaussians",
+                   "write a .ply or a .compressed.ply, or train with kernel degree 2");
+  splat_traits kept;
+  for (auto const& trait : traits)
+    if (keeps(format.room, trait.first)) kept.insert(trait);
+  if (model.sh_degree > format.room.sh_degree)
+    format.write(path, with_sh_degree(model, format.room.sh_degree), kept, packing);
+  else
+    format.write(path, model, kept, packing);
+}
+
+std::vector<std::string> left_out(std::filesystem::path const& path, gaussian_model const& model,
+                                  splat_traits const& traits) {
+  splat_format const& format = written_as(path);
+  std::vector<std::string> lines;
+  if (model.sh_degree > format.room.sh_degree)
+    lines.push_back("spherical harmonics above degree " + std::to_string(format.room.sh_degree) +
+                    " (the model has degree " + std::to_string(model.sh_degree) + ")");
+  for (auto const& [key, value] : traits) {
+    if (!keeps(format.room, key))
+      lines.push_back(key + " " + value);
+    else if (key == "antialias" && !format.room.traits && !value.empty())
+      lines.push_back("the width of antialias, " + value + ", of which the mark stays");
+  }
+  return lines;
 }
 
 }  // namespace gart

@@ -132,6 +132,10 @@ void write_checkpoint(std::filesystem::path const& path, training_state const& s
     out.add("exposure", e.value), out.add("exposure/first", e.first), out.add("exposure/second", e.second);
     out.add("exposure/visits", e.visits);
   }
+  if (pose_state const& p = state.poses; !p.value.empty()) {
+    out.add("pose", p.value), out.add("pose/first", p.first), out.add("pose/second", p.second);
+    out.add("pose/metric", p.metric), out.add("pose/visits", p.visits);
+  }
   out.write(path);
 }
 
@@ -169,6 +173,16 @@ training_state state_of(checkpoint_reader const& in) {
     std::size_t const floats = exposure::floats * e.visits.size();
     if (e.value.size() != floats || e.first.size() != floats || e.second.size() != floats)
       in.fail("its arrays exposure* differ in length");
+  }
+  if (in.has("pose")) {
+    pose_state& p = s.poses;
+    p.value = in.get<double>("pose"), p.visits = in.get<u32>("pose/visits");
+    p.metric = in.get<double>("pose/metric");
+    p.first = in.get<double>("pose/first"), p.second = in.get<double>("pose/second");
+    std::size_t const numbers = std::tuple_size_v<pose_numbers> * p.visits.size();
+    if (p.value.size() != numbers || p.first.size() != numbers || p.second.size() != numbers ||
+        p.metric.size() != std::tuple_size_v<pose_numbers> * numbers)
+      in.fail("its arrays pose* differ in length");
   }
   if (in.has("sh_trials")) s.trials = in.get<band_trial>("sh_trials");
   for (band_trial const& t : s.trials)

@@ -115,6 +115,7 @@ class degree_selection final : public session {
     open(s);
   }
   exposure_field exposures() const override { return inner_->exposures(); }
+  std::vector<named_camera> poses() const override { return inner_->poses(); }
   std::vector<band_trial> trials() const override { return trials_; }
   profiler& profile() override { return profile_; }
   std::size_t peak_bytes() const override { return std::max(peak_bytes_, inner_->peak_bytes()); }
@@ -229,6 +230,8 @@ trial_plan plan_trials(configuration_request const& request, train_options const
     plan.why = "there is no band to measure";
   } else if (!(options.sh_gain > 0)) {
     plan.why = "no gain is asked of a band";
+  } else if (options.refine_poses) {
+    plan.why = "poses are learned, and views held out would have none";
   } else if (train_views < fewest_views) {
     plan.why = std::to_string(train_views) + " training views are too few to hold some out and measure";
   } else if (!long_enough(plan, options.iterations)) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 namespace gart {
 
@@ -19,16 +20,17 @@ some_views evenly_spread(std::vector<dataset_view> const& views, std::size_t cou
 }
 
 scores evaluate(some_views const& views, vec3 background, exposure_field const& exposures, render_view const& render,
-                keep_view const& keep) {
+                keep_view const& keep, place_view const& place) {
   scores result;
-  result.exposed = !exposures.empty();
-  double psnr_sum = 0, ssim_sum = 0, affine_sum = 0, own_sum = 0;
+  result.exposed = !exposures.empty(), result.placed = static_cast<bool>(place);
+  double psnr_sum = 0, ssim_sum = 0, affine_sum = 0, own_sum = 0, captured_sum = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     auto const& view = *views[i];
     view_score score;
     score.name = view.name;
+    camera const placed = place ? place(view) : view.view;
     auto const start = std::chrono::steady_clock::now();
-    image_float image = render(view.view).color;
+    image_float image = render(placed).color;
     score.milliseconds = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     image_float const truth = composited(view.image, background);
     if (image.data.size() != truth.data.size()) {
@@ -52,6 +54,13 @@ scores evaluate(some_views const& views, vec3 background, exposure_field const& 
     score.ssim = ssim(scored, truth);
     score.affine_psnr = psnr_affine_color(image, truth, view.mask);
     psnr_sum += score.psnr, ssim_sum += score.ssim, affine_sum += score.affine_psnr, own_sum += score.own_psnr;
+    if (place) {
+      image_float const kept = std::exchange(image, render(view.view).color);
+      apply(exposures.at(view.view), image);
+      score.captured_psnr = score_psnr();
+      image = kept;
+    }
+    captured_sum += score.captured_psnr;
     if (keep) keep(i, score, image, truth);
     result.views.push_back(std::move(score));
   }
@@ -59,6 +68,7 @@ scores evaluate(some_views const& views, vec3 background, exposure_field const& 
     result.psnr = psnr_sum / static_cast<double>(views.size());
     result.ssim = ssim_sum / static_cast<double>(views.size());
     result.affine_psnr = affine_sum / static_cast<double>(views.size());
+    if (place) result.captured_psnr = captured_sum / static_cast<double>(views.size());
     if (result.exposed) result.own_psnr = own_sum / static_cast<double>(views.size());
   }
   return result;

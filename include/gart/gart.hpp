@@ -10,12 +10,14 @@
 #include <gart/core/version.hpp>
 #include <gart/exec/cuda.hpp>
 #include <gart/exec/parallel.hpp>
+#include <gart/io/camera_file.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
 #include <gart/io/splat_file.hpp>
 #include <gart/loss/affine_color.hpp>
 #include <gart/loss/metrics.hpp>
+#include <gart/pose/differentiate_pose.hpp>
 #include <gart/reference/reference.hpp>
 #include <gart/render/frame.hpp>
 #include <gart/runtime/choose.hpp>
@@ -26,6 +28,8 @@
 #include <gart/runtime/presets.hpp>
 #include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
+#include <gart/runtime/track.hpp>
+#include <gart/scene/similarity.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
 #include <gart/train/trainer.hpp>

@@ -79,6 +79,25 @@ void check_dataset(gart::dataset const& data) {
   promise(finite(data.bounds_min) && finite(data.bounds_max), "bounds that are not finite");
 }
 
+void check_model(gart::gaussian_model const& m) {
+  gart::gaussian_model shape;
+  shape.resize(m.size(), m.sh_degree);
+  promise(m.sh_degree >= 0 && m.sh_degree <= 3 && m.mean.size() == shape.mean.size() &&
+              m.log_scale.size() == shape.log_scale.size() && m.quaternion.size() == shape.quaternion.size() &&
+              m.sh.size() == shape.sh.size(),
+          "arrays that differ in length");
+  promise(finite(m.mean) && finite(m.log_scale) && finite(m.quaternion) && finite(m.opacity) && finite(m.sh),
+          "a Gaussian that is not finite");
+}
+
+bool read_splats(scratch_folder const& folder, char const* name, std::string_view input) {
+  fs::path const file = folder.put(name, input);
+  return accepted(folder, [&] {
+    gart::splat_traits traits;
+    check_model(gart::read_splats(file, &traits));
+  });
+}
+
 // The first n parts of `input`, between which stands a line "====". A part that is not there is no file.
 template <std::size_t n>
 void put_parts(scratch_folder const& folder, std::array<char const*, n> const& names, std::string_view input) {
@@ -128,20 +147,38 @@ bool splat_ply(std::string_view input) {
   return accepted(folder, [&] {
     gart::splat_traits traits;
     gart::gaussian_model const m = gart::read_splat_ply(file, &traits);
-    gart::gaussian_model shape;
-    shape.resize(m.size(), m.sh_degree);
-    promise(m.sh_degree >= 0 && m.sh_degree <= 3 && m.mean.size() == shape.mean.size() &&
-                m.log_scale.size() == shape.log_scale.size() && m.quaternion.size() == shape.quaternion.size() &&
-                m.sh.size() == shape.sh.size(),
-            "arrays that differ in length");
-    promise(finite(m.mean) && finite(m.log_scale) && finite(m.quaternion) && finite(m.opacity) && finite(m.sh),
-            "a Gaussian that is not finite");
+    check_model(m);
     gart::write_splat_ply(again, m);
     gart::gaussian_model const back = gart::read_splat_ply(again);
     promise(back.sh_degree == m.sh_degree && back.mean == m.mean && back.log_scale == m.log_scale &&
                 back.quaternion == m.quaternion && back.opacity == m.opacity && back.sh == m.sh,
             "a model that is another when written and read again");
   });
+}
+
+bool spz(std::string_view input) {
+  static scratch_folder const folder("spz");
+  return read_splats(folder, "model.spz", input);
+}
+
+bool compressed_ply(std::string_view input) {
+  static scratch_folder const folder("compressed_ply");
+  return read_splats(folder, "model.compressed.ply", input);
+}
+
+bool sog(std::string_view input) {
+  static scratch_folder const folder("sog");
+  return read_splats(folder, "model.sog", input);
+}
+
+bool splat_bytes(std::string_view input) {
+  static scratch_folder const folder("splat_bytes");
+  return read_splats(folder, "model.splat", input);
+}
+
+bool glb(std::string_view input) {
+  static scratch_folder const folder("glb");
+  return read_splats(folder, "model.glb", input);
 }
 
 bool point_ply(std::string_view input) {

@@ -11,6 +11,11 @@
 namespace gart_fuzz {
 
 bool splat_ply(std::string_view input);  // and written again, which must give the same model
+bool spz(std::string_view input);        // the formats of docs/formats.md, each by its first bytes or its name
+bool compressed_ply(std::string_view input);
+bool sog(std::string_view input);
+bool splat_bytes(std::string_view input);
+bool glb(std::string_view input);
 bool point_ply(std::string_view input);
 bool colmap_bin(std::string_view input);  // cameras, images, points3D, between them a line "===="
 bool colmap_txt(std::string_view input);  // likewise

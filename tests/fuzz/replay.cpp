@@ -26,6 +26,11 @@ struct reader {
 
 constexpr reader readers[] = {
     {"splat_ply", gart_fuzz::splat_ply},
+    {"spz", gart_fuzz::spz},
+    {"compressed_ply", gart_fuzz::compressed_ply},
+    {"sog", gart_fuzz::sog},
+    {"splat_bytes", gart_fuzz::splat_bytes},
+    {"glb", gart_fuzz::glb},
     {"point_ply", gart_fuzz::point_ply},
     {"colmap_bin", gart_fuzz::colmap_bin},
     {"colmap_txt", gart_fuzz::colmap_txt},

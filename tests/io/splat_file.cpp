@@ -31,7 +31,7 @@ TEST_CASE("a file of Gaussians is known by its first bytes, whatever its name") 
 
 TEST_CASE("what is in no format is refused with the list of formats") {
   scratch_folder const folder;
-  for (char const* bytes : {"", "p", "glTF and more than 16 bytes"}) {
+  for (char const* bytes : {"", "p", "glXF and more than 16 bytes"}) {
     auto const path = folder.put("model.xyz", bytes);
     std::string const said = error_of([&] { gart::read_splats(path); });
     CHECK(holds(said, "model.xyz"));
@@ -53,9 +53,20 @@ TEST_CASE("the formats have a name, an ending and a reader, and each knows what 
     CHECK(format->extension[0] == '.');
     if (!format->write) continue;
     auto const path = folder.path / (std::string("model") + format->extension);
-    gart::write_splats(path, one());
+    try {
+      gart::write_splats(path, one());
+    } catch (gart::io_error const& e) {
+      CHECK(holds(e.what(), "install lib"));  // built without the format's library
+      continue;
+    }
     auto const bytes = gart::read_file(path);
-    CHECK(format->begins({reinterpret_cast<char const*>(bytes.data()), std::min<std::size_t>(16, bytes.size())}));
+    std::string_view const first(reinterpret_cast<char const*>(bytes.data()),
+                                 std::min<std::size_t>(4096, bytes.size()));
+    // The first that knows the bytes is the one that reads them; a format without such bytes is known by its name.
+    gart::splat_format const* known = nullptr;
+    for (gart::splat_format const* any : gart::splat_formats())
+      if (!known && any->begins && any->begins(first)) known = any;
+    CHECK(known == (format->begins ? format : nullptr));
     CHECK(gart::read_splats(path).size() == 1);
   }
 }

@@ -1,5 +1,6 @@
 #include "support.hpp"
 
+#include <gart/io/camera_file.hpp>
 #include <gart/io/ply.hpp>
 
 #include <chrono>
@@ -372,7 +373,7 @@ TEST_CASE("cameras of every model are written to a camera JSON and read back") {
   lens = {};
   lens.alpha = 0.6f, lens.beta = 1.1f;
   add(kind::eucm, lens);
-  gart::write_camera_json(folder.path / "cameras.json", cameras);
+  gart::write_cameras(folder.path / "cameras.json", cameras);
   auto const back = gart::load_cameras(folder.path / "cameras.json");
   REQUIRE(back.size() == cameras.size());
   for (std::size_t i = 0; i < back.size(); ++i) {
@@ -387,7 +388,7 @@ TEST_CASE("cameras of every model are written to a camera JSON and read back") {
     CHECK(b.rotation == a.rotation);
   }
   cameras.resize(1), cameras[0].view.lens.s1 = 0.1f;
-  CHECK(holds(error_of([&] { gart::write_camera_json(folder.path / "cameras.json", cameras); }), "no camera model"));
+  CHECK(holds(error_of([&] { gart::write_cameras(folder.path / "cameras.json", cameras); }), "no camera model"));
 }
 
 TEST_CASE("camera JSON is in OpenCV axes") {

@@ -135,24 +135,32 @@ TEST_CASE_TEMPLATE("the dead give their rows to halves of those that the error i
   CHECK(densifier.error_sum.size() == most);
 }
 
-TEST_CASE_TEMPLATE("sources are drawn in proportion to the error seen through them", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("sources are drawn in proportion to the error seen through them, and their opacity", E,
+                   GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   index_t const n = 40000, drawn = 800;
-  gaussian_model const start = tagged(n, random);
+  int const kinds = 8;
+  auto const error_of = [](index_t kind) { return 1.0 + kind % 4; };
+  auto const opacity_of = [](index_t kind) { return kind < 4 ? 0.2 : 0.8; };
+  gaussian_model start = tagged(n, random);
   std::vector<float> error(n);
-  for (index_t i = 0; i < n; ++i) error[i] = static_cast<float>(1 + i % 4);
+  for (index_t i = 0; i < n; ++i) {
+    error[i] = static_cast<float>(error_of(i % kinds));
+    start.opacity[i] = static_cast<float>(logit(opacity_of(i % kinds)));
+  }
   training<E> t(start);
   auto densifier = t.densifier(n + drawn, error, gart_test::seed());
   REQUIRE(densifier.densify(t.model, t.state, 1500).added == drawn);
   gaussian_model const got = t.model.to_host();
-  double count[4] = {}, chi_square = 0;
-  for (index_t i = n; i < n + drawn; ++i) ++count[tag_of(got, i) % 4];
-  for (int k = 0; k < 4; ++k) {
-    double const expected = drawn * (1 + k) / 10.0, d = count[k] - expected;
+  double count[kinds] = {}, chi_square = 0, all = 0;
+  for (index_t i = n; i < n + drawn; ++i) ++count[tag_of(got, i) % kinds];
+  for (index_t k = 0; k < kinds; ++k) all += error_of(k) * opacity_of(k);
+  for (index_t k = 0; k < kinds; ++k) {
+    double const expected = drawn * error_of(k) * opacity_of(k) / all, d = count[k] - expected;
     chi_square += d * d / expected;
   }
-  CHECK(chi_square < 25);  // of three degrees of freedom: one run in 60,000
+  CHECK(chi_square < 33);  // of seven degrees of freedom: one run in 40,000
 }
 
 TEST_CASE_TEMPLATE("the count follows its curve and at most doubles", E, GART_TEST_POLICIES) {

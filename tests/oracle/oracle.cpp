@@ -74,7 +74,8 @@ Eigen::Matrix<S, 3, 3> rotation_of(S w, S x, S y, S z) {
 // What the filter of a camera's pixels makes of a Gaussian.
 class pixels_filter {
  public:
-  pixels_filter(gart::camera const& c, double pixels) : c_(c), pixels_(pixels) {
+  pixels_filter(gart::camera const& c, double pixels, Matrix3d const& turn = Matrix3d::Identity())
+      : c_(c), pixels_(pixels), turn_(turn) {
     for (int k = 0; pixels > 0 && k <= 64; ++k) {
       double const u = k / 64.0 * c.width, v = k / 64.0 * c.height;
       for (Vector3d const& p : {camera_direction(c, u, 0), camera_direction(c, u, c.height), camera_direction(c, 0, v),
@@ -118,7 +119,8 @@ class pixels_filter {
     Eigen::Matrix<S, 3, 1> q;
     for (int axis = 0; axis < 3; ++axis) {
       q[axis] = S(0.0);
-      for (int k = 0; k < 3; ++k) q[axis] += S(p[k] * double(c_.rotation[axis][k]));
+      Vector3d const turned = turn_ * Vector3d(c_.rotation[axis][0], c_.rotation[axis][1], c_.rotation[axis][2]);
+      for (int k = 0; k < 3; ++k) q[axis] += S(p[k] * turned[k]);
     }
     S const x = inside(q[0], q[2], lo_[0], hi_[0]), y = inside(q[1], q[2], lo_[1], hi_[1]);
     S const squares = 1.0 + x * x + y * y, length = sqrt(squares);
@@ -148,6 +150,7 @@ class pixels_filter {
 
   gart::camera const& c_;
   double pixels_;
+  Matrix3d turn_;  // of the camera in the world
   Vector3d lo_ = Vector3d::Constant(1e300), hi_ = Vector3d::Constant(-1e300);
 };
 
@@ -406,14 +409,19 @@ direction ray_through(gart::camera const& c, int i, int j) {
   return {d.x(), d.y(), d.z()};
 }
 
-picture render(parameters const& m, gart::camera const& c, gart::render_options const& options, int active_degree) {
+picture render(parameters const& m, gart::camera const& c, gart::render_options const& options, int active_degree,
+               motion const& by) {
   check_degree(m, active_degree);
-  auto const gaussians = prepare(m, origin_of(c), pixels_filter(c, options.antialias));
+  Vector3d const w(by.turn[0], by.turn[1], by.turn[2]);
+  Matrix3d turn = Matrix3d::Identity();
+  if (w.norm() > 0) turn = Eigen::AngleAxisd(w.norm(), w.normalized()).toRotationMatrix();
+  Vector3d const origin = origin_of(c) + Vector3d(by.shift[0], by.shift[1], by.shift[2]);
+  auto const gaussians = prepare(m, origin, pixels_filter(c, options.antialias, turn));
   picture out{c.width, c.height, std::vector<pixel>(std::size_t(c.width) * c.height)};
   for (int j = 0; j < c.height; ++j)
     for (int i = 0; i < c.width; ++i) {
       pixel& p = out.pixels[std::size_t(j) * c.width + i];
-      Vector3d const d = world_direction(c, i, j);
+      Vector3d const d = turn * world_direction(c, i, j);
       double y[16];
       harmonics(d, y);
       p.list = hits_of(gaussians, m.kernel_degree, d, options);

@@ -64,8 +64,15 @@ struct picture {
   std::vector<pixel> pixels;  // row-major
 };
 
+// Of the camera from where it stands, in double: turned in the world about its position, by |turn| about `turn`, and
+// shifted.
+struct motion {
+  double shift[3] = {}, turn[3] = {};
+};
+
 // `active_degree` <= the model's degree limits the bands evaluated.
-picture render(parameters const&, gart::camera const&, gart::render_options const&, int active_degree);
+picture render(parameters const&, gart::camera const&, gart::render_options const&, int active_degree,
+               motion const& = {});
 
 // Gradient of L given dL/dcolour [height][width][3] and, where not empty, dL/dtransmittance [height][width]. A clamp
 // that holds has derivative zero.

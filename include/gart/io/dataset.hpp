@@ -10,14 +10,12 @@
 /// the file, the field and the remedy; unsupported for a camera model that gart does not trace, by its name;
 /// invalid_argument for an option out of its range.
 
-#include <gart/core/span.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/scene/image.hpp>
 
 #include <filesystem>
 #include <functional>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace gart {
@@ -68,22 +66,5 @@ dataset load_dataset(std::filesystem::path const& path, dataset_options const& o
 /// {"name","width","height","fx","fy","cx","cy","c2w"} with c2w camera-to-world in OpenCV axes, and "camera_model" by
 /// COLMAP's name, with the parameters of its lens, where it is no pinhole; EQUIRECTANGULAR has no fx to cy.
 std::vector<named_camera> load_cameras(std::filesystem::path const& path);
-
-/// The same place, way up and height through another camera, by COLMAP's name of its model and what parameters are to
-/// be other than none: "FISHEYE", "OPENCV_FISHEYE,k1=0.02,fx=90", "EQUIRECTANGULAR". Focal lengths follow from
-/// `angle`, the degrees across the image's shorter side, where none is given: by itself 180 for what can see that, else
-/// 60. The sphere is twice as wide as high. Errors: unsupported, invalid_argument for what is no such camera.
-camera seen_through(camera const& view, std::string const& model);
-
-/// What files call a camera's model, and its parameters by their names there.
-struct camera_fields {
-  std::string model;                                  ///< COLMAP's name
-  std::vector<std::pair<std::string, float>> values;  ///< as "fx"; none of EQUIRECTANGULAR
-};
-/// Errors: unsupported for a lens with terms that no one model has.
-camera_fields fields_of(camera const& view);
-
-/// A camera JSON, as load_cameras reads it. Errors: io_error; unsupported for a lens with terms that no one model has.
-void write_camera_json(std::filesystem::path const& path, span<named_camera const> cameras);
 
 }  // namespace gart

@@ -1,10 +1,16 @@
 #pragma once
 /// \file
 /// Files of Gaussians in any format that gart knows: one table has them. A file is known by its first bytes when it is
-/// read, whatever its name, and by the ending of its name when it is written.
+/// read, whatever its name, and by the ending of its name when it is written. docs/formats.md has what each format
+/// holds, and what it costs.
 ///
-/// Errors: io_error naming the file and the formats there are, where it is in none of them; else as the format's own
-/// reader and writer (io/ply.hpp).
+/// Every model is in the axes of a splat PLY; formats that keep others (SPZ: y up, z back; GLB: y up, x left) are
+/// turned as they are read and written, with the colours that depend on direction.
+///
+/// Errors: io_error naming the file and the formats there are, where it is in none of them; naming what the format has
+/// no room for, where the image would be another one without it; naming the package to install, where gart was built
+/// without it; else as the format's own reader and writer (io/ply.hpp). invalid_argument for a model whose arrays
+/// disagree in size, and for a packing out of its range.
 
 #include <gart/core/span.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -13,28 +19,51 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace gart {
 
 /// What a model was trained with, key -> value, where a format has room for it.
 using splat_traits = std::map<std::string, std::string>;
 
-/// A format of files of Gaussians.
-struct splat_format {
-  char const* name;                                                             ///< as people call it
-  char const* extension;                                                        ///< with its dot, in lower case
-  bool (*begins)(std::string_view first);                                       ///< whether its files begin so
-  gaussian_model (*read)(std::filesystem::path const& path, splat_traits* to);  ///< traits only where `to` is not null
-  void (*write)(std::filesystem::path const& path, gaussian_model const& model,
-                splat_traits const& traits);  ///< null for a format that is only read
+/// How the formats that pack their numbers are written.
+struct splat_packing {
+  int sh1_bits = 5;  ///< SPZ: of a coefficient of degree 1, 1 to 8
+  int sh_bits = 5;   ///< SPZ: of a coefficient of degree 2 or 3, 1 to 8
+  int palette = 0;   ///< SOG: rows of coefficients that all Gaussians share, to 65,536; 0: by their number
 };
 
-/// The formats there are. `begins` is given the first 16 bytes, or all of a shorter file.
+/// What a format has room for, besides means, scales, rotations, opacities and a colour.
+struct splat_room {
+  int sh_degree = 3;       ///< of its spherical harmonics
+  bool traits = false;     ///< keys and values
+  bool kernel = false;     ///< another kernel than the Gaussian, said by the trait kernel_degree
+  bool antialias = false;  ///< a mark for the trait antialias, without its width
+};
+
+/// A format of files of Gaussians.
+struct splat_format {
+  char const* name;                        ///< as people call it
+  char const* extension;                   ///< with its dots, in lower case
+  splat_room room;                         ///< `write` is given no more than that
+  bool (*begins)(std::string_view first);  ///< whether its files begin so; null: known by the ending alone
+  gaussian_model (*read)(std::filesystem::path const& path, splat_traits* to);  ///< traits only where `to` is not null
+  void (*write)(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits,
+                splat_packing const& packing);  ///< null for a format that is only read
+};
+
+/// The formats there are. `begins` is given the first 4,096 bytes, or all of a shorter file. Where an ending is the
+/// end of another, the longer one is first.
 span<splat_format const* const> splat_formats();
 
 /// Reads a file of Gaussians; its traits into `traits`, where that is not null.
 gaussian_model read_splats(std::filesystem::path const& path, splat_traits* traits = nullptr);
 /// Writes a file of Gaussians, to a temporary name, then renamed.
-void write_splats(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits = {});
+void write_splats(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits = {},
+                  splat_packing const& packing = {});
+
+/// What the format of this name has no room for and write_splats leaves out of this model, a line each.
+std::vector<std::string> left_out(std::filesystem::path const& path, gaussian_model const& model,
+                                  splat_traits const& traits);
 
 }  // namespace gart

@@ -5,14 +5,15 @@
 /// The statistic. A hit of weight w shows its Gaussian with that share of the pixel; the backward pass sums w times the
 /// pixel's error over a Gaussian's hits (backward::moments), for any camera, since no projection is in it. The sums of
 /// all steps since the last densification are its share of the total error. Not the mean over the views that saw it:
-/// that prefers what few views see, veils before single cameras.
+/// that prefers what few views see, veils before single cameras. The opacity counts a second time against veils: much
+/// error is seen through them that is not theirs, and halves of them learn single views by heart.
 ///
-/// A densification draws Gaussians without replacement, in proportion to their share (Efraimidis and Spirakis 2006: the
-/// least of -ln(u) / weight, u uniform), and splits each along its long axis (long_axis_split.hpp). As many are drawn
-/// as there are dead Gaussians, whose rows the second halves take, and as the count is to grow. It grows on a
-/// square-root curve, early, to the budget at the share `fill` of the run, and at most doubles at a time. First halves
-/// keep Adam's moments, second ones start with none. After `fill` only the dead are replaced, after `until` nothing
-/// moves.
+/// A densification draws Gaussians without replacement, in proportion to their share times their opacity (Efraimidis
+/// and Spirakis 2006: the least of -ln(u) / weight, u uniform), and splits each along its long axis
+/// (long_axis_split.hpp). As many are drawn as there are dead Gaussians, whose rows the second halves take, and as the
+/// count is to grow. It grows on a square-root curve, early, to the budget at the share `fill` of the run, and at most
+/// doubles at a time. First halves keep Adam's moments, second ones start with none. After `fill` only the dead are
+/// replaced, after `until` nothing moves.
 ///
 /// A small penalty on the mean opacity, paid by all Gaussians, takes those that no view needs; they fade until they are
 /// dead. A Gaussian whose opacity or geometry is not finite counts as dead. Where no error is attributed, or none is
@@ -66,7 +67,7 @@ struct error_key_kernel {
   u32* id;
   GART_KERNEL void operator()(index_t i) const {
     bool const lives = is_alive(model, i, dead_opacity);
-    float const weight = sum[i];
+    float const weight = sum[i] * sigmoid(model.opacity[i]);
     bool const fits = lives && weight > 0 && is_finite(weight);
     float const u = (static_cast<float>(random.words(i).v[0] >> 8) + 0.5f) * 0x1p-24f;
     dead[i] = !lives, drawable[i] = fits;

@@ -33,6 +33,7 @@ class compiled_session final : public session {
   training_state state() const override { return trainer_.state(); }
   void set_state(training_state const& state) override { trainer_.set_state(state); }
   exposure_field exposures() const override { return trainer_.exposures(); }
+  std::vector<named_camera> poses() const override { return trainer_.poses(); }
   profiler& profile() override {
     exec_.synchronize();
     return exec_.profile;

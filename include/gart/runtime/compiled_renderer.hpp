@@ -4,6 +4,7 @@
 /// memory that a caller does not bring.
 
 #include <gart/backward/backward.hpp>
+#include <gart/pose/differentiate_pose.hpp>
 #include <gart/render/bytes.hpp>
 #include <gart/render/render_image.hpp>
 #include <gart/runtime/configuration_of.hpp>
@@ -27,7 +28,8 @@ class compiled_renderer final : public renderer {
         model_(exec_, 0, sh_degree),
         gradients_(exec_, 0, sh_degree),
         color_(exec_),
-        color_gradient_(exec_) {}
+        color_gradient_(exec_),
+        by_pose_(exec_) {}
 
   void set_model(gaussian_model const& model) override {
     require_degree(model.sh_degree);
@@ -67,6 +69,11 @@ class compiled_renderer final : public renderer {
     gart::differentiate(frame_, pass_, {color_gradient, std::size_t{3} * pixels_of(view)}, gradients);
     if (targets.rgba) color_to_bytes(exec_, images.color, pixels_of(view), targets.rgba);
   }
+  pose_gradient differentiate_pose() override {
+    if (gradients_.size() != scene_.count || scene_.count == 0)
+      throw invalid_argument("renderer.differentiate_pose: call renderer.differentiate first");
+    return by_pose_(frame_, std::as_const(gradients_).view());
+  }
   gaussian_model gradients() const override { return gradients_.to_host(); }
   void wait() override { exec_.synchronize(); }
 
@@ -105,6 +112,7 @@ class compiled_renderer final : public renderer {
   gaussians<E> model_, gradients_;
   gaussians_view<float const> scene_{.sh_degree = sh_degree};
   buffer<float, E> color_, color_gradient_;
+  pose_differentiation<E> by_pose_;
 };
 
 }  // namespace gart::inline GART_ISA

@@ -17,22 +17,25 @@ namespace gart {
 
 /// One view against its photograph.
 struct view_score {
-  std::string name;         ///< the view's
-  double psnr = 0,          ///< in dB
-      ssim = 0;             ///< at most 1
-  double affine_psnr = 0;   ///< after the affine colour that fits best
-  double own_psnr = 0;      ///< without an exposure: of the scene's own colours
-  double milliseconds = 0;  ///< of rendering, to an image in host memory
+  std::string name;          ///< the view's
+  double psnr = 0,           ///< in dB
+      ssim = 0;              ///< at most 1
+  double affine_psnr = 0;    ///< after the affine colour that fits best
+  double own_psnr = 0;       ///< without an exposure: of the scene's own colours
+  double captured_psnr = 0;  ///< at the capture's pose, where the view was placed at another
+  double milliseconds = 0;   ///< of rendering, to an image in host memory
 };
 
 /// Means over views.
 struct scores {
-  double psnr = std::numeric_limits<double>::quiet_NaN();         ///< stays so where there are no views
-  double ssim = std::numeric_limits<double>::quiet_NaN();         ///< from 0 to 1
-  double affine_psnr = std::numeric_limits<double>::quiet_NaN();  ///< in dB
-  double own_psnr = std::numeric_limits<double>::quiet_NaN();     ///< in dB
-  bool exposed = false;                                           ///< whether views were scored with exposures
-  std::vector<view_score> views;                                  ///< each of them, in order
+  double psnr = std::numeric_limits<double>::quiet_NaN();           ///< stays so where there are no views
+  double ssim = std::numeric_limits<double>::quiet_NaN();           ///< from 0 to 1
+  double affine_psnr = std::numeric_limits<double>::quiet_NaN();    ///< in dB
+  double own_psnr = std::numeric_limits<double>::quiet_NaN();       ///< in dB
+  double captured_psnr = std::numeric_limits<double>::quiet_NaN();  ///< in dB
+  bool placed = false;            ///< whether views were scored at other poses than the capture's
+  bool exposed = false;           ///< whether views were scored with exposures
+  std::vector<view_score> views;  ///< each of them, in order
 };
 
 using some_views = std::vector<dataset_view const*>;  ///< of a dataset, which must outlive it
@@ -42,12 +45,15 @@ some_views all_of(std::vector<dataset_view> const& views);
 some_views evenly_spread(std::vector<dataset_view> const& views, std::size_t count);
 
 using render_view = std::function<rendered(camera const&)>;  ///< one view to host memory
+/// A view's camera where it is not the capture's: learned, or aligned to its photograph.
+using place_view = std::function<camera(dataset_view const&)>;
 /// Sees each view as it was scored, in order.
 using keep_view =
     std::function<void(std::size_t index, view_score const&, image_float const& render, image_float const& truth)>;
 
-/// Where there are exposures each view is scored with its own, as the field gives it for the camera.
+/// Where views are placed, each is also scored at the capture's pose. Where there are exposures each view is scored
+/// with its own, as the field gives it for the camera.
 scores evaluate(some_views const& views, vec3 background, exposure_field const& exposures, render_view const& render,
-                keep_view const& keep = {});
+                keep_view const& keep = {}, place_view const& place = {});
 
 }  // namespace gart

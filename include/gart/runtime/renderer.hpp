@@ -14,6 +14,7 @@
 /// options.rebuild_every where the tracer builds no tree; out_of_memory; whatever the policy throws.
 
 #include <gart/exec/profile.hpp>
+#include <gart/pose/pose.hpp>
 #include <gart/render/options.hpp>
 #include <gart/render/rendered.hpp>
 #include <gart/runtime/request.hpp>
@@ -59,6 +60,9 @@ class renderer {
   /// the Gaussians, which are overwritten. `targets` takes the view besides.
   virtual void differentiate_into(camera const& view, render_options const& options, float const* color_gradient,
                                   gaussians_view<float> gradients, render_targets const& targets = {}) = 0;
+  /// dL/d the pose of the view of the last differentiate, while the model is the one that it was of. Waits for it.
+  /// Errors: invalid_argument before that.
+  virtual pose_gradient differentiate_pose() = 0;
   virtual void wait() = 0;  ///< until all that was asked for is done
 
   /// Times of stages; waits for the policy.

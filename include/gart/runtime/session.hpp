@@ -51,6 +51,8 @@ class session {
   virtual void set_state(training_state const& state) = 0;
   /// Of the training views so far; empty where none are learned. render() shows the scene's own colours.
   virtual exposure_field exposures() const { return {}; }
+  /// The cameras of the training views as they are learned, in order; empty where none are.
+  virtual std::vector<named_camera> poses() const { return {}; }
   virtual std::vector<band_trial> trials() const { return {}; }  ///< that are over
   /// Times of stages; waits for the policy.
   virtual profiler& profile() = 0;

@@ -6,6 +6,7 @@
 #include <gart/core/names.hpp>
 #include <gart/core/types.hpp>
 #include <gart/optim/options.hpp>
+#include <gart/pose/options.hpp>
 #include <gart/render/options.hpp>
 
 #include <string>
@@ -45,9 +46,10 @@ struct train_options {
   /// Of the first Gaussians; the scale is times the distance to the neighbours. 0: what suits the start
   /// (runtime/choose.hpp).
   float initial_opacity = 0;
-  float initial_scale = 0;   ///< times the distance to the neighbours; 0 as above
-  float ssim_weight = 0.2f;  ///< share of D-SSIM in the loss, the rest is L1
-  bool exposure = false;     ///< learn an exposure of each training view (exposure/exposure.hpp)
+  float initial_scale = 0;    ///< times the distance to the neighbours; 0 as above
+  float ssim_weight = 0.2f;   ///< share of D-SSIM in the loss, the rest is L1
+  bool exposure = false;      ///< learn an exposure of each training view (exposure/exposure.hpp)
+  bool refine_poses = false;  ///< learn the pose of each training view (pose/pose_training.hpp)
   /// Bytes of the LT buffer above which a step is done with less; 0: half of what is free when the trainer is made,
   /// and no limit where sums are to be in a fixed order.
   u64 lt_budget = 0;
@@ -59,6 +61,7 @@ struct train_options {
   approximation_options render = {};  ///< what is traded for time
   learning_rates rates = {};          ///< of Adam, by group of parameters
   adam_options adam = {};             ///< of Adam
+  pose_options poses = {};            ///< of learned poses
   error_growth_options error = {};    ///< of growth by error
   mcmc_options mcmc = {};             ///< of growth by MCMC
   adc_options adc = {};               ///< of adaptive density control

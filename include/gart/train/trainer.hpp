@@ -23,6 +23,8 @@
 #include <gart/optim/finite.hpp>
 #include <gart/optim/mcmc.hpp>
 #include <gart/optim/schedule.hpp>
+#include <gart/pose/differentiate_pose.hpp>
+#include <gart/pose/pose_training.hpp>
 #include <gart/render/frame.hpp>
 #include <gart/render/render_image.hpp>
 #include <gart/scene/traits.hpp>
@@ -82,7 +84,8 @@ class trainer {
   void save(std::filesystem::path const& path) const { write_checkpoint(path, state()); }
   /// Takes up the run of a checkpoint.
   void load(std::filesystem::path const& path) { set_state(read_checkpoint(path, sh_degree)); }
-  exposure_field exposures() const;  ///< of the views that were trained on; empty where none are learned
+  exposure_field exposures() const;         ///< of the views that were trained on; empty where none are learned
+  std::vector<named_camera> poses() const;  ///< of the training views; empty where none are learned
   std::size_t lt_bytes() const { return lt_bytes_; }  ///< of the last step
   /// The Gaussians, in the policy's memory.
   gaussians<E>& scene() { return scene_; }
@@ -94,7 +97,7 @@ class trainer {
 
   template <class Pass, class Loss>
   void differentiate_by(Pass& pass, Loss&& loss, std::size_t view, learning_rates const& rates);
-  void update(dataset_view const& view, learning_rates const& rates, int degree, span<float const> moments);
+  void update(camera const& view, learning_rates const& rates, int degree, span<float const> moments);
   bool grows_by_error() const { return options_.densify == densify_kind::error; }
   vec3 background_of(int step) const;
   static mcmc_options mcmc_options_of(train_options const& options) {
@@ -129,8 +132,11 @@ class trainer {
   adaptive_density<E> adc_;
   buffer<float, E> color_, color_gradient_, value_;
   std::optional<exposure_training<E>> exposures_;  // where options.exposure asks for them
-  std::optional<finite_check<E>> finite_;          // where options.check_finite asks for it
-  index_t started_with_ = 0;                       // Gaussians
+  buffer<float, E> depth_, transmittance_;         // of the step's image, where a pose asks for them
+  std::optional<pose_training> poses_;             // where options.refine_poses asks for them
+  pose_differentiation<E> by_pose_;
+  std::optional<finite_check<E>> finite_;  // where options.check_finite asks for it
+  index_t started_with_ = 0;               // Gaussians
   int step_ = 0;
   float growth_ = 1;
   std::size_t lt_bytes_ = 0;

@@ -31,7 +31,10 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       adc_(exec, adc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
       color_(exec),
       color_gradient_(exec),
-      value_(exec, 2),
+      value_(exec, 2 + pose_gradient::floats),
+      depth_(exec),
+      transmittance_(exec),
+      by_pose_(exec),
       started_with_(static_cast<index_t>(start.size())) {
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
@@ -39,6 +42,11 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
   // Sums in a fixed order were asked for: no budget of our own takes them away.
   if (options.lt_budget == 0 && !Strategy::ordered) options_.lt_budget = exec.free_bytes() / 2;
   if (options.exposure) exposures_.emplace(exec, data.train.size());
+  if (options.refine_poses) {
+    std::vector<camera> captured;
+    for (dataset_view const& view : data.train) captured.push_back(view.view);
+    poses_.emplace(options.poses, std::move(captured), data.extent);
+  }
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
 }
@@ -64,6 +72,7 @@ template <class Loss>
 step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   std::size_t const index = order_.at(step_);
   dataset_view const& view = data_.train[index];
+  camera const seen = poses_ ? poses_->view(index) : view.view;
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates rates = options_.rates;
   rates.sh_rest = sh_rest_of(rates, data_.points.size() > 0, options_.iterations);
@@ -72,7 +81,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
   color_.resize(floats), color_gradient_.resize(floats);
 
-  frame_.prepare(std::as_const(scene_).view(), view.view, render, degree);
+  frame_.prepare(std::as_const(scene_).view(), seen, render, degree);
   span<float const> moments;
   char const* used = nullptr;
   // With less memory where the LT buffer would pass its budget or the numbers of its slots, and then with none.
@@ -80,8 +89,10 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
     differentiate_by(pass, loss, index, rates);
     moments = pass.moments(), lt_bytes_ = pass.lt_bytes(), used = Pass::strategy_type::name;
   });
+  bool const moves = poses_ && poses_->learns(step_, options_.iterations);
+  if (moves) by_pose_(frame_, std::as_const(gradients_).view(), value_.view().subspan(2, pose_gradient::floats));
   ++step_;
-  update(view, rates, degree, moments);
+  update(seen, rates, degree, moments);
 
   step_report report;
   if (finite_) report.skipped = (*finite_)(scene_, state_, "step " + std::to_string(step_) + ", view " + view.name);
@@ -90,6 +101,7 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   report.view = view.name;
   report.backward = used;
   std::vector<float> const value = value_.to_host();
+  if (moves) poses_->step(index, pose_gradient(value.data() + 2), step_ - 1, options_.iterations);
   report.loss = value[0];
   report.psnr = value[1] > 0 ? -10.0f * std::log10(value[1]) : 99.0f;
   return report;
@@ -102,26 +114,36 @@ void trainer<E, Traits, Tracer, Strategy>::differentiate_by(Pass& pass, Loss&& l
   dataset_view const& view = data_.train[index];
   image_targets targets;
   targets.color = color_.data();
+  bool const measures = poses_ && poses_->learns(step_, options_.iterations) && poses_->wants_metric(index);
+  if (measures) {
+    depth_.resize(color_.size() / 3), transmittance_.resize(color_.size() / 3);
+    targets.depth = depth_.data(), targets.transmittance = transmittance_.data();
+  }
   pass.render(frame_, targets);
   {
     stage_scope stage(exec_, "loss");
     span<float const> const image = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
     truth_view const truth = images_.get(exec_, index, frame_.options().background);
-    loss(loss_input<E>{exec_, view, truth, view.view.width, view.view.height, image, color_gradient_, value_});
+    loss(loss_input<E>{exec_, view, truth, view.view.width, view.view.height, image, color_gradient_,
+                       value_.view().subspan(0, 2)});
     if (grows_by_error()) error_map(exec_, image, truth, error_map_);
     if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }
   differentiate(frame_, pass, color_gradient_, gradients_, error_map_);
+  if (measures) {
+    std::vector<float> const depth = depth_.to_host(), transmittance = transmittance_.to_host();
+    poses_->set_metric(index, {depth.data(), depth.size()}, {transmittance.data(), transmittance.size()});
+  }
 }
 
 // The optimizer's step and what grows, moves and prunes the Gaussians.
 template <execution E, class Traits, class Tracer, strategy Strategy>
-void trainer<E, Traits, Tracer, Strategy>::update(dataset_view const& view, learning_rates const& rates, int degree,
+void trainer<E, Traits, Tracer, Strategy>::update(camera const& view, learning_rates const& rates, int degree,
                                                   span<float const> moments) {
   bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
   if (grows_by_error()) error_.accumulate(scene_, moments, gradients_);
   if (use_mcmc) mcmc_.add_penalties(scene_, gradients_);
-  if (use_adc) adc_.accumulate(scene_, gradients_, view.view);
+  if (use_adc) adc_.accumulate(scene_, gradients_, view);
   adam_step(exec_, scene_, gradients_, state_, rates, step_, degree, finite_ ? finite_->skipped() : span<u64>{},
             options_.adam);
   density_change change;
@@ -166,11 +188,19 @@ exposure_field trainer<E, Traits, Tracer, Strategy>::exposures() const {
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy>
+std::vector<named_camera> trainer<E, Traits, Tracer, Strategy>::poses() const {
+  std::vector<named_camera> out;
+  for (std::size_t i = 0; poses_ && i < data_.train.size(); ++i) out.push_back({data_.train[i].name, poses_->view(i)});
+  return out;
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy>
 training_state trainer<E, Traits, Tracer, Strategy>::state() const {
   training_state s;
   s.scene = scene_.to_host(), s.first = state_.first.to_host(), s.second = state_.second.to_host();
   s.step = step_, s.growth = growth_, s.seed = options_.seed;
   if (exposures_) s.exposures = exposures_->state();
+  if (poses_) s.poses = poses_->state();
   s.error_sum = error_.error_sum.to_host();
   s.gradient_sum = adc_.gradient_sum.to_host(), s.touched = adc_.touched.to_host();
   return s;
@@ -187,6 +217,11 @@ void trainer<E, Traits, Tracer, Strategy>::set_state(training_state const& s) {
     if (s.exposures.visits.size() != data_.train.size())
       throw invalid_argument("trainer: the state has exposures of another number of training views");
     exposures_->set_state(s.exposures);
+  }
+  if (poses_) {
+    if (s.poses.visits.size() != data_.train.size())
+      throw invalid_argument("trainer: the state has poses of another number of training views");
+    poses_->set_state(s.poses);
   }
   options_.seed = s.seed;
   order_ = view_order(data_.train.size(), options_.held_out, options_.seed);

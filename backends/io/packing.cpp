@@ -1,0 +1,165 @@
+#include "packing.hpp"
+
+#include <gart/bvh/morton.hpp>
+#include <gart/math/logit.hpp>
+#include <gart/math/sh.hpp>
+
+#include <exception>
+#include <numeric>
+#include <thread>
+#include <utility>
+
+namespace gart::io {
+
+namespace {
+
+constexpr double sh_0 = 0.28209479177387814;
+
+// What half a turn about an axis does to each function of the basis: it changes its sign or leaves it, as any one
+// direction in no plane of symmetry shows.
+std::array<float, 16> signs_of_half_turn(int axis) {
+  vec3 d(0.48f, 0.36f, 0.8f);
+  sh_basis<3> const before(d);
+  for (int k = 0; k < 3; ++k)
+    if (k != axis) d[k] = -d[k];
+  sh_basis<3> const after(d);
+  std::array<float, 16> signs;
+  for (std::size_t k = 0; k < signs.size(); ++k) signs[k] = before.y[k] * after.y[k] < 0 ? -1.0f : 1.0f;
+  return signs;
+}
+
+// The first Gaussian with a number that is not finite, and the array; none: the model's size.
+std::pair<std::size_t, char const*> first_not_finite(gaussian_model const& model) {
+  std::pair<std::size_t, char const*> first{model.size(), ""};
+  for_each_array(
+      [&](parameter_array const& a, std::vector<float> const& values) {
+        auto const bad = std::find_if(values.begin(), values.end(), [](float v) { return !std::isfinite(v); });
+        if (bad == values.end()) return;
+        auto const at = static_cast<std::size_t>(bad - values.begin()) / a.width(model.sh_degree);
+        if (at < first.first) first = {at, a.title};
+      },
+      model);
+  return first;
+}
+
+}  // namespace
+
+u8 opacity_byte(float logit) { return static_cast<u8>(unorm(sigmoid_in_double(static_cast<double>(logit)), 8)); }
+float opacity_logit(double opacity) { return static_cast<float>(logit_in_double(std::clamp(opacity, 1e-6, 1 - 1e-6))); }
+float opacity_logit(u8 byte) { return opacity_logit(byte / 255.0); }
+
+float base_color(float coefficient) { return static_cast<float>(static_cast<double>(coefficient) * sh_0 + 0.5); }
+float base_coefficient(double color) { return static_cast<float>((color - 0.5) / sh_0); }
+
+std::array<double, 4> unit(float const* q) {
+  std::array<double, 4> u;
+  double norm = 0;
+  for (std::size_t k = 0; k < 4; ++k) u[k] = static_cast<double>(q[k]), norm += u[k] * u[k];
+  if (norm == 0) return {1, 0, 0, 0};
+  for (double& v : u) v /= std::sqrt(norm);
+  return u;
+}
+
+int largest_positive(std::array<double, 4>& q) {
+  std::size_t largest = 0;
+  for (std::size_t k = 1; k < 4; ++k)
+    if (std::abs(q[k]) > std::abs(q[largest])) largest = k;
+  if (q[largest] < 0)
+    for (double& v : q) v = -v;
+  return static_cast<int>(largest);
+}
+
+std::vector<u32> along_a_curve(gaussian_model const& model) {
+  box bounds = empty_box();
+  auto const mean = [&](std::size_t i) {
+    return vec3(model.mean[3 * i], model.mean[3 * i + 1], model.mean[3 * i + 2]);
+  };
+  for (std::size_t i = 0; i < model.size(); ++i)
+    for (int k = 0; k < 3; ++k) {
+      bounds.lo[k] = std::min(bounds.lo[k], mean(i)[k]);
+      bounds.hi[k] = std::max(bounds.hi[k], mean(i)[k]);
+    }
+  std::vector<std::pair<u64, u32>> keys(model.size());
+  for (std::size_t i = 0; i < keys.size(); ++i) keys[i] = {morton_code(mean(i), bounds), static_cast<u32>(i)};
+  std::sort(keys.begin(), keys.end());
+  std::vector<u32> order(keys.size());
+  std::transform(keys.begin(), keys.end(), order.begin(), [](auto const& key) { return key.second; });
+  return order;
+}
+
+gaussian_model in_order(gaussian_model const& model, std::vector<u32> const& order) {
+  gaussian_model sorted;
+  sorted.resize(order.size(), model.sh_degree);
+  for_each_array(
+      [&](parameter_array const& a, std::vector<float>& to, std::vector<float> const& from) {
+        std::size_t const width = a.width(model.sh_degree);
+        for (std::size_t i = 0; i < order.size(); ++i)
+          std::copy_n(from.data() + order[i] * width, width, &to[i * width]);
+      },
+      sorted, model);
+  return sorted;
+}
+
+void half_turn(gaussian_model& model, int axis) {
+  auto const signs = signs_of_half_turn(axis);
+  std::size_t const n = model.size(), coefficients = static_cast<std::size_t>(sh_coefficients(model.sh_degree));
+  for (std::size_t i = 0; i < n; ++i) {
+    // Conjugation by the half turn keeps the part of the quaternion along its axis.
+    for (int k = 0; k < 3; ++k) {
+      if (k == axis) continue;
+      model.mean[3 * i + static_cast<std::size_t>(k)] *= -1;
+      model.quaternion[4 * i + 1 + static_cast<std::size_t>(k)] *= -1;
+    }
+    for (std::size_t k = 1; k < coefficients; ++k)
+      for (std::size_t c = 0; c < 3; ++c) model.sh[3 * (coefficients * i + k) + c] *= signs[k];
+  }
+}
+
+void in_parts(std::size_t n, std::function<void(std::size_t, std::size_t)> const& f) {
+  std::size_t const parts = std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, n / 4096 + 1);
+  std::vector<std::exception_ptr> failed(parts);
+  auto const part = [&](std::size_t i) {
+    try {
+      f(n * i / parts, n * (i + 1) / parts);
+    } catch (...) {
+      failed[i] = std::current_exception();
+    }
+  };
+  std::vector<std::thread> threads;
+  for (std::size_t i = 1; i < parts; ++i) threads.emplace_back(part, i);
+  part(0);
+  for (std::thread& t : threads) t.join();
+  for (std::exception_ptr const& e : failed)
+    if (e) std::rethrow_exception(e);
+}
+
+void require_plausible(std::string const& file, u64 gaussians, u64 bytes) {
+  if (gaussians > most_gaussians || gaussians > bytes * 1024 / 9)
+    throw io_error(file,
+                   "promises " + std::to_string(gaussians) + " Gaussians, more than its " + std::to_string(bytes) +
+                       " bytes can hold",
+                   "the file is truncated or damaged: copy or export it again");
+}
+
+void require_finite(std::string const& file, gaussian_model const& model) {
+  auto const [at, array] = first_not_finite(model);
+  if (at < model.size())
+    throw io_error(file, "Gaussian " + std::to_string(at) + ", " + array + " is not finite",
+                   "remove or correct that Gaussian, and export it again");
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    float const* q = model.quaternion.data() + 4 * i;
+    if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0)
+      throw io_error(file, "Gaussian " + std::to_string(i) + ", rotation is all zero, which is no rotation",
+                     "remove that Gaussian");
+  }
+}
+
+void require_packable(std::filesystem::path const& path, gaussian_model const& model) {
+  auto const [at, array] = first_not_finite(model);
+  if (at < model.size())
+    throw io_error(path.string(),
+                   "Gaussian " + std::to_string(at) + ", " + array + " is not finite and cannot be packed",
+                   "remove that Gaussian, or write a .ply");
+}
+
+}  // namespace gart::io

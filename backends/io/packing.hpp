@@ -1,0 +1,70 @@
+#pragma once
+// What the formats that pack Gaussians share: a number as a byte, an order in which neighbours are neighbours, other
+// axes, threads.
+
+#include <gart/core/error.hpp>
+#include <gart/scene/gaussians.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace gart::io {
+
+// The nearest of the integers 0 to 2^bits - 1 to x in [0, 1].
+inline u32 unorm(double x, int bits) {
+  double const most = static_cast<double>((1u << bits) - 1);
+  return static_cast<u32>(std::clamp(x, 0.0, 1.0) * most + 0.5);
+}
+
+// A number from `low` to `high` as one of `bits` bits, and back. Where both are one there is nothing to say.
+inline u32 between(float x, float low, float high, int bits) {
+  return high > low ? unorm((static_cast<double>(x) - static_cast<double>(low)) /
+                                (static_cast<double>(high) - static_cast<double>(low)),
+                            bits)
+                    : 0;
+}
+inline float from_between(u32 n, float low, float high, int bits) {
+  double const t = static_cast<double>(n) / static_cast<double>((1u << bits) - 1);
+  return static_cast<float>(static_cast<double>(low) * (1 - t) + static_cast<double>(high) * t);
+}
+
+u8 opacity_byte(float logit);
+// Nothing and all are as far from their neighbours as a millionth: a logit is finite.
+float opacity_logit(u8 byte);
+float opacity_logit(double opacity);
+
+// The colour of the coefficient of degree 0, and back.
+float base_color(float coefficient);
+float base_coefficient(double color);
+
+// The quaternion at q (w, x, y, z) divided by its norm, in double.
+std::array<double, 4> unit(float const* q);
+
+// The largest component by magnitude of four, made positive by the sign of all.
+int largest_positive(std::array<double, 4>& q);
+
+// The Gaussians by their place on a curve through space, neighbours near each other: what is alike stands together.
+std::vector<u32> along_a_curve(gaussian_model const& model);
+gaussian_model in_order(gaussian_model const& model, std::vector<u32> const& order);
+
+// Turned by half a turn about an axis (0, 1, 2: x, y, z), with the colours that depend on direction. Twice is nothing;
+// every number keeps its bits but for signs.
+void half_turn(gaussian_model& model, int axis);
+
+// f(first, last) over parts of [0, n) on as many threads as there are, f free of shared writes.
+void in_parts(std::size_t n, std::function<void(std::size_t, std::size_t)> const& f);
+
+// Refuses a count that no file of so many bytes can hold: none is a thousand times smaller than its content.
+void require_plausible(std::string const& file, u64 gaussians, u64 bytes);
+// Refuses numbers that are not finite, and rotations of no direction, as the reader of PLY does.
+void require_finite(std::string const& file, gaussian_model const& model);
+// Refuses to write numbers that are not finite: packed they would be others.
+void require_packable(std::filesystem::path const& path, gaussian_model const& model);
+
+}  // namespace gart::io

@@ -1,0 +1,24 @@
+#pragma once
+// Lossless WebP: four bytes a pixel there and back, whatever the fourth is.
+
+#include <gart/core/types.hpp>
+
+#include <string>
+#include <vector>
+
+namespace gart::io {
+
+struct texture {
+  int width = 0, height = 0;
+  std::vector<u8> rgba;
+
+  texture() = default;
+  texture(int w, int h) : width(w), height(h), rgba(pixels() * 4, 0) {}
+  std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
+};
+
+// io_error naming the package, where gart was built without libwebp; for more than `most` pixels; for what is none.
+std::vector<u8> encode_webp(texture const& image, std::string const& file);
+texture decode_webp(std::vector<u8> const& bytes, std::size_t most, std::string const& file, std::string const& entry);
+
+}  // namespace gart::io

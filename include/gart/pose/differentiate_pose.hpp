@@ -1,0 +1,196 @@
+#pragma once
+/// \file
+/// The gradient of a view's pose, from the gradients of the Gaussians that a backward pass has left:
+///
+///   differentiate(frame, pass, color_gradient, gradients);      // backward/backward.hpp
+///   pose_differentiation<E> by_pose(exec);
+///   pose_gradient const g = by_pose(frame, gradients);          // or into memory of the policy
+///
+/// An image depends on where the Gaussians are relative to the camera, so that moving the camera by dp is moving all of
+/// them by -dp, and turning it by a small w about its position p is turning them by -w about p, with the colours that
+/// the turned rays see:
+///   dL/dp = -sum_i dL/dmean_i
+///   dL/dw = sum_i [ -(mean_i - p) x dL/dmean_i - torque_i + turn_i ]
+/// torque_i is dL/d a small turn of the Gaussian in the world, 1/2 of the vector part of dL/dq q*, since dL/dq is a
+/// turn pulled back to the quaternion q (math/quaternion.hpp); turn_i that of its colours (math/sh_turn.hpp). No
+/// hit is looked at again. It holds for every strategy, any function of the image, with or without the filter of the
+/// pixels, whose gradients are in those of the parameters, and any camera whose rays all move with its pose.
+///
+/// Gaussians whose mean and first band have no gradient were not seen and cost their reads alone; numbers that are not
+/// finite are left out. Sums: in double past a lane's own, in an order that depends on the number of Gaussians only.
+/// Cost: one read of the gradients, and of the parameters of what was seen: 464 bytes a Gaussian of degree 3 at most.
+/// Memory: 48 bytes for each of at most 1024 sums.
+
+#include <gart/core/error.hpp>
+#include <gart/exec/buffer.hpp>
+#include <gart/exec/stage.hpp>
+#include <gart/math/sh_turn.hpp>
+#include <gart/pose/pose.hpp>
+#include <gart/scene/parameters.hpp>
+
+#include <algorithm>
+
+namespace gart::inline GART_ISA {
+
+namespace pose_kernels {
+
+// A team takes every teams-th run of Gaussians. Their coefficients go through scratch: a row is read by neighbouring
+// lanes, and used by one.
+template <int Degree>
+struct sum_gaussians {
+  static constexpr int block_size = 128, min_blocks = 8;
+  static constexpr index_t run = 64;  // Gaussians at a time
+  static constexpr int row = 3 * sh_coefficients(Degree), pitch = row | 1, word = row % 4 == 0 ? 4 : 1;
+  struct scratch {
+    float color[run * pitch], by_color[run * pitch];
+    float sum[run * pose_gradient::floats];  // a row a lane
+  };
+
+  gaussians_view<float const> scene, gradients;
+  vec3d position;
+  index_t teams;
+  double* sums;  // [teams][6]
+
+  GART_KERNEL void operator()(auto const& team) const {
+    scratch& s = team.scratch();
+    team.for_each(run * pose_gradient::floats, [&](index_t k) { s.sum[k] = 0; });
+    team.barrier();
+    for (index_t first = team.tile() * run; first < scene.count; first += teams * run) {
+      index_t const count = scene.count - first < run ? scene.count - first : run;
+      if constexpr (Degree > 0) {
+        team.for_each(count * (row / word), [&](index_t k) { load(s, first, k); });
+        team.barrier();
+      }
+      team.for_each(count, [&](index_t k) { add(s, first + k, k); });
+      team.barrier();
+    }
+    team.for_each(pose_gradient::floats, [&](index_t k) {
+      double sum = 0;
+      for (index_t lane = 0; lane < run; ++lane) sum += double{s.sum[pose_gradient::floats * lane + k]};
+      sums[std::size_t{pose_gradient::floats} * team.tile() + k] = sum;
+    });
+  }
+
+ private:
+  GART_HD bool seen(index_t i) const {
+    float const* const mean = gradients.mean + std::size_t{3} * i;
+    float const* const band = gradients.sh + std::size_t{row} * i;
+    return (mean[0] != 0) | (mean[1] != 0) | (mean[2] != 0) | (band[0] != 0) | (band[1] != 0) | (band[2] != 0);
+  }
+
+  GART_HD void load(scratch& s, index_t first, index_t k) const {
+    index_t const lane = k / (row / word), column = k % (row / word) * word;
+    if (!seen(first + lane)) return;
+    std::size_t const from = std::size_t{row} * (first + lane) + column, to = std::size_t{pitch} * lane + column;
+    if constexpr (word == 4) {
+      quad const c = *reinterpret_cast<quad const*>(scene.sh + from);
+      quad const g = *reinterpret_cast<quad const*>(gradients.sh + from);
+      for (int j = 0; j < 4; ++j) s.color[to + j] = c.v[j], s.by_color[to + j] = g.v[j];
+    } else {
+      s.color[to] = scene.sh[from], s.by_color[to] = gradients.sh[from];
+    }
+  }
+
+  GART_HD void add(scratch& s, index_t i, index_t lane) const {
+    if (!seen(i)) return;
+    float const* const m = gradients.mean + std::size_t{3} * i;
+    float const* const g = gradients.quaternion + std::size_t{4} * i;
+    gaussian_parameters const p = load_parameters(scene, i);
+    quaternion const& q = p.rotation;
+    vec3 const by_mean(m[0], m[1], m[2]), arm = relative_mean(p.mean, position);
+    vec3 turn(0.0f);
+    if constexpr (Degree > 0) turn = sh_turn<Degree>(s.color + pitch * lane, s.by_color + pitch * lane);
+    // The vector part of g q*.
+    vec3 const torque(q.w * g[1] - g[0] * q.x - g[2] * q.z + g[3] * q.y,
+                      q.w * g[2] - g[0] * q.y - g[3] * q.x + g[1] * q.z,
+                      q.w * g[3] - g[0] * q.z - g[1] * q.y + g[2] * q.x);
+    float const out[pose_gradient::floats] = {-by_mean.x,
+                                              -by_mean.y,
+                                              -by_mean.z,
+                                              arm.z * by_mean.y - arm.y * by_mean.z - 0.5f * torque.x + turn.x,
+                                              arm.x * by_mean.z - arm.z * by_mean.x - 0.5f * torque.y + turn.y,
+                                              arm.y * by_mean.x - arm.x * by_mean.y - 0.5f * torque.z + turn.z};
+    for (int k = 0; k < pose_gradient::floats; ++k)
+      if (!is_finite(out[k])) return;
+    for (int k = 0; k < pose_gradient::floats; ++k) s.sum[pose_gradient::floats * lane + k] += out[k];
+  }
+};
+
+// One team: the teams' sums, in their order.
+struct sum_teams {
+  static constexpr index_t lanes = 32;
+  struct scratch {
+    double sum[lanes * pose_gradient::floats];
+  };
+  double const* sums;
+  index_t teams;
+  float* out;  // [6]
+
+  GART_KERNEL void operator()(auto const& team) const {
+    scratch& s = team.scratch();
+    team.for_each(lanes * pose_gradient::floats, [&](index_t k) {
+      double sum = 0;
+      for (std::size_t at = k; at < std::size_t{teams} * pose_gradient::floats; at += lanes * pose_gradient::floats)
+        sum += sums[at];
+      s.sum[k] = sum;
+    });
+    team.barrier();
+    team.for_each(pose_gradient::floats, [&](index_t k) {
+      double sum = 0;
+      for (index_t lane = 0; lane < lanes; ++lane) sum += s.sum[pose_gradient::floats * lane + k];
+      out[k] = static_cast<float>(sum);
+    });
+  }
+};
+
+}  // namespace pose_kernels
+
+/// The gradients of poses, one at a time, and the memory that they need.
+template <execution E>
+class pose_differentiation {
+ public:
+  /// Allocates nothing; `exec` must outlive it.
+  explicit pose_differentiation(E& exec) : exec_(&exec), sums_(exec), out_(exec) {}
+
+  /// Into out, [6] in the policy's memory: a pose_gradient's numbers in order. `gradients` are those that
+  /// differentiate() wrote for the view that the frame is prepared for. Errors: invalid_argument for gradients of
+  /// another number of Gaussians or another degree, or a short `out`.
+  template <class Frame>
+  void operator()(Frame const& frame, gaussians_view<float const> gradients, span<float> out) {
+    gaussians_view<float const> const scene = frame.scene();
+    if (gradients.count != scene.count || gradients.sh_degree != scene.sh_degree)
+      throw invalid_argument(
+          "differentiate_pose: the gradients must have the number and the SH degree of the Gaussians");
+    if (out.size() < pose_gradient::floats)
+      throw invalid_argument("differentiate_pose: the gradient of a pose has six numbers");
+    using kernel = pose_kernels::sum_gaussians<Frame::sh_degree>;
+    index_t const teams = std::min((scene.count + kernel::run - 1) / kernel::run, E::device ? most_teams : host_teams);
+    sums_.resize(std::size_t{pose_gradient::floats} * most_teams);
+    stage_scope stage(*exec_, "pose");
+    parallel_for(*exec_, "pose/sum", tile_range{teams, kernel::block_size},
+                 kernel{scene, gradients, frame.view().position, teams, sums_.data()});
+    parallel_for(*exec_, "pose/total", tile_range{1, 192}, pose_kernels::sum_teams{sums_.data(), teams, out.data()});
+  }
+
+  /// To the host; waits for it.
+  template <class Frame>
+  pose_gradient operator()(Frame const& frame, gaussians_view<float const> gradients) {
+    out_.resize(pose_gradient::floats);
+    (*this)(frame, gradients, out_.view());
+    return pose_gradient(out_.to_host().data());
+  }
+
+ private:
+  static constexpr index_t most_teams = 1024, host_teams = 64;
+  E* exec_;
+  buffer<double, E> sums_;
+  buffer<float, E> out_;
+};
+
+/// Once, to the host.
+template <class Frame>
+pose_gradient differentiate_pose(Frame const& frame, gaussians_view<float const> gradients) {
+  return pose_differentiation<typename Frame::execution_type>(frame.exec())(frame, gradients);
+}
+
+}  // namespace gart::inline GART_ISA

@@ -1,0 +1,180 @@
+#include "commands.hpp"
+#include "help.hpp"
+#include "output.hpp"
+#include "progress.hpp"
+
+#include <gart/core/error.hpp>
+#include <gart/io/splat_file.hpp>
+#include <gart/math/logit.hpp>
+#include <gart/scene/similarity.hpp>
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace gart_cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct convert_arguments {
+  fs::path in, out;
+  std::string crop, transform, sh_bits;
+  double prune = 0;
+  int sh_degree = 3;
+  gart::splat_packing packing;
+  bool quiet = false;
+};
+
+std::vector<double> numbers(std::string const& option, std::string_view text) {
+  std::vector<double> all;
+  while (true) {
+    std::string_view const word = text.substr(0, text.find(','));
+    double value = 0;
+    auto const [end, code] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (code != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
+      throw usage_error(option + ": '" + std::string(word) + "' is not a number (numbers with commas, no spaces)");
+    all.push_back(value);
+    if (word.size() == text.size()) return all;
+    text.remove_prefix(word.size() + 1);
+  }
+}
+
+gart::similarity similarity_named(std::string const& text) {
+  auto const v = numbers("--transform", text);
+  try {
+    if (v.size() == 16) {
+      std::array<double, 16> m;
+      std::copy(v.begin(), v.end(), m.begin());
+      return gart::similarity_of(m);
+    }
+    if (v.size() == 7 || v.size() == 8) {
+      double const scale = v.size() == 8 ? v[7] : 1;
+      if (!(scale > 0)) throw gart::invalid_argument("the scale must be above 0");
+      if (v[0] == 0 && v[1] == 0 && v[2] == 0 && v[3] == 0)
+        throw gart::invalid_argument("the quaternion is all zero, which is no rotation");
+      return {gart::rotation_of({v[0], v[1], v[2], v[3]}), scale, gart::vec3d(v[4], v[5], v[6])};
+    }
+  } catch (gart::invalid_argument const& e) {
+    throw usage_error(std::string("--transform: ") + e.what());
+  }
+  throw usage_error("--transform: " + std::to_string(v.size()) +
+                    " numbers, not 16 (a matrix), 7 (quaternion, translation) or 8 (and a scale)");
+}
+
+// Those of which keep(i) is true, in their order.
+gart::gaussian_model kept(gart::gaussian_model const& model, auto const& keep) {
+  gart::gaussian_model some;
+  some.sh_degree = model.sh_degree;
+  gart::for_each_array(
+      [&](gart::parameter_array const& a, auto& to, auto const& from) {
+        std::size_t const width = a.width(model.sh_degree);
+        for (std::size_t i = 0; i < model.size(); ++i)
+          if (keep(i)) to.insert(to.end(), &from[i * width], &from[i * width] + width);
+      },
+      some, model);
+  return some;
+}
+
+int run_convert(convert_arguments const& a) {
+  std::optional<gart::similarity> moved;
+  if (!a.transform.empty()) moved = similarity_named(a.transform);
+  std::vector<double> const box = a.crop.empty() ? std::vector<double>() : numbers("--crop", a.crop);
+  if (!box.empty() && box.size() != 6)
+    throw usage_error("--crop: " + std::to_string(box.size()) + " numbers, not the 6 of two corners");
+  gart::splat_packing packing = a.packing;
+  if (!a.sh_bits.empty()) {
+    auto const bits = numbers("--sh-bits", a.sh_bits);
+    if (bits.size() != 2 || bits[0] < 1 || bits[0] > 8 || bits[1] < 1 || bits[1] > 8)
+      throw usage_error("--sh-bits: two numbers from 1 to 8 belong there, as in 5,5");
+    packing.sh1_bits = static_cast<int>(bits[0]), packing.sh_bits = static_cast<int>(bits[1]);
+  }
+  prepare_file(a.out);
+
+  gart::splat_traits traits;
+  gart::gaussian_model model = gart::read_splats(a.in, &traits);
+  std::size_t const read = model.size();
+  if (!box.empty())
+    model = kept(model, [&](std::size_t i) {
+      bool inside = true;
+      for (std::size_t c = 0; c < 3; ++c) {
+        double const v = static_cast<double>(model.mean[3 * i + c]);
+        inside = inside && v >= box[c] && v <= box[c + 3];
+      }
+      return inside;
+    });
+  if (a.prune > 0)
+    model = kept(model, [&](std::size_t i) {
+      return gart::sigmoid_in_double(static_cast<double>(model.opacity[i])) >= a.prune;
+    });
+  if (model.size() == 0)
+    throw gart::io_error(a.in.string(), "no Gaussian is left", "a larger --crop, or a smaller --prune, keeps some");
+  model = gart::with_sh_degree(std::move(model), std::min(a.sh_degree, model.sh_degree));
+  if (moved) gart::apply(*moved, model);
+
+  std::vector<std::string> lost = gart::left_out(a.out, model, traits);
+  if (fs::exists(a.in.parent_path() / "exposures.json"))
+    lost.push_back("the exposures of " + (a.in.parent_path() / "exposures.json").string() + ", which no format holds");
+  gart::write_splats(a.out, model, traits, packing);
+  if (a.quiet) return 0;
+  for (std::string const& what : lost) std::printf("left out: %s\n", what.c_str());
+  auto const before = static_cast<double>(fs::file_size(a.in)), after = static_cast<double>(fs::file_size(a.out));
+  std::printf("%s: %zu of %zu Gaussians, SH degree %d, %s, %.3f of %s\n", a.out.string().c_str(), model.size(), read,
+              model.sh_degree, as_bytes(after).c_str(), after / before, a.in.filename().string().c_str());
+  return 0;
+}
+
+}  // namespace
+
+void add_convert(CLI::App& app, command& selected) {
+  auto a = std::make_shared<convert_arguments>();
+  CLI::App* convert = app.add_subcommand("convert", "Write a model in another format, cropped, pruned or moved.");
+  convert->add_option("IN", a->in, "Gaussians in any format; its first bytes say which")->type_name("")->required();
+  convert
+      ->add_option("OUT", a->out,
+                   "Where they go; the ending says the format: .ply, .compressed.ply,\n.spz, .sog, .splat or .glb")
+      ->type_name("")
+      ->required();
+  convert->add_option("--sh-degree", a->sh_degree, "Keep spherical harmonics to this degree, 0 to 3")
+      ->type_name("D")
+      ->check(between(0, 3));
+  convert
+      ->add_option("--crop", a->crop,
+                   "Keep the Gaussians whose means lie in this box: its least and its\ngreatest corner")
+      ->type_name("x,y,z,X,Y,Z");
+  convert->add_option("--prune", a->prune, "Leave out Gaussians of less opacity than this, 0 to 1")
+      ->type_name("A")
+      ->check(between(0, 1));
+  convert
+      ->add_option("--transform", a->transform,
+                   "Turn, scale and move: a 4x4 matrix row by row, or a quaternion and\na translation "
+                   "w,x,y,z,X,Y,Z, and a scale after them where it is not 1")
+      ->type_name("NUMBERS");
+  convert
+      ->add_option("--sh-bits", a->sh_bits,
+                   "SPZ: bits of a coefficient of degree 1, and of those above, 1 to 8\n(default: 5,5)")
+      ->type_name("A,B");
+  convert
+      ->add_option("--palette", a->packing.palette,
+                   "SOG: rows of coefficients that all Gaussians share, to 65536\n(default: a twelfth of their "
+                   "number)")
+      ->type_name("N")
+      ->check(between(1, 65536));
+  convert->add_flag("--quiet", a->quiet, "Say nothing but errors");
+  convert->footer(
+      "\nWrites OUT whole or not at all. The box and the opacity are IN's own; what is kept is moved after. What OUT's "
+      "format\nhas no room for is said, or refused where the image would be another one without it.\n"
+      "\nExamples:\n"
+      "  gart convert run/model.ply scene.spz\n"
+      "  gart convert scene.sog part.glb --crop -1,-1,-1,1,1,1 --prune 0.02\n"
+      "  gart convert model.ply turned.ply --transform 0.7071,0.7071,0,0,0,0,0,2");
+  convert->callback([a, &selected] { selected = [a] { return run_convert(*a); }; });
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,231 @@
+// Gradients of poses against central differences of the oracle's images, which is turned and shifted in double.
+#include <gart/pose/differentiate_pose.hpp>
+#include <oracle/oracle.hpp>
+#include <oracle/scenes.hpp>
+#include <support/policies.hpp>
+#include <support/trace_scene.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+using namespace gart_test;
+
+namespace {
+
+// A scene, the gradient of a loss by its image, zero where a difference crosses a step, and the loss's derivatives.
+struct expectation {
+  oracle::scene scene;
+  std::vector<float> weights;
+  double translation[3], rotation[3];
+};
+
+bool same_branches(oracle::pixel const& a, oracle::pixel const& b) {
+  return std::equal(a.list.begin(), a.list.end(), b.list.begin(), b.list.end(), [](auto const& x, auto const& y) {
+    return x.id == y.id && x.clamps == y.clamps && x.counted == y.counted;
+  });
+}
+
+expectation expect(oracle::scene s, std::mt19937_64& random) {
+  s.options.near = 1e-3f;  // what it cuts off is a step, and left out as steps are
+  expectation out{s, {}, {}, {}};
+  oracle::parameters const m(s.model);
+  double smallest = 1;
+  for (double l : m.log_scale) smallest = std::min(smallest, std::exp(l));
+  double const h = 2e-4 * smallest;
+  auto const render = [&](oracle::motion const& by) {
+    return oracle::render(m, s.view, s.options, s.active_degree, by);
+  };
+  auto const base = render({});
+  std::size_t const pixels = base.pixels.size();
+  std::vector<bool> usable(pixels, true);
+  std::vector<oracle::picture> moved;  // shifts, then turns; plus and minus, by h and 2 h
+  for (int k = 0; k < 6; ++k)
+    for (double const step : {h, -h, 2 * h, -2 * h}) {
+      oracle::motion by;
+      (k < 3 ? by.shift[k] : by.turn[k - 3]) = step;
+      moved.push_back(render(by));
+      for (std::size_t p = 0; p < pixels; ++p)
+        usable[p] = usable[p] && !base.pixels[p].edge && !base.pixels[p].kink &&
+                    same_branches(base.pixels[p], moved.back().pixels[p]);
+    }
+  REQUIRE(std::count(usable.begin(), usable.end(), true) > static_cast<long>(pixels / 2));
+  // Half the squared distance from the image of another pose has the difference for its gradient.
+  std::normal_distribution<double> normal(0, 0.05);
+  oracle::motion away;
+  for (int k = 0; k < 3; ++k) away.shift[k] = normal(random), away.turn[k] = normal(random);
+  auto const there = render(away);
+  for (std::size_t p = 0; p < pixels; ++p)
+    for (int c = 0; c < 3; ++c) {
+      double const difference = base.pixels[p].color[c] - there.pixels[p].color[c];
+      out.weights.push_back(usable[p] ? static_cast<float>(difference) : 0.0f);
+    }
+  for (int k = 0; k < 6; ++k) {
+    double sum = 0;
+    for (std::size_t p = 0; p < pixels; ++p)
+      for (int c = 0; c < 3; ++c) {
+        auto const at = [&](int step) { return moved[static_cast<std::size_t>(4 * k + step)].pixels[p].color[c]; };
+        sum += double{out.weights[3 * p + c]} * (8 * (at(0) - at(1)) - (at(2) - at(3))) / (12 * h);
+      }
+    (k < 3 ? out.translation[k] : out.rotation[k - 3]) = sum;
+  }
+  return out;
+}
+
+double relative(gart::vec3d const& got, double const (&expected)[3]) {
+  double error = 0, norm = 0;
+  for (int k = 0; k < 3; ++k)
+    error += (got[k] - expected[k]) * (got[k] - expected[k]), norm += expected[k] * expected[k];
+  REQUIRE(norm > 0);
+  return std::isfinite(error) ? std::sqrt(error / norm) : HUGE_VAL;
+}
+
+template <int Degree, class Strategy, class Tracer, class E>
+gart::pose_gradient pose_by(E& exec, expectation const& e) {
+  auto const& s = e.scene;
+  using frame_type = frame_by<Degree, Tracer, E>;
+  gart::gaussians<E> const scene(exec, s.model);
+  gart::gaussians<E> gradients(exec, scene.size(), Degree);
+  frame_type frame(exec);
+  gart::backward_pass<frame_type, Strategy> pass(exec);
+  gart::buffer<float, E> color(exec, e.weights.size()), weights(exec, e.weights);
+  frame.prepare(scene.view(), s.view, s.options, s.active_degree);
+  REQUIRE(pass.prepare(frame));
+  pass.render(frame, {color.data()});
+  gart::differentiate(frame, pass, weights, gradients);
+  return gart::differentiate_pose(frame, std::as_const(gradients).view());
+}
+
+template <class E, class F>
+void by_all(expectation const& e, F const& check) {
+  E exec;
+  detail::with_degree(e.scene.model.sh_degree, [&](auto degree) {
+    auto const by = [&]<tracer_kind Kind, class Tracer>(std::integral_constant<tracer_kind, Kind>,
+                                                        std::type_identity<Tracer>) {
+      gart::strategies::for_each([&]<class Strategy>(Strategy) {
+        if constexpr (compiled_for<Strategy>(Kind, degree)) {
+          CAPTURE(std::string(Strategy::name));
+          check(pose_by<degree, Strategy, Tracer>(exec, e));
+        }
+      });
+    };
+    by(std::integral_constant<tracer_kind, tracer_kind::bvh>{}, std::type_identity<gart::bvh_tracer<E>>{});
+    by(std::integral_constant<tracer_kind, tracer_kind::tiles>{}, std::type_identity<gart::tile_tracer<E>>{});
+  });
+}
+
+std::vector<expectation> const& expectations() {
+  static std::vector<expectation> const all = [] {
+    std::vector<expectation> out;
+    std::mt19937_64 random(seed());
+    for (int degree = 0; degree <= 3; ++degree) {
+      oracle::scene s = oracle::smooth_scene(seed() + static_cast<std::uint64_t>(degree), degree, 2.0f);
+      out.push_back(expect(s, random));
+      s.options.antialias = 0.7f;
+      s.name = "smooth, through the filter of the pixels";
+      out.push_back(expect(s, random));
+    }
+    oracle::scene low = oracle::smooth_scene(seed(), 3, 8.0f);
+    low.name = "smooth, the first two bands", low.active_degree = 1;
+    out.push_back(expect(low, random));
+    low.view.lens = {}, low.name = "smooth, a pinhole";
+    out.push_back(expect(low, random));
+    return out;
+  }();
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("gradients of poses agree with differences of the oracle's images", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  double worst = 0;
+  for (expectation const& e : expectations()) {
+    CAPTURE(e.scene.name);
+    CAPTURE(e.scene.model.sh_degree);
+    by_all<E>(e, [&](gart::pose_gradient const& got) {
+      double const t = relative(got.translation, e.translation), r = relative(got.rotation, e.rotation);
+      worst = std::max({worst, t, r});
+      CHECK(t <= 1e-5);
+      CHECK(r <= 1e-5);
+    });
+  }
+  MESSAGE("worst relative error " << worst);
+}
+
+namespace {
+
+// What the sum over Gaussians asks of a frame.
+template <class E>
+struct stored {
+  using execution_type = E;
+  static constexpr int sh_degree = 2;
+  E* policy;
+  gart::gaussians_view<float const> gaussians;
+  gart::camera seen_by;
+  E& exec() const { return *policy; }
+  gart::gaussians_view<float const> scene() const { return gaussians; }
+  gart::camera const& view() const { return seen_by; }
+};
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("sums over any number of Gaussians are those in double, broken ones left out", E,
+                   GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  std::mt19937_64 random(seed);
+  std::normal_distribution<float> normal;
+  E exec;
+  for (std::size_t const count : {std::size_t{0}, std::size_t{1}, std::size_t{64}, std::size_t{20011}}) {
+    CAPTURE(count);
+    gart::gaussian_model model, gradients;
+    for (auto* m : {&model, &gradients}) {
+      m->resize(count, 2);
+      for (auto* values : {&m->mean, &m->log_scale, &m->quaternion, &m->opacity, &m->sh})
+        for (float& x : *values) x = normal(random);
+    }
+    gart::camera view;
+    view.position = {1e6, -2e6, 3};
+    for (std::size_t k = 0; k < model.mean.size(); ++k)
+      model.mean[k] += static_cast<float>(view.position[static_cast<int>(k % 3)]);
+    double expected[6] = {};
+    for (std::size_t i = 0; i < count; ++i) {
+      if (i % 7 == 3) gradients.quaternion[4 * i] = std::numeric_limits<float>::quiet_NaN();
+      if (i % 7 == 5) {
+        for (std::size_t k = 0; k < 3; ++k) gradients.mean[3 * i + k] = gradients.sh[27 * i + k] = 0;  // not seen
+      }
+      if (i % 7 == 3 || i % 7 == 5) continue;
+      double arm[3], by[3];
+      for (std::size_t k = 0; k < 3; ++k) {
+        arm[k] = double{model.mean[3 * i + k]} - view.position[static_cast<int>(k)],
+        by[k] = double{gradients.mean[3 * i + k]};
+        expected[k] -= by[k];
+      }
+      for (std::size_t k = 0; k < 3; ++k)
+        expected[3 + k] -= arm[(k + 1) % 3] * by[(k + 2) % 3] - arm[(k + 2) % 3] * by[(k + 1) % 3];
+      float const *q = &model.quaternion[4 * i], *g = &gradients.quaternion[4 * i];
+      for (std::size_t k = 0; k < 3; ++k) {
+        std::size_t const a = 1 + (k + 1) % 3, b = 1 + (k + 2) % 3;
+        expected[3 + k] -= 0.5 * (double{q[0]} * double{g[1 + k]} - double{g[0]} * double{q[1 + k]} -
+                                  (double{g[a]} * double{q[b]} - double{g[b]} * double{q[a]}));
+      }
+      // The turn of the colours, by differences of the band's functions is what the oracle's test has; here its sum.
+      gart::vec3 const turn = gart::sh_turn<2>(&model.sh[27 * i], &gradients.sh[27 * i]);
+      for (int k = 0; k < 3; ++k) expected[3 + k] += double{turn[k]};
+    }
+    gart::gaussians<E> const scene(exec, model), by(exec, gradients);
+    stored<E> const frame{&exec, scene.view(), view};
+    auto const got = gart::differentiate_pose(frame, by.view());
+    for (int k = 0; k < 3; ++k) {
+      CHECK(std::abs(got.translation[k] - expected[k]) <= 1e-5 * (1 + std::sqrt(static_cast<double>(count))));
+      CHECK(std::abs(got.rotation[k] - expected[3 + k]) <= 1e-4 * (1 + std::sqrt(static_cast<double>(count))));
+    }
+    gart::gaussians<E> const fewer(exec, count + 1, 2);
+    CHECK_THROWS_AS(gart::differentiate_pose(frame, fewer.view()), gart::invalid_argument);
+  }
+}
