@@ -5,6 +5,7 @@
 #include "render_images.hpp"
 #include "samples.hpp"
 
+#include <gart/io/camera_file.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/exposure_file.hpp>
 #include <gart/io/image_file.hpp>
@@ -25,7 +26,7 @@ namespace fs = std::filesystem;
 struct render_arguments {
   fs::path model, cameras, out, json, exposures;
   configuration_options configuration;
-  std::string background = "black";
+  std::string background = "black", camera;
   int downscale = 1, samples = 1;
   float alpha_min = -1, t_min = -1;
   int max_hits = -1;
@@ -68,6 +69,7 @@ int run_render(render_arguments const& a) {
   double total = 0;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     auto& [name, view] = cameras[i];
+    if (!a.camera.empty()) view = gart::seen_through(view, a.camera);
     if (a.downscale > 1)
       view = gart::resized(view, std::max(1, view.width / a.downscale), std::max(1, view.height / a.downscale));
     auto const start = std::chrono::steady_clock::now();
@@ -115,6 +117,12 @@ void add_render(CLI::App& app, command& selected) {
       ->type_name("")
       ->required();
   render->add_option("--out", a->out, "Folder of the images; made where there is none")->type_name("DIR")->required();
+  render
+      ->add_option("--camera", a->camera,
+                   "Through another camera in the same places: COLMAP's name of a\nmodel and its parameters, as "
+                   "EQUIRECTANGULAR, FISHEYE,angle=200 or\nOPENCV_FISHEYE,fx=90,k1=0.02; angle is across the shorter "
+                   "side")
+      ->type_name("MODEL");
   add_exposures(*render, a->exposures);
   render->add_option("--background", a->background, "black or white: what it was trained on")
       ->type_name("NAME")

@@ -74,6 +74,11 @@ void add_synth(CLI::App& app, command& selected) {
       ->type_name("N")
       ->check(whole_number())
       ->capture_default_str();
+  synth
+      ->add_option("--camera", options->camera,
+                   "Through another camera than a pinhole: COLMAP's name of a model\nand its parameters, as "
+                   "EQUIRECTANGULAR, FISHEYE,angle=200 or\nOPENCV_FISHEYE,k1=0.02; angle is across a view")
+      ->type_name("MODEL");
   synth->add_flag("--depth", options->depth,
                   "Also a depth map of each view, r_N_depth.png: distances along\nthe rays, for gart train "
                   "--depth-weight");

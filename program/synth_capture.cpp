@@ -4,6 +4,7 @@
 #include "synth_trace.hpp"
 
 #include <gart/core/error.hpp>
+#include <gart/io/camera_file.hpp>
 #include <gart/io/depth_file.hpp>
 #include <gart/io/file.hpp>
 #include <gart/io/image_file.hpp>
@@ -59,8 +60,21 @@ void prepare_folder(fs::path const& out) {
 
 std::string transforms_json(std::vector<gart::camera> const& cameras, std::string const& split, bool depth) {
   char text[256];
-  std::snprintf(text, sizeof text, "{\n  %s,\n  \"camera_angle_x\": %.17g,\n", mark, angle_x);
-  std::string json = text;
+  gart::camera const& first = cameras.front();
+  std::string json = std::string("{\n  ") + mark + ",\n";
+  if (auto const lens = gart::fields_of(first); lens.model == "PINHOLE") {
+    std::snprintf(text, sizeof text, "  \"camera_angle_x\": %.17g,\n", angle_x);
+    json += text;
+  } else {
+    json += "  \"camera_model\": \"" + lens.model + "\",\n  \"w\": " + std::to_string(first.width) +
+            ",\n  \"h\": " + std::to_string(first.height) + ",\n";
+    for (auto const& [name, value] : lens.values) {
+      bool const focal = name == "fx" || name == "fy";
+      std::snprintf(text, sizeof text, "  \"%s\": %.9g,\n", focal ? name == "fx" ? "fl_x" : "fl_y" : name.c_str(),
+                    value);
+      json += text;
+    }
+  }
   if (depth) {
     std::snprintf(text, sizeof text, "  \"depth_kind\": \"distance\",\n  \"depth_unit_scale_factor\": %g,\n",
                   depth_step);
@@ -117,10 +131,13 @@ void write_synth_capture(synth_options const& options, std::function<void(int do
   check_range("--points", options.points, synth_points);
   check_range("--threads", options.threads, synth_threads);
 
+  auto train = synth_cameras(options.train, options.size, false);
+  auto test = synth_cameras(options.test, options.size, true);
+  for (auto* cameras : {&train, &test})
+    for (gart::camera& c : *cameras)
+      if (!options.camera.empty()) c = gart::seen_through(c, options.camera);
   synth_renderer const renderer(make_synth_scene(options.seed), options.threads);
   prepare_folder(options.out);
-  auto const train = synth_cameras(options.train, options.size, false);
-  auto const test = synth_cameras(options.test, options.size, true);
   int done = 0;
   int const total = options.train + options.test;
   for (auto const* cameras : {&train, &test}) {

@@ -4,6 +4,7 @@
 //   DIR/train/r_N.png, DIR/test/r_N.png                   RGBA, straight alpha
 //   DIR/train/r_N_depth.png and so on                     where asked for: distances along the rays, 16 bits
 //   DIR/points3d.ply                                      starting points on the surfaces, coloured
+// Through another camera than a pinhole the transforms name its model and parameters in place of camera_angle_x.
 // The transforms are written last, each file whole: a capture that was interrupted is not taken for one.
 
 #include "synth_scene.hpp"
@@ -12,6 +13,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <vector>
 
 namespace gart_cli {
@@ -22,9 +24,10 @@ struct synth_options {
   int size = 160;            // pixels a side
   int samples = 32;          // paths a pixel
   int points = 10000;
+  std::string camera;  // as gart::seen_through has it; empty: a pinhole
+  bool depth = false;  // depth maps too
   u64 seed = 1;
   int threads = 0;  // 0: all
-  bool depth = false;
 };
 
 struct synth_limits {

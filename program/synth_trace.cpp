@@ -223,7 +223,8 @@ gart::image8 synth_renderer::render(gart::camera const& view, int samples, u64 s
         sample_sequence random(stream, s);
         vec2 const at = random.next();
         vec3 sample;
-        if (!tracer.radiance(origin, gart::ray_direction(view, x + at.x, y + at.y), random, sample)) continue;
+        vec3 const direction = gart::ray_direction(view, x + at.x, y + at.y);
+        if (direction == vec3(0.0f) || !tracer.radiance(origin, direction, random, sample)) continue;
         sum += sample;
         ++covered;
       }
@@ -243,7 +244,7 @@ gart::image_float synth_renderer::distances(gart::camera const& view) const {
     for (int x = 0; x < view.width; ++x) {
       synth_hit hit;
       vec3 const direction = gart::ray_direction(view, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
-      if (tracer.tracer.intersect(origin, direction, 0, hit)) map.at(x, y, 0) = hit.t;
+      if (direction != vec3(0.0f) && tracer.tracer.intersect(origin, direction, 0, hit)) map.at(x, y, 0) = hit.t;
     }
   });
   return map;

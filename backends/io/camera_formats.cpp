@@ -3,34 +3,38 @@
 
 #include "camera_formats.hpp"
 
+#include <gart/core/error.hpp>
+
 #include <algorithm>
 #include <iterator>
 
 namespace gart::io {
 namespace {
 
-constexpr camera_kind perspective = camera_kind::perspective;
+using kind = camera_kind;
 
+// Of the names of one kind the writer takes the first that says all, so short ones come first.
 constexpr camera_format formats[] = {
-    {0, "SIMPLE_PINHOLE", "f cx cy", perspective},
-    {1, "PINHOLE", "fx fy cx cy", perspective},
-    {2, "SIMPLE_RADIAL", "f cx cy k1", perspective},
-    {3, "RADIAL", "f cx cy k1 k2", perspective},
-    {4, "OPENCV", "fx fy cx cy k1 k2 p1 p2", perspective},
-    {5, "OPENCV_FISHEYE", "fx fy cx cy k1 k2 k3 k4", {}},
-    {6, "FULL_OPENCV", "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6", {}},
-    {7, "FOV", "fx fy cx cy omega", {}},
-    {8, "SIMPLE_RADIAL_FISHEYE", "f cx cy k1", {}},
-    {9, "RADIAL_FISHEYE", "f cx cy k1 k2", {}},
-    {10, "THIN_PRISM_FISHEYE", "fx fy cx cy k1 k2 p1 p2 k3 k4 sx1 sy1", {}},
-    {11, "RAD_TAN_THIN_PRISM_FISHEYE", "fx fy cx cy k0 k1 k2 k3 k4 k5 p0 p1 s0 s1 s2 s3", {}},
-    {12, "SIMPLE_DIVISION", "f cx cy k1", {}},
-    {13, "DIVISION", "fx fy cx cy k1", {}},
-    {14, "SIMPLE_FISHEYE", "f cx cy", {}},
-    {15, "FISHEYE", "fx fy cx cy", {}},
-    {16, "EUCM", "fx fy cx cy alpha beta", {}},
-    {17, "EQUIRECTANGULAR", "width height", {}},
-    {-1, "PERSPECTIVE", "fx fy cx cy k1 k2 p1 p2", perspective},
+    {0, "SIMPLE_PINHOLE", "f cx cy", kind::perspective},
+    {1, "PINHOLE", "fx fy cx cy", kind::perspective},
+    {2, "SIMPLE_RADIAL", "f cx cy k1", kind::perspective},
+    {3, "RADIAL", "f cx cy k1 k2", kind::perspective},
+    {4, "OPENCV", "fx fy cx cy k1 k2 p1 p2", kind::perspective},
+    {14, "SIMPLE_FISHEYE", "f cx cy", kind::fisheye},
+    {15, "FISHEYE", "fx fy cx cy", kind::fisheye},
+    {5, "OPENCV_FISHEYE", "fx fy cx cy k1 k2 k3 k4", kind::fisheye},
+    {6, "FULL_OPENCV", "fx fy cx cy k1 k2 p1 p2 k3 k4=d1 k5=d2 k6=d3", kind::perspective},
+    {7, "FOV", "fx fy cx cy omega", kind::fov},
+    {8, "SIMPLE_RADIAL_FISHEYE", "f cx cy k=k1", kind::fisheye},
+    {9, "RADIAL_FISHEYE", "f cx cy k1 k2", kind::fisheye},
+    {10, "THIN_PRISM_FISHEYE", "fx fy cx cy k1 k2 p1 p2 k3 k4 sx1=s1 sy1=s3", kind::fisheye},
+    {11, "RAD_TAN_THIN_PRISM_FISHEYE",
+     "fx fy cx cy k0=k1 k1=k2 k2=k3 k3=k4 k4=k5 k5=k6 p0=p2 p1 s0=s1 s1=s2 s2=s3 s3=s4", kind::fisheye624},
+    {12, "SIMPLE_DIVISION", "f cx cy k=k1", kind::division},
+    {13, "DIVISION", "fx fy cx cy k=k1", kind::division},
+    {16, "EUCM", "fx fy cx cy alpha beta", kind::eucm},
+    {17, "EQUIRECTANGULAR", "width height", kind::equirectangular},
+    {-1, "PERSPECTIVE", "fx fy cx cy k1 k2 p1 p2 k3 k4", kind::perspective},
 };
 
 template <class F>
@@ -43,10 +47,21 @@ camera_format const* find(F&& f) {
 
 int camera_format::parameters() const { return 1 + static_cast<int>(std::count(fields.begin(), fields.end(), ' ')); }
 
-std::string_view camera_format::field(int place) const {
-  std::string_view rest = fields;
+namespace {
+std::string_view word(std::string_view rest, int place) {
   for (; place > 0; --place) rest.remove_prefix(rest.find(' ') + 1);
   return rest.substr(0, rest.find(' '));
+}
+}  // namespace
+
+std::string_view camera_format::field(int place) const {
+  std::string_view const both = word(fields, place);
+  return both.substr(0, both.find('='));
+}
+
+std::string_view camera_format::member(int place) const {
+  std::string_view const both = word(fields, place);
+  return both.find('=') == both.npos ? both : both.substr(both.find('=') + 1);
 }
 
 bool camera_format::has(std::string_view wanted) const {
@@ -76,16 +91,58 @@ std::string traced_camera_formats() {
   return out;
 }
 
-void set_field(camera& c, std::string_view field, double value) {
+namespace {
+struct member {
+  std::string_view name;
+  float camera::*own;
+  float distortion::*of_lens;
+};
+constexpr member members[] = {
+    {"fx", &camera::fx, nullptr},           {"fy", &camera::fy, nullptr},
+    {"cx", &camera::cx, nullptr},           {"cy", &camera::cy, nullptr},
+    {"k1", nullptr, &distortion::k1},       {"k2", nullptr, &distortion::k2},
+    {"k3", nullptr, &distortion::k3},       {"k4", nullptr, &distortion::k4},
+    {"k5", nullptr, &distortion::k5},       {"k6", nullptr, &distortion::k6},
+    {"p1", nullptr, &distortion::p1},       {"p2", nullptr, &distortion::p2},
+    {"d1", nullptr, &distortion::d1},       {"d2", nullptr, &distortion::d2},
+    {"d3", nullptr, &distortion::d3},       {"s1", nullptr, &distortion::s1},
+    {"s2", nullptr, &distortion::s2},       {"s3", nullptr, &distortion::s3},
+    {"s4", nullptr, &distortion::s4},       {"omega", nullptr, &distortion::omega},
+    {"alpha", nullptr, &distortion::alpha}, {"beta", nullptr, &distortion::beta},
+};
+}  // namespace
+
+void set_member(camera& c, std::string_view name, double value) {
   float const v = static_cast<float>(value);
-  if (field == "f") c.fx = c.fy = v;
-  struct {
-    std::string_view name;
-    float* at;
-  } const fields[] = {{"fx", &c.fx},      {"fy", &c.fy},      {"cx", &c.cx},      {"cy", &c.cy},
-                      {"k1", &c.lens.k1}, {"k2", &c.lens.k2}, {"p1", &c.lens.p1}, {"p2", &c.lens.p2}};
-  for (auto const& f : fields)
-    if (f.name == field) *f.at = v;
+  if (name == "f") c.fx = c.fy = v;
+  for (member const& m : members)
+    if (m.name == name) (m.own ? c.*m.own : c.lens.*m.of_lens) = v;
+}
+
+float member_of(camera const& c, std::string_view name) {
+  if (name == "f") return c.fx;
+  for (member const& m : members)
+    if (m.name == name) return m.own ? c.*m.own : c.lens.*m.of_lens;
+  return 0;
+}
+
+bool is_pinhole_member(std::string_view name) {
+  return name == "f" || name == "fx" || name == "fy" || name == "cx" || name == "cy";
+}
+
+camera_format const& camera_format_for(camera const& c) {
+  camera const plain;
+  for (camera_format const& f : formats) {
+    if (f.kind != c.kind || f.fields.substr(0, 2) == "f ") continue;
+    bool whole = true;
+    for (member const& m : members) {
+      bool said = m.own != nullptr || member_of(c, m.name) == plain.lens.*m.of_lens;
+      for (int k = 0; k < f.parameters(); ++k) said = said || f.member(k) == m.name;
+      whole = whole && said;
+    }
+    if (whole) return f;
+  }
+  throw unsupported("no camera model of files has all the parameters of this camera's lens");
 }
 
 }  // namespace gart::io

@@ -14,13 +14,14 @@ namespace gart::io {
 struct camera_format {
   int number;  // COLMAP's; below zero where it has none
   std::string_view name;
-  std::string_view
-      fields;  // COLMAP's parameters in their order, by the names of transforms.json; f: both focal lengths
+  std::string_view fields;  // COLMAP's parameters in their order, each by its name in files, f both focal lengths, and
+                            // behind a = by that of the camera's member (scene/camera.hpp) where it is another
   std::optional<camera_kind> kind;
 
   int parameters() const;
-  // The field at a place, from 0.
+  // The field at a place, from 0: its name in files, and the camera's.
   std::string_view field(int place) const;
+  std::string_view member(int place) const;
   bool has(std::string_view name) const;
 };
 
@@ -31,7 +32,14 @@ camera_format const* camera_format_of(std::string_view name);
 // "A, B and C": all that are traced, for errors.
 std::string traced_camera_formats();
 
-// A camera's parameter by its name in a format; of lenses by the names of transforms.json.
-void set_field(camera& c, std::string_view field, double value);
+// A camera's parameter by its member's name. A name that there is not is passed over.
+void set_member(camera& c, std::string_view member, double value);
+float member_of(camera const& c, std::string_view member);
+
+// The format that says all of a camera, and is no simpler one's name.
+camera_format const& camera_format_for(camera const& c);
+
+// "f", "fx", "fy", "cx" or "cy".
+bool is_pinhole_member(std::string_view member);
 
 }  // namespace gart::io

@@ -166,7 +166,8 @@ void read_cameras_txt(fs::path const& path, model_files& model) {
     s.width = in.number<u64>("a camera's width");
     s.height = in.number<u64>("a camera's height");
     for (int k = 0; k < s.model->parameters(); ++k)
-      s.parameters[static_cast<std::size_t>(k)] = in.number<double>("a camera's parameter");
+      s.parameters[static_cast<std::size_t>(k)] =
+          in.number<double>(("the camera's " + std::string(s.model->field(k))).c_str());
     model.sensors[id] = s;
   }
 }
@@ -212,7 +213,10 @@ camera lens_of(sensor const& s, std::string const& where) {
   c.kind = *s.model->kind;
   c.width = static_cast<int>(s.width), c.height = static_cast<int>(s.height);
   for (int k = 0; k < s.model->parameters(); ++k)
-    set_field(c, s.model->field(k), s.parameters[static_cast<std::size_t>(k)]);
+    set_member(c, s.model->member(k), s.parameters[static_cast<std::size_t>(k)]);
+  if (c.kind == camera_kind::equirectangular &&
+      !(s.parameters[0] == static_cast<double>(s.width) && s.parameters[1] == static_cast<double>(s.height)))
+    throw io_error(where, "the size of the EQUIRECTANGULAR model is not the camera's", "export the model again");
   return c;
 }
 

@@ -1,100 +1,19 @@
-// transforms.json of Blender (NeRF-Synthetic), nerfstudio and instant-ngp, and gart's camera JSON.
+// transforms.json of Blender (NeRF-Synthetic), nerfstudio and instant-ngp.
 // https://docs.nerf.studio/quickstart/data_conventions.html
 
 #include "bytes.hpp"
 #include "camera_formats.hpp"
 #include "capture.hpp"
+#include "json_record.hpp"
 
-#include <gart/core/error.hpp>
-#include <gart/io/file.hpp>
 #include <gart/io/ply.hpp>
 
-#include <nlohmann/json.hpp>
-
 #include <algorithm>
-#include <cmath>
 #include <set>
 
 namespace gart::io {
 namespace fs = std::filesystem;
 namespace {
-
-using nlohmann::json;
-
-json read_json(fs::path const& path) {
-  std::vector<u8> const bytes = read_file(path);
-  try {
-    return json::parse(bytes.begin(), bytes.end());
-  } catch (json::exception const& e) {
-    throw io_error(path.string(), std::string("is not valid JSON: ") + e.what(), "the file is truncated or damaged");
-  }
-}
-
-// A JSON object, and the one its missing keys are looked up in.
-struct record {
-  json const& own;
-  json const* fallback;
-  std::string where;
-
-  json const* find(char const* key) const {
-    if (auto const it = own.find(key); it != own.end() && !it->is_null()) return &*it;
-    if (!fallback) return nullptr;
-    auto const it = fallback->find(key);
-    return it != fallback->end() && !it->is_null() ? &*it : nullptr;
-  }
-  bool has(char const* key) const { return find(key) != nullptr; }
-  json const& at(char const* key) const {
-    json const* value = find(key);
-    if (!value) throw io_error(where, std::string("'") + key + "' is missing", "add it");
-    return *value;
-  }
-  double number(char const* key) const {
-    json const& value = at(key);
-    if (!value.is_number()) throw io_error(where, std::string("'") + key + "' is not a number", "write a number");
-    double const v = value.get<double>();
-    if (!std::isfinite(v)) throw io_error(where, std::string("'") + key + "' is not finite", "write a finite number");
-    return v;
-  }
-  double number_or(char const* key, double other) const { return has(key) ? number(key) : other; }
-  int size(char const* key) const {
-    double const v = number(key);
-    if (!(v >= 1 && v <= 1e6)) {
-      throw io_error(where, std::string("'") + key + "' is not a size in pixels", "write a number from 1 to 1000000");
-    }
-    return static_cast<int>(std::lround(v));
-  }
-  std::string text(char const* key) const {
-    json const& value = at(key);
-    if (!value.is_string()) throw io_error(where, std::string("'") + key + "' is not a text", "write it in quotes");
-    return value.get<std::string>();
-  }
-  bool flag(char const* key) const {
-    json const* value = find(key);
-    return value && value->is_boolean() && value->get<bool>();
-  }
-};
-
-// A 3x4 or 4x4 matrix, row by row, camera to world.
-void read_pose(record const& r, char const* key, bool opengl_axes, camera& view) {
-  json const& rows = r.at(key);
-  auto const refuse = [&] {
-    throw io_error(r.where, std::string("'") + key + "' is not a matrix of 4 x 4 numbers", "export it again");
-  };
-  if (!rows.is_array() || rows.size() < 3 || rows.size() > 4) refuse();
-  mat3d axes(1.0);
-  vec3d center(0.0);
-  for (int i = 0; i < 3; ++i) {
-    json const& row = rows[static_cast<std::size_t>(i)];
-    if (!row.is_array() || row.size() != 4) refuse();
-    for (int j = 0; j < 4; ++j) {
-      json const& value = row[static_cast<std::size_t>(j)];
-      if (!value.is_number()) refuse();
-      (j < 3 ? axes[j][i] : center[i]) = value.get<double>();
-    }
-  }
-  if (opengl_axes) axes[1] = -axes[1], axes[2] = -axes[2];
-  set_pose(view, axes, center, r.where);
-}
 
 fs::path from_text(fs::path const& folder, std::string text) {
   std::replace(text.begin(), text.end(), '\\', '/');
@@ -114,22 +33,15 @@ fs::path find_photo(fs::path const& path) {
 }
 
 void read_lens(record const& r, frame& f) {
-  std::string const name = r.has("camera_model") ? r.text("camera_model") : "PERSPECTIVE";
-  camera_format const* const model = camera_format_of(name);
-  if (!model || !model->kind) {
-    throw unsupported(r.where + ": the camera model is " + name.substr(0, 60) + "; gart traces " +
-                      traced_camera_formats() + " (undistort the capture)");
-  }
-  if (r.flag("is_fisheye"))
-    throw unsupported(r.where + ": 'is_fisheye' is set; gart traces no fisheye lens (undistort the capture)");
+  camera_format const* const model = camera_model_of(r, r.flag("is_fisheye") ? "OPENCV_FISHEYE" : "PERSPECTIVE");
   f.view.kind = *model->kind;
-  for (char const* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"}) set_field(f.view, key, r.number_or(key, 0));
-  for (char const* key : {"k3", "k4", "k5", "k6"}) {
-    if (r.number_or(key, 0) != 0) {
-      throw unsupported(r.where + ": '" + key +
-                        "' is not zero; gart traces the distortion k1 k2 p1 p2 (undistort the capture)");
-    }
+  read_lens_members(r, *model, f.view);
+  if (f.view.kind == camera_kind::equirectangular) {
+    if (r.has("w") != r.has("h")) throw io_error(r.where, "only one of 'w' and 'h' is there", "give both or neither");
+    if (r.has("w")) f.set_size(r.size("w"), r.size("h"));
+    return;
   }
+  if (f.view.kind != camera_kind::perspective) r.at("fl_x");
 
   auto const angle = [&](char const* key) {
     double const v = r.number_or(key, 0);
@@ -253,36 +165,6 @@ capture read_transforms(fs::path const& file) {
   result.format = "nerfstudio";
   read_frames(file, part::unassigned, result);
   return result;
-}
-
-bool is_json_list(fs::path const& file) {
-  for (u8 byte : read_file(file)) {
-    if (byte == '[') return true;
-    if (!is_space(static_cast<char>(byte)) && byte < 0x80) return false;  // a byte order mark may come first
-  }
-  return false;
-}
-
-std::vector<named_camera> read_camera_json(fs::path const& file) {
-  json const root = read_json(file);
-  std::vector<named_camera> cameras;
-  for (std::size_t i = 0; i < root.size(); ++i) {
-    record const r{root[i], nullptr, file.string() + ", camera " + std::to_string(i)};
-    if (!r.own.is_object()) throw io_error(r.where, "is not a JSON object", "write {\"name\", \"width\", ...}");
-    named_camera c;
-    c.name = r.text("name");
-    c.view.width = r.size("width"), c.view.height = r.size("height");
-    c.view.fx = static_cast<float>(r.number("fx")), c.view.fy = static_cast<float>(r.number("fy"));
-    c.view.cx = static_cast<float>(r.number("cx")), c.view.cy = static_cast<float>(r.number("cy"));
-    read_pose(r, "c2w", false, c.view);
-    check_camera(c.view, r.where);
-    cameras.push_back(std::move(c));
-  }
-  if (cameras.empty()) throw io_error(file.string(), "holds no camera", "add one");
-  std::vector<std::string*> names;
-  for (named_camera& c : cameras) names.push_back(&c.name);
-  make_file_names(names);
-  return cameras;
 }
 
 }  // namespace gart::io

@@ -104,7 +104,7 @@ capture_traits inspect(dataset const& data) {
   traits.views = data.train.size();
   for (auto const* views : {&data.train, &data.test}) {
     for (dataset_view const& v : *views) {
-      if (!v.view.lens.any()) continue;
+      if (v.view.kind == camera_kind::perspective && !v.view.lens.any()) continue;
       ++traits.distorted;
       traits.folding += !one_to_one(v.view);
     }

@@ -242,7 +242,8 @@ void check_hits(E& exec, Model const& view, gart::gaussian_model const& model) {
     hits += static_cast<long>(b.size());
     for (gart::hit const& h : b) {
       gart::footprint const& f = prints[h.id];
-      outside += x < f.box.x0 || x >= f.box.x1 || y < f.box.y0 || y >= f.box.y1;
+      int const column = x < f.box.x0 ? x + f.seam : x;
+      outside += column < f.box.x0 || column >= f.box.x1 || y < f.box.y0 || y >= f.box.y1;
       too_near += h.t * depth.per_distance(by_bvh.rays[p].direction) < f.depth;
     }
     auto const expected = scene.brute().hits(by_bvh.rays[p]);

@@ -33,7 +33,8 @@ void check_points(gart::point_cloud const& points) {
 
 void check_camera(gart::camera const& c) {
   promise(c.width >= 1 && c.height >= 1, "a camera without pixels");
-  promise(c.fx > 0 && c.fy > 0 && finite({c.fx, c.fy, c.cx, c.cy}), "intrinsics that are not finite");
+  bool const sphere = c.kind == gart::camera_kind::equirectangular;
+  promise(sphere || (c.fx > 0 && c.fy > 0 && finite({c.fx, c.fy, c.cx, c.cy})), "intrinsics that are not finite");
   promise(finite({c.lens.k1, c.lens.k2, c.lens.p1, c.lens.p2}), "a lens that is not finite");
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {

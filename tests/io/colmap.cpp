@@ -151,44 +151,81 @@ TEST_CASE(".bin is preferred, and a named .txt is taken") {
   CHECK(gart::load_dataset(folder.path / "sparse/0/cameras.txt", all_train()).points.size() == 0);
 }
 
-TEST_CASE("every COLMAP model that is not traced is refused by its name") {
-  std::pair<char const*, int> const models[] = {{"OPENCV_FISHEYE", 8},
-                                                {"FULL_OPENCV", 12},
-                                                {"FOV", 5},
-                                                {"SIMPLE_RADIAL_FISHEYE", 4},
-                                                {"RADIAL_FISHEYE", 5},
-                                                {"THIN_PRISM_FISHEYE", 12},
-                                                {"RAD_TAN_THIN_PRISM_FISHEYE", 16},
-                                                {"SIMPLE_DIVISION", 4},
-                                                {"DIVISION", 5},
-                                                {"SIMPLE_FISHEYE", 3},
-                                                {"FISHEYE", 4},
-                                                {"EUCM", 6},
-                                                {"EQUIRECTANGULAR", 2}};
-  int id = 5;
-  for (auto const& [name, parameters] : models) {
-    CAPTURE(name);
-    scratch_folder const folder;
-    put_photos(folder);
-    test_model m = binary_model();
-    m.cameras.clear();
-    append(m.cameras, u64{2});
-    for (u32 camera : {40u, 9u}) {
-      append(m.cameras, camera), append(m.cameras, id), append(m.cameras, u64{64}), append(m.cameras, u64{66});
-      for (int k = 0; k < parameters; ++k) append(m.cameras, 50.0);
+TEST_CASE("every COLMAP model is read, binary and text") {
+  using kind = gart::camera_kind;
+  struct model {
+    int number;
+    std::string name;
+    std::vector<double> parameters;
+    kind expected;
+    float gart::distortion::*member;  // one of its lens, and its value
+    float value;
+  };
+  using lens = gart::distortion;
+  model const models[] = {
+      {0, "SIMPLE_PINHOLE", {50, 31, 33}, kind::perspective, &lens::k1, 0},
+      {1, "PINHOLE", {50, 51, 31, 33}, kind::perspective, &lens::k1, 0},
+      {2, "SIMPLE_RADIAL", {50, 31, 33, 0.1}, kind::perspective, &lens::k1, 0.1f},
+      {3, "RADIAL", {50, 31, 33, 0.1, 0.02}, kind::perspective, &lens::k2, 0.02f},
+      {4, "OPENCV", {50, 51, 31, 33, 0.1, 0.02, 0.001, 0.002}, kind::perspective, &lens::p2, 0.002f},
+      {5, "OPENCV_FISHEYE", {50, 51, 31, 33, 0.1, 0.02, 0.001, 0.002}, kind::fisheye, &lens::k4, 0.002f},
+      {6,
+       "FULL_OPENCV",
+       {50, 51, 31, 33, 0.1, 0.02, 0.001, 0.002, 0.03, 0.01, 0.004, 0.005},
+       kind::perspective,
+       &lens::d3,
+       0.005f},
+      {7, "FOV", {50, 51, 31, 33, 0.9}, kind::fov, &lens::omega, 0.9f},
+      {8, "SIMPLE_RADIAL_FISHEYE", {50, 31, 33, 0.1}, kind::fisheye, &lens::k1, 0.1f},
+      {9, "RADIAL_FISHEYE", {50, 31, 33, 0.1, 0.02}, kind::fisheye, &lens::k2, 0.02f},
+      {10,
+       "THIN_PRISM_FISHEYE",
+       {50, 51, 31, 33, 0.1, 0.02, 0.001, 0.002, 0.03, 0.01, 0.004, 0.005},
+       kind::fisheye,
+       &lens::s3,
+       0.005f},
+      {11,
+       "RAD_TAN_THIN_PRISM_FISHEYE",
+       {50, 51, 31, 33, 0.1, 0.02, 0, 0, 0, 0, 0.001, 0.002, 0.003, 0.004, 0.005, 0.006},
+       kind::fisheye624,
+       &lens::p2,
+       0.001f},
+      {12, "SIMPLE_DIVISION", {50, 31, 33, -0.1}, kind::division, &lens::k1, -0.1f},
+      {13, "DIVISION", {50, 51, 31, 33, -0.1}, kind::division, &lens::k1, -0.1f},
+      {14, "SIMPLE_FISHEYE", {50, 31, 33}, kind::fisheye, &lens::k1, 0},
+      {15, "FISHEYE", {50, 51, 31, 33}, kind::fisheye, &lens::k1, 0},
+      {16, "EUCM", {50, 51, 31, 33, 0.6, 1.1}, kind::eucm, &lens::beta, 1.1f},
+      {17, "EQUIRECTANGULAR", {64, 66}, kind::equirectangular, &lens::k1, 0},
+  };
+  for (model const& m : models)
+    for (bool text : {false, true}) {
+      CAPTURE(m.name);
+      scratch_folder const folder;
+      put_photos(folder);
+      test_model files = text ? text_model() : binary_model();
+      if (text) {
+        files.cameras = "40 " + m.name + " 64 66";
+        for (double v : m.parameters) files.cameras += " " + std::to_string(v);
+        files.cameras += "\n9 PINHOLE 64 66 50 50 32 33\n";
+      } else {
+        files.cameras.clear();
+        append(files.cameras, u64{2});
+        append(files.cameras, u32{40}), append(files.cameras, m.number), append(files.cameras, u64{64}),
+            append(files.cameras, u64{66});
+        for (double v : m.parameters) append(files.cameras, v);
+        append(files.cameras, u32{9}), append(files.cameras, 1), append(files.cameras, u64{64}),
+            append(files.cameras, u64{66});
+        for (double v : {50.0, 50.0, 32.0, 33.0}) append(files.cameras, v);
+      }
+      put_model(folder, files, "sparse/0/", text ? ".txt" : ".bin");
+      gart::camera const c = gart::load_dataset(folder.path, all_train()).train.at(0).view;
+      CHECK(c.kind == m.expected);
+      CHECK(c.lens.*m.member == m.value);
+      if (m.expected == kind::equirectangular) continue;
+      CHECK(c.fx == 50);
+      CHECK(c.fy == (m.parameters[1] == 51 ? 51 : 50));
+      CHECK(c.cy == 33);
     }
-    put_model(folder, m, "sparse/0/", ".bin");
-    CHECK_THROWS_AS(gart::load_dataset(folder.path), gart::unsupported);
-    std::string const binary = error_of([&] { gart::load_dataset(folder.path); });
-    CHECK(holds(binary, std::string(" ") + name + ";"));
-    CHECK(holds(binary, "cameras.bin, camera "));
-    test_model t = text_model();
-    t.cameras = std::string("40 ") + name + " 64 66";
-    for (int k = 0; k < parameters; ++k) t.cameras += " 50";
-    put_model(folder, t, "text/", ".txt");
-    CHECK(holds(error_of([&] { gart::load_dataset(folder.path / "text"); }), std::string(" ") + name + ";"));
-    ++id;
-  }
 }
 
 TEST_CASE("photos of another size scale the intrinsics, and of another shape are refused") {
@@ -251,6 +288,16 @@ TEST_CASE("values that no camera can have are refused") {
   CHECK(holds(refused([&](test_model& m) { replace(m.cameras, " 64 66", " -64 66"); }), "width"));
   CHECK(holds(refused([&](test_model& m) { replace(m.cameras, " 64 66", " 0 66"); }), "out of range"));
   CHECK(holds(refused([&](test_model& m) { replace(m.cameras, "OPENCV", "PINCUSHION"); }), "PINCUSHION"));
+  auto const lens = [&](std::string const& text) {
+    return refused([&](test_model& m) { m.cameras = "40 " + text + "\n9 PINHOLE 64 66 50 50 32 33\n"; });
+  };
+  CHECK(holds(lens("FISHEYE 64 66 -50 50 32 33"), "focal length"));
+  CHECK(holds(lens("FOV 64 66 50 50 32 33 0"), "omega"));
+  CHECK(holds(lens("FOV 64 66 50 50 32 33"), "omega is missing"));
+  CHECK(holds(lens("EUCM 64 66 50 50 32 33 0.5 -1"), "beta"));
+  CHECK(holds(lens("OPENCV_FISHEYE 64 66 50 50 32 33 -100 0 0 0"), "not one to one"));
+  CHECK(holds(lens("THIN_PRISM_FISHEYE 64 66 50 50 32 33 0 0 500 0 0 0 0 0"), "camera 40"));
+  CHECK(holds(lens("EQUIRECTANGULAR 64 66 64 65"), "EQUIRECTANGULAR"));
   CHECK(holds(refused([&](test_model& m) { replace(m.images, " 1 2 3 ", " inf 2 3 "); }), "not finite"));
   CHECK(holds(refused([&](test_model& m) { replace(m.images, "3 2 0", "3 0 0"); }), "quaternion"));
   CHECK(holds(refused([&](test_model& m) { replace(m.images, "9 sub", "8 sub"); }), "camera 8 is not in"));

@@ -1,9 +1,11 @@
 #include "support.hpp"
 
+#include <gart/io/camera_file.hpp>
 #include <gart/io/ply.hpp>
 
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <set>
 
 using namespace gart_test;
@@ -239,7 +241,7 @@ TEST_CASE("what is missing, of a wrong type or not traced is named") {
     CHECK(holds(what, path.string()));
     return what;
   };
-  std::string const one = frame("a.png", 1);
+  std::string const one = frame("a.png", 1), focal = "\"fl_x\": 20, \"w\": 16, \"h\": 12";
   CHECK(holds(refused("{\"fl_x\": 1}"), "'frames' is missing"));
   CHECK(holds(refused("[1]"), "not a JSON object"));
   CHECK(holds(refused("{\"frames\": 3}"), "'frames' is not a list"));
@@ -270,9 +272,23 @@ TEST_CASE("what is missing, of a wrong type or not traced is named") {
               "farther than 1e18"));
   CHECK(holds(refused(scene("\"fl_x\": 20, \"w\": 16", one)), "'h'"));
   CHECK(holds(refused(scene("\"camera_angle_x\": 4", one)), "angle"));
-  CHECK(holds(refused(scene(lens + ", \"camera_model\": \"OPENCV_FISHEYE\"", one)), "OPENCV_FISHEYE"));
-  CHECK(holds(refused(scene(lens + ", \"k3\": 0.1", one)), "'k3' is not zero"));
-  CHECK(holds(refused(scene(lens + ", \"is_fisheye\": true", one)), "fisheye"));
+  CHECK(
+      holds(refused(scene(lens + ", \"camera_model\": \"OMNIDIRECTIONALSTEREO_L\"", one)), "OMNIDIRECTIONALSTEREO_L"));
+  CHECK(holds(refused(scene(lens + ", \"k5\": 0.1", one)), "'k5' is not zero"));
+  CHECK(holds(refused(scene(lens + ", \"camera_model\": \"FISHEYE\", \"k1\": 0.1", one)), "'k1' is not zero"));
+  CHECK(holds(refused(scene(focal + ", \"camera_model\": \"FOV\"", one)), "'omega' is missing"));
+  CHECK(
+      holds(refused(scene(focal + ", \"camera_model\": \"FOV\", \"omega\": -1, \"w\": 16, \"h\": 12", one)), "omega"));
+  CHECK(holds(refused(scene(focal + ", \"camera_model\": \"EUCM\", \"alpha\": 0.5", one)), "'beta' is missing"));
+  CHECK(holds(
+      refused(scene(focal + ", \"camera_model\": \"EUCM\", \"alpha\": 2, \"beta\": 1, \"w\": 16, \"h\": 12", one)),
+      "alpha"));
+  CHECK(holds(refused(scene(focal + ", \"camera_model\": \"DIVISION\"", one)), "'k' is missing"));
+  CHECK(holds(refused(scene(focal + ", \"camera_model\": \"OPENCV_FISHEYE\", \"k1\": -4e4, \"w\": 16, \"h\": 12", one)),
+              "not one to one"));
+  CHECK(holds(refused(scene("\"camera_angle_x\": 1, \"camera_model\": \"FISHEYE\"", one)), "'fl_x' is missing"));
+  CHECK(
+      holds(refused(scene("\"fl_x\": -3, \"camera_model\": \"FISHEYE\", \"w\": 16, \"h\": 12", one)), "focal length"));
   CHECK(holds(refused(scene(lens, frame("none.png", 1))), "none of the 1 image"));
   folder.put("transforms.json", scene(lens + ", \"ply_file_path\": \"none.ply\"", one));
   CHECK(holds(error_of([&] { gart::load_dataset(folder.path, all_train()); }), "none.ply"));
@@ -293,6 +309,86 @@ TEST_CASE("damaged JSON is refused and never crashes") {
   std::string const text = scene(lens, frame("a.png", 1));
   maltreat(folder.put("transforms.json", text), text, true,
            [&] { gart::load_dataset(folder.path / "transforms.json", all_train()); });
+}
+
+TEST_CASE("transforms.json names its lenses") {
+  scratch_folder const folder;
+  folder.put_image("a.png", 16, 12);
+  auto const read = [&](std::string const& more) {
+    folder.put("transforms.json", scene(more + ", \"w\": 16, \"h\": 12", frame("a.png", 1)));
+    return gart::load_dataset(folder.path, all_train()).train.at(0).view;
+  };
+  std::string const focal = "\"fl_x\": 20, \"fl_y\": 21";
+  gart::camera c = read(focal + ", \"camera_model\": \"OPENCV_FISHEYE\", \"k1\": 0.01, \"k4\": 0.002");
+  CHECK(c.kind == gart::camera_kind::fisheye);
+  CHECK(c.lens.k4 == 0.002f);
+  CHECK(c.cy == 6);
+  CHECK(read(focal + ", \"is_fisheye\": true, \"k2\": 0.01").kind == gart::camera_kind::fisheye);
+  c = read("\"camera_model\": \"EQUIRECTANGULAR\"");
+  CHECK(c.kind == gart::camera_kind::equirectangular);
+  CHECK(c.width == 16);
+  c = read(focal + ", \"camera_model\": \"FULL_OPENCV\", \"k3\": 0.01, \"k4\": 0.02, \"k6\": 0.03");
+  CHECK(c.kind == gart::camera_kind::perspective);
+  CHECK(c.lens.k3 == 0.01f);
+  CHECK(c.lens.d1 == 0.02f);
+  CHECK(c.lens.d3 == 0.03f);
+  c = read(focal + ", \"camera_model\": \"OPENCV\", \"k3\": 0.01, \"k4\": 0.02");
+  CHECK(c.lens.k4 == 0.02f);
+  c = read(focal + ", \"camera_model\": \"EUCM\", \"alpha\": 0.6, \"beta\": 1.2");
+  CHECK(c.kind == gart::camera_kind::eucm);
+  CHECK(c.lens.beta == 1.2f);
+}
+
+TEST_CASE("cameras of every model are written to a camera JSON and read back") {
+  scratch_folder const folder;
+  std::vector<gart::named_camera> cameras;
+  auto const add = [&](gart::camera_kind kind, gart::distortion const& lens) {
+    gart::named_camera c;
+    c.name = "view" + std::to_string(cameras.size());
+    c.view.kind = kind, c.view.lens = lens;
+    c.view.width = 64, c.view.height = 48;
+    if (kind != gart::camera_kind::equirectangular)
+      c.view.fx = 30.1f, c.view.fy = 31, c.view.cx = 32.5f, c.view.cy = 23;
+    c.view.position = {1.25, 1e6 + 0.1, -3};
+    c.view.rotation = gart::mat3(0, 1, 0, 0, 0, 1, 1, 0, 0);
+    cameras.push_back(c);
+  };
+  using kind = gart::camera_kind;
+  gart::distortion lens;
+  add(kind::perspective, lens), add(kind::fisheye, lens), add(kind::equirectangular, lens);
+  lens.k1 = 0.01f;
+  add(kind::perspective, lens), add(kind::fisheye, lens), add(kind::division, lens);
+  lens.k3 = 0.003f;
+  add(kind::perspective, lens), add(kind::fisheye, lens);
+  lens.d2 = 0.01f;
+  add(kind::perspective, lens);
+  lens = {};
+  lens.s3 = 0.001f, lens.p1 = 0.001f;
+  add(kind::fisheye, lens);
+  lens.k6 = 1e-5f, lens.s4 = 1e-4f;
+  add(kind::fisheye624, lens);
+  lens = {};
+  lens.omega = 0.9f;
+  add(kind::fov, lens);
+  lens = {};
+  lens.alpha = 0.6f, lens.beta = 1.1f;
+  add(kind::eucm, lens);
+  gart::write_cameras(folder.path / "cameras.json", cameras);
+  auto const back = gart::load_cameras(folder.path / "cameras.json");
+  REQUIRE(back.size() == cameras.size());
+  for (std::size_t i = 0; i < back.size(); ++i) {
+    gart::camera const &a = cameras[i].view, &b = back[i].view;
+    CAPTURE(i);
+    CHECK(back[i].name == cameras[i].name);
+    CHECK(b.kind == a.kind);
+    CHECK(std::memcmp(&a.lens, &b.lens, sizeof a.lens) == 0);
+    CHECK(b.fx == a.fx);
+    CHECK(b.cx == a.cx);
+    CHECK(b.position == a.position);
+    CHECK(b.rotation == a.rotation);
+  }
+  cameras.resize(1), cameras[0].view.lens.s1 = 0.1f;
+  CHECK(holds(error_of([&] { gart::write_cameras(folder.path / "cameras.json", cameras); }), "no camera model"));
 }
 
 TEST_CASE("camera JSON is in OpenCV axes") {

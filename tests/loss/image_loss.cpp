@@ -134,6 +134,20 @@ TEST_CASE_TEMPLATE("a mask that hides everything leaves nothing", E, GART_TEST_P
   for (float const g : got.gradient) REQUIRE(g == 0.0f);
 }
 
+TEST_CASE_TEMPLATE("a mask weighs gradients in parts of 255", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  E exec;
+  case_data d = make_case(20, 24, 3, false, 0.4, random);
+  result const unweighted = evaluate(exec, d, 0.2f);
+  d.mask.assign(20 * 24, 255);
+  CHECK(evaluate(exec, d, 0.2f).gradient == unweighted.gradient);
+  for (std::size_t i = 0; i < d.mask.size(); ++i) d.mask[i] = i % 2 ? 51 : 255;
+  result const got = evaluate(exec, d, 0.2f);
+  for (std::size_t i = 0; i < got.gradient.size(); ++i)
+    REQUIRE(got.gradient[i] == doctest::Approx(unweighted.gradient[i] * (i / 3 % 2 ? 0.2f : 1.0f)).epsilon(1e-6));
+}
+
 TEST_CASE_TEMPLATE("the same image gives the same bits, and the object serves images of any size", E,
                    GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());

@@ -2,12 +2,14 @@
 // has pictures with something in them, and points that lie on the scene's surfaces.
 #include <doctest/doctest.h>
 
+#include <gart/camera/models.hpp>
 #include <gart/core/error.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/file.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <string>
 
@@ -243,6 +245,54 @@ TEST_CASE("a capture loads, with its split, its alpha, its cameras and its point
   gart::write_file(folder.path / "transforms_train.json", std::string_view("{\"frames\": []}"));
   CHECK_THROWS_AS(write_synth_capture(options), gart::io_error);
   CHECK(gart::read_file(folder.path / "train/r_3.png") == before);
+}
+
+TEST_CASE("a capture through a fisheye or of the sphere names its camera, and its distances are along the rays") {
+  if (!has_embree()) return;
+  for (char const* const model : {"OPENCV_FISHEYE,angle=60,k1=0.02", "EQUIRECTANGULAR"}) {
+    CAPTURE(std::string(model));
+    scratch_folder const folder;
+    synth_options options;
+    options.out = folder.path, options.camera = model, options.depth = true;
+    options.train = 2, options.test = 1, options.size = 48, options.samples = 4, options.points = 50;
+    write_synth_capture(options);
+    gart::dataset_options load;
+    load.depth.load = true;
+    gart::dataset const data = gart::load_dataset(folder.path, load);
+    REQUIRE(data.train.size() == 2);
+    gart::camera const& c = data.train[0].view;
+    bool const sphere = c.kind == gart::camera_kind::equirectangular;
+    CHECK((sphere || c.kind == gart::camera_kind::fisheye));
+    CHECK(c.width == (sphere ? 96 : 48));
+    if (!sphere) {
+      CHECK(c.lens.k1 == 0.02f);
+      // The middle of the left border lies half the angle aside.
+      CHECK(gart::ray_direction(c, 0, c.cy) != gart::vec3(0.0f));
+      gart::vec3 const side = gart::ray_direction(c, 0, c.cy), ahead = gart::ray_direction(c, c.cx, c.cy);
+      CHECK(std::acos(glm::dot(side, ahead)) == doctest::Approx(3.14159265 / 6).epsilon(1e-4));
+    }
+    gart::image_float const& distance = data.train[0].depth;
+    REQUIRE(distance.width == c.width);
+    long seen = 0, clear = 0;
+    for (int y = 0; y < c.height; ++y)
+      for (int x = 0; x < c.width; ++x) {
+        float const t = distance.at(x, y, 0);
+        if (t == 0) continue;
+        ++seen;
+        gart::vec3 const at = gart::vec3(c.position) +
+                              t * gart::ray_direction(c, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+        CHECK(std::sqrt(glm::dot(at, at)) < 1.35f);  // what the scene lies within
+        clear += data.train[0].image.at(x, y, 3) == 0;
+      }
+    CHECK(clear < 5);  // a thin thing that no sample met
+    CHECK(seen > (sphere ? 20 : 100));
+  }
+  synth_options options;
+  options.out = fs::temp_directory_path() / "gart_synth_none", options.camera = "FISHEYE,k9=1";
+  CHECK_THROWS_AS(write_synth_capture(options), gart::invalid_argument);
+  options.camera = "PINCUSHION";
+  CHECK_THROWS_AS(write_synth_capture(options), gart::unsupported);
+  CHECK(!fs::exists(options.out));
 }
 
 TEST_CASE("an option out of its range is refused by name, before anything is written") {

@@ -99,23 +99,23 @@ struct gather_kernel {
   }
 
   /// What a primitive's walk of a tile has summed goes to the Gaussian, or to its row.
-  GART_KERNEL GART_INLINE void finish(pixel_box const& box, pixel_box const& area, u32 id,
+  GART_KERNEL GART_INLINE void finish(footprint_slots const& range, pixel_box const& area, u32 id,
                                       float const (&sh_sum)[sh_stride],
                                       float const (&moment_sum)[moment_stride]) const {
-    if constexpr (C::terms::color) add_color_sums(box, area, id, 0, sh_sum);
-    if constexpr (C::terms::geometry) add_moment_sums(box, area, id, moment_sum);
+    if constexpr (C::terms::color) add_color_sums(range, area, id, 0, sh_sum);
+    if constexpr (C::terms::geometry) add_moment_sums(range, area, id, moment_sum);
   }
 
  protected:
   /// `sums`, an array of N, are floats [first, first + N) of the colour's.
-  GART_KERNEL GART_INLINE void add_color_sums(pixel_box const& box, pixel_box const& area, u32 id, int first,
+  GART_KERNEL GART_INLINE void add_color_sums(footprint_slots const& range, pixel_box const& area, u32 id, int first,
                                               auto const& sums) const {
     constexpr int N = std::extent_v<std::remove_cvref_t<decltype(sums)>>;
     int const active = 3 * sh_coefficients(active_degree) - first;
     if constexpr (C::sums == gather_sums::atomic) {
       C::policy::atomic_add_row(sh_gradient + static_cast<std::size_t>(sh_stride) * id + first, sums, active);
     } else if constexpr (N % 4 == 0 || N == sh_stride) {
-      quad* const out = row_of(box, area, id) + first / 4;
+      quad* const out = row_of(range, area, id) + first / 4;
       GART_UNROLL
       for (int q = 0; q < (N + 3) / 4; ++q) {
         quad four{};
@@ -124,18 +124,18 @@ struct gather_kernel {
         out[q] = four;
       }
     } else {
-      float* const out = reinterpret_cast<float*>(row_of(box, area, id)) + first;
+      float* const out = reinterpret_cast<float*>(row_of(range, area, id)) + first;
       GART_UNROLL
       for (int i = 0; i < N; ++i) out[i] = i < active ? sums[i] : 0.0f;
     }
   }
   /// The same with the moments.
-  GART_KERNEL GART_INLINE void add_moment_sums(pixel_box const& box, pixel_box const& area, u32 id,
+  GART_KERNEL GART_INLINE void add_moment_sums(footprint_slots const& range, pixel_box const& area, u32 id,
                                                float const (&sums)[moment_stride]) const {
     if constexpr (C::sums == gather_sums::atomic) {
       C::policy::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * id, sums, moment_count);
     } else {
-      quad* const out = row_of(box, area, id) + pair_gradient<C::sh_degree>::sh_quads;
+      quad* const out = row_of(range, area, id) + pair_gradient<C::sh_degree>::sh_quads;
       GART_UNROLL
       for (int q = 0; q < moment_stride / 4; ++q)
         out[q] = {{sums[4 * q], sums[4 * q + 1], sums[4 * q + 2], sums[4 * q + 3]}};
@@ -171,8 +171,8 @@ struct gather_kernel {
     float sh_sum[sh_stride] = {};
     float moment_sum[moment_stride] = {};
     lane_data const data(*this, id);
-    pixel_box const cell = intersect(range.box, area);
-    u32 const first = static_cast<u32>(range.offset) + tile_offset(range.box, cell);
+    pixel_box const cell = cell_in(range, area);
+    u32 const first = static_cast<u32>(range.offset) + tile_offset(range, cell);
     auto const slot = slots_from(first);
     u32 const width = cell.width(), last_slot = cell.area() - 1;
     u32 const skip = area.width() - width;
@@ -194,7 +194,7 @@ struct gather_kernel {
       ++p;
       if (++column == width) column = 0, p += skip;
     }
-    finish(range.box, area, id, sh_sum, moment_sum);
+    finish(range, area, id, sh_sum, moment_sum);
   }
 
   /// The slots from that number on.
@@ -276,10 +276,11 @@ struct gather_kernel {
   }
 
   /// The pair's row of the ordered sums.
-  GART_HD GART_INLINE quad* row_of(pixel_box const& box, pixel_box const& area, u32 id) const {
-    pixel_box const tiles = tiles_of<C::tile_size>(box);
-    u64 const pair =
-        pair_offsets[id] + (area.y0 / C::tile_size - tiles.y0) * tiles.width() + (area.x0 / C::tile_size - tiles.x0);
+  GART_HD GART_INLINE quad* row_of(footprint_slots const& range, pixel_box const& area, u32 id) const {
+    pixel_box const tiles = tiles_of<C::tile_size>(range);
+    u32 const past = (range.columns_past(area.x1) + C::tile_size - 1) / C::tile_size;
+    u64 const pair = pair_offsets[id] + (area.y0 / C::tile_size - tiles.y0) * tiles.width() +
+                     (area.x0 / C::tile_size + past - tiles.x0);
     return rows + pair * pair_gradient<C::sh_degree>::quads;
   }
 };

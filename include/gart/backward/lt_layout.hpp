@@ -13,8 +13,9 @@
 namespace gart::inline GART_ISA {
 
 /// Slots of the box before tile cell `cell` (the box cut by the tile): whole rows of cells above, cells to the left.
-GART_HD constexpr u32 tile_offset(pixel_box const& box, pixel_box const& cell) {
-  return (u32{cell.y0} - box.y0) * box.width() + (u32{cell.x0} - box.x0) * cell.height();
+GART_HD constexpr u32 tile_offset(footprint_slots const& range, pixel_box const& cell) {
+  pixel_box const& box = range.box;
+  return (u32{cell.y0} - box.y0) * box.width() + (cell.x0 + range.columns_past(cell.x1) - box.x0) * cell.height();
 }
 
 /// Slots of the cell before pixel (x, y): whole rows above, pixels to the left.
@@ -33,8 +34,8 @@ struct alignas(16) tile_slots {
   tile_slots() = default;
   /// The cell of a primitive's box and the tile whose pixels are `tile`.
   GART_HD GART_INLINE tile_slots(footprint_slots const& range, pixel_box const& tile) {
-    pixel_box const cell = intersect(range.box, tile);
-    first = static_cast<u32>(range.offset) + tile_offset(range.box, cell);
+    pixel_box const cell = cell_in(range, tile);
+    first = static_cast<u32>(range.offset) + tile_offset(range, cell);
     width = cell.width();
     x = cell.x0, y = cell.y0, x1 = cell.x1, y1 = cell.y1;
   }
@@ -53,20 +54,22 @@ struct alignas(16) tile_slots {
   }
 };
 
-/// The cell of the box that holds pixel (x, y), which must lie in the box.
+/// The cell of the box that holds pixel (x, y) of the image, which must lie in the box.
 template <int Size>
-GART_HD constexpr pixel_box cell_of(pixel_box const& box, u32 x, u32 y) {
-  u32 const tx = x / Size * Size, ty = y / Size * Size;
-  return {static_cast<u16>(tx > box.x0 ? tx : box.x0), static_cast<u16>(ty > box.y0 ? ty : box.y0),
-          static_cast<u16>(tx + Size < box.x1 ? tx + Size : box.x1),
-          static_cast<u16>(ty + Size < box.y1 ? ty + Size : box.y1)};
+GART_HD constexpr pixel_box cell_of(footprint_slots const& range, u32 x, u32 y) {
+  u32 const tx = x / Size * Size, ty = y / Size * Size, seam = static_cast<u32>(range.seam);
+  // A tile of the image's last columns is cut off there: at the seam, or where the box ends before it.
+  u32 const last = x < range.box.x0 ? tx + Size : seam > 0 ? seam : u32{range.box.x1};
+  u32 const x1 = last < tx + Size ? last : tx + Size;
+  return cell_in(range, {static_cast<u16>(tx), static_cast<u16>(ty), static_cast<u16>(x1),
+                         static_cast<u16>(ty + Size < range.box.y1 ? ty + Size : range.box.y1)});
 }
 
 /// The slot of pixel (x, y), which must lie in the box.
 template <int Size>
 GART_HD constexpr u64 lt_index(footprint_slots const& range, u32 x, u32 y) {
-  pixel_box const cell = cell_of<Size>(range.box, x, y);
-  return range.offset + tile_offset(range.box, cell) + pixel_offset(cell, x, y);
+  pixel_box const cell = cell_of<Size>(range, x, y);
+  return range.offset + tile_offset(range, cell) + pixel_offset(cell, x, y);
 }
 
 }  // namespace gart::inline GART_ISA

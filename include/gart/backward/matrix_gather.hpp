@@ -190,7 +190,7 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
       GART_UNROLL
       for (int j = 0; j < moment_count; ++j)
         for (int other = 1; other < 4; other *= 2) moment_sum[j] += __shfl_xor_sync(everyone, moment_sum[j], other);
-      if (column == 0 && wants(all_wanted, lane / 4)) this->add_moment_sums(box_of(id), area, id, moment_sum);
+      if (column == 0 && wants(all_wanted, lane / 4)) this->add_moment_sums(range_of(id), area, id, moment_sum);
     }
     add_colors(s, area, k, color_sum, all_wanted);
   }
@@ -217,7 +217,7 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
       float values[piece];
       GART_UNROLL
       for (u32 j = 0; j < piece; ++j) values[j] = sums[n][from + j];
-      this->add_color_sums(box_of(id), area, id, from, values);
+      this->add_color_sums(range_of(id), area, id, from, values);
     }
     __syncwarp();
   }
@@ -225,7 +225,9 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
   // Whether any of the four lanes of primitive n voted for it.
   __device__ GART_INLINE static bool wants(u32 votes, u32 n) { return (votes >> 4 * n & 15u) != 0; }
   // Rows of sums alone are found by it.
-  __device__ GART_INLINE pixel_box box_of(u32 id) const { return ordered ? this->ranges[id].box : pixel_box{}; }
+  __device__ GART_INLINE footprint_slots range_of(u32 id) const {
+    return ordered ? this->ranges[id] : footprint_slots{};
+  }
 };
 
 #endif

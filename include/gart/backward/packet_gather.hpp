@@ -105,8 +105,8 @@ struct packet_gather {
   // compiler a call that does nothing but prefetch does nothing.
   GART_INLINE void prefetch_slots(pixel_box const& area, u32 id) const {
     footprint_slots const range = gather.ranges[id];
-    pixel_box const cell = intersect(range.box, area);
-    char const* const slots = reinterpret_cast<char const*>(gather.slots + range.offset + tile_offset(range.box, cell));
+    pixel_box const cell = cell_in(range, area);
+    char const* const slots = reinterpret_cast<char const*>(gather.slots + range.offset + tile_offset(range, cell));
     for (std::size_t byte = 0; byte < cell.area() * sizeof(entry_type); byte += 64) prefetch_to_l2(slots + byte);
     prefetch(&gather.records[id]);
     if constexpr (C::sums == gather_sums::atomic) {
@@ -198,7 +198,7 @@ struct packet_gather {
           for (int i = 0; i < moment_count; ++i) moments_row[i] += moment_totals[i];
       });
     } else {
-      gather.finish(range.box, area, id, sh, reinterpret_cast<float const(&)[moment_stride]>(moment_totals));
+      gather.finish(range, area, id, sh, reinterpret_cast<float const(&)[moment_stride]>(moment_totals));
     }
   }
 

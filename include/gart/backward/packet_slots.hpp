@@ -29,10 +29,10 @@ struct slot_cell : packet_cell {
   /// Of the box of `gaussian` in the tile whose pixels are `tile`.
   GART_INLINE slot_cell(u32 gaussian, footprint_slots const& range, pixel_box const& tile)
       : packet_cell(gaussian, range, tile) {
-    pixel_box const cell = intersect(range.box, tile);
+    pixel_box const cell = cell_in(range, tile);
     u32 const x = u32{cell.x0} - tile.x0, y = u32{cell.y0} - tile.y0;
     width = cell.width();
-    first = static_cast<std::ptrdiff_t>(range.offset + tile_offset(range.box, cell)) -
+    first = static_cast<std::ptrdiff_t>(range.offset + tile_offset(range, cell)) -
             static_cast<std::ptrdiff_t>(y * width + x);
   }
 };

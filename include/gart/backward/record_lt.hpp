@@ -24,8 +24,8 @@ struct record_lt {
   GART_HD GART_INLINE u32 place_of(u32 id, pixel at) const {
     footprint_slots const range = ranges[id];
     pixel_box const& b = range.box;
-    u32 const x = static_cast<u32>(at.x), y = static_cast<u32>(at.y);
-    if (x < b.x0 || x >= b.x1 || y < b.y0 || y >= b.y1) return tile_slots::none;
+    u32 const x = static_cast<u32>(at.x), y = static_cast<u32>(at.y), column = x + range.columns_past(x + 1);
+    if (column < b.x0 || column >= b.x1 || y < b.y0 || y >= b.y1) return tile_slots::none;
     return static_cast<u32>(lt_index<Size>(range, x, y));
   }
   /// Writes the slot of a hit: the opaque colour V, the weight and the clamps.

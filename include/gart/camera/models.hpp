@@ -5,8 +5,10 @@
 ///
 /// Errors: require_camera throws invalid_argument for what no ray can be cast by; everything that renders calls it.
 
+#include <gart/camera/equirectangular.hpp>
 #include <gart/camera/opencv.hpp>
 #include <gart/camera/pinhole.hpp>
+#include <gart/camera/radial_lens.hpp>
 
 namespace gart::inline GART_ISA {
 
@@ -16,8 +18,12 @@ decltype(auto) visit_camera(camera const& c, F&& f) {
   switch (c.kind) {
     case camera_kind::perspective:
       break;
+    case camera_kind::equirectangular:
+      return f(equirectangular(c));
+    default:
+      return f(radial_lens(c));
   }
-  return c.lens.any() ? f(opencv(c)) : f(pinhole(c));
+  return !c.lens.any() ? f(pinhole(c)) : c.lens.more() ? f(radial_lens(c)) : f(opencv(c));
 }
 
 /// What no ray can be cast by.

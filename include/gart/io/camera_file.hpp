@@ -1,16 +1,35 @@
 #pragma once
 /// \file
-/// Cameras as JSON, as load_cameras (io/dataset.hpp) reads them and the program renders them:
+/// Cameras as files have them: what a model is called, and a camera JSON, as load_cameras (io/dataset.hpp) reads it and
+/// the program renders it:
 ///   [{"name", "width", "height", "fx", "fy", "cx", "cy", "c2w": 4 rows of 4}, ...]
-/// in pixels, c2w camera to world in OpenCV axes; with "camera_model": "OPENCV" and "k1", "k2", "p1", "p2" where the
-/// lens is distorted. Written whole or not at all, with every digit. Errors: io_error.
+/// in pixels, c2w camera to world in OpenCV axes; with "camera_model" by COLMAP's name, and the parameters of its lens,
+/// where it is no pinhole. Written whole or not at all, with every digit. Errors: io_error; unsupported for a lens with
+/// terms that no one model has.
 
 #include <gart/scene/camera.hpp>
 
 #include <filesystem>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace gart {
+
+/// What files call a camera's model, and its parameters by their names there.
+struct camera_fields {
+  std::string model;                                  ///< COLMAP's name
+  std::vector<std::pair<std::string, float>> values;  ///< as "fx"; none of EQUIRECTANGULAR
+};
+
+/// Of a camera.
+camera_fields fields_of(camera const& view);
+
+/// The same place, way up and height through another camera, by COLMAP's name of its model and what parameters are to
+/// be other than none: "FISHEYE", "OPENCV_FISHEYE,k1=0.02,fx=90", "EQUIRECTANGULAR". Focal lengths follow from
+/// `angle`, the degrees across the image's shorter side, where none is given: by itself 180 for what can see that, else
+/// 60. The sphere is twice as wide as high. Errors: unsupported, invalid_argument for what is no such camera.
+camera seen_through(camera const& view, std::string const& model);
 
 /// Writes all of them, in order.
 void write_cameras(std::filesystem::path const& path, std::vector<named_camera> const& cameras);

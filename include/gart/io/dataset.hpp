@@ -77,7 +77,8 @@ struct dataset_options {
 dataset load_dataset(std::filesystem::path const& path, dataset_options const& options = {});
 
 /// The cameras alone: a dataset (all its views, test views first) or a camera JSON, a list of
-/// {"name","width","height","fx","fy","cx","cy","c2w"} with c2w camera-to-world in OpenCV axes.
+/// {"name","width","height","fx","fy","cx","cy","c2w"} with c2w camera-to-world in OpenCV axes, and "camera_model" by
+/// COLMAP's name, with the parameters of its lens, where it is no pinhole; EQUIRECTANGULAR has no fx to cy.
 std::vector<named_camera> load_cameras(std::filesystem::path const& path);
 
 }  // namespace gart

@@ -29,7 +29,8 @@ struct truth_view {
   u8 const* pixels = nullptr;  ///< [H][W][channels]
   int channels = 3;            ///< 3, or 4 with straight alpha: rgb * a + background * (1 - a)
   u8 const* mask = nullptr;    ///< [H][W], or null; where it is 0 the image counts as equal to the truth: no loss,
-                               ///< no gradient, and the means still divide by all pixels
+                               ///< no gradient, and the means still divide by all pixels; else the gradient's weight,
+                               ///< in parts of 255
   vec3 background{0.0f};       ///< where alpha is not 1, [0, 1]
 
   /// Whether the pixel is not excluded by the mask.
@@ -290,7 +291,10 @@ struct loss_gradient_kernel {
         out[v] = ((1.0f - weight) * sign - weight * structure) * share;
       }
       for (int v = 0; v < inside; ++v)
-        gradient[(pixel + v) * 3 + at.channel] = !mask || mask[pixel + v] != 0 ? out[v] : 0.0f;
+        gradient[(pixel + v) * 3 + at.channel] = !mask ? out[v]
+                                                 : mask[pixel + v] != 0
+                                                     ? out[v] * (static_cast<float>(mask[pixel + v]) / 255.0f)
+                                                     : 0.0f;
     });
   }
 };

@@ -37,6 +37,11 @@ struct pixel_box {
 struct footprint {
   pixel_box box;    ///< empty where it cannot be
   float depth = 0;  ///< no hit has a smaller one, along what its camera measures depth: conservative near depth
+  /// Of an image whose right border goes on at its left one: its width where the box goes on past it, its columns from
+  /// there on the image's from 0 on; else 0. Such a box leaves out seam_room columns or more.
+  u16 seam = 0;
+
+  static constexpr int seam_room = 32;  ///< as wide as the widest tile: no tile holds both ends of a box
 };
 
 /// How far float arithmetic may move a hit, by the distance: 32 roundings.

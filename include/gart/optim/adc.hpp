@@ -196,10 +196,11 @@ class adaptive_density {
   void accumulate(gaussians<E> const& model, gaussians<E> const& gradient, camera const& view) {
     if (touched.size() != model.size()) clear_statistic(model.size());
     parallel_for(*exec_, "adc_accumulate", model.size(),
-                 detail::adc_accumulate_kernel{
-                     model.view(), gradient.view(), view.rotation[0], view.rotation[1], view.rotation[2],
-                     vec3(view.position), 0.5f * static_cast<float>(view.width) / view.fx,
-                     0.5f * static_cast<float>(view.height) / view.fy, gradient_sum.data(), touched.data()});
+                 detail::adc_accumulate_kernel{model.view(), gradient.view(), view.rotation[0], view.rotation[1],
+                                               view.rotation[2], vec3(view.position),
+                                               0.5f * static_cast<float>(view.width) / pixels_per_radian(view).x,
+                                               0.5f * static_cast<float>(view.height) / pixels_per_radian(view).y,
+                                               gradient_sum.data(), touched.data()});
   }
 
   /// Whether the step densifies.

@@ -26,17 +26,17 @@ struct measure {
   span<u32> areas, tiles;
   GART_KERNEL void operator()(index_t i) const {
     footprint const f = footprint_of<Response>(bounds, load_parameters(scene, i), frame, alpha_min);
-    ranges[i].box = f.box;
+    ranges[i].box = f.box, ranges[i].seam = f.seam;
     depths[i] = f.depth;
     areas[i] = f.box.area();
-    tiles[i] = tiles_of<Size>(f.box).area();
+    tiles[i] = tiles_of<Size>(ranges[i]).area();
   }
 };
 
 struct place {
   span<u64 const> offsets;
   span<footprint_slots> ranges;
-  GART_KERNEL void operator()(index_t i) const { ranges[i].offset = offsets[i]; }
+  GART_KERNEL void operator()(index_t i) const { ranges[i].offset = offsets[i] & footprint_slots::most; }
 };
 
 }  // namespace tile_kernels

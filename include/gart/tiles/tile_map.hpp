@@ -45,7 +45,7 @@ struct emit_pairs {
   static constexpr u32 share = 128;  // primitives of a team
   struct scratch {
     typename Order::primitive primitive[share];
-    pixel_box box[share];
+    footprint_slots range[share];
     u32 first[share];  // of the team's pairs
   };
 
@@ -65,16 +65,16 @@ struct emit_pairs {
     if (total == 0) return;
     scratch& s = team.scratch();
     team.for_each(n, [&](index_t k) {
-      s.box[k] = ranges[begin + k].box;
+      s.range[k] = ranges[begin + k];
       s.first[k] = static_cast<u32>(offsets[begin + k] - at);
-      if (!s.box[k].empty()) s.primitive[k] = order.of(begin + k);
+      if (!s.range[k].box.empty()) s.primitive[k] = order.of(begin + k);
     });
     team.barrier();
     if constexpr (E::device)
       team.for_each(total, [&](index_t pair) { find(s, at, pair, begin, n); });
     else
       for (u32 k = 0; k < n; ++k) {
-        pixel_box const tiles = tiles_of<Size>(s.box[k]);
+        pixel_box const tiles = tiles_of<Size>(s.range[k]);
         u64 to = at + s.first[k];
         for (u32 y = tiles.y0; y < tiles.y1; ++y)
           for (u32 x = tiles.x0; x < tiles.x1; ++x) emit(s, k, x, y, to++, begin);
@@ -87,14 +87,14 @@ struct emit_pairs {
     u32 k = 0;  // the last primitive whose pairs begin no later
     for (u32 step = share / 2; step > 0; step /= 2)
       if (k + step < n && s.first[k + step] <= pair) k += step;
-    pixel_box const tiles = tiles_of<Size>(s.box[k]);
+    pixel_box const tiles = tiles_of<Size>(s.range[k]);
     u32 const number = pair - s.first[k];
     emit(s, k, tiles.x0 + number % tiles.width(), tiles.y0 + number / tiles.width(), at + pair, begin);
   }
 
   GART_HD GART_INLINE void emit(scratch const& s, u32 k, u32 x, u32 y, u64 to, u32 begin) const {
-    u32 const tile = y * grid.columns() + x;
-    keys[to] = tile << order_bits | order.key(s.primitive[k], intersect(s.box[k], grid.tile(x, y)), tile);
+    u32 const column = x < grid.columns() ? x : x - grid.columns(), tile = y * grid.columns() + column;
+    keys[to] = tile << order_bits | order.key(s.primitive[k], cell_in(s.range[k], grid.tile(column, y)), tile);
     primitives[to] = begin + k;
   }
 };

@@ -21,7 +21,7 @@ struct packet_cell {
   packet_cell() = default;
   /// Of the box of `gaussian` in the tile whose pixels are `tile`.
   GART_INLINE packet_cell(u32 gaussian, footprint_slots const& range, pixel_box const& tile) : id(gaussian) {
-    pixel_box const cell = intersect(range.box, tile);
+    pixel_box const cell = cell_in(range, tile);
     u32 const x = u32{cell.x0} - tile.x0, y = u32{cell.y0} - tile.y0;
     columns = ((u32{1} << cell.width()) - 1) << x;
     rows = (~u64{0} >> (64 - 4 * cell.height()) << 4 * y) & 0x1111111111111111u;

@@ -156,8 +156,9 @@ class walk_tile_warps {
       footprint_slots range;
       if (exists) range = k_.ranges[id];
       pixel_box const& b = range.box;
-      bool const wanted = exists && b.x0 < corner_.x + block_width && b.x1 > corner_.x &&
-                          b.y0 < corner_.y + block_height && b.y1 > corner_.y;
+      int const x = corner_.x + static_cast<int>(range.columns_past(area_.x1));
+      bool const wanted =
+          exists && b.x0 < x + block_width && b.x1 > x && b.y0 < corner_.y + block_height && b.y1 > corner_.y;
       u32 const all = __ballot_sync(full_warp, wanted);
       if (wanted) {
         int const to = __popc(all & ((1u << lane_) - 1));

@@ -1,8 +1,9 @@
 #pragma once
 /// \file
 /// The true images where kernels can read them: the dataset's own memory on host policies; on a device each is copied
-/// at its first use and stays.
+/// at its first use and stays. Masks have the weights of the cameras' pixels (camera/pixel_weights.hpp) in them.
 
+#include <gart/camera/pixel_weights.hpp>
 #include <gart/exec/buffer.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/loss/image_loss.hpp>
@@ -16,7 +17,8 @@ template <execution E>
 class training_images {
  public:
   /// The dataset must outlive it.
-  explicit training_images(dataset const& data) : data_(data), pixels_(data.train.size()), masks_(data.train.size()) {}
+  explicit training_images(dataset const& data)
+      : data_(data), pixels_(data.train.size()), masks_(data.train.size()), weights_(data.train.size()) {}
 
   /// The photograph of a training view, by its index, over that background.
   truth_view get(E& exec, std::size_t view, vec3 background) {
@@ -25,7 +27,14 @@ class training_images {
     out.channels = v.image.channels;
     out.background = background;
     out.pixels = resident(exec, v.image, pixels_[view]);
-    out.mask = v.mask.empty() ? nullptr : resident(exec, v.mask, masks_[view]);
+    if (has_pixel_weights(v.view)) {
+      image8& weights = weights_[view];
+      if (masks_[view].size() == 0 && weights.empty()) weights = weighted(v);
+      out.mask = resident(exec, weights, masks_[view]);
+      if constexpr (E::device) weights = {};
+    } else {
+      out.mask = v.mask.empty() ? nullptr : resident(exec, v.mask, masks_[view]);
+    }
     return out;
   }
 
@@ -35,8 +44,15 @@ class training_images {
     if (copy.size() == 0) copy = buffer<u8, E>(exec, image.data);
     return copy.data();
   }
+  static image8 weighted(dataset_view const& v) {
+    image8 out = pixel_weights(v.view);
+    for (std::size_t i = 0; i < v.mask.data.size(); ++i)
+      if (v.mask.data[i] == 0) out.data[i] = 0;
+    return out;
+  }
   dataset const& data_;
   std::vector<buffer<u8, E>> pixels_, masks_;
+  std::vector<image8> weights_;
 };
 
 }  // namespace gart::inline GART_ISA

@@ -1,0 +1,144 @@
+// gart's camera JSON, there and back; and what a camera's model and lens are in JSON of any kind.
+
+#include "bytes.hpp"
+#include "camera_formats.hpp"
+#include "capture.hpp"
+#include "json_record.hpp"
+
+#include <gart/io/camera_file.hpp>
+
+#include <algorithm>
+
+namespace gart::io {
+namespace fs = std::filesystem;
+
+camera_format const* camera_model_of(record const& r, char const* otherwise) {
+  std::string const name = r.has("camera_model") ? r.text("camera_model") : otherwise;
+  camera_format const* const model = camera_format_of(name);
+  if (!model || !model->kind) {
+    throw unsupported(r.where + ": the camera model is " + name.substr(0, 60) + "; gart traces " +
+                      traced_camera_formats() + " (undistort the capture)");
+  }
+  return model;
+}
+
+void read_lens_members(record const& r, camera_format const& model, camera& view) {
+  if (view.kind == camera_kind::equirectangular) return;
+  // Captures write all of a pinhole's terms, and name any of its models.
+  camera_format const& form =
+      view.kind == camera_kind::perspective && model.number != 6 ? *camera_format_of("PERSPECTIVE") : model;
+  for (int k = 0; k < form.parameters(); ++k) {
+    if (is_pinhole_member(form.member(k))) continue;
+    std::string const key(form.field(k));
+    bool const polynomial = view.kind == camera_kind::perspective || view.kind == camera_kind::fisheye ||
+                            view.kind == camera_kind::fisheye624;
+    set_member(view, form.member(k), polynomial ? r.number_or(key.c_str(), 0) : r.number(key.c_str()));
+  }
+  for (char const* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"})
+    if (!form.has(key) && r.number_or(key, 0) != 0)
+      throw unsupported(r.where + ": '" + key + "' is not zero, and " + std::string(model.name) +
+                        " has no such term (correct camera_model, or undistort the capture)");
+}
+
+bool is_json_list(fs::path const& file) {
+  for (u8 byte : read_file(file)) {
+    if (byte == '[') return true;
+    if (!is_space(static_cast<char>(byte)) && byte < 0x80) return false;  // a byte order mark may come first
+  }
+  return false;
+}
+
+std::vector<named_camera> read_camera_json(fs::path const& file) {
+  json const root = read_json(file);
+  std::vector<named_camera> cameras;
+  for (std::size_t i = 0; i < root.size(); ++i) {
+    record const r{root[i], nullptr, file.string() + ", camera " + std::to_string(i)};
+    if (!r.own.is_object()) throw io_error(r.where, "is not a JSON object", "write {\"name\", \"width\", ...}");
+    named_camera c;
+    c.name = r.text("name");
+    c.view.width = r.size("width"), c.view.height = r.size("height");
+    camera_format const* const model = camera_model_of(r, "PINHOLE");
+    c.view.kind = *model->kind;
+    if (c.view.kind != camera_kind::equirectangular)
+      for (char const* key : {"fx", "fy", "cx", "cy"}) set_member(c.view, key, r.number(key));
+    read_lens_members(r, *model, c.view);
+    read_pose(r, "c2w", false, c.view);
+    check_camera(c.view, r.where);
+    cameras.push_back(std::move(c));
+  }
+  if (cameras.empty()) throw io_error(file.string(), "holds no camera", "add one");
+  std::vector<std::string*> names;
+  for (named_camera& c : cameras) names.push_back(&c.name);
+  make_file_names(names);
+  return cameras;
+}
+
+}  // namespace gart::io
+
+namespace gart {
+
+camera_fields fields_of(camera const& view) {
+  io::camera_format const& model = io::camera_format_for(view);
+  camera_fields out{std::string(model.name), {}};
+  for (int k = 0; k < model.parameters(); ++k)
+    if (view.kind != camera_kind::equirectangular)
+      out.values.emplace_back(model.field(k), io::member_of(view, model.member(k)));
+  return out;
+}
+
+camera seen_through(camera const& view, std::string const& text) {
+  std::string const name = text.substr(0, text.find(',')), where = "camera " + text;
+  io::camera_format const* const model = io::camera_format_of(name);
+  if (!model || !model->kind) throw unsupported(where + ": gart traces " + io::traced_camera_formats());
+  camera c;
+  c.kind = *model->kind;
+  c.width = view.width, c.height = view.height, c.position = view.position, c.rotation = view.rotation;
+  if (c.kind == camera_kind::equirectangular) c.width = 2 * c.height;
+  bool const wide = c.kind != camera_kind::perspective && c.kind != camera_kind::division;
+  double angle = wide ? 180 : 60;
+  c.cx = 0.5f * static_cast<float>(c.width), c.cy = 0.5f * static_cast<float>(c.height);
+  for (std::size_t at = name.size(); at < text.size();) {
+    std::string const pair = text.substr(at + 1, text.find(',', at + 1) - at - 1);
+    std::string const key = pair.substr(0, pair.find('='));
+    double value = 0;
+    if (pair.find('=') == pair.npos || !io::parse_number(std::string_view(pair).substr(key.size() + 1), value))
+      throw invalid_argument(where + ": '" + pair + "' is not NAME=NUMBER");
+    bool known = key == "angle";
+    if (known) angle = value;
+    for (int k = 0; k < model->parameters(); ++k)
+      if (model->field(k) == key) io::set_member(c, model->member(k), value), known = true;
+    if (!known)
+      throw invalid_argument(where + ": " + name + " has no '" + key + "' (it has " + std::string(model->fields) + ")");
+    at += 1 + pair.size();
+  }
+  if (c.kind != camera_kind::equirectangular && c.fx == 0) {
+    double q, value, ignored;
+    lens_curve const curve(c.kind, c.lens);
+    curve.curve(angle * 3.141592653589793 / 360, q, ignored);
+    curve.radial(q * q, value, ignored);
+    c.fx = static_cast<float>(0.5 * std::min(c.width, c.height) / (q * value));
+  }
+  if (c.fy == 0) c.fy = c.fx;
+  io::check_camera(c, where);
+  return c;
+}
+
+void write_cameras(std::filesystem::path const& path, std::vector<named_camera> const& cameras) {
+  using nlohmann::json;
+  json out = json::array();
+  for (named_camera const& c : cameras) {
+    camera const& v = c.view;
+    camera_fields const fields = fields_of(v);
+    json one = {{"name", c.name}, {"width", v.width}, {"height", v.height}};
+    if (fields.model != "PINHOLE") one["camera_model"] = fields.model;
+    for (auto const& [key, value] : fields.values) one[key] = value;
+    json rows = json::array();
+    for (int i = 0; i < 3; ++i) rows.push_back({v.rotation[0][i], v.rotation[1][i], v.rotation[2][i], v.position[i]});
+    rows.push_back({0, 0, 0, 1});
+    one["c2w"] = rows;
+    out.push_back(one);
+  }
+  write_file(path, out.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace gart

@@ -1,0 +1,103 @@
+#pragma once
+// What the readers of JSON share: a file, an object whose fields are named in errors, a pose.
+
+#include "capture.hpp"
+
+#include <gart/core/error.hpp>
+#include <gart/io/file.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace gart::io {
+
+using nlohmann::json;
+
+struct camera_format;
+
+inline json read_json(std::filesystem::path const& path) {
+  std::vector<u8> const bytes = read_file(path);
+  try {
+    return json::parse(bytes.begin(), bytes.end());
+  } catch (json::exception const& e) {
+    throw io_error(path.string(), std::string("is not valid JSON: ") + e.what(), "the file is truncated or damaged");
+  }
+}
+
+// A JSON object, and the one its missing keys are looked up in.
+struct record {
+  json const& own;
+  json const* fallback;
+  std::string where;
+
+  json const* find(char const* key) const {
+    if (auto const it = own.find(key); it != own.end() && !it->is_null()) return &*it;
+    if (!fallback) return nullptr;
+    auto const it = fallback->find(key);
+    return it != fallback->end() && !it->is_null() ? &*it : nullptr;
+  }
+  bool has(char const* key) const { return find(key) != nullptr; }
+  json const& at(char const* key) const {
+    json const* value = find(key);
+    if (!value) throw io_error(where, std::string("'") + key + "' is missing", "add it");
+    return *value;
+  }
+  double number(char const* key) const {
+    json const& value = at(key);
+    if (!value.is_number()) throw io_error(where, std::string("'") + key + "' is not a number", "write a number");
+    double const v = value.get<double>();
+    if (!std::isfinite(v)) throw io_error(where, std::string("'") + key + "' is not finite", "write a finite number");
+    return v;
+  }
+  double number_or(char const* key, double other) const { return has(key) ? number(key) : other; }
+  int size(char const* key) const {
+    double const v = number(key);
+    if (!(v >= 1 && v <= 1e6)) {
+      throw io_error(where, std::string("'") + key + "' is not a size in pixels", "write a number from 1 to 1000000");
+    }
+    return static_cast<int>(std::lround(v));
+  }
+  std::string text(char const* key) const {
+    json const& value = at(key);
+    if (!value.is_string()) throw io_error(where, std::string("'") + key + "' is not a text", "write it in quotes");
+    return value.get<std::string>();
+  }
+  bool flag(char const* key) const {
+    json const* value = find(key);
+    return value && value->is_boolean() && value->get<bool>();
+  }
+};
+
+// A 3x4 or 4x4 matrix, row by row, camera to world.
+inline void read_pose(record const& r, char const* key, bool opengl_axes, camera& view) {
+  json const& rows = r.at(key);
+  auto const refuse = [&] {
+    throw io_error(r.where, std::string("'") + key + "' is not a matrix of 4 x 4 numbers", "export it again");
+  };
+  if (!rows.is_array() || rows.size() < 3 || rows.size() > 4) refuse();
+  mat3d axes(1.0);
+  vec3d center(0.0);
+  for (int i = 0; i < 3; ++i) {
+    json const& row = rows[static_cast<std::size_t>(i)];
+    if (!row.is_array() || row.size() != 4) refuse();
+    for (int j = 0; j < 4; ++j) {
+      json const& value = row[static_cast<std::size_t>(j)];
+      if (!value.is_number()) refuse();
+      (j < 3 ? axes[j][i] : center[i]) = value.get<double>();
+    }
+  }
+  if (opengl_axes) axes[1] = -axes[1], axes[2] = -axes[2];
+  set_pose(view, axes, center, r.where);
+}
+
+// The model that 'camera_model' names; refuses one that is not traced.
+camera_format const* camera_model_of(record const& r, char const* otherwise);
+
+// The parameters of its lens, all but focal lengths and principal point; refuses what the model has not.
+void read_lens_members(record const& r, camera_format const& model, camera& view);
+
+}  // namespace gart::io

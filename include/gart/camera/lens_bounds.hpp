@@ -1,0 +1,309 @@
+#pragma once
+/// \file
+/// Boxes of ellipsoids through a lens of any curve (camera/lens_curve.hpp). With v a direction in the
+/// ellipsoid's middle, its silhouette in the plane across v is an ellipse, exactly: the image coordinate u of a
+/// direction at the angle d from v, which lies in [a-, a+] along u's gradient there, is within
+///   u(v) + |grad u| [a-, a+] +- K d^2 / 2,
+/// K the largest second derivative of u up to that angle from the axis. With the Hessian H of u = r(theta) cos(phi),
+///   r'' cos(phi),   -(r' - r cot(theta)) / sin(theta) sin(phi),   (r' cot(theta) - r / sin^2(theta)) cos(phi),
+/// it is within the extremes of g s + s H s / 2 over that ellipse +- K3 d^3 / 6, K3 of third derivatives: a quadratic
+/// over an ellipse, bounded by its dual. K and K3 are tabulated as running maxima. Both are cut by the image of the
+/// ring and the sector about the axis that the ellipsoid is seen in (camera/seen_angles.hpp), which alone remains where
+/// it surrounds the camera or reaches to where the lens says nothing. In double.
+
+#include <gart/camera/lens_curve.hpp>
+#include <gart/camera/seen_angles.hpp>
+
+#include <cmath>
+
+namespace gart::inline GART_ISA {
+
+/// A lens with what its boxes need. Host side made, trivially copyable.
+class lens_bounds {
+ public:
+  lens_bounds() = default;
+  /// The lens of a camera's size, focal lengths and principal point; without a pose or a near distance, for what does
+  /// not depend on these.
+  lens_bounds(lens_curve const& curve, double fx, double fy, double cx, double cy, int width, int height)
+      : curve_(curve), fx_(fx), fy_(fy), cx_(cx), cy_(cy), width_(width), height_(height) {
+    find_last();
+    tabulate();
+  }
+  /// With a pose and a near distance.
+  lens_bounds seen_from(mat3 const& rotation, float near) const {
+    lens_bounds out = *this;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) out.to_camera_[i][j] = rotation[j][i];
+    out.near_ = near;
+    return out;
+  }
+
+  double last() const { return last_; }               ///< the largest angle with the axis that a ray may have
+  double farthest_q() const { return last_q_; }       ///< its q
+  double farthest_r() const { return last_r_; }       ///< what the radial terms make of that
+  lens_curve const& curve() const { return curve_; }  ///< of the lens
+
+  /// The distance from the axis that the curve and the radial terms give, and its derivative by the angle.
+  GART_HD void distance_at(double theta, double& r, double& slope) const {
+    double q, by_theta, value, by_square;
+    curve_.curve(theta, q, by_theta);
+    curve_.radial(q * q, value, by_square);
+    r = q * value, slope = by_theta * (value + 2 * q * q * by_square);
+  }
+
+  /// The pixels that can hit it, and its near depth; empty where none can.
+  GART_HD footprint operator()(ellipsoid const& e) const {
+    constexpr double pi = 3.141592653589793;
+    seen_ellipsoid const s(to_camera_, e);
+    footprint out;
+    out.depth = least_distance(e, near_);
+    axial_range const range = angles_about_z(s, out.depth);
+    if (range.lo > last_) return {};
+    detail::interval u, v;
+    double const lo = range.lo, hi = range.hi < last_ ? range.hi : last_;
+    // The ring and the sector.
+    double r_lo, r_hi, ignored;
+    distance_at(lo, r_lo, ignored), distance_at(hi, r_hi, ignored);
+    if (range.half >= pi) {
+      u = {-r_hi, r_hi}, v = {-r_hi, r_hi};
+    } else {
+      double const from = range.middle - range.half, to = range.middle + range.half;
+      for (double const phi : {from, to}) {
+        double const c = cos(phi), n = sin(phi);
+        u.add(r_lo * c), u.add(r_hi * c), v.add(r_lo * n), v.add(r_hi * n);
+      }
+      double const quarter = 0.5 * pi;
+      for (double k = ceil(from / quarter); k * quarter < to; k += 1) {
+        int const side = static_cast<int>(k) & 3;
+        if (side == 0) u.add(r_hi);
+        if (side == 2) u.add(-r_hi);
+        if (side == 1) v.add(r_hi);
+        if (side == 3) v.add(-r_hi);
+      }
+    }
+    if (curve_.beside()) {
+      double most_u, most_v;
+      curve_.most_beside(curve_.after() ? r_hi : q_at(hi), most_u, most_v);
+      u = {u.lo - most_u, u.hi + most_u}, v = {v.lo - most_v, v.hi + most_v};
+    }
+    cut_by_gradient(s, out.depth, u, v);
+    constexpr double pad = 0.01;
+    out.box = {
+        detail::first_pixel(fx_ * u.lo + cx_ - pad, width_), detail::first_pixel(fy_ * v.lo + cy_ - pad, height_),
+        detail::first_pixel(fx_ * u.hi + cx_ + pad, width_), detail::first_pixel(fy_ * v.hi + cy_ + pad, height_)};
+    if (out.box.empty()) return {};
+    return out;
+  }
+
+  /// The image point of a direction in the camera's axes, of any length. Host side: of no use to boxes.
+  void image_of(vec3d const& d, double& u, double& v) const {
+    double const across = std::sqrt(d.x * d.x + d.y * d.y);
+    double q, ignored, value;
+    curve_.curve(std::atan2(across, d.z), q, ignored);
+    curve_.radial(q * q, value, ignored);
+    double const x = across > 0 ? q * d.x / across : 0, y = across > 0 ? q * d.y / across : 0;
+    double a = x * value, b = y * value;
+    if (curve_.beside()) {
+      auto const t = curve_.after() ? curve_.beside_at(a, b) : curve_.beside_at(x, y);
+      a += t.x, b += t.y;
+    }
+    u = fx_ * a + cx_, v = fy_ * b + cy_;
+  }
+
+ private:
+  static constexpr int cells = 96;
+
+  GART_HD double q_at(double theta) const {
+    double q, ignored;
+    curve_.curve(theta, q, ignored);
+    return q;
+  }
+
+  // u and v, in units of the focal lengths, cut by what they are at most by their gradients at the centre.
+  GART_HD void cut_by_gradient(seen_ellipsoid const& s, double least, detail::interval& u, detail::interval& v) const {
+    vec3d const& m = s.center;
+    if (!(s.distance > 0)) return;
+    // About the middle of the silhouette as it is across the centre's direction.
+    vec3d w = m / s.distance;
+    vec3d const side = fabs(w.x) < 0.6 ? vec3d(1, 0, 0) : vec3d(0, 1, 0), a1 = unit(cross(side, w)), a2 = cross(w, a1);
+    flat_silhouette const first(s, a1, a2, w);
+    if (!first.whole) return;
+    w = unit(w + a1 * first.z1 + a2 * first.z2);
+    double const across = sqrt(w.x * w.x + w.y * w.y), theta = atan2(across, w.z);
+    bool const on_axis = !(across > 1e-9);
+    double const cp = on_axis ? 1 : w.x / across, sp = on_axis ? 0 : w.y / across, cosine = w.z, sine = across;
+    flat_silhouette const f(s, {cosine * cp, cosine * sp, -sine}, {-sp, cp, 0}, w);
+    if (!f.whole) return;
+    double const error = s.error / least, d = atan(sqrt(f.z1 * f.z1 + f.z2 * f.z2) + sqrt(f.major2())) + error;
+    if (!(theta + d < end_)) return;
+    double q, q_slope, value, by_square;
+    curve_.curve(theta, q, q_slope);
+    curve_.radial(q * q, value, by_square);
+    double const r = q * value, r_slope = q_slope * (value + 2 * q * q * by_square);
+    double const r_across = on_axis ? r_slope : r / sine, q_across = on_axis ? q_slope : q / sine;
+    // Gradients along e1 and e2.
+    double gx1 = r_slope * cp, gx2 = -r_across * sp, gy1 = r_slope * sp, gy2 = r_across * cp;
+    double x = r * cp, y = r * sp;
+    if (curve_.beside()) {
+      bool const after = curve_.after();
+      double const along = after ? r_slope : q_slope, beside = after ? r_across : q_across;
+      double const bx1 = along * cp, bx2 = -beside * sp, by1 = along * sp, by2 = beside * cp;
+      auto const t = after ? curve_.beside_at(x, y) : curve_.beside_at(q * cp, q * sp);
+      gx1 += t.xx * bx1 + t.xy * by1, gx2 += t.xx * bx2 + t.xy * by2;
+      gy1 += t.yx * bx1 + t.yy * by1, gy2 += t.yx * bx2 + t.yy * by2;
+      x += t.x, y += t.y;
+    }
+    int const cell = cell_of(theta + d);
+    // What is left out by gradients alone; and by second derivatives too, where these are as below.
+    double const bend = 0.5 * d * d * bend_[cell];
+    bool const bent = sine > 1e-3 && d < 1.2;
+    double const slope_s = tan(d), shrunk = d > 1e-4 ? 1 - d / slope_s : 1e-8;
+    double const rest =
+        d * d * (d * twist_[cell] / 6 + 0.5 * beside_[cell] + 1e-6) + 0.5 * shrunk * slope_s * slope_s * bend_[cell];
+    double second = 0, mixed = 0, round = 0;
+    if (bent) {
+      constexpr double h = 1e-4;
+      double before, after, ignored;
+      distance_at(theta - h, ignored, before), distance_at(theta + h, ignored, after);
+      second = (after - before) / (2 * h), mixed = (r_slope - r * cosine / sine) / sine;
+      round = (r_slope * cosine - r / sine) / sine;
+    }
+    auto const cut = [&](detail::interval& to, double at, double g1, double g2, double cp_of, double sp_of) {
+      double const middle = g1 * f.z1 + g2 * f.z2;
+      double const half2 = g1 * g1 * f.h11 + 2 * g1 * g2 * f.h12 + g2 * g2 * f.h22;
+      double const half = sqrt(half2 > 0 ? half2 : 0.0), turned = error * sqrt(g1 * g1 + g2 * g2);
+      double lo = middle - half - bend, hi = middle + half + bend;
+      if (bent) {
+        // The silhouette is s = z + L y, |y| <= 1, on which u - u(v) = g s + s H s / 2.
+        double const b11 = second * cp_of, b12 = -mixed * sp_of, b22 = round * cp_of;
+        double const l11 = sqrt(f.h11) + 1e-300, l21 = f.h12 / l11, left = f.h22 - l21 * l21,
+                     l22 = sqrt(left > 0 ? left : 0.0);
+        double const w1 = g1 + b11 * f.z1 + b12 * f.z2, w2 = g2 + b12 * f.z1 + b22 * f.z2;
+        double const base = middle + 0.5 * (b11 * f.z1 * f.z1 + 2 * b12 * f.z1 * f.z2 + b22 * f.z2 * f.z2);
+        double const y1 = l11 * w1 + l21 * w2, y2 = l22 * w2;
+        double const c11 = l11 * l11 * b11 + 2 * l11 * l21 * b12 + l21 * l21 * b22, c12 = l22 * (l11 * b12 + l21 * b22),
+                     c22 = l22 * l22 * b22;
+        double const most = base + most_on_disc(y1, y2, c11, c12, c22) + rest;
+        double const fewest = base - most_on_disc(-y1, -y2, -c11, -c12, -c22) - rest;
+        hi = most < hi ? most : hi, lo = fewest > lo ? fewest : lo;
+      }
+      lo += at - turned, hi += at + turned;
+      to.lo = lo > to.lo ? lo : to.lo, to.hi = hi < to.hi ? hi : to.hi;
+    };
+    cut(u, x, gx1, gx2, cp, sp), cut(v, y, gy1, gy2, sp, -cp);
+  }
+
+  GART_HD static vec3d unit(vec3d const& a) { return a / sqrt(a.x * a.x + a.y * a.y + a.z * a.z); }
+  GART_HD static vec3d cross(vec3d const& a, vec3d const& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  }
+  GART_HD int cell_of(double theta) const {
+    int const cell = static_cast<int>(theta / end_ * cells);
+    return cell < cells ? cell : cells - 1;
+  }
+
+  // The last angle: where the distance still grows, and no farther than the image needs.
+  void find_last() {
+    double need = 0;
+    for (double const u : {-cx_ / fx_, (width_ - cx_) / fx_})
+      for (double const v : {-cy_ / fy_, (height_ - cy_) / fy_}) need = std::fmax(need, std::hypot(u, v));
+    need *= 1.05;
+    if (curve_.beside()) need += 2 * curve_.steepest_beside(need) * need;
+    constexpr int steps = 2048;
+    constexpr double most = 3.1415926;
+    auto const grows = [&](double theta) {
+      double r, slope;
+      distance_at(theta, r, slope);
+      return slope > 1e-6 && std::isfinite(r) && r < need;
+    };
+    double lo = 0, hi = most;
+    for (int i = 1; i <= steps; ++i) {
+      double const theta = most * i / steps;
+      if (!grows(theta)) {
+        hi = theta;
+        break;
+      }
+      lo = theta;
+    }
+    for (int i = 0; i < 50 && hi < most; ++i) {
+      double const middle = 0.5 * (lo + hi);
+      (grows(middle) ? lo : hi) = middle;
+    }
+    last_ = hi < most ? lo : most;
+    double ignored;
+    distance_at(last_, last_r_, ignored);
+    last_q_ = q_at(last_);
+  }
+
+  void tabulate() {
+    // Beyond the last angle what is seen of an ellipsoid may still be bounded by where the curve goes.
+    end_ = last_;
+    for (double const step = 1.0 / 64; end_ + step < last_ + 1 && end_ + step < 3.12; end_ += step) {
+      double r, slope;
+      distance_at(end_ + step, r, slope);
+      if (!(std::isfinite(r) && std::fabs(r) < 2 * last_r_ + 10 && std::fabs(slope) < 100 * (1 + last_r_))) break;
+    }
+    end_ = end_ > 3.12 ? 3.12 : end_ > 1e-3 ? end_ : 1e-3;
+    double bend = 0, twist = 0, beside = 0;
+    constexpr int samples = 4;
+    for (int cell = 0; cell < cells; ++cell) {
+      for (int i = 0; i <= samples; ++i) {
+        double const theta = end_ * (cell + i / double{samples}) / cells;
+        changes const own = changes_at(theta, [&](double at) {
+          double r, ignored;
+          distance_at(at, r, ignored);
+          return r;
+        });
+        bend = std::fmax(bend, own.second), twist = std::fmax(twist, own.third);
+        if (!curve_.beside()) continue;
+        changes const of_q = curve_.after() ? own : changes_at(theta, [&](double at) { return q_at(at); });
+        double const reach = of_q.value;
+        beside = std::fmax(beside, curve_.steepest_beside(reach) * of_q.second +
+                                       curve_.most_bent_beside(reach) * of_q.first * of_q.first);
+      }
+      // A tenth for what lies between samples.
+      beside_[cell] = static_cast<float>(1.1 * beside);
+      bend_[cell] = static_cast<float>(1.1 * (bend + beside) + 1e-6), twist_[cell] = static_cast<float>(1.1 * twist);
+    }
+  }
+
+  // Of an image coordinate distance(theta) cos(phi), whatever phi: how large its derivatives along a line of sight that
+  // turns from that angle are at most, in any direction.
+  struct changes {
+    double value = 0, first = 0, second = 0, third = 0;
+  };
+  template <class F>
+  static changes changes_at(double theta, F const& distance) {
+    constexpr int directions = 12;
+    double const h = 0.004 * std::fmin(1.0, 10 * (3.1415926 - theta));
+    changes out;
+    out.value = distance(theta);
+    for (int k = 0; k <= directions; ++k) {
+      double const psi = 3.141592653589793 * k / directions, c = std::cos(psi), s = std::sin(psi);
+      double x[5], y[5];
+      for (int i = -2; i <= 2; ++i) {
+        double const ct = std::cos(i * h), st = std::sin(i * h), sine = std::sin(theta), cosine = std::cos(theta);
+        double const dx = ct * sine + st * c * cosine, dy = st * s, dz = ct * cosine - st * c * sine;
+        double const across = std::hypot(dx, dy), r = distance(std::atan2(across, dz));
+        x[i + 2] = across > 0 ? r * dx / across : 0, y[i + 2] = across > 0 ? r * dy / across : 0;
+      }
+      auto const length = [](double a, double b) { return std::hypot(a, b); };
+      out.first = std::fmax(out.first, length(x[3] - x[1], y[3] - y[1]) / (2 * h));
+      out.second = std::fmax(out.second, length(x[3] - 2 * x[2] + x[1], y[3] - 2 * y[2] + y[1]) / (h * h));
+      out.third = std::fmax(
+          out.third, length(x[4] - 2 * x[3] + 2 * x[1] - x[0], y[4] - 2 * y[3] + 2 * y[1] - y[0]) / (2 * h * h * h));
+    }
+    return out;
+  }
+
+  mat3d to_camera_{1.0};
+  lens_curve curve_;
+  double fx_ = 1, fy_ = 1, cx_ = 0, cy_ = 0;
+  double last_ = 0, last_q_ = 0, last_r_ = 0, end_ = 1;
+  int width_ = 0, height_ = 0;
+  float near_ = 0;
+  // Running maxima by the angle: second and third derivatives, and the second of the tangential terms.
+  float bend_[cells] = {}, twist_[cells] = {}, beside_[cells] = {};
+};
+
+}  // namespace gart::inline GART_ISA
