@@ -33,10 +33,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <cstring>
 
 namespace gart::inline GART_ISA {
 
 namespace detail {
+
+inline float try_knob(char const* name, float fallback) {
+  char const* e = std::getenv("GART_TRY");
+  if (!e) return fallback;
+  std::size_t const n = std::strlen(name);
+  for (char const* at = e; *at;) {
+    if (!std::strncmp(at, name, n) && at[n] == '=') return static_cast<float>(std::atof(at + n + 1));
+    at = std::strchr(at, ',');
+    if (!at) break;
+    ++at;
+  }
+  return fallback;
+}
 
 struct error_sum_kernel {
   float const* moments;
@@ -64,9 +79,10 @@ struct error_key_kernel {
   u32* drawable;
   u32* key;
   u32* id;
+  float p, q;
   GART_KERNEL void operator()(index_t i) const {
     bool const lives = is_alive(model, i, dead_opacity);
-    float const weight = sum[i];
+    float const weight = (sum[i] > 0 ? powf(sum[i], q) : 0.0f) * powf(sigmoid(model.opacity[i]), p);
     bool const fits = lives && weight > 0 && is_finite(weight);
     float const u = (static_cast<float>(random.words(i).v[0] >> 8) + 0.5f) * 0x1p-24f;
     dead[i] = !lives, drawable[i] = fits;
@@ -202,7 +218,7 @@ class error_growth {
                                           dead_.data(),
                                           drawable_.data(),
                                           key_.data(),
-                                          id_.data()});
+                                          id_.data(), detail::try_knob("p", 0), detail::try_knob("q", 1)});
     exclusive_scan(*exec_, span<u32 const>(drawable_), place_.view(), totals_.view().subspan(0, 1));
     exclusive_scan(*exec_, span<u32 const>(dead_), place_.view(), totals_.view().subspan(1, 1));
     u64 totals[2];

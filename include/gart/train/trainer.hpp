@@ -34,7 +34,81 @@
 
 #include <optional>
 
+#include <gart/math/sh.hpp>
+#include <cstdlib>
+#include <cstring>
+
 namespace gart::inline GART_ISA {
+namespace detail {
+inline char const* try_text() { char const* t = std::getenv("GART_TRY"); return t ? t : ""; }
+inline bool trying(char const* what) { return std::strstr(try_text(), what) != nullptr; }
+inline float try_value(char const* what, float otherwise) {
+  char const* at = std::strstr(try_text(), what);
+  return at && at[std::strlen(what)] == '=' ? static_cast<float>(std::atof(at + std::strlen(what) + 1)) : otherwise;
+}
+GART_HD inline void center_direction(float const* m, vec3d const& p, float (&d)[3], float& inverse) {
+  double x = m[0] - p.x, y = m[1] - p.y, z = m[2] - p.z;
+  double n = sqrt(x * x + y * y + z * z);
+  n = n > 1e-12 ? n : 1e-12;
+  d[0] = float(x / n), d[1] = float(y / n), d[2] = float(z / n), inverse = float(1 / n);
+}
+struct center_color_kernel {
+  gaussians_view<float const> scene;
+  vec3d position;
+  int bands;
+  float* out;
+  GART_KERNEL void operator()(index_t i) const {
+    float d[3], inverse;
+    center_direction(scene.mean + std::size_t{3} * i, position, d, inverse);
+    sh_basis<3> const y(vec3(d[0], d[1], d[2]));
+    int const stride = scene.sh_stride();
+    float const* c = scene.sh + static_cast<std::size_t>(stride) * i;
+    float* o = out + static_cast<std::size_t>(stride) * i;
+    int const n = bands < stride / 3 ? bands : stride / 3;
+    for (int k = 0; k < 3; ++k) {
+      float sum = 0;
+      for (int b = 0; b < n; ++b) sum += y.y[b] * c[3 * b + k];
+      o[k] = sum / y.y[0];
+    }
+  }
+};
+struct center_expand_kernel {
+  gaussians_view<float const> scene;
+  vec3d position;
+  int bands;
+  gaussians_view<float> gradient;
+  GART_KERNEL void operator()(index_t i) const {
+    float d[3], inverse;
+    center_direction(scene.mean + std::size_t{3} * i, position, d, inverse);
+    sh_basis<3> const basis(vec3(d[0], d[1], d[2]));
+    float const x = d[0], y = d[1], z = d[2], xx = x * x, yy = y * y, zz = z * z;
+    int const stride = scene.sh_stride();
+    float const* c = scene.sh + static_cast<std::size_t>(stride) * i;
+    float* g = gradient.sh + static_cast<std::size_t>(stride) * i;
+    float const r[3] = {g[0] / basis.y[0], g[1] / basis.y[0], g[2] / basis.y[0]};
+    if (r[0] == 0 && r[1] == 0 && r[2] == 0) return;
+    float const a1 = 0.4886025119029199f, a2 = 1.0925484305920792f, a6 = 0.31539156525252005f, a8 = 0.5462742152960396f;
+    float const b9 = -0.5900435899266435f, b10 = 2.890611442640554f, b11 = -0.4570457994644658f, b12 = 0.3731763325901154f,
+                b14 = 1.445305721320277f;
+    float const j[16][3] = {{0, 0, 0}, {0, -a1, 0}, {0, 0, a1}, {-a1, 0, 0},
+      {a2 * y, a2 * x, 0}, {0, -a2 * z, -a2 * y}, {-2 * a6 * x, -2 * a6 * y, 4 * a6 * z}, {-a2 * z, 0, -a2 * x}, {2 * a8 * x, -2 * a8 * y, 0},
+      {b9 * 6 * x * y, b9 * 3 * (xx - yy), 0}, {b10 * y * z, b10 * x * z, b10 * x * y},
+      {b11 * -2 * x * y, b11 * (4 * zz - xx - 3 * yy), b11 * 8 * y * z},
+      {b12 * -6 * x * z, b12 * -6 * y * z, b12 * (6 * zz - 3 * xx - 3 * yy)},
+      {b11 * (4 * zz - 3 * xx - yy), b11 * -2 * x * y, b11 * 8 * x * z},
+      {b14 * 2 * x * z, b14 * -2 * y * z, b14 * (xx - yy)}, {b9 * 3 * (xx - yy), b9 * -6 * x * y, 0}};
+    int const n = bands < stride / 3 ? bands : stride / 3;
+    float gd[3] = {0, 0, 0};
+    for (int b = 0; b < n; ++b) {
+      float const s = c[3 * b] * r[0] + c[3 * b + 1] * r[1] + c[3 * b + 2] * r[2];
+      for (int k = 0; k < 3; ++k) gd[k] += s * j[b][k], g[3 * b + k] = basis.y[b] * r[k];
+    }
+    float const along = gd[0] * x + gd[1] * y + gd[2] * z;
+    for (int k = 0; k < 3; ++k) gradient.mean[std::size_t{3} * i + k] += (gd[k] - along * d[k]) * inverse;
+  }
+};
+}  // namespace detail
+
 
 /// What a loss sees: the rendered image and its view, in the policy's memory. It writes dL/d image and, into
 /// value[0..1], the loss and the mean squared error.
@@ -118,6 +192,7 @@ class trainer {
   dataset const& data_;
   gaussians<E> scene_, gradients_;
   optimizer_state<E> state_;
+  buffer<float, E> center_;
   frame_type frame_;
   backward_passes<frame_type, Strategy> passes_;
   image_loss<E> loss_;

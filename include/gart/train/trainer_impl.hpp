@@ -19,6 +19,7 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       scene_(exec, start),
       gradients_(exec, static_cast<index_t>(start.size()), sh_degree),
       state_(exec, static_cast<index_t>(start.size()), sh_degree),
+      center_(exec),
       frame_(exec),
       passes_(exec),
       loss_(exec),
@@ -72,7 +73,16 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
   color_.resize(floats), color_gradient_.resize(floats);
 
-  frame_.prepare(std::as_const(scene_).view(), view.view, render, degree);
+  bool const center = detail::trying("center");
+  options_.ssim_weight = detail::try_value("ssimw", options_.ssim_weight);
+  gaussians_view<float const> seen = std::as_const(scene_).view();
+  int const bands = sh_coefficients(degree);
+  if (center) {
+    center_.resize(std::size_t(scene_.size()) * seen.sh_stride());
+    parallel_for(exec_, "center", scene_.size(), detail::center_color_kernel{seen, view.view.position, bands, center_.data()});
+    seen.sh = center_.data();
+  }
+  frame_.prepare(seen, view.view, render, center ? 0 : degree);
   span<float const> moments;
   char const* used = nullptr;
   // With less memory where the LT buffer would pass its budget or the numbers of its slots, and then with none.
@@ -80,6 +90,9 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
     differentiate_by(pass, loss, index, rates);
     moments = pass.moments(), lt_bytes_ = pass.lt_bytes(), used = Pass::strategy_type::name;
   });
+  if (center)
+    parallel_for(exec_, "expand", scene_.size(),
+                 detail::center_expand_kernel{std::as_const(scene_).view(), view.view.position, bands, gradients_.view()});
   ++step_;
   update(view, rates, degree, moments);
 
@@ -147,7 +160,14 @@ vec3 trainer<E, Traits, Tracer, Strategy>::background_of(int step) const {
 
 template <execution E, class Traits, class Tracer, strategy Strategy>
 rendered trainer<E, Traits, Tracer, Strategy>::render(camera const& view, vec3 background) {
-  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background));
+  gaussians_view<float const> seen = std::as_const(scene_).view();
+  bool const center = detail::trying("center");
+  if (center) {
+    center_.resize(std::size_t(scene_.size()) * seen.sh_stride());
+    parallel_for(exec_, "center", scene_.size(), detail::center_color_kernel{seen, view.position, sh_coefficients(sh_degree), center_.data()});
+    seen.sh = center_.data();
+  }
+  frame_.prepare(seen, view, render_options_of(options_, data_.extent, background), center ? 0 : sh_degree);
   return render_image(frame_);
 }
 
