@@ -73,7 +73,7 @@ TEST_CASE_TEMPLATE("sums past 2^32 and pairs past 2^31", E, GART_TEST_POLICIES) 
   CHECK(prints.slots() == u64{40} * 65535 * 65528);
   gart::buffer<gart::footprint_slots, E> ranges(exec, 40);
   exec.copy(ranges.data(), prints.ranges().data(), 40 * sizeof(gart::footprint_slots));
-  CHECK(ranges.to_host()[39].offset == u64{39} * 65535 * 65528);
+  CHECK(u64{ranges.to_host()[39].offset} == u64{39} * 65535 * 65528);
 
   auto const before = exec.memory.current;
   gart::tile_map<E, 8> map(exec);
