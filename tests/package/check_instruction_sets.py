@@ -14,6 +14,7 @@ the sums have one order.
 
 Values are compared where a program happens to have them. So the objects for none and for native at -O0, which inlines
 nothing, are also searched for symbols that both have: none may have come out with a fused multiply-add, or with lanes.
+Copies of a structure may: whatever register they go through, they move the same bytes.
 """
 import argparse
 import concurrent.futures
@@ -78,7 +79,7 @@ def shared_code(one, other):
     for line in told.stdout.splitlines():
         if head := re.match(r"[0-9a-f]+ <(.*)>:$", line):
             name = head[1]
-        elif name in shared and re.search(r"\tvfn?m(add|sub)|%zmm|%k[0-7]", line):
+        elif name in shared and re.search(r"\tvfn?m(add|sub)|%zmm|%k[0-7]", line) and "\tvmov" not in line:
             found.add(name)
     return sorted(found)
 
