@@ -10,6 +10,21 @@
 
 namespace gart::inline GART_ISA {
 
+namespace detail {
+
+// 0 to 1. Those of most cameras count alike.
+template <class Model>
+double pixel_weight(Model const&, float, float) {
+  return 1;
+}
+// A row has one height on the sphere; none counts for nothing.
+inline double pixel_weight(equirectangular const& model, float, float v) {
+  return std::fmax(1.0 / 255, std::sin(3.141592653589793 * double{v} / model.height));
+}
+inline double pixel_weight(radial_lens const& model, float u, float v) { return model.sees(u, v) ? 1 : 0; }
+
+}  // namespace detail
+
 /// Whether pixels count differently.
 inline bool has_pixel_weights(camera const& c) {
   return visit_camera(c, []<class Model>(Model const&) {
@@ -20,19 +35,11 @@ inline bool has_pixel_weights(camera const& c) {
 /// Of each pixel, [H][W]. Cost: of a lens with tangential terms a ray a pixel.
 inline image8 pixel_weights(camera const& c) {
   image8 out(c.width, c.height, 1, 255);
-  visit_camera(c, [&]<class Model>(Model const& model) {
-    if constexpr (std::is_same_v<Model, equirectangular> || std::is_same_v<Model, radial_lens>)
-      for (int y = 0; y < c.height; ++y) {
-        float const v = static_cast<float>(y) + 0.5f;
-        // A row has one height on the sphere; none counts for nothing.
-        double const row = std::sin(3.141592653589793 * double{v} / c.height);
-        u8 const weight = static_cast<u8>(std::fmax(1.0, std::round(255 * row)));
-        for (int x = 0; x < c.width; ++x) {
-          if constexpr (std::is_same_v<Model, equirectangular>)
-            out.at(x, y, 0) = weight;
-          else if (!model.sees(static_cast<float>(x) + 0.5f, v))
-            out.at(x, y, 0) = 0;
-        }
+  visit_camera(c, [&](auto const& model) {
+    for (int y = 0; y < c.height; ++y)
+      for (int x = 0; x < c.width; ++x) {
+        double const weight = detail::pixel_weight(model, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+        out.at(x, y, 0) = static_cast<u8>(std::lround(255 * weight));
       }
   });
   return out;
