@@ -103,7 +103,8 @@ class cuda_exec {
       for (int i = 0; i < N; i += 4)
         if (i < n)
           atomicAdd(reinterpret_cast<float4*>(row + i),
-                    make_float4(values[i], values[i + 1], values[i + 2], values[i + 3]));
+                    make_float4(values[i], i + 1 < n ? values[i + 1] : 0, i + 2 < n ? values[i + 2] : 0,
+                                i + 3 < n ? values[i + 3] : 0));
     } else
 #endif
     {
