@@ -26,7 +26,7 @@ struct dataset_view {
   std::string name;   ///< unique in the dataset, fit for a file name: renders/NAME.png
   camera view;        ///< for the image as it is held (after dataset_options.downscale)
   image8 image;       ///< 3 channels, or 4 with straight alpha
-  image8 mask;        ///< 1 channel, 0 = ignore; empty where there is none
+  image8 mask;        ///< 1 channel, 0 = ignore, else the gradient's weight in parts of 255; empty: none
   image_float depth;  ///< distance along the ray, 0 = not measured; empty where none was asked for
 };
 
