@@ -49,8 +49,8 @@ gart::dataset capture(E& exec, std::uint64_t seed) {
   return data;
 }
 
-template <class E>
-using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::primitive_strategy>;
+template <class E, class Strategy = gart::primitive_strategy>
+using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy>;
 
 // The Gaussians of the capture stand still: what is learned besides them is learned alone.
 inline gart::train_options still(int iterations) {
