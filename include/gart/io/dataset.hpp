@@ -50,6 +50,13 @@ struct dataset {
   bool alpha = false;                     ///< images carry alpha: composited over the background chosen
   /// Random starting points lie in this box; Blender's [-1.3, 1.3]^3, else around the cameras.
   vec3d bounds_min{-1.3}, bounds_max{1.3};  ///< corners
+
+  /// Pixels of all training views.
+  u64 training_pixels() const {
+    u64 sum = 0;
+    for (dataset_view const& v : train) sum += u64(v.view.width) * u64(v.view.height);
+    return sum;
+  }
 };
 
 /// Which depth maps to read of a capture, and what their values are. A frame's map is what `depth_file_path` of a
