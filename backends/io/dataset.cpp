@@ -110,6 +110,12 @@ fs::path depth_beside(fs::path const& photo) {
   return found;
 }
 
+// Which way the camera looks while a pixel is read.
+vec3 axis_of(camera const& view, float u, float v) {
+  if (view.shutter == shutter_kind::global) return view.rotation[2];
+  return at_time(view, shutter_lines_of(view).time_at<double>(u, v)).rotation[2];
+}
+
 // Distances along the rays of `view`, the camera of the photo made smaller by that factor: the sample in the middle of
 // each block, for a mean would lie between the surfaces at an edge.
 image_float read_distances(frame const& f, camera const& view, image_size size, dataset_options const& options) {
@@ -137,7 +143,7 @@ image_float read_distances(frame const& f, camera const& view, image_size size, 
         float cosine = 1;
         if (kind != depth_kind::distance) {
           vec3 const d = model.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f).direction;
-          vec3 const axis = view.rotation[2];
+          vec3 const axis = axis_of(view, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
           cosine = d.x * axis.x + d.y * axis.y + d.z * axis.z;
         }
         if (depth > 0 && !(cosine > 0))
@@ -165,8 +171,7 @@ camera downscaled(camera c, int factor, std::string const& where) {
   if (width < 1 || height < 1) {
     throw invalid_argument("dataset_options.downscale = " + std::to_string(factor) + " leaves nothing of " + where);
   }
-  c.width = width * factor, c.height = height * factor;
-  return resized(c, width, height);
+  return resized(cropped(c, width * factor, height * factor), width, height);
 }
 
 void drop_frames_without_photo(capture& c, bool load_images) {

@@ -59,6 +59,12 @@ inline lens_bounds tabulated(camera_kind kind, distortion const& l, float fx, fl
 
 }  // namespace detail
 
+/// A direction in a camera's axes, of any length.
+struct fixed_direction {
+  fixed_double x, y, z;  ///< in double of fixed rounding
+  bool seen = false;     ///< false: there is none
+};
+
 /// A direction in a camera's axes, of any length, in the world's and a unit.
 GART_HD inline vec3 unit_in_world(mat3 const& rotation, fixed_double x, fixed_double y, fixed_double z) {
   fixed_double d[3];
@@ -101,15 +107,20 @@ struct radial_lens : camera_base {
   }
   /// The same, of one point.
   GART_HD vec3 direction_of(float u, float v) const {
+    fixed_direction const d = direction_in_camera(u, v);
+    return d.seen ? unit_in_world(rotation, d.x, d.y, d.z) : vec3(0.0f);
+  }
+  /// In the camera's axes.
+  GART_HD fixed_direction direction_in_camera(float u, float v) const {
     using number = fixed_double;
     number x, y;
     if (!curve.undistorted((number(u) - number(cx)) / number(fx), (number(v) - number(cy)) / number(fy), most_q, most_r,
                            x, y))
-      return vec3(0.0f);
+      return {};
     number const q = square_root(x * x + y * y);
     meridian_direction<number> const d = curve.back(q);
     number const share = q > 0.0 ? d.sine / q : number(0.0);
-    return unit_in_world(rotation, share * x, share * y, d.cosine);
+    return {share * x, share * y, d.cosine, true};
   }
 
   /// Whether the image point has a ray.
@@ -138,9 +149,7 @@ struct radial_lens : camera_base {
   /// Size, focal lengths, principal point, pose or a parameter of the lens.
   camera_fault fault() const {
     if (camera_fault const size = size_fault(*this); size.what) return size;
-    if (!(fx > 0 && fy > 0 && is_finite(fx) && is_finite(fy)))
-      return {"the focal length is not a positive number", "correct fx and fy"};
-    if (!(is_finite(cx) && is_finite(cy))) return {"the principal point is not finite", "correct cx and cy"};
+    if (camera_fault const focal = focal_fault(fx, fy, cx, cy); focal.what) return focal;
     for (float const k : {lens.k1, lens.k2, lens.k3, lens.k4, lens.k5, lens.k6, lens.p1, lens.p2, lens.d1, lens.d2,
                           lens.d3, lens.s1, lens.s2, lens.s3, lens.s4})
       if (!is_finite(k))
