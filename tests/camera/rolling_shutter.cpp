@@ -163,9 +163,9 @@ TEST_CASE("a rolling shutter without a motion is the lens itself") {
 
 TEST_CASE("no silhouette leaves its box while the camera moves, and boxes are tight") {
   constexpr double pi = 3.14159265358979323846;
-  constexpr int side = 600, around = 720;
+  constexpr int side = 400, around = 360;
   char const* const text = std::getenv("GART_TEST_COUNT");
-  long const count = text ? std::atol(text) : 300;
+  long const count = text ? std::atol(text) : 120;
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   auto const uniform = [&](double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(random); };

@@ -43,6 +43,8 @@ struct rolling_bounds {
   Bounds still;            ///< at the middle of the read-out
   shutter_lines_of lines;  ///< when they are exposed
   vec3d travel, turn;      ///< over the whole image, in world axes
+  int across;              ///< pixels of a line
+  float near;              ///< of hits
 
   /// The pixels that can hit it, and its near depth; empty where none can.
   GART_HD footprint operator()(ellipsoid const& e) const {
@@ -50,7 +52,8 @@ struct rolling_bounds {
     footprint out;
     GART_NO_UNROLL
     for (int round = 0; round < most_rounds; ++round) {
-      footprint const f = still(over(e, first, end));
+      ellipsoid const larger = over(e, first, end);
+      footprint const f = around_camera(larger) ? everything(larger, first, end) : still(larger);
       if (f.box.empty()) return {};
       float const depth = f.depth > out.depth ? f.depth : out.depth;
       if (round == 0 || f.box.area() < out.box.area()) out = f;
@@ -75,6 +78,22 @@ struct rolling_bounds {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
   }
   GART_HD static double length(vec3d const& a) { return sqrt(dot(a, a)); }
+
+  // Whether the camera is within what `over` returns, whose axes are a triangle's. Where hits lie in front of such a
+  // camera depends on the ellipsoid itself, and says nothing of a smaller one inside.
+  GART_HD static bool around_camera(ellipsoid const& e) {
+    double const x = e.center.x / e.axes[0].x, y = (e.center.y - e.axes[0].y * x) / e.axes[1].y,
+                 z = (e.center.z - e.axes[0].z * x - e.axes[1].z * y) / e.axes[2].z;
+    return !(x * x + y * y + z * z > 1 + 1e-6);
+  }
+  GART_HD footprint everything(ellipsoid const& e, double first, double end) const {
+    footprint out;
+    out.depth = least_distance(e, near);
+    u16 const lo = static_cast<u16>(first), hi = static_cast<u16>(end + 0.5);
+    out.box =
+        lines.columns ? pixel_box{lo, 0, hi, static_cast<u16>(across)} : pixel_box{0, lo, static_cast<u16>(across), hi};
+    return out;
+  }
 
   // All that it is in the axes of the middle of the read-out while the lines between these places are exposed.
   GART_HD ellipsoid over(ellipsoid const& e, double first, double end) const {
@@ -169,7 +188,8 @@ struct rolling_shutter : camera_base {
   auto bounds(float near) const {
     using still = decltype(lens.bounds(near));
     mat3d const axes(lens.rotation);
-    return rolling_bounds<still>{lens.bounds(near), lines, axes * vec3d(travel), axes * vec3d(turn)};
+    return rolling_bounds<still>{
+        lens.bounds(near), lines, axes * vec3d(travel), axes * vec3d(turn), lines.columns ? height : width, near};
   }
 
   /// Of so many pixels, as at the middle of the read-out.
