@@ -163,7 +163,7 @@ TEST_CASE("a rolling shutter without a motion is the lens itself") {
 
 TEST_CASE("no silhouette leaves its box while the camera moves, and boxes are tight") {
   constexpr double pi = 3.14159265358979323846;
-  constexpr int side = 400, around = 360;
+  constexpr int side = 900, around = 240;
   char const* const text = std::getenv("GART_TEST_COUNT");
   long const count = text ? std::atol(text) : 120;
   CAPTURE(gart_test::seed());
@@ -205,7 +205,10 @@ TEST_CASE("no silhouette leaves its box while the camera moves, and boxes are ti
         int const lines = columns ? c.width : c.height, along = columns ? c.height : c.width;
         int first_line = lines, last_line = -1, lo = along, hi = -1;
         bool whole = true, wrong = false;
+        int const b0 = columns ? f.box.y0 : f.box.x0, b1 = columns ? f.box.y1 : f.box.x1;
+        int const l0 = columns ? f.box.x0 : f.box.y0, l1 = columns ? f.box.x1 : f.box.y1;
         for (int line = 0; line < lines; ++line) {
+          if ((line < l0 - 20 || line > l1 + 20) && line % 16 != 0) continue;
           double const t = static_cast<double>(from_end(shutter) ? lines - 1 - line : line) / (lines - 1);
           gart::mat3d const to_camera = glm::transpose(motion.axes(t));
           gart::vec3d const o = motion.position(t) - c.position, m = to_camera * (e.center - o);
@@ -250,12 +253,10 @@ TEST_CASE("no silhouette leaves its box while the camera moves, and boxes are ti
         }
         if (!whole || last_line < 0) continue;
         whole = first_line > 0 && last_line < lines - 1;
-        int const b0 = columns ? f.box.y0 : f.box.x0, b1 = columns ? f.box.y1 : f.box.x1;
-        int const l0 = columns ? f.box.x0 : f.box.y0, l1 = columns ? f.box.x1 : f.box.y1;
         wrong = lo < b0 || hi > b1 || first_line < l0 || last_line >= l1;
         outside += wrong;
         double const exact = double(hi - lo) * (last_line + 1 - first_line);
-        if (!whole || exact < 100) continue;
+        if (!whole || exact < 400) continue;  // where a pixel at the border counts for little
         ++measured, ratio += f.box.area() / exact;
       }
       CAPTURE(name);
