@@ -11,53 +11,9 @@
 #include <gart/camera/lens_bounds.hpp>
 #include <gart/camera/model.hpp>
 
-#include <array>
-#include <map>
-#include <mutex>
 #include <vector>
 
 namespace gart::inline GART_ISA {
-
-namespace detail {
-
-// The tables of a lens take milliseconds, and views share lenses: made once a lens and program, of the latest
-// thousands.
-inline lens_bounds tabulated(camera_kind kind, distortion const& l, float fx, float fy, float cx, float cy, int width,
-                             int height) {
-  static std::mutex guard;
-  static std::map<std::array<float, 25>, lens_bounds> known;
-  std::array<float, 25> const key{static_cast<float>(kind),
-                                  static_cast<float>(width),
-                                  static_cast<float>(height),
-                                  fx,
-                                  fy,
-                                  cx,
-                                  cy,
-                                  l.k1,
-                                  l.k2,
-                                  l.p1,
-                                  l.p2,
-                                  l.k3,
-                                  l.k4,
-                                  l.k5,
-                                  l.k6,
-                                  l.d1,
-                                  l.d2,
-                                  l.d3,
-                                  l.s1,
-                                  l.s2,
-                                  l.s3,
-                                  l.s4,
-                                  l.omega,
-                                  l.alpha,
-                                  l.beta};
-  std::lock_guard const lock(guard);
-  if (auto const found = known.find(key); found != known.end()) return found->second;
-  if (known.size() >= 4096) known.clear();
-  return known.emplace(key, lens_bounds({kind, l}, fx, fy, cx, cy, width, height)).first->second;
-}
-
-}  // namespace detail
 
 /// A direction in a camera's axes, of any length.
 struct fixed_direction {
@@ -198,7 +154,7 @@ struct radial_lens : camera_base {
   }
 
  private:
-  lens_bounds whole() const { return detail::tabulated(kind, lens, fx, fy, cx, cy, width, height); }
+  lens_bounds whole() const { return tabulated_bounds(kind, lens, fx, fy, cx, cy, width, height); }
 };
 
 static_assert(central_camera<radial_lens>);
