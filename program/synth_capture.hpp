@@ -4,8 +4,9 @@
 //   DIR/train/r_N.png, DIR/test/r_N.png                   RGBA, straight alpha
 //   DIR/train/r_N_depth.png and so on                     where asked for: distances along the rays, 16 bits
 //   DIR/points3d.ply                                      starting points on the surfaces, coloured
-// A training view through a rolling shutter has the poses of its first and last row. Through another camera than a pinhole the transforms name its model and parameters in place of camera_angle_x.
-// The transforms are written last, each file whole: a capture that was interrupted is not taken for one.
+// A training view through a rolling shutter has the poses of its first and last row. Through another camera than a
+// pinhole the transforms name its model and parameters in place of camera_angle_x. The transforms are written last,
+// each file whole: a capture that was interrupted is not taken for one.
 
 #include "synth_scene.hpp"
 
