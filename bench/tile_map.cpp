@@ -15,9 +15,10 @@ void tile_map(benchmark::State& state, E& exec) {
   gart::tile_grid<TileSize> const grid{frame.view.width, frame.view.height};
   if constexpr (ByDepth) {
     gart::depth_orders<E, TileSize> orders(exec);
+    gart::camera_rays<E> rays(exec);
+    rays.cast(exec, frame.view);
     gart::visit_camera(frame.view, [&](auto const& model) {
-      auto const by_depth =
-          orders.of(exec, model, frame.traced.rays(), prints.depths().data(), frame.traced.gaussians().data());
+      auto const by_depth = orders.of(exec, model, rays, prints.depths().data(), frame.traced.gaussians().data());
       gart_bench::measure(state, exec, [&] { map.build(exec, grid, prints, by_depth); });
     });
   } else {

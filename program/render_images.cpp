@@ -97,11 +97,13 @@ image_float mean_distances(gart::rendered const& r) {
 
 image_float normals_of(image_float const& distances, gart::camera const& view) {
   image_float out(distances.width, distances.height, 3);
-  std::vector<vec3> point(distances.data.size());
+  std::vector<vec3> point(distances.data.size()), direction(distances.data.size());
   for (int y = 0; y < distances.height; ++y)
-    for (int x = 0; x < distances.width; ++x)
-      point[static_cast<std::size_t>(y) * distances.width + x] =
-          distances.at(x, y, 0) * gart::ray_direction(view, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+    for (int x = 0; x < distances.width; ++x) {
+      gart::ray const r = gart::ray_through(view, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+      std::size_t const at = static_cast<std::size_t>(y) * distances.width + x;
+      point[at] = r.origin + distances.at(x, y, 0) * r.direction, direction[at] = r.direction;
+    }
   // The difference to the neighbour that lies at the more alike distance, so that an edge is no slope.
   auto const along = [&](int x, int y, int dx, int dy, vec3& d) {
     auto const inside = [&](int s) {
@@ -124,7 +126,7 @@ image_float normals_of(image_float const& distances, gart::camera const& view) {
       float const length = std::sqrt(glm::dot(n, n));
       if (!(length > 0)) continue;
       n = n / length;
-      if (glm::dot(n, point[static_cast<std::size_t>(y) * distances.width + x]) > 0) n = -n;
+      if (glm::dot(n, direction[static_cast<std::size_t>(y) * distances.width + x]) > 0) n = -n;
       for (int c = 0; c < 3; ++c) out.at(x, y, c) = n[c];
     }
   }

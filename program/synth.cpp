@@ -77,8 +77,15 @@ void add_synth(CLI::App& app, command& selected) {
   synth
       ->add_option("--camera", options->camera,
                    "Through another camera than a pinhole: COLMAP's name of a model\nand its parameters, as "
-                   "EQUIRECTANGULAR, FISHEYE,angle=200 or\nOPENCV_FISHEYE,k1=0.02; angle is across a view")
+                   "EQUIRECTANGULAR, FISHEYE,angle=200 or\nOPENCV_FISHEYE,k1=0.02; angle is across a view. "
+                   "ORTHOGRAPHIC,\nextent=2.7 has parallel rays, 2.7 world units across")
       ->type_name("MODEL");
+  synth
+      ->add_option("--rolling", options->rolling,
+                   "Train views through a rolling shutter: row after row while the\ncamera turns by so many degrees, "
+                   "and travels")
+      ->type_name("DEGREES")
+      ->capture_default_str();
   synth->add_flag("--depth", options->depth,
                   "Also a depth map of each view, r_N_depth.png: distances along\nthe rays, for gart train "
                   "--depth-weight");

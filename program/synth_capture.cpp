@@ -3,6 +3,7 @@
 #include "synth_random.hpp"
 #include "synth_trace.hpp"
 
+#include <gart/camera/models.hpp>
 #include <gart/core/error.hpp>
 #include <gart/io/camera_file.hpp>
 #include <gart/io/depth_file.hpp>
@@ -58,11 +59,39 @@ void prepare_folder(fs::path const& out) {
   for (char const* split : {"train", "test"}) fs::remove(out / (std::string("transforms_") + split + ".json"), failed);
 }
 
+// Turns about one of its own axes, row by row, and travels as far as half that angle is at the scene.
+gart::camera while_moving(gart::camera const& view, double degrees, u64 seed) {
+  auto const random = [&](u64 k) { return unit_float(static_cast<u32>(hash(seed, k))); };
+  double const angle = degrees * std::numbers::pi / 180, about = 2 * std::numbers::pi * random(0),
+               towards = 2 * std::numbers::pi * random(1);
+  gart::vec3d const turn(angle * std::cos(about), angle * std::sin(about), 0);
+  double const far = 0.5 * angle * distance;
+  gart::vec3d const travel(far * std::cos(towards), far * std::sin(towards), 0);
+  gart::camera out = view;
+  out.shutter = gart::shutter_kind::top_to_bottom;
+  out.turn = vec3(turn), out.travel = vec3(travel);
+  return out;
+}
+
+std::string pose_text(gart::camera const& view) {
+  char text[256];
+  std::string out = "[";
+  for (int row = 0; row < 3; ++row) {
+    gart::mat3 const& r = view.rotation;
+    // OpenGL's y and z are the negatives of OpenCV's.
+    std::snprintf(text, sizeof text, "[%.9g, %.9g, %.9g, %.17g], ", r[0][row], -r[1][row], -r[2][row],
+                  view.position[row]);
+    out += text;
+  }
+  return out + "[0, 0, 0, 1]]";
+}
+
 std::string transforms_json(std::vector<gart::camera> const& cameras, std::string const& split, bool depth) {
   char text[256];
   gart::camera const& first = cameras.front();
   std::string json = std::string("{\n  ") + mark + ",\n";
-  if (auto const lens = gart::fields_of(first); lens.model == "PINHOLE") {
+  bool const rolls = first.shutter != gart::shutter_kind::global;
+  if (auto const lens = gart::fields_of(first); lens.model == "PINHOLE" && !rolls) {
     std::snprintf(text, sizeof text, "  \"camera_angle_x\": %.17g,\n", angle_x);
     json += text;
   } else {
@@ -75,6 +104,7 @@ std::string transforms_json(std::vector<gart::camera> const& cameras, std::strin
       json += text;
     }
   }
+  if (rolls) json += "  \"shutter_type\": \"" + gart::shutter_type_of(first) + "\",\n";
   if (depth) {
     std::snprintf(text, sizeof text, "  \"depth_kind\": \"distance\",\n  \"depth_unit_scale_factor\": %g,\n",
                   depth_step);
@@ -86,15 +116,14 @@ std::string transforms_json(std::vector<gart::camera> const& cameras, std::strin
     std::string const file = "./" + split + "/r_" + std::to_string(i);
     json += "    {\"file_path\": \"" + file + "\", ";
     if (depth) json += "\"depth_file_path\": \"" + file + "_depth.png\", ";
-    json += "\"transform_matrix\": [";
-    for (int row = 0; row < 3; ++row) {
-      gart::mat3 const& r = cameras[i].rotation;
-      // OpenGL's y and z are the negatives of OpenCV's.
-      std::snprintf(text, sizeof text, "[%.9g, %.9g, %.9g, %.17g], ", r[0][row], -r[1][row], -r[2][row],
-                    cameras[i].position[row]);
-      json += text;
+    if (rolls) {
+      gart::line_poses const lines = gart::poses_of_lines(cameras[i]);
+      json +=
+          "\"transform_matrix\": " + pose_text(lines.first) + ", \"transform_matrix_end\": " + pose_text(lines.last);
+    } else {
+      json += "\"transform_matrix\": " + pose_text(cameras[i]);
     }
-    json += "[0, 0, 0, 1]]}";
+    json += "}";
   }
   return json + "\n  ]\n}\n";
 }
@@ -130,12 +159,19 @@ void write_synth_capture(synth_options const& options, std::function<void(int do
   check_range("--samples", options.samples, synth_samples);
   check_range("--points", options.points, synth_points);
   check_range("--threads", options.threads, synth_threads);
+  if (!(options.rolling >= 0 && options.rolling <= 90))
+    throw gart::invalid_argument("--rolling " + std::to_string(options.rolling) + ": give 0 to 90 degrees");
 
   auto train = synth_cameras(options.train, options.size, false);
   auto test = synth_cameras(options.test, options.size, true);
   for (auto* cameras : {&train, &test})
     for (gart::camera& c : *cameras)
       if (!options.camera.empty()) c = gart::seen_through(c, options.camera);
+  if (options.rolling > 0)
+    for (std::size_t i = 0; i < train.size(); ++i) {
+      train[i] = while_moving(train[i], options.rolling, hash(options.seed, 0x726f6c6c + i));
+      gart::require_camera(train[i]);
+    }
   synth_renderer const renderer(make_synth_scene(options.seed), options.threads);
   prepare_folder(options.out);
   int done = 0;

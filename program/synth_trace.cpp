@@ -212,7 +212,6 @@ synth_renderer::~synth_renderer() = default;
 gart::image8 synth_renderer::render(gart::camera const& view, int samples, u64 seed) const {
   implementation const& tracer = *implementation_;
   gart::image8 image(view.width, view.height, 4);
-  vec3 const origin(view.position);
   tracer.for_each(view.height, [&](int y) {
     for (int x = 0; x < view.width; ++x) {
       u64 const stream = hash(seed, static_cast<u64>(y) * view.width + x);
@@ -223,8 +222,9 @@ gart::image8 synth_renderer::render(gart::camera const& view, int samples, u64 s
         sample_sequence random(stream, s);
         vec2 const at = random.next();
         vec3 sample;
-        vec3 const direction = gart::ray_direction(view, x + at.x, y + at.y);
-        if (direction == vec3(0.0f) || !tracer.radiance(origin, direction, random, sample)) continue;
+        gart::ray const r = gart::ray_through(view, x + at.x, y + at.y);
+        vec3 const origin(view.position + gart::vec3d(r.origin));
+        if (r.direction == vec3(0.0f) || !tracer.radiance(origin, r.direction, random, sample)) continue;
         sum += sample;
         ++covered;
       }
@@ -239,12 +239,12 @@ gart::image8 synth_renderer::render(gart::camera const& view, int samples, u64 s
 gart::image_float synth_renderer::distances(gart::camera const& view) const {
   implementation const& tracer = *implementation_;
   gart::image_float map(view.width, view.height, 1);
-  vec3 const origin(view.position);
   tracer.for_each(view.height, [&](int y) {
     for (int x = 0; x < view.width; ++x) {
       synth_hit hit;
-      vec3 const direction = gart::ray_direction(view, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
-      if (direction != vec3(0.0f) && tracer.tracer.intersect(origin, direction, 0, hit)) map.at(x, y, 0) = hit.t;
+      gart::ray const r = gart::ray_through(view, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+      vec3 const origin(view.position + gart::vec3d(r.origin));
+      if (r.direction != vec3(0.0f) && tracer.tracer.intersect(origin, r.direction, 0, hit)) map.at(x, y, 0) = hit.t;
     }
   });
   return map;

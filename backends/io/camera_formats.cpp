@@ -34,6 +34,8 @@ constexpr camera_format formats[] = {
     {13, "DIVISION", "fx fy cx cy k=k1", kind::division},
     {16, "EUCM", "fx fy cx cy alpha beta", kind::eucm},
     {17, "EQUIRECTANGULAR", "width height", kind::equirectangular},
+    {-1, "ORTHOPHOTO", "fx fy cx cy", kind::orthographic},
+    {-1, "ORTHOGRAPHIC", "fx fy cx cy", kind::orthographic},
     {-1, "PERSPECTIVE", "fx fy cx cy k1 k2 p1 p2 k3 k4", kind::perspective},
 };
 
@@ -80,7 +82,7 @@ camera_format const* camera_format_of(std::string_view name) {
 
 std::string traced_camera_formats() {
   std::string out;
-  auto const traced = [](camera_format const& f) { return f.kind && f.number >= 0; };
+  auto const traced = [](camera_format const& f) { return f.kind && (f.number >= 0 || f.kind != kind::perspective); };
   auto left = std::count_if(std::begin(formats), std::end(formats), traced);
   for (camera_format const& f : formats) {
     if (!traced(f)) continue;

@@ -40,6 +40,53 @@ void read_lens_members(record const& r, camera_format const& model, camera& view
                         " has no such term (correct camera_model, or undistort the capture)");
 }
 
+namespace {
+
+struct shutter_name {
+  shutter_kind kind;
+  char const* name;  // 3dgrut's and gsplat's
+};
+constexpr shutter_name shutter_names[] = {{shutter_kind::global, "GLOBAL"},
+                                          {shutter_kind::top_to_bottom, "ROLLING_TOP_TO_BOTTOM"},
+                                          {shutter_kind::left_to_right, "ROLLING_LEFT_TO_RIGHT"},
+                                          {shutter_kind::bottom_to_top, "ROLLING_BOTTOM_TO_TOP"},
+                                          {shutter_kind::right_to_left, "ROLLING_RIGHT_TO_LEFT"}};
+
+}  // namespace
+
+void read_shutter(record const& r, char const* key, bool opengl_axes, camera& view) {
+  std::string const end = std::string("'") + key + "'";
+  if (!r.has("shutter_type")) {
+    if (r.has(key))
+      throw io_error(r.where, end + " is there, and 'shutter_type' is missing",
+                     "say which way the image is read, as ROLLING_TOP_TO_BOTTOM");
+    return;
+  }
+  std::string const name = r.text("shutter_type");
+  auto const* const found = std::find_if(std::begin(shutter_names), std::end(shutter_names),
+                                         [&](shutter_name const& s) { return name == s.name; });
+  if (found == std::end(shutter_names)) {
+    std::string all;
+    for (shutter_name const& s : shutter_names) all += (all.empty() ? "" : ", ") + std::string(s.name);
+    throw io_error(r.where, "'shutter_type' is " + name.substr(0, 60), "write one of " + all);
+  }
+  if (found->kind == shutter_kind::global) return;
+  if (!r.has(key))
+    throw io_error(r.where, end + " is missing", "add the pose of the last line that is read: the shutter is " + name);
+  if (!view.width || !view.height)
+    throw io_error(r.where, "'w' and 'h' are missing", "add them: with a rolling shutter each line has a pose");
+  camera last = view;
+  read_pose(r, key, opengl_axes, last);
+  if (last.position == view.position && last.rotation == view.rotation)
+    throw io_error(r.where, end + " is the pose of the first line too: nothing moves while the image is read",
+                   "correct it, or make 'shutter_type' GLOBAL");
+  camera const first = view;
+  view.shutter = found->kind;
+  if (shutter_lines(view) < 2)
+    throw io_error(r.where, "the image has one line, and a rolling shutter", "make 'shutter_type' GLOBAL");
+  view = rolling_between(first, last, found->kind);
+}
+
 bool is_json_list(fs::path const& file) {
   for (u8 byte : read_file(file)) {
     if (byte == '[') return true;
@@ -63,6 +110,7 @@ std::vector<named_camera> read_camera_json(fs::path const& file) {
       for (char const* key : {"fx", "fy", "cx", "cy"}) set_member(c.view, key, r.number(key));
     read_lens_members(r, *model, c.view);
     read_pose(r, "c2w", false, c.view);
+    read_shutter(r, "c2w_end", false, c.view);
     check_camera(c.view, r.where);
     cameras.push_back(std::move(c));
   }
@@ -86,6 +134,12 @@ camera_fields fields_of(camera const& view) {
   return out;
 }
 
+std::string shutter_type_of(camera const& view) {
+  for (io::shutter_name const& s : io::shutter_names)
+    if (s.kind == view.shutter) return s.name;
+  return {};
+}
+
 camera seen_through(camera const& view, std::string const& text) {
   std::string const name = text.substr(0, text.find(',')), where = "camera " + text;
   io::camera_format const* const model = io::camera_format_of(name);
@@ -94,8 +148,9 @@ camera seen_through(camera const& view, std::string const& text) {
   c.kind = *model->kind;
   c.width = view.width, c.height = view.height, c.position = view.position, c.rotation = view.rotation;
   if (c.kind == camera_kind::equirectangular) c.width = 2 * c.height;
+  bool const parallel = c.kind == camera_kind::orthographic;
   bool const wide = c.kind != camera_kind::perspective && c.kind != camera_kind::division;
-  double angle = wide ? 180 : 60;
+  double angle = wide ? 180 : 60, extent = 0;
   c.cx = 0.5f * static_cast<float>(c.width), c.cy = 0.5f * static_cast<float>(c.height);
   for (std::size_t at = name.size(); at < text.size();) {
     std::string const pair = text.substr(at + 1, text.find(',', at + 1) - at - 1);
@@ -103,15 +158,21 @@ camera seen_through(camera const& view, std::string const& text) {
     double value = 0;
     if (pair.find('=') == pair.npos || !io::parse_number(std::string_view(pair).substr(key.size() + 1), value))
       throw invalid_argument(where + ": '" + pair + "' is not NAME=NUMBER");
-    bool known = key == "angle";
-    if (known) angle = value;
+    bool known = key == (parallel ? "extent" : "angle");
+    if (known) (parallel ? extent : angle) = value;
     for (int k = 0; k < model->parameters(); ++k)
       if (model->field(k) == key) io::set_member(c, model->member(k), value), known = true;
     if (!known)
       throw invalid_argument(where + ": " + name + " has no '" + key + "' (it has " + std::string(model->fields) + ")");
     at += 1 + pair.size();
   }
-  if (c.kind != camera_kind::equirectangular && c.fx == 0) {
+  if (parallel && c.fx == 0) {
+    if (!(extent > 0))
+      throw invalid_argument(where +
+                             ": give extent=UNITS, what it sees across the image's shorter side, or fx, the "
+                             "pixels a world unit");
+    c.fx = static_cast<float>(std::min(c.width, c.height) / extent);
+  } else if (c.kind != camera_kind::equirectangular && c.fx == 0) {
     double q, value, ignored;
     lens_curve const curve(c.kind, c.lens);
     curve.curve(angle * 3.141592653589793 / 360, q, ignored);
@@ -132,10 +193,20 @@ void write_cameras(std::filesystem::path const& path, std::vector<named_camera> 
     json one = {{"name", c.name}, {"width", v.width}, {"height", v.height}};
     if (fields.model != "PINHOLE") one["camera_model"] = fields.model;
     for (auto const& [key, value] : fields.values) one[key] = value;
-    json rows = json::array();
-    for (int i = 0; i < 3; ++i) rows.push_back({v.rotation[0][i], v.rotation[1][i], v.rotation[2][i], v.position[i]});
-    rows.push_back({0, 0, 0, 1});
-    one["c2w"] = rows;
+    auto const pose = [](camera const& at) {
+      json rows = json::array();
+      for (int i = 0; i < 3; ++i)
+        rows.push_back({at.rotation[0][i], at.rotation[1][i], at.rotation[2][i], at.position[i]});
+      rows.push_back({0, 0, 0, 1});
+      return rows;
+    };
+    if (v.shutter == shutter_kind::global) {
+      one["c2w"] = pose(v);
+    } else {
+      line_poses const lines = poses_of_lines(v);
+      one["shutter_type"] = shutter_type_of(v);
+      one["c2w"] = pose(lines.first), one["c2w_end"] = pose(lines.last);
+    }
     out.push_back(one);
   }
   write_file(path, out.dump(1, ' ', false, json::error_handler_t::replace) + "\n");

@@ -86,8 +86,7 @@ camera downscaled(camera c, int factor, std::string const& where) {
   if (width < 1 || height < 1) {
     throw invalid_argument("dataset_options.downscale = " + std::to_string(factor) + " leaves nothing of " + where);
   }
-  c.width = width * factor, c.height = height * factor;
-  return resized(c, width, height);
+  return resized(cropped(c, width * factor, height * factor), width, height);
 }
 
 void drop_frames_without_photo(capture& c, bool load_images) {

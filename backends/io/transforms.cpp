@@ -128,6 +128,7 @@ void read_frames(fs::path const& file, part role, capture& result) {
     read_depth_fields(r, folder, f);
     read_lens(r, f);
     read_pose(r, "transform_matrix", true, f.view);
+    read_shutter(r, "transform_matrix_end", true, f.view);
     if (f.view.width) check_camera(f.view, r.where);
     result.frames.push_back(std::move(f));
   }

@@ -33,6 +33,12 @@ fs::path depth_beside(fs::path const& photo) {
   return found;
 }
 
+// Which way the camera looks while a pixel is read.
+vec3 axis_of(camera const& view, float u, float v) {
+  if (view.shutter == shutter_kind::global) return view.rotation[2];
+  return at_time(view, shutter_lines_of(view).time_at<double>(u, v)).rotation[2];
+}
+
 }  // namespace
 
 image8 read_mask(fs::path const& path, image_size size, int factor) {
@@ -80,7 +86,7 @@ image_float read_distances(frame const& f, camera const& view, image_size size, 
         float cosine = 1;
         if (kind != depth_kind::distance) {
           vec3 const d = model.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f).direction;
-          vec3 const axis = view.rotation[2];
+          vec3 const axis = axis_of(view, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
           cosine = d.x * axis.x + d.y * axis.y + d.z * axis.z;
         }
         if (depth > 0 && !(cosine > 0))

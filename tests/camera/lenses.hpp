@@ -45,6 +45,10 @@ inline std::vector<named_lens> const& lenses() {
     auto& full = add("FULL_OPENCV", kind::perspective, 0.6, 0.7);
     full.k1 = 0.15f, full.k2 = -0.02f, full.p1 = 0.002f, full.p2 = -0.001f, full.k3 = 0.01f, full.d1 = 0.3f,
     full.d2 = 0.02f, full.d3 = -0.004f;
+    auto& radial_tangential = add("OPENCV", kind::perspective, 0.6, 0.7);
+    radial_tangential.k1 = 0.1f, radial_tangential.k2 = -0.02f, radial_tangential.p1 = 0.002f,
+    radial_tangential.p2 = -0.001f;
+    add("RADIAL", kind::perspective, 0.6, 0.7).k1 = -0.12f;
     add("EQUIRECTANGULAR", kind::equirectangular, 1, 3.2);
     return out;
   }();

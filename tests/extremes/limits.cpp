@@ -33,6 +33,7 @@ struct no_tracer : gart::tracer_base {
   void prepare(E&, gart::gaussians_view<float const>, gart::span<gart::ray_gaussian const>, gart::camera const&,
                gart::trace_options const&) {}
   gart::pixel_rays rays() const { return {}; }
+  gart::origin_rays rays_with_origins() const { return {}; }
   template <gart::ray_program P>
   void trace(E&, char const*, gart::index_t, P const&) {}
 };

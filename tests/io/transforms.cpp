@@ -337,6 +337,66 @@ TEST_CASE("transforms.json names its lenses") {
   c = read(focal + ", \"camera_model\": \"EUCM\", \"alpha\": 0.6, \"beta\": 1.2");
   CHECK(c.kind == gart::camera_kind::eucm);
   CHECK(c.lens.beta == 1.2f);
+  for (char const* name : {"ORTHOPHOTO", "ORTHOGRAPHIC"}) {
+    c = read(focal + ", \"camera_model\": \"" + name + "\"");
+    CHECK(c.kind == gart::camera_kind::orthographic);
+    CHECK(c.fy == 21);
+    CHECK(c.cx == 8);
+  }
+}
+
+TEST_CASE("a rolling shutter is read with the poses of its first and last line, and what is wrong is named") {
+  scratch_folder const folder;
+  folder.put_image("a.png", 16, 12);
+  fs::path const path = folder.path / "transforms.json";
+  std::string const sized = "\"fl_x\": 20, \"w\": 16, \"h\": 12, \"shutter_type\": ";
+  auto const moving = [](std::string const& more) {
+    return "{\"file_path\": \"a.png\", \"transform_matrix\": " + pose(1) + more + "}";
+  };
+  std::string const end = ", \"transform_matrix_end\": " + pose(3);
+  auto const read = [&](std::string const& text, gart::dataset_options const& options = all_train()) {
+    folder.put("transforms.json", text);
+    return gart::load_dataset(folder.path, options).train.at(0).view;
+  };
+  gart::camera const c = read(scene(sized + "\"ROLLING_BOTTOM_TO_TOP\"", moving(end)));
+  CHECK(c.shutter == gart::shutter_kind::bottom_to_top);
+  CHECK(c.position.z == 2);
+  // From the first line's pose to the last's are 11 of 12 lines.
+  CHECK(c.travel.x * c.rotation[0].z + c.travel.y * c.rotation[1].z + c.travel.z * c.rotation[2].z ==
+        doctest::Approx(2 * 12 / 11.0));
+  CHECK(c.turn == gart::vec3(0.0f));
+  CHECK(read(scene(sized + "\"GLOBAL\"", moving(end))).shutter == gart::shutter_kind::global);
+  // Of five rows out of twelve two whole ones are left, of ten: the motion is theirs.
+  gart::dataset_options fifth = all_train();
+  fifth.downscale = 5;
+  gart::camera const small = read(scene(sized + "\"ROLLING_TOP_TO_BOTTOM\"", moving(end)), fifth);
+  CHECK(small.height == 2);
+  CHECK(std::sqrt(glm::dot(small.travel, small.travel)) == doctest::Approx(2 * 12 / 11.0 * 10 / 12));
+  CHECK(small.position.z == doctest::Approx(2 - 2 * 12 / 11.0 / 12));
+  auto const refused = [&](std::string const& text) {
+    std::string const what = error_of([&] { read(text); });
+    CHECK(holds(what, path.string()));
+    CHECK(holds(what, "frame 0"));
+    return what;
+  };
+  CHECK(holds(refused(scene(sized + "\"ROLLING_TOP_TO_BOTTOM\"", moving(""))), "'transform_matrix_end' is missing"));
+  CHECK(holds(refused(scene(sized + "\"TOP\"", moving(end))), "write one of GLOBAL, ROLLING_TOP_TO_BOTTOM"));
+  CHECK(holds(refused(scene(sized + "3", moving(end))), "'shutter_type' is not a text"));
+  CHECK(holds(refused(scene(lens, moving(end))), "'shutter_type' is missing"));
+  CHECK(holds(refused(scene(sized + "\"ROLLING_TOP_TO_BOTTOM\"", moving(", \"transform_matrix_end\": " + pose(1)))),
+              "nothing moves"));
+  CHECK(holds(refused(scene(sized + "\"ROLLING_TOP_TO_BOTTOM\"", moving(", \"transform_matrix_end\": [[1]]"))),
+              "'transform_matrix_end' is not a matrix"));
+  CHECK(holds(refused(scene("\"fl_x\": 20, \"shutter_type\": \"ROLLING_TOP_TO_BOTTOM\"", moving(end))),
+              "'w' and 'h' are missing"));
+  CHECK(holds(
+      refused(scene("\"fl_x\": 20, \"w\": 16, \"h\": 1, \"shutter_type\": \"ROLLING_TOP_TO_BOTTOM\"", moving(end))),
+      "one line"));
+  CHECK(holds(refused(scene(sized + "\"ROLLING_TOP_TO_BOTTOM\", \"camera_model\": \"ORTHOPHOTO\"", moving(end))),
+              "no rolling shutter"));
+  CHECK(holds(refused(scene(sized + "\"ROLLING_TOP_TO_BOTTOM\"",
+                            moving(", \"transform_matrix_end\": [[-1,0,0,0],[0,1,0,0],[0,0,-1,0]]"))),
+              "half a turn"));
 }
 
 TEST_CASE("cameras of every model are written to a camera JSON and read back") {
@@ -373,6 +433,16 @@ TEST_CASE("cameras of every model are written to a camera JSON and read back") {
   lens = {};
   lens.alpha = 0.6f, lens.beta = 1.1f;
   add(kind::eucm, lens);
+  lens = {};
+  add(kind::orthographic, lens);
+  std::size_t const still = cameras.size();
+  using shutter = gart::shutter_kind;
+  for (shutter const s :
+       {shutter::top_to_bottom, shutter::left_to_right, shutter::bottom_to_top, shutter::right_to_left}) {
+    add(s == shutter::top_to_bottom ? kind::equirectangular : kind::perspective, lens);
+    gart::camera& view = cameras.back().view;
+    view.shutter = s, view.travel = {0.1f, -0.2f, 0.3f}, view.turn = {-0.05f, 0.02f, 0.1f};
+  }
   gart::write_cameras(folder.path / "cameras.json", cameras);
   auto const back = gart::load_cameras(folder.path / "cameras.json");
   REQUIRE(back.size() == cameras.size());
@@ -384,8 +454,19 @@ TEST_CASE("cameras of every model are written to a camera JSON and read back") {
     CHECK(std::memcmp(&a.lens, &b.lens, sizeof a.lens) == 0);
     CHECK(b.fx == a.fx);
     CHECK(b.cx == a.cx);
-    CHECK(b.position == a.position);
-    CHECK(b.rotation == a.rotation);
+    CHECK(b.shutter == a.shutter);
+    if (i < still) {
+      CHECK(b.position == a.position);
+      CHECK(b.rotation == a.rotation);
+      continue;
+    }
+    // The file has the poses of the first and the last line.
+    for (int k = 0; k < 3; ++k) {
+      CHECK(std::abs(b.position[k] - a.position[k]) < 1e-8);
+      CHECK(std::abs(b.travel[k] - a.travel[k]) < 1e-6);
+      CHECK(std::abs(b.turn[k] - a.turn[k]) < 1e-6);
+      for (int j = 0; j < 3; ++j) CHECK(std::abs(b.rotation[k][j] - a.rotation[k][j]) < 1e-6);
+    }
   }
   cameras.resize(1), cameras[0].view.lens.s1 = 0.1f;
   CHECK(holds(error_of([&] { gart::write_cameras(folder.path / "cameras.json", cameras); }), "no camera model"));

@@ -295,6 +295,54 @@ TEST_CASE("a capture through a fisheye or of the sphere names its camera, and it
   CHECK(!fs::exists(options.out));
 }
 
+TEST_CASE("a capture of parallel rays or through a rolling shutter has distances along rays that begin where they do") {
+  if (!has_embree()) return;
+  for (bool const rolls : {false, true}) {
+    CAPTURE(rolls);
+    scratch_folder const folder;
+    synth_options options;
+    options.out = folder.path, options.depth = true;
+    options.camera = rolls ? "" : "ORTHOGRAPHIC,extent=2.4", options.rolling = rolls ? 5 : 0;
+    options.train = 2, options.test = 1, options.size = 48, options.samples = 4, options.points = 50;
+    write_synth_capture(options);
+    gart::dataset_options load;
+    load.depth.load = true;
+    gart::dataset const data = gart::load_dataset(folder.path, load);
+    REQUIRE(data.train.size() == 2);
+    gart::camera const& c = data.train[0].view;
+    if (rolls) {
+      CHECK(c.shutter == gart::shutter_kind::top_to_bottom);
+      CHECK(std::sqrt(glm::dot(c.turn, c.turn)) == doctest::Approx(5 * 3.14159265 / 180).epsilon(1e-4));
+      CHECK(std::sqrt(glm::dot(c.travel, c.travel)) > 0.1f);
+      CHECK(data.test[0].view.shutter == gart::shutter_kind::global);
+    } else {
+      CHECK(c.kind == gart::camera_kind::orthographic);
+      CHECK(c.fx == doctest::Approx(20));
+    }
+    long seen = 0, clear = 0;
+    for (int y = 0; y < c.height; ++y)
+      for (int x = 0; x < c.width; ++x) {
+        float const t = data.train[0].depth.at(x, y, 0);
+        if (t == 0) continue;
+        ++seen;
+        gart::ray const r = gart::ray_through(c, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+        gart::vec3 const at = gart::vec3(c.position) + r.origin + t * r.direction;
+        CHECK(std::sqrt(glm::dot(at, at)) < 1.35f);  // what the scene lies within
+        clear += data.train[0].image.at(x, y, 3) == 0;
+      }
+    CHECK(clear < 5);  // a thin thing that no sample met
+    CHECK(seen > 100);
+  }
+  synth_options options;
+  options.out = fs::temp_directory_path() / "gart_synth_none", options.camera = "ORTHOGRAPHIC";
+  CHECK_THROWS_WITH_AS(write_synth_capture(options), doctest::Contains("extent=UNITS"), gart::invalid_argument);
+  options.camera = "ORTHOGRAPHIC,extent=2", options.rolling = 3;
+  CHECK_THROWS_WITH_AS(write_synth_capture(options), doctest::Contains("no rolling shutter"), gart::invalid_argument);
+  options.camera = "", options.rolling = 91;
+  CHECK_THROWS_WITH_AS(write_synth_capture(options), doctest::Contains("--rolling"), gart::invalid_argument);
+  CHECK(!fs::exists(options.out));
+}
+
 TEST_CASE("an option out of its range is refused by name, before anything is written") {
   scratch_folder folder;
   for (auto const member : {&synth_options::train, &synth_options::test, &synth_options::size, &synth_options::samples,

@@ -122,7 +122,7 @@ struct pass {
     rays.cast(exec, view);
     gart::depth_orders<E, Size> orders(exec);
     gart::visit_camera(view, [&](auto const& model) {
-      map.build(exec, grid, prints, orders.of(exec, model, rays.view(), prints.depths().data(), records.data()));
+      map.build(exec, grid, prints, orders.of(exec, model, rays, prints.depths().data(), records.data()));
     });
     gart::ray_depth const depth = gart::visit_camera(view, [](auto const& model) { return model.depth(); });
     gart::tile_map_view const made = map.view();

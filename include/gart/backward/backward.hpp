@@ -169,22 +169,24 @@ class backward_pass {
     }
     if constexpr (Strategy::scatter::any) {
       pixel_order const order{view.width, view.height};
-      frame.trace("backward/scatter", order.launch_size(),
-                  scatter_program<sh_degree, response, typename Strategy::scatter, execution_type>{
-                      {},
-                      frame.rays(),
-                      order,
-                      scene.sh,
-                      frame.active_degree(),
-                      frame.options().transmittance_min,
-                      frame.options().max_hits,
-                      frame.gaussians().data(),
-                      color_,
-                      image.color.data(),
-                      error.data(),
-                      gradients.sh,
-                      moments_.data(),
-                      depth_});
+      frame.with_rays([&]<class Rays>(Rays const& rays) {
+        frame.trace("backward/scatter", order.launch_size(),
+                    scatter_program<sh_degree, response, typename Strategy::scatter, execution_type, Rays>{
+                        {},
+                        rays,
+                        order,
+                        scene.sh,
+                        frame.active_degree(),
+                        frame.options().transmittance_min,
+                        frame.options().max_hits,
+                        frame.gaussians().data(),
+                        color_,
+                        image.color.data(),
+                        error.data(),
+                        gradients.sh,
+                        moments_.data(),
+                        depth_});
+      });
     }
     auto const finish = [&]<class Filter>(Filter const& filter) {
       parallel_for(exec, "backward/finish", scene.count,
@@ -215,12 +217,15 @@ class backward_pass {
 
   void gather(Frame const& frame, span<float const> color_gradient, span<float const> error,
               gaussians_view<float> gradients) {
-    using kernel = gather_of<strategy_gather<execution_type, sh_degree, typename Frame::response, Strategy, tile_size>>;
-    parallel_for(
-        frame.exec(), "backward/gather", tile_range{grid_.count(), kernel::block_size},
-        kernel{frame.rays(), grid_, lists_, prints_->ranges().data(), slots_.data(), frame.gaussians().data(),
-               frame.active_degree(), color_, color_gradient.data(), error.data(), gradients.sh, moments_.data(),
-               prints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near, gathered()});
+    frame.with_rays([&]<class Rays>(Rays const& rays) {
+      using kernel =
+          gather_of<strategy_gather<execution_type, sh_degree, typename Frame::response, Strategy, tile_size, Rays>>;
+      parallel_for(
+          frame.exec(), "backward/gather", tile_range{grid_.count(), kernel::block_size},
+          kernel{rays, grid_, lists_, prints_->ranges().data(), slots_.data(), frame.gaussians().data(),
+                 frame.active_degree(), color_, color_gradient.data(), error.data(), gradients.sh, moments_.data(),
+                 prints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near, gathered()});
+    });
   }
   auto gathered() const {
     if constexpr (records_depths)

@@ -43,6 +43,8 @@ struct gather_kernel {
   /// A slot as it is read.
   using slot_type = std::conditional_t<C::terms::depth, entry_with_depth<entry_type>, entry_type>;
 
+  static constexpr bool central = C::rays::central;  ///< whether all rays begin at the frame's origin
+
   /// What a lane needs of a pixel: direction and (colour . gradient), gradient, SH basis. Records are an odd number of
   /// 16-byte words apart where they can be, so that lanes on neighbouring pixels read different banks.
   struct pixel_data {
@@ -54,16 +56,17 @@ struct gather_kernel {
     quad basis[basis_quads];
     quad last;  ///< t and place of the ray's last hit, where validity is recomputed; the depth's gradient, where there
                 /// is one; and what makes the words odd in number
-    quad spread[basis_quads % 2 ? 1 : 0];  ///< room, where the words would be even in number
+    quad origin[central ? 0 : 1];                       ///< of the ray, where it has one
+    quad spread[(basis_quads + !central) % 2 ? 1 : 0];  ///< room, where the words would be even in number
   };
   /// What a team shares.
   struct scratch {
     pixel_data pixels[grid_type::pixels];  ///< of the tile
   };
 
-  pixel_rays rays;    ///< of the view
-  grid_type grid;     ///< of the view
-  tile_map_view map;  ///< the tiles' lists
+  typename C::rays rays;  ///< of the view
+  grid_type grid;         ///< of the view
+  tile_map_view map;      ///< the tiles' lists
   /// [N]: boxes, and where their slots begin.
   footprint_slots const* ranges = nullptr;
   entry_type const* slots = nullptr;  ///< the LT buffer
@@ -145,7 +148,9 @@ struct gather_kernel {
   /// What the lanes need of pixel `at`.
   GART_HD void load_pixel(pixel_data& out, pixel const& at) const {
     std::size_t const a = 3 * (static_cast<std::size_t>(at.y) * rays.view.width + at.x);
-    vec3 const d = pixel_ray(rays, at).direction;
+    auto const r = pixel_ray(rays, at);
+    vec3 const d = r.direction;
+    if constexpr (!central) out.origin[0] = {{r.origin.x, r.origin.y, r.origin.z, 0}};
     vec3 const c(color[a], color[a + 1], color[a + 2]);
     vec3 const g(color_gradient[a], color_gradient[a + 1], color_gradient[a + 2]);
     out.direction_total = {{d.x, d.y, d.z, c.x * g.x + c.y * g.y + c.z * g.z}};
@@ -225,7 +230,12 @@ struct gather_kernel {
     if constexpr (std::is_same_v<lane_data, record_data>)
       evaluate_all<response_type>(out, [&](int i) {
         quad const d = pixel_of(i).direction_total;
-        return approach_to(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
+        if constexpr (central) {
+          return approach_to(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});
+        } else {
+          quad const o = pixel_of(i).origin[0];
+          return approach_to(data.gaussian, ray{{o.v[0], o.v[1], o.v[2]}, {d.v[0], d.v[1], d.v[2]}});
+        }
       });
   }
   /// Whether the slot of that number is a hit.

@@ -12,9 +12,11 @@
 ///   validity   how a slot that is a hit is told from one that is none (backward/strategies.hpp)
 ///   form       which form of the kernel runs (exec/concepts.hpp): the policy's, unless a strategy asks for the
 ///              plain one
+///   rays       of the view's pixels: pixel_rays; the plain form takes origin_rays too (camera/pixel_rays.hpp)
 /// strategy_gather makes one of a strategy; a struct of a program's own does as well (bench/registers.cu).
 
 #include <gart/backward/strategies.hpp>
+#include <gart/camera/pixel_rays.hpp>
 #include <gart/exec/concepts.hpp>
 #include <gart/math/response.hpp>
 
@@ -41,10 +43,11 @@ concept gather_configuration = requires {
   { C::validity } -> std::convertible_to<slot_validity>;
   { C::form } -> std::convertible_to<kernel_form>;
 }
-&&execution<typename C::policy>&& response_function<typename C::response>;
+&&execution<typename C::policy>&& response_function<typename C::response>&& rays_of_pixels<typename C::rays>;
 
 /// The gather of a strategy on a policy.
-template <execution E, int ShDegree, response_function Response, strategy Strategy, int TileSize>
+template <execution E, int ShDegree, response_function Response, strategy Strategy, int TileSize,
+          rays_of_pixels Rays = pixel_rays>
 struct strategy_gather {
   using policy = E;                                                   ///< on which it runs
   using response = Response;                                          ///< of the Gaussians
@@ -55,7 +58,9 @@ struct strategy_gather {
   /// In an order or atomically.
   static constexpr gather_sums sums = Strategy::ordered ? gather_sums::ordered : gather_sums::atomic;
   static constexpr slot_validity validity = Strategy::validity;  ///< how slots that are hits are told
-  static constexpr kernel_form form = Strategy::lane_by_lane ? kernel_form::plain : E::form;  ///< of the kernel
+  /// Of the kernel.
+  static constexpr kernel_form form = Strategy::lane_by_lane || !Rays::central ? kernel_form::plain : E::form;
+  using rays = Rays;  ///< of the view's pixels
 };
 
 }  // namespace gart::inline GART_ISA

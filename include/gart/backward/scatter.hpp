@@ -16,10 +16,10 @@
 namespace gart::inline GART_ISA {
 
 /// The ray program of the backward pass by pixel (trace/ray_program.hpp).
-template <int ShDegree, class Response, class Terms, execution E>
+template <int ShDegree, class Response, class Terms, execution E, rays_of_pixels Rays = pixel_rays>
 struct scatter_program : ray_program_base {
-  /// Rays from the camera's centre.
-  using ray_type = primary_ray;
+  /// From the camera's centre, or from anywhere.
+  using ray_type = typename Rays::ray_type;
   static constexpr int sh_stride = 3 * sh_basis<ShDegree>::size;  ///< floats of a Gaussian's coefficients
   /// A ray on its way.
   struct state {
@@ -30,9 +30,10 @@ struct scatter_program : ray_program_base {
     float error;                                 ///< of the pixel
     u32 left;                                    ///< hits until the cap; from 0, no cap, it counts down past it
     float depth_gradient[Terms::depth ? 1 : 0];  ///< of the pixel, where there is one
+    vec3 origin[Rays::central ? 0 : 1];          ///< of the ray, where it has one
   };
 
-  pixel_rays rays;               ///< of the view
+  Rays rays;                     ///< of the view
   pixel_order order;             ///< of the view
   float const* sh = nullptr;     ///< coefficients, [N][K][3]
   int active_degree = ShDegree;  ///< bands above it have no gradient
@@ -56,7 +57,9 @@ struct scatter_program : ray_program_base {
   GART_HD state begin(index_t i) const {
     state s;
     pixel const at = order.at(i);
-    s.direction = pixel_ray(rays, at).direction;
+    ray_type const r = pixel_ray(rays, at);
+    s.direction = r.direction;
+    if constexpr (!Rays::central) s.origin[0] = r.origin;
     s.basis = sh_basis<ShDegree>(s.direction);
     float const* c = color + 3 * order.address(at);
     float const* g = color_gradient + 3 * order.address(at);
@@ -71,7 +74,14 @@ struct scatter_program : ray_program_base {
     return s;
   }
   /// Ray i, in the view's frame.
-  GART_HD primary_ray ray_of(index_t, state const& s) const { return {s.direction}; }
+  GART_HD ray_type ray_of(index_t, state const& s) const { return ray_of(s); }
+  /// The ray of a state.
+  GART_HD GART_INLINE ray_type ray_of(state const& s) const {
+    if constexpr (Rays::central)
+      return {s.direction};
+    else
+      return {s.origin[0], s.direction};
+  }
 
   /// Adds a hit's gradient to its Gaussian. False: the ray ends.
   GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h) const {
@@ -95,7 +105,7 @@ struct scatter_program : ray_program_base {
     }
     if constexpr (Terms::geometry) {
       ray_gaussian const g = records[h.id];
-      ray_peak const r = evaluate<Response>(g, primary_ray{s.direction});
+      ray_peak const r = evaluate<Response>(g, ray_of(s));
       moments_of<float> m = hit_moments<Response>(g, r, alpha_gradient);
       if constexpr (Terms::depth) add_depth_moments(m, r, weight * s.depth_gradient[0], true);
       m.v[error_place] = weight * s.error;

@@ -61,9 +61,14 @@ struct equirectangular : camera_base {
   }
   /// The same, of one point.
   GART_HD vec3 direction_of(float u, float v) const {
+    fixed_direction const d = direction_in_camera(u, v);
+    return unit_in_world(rotation, d.x, d.y, d.z);
+  }
+  /// In the camera's axes.
+  GART_HD fixed_direction direction_in_camera(float u, float v) const {
     sine_cosine const round = sine_cosine_of_quarters(4 * static_cast<double>(u) - 2.0 * width, width);
     sine_cosine const down = sine_cosine_of_quarters(2 * static_cast<double>(v), height);
-    return unit_in_world(rotation, round.sine * down.sine, -down.cosine, round.cosine * down.sine);
+    return {round.sine * down.sine, -down.cosine, round.cosine * down.sine, true};
   }
 
   /// For hits at t > near.

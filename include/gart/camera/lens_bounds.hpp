@@ -14,7 +14,10 @@
 #include <gart/camera/lens_curve.hpp>
 #include <gart/camera/seen_angles.hpp>
 
+#include <array>
 #include <cmath>
+#include <map>
+#include <mutex>
 
 namespace gart::inline GART_ISA {
 
@@ -305,5 +308,42 @@ class lens_bounds {
   // Running maxima by the angle: second and third derivatives, and the second of the tangential terms.
   float bend_[cells] = {}, twist_[cells] = {}, beside_[cells] = {};
 };
+
+/// Of a camera's lens: its tables take milliseconds, and views share lenses, so they are made once a lens and program,
+/// of the latest thousands. Host side.
+inline lens_bounds tabulated_bounds(camera_kind kind, distortion const& l, float fx, float fy, float cx, float cy,
+                                    int width, int height) {
+  static std::mutex guard;
+  static std::map<std::array<float, 25>, lens_bounds> known;
+  std::array<float, 25> const key{static_cast<float>(kind),
+                                  static_cast<float>(width),
+                                  static_cast<float>(height),
+                                  fx,
+                                  fy,
+                                  cx,
+                                  cy,
+                                  l.k1,
+                                  l.k2,
+                                  l.p1,
+                                  l.p2,
+                                  l.k3,
+                                  l.k4,
+                                  l.k5,
+                                  l.k6,
+                                  l.d1,
+                                  l.d2,
+                                  l.d3,
+                                  l.s1,
+                                  l.s2,
+                                  l.s3,
+                                  l.s4,
+                                  l.omega,
+                                  l.alpha,
+                                  l.beta};
+  std::lock_guard const lock(guard);
+  if (auto const found = known.find(key); found != known.end()) return found->second;
+  if (known.size() >= 4096) known.clear();
+  return known.emplace(key, lens_bounds({kind, l}, fx, fy, cx, cy, width, height)).first->second;
+}
 
 }  // namespace gart::inline GART_ISA

@@ -27,7 +27,8 @@
 ///     Host side: whether no two pixels see one direction, and each sees one. Footprints need it. camera_base has true.
 ///
 /// Which pixels of a tile come how near an ellipsoid needs no member: tiles/tile_planes.hpp has it from the rays.
-/// Kernels cast a pinhole's rays themselves; those of other models are cast once a view (camera/pixel_rays.hpp).
+/// Kernels cast a pinhole's rays themselves; those of other models are cast once a view (camera/pixel_rays.hpp). Rays
+/// without one centre are walked one by one, not in packets or warps.
 
 #include <gart/camera/ray_depth.hpp>
 #include <gart/core/error.hpp>
@@ -142,6 +143,14 @@ inline camera_fault pose_fault(vec3d const& position, mat3 const& rotation) {
     for (int j = 0; j < 3; ++j) finite = finite && is_finite(rotation[k][j]);
     if (!finite) return {"the pose is not finite", "correct the position and the rotation"};
   }
+  return {};
+}
+
+/// Of a camera with focal lengths and a principal point.
+inline camera_fault focal_fault(float fx, float fy, float cx, float cy) {
+  if (!(fx > 0 && fy > 0 && is_finite(fx) && is_finite(fy)))
+    return {"the focal length is not a positive number", "correct fx and fy"};
+  if (!(is_finite(cx) && is_finite(cy))) return {"the principal point is not finite", "correct cx and cy"};
   return {};
 }
 

@@ -7,14 +7,21 @@
 
 #include <gart/camera/equirectangular.hpp>
 #include <gart/camera/opencv.hpp>
+#include <gart/camera/orthographic.hpp>
 #include <gart/camera/pinhole.hpp>
 #include <gart/camera/radial_lens.hpp>
+#include <gart/camera/rolling_shutter.hpp>
 
 namespace gart::inline GART_ISA {
 
-/// Calls f with the model that the camera is of, and returns what f does.
+/// Calls f with the model that the camera is of, and returns what f does. A rolling shutter has one lens for all that
+/// project slopes and for fisheyes.
 template <class F>
 decltype(auto) visit_camera(camera const& c, F&& f) {
+  if (c.kind == camera_kind::orthographic) return f(orthographic(c));
+  if (c.shutter != shutter_kind::global)
+    return c.kind == camera_kind::equirectangular ? f(rolling_shutter<equirectangular>(c))
+                                                  : f(rolling_shutter<radial_lens>(c));
   switch (c.kind) {
     case camera_kind::perspective:
       break;
@@ -34,9 +41,15 @@ inline camera_fault fault_of(camera const& c) {
 /// Throws invalid_argument for a camera by which no ray can be cast.
 inline void require_camera(camera const& c) { refuse_camera(fault_of(c)); }
 
-/// Unit direction, in the world, of the ray through an image point. Host side.
-inline vec3 ray_direction(camera const& c, float u, float v) {
-  return visit_camera(c, [&](auto const& model) -> vec3 { return model.ray(u, v).direction; });
+/// The ray through an image point: its unit direction in the world, its origin relative to the camera's position. Host
+/// side.
+inline ray ray_through(camera const& c, float u, float v) {
+  return visit_camera(c, [&](auto const& model) -> ray {
+    auto const r = model.ray(u, v);
+    return {origin_of(r), r.direction};
+  });
 }
+/// Its direction alone.
+inline vec3 ray_direction(camera const& c, float u, float v) { return ray_through(c, u, v).direction; }
 
 }  // namespace gart::inline GART_ISA

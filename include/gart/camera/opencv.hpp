@@ -5,10 +5,13 @@
 ///   x_d = x (1 + k1 r2 + k2 r2^2) + 2 p1 x y + p2 (r2 + 2 x x),  y_d likewise with p1 and p2 exchanged;
 /// a ray inverts it by Newton's method (camera/undistort.hpp).
 ///
-/// The rectangle of slopes that bounds an ellipsoid is mapped to the image edge by edge: the map is one to one where
-/// the image is, so the image of the rectangle lies within the image of its border, which is sampled and widened by
-/// what a curved edge can bulge between samples.
+/// A box is what two bounds have in common. One is that of any curve of the angle with the axis
+/// (camera/lens_bounds.hpp), the tighter one for most. For what is seen large, or crosses the near plane, the rectangle
+/// of slopes is mapped to the image edge by edge: the map is one to one where the image is, so the image of the
+/// rectangle lies within the image of its border, which is sampled and widened by what a curved edge can bulge between
+/// samples.
 
+#include <gart/camera/lens_bounds.hpp>
 #include <gart/camera/pinhole.hpp>
 #include <gart/camera/undistort.hpp>
 
@@ -21,7 +24,9 @@ class opencv_bounds {
  public:
   /// Host side: the bounds of what the image sees, in slopes, by sampling its border.
   opencv_bounds(pinhole const& c, distortion const& lens, seen_slopes const& seen, float near)
-      : lens_(lens), near_(near) {
+      : lens_(lens),
+        curved_(tabulated_bounds(camera_kind::perspective, lens, c.fx, c.fy, c.cx, c.cy, c.width, c.height)
+                    .seen_from(c.rotation, near)) {
     // The border between samples may bulge a little further.
     double const margin = 0.02;
     double const mu = margin * (seen.x1 - seen.x0), mw = margin * (seen.y1 - seen.y0);
@@ -34,9 +39,12 @@ class opencv_bounds {
     slope_box s;
     footprint out = project(view_, e, s);
     if (!s.visible) return {};
-    out.box = pixels_of(view_, distorted(s));
-    float const distance = least_distance(e, near_);  // what z is at most
-    out.depth = distance > out.depth ? distance : out.depth;
+    footprint const curved = curved_(e);  // its depth is a distance, which z is at most
+    pixel_box const a = pixels_of(view_, distorted(s)), &b = curved.box;
+    out.box = {a.x0 > b.x0 ? a.x0 : b.x0, a.y0 > b.y0 ? a.y0 : b.y0, a.x1 < b.x1 ? a.x1 : b.x1,
+               a.y1 < b.y1 ? a.y1 : b.y1};
+    if (out.box.empty()) return {};
+    out.depth = curved.depth > out.depth ? curved.depth : out.depth;
     return out;
   }
 
@@ -72,7 +80,7 @@ class opencv_bounds {
   }
 
   distortion lens_;
-  float near_;
+  lens_bounds curved_;
   detail::interval u_, w_;  // slopes the image sees
   footprint_view view_;
 };

@@ -63,9 +63,7 @@ struct pinhole : camera_base {
   /// Size, focal lengths, principal point or pose.
   camera_fault fault() const {
     if (camera_fault const size = size_fault(*this); size.what) return size;
-    if (!(fx > 0 && fy > 0 && is_finite(fx) && is_finite(fy)))
-      return {"the focal length is not a positive number", "correct fx and fy"};
-    if (!(is_finite(cx) && is_finite(cy))) return {"the principal point is not finite", "correct cx and cy"};
+    if (camera_fault const focal = focal_fault(fx, fy, cx, cy); focal.what) return focal;
     return pose_fault(position, rotation);
   }
 

@@ -2,7 +2,8 @@
 /// \file
 /// The rays of a view's pixels, as kernels take them, whatever the camera. Kernels cast a pinhole's themselves; those
 /// of any other model with one centre are cast once a view into a table of directions, 12 bytes a pixel, and read. So a
-/// kernel knows one model, and a lens that is dear to invert is inverted once a pixel.
+/// kernel knows one model, and a lens that is dear to invert is inverted once a pixel. Rays without one centre have a
+/// table of origins too, and a type of their own: what kernels are compiled for, so that the others' stay as they are.
 
 #include <gart/camera/models.hpp>
 #include <gart/exec/buffer.hpp>
@@ -12,8 +13,10 @@ namespace gart::inline GART_ISA {
 
 /// Trivially copyable: kernels hold one by value.
 struct pixel_rays {
-  pinhole view;                      ///< of another model: its size and position
-  vec3 const* directions = nullptr;  ///< [H][W], of a model that is no pinhole
+  using ray_type = primary_ray;          ///< of a pixel
+  static constexpr bool central = true;  ///< all begin at the frame's origin
+  pinhole view;                          ///< of another model: its size and position
+  vec3 const* directions = nullptr;      ///< [H][W], of a model that is no pinhole
 
   /// Through the middle of a pixel of the image.
   GART_HD GART_INLINE primary_ray of(int x, int y) const {
@@ -22,7 +25,38 @@ struct pixel_rays {
   }
 };
 
+/// The same of rays with an origin each.
+struct origin_rays {
+  using ray_type = ray;                   ///< of a pixel
+  static constexpr bool central = false;  ///< all begin at the frame's origin
+  pinhole view;                           ///< its size and position
+  vec3 const* directions = nullptr;       ///< [H][W]
+  vec3 const* origins = nullptr;          ///< [H][W]; null: the view's rays have one centre
+
+  /// Through the middle of a pixel of the image.
+  GART_HD GART_INLINE ray of(int x, int y) const {
+    std::size_t const at = static_cast<std::size_t>(y) * view.width + x;
+    return {origins[at], directions[at]};
+  }
+};
+
+/// Kernels take either.
+template <class R>
+concept rays_of_pixels = std::same_as<R, pixel_rays> || std::same_as<R, origin_rays>;
+
 namespace camera_kernels {
+
+// An index is a pixel.
+template <camera_model M>
+struct cast_origins {
+  M model;
+  vec3 *directions, *origins;
+  GART_KERNEL void operator()(index_t i) const {
+    index_t const width = static_cast<index_t>(model.width);
+    ray const r = model.ray(static_cast<float>(i % width) + 0.5f, static_cast<float>(i / width) + 0.5f);
+    directions[i] = r.direction, origins[i] = r.origin;
+  }
+};
 
 // On a host an index is a run of lane_count pixels of a row, elsewhere a pixel.
 template <central_camera M>
@@ -58,7 +92,7 @@ template <execution E>
 class camera_rays {
  public:
   /// No rays yet.
-  explicit camera_rays(E& exec) : directions_(exec) {}
+  explicit camera_rays(E& exec) : directions_(exec), origins_(exec) {}
 
   /// View: a camera or a camera model.
   template <class View>
@@ -68,12 +102,19 @@ class camera_rays {
 
   /// Until the next cast. Of a model without one centre there are none.
   pixel_rays view() const { return rays_; }
+  /// The same, of a model without one centre alone.
+  origin_rays with_origins() const { return from_origins_; }
 
  private:
-  void cast_model(E&, pinhole const& model) { rays_ = {model, nullptr}; }
+  void cast_model(E&, pinhole const& model) { set(model), rays_.view = model; }
   template <camera_model M>
-  void cast_model(E&, M const& model) {
+  void cast_model(E& exec, M const& model) {
+    std::size_t const pixels = static_cast<std::size_t>(model.width) * model.height;
+    directions_.resize(pixels), origins_.resize(pixels);
+    parallel_for(exec, "rays", static_cast<index_t>(pixels),
+                 camera_kernels::cast_origins<M>{model, directions_.data(), origins_.data()});
     set(model);
+    from_origins_ = {rays_.view, directions_.data(), origins_.data()};
   }
   template <central_camera M>
   void cast_model(E& exec, M const& model) {
@@ -84,12 +125,13 @@ class camera_rays {
     rays_.directions = directions_.data();
   }
   void set(camera_base const& model) {
-    rays_ = {};
+    rays_ = {}, from_origins_ = {};
     static_cast<camera_base&>(rays_.view) = model;
   }
 
-  buffer<vec3, E> directions_;
+  buffer<vec3, E> directions_, origins_;
   pixel_rays rays_;
+  origin_rays from_origins_;
 };
 
 }  // namespace gart::inline GART_ISA

@@ -22,14 +22,22 @@ inline double pixel_weight(equirectangular const& model, float, float v) {
   return std::fmax(1.0 / 255, std::sin(3.141592653589793 * double{v} / model.height));
 }
 inline double pixel_weight(radial_lens const& model, float u, float v) { return model.sees(u, v) ? 1 : 0; }
+template <class Lens>
+double pixel_weight(rolling_shutter<Lens> const& model, float u, float v) {
+  return pixel_weight(model.lens, u, v);
+}
+
+// Whether pixels of a model count differently.
+template <class Model>
+inline constexpr bool weighs_pixels = std::is_same_v<Model, equirectangular> || std::is_same_v<Model, radial_lens>;
+template <class Lens>
+inline constexpr bool weighs_pixels<rolling_shutter<Lens>> = weighs_pixels<Lens>;
 
 }  // namespace detail
 
 /// Whether pixels count differently.
 inline bool has_pixel_weights(camera const& c) {
-  return visit_camera(c, []<class Model>(Model const&) {
-    return std::is_same_v<Model, equirectangular> || std::is_same_v<Model, radial_lens>;
-  });
+  return visit_camera(c, []<class Model>(Model const&) { return detail::weighs_pixels<Model>; });
 }
 
 /// Of each pixel, [H][W]. Cost: of a lens with tangential terms a ray a pixel.

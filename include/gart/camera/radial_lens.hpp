@@ -11,53 +11,15 @@
 #include <gart/camera/lens_bounds.hpp>
 #include <gart/camera/model.hpp>
 
-#include <array>
-#include <map>
-#include <mutex>
 #include <vector>
 
 namespace gart::inline GART_ISA {
 
-namespace detail {
-
-// The tables of a lens take milliseconds, and views share lenses: made once a lens and program, of the latest
-// thousands.
-inline lens_bounds tabulated(camera_kind kind, distortion const& l, float fx, float fy, float cx, float cy, int width,
-                             int height) {
-  static std::mutex guard;
-  static std::map<std::array<float, 25>, lens_bounds> known;
-  std::array<float, 25> const key{static_cast<float>(kind),
-                                  static_cast<float>(width),
-                                  static_cast<float>(height),
-                                  fx,
-                                  fy,
-                                  cx,
-                                  cy,
-                                  l.k1,
-                                  l.k2,
-                                  l.p1,
-                                  l.p2,
-                                  l.k3,
-                                  l.k4,
-                                  l.k5,
-                                  l.k6,
-                                  l.d1,
-                                  l.d2,
-                                  l.d3,
-                                  l.s1,
-                                  l.s2,
-                                  l.s3,
-                                  l.s4,
-                                  l.omega,
-                                  l.alpha,
-                                  l.beta};
-  std::lock_guard const lock(guard);
-  if (auto const found = known.find(key); found != known.end()) return found->second;
-  if (known.size() >= 4096) known.clear();
-  return known.emplace(key, lens_bounds({kind, l}, fx, fy, cx, cy, width, height)).first->second;
-}
-
-}  // namespace detail
+/// A direction in a camera's axes, of any length.
+struct fixed_direction {
+  fixed_double x, y, z;  ///< in double of fixed rounding
+  bool seen = false;     ///< false: there is none
+};
 
 /// A direction in a camera's axes, of any length, in the world's and a unit.
 GART_HD inline vec3 unit_in_world(mat3 const& rotation, fixed_double x, fixed_double y, fixed_double z) {
@@ -101,15 +63,20 @@ struct radial_lens : camera_base {
   }
   /// The same, of one point.
   GART_HD vec3 direction_of(float u, float v) const {
+    fixed_direction const d = direction_in_camera(u, v);
+    return d.seen ? unit_in_world(rotation, d.x, d.y, d.z) : vec3(0.0f);
+  }
+  /// In the camera's axes.
+  GART_HD fixed_direction direction_in_camera(float u, float v) const {
     using number = fixed_double;
     number x, y;
     if (!curve.undistorted((number(u) - number(cx)) / number(fx), (number(v) - number(cy)) / number(fy), most_q, most_r,
                            x, y))
-      return vec3(0.0f);
+      return {};
     number const q = square_root(x * x + y * y);
     meridian_direction<number> const d = curve.back(q);
     number const share = q > 0.0 ? d.sine / q : number(0.0);
-    return unit_in_world(rotation, share * x, share * y, d.cosine);
+    return {share * x, share * y, d.cosine, true};
   }
 
   /// Whether the image point has a ray.
@@ -138,9 +105,7 @@ struct radial_lens : camera_base {
   /// Size, focal lengths, principal point, pose or a parameter of the lens.
   camera_fault fault() const {
     if (camera_fault const size = size_fault(*this); size.what) return size;
-    if (!(fx > 0 && fy > 0 && is_finite(fx) && is_finite(fy)))
-      return {"the focal length is not a positive number", "correct fx and fy"};
-    if (!(is_finite(cx) && is_finite(cy))) return {"the principal point is not finite", "correct cx and cy"};
+    if (camera_fault const focal = focal_fault(fx, fy, cx, cy); focal.what) return focal;
     for (float const k : {lens.k1, lens.k2, lens.k3, lens.k4, lens.k5, lens.k6, lens.p1, lens.p2, lens.d1, lens.d2,
                           lens.d3, lens.s1, lens.s2, lens.s3, lens.s4})
       if (!is_finite(k))
@@ -189,7 +154,7 @@ struct radial_lens : camera_base {
   }
 
  private:
-  lens_bounds whole() const { return detail::tabulated(kind, lens, fx, fy, cx, cy, width, height); }
+  lens_bounds whole() const { return tabulated_bounds(kind, lens, fx, fy, cx, cy, width, height); }
 };
 
 static_assert(central_camera<radial_lens>);

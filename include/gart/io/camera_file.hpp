@@ -4,8 +4,9 @@
 /// the program renders it:
 ///   [{"name", "width", "height", "fx", "fy", "cx", "cy", "c2w": 4 rows of 4}, ...]
 /// in pixels, c2w camera to world in OpenCV axes; with "camera_model" by COLMAP's name, and the parameters of its lens,
-/// where it is no pinhole. Written whole or not at all, with every digit. Errors: io_error; unsupported for a lens with
-/// terms that no one model has.
+/// where it is no pinhole. With a rolling shutter "shutter_type" has the way it goes, as "ROLLING_TOP_TO_BOTTOM", c2w
+/// is the pose of the first line that is read and "c2w_end" that of the last. Written whole or not at all, with every
+/// digit. Errors: io_error; unsupported for a lens with terms that no one model has.
 
 #include <gart/scene/camera.hpp>
 
@@ -25,10 +26,14 @@ struct camera_fields {
 /// Of a camera.
 camera_fields fields_of(camera const& view);
 
+/// "GLOBAL", "ROLLING_TOP_TO_BOTTOM" and so on, as files have it.
+std::string shutter_type_of(camera const& view);
+
 /// The same place, way up and height through another camera, by COLMAP's name of its model and what parameters are to
 /// be other than none: "FISHEYE", "OPENCV_FISHEYE,k1=0.02,fx=90", "EQUIRECTANGULAR". Focal lengths follow from
 /// `angle`, the degrees across the image's shorter side, where none is given: by itself 180 for what can see that, else
-/// 60. The sphere is twice as wide as high. Errors: unsupported, invalid_argument for what is no such camera.
+/// 60. Parallel rays take `extent`, the world units across that side. The sphere is twice as wide as high. Errors:
+/// unsupported, invalid_argument for what is no such camera.
 camera seen_through(camera const& view, std::string const& model);
 
 /// Writes all of them, in order.

@@ -10,6 +10,9 @@
 /// positive, and its least value over a rectangle lies at a corner. What rounding can move it, at a corner or at a hit,
 /// is taken off N and added to |m_k . d| in a way that leaves the one linear and the other convex: the bound holds for
 /// every ray.
+///
+/// Where the rays' origins are o + s h, -1 <= s <= 1, the bound is (N - k sqrt(Q)) / Q, k = |M h|, with N of rays from
+/// o: sqrt(Q) is convex too, and the least value still lies at a corner.
 
 #include <gart/math/ray_gaussian.hpp>
 
@@ -39,10 +42,13 @@ class rectangle_depth {
     return cd < ab ? cd : ab;
   }
 
- private:
+ protected:
   static constexpr float rounding = 4e-6f;  // 64 of them
 
-  GART_HD GART_INLINE float at(float u, float v) const {
+  struct quotient {
+    float n, q;
+  };
+  GART_HD GART_INLINE quotient quotient_at(float u, float v) const {
     float n = -loss_, q = 0;
     GART_UNROLL
     for (int k = 0; k < 3; ++k) {
@@ -51,12 +57,54 @@ class rectangle_depth {
       float const widest = fabsf(d) + error_[k];
       q += widest * widest;
     }
-    return n / q * (1 - rounding);
+    return {n, q};
   }
 
   vec3 m_[3];
   float o_[3], error_[3];
   float loss_;
+
+ private:
+  GART_HD GART_INLINE float at(float u, float v) const {
+    quotient const r = quotient_at(u, v);
+    return r.n / r.q * (1 - rounding);
+  }
+};
+
+/// The bound of rays whose origins lie on a line.
+class moving_rectangle_depth : rectangle_depth {
+ public:
+  /// As rectangle_depth's, of rays from origin - half to origin + half, relative to the point that `g` is.
+  GART_HD moving_rectangle_depth(ray_gaussian g, mat3 const& plane, float reach, vec3 const& origin, vec3 const& half) {
+    float moved2 = 0, rows2 = 0;
+    for (int k = 0; k < 3; ++k) {
+      vec3 const m(g.m[k].x, g.m[k].y, g.m[k].z);
+      g.m[k].o += m.x * origin.x + m.y * origin.y + m.z * origin.z;
+      float const by = m.x * half.x + m.y * half.y + m.z * half.z;
+      moved2 += by * by, rows2 += m.x * m.x + m.y * m.y + m.z * m.z;
+    }
+    float const far =
+        fabsf(origin.x) + fabsf(origin.y) + fabsf(origin.z) + fabsf(half.x) + fabsf(half.y) + fabsf(half.z);
+    moved_ = sqrtf(moved2) * (1 + rounding) + rounding * far * sqrtf(rows2);
+    static_cast<rectangle_depth&>(*this) = rectangle_depth(g, plane, reach);
+  }
+
+  /// At most the factor of any hit through [u0, u1] x [v0, v1]; not positive, or NaN, where it says nothing.
+  GART_HD float operator()(float u0, float u1, float v0, float v1) const {
+    float least = at(u0, v0);
+    for (int corner = 1; corner < 4; ++corner) {
+      float const other = at(corner & 1 ? u1 : u0, corner & 2 ? v1 : v0);
+      least = other < least ? other : least;
+    }
+    return least;
+  }
+
+ private:
+  GART_HD float at(float u, float v) const {
+    quotient const r = quotient_at(u, v);
+    return (r.n - moved_ * sqrtf(r.q)) / r.q * (1 - rounding);
+  }
+  float moved_;
 };
 
 }  // namespace gart::inline GART_ISA

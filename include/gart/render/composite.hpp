@@ -45,12 +45,12 @@ struct composited_hits {
 };
 
 /// The pixel program of the forward pass (trace/ray_program.hpp): composites each ray's hits and writes `out`.
-template <int ShDegree, hit_record Record>
+template <int ShDegree, hit_record Record, rays_of_pixels Rays = pixel_rays>
 struct composite : ray_program_base {
-  static constexpr bool has_packets = true,  ///< it is walked in packets on a host
-      has_warps = true;                      ///< and in warps on a device
-  /// Rays from the camera's centre.
-  using ray_type = primary_ray;
+  static constexpr bool has_packets = Rays::central,  ///< it is walked in packets on a host
+      has_warps = Rays::central;                      ///< and in warps on a device
+  /// From the camera's centre, or from anywhere.
+  using ray_type = typename Rays::ray_type;
   /// A ray on its way.
   struct state : composited_hits<float> {
     pixel at;                  ///< whose ray it is
@@ -58,7 +58,7 @@ struct composite : ray_program_base {
     sh_basis<ShDegree> basis;  ///< of that direction
   };
 
-  pixel_rays rays;               ///< of the view
+  Rays rays;                     ///< of the view
   pixel_order order;             ///< of the view
   float const* sh = nullptr;     ///< coefficients, [N][K][3], K of ShDegree
   int active_degree = ShDegree;  ///< bands above it are not evaluated
@@ -79,7 +79,12 @@ struct composite : ray_program_base {
     return s;
   }
   /// Ray i, in the view's frame.
-  GART_HD primary_ray ray_of(index_t, state const& s) const { return {s.direction}; }
+  GART_HD ray_type ray_of(index_t, state const& s) const {
+    if constexpr (Rays::central)
+      return {s.direction};
+    else
+      return pixel_ray(rays, s.at);
+  }
   /// Composites a hit. False: the ray ends.
   GART_HD GART_INLINE bool on_hit(state& s, hit const& h) const {
     constexpr std::size_t stride = row_floats;

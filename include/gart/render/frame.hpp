@@ -78,11 +78,26 @@ class frame {
   /// The forward pass. `record` takes what a backward pass wants to find of each hit.
   template <hit_record Record = record_none>
   void render(image_targets const& targets, Record const& record = {}) {
-    if constexpr (camera_model<View>) static_assert(central_camera<View>, "images need a camera with one centre");
     require_prepared("render");
     pixel_order const order{view_->width, view_->height};
-    trace("forward", order.launch_size(),
-          composite<sh_degree, Record>{{}, rays(), order, scene_.sh, active_degree_, options_, targets, record});
+    with_rays([&]<class Rays>(Rays const& rays) {
+      trace("forward", order.launch_size(),
+            composite<sh_degree, Record, Rays>{{}, rays, order, scene_.sh, active_degree_, options_, targets, record});
+    });
+  }
+
+  /// Calls f with the rays of the view's pixels, of the type that they have (camera/pixel_rays.hpp).
+  template <class F>
+  void with_rays(F&& f) const {
+    require_prepared("with_rays");
+    if constexpr (central_camera<View>)
+      f(tracer_.rays());
+    else if constexpr (camera_model<View>)
+      f(tracer_.rays_with_origins());
+    else if (origin_rays const rays = tracer_.rays_with_origins(); rays.origins)
+      f(rays);
+    else
+      f(tracer_.rays());
   }
 
   /// Any other rays through the Gaussians; tracers by tiles take pixel programs alone.
@@ -101,7 +116,8 @@ class frame {
   render_options const& options() const { return require_prepared("options"), options_; }
   /// Bands above it are not evaluated.
   int active_degree() const { return require_prepared("active_degree"), active_degree_; }
-  pixel_rays rays() const { return require_prepared("rays"), tracer_.rays(); }  ///< of the view's pixels
+  /// Of the pixels of a view with one centre.
+  pixel_rays rays() const { return require_prepared("rays"), tracer_.rays(); }
   /// The Gaussians in the view's frame, [N]; empty before the first prepare.
   span<ray_gaussian const> gaussians() const { return gaussians_; }
   /// With its rays, lists or tree.

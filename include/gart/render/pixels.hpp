@@ -9,9 +9,12 @@
 namespace gart::inline GART_ISA {
 
 /// The ray of a pixel of the view that `rays` was made for, in its frame.
-GART_HD GART_INLINE primary_ray pixel_ray(pixel_rays const& rays, pixel p) { return rays.of(p.x, p.y); }
+template <rays_of_pixels Rays>
+GART_HD GART_INLINE typename Rays::ray_type pixel_ray(Rays const& rays, pixel p) {
+  return rays.of(p.x, p.y);
+}
 
-/// Host side, of any camera.
+/// Host side, of any camera with one centre.
 inline primary_ray pixel_ray(camera const& c, pixel p) {
   return {ray_direction(c, static_cast<float>(p.x) + 0.5f, static_cast<float>(p.y) + 0.5f)};
 }

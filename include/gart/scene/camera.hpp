@@ -24,7 +24,12 @@ enum class camera_kind {
   eucm,             ///< the enhanced unified model, by alpha and beta
   division,         ///< Fitzgibbon's, by k1
   equirectangular,  ///< the whole sphere, camera/equirectangular.hpp
+  orthographic,     ///< parallel rays, camera/orthographic.hpp; focal lengths are pixels a world unit
 };
+
+/// When the lines of an image are exposed: all at once, or one after another while the camera moves
+/// (camera/rolling_shutter.hpp).
+enum class shutter_kind { global, top_to_bottom, left_to_right, bottom_to_top, right_to_left };
 
 /// Coefficients of a lens; none is used where all are zero.
 struct distortion {
@@ -51,6 +56,10 @@ struct camera {
   mat3 rotation{1.0f};                   ///< camera to world; columns are the camera's axes in the world
   vec3d position{0.0};                   ///< the centre in the world, in double: everything else is relative to it
   camera_kind kind = camera_kind::perspective;  ///< its model
+  shutter_kind shutter = shutter_kind::global;  ///< where the pose is that of the middle of the read-out
+  /// What the camera moves by, in its own axes, while its shutter goes from one border of the image to the other.
+  vec3 travel{0.0f};
+  vec3 turn{0.0f};  ///< the same of its rotation: the axis times the angle, radians
 };
 
 /// A camera of a file.
@@ -69,7 +78,8 @@ struct camera_fault {
 
 namespace gart::inline GART_ISA {
 
-/// Across and down, in the middle of the image: the focal lengths, or what the sphere has in their place.
+/// Across and down, in the middle of the image: the focal lengths, or what the sphere has in their place. Of parallel
+/// rays pixels a world unit.
 inline vec2 pixels_per_radian(camera const& c) {
   if (c.kind != camera_kind::equirectangular) return {c.fx, c.fy};
   return {static_cast<float>(c.width) / 6.2831853f, static_cast<float>(c.height) / 3.1415927f};

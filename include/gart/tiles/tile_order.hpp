@@ -128,6 +128,97 @@ class any_depth_order : public detail::depth_bits {
   tile_plane const* planes_;
 };
 
+/// The same for rays that begin where a moving camera is: those of a tile on a part of its way.
+template <int Size>
+class moving_depth_order : public detail::depth_bits {
+ public:
+  /// As any_depth_order's; rays: of the view, whose origins within a tile lie between those of its corners.
+  moving_depth_order(float const* depths, ray_gaussian const* gaussians, tile_plane const* planes,
+                     origin_rays const& rays)
+      : depths_(depths), gaussians_(gaussians), planes_(planes), rays_(rays) {}
+
+  /// What it needs of a primitive.
+  struct primitive {
+    ray_gaussian gaussian;  ///< in the view's frame
+    float depth;            ///< anywhere
+  };
+  /// Of primitive i.
+  GART_HD primitive of(index_t i) const { return {gaussians_[i], depths_[i]}; }
+  /// Of a pair.
+  GART_HD u32 key(primitive const& p, pixel_box const& cell, u32 tile) const {
+    tile_plane const plane = planes_[tile];
+    if (!(plane.reach > 0)) return depth_key(p.depth, shift_);
+    constexpr float inset = tile_plane::inset;
+    float const x0 = static_cast<float>(cell.x0 % Size) + inset - plane.widen_x;
+    float const x1 = static_cast<float>((cell.x1 - 1) % Size + 1) - inset + plane.widen_x;
+    float const y0 = static_cast<float>(cell.y0 % Size) + inset - plane.widen_y;
+    float const y1 = static_cast<float>((cell.y1 - 1) % Size + 1) - inset + plane.widen_y;
+    vec3 const first = rays_.of(cell.x0, cell.y0).origin, last = rays_.of(cell.x1 - 1, cell.y1 - 1).origin;
+    moving_rectangle_depth const in(p.gaussian, mat3(plane.dx, plane.dy, plane.origin), plane.reach,
+                                    0.5f * (first + last), 0.5f * (last - first));
+    return key_of(in(x0, x1, y0, y1), p.depth);
+  }
+
+ private:
+  float const* depths_;
+  ray_gaussian const* gaussians_;
+  tile_plane const* planes_;
+  origin_rays rays_;
+};
+
+/// The same for parallel rays: where on a ray the response is largest is linear in the pixel, so least at a corner.
+class parallel_depth_order : public detail::depth_bits {
+ public:
+  /// As depth_order's.
+  parallel_depth_order(float const* depths, ray_gaussian const* gaussians, orthographic const& view)
+      : depths_(depths), gaussians_(gaussians), direction_(view.ray(0, 0).direction) {
+    corner_ = vec3d(0.0);
+    for (int k = 0; k < 3; ++k) {
+      across_[k] = double{view.rotation[0][k]} / view.fx, down_[k] = double{view.rotation[1][k]} / view.fy;
+      corner_[k] = -across_[k] * view.cx - down_[k] * view.cy;
+    }
+    auto const norm1 = [](vec3d const& a) { return std::fabs(a.x) + std::fabs(a.y) + std::fabs(a.z); };
+    far_ = norm1(corner_) + norm1(across_) * view.width + norm1(down_) * view.height;
+  }
+
+  /// What it needs of a primitive: t = base + u across + v down, off by `loss` and a part of itself.
+  struct primitive {
+    double base, across, down, loss, part;  ///< by pixels
+    float depth;                            ///< anywhere
+  };
+  /// Of primitive i.
+  GART_HD primitive of(index_t i) const {
+    constexpr double rounding = 4e-6;  // 64 of them
+    ray_gaussian const g = gaussians_[i];
+    primitive p{0, 0, 0, 0, 0, depths_[i]};
+    double dd = 0, width2 = 0;
+    for (int k = 0; k < 3; ++k) {
+      vec3d const m(g.m[k].x, g.m[k].y, g.m[k].z);
+      auto const along = [&](vec3d const& a) { return m.x * a.x + m.y * a.y + m.z * a.z; };
+      double const d = along(direction_), row = fabs(m.x) + fabs(m.y) + fabs(m.z), o = g.m[k].o;
+      p.base -= d * (o + along(corner_)), p.across -= d * along(across_), p.down -= d * along(down_);
+      p.loss += (fabs(o) + row * far_) * (fabs(d) + row), width2 += row * (2 * fabs(d) + rounding * row);
+      dd += d * d;
+    }
+    p.base /= dd, p.across /= dd, p.down /= dd;
+    p.loss *= rounding / dd, p.part = rounding * width2 / dd;
+    return p;
+  }
+  /// Of a pair.
+  GART_HD u32 key(primitive const& p, pixel_box const& cell, u32 /*tile*/) const {
+    constexpr double inset = tile_plane::inset;
+    double const x = (p.across < 0 ? cell.x1 - inset : cell.x0 + inset) * p.across;
+    double const y = (p.down < 0 ? cell.y1 - inset : cell.y0 + inset) * p.down;
+    return key_of(static_cast<float>(((p.base + x + y) * (1 - p.part) - p.loss) * (1 - 1e-6)), p.depth);
+  }
+
+ private:
+  float const* depths_;
+  ray_gaussian const* gaussians_;
+  vec3d direction_, corner_, across_, down_;
+  double far_;
+};
+
 /// The order that a camera's tile lists are sorted by.
 template <execution E, int Size>
 class depth_orders {
@@ -135,19 +226,28 @@ class depth_orders {
   /// No planes yet.
   explicit depth_orders(E& exec) : planes_(exec) {}
 
-  /// rays: of the model, where they have one centre. The order is valid until the next call.
   ///@{
-  /// The order of a view; rays: of the model, where they have one centre. It is valid until the next call.
-  depth_order of(E&, pinhole const& model, pixel_rays const&, float const* depths, ray_gaussian const* gaussians) {
+  /// The order of a view, whose rays are cast. It is valid until the next call.
+  depth_order of(E&, pinhole const& model, camera_rays<E> const&, float const* depths, ray_gaussian const* gaussians) {
     return {depths, gaussians, model};
   }
+  parallel_depth_order of(E&, orthographic const& model, camera_rays<E> const&, float const* depths,
+                          ray_gaussian const* gaussians) {
+    return {depths, gaussians, model};
+  }
+  template <class Lens>
+  moving_depth_order<Size> of(E& exec, rolling_shutter<Lens> const& model, camera_rays<E> const& rays,
+                              float const* depths, ray_gaussian const* gaussians) {
+    pixel_rays directions = rays.view();
+    directions.directions = rays.with_origins().directions;
+    find_planes(exec, model, directions);
+    return {depths, gaussians, planes_.data(), rays.with_origins()};
+  }
   template <camera_model M>
-  any_depth_order<Size> of(E& exec, M const& model, [[maybe_unused]] pixel_rays const& rays, float const* depths,
+  any_depth_order<Size> of(E& exec, M const& model, [[maybe_unused]] camera_rays<E> const& rays, float const* depths,
                            ray_gaussian const* gaussians) {
     if constexpr (central_camera<M>) {
-      tile_grid<Size> const grid{model.width, model.height};
-      planes_.resize(grid.count());
-      parallel_for(exec, "map/planes", grid.count(), tile_planes<Size>{rays, grid, planes_});
+      find_planes(exec, model, rays.view());
       return {depths, gaussians, planes_.data()};
     } else {
       return {depths, gaussians, nullptr};
@@ -156,6 +256,12 @@ class depth_orders {
   ///@}
 
  private:
+  void find_planes(E& exec, camera_base const& model, pixel_rays const& directions) {
+    tile_grid<Size> const grid{model.width, model.height};
+    planes_.resize(grid.count());
+    parallel_for(exec, "map/planes", grid.count(), tile_planes<Size>{directions, grid, planes_});
+  }
+
   buffer<tile_plane, E> planes_;
 };
 

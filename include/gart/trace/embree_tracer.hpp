@@ -97,6 +97,8 @@ class embree_tracer : public tracer_base {
 
   /// Of the view that it was prepared for.
   pixel_rays rays() const { return rays_.view(); }
+  /// The same, of a view without one centre.
+  origin_rays rays_with_origins() const { return rays_.with_origins(); }
 
   /// Feeds `program` the hits of rays 0 to `rays`; `label` names the launch in profiles.
   template <ray_program P>

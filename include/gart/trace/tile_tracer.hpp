@@ -158,8 +158,7 @@ class tile_tracer : public tracer_base {
       rays_.cast(exec, model);
       depth_ = model.depth();
       prints_.template measure<Response>(exec, scene, model, options.alpha_min, options.near);
-      map_.build(exec, grid_, prints_,
-                 orders_.of(exec, model, rays_.view(), prints_.depths().data(), gaussians.data()));
+      map_.build(exec, grid_, prints_, orders_.of(exec, model, rays_, prints_.depths().data(), gaussians.data()));
     });
     if constexpr (E::device) map_.rank_tiles(exec);
     scene_ = {gaussians.data(), scene.count, options.near};
@@ -167,6 +166,8 @@ class tile_tracer : public tracer_base {
 
   /// Of the view that it was prepared for.
   pixel_rays rays() const { return rays_.view(); }
+  /// The same, of a view without one centre.
+  origin_rays rays_with_origins() const { return rays_.with_origins(); }
 
   /// Feeds `program` the hits of its pixels' rays; `label` names the launch in profiles.
   template <pixel_program P>

@@ -65,8 +65,9 @@ concept tracer = execution<E> && std::constructible_from<T, E&> &&
   // `gaussians` are those of `scene` in the view's frame. Both are read until the next prepare. The view is a camera or
   // a camera model (camera/model.hpp).
   t.prepare(e, scene, gaussians, view, options);
-  { prepared.rays() } -> std::same_as<pixel_rays>;  // of the view's pixels
-  t.trace(e, "label", index_t{}, program);          // rays 0 to a number
+  { prepared.rays() } -> std::same_as<pixel_rays>;                // of the view's pixels
+  { prepared.rays_with_origins() } -> std::same_as<origin_rays>;  // where they have no one centre
+  t.trace(e, "label", index_t{}, program);                        // rays 0 to a number
   // From tracer_base:
   { T::tile_size } -> std::convertible_to<int>;
   { T::lends_footprints } -> std::convertible_to<bool>;

@@ -15,6 +15,7 @@ struct nothing {
   void prepare(gart::serial_exec&, gart::gaussians_view<float const>, gart::span<gart::ray_gaussian const>,
                gart::camera const&, gart::trace_options const&) {}
   gart::pixel_rays rays() const { return {}; }
+  gart::origin_rays rays_with_origins() const { return {}; }
   template <gart::ray_program P>
   void trace(gart::serial_exec&, char const*, gart::index_t, P const&) {}
 };

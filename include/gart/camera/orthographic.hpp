@@ -1,0 +1,125 @@
+#pragma once
+/// \file
+/// Parallel rays: a pixel's ray begins on the plane through `position` and goes along the camera's axis,
+///   u = fx x + cx,   v = fy y + cy,
+/// fx and fy in pixels a world unit (nerfstudio's ORTHOPHOTO). Hits lie in front of that plane.
+///
+/// The box of an ellipsoid m + A s is m_x +- |A_x|, exactly; where it crosses the plane at `near`, what lies in front
+/// of that: an extreme behind it gives way to that of the section, an ellipse.
+
+#include <gart/camera/model.hpp>
+
+namespace gart::inline GART_ISA {
+
+/// Boxes of ellipsoids.
+struct orthographic_bounds {
+  mat3d to_camera;        ///< world to camera
+  double fx, fy, cx, cy;  ///< pixels a world unit, principal point
+  int width, height;      ///< pixels
+  float near;             ///< of hits
+
+  /// The pixels that can hit it, and its near depth; empty where none can.
+  GART_HD footprint operator()(ellipsoid const& e) const {
+    vec3d const m = to_camera * e.center;
+    mat3d const a = to_camera * e.axes;
+    vec3d const ax(a[0][0], a[1][0], a[2][0]), ay(a[0][1], a[1][1], a[2][1]), az(a[0][2], a[1][2], a[2][2]);
+    double const depth = length(az), reach = fabs(e.center.x) + fabs(e.center.y) + fabs(e.center.z);
+    double const error = 2 * rounding_of_hits * (reach + length(ax) + length(ay) + depth);
+    footprint out;
+    if (!(m.z + depth + error > near)) return out;
+    double const nearest = m.z - depth - error;
+    out.depth = static_cast<float>((nearest > near ? nearest : near) * (1 - 1e-6));
+    detail::interval const x = extent(m.x, ax, m.z, az, near - error), y = extent(m.y, ay, m.z, az, near - error);
+    double const pad_x = fx * error + 0.01, pad_y = fy * error + 0.01;
+    out.box = {detail::first_pixel(fx * x.lo + cx - pad_x, width), detail::first_pixel(fy * y.lo + cy - pad_y, height),
+               detail::first_pixel(fx * x.hi + cx + pad_x, width), detail::first_pixel(fy * y.hi + cy + pad_y, height)};
+    if (out.box.empty()) return {};
+    return out;
+  }
+
+ private:
+  GART_HD static double dot(vec3d const& a, vec3d const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+  GART_HD static double length(vec3d const& a) { return sqrt(dot(a, a)); }
+
+  // Of x over what of the ellipsoid has z >= n; (mx, ax): centre and row of the axis, (mz, az): of depth.
+  GART_HD static detail::interval extent(double mx, vec3d const& ax, double mz, vec3d const& az, double n) {
+    double const half = length(ax), zz = dot(az, az), xz = dot(ax, az);
+    detail::interval out;
+    for (int side = -1; side <= 1; side += 2) {
+      double const z = half > 0 ? mz + side * xz / half : mz;
+      if (z >= n) out.add(mx + side * half);
+    }
+    if (mz - sqrt(zz) < n && zz > 0) {
+      double const e = n - mz, share = 1 - e * e / zz, across2 = half * half - xz * xz / zz;
+      double const reach = share > 0 && across2 > 0 ? sqrt(share * across2) : 0.0, middle = mx + xz * e / zz;
+      out.add(middle - reach), out.add(middle + reach);
+    }
+    return out;
+  }
+};
+
+/// The filter of its pixels: as wide everywhere.
+struct orthographic_filter {
+  vec3d position;  ///< of the camera
+  float sigma;     ///< world units
+
+  /// The mean relative to the camera.
+  GART_HD GART_INLINE vec3 from_camera(gaussian_parameters const& g) const { return relative_mean(g.mean, position); }
+  /// Anywhere.
+  GART_HD GART_INLINE float sigma_at(vec3 const&) const { return sigma; }
+  /// It does not change with the mean.
+  GART_HD GART_INLINE filter_at at(vec3 const&) const { return {sigma, vec3(0.0f)}; }
+};
+
+/// The model.
+struct orthographic : camera_base {
+  float fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels a world unit, principal point
+  mat3 rotation{1.0f};                   ///< camera to world; columns are the camera's axes
+  bool rolls = false;                    ///< a rolling shutter was asked for
+
+  ///@{
+  /// From the run-time camera.
+  orthographic() = default;
+  GART_HD explicit orthographic(camera const& c)
+      : camera_base(c),
+        fx(c.fx),
+        fy(c.fy),
+        cx(c.cx),
+        cy(c.cy),
+        rotation(c.rotation),
+        rolls(c.shutter != shutter_kind::global) {}
+  ///@}
+
+  /// Through the image point (u, v), in pixels.
+  GART_HD GART_INLINE gart::ray ray(float u, float v) const {
+    float const x = divide(add(u, -cx), fx), y = divide(add(v, -cy), fy);
+    gart::ray out;
+    for (int k = 0; k < 3; ++k) out.origin[k] = fma(rotation[0][k], x, mul(rotation[1][k], y));
+    out.direction = unit_ray<float>(rotation[2]).direction;
+    return out;
+  }
+
+  /// For hits at t > near.
+  orthographic_bounds bounds(float near) const {
+    require_near(near);
+    mat3d to_camera(1.0);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) to_camera[i][j] = rotation[j][i];
+    return {to_camera, fx, fy, cx, cy, width, height, near};
+  }
+
+  /// Of so many pixels.
+  orthographic_filter filter(float pixels) const { return {position, pixels / std::sqrt(fx * fy)}; }
+
+  /// Size, focal lengths, principal point, pose or shutter.
+  camera_fault fault() const {
+    if (camera_fault const size = size_fault(*this); size.what) return size;
+    if (camera_fault const focal = focal_fault(fx, fy, cx, cy); focal.what) return focal;
+    if (rolls) return {"an orthographic camera has no rolling shutter", "make its shutter GLOBAL"};
+    return pose_fault(position, rotation);
+  }
+};
+
+static_assert(camera_model<orthographic> && !central_camera<orthographic>);
+
+}  // namespace gart::inline GART_ISA

@@ -1,0 +1,84 @@
+#pragma once
+/// \file
+/// The motion of a camera while its shutter goes over the image (scene/camera.hpp): from the poses of the first and the
+/// last line that are read, as files have them, and back. A camera holds the pose of the middle of the read-out, and
+/// what it moves by, in its own axes, while the shutter goes from border to border,
+///   rotation(s) = R exp(s [turn]x),   position(s) = p + s R travel,   -1/2 <= s <= 1/2:
+/// linear in translation, slerp in rotation. So a camera that is moved as a whole takes its motion along, and an image
+/// of another size has the same.
+
+#include <gart/math/turn.hpp>
+#include <gart/scene/camera.hpp>
+
+namespace gart::inline GART_ISA {
+
+/// The camera's axes, orthonormal in double: floats are off by their roundings.
+inline mat3d axes_of(camera const& view) {
+  vec3d x(view.rotation[0]), y(view.rotation[1]);
+  x = glm::normalize(x);
+  y = glm::normalize(y - x * glm::dot(x, y));
+  mat3d out(1.0);
+  out[0] = x, out[1] = y, out[2] = glm::cross(x, y);
+  return out;
+}
+
+/// How many lines the shutter passes one after another: rows or columns.
+inline int shutter_lines(camera const& view) {
+  bool const columns = view.shutter == shutter_kind::left_to_right || view.shutter == shutter_kind::right_to_left;
+  return columns ? view.width : view.height;
+}
+
+/// The camera as it stands at a time of the read-out, -1/2 to 1/2, without a motion.
+inline camera at_time(camera view, double s) {
+  mat3d const axes = axes_of(view), turned = axes * turn_of(vec3d(view.turn) * s);
+  view.position += axes * vec3d(view.travel) * s;
+  if (view.turn != vec3(0.0f))
+    for (int k = 0; k < 3; ++k) view.rotation[k] = vec3(turned[k]);
+  view.shutter = shutter_kind::global, view.travel = view.turn = vec3(0.0f);
+  return view;
+}
+
+/// The camera while the first line that is read is exposed, and the last.
+struct line_poses {
+  camera first, last;  ///< without a motion
+};
+
+/// Of a camera.
+inline line_poses poses_of_lines(camera const& view) {
+  double const half = 0.5 - 0.5 / shutter_lines(view);
+  return {at_time(view, -half), at_time(view, half)};
+}
+
+/// A camera with a rolling shutter, from one with the pose of the first line that is read, and the pose of the last.
+/// The image must have a size, and two lines or more.
+inline camera rolling_between(camera first, camera const& last, shutter_kind shutter) {
+  first.shutter = shutter;
+  int const lines = shutter_lines(first);
+  double const share = lines / (lines - 1.0), middle = 0.5;
+  mat3d const from = axes_of(first);
+  vec3d const turn = angles_of(glm::transpose(from) * axes_of(last)), travel = last.position - first.position;
+  mat3d const axes = from * turn_of(turn * middle);
+  first.position += travel * middle;
+  for (int k = 0; k < 3; ++k) first.rotation[k] = vec3(axes[k]);
+  first.travel = vec3(glm::transpose(axes) * travel * share), first.turn = vec3(turn * share);
+  return first;
+}
+
+/// The camera with a part of its image, from its top left corner: its shutter goes over that alone.
+inline camera cropped(camera c, int width, int height) {
+  if (c.shutter != shutter_kind::global) {
+    int const before = shutter_lines(c);
+    camera out = c;
+    out.width = width, out.height = height;
+    double const share = static_cast<double>(shutter_lines(out)) / before;
+    bool const from_end = c.shutter == shutter_kind::bottom_to_top || c.shutter == shutter_kind::right_to_left;
+    double const middle = (from_end ? 0.5 : -0.5) * (1 - share);
+    camera const at = at_time(c, middle);
+    c.travel = vec3(turn_of(vec3d(c.turn) * -middle) * vec3d(c.travel) * share), c.turn *= static_cast<float>(share);
+    c.position = at.position, c.rotation = at.rotation;
+  }
+  c.width = width, c.height = height;
+  return c;
+}
+
+}  // namespace gart::inline GART_ISA
