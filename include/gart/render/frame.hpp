@@ -70,7 +70,7 @@ class frame {
         *exec_, "preprocess", scene.count,
         render_kernels::prepare_gaussians<response>{seen_, view.position, options.alpha_min, gaussians_.view()});
     tracer_.prepare(*exec_, seen_, gaussians(), view,
-                    trace_options{options.alpha_min, options.near, options.rebuild_every});
+                    trace_options{options.alpha_min, options.near, options.rebuild_every, options.rows});
     prepared_ = true;
     ++preparations_;
   }
@@ -80,7 +80,7 @@ class frame {
   void render(image_targets const& targets, Record const& record = {}) {
     if constexpr (camera_model<View>) static_assert(central_camera<View>, "images need a camera with one centre");
     require_prepared("render");
-    pixel_order const order{view_->width, view_->height};
+    pixel_order const order{view_->width, view_->height, options_.rows};
     trace("forward", order.launch_size(),
           composite<sh_degree, Record>{{}, rays(), order, scene_.sh, active_degree_, options_, targets, record});
   }
