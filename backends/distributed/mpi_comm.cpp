@@ -145,11 +145,4 @@ void mpi_comm::abort(int code) {
   std::_Exit(code);
 }
 
-int mpi_comm::launched() {
-  // OpenMPI's mpirun; MPICH's and Intel's; Slurm's srun --mpi.
-  for (char const* name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"})
-    if (char const* const value = std::getenv(name)) return std::atoi(value);
-  return std::getenv("PMIX_RANK") ? 1 : 0;
-}
-
 }  // namespace gart

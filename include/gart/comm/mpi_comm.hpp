@@ -56,8 +56,6 @@ class mpi_comm {
   /// Ends all ranks at once with that exit code: what a rank does that cannot go on. Says nothing itself.
   [[noreturn]] void abort(int code);
 
-  /// How many ranks the launcher says it started, without starting MPI; 0 where there is no launcher.
-  static int launched();
 
  private:
   struct state;
