@@ -34,7 +34,7 @@ std::unique_ptr<gart::mpi_comm>& started() {
 
 }  // namespace
 
-int ranks::launched() { return first_of({"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_NTASKS"}, 1); }
+int ranks::launched() { return first_of({"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"}, 1); }
 int ranks::launched_rank() {
   return launched() > 1 ? first_of({"OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID"}, 0) : 0;
 }

@@ -52,8 +52,9 @@ bool training_run::train(interrupt_guard const& interrupt) {
     bool const by_time = a_.time_budget > 0;
     if (by_time && passes(200)) course_.close_point();
     int const between = a_.steps_between_tests();
-    bool const due =
-        by_time && a_.eval_every < 0 ? passes(5) : between > 0 && report.step / between != (report.step - a_.batch) / between;
+    bool const due = by_time && a_.eval_every < 0
+                         ? passes(5)
+                         : between > 0 && report.step / between != (report.step - a_.batch) / between;
     if (!report.trial && due && report.step < a_.length(report.step, course_.seconds)) test(report.step);
     double const elapsed = a_.checkpoint_minutes > 0 ? ranks::agreed(since_start.seconds()) : 0;
     if (a_.checkpoint_minutes > 0 && elapsed - last_checkpoint > 60 * a_.checkpoint_minutes) {

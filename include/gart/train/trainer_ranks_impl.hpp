@@ -95,7 +95,8 @@ step_report trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(Loss&& los
   double sum = 0, square = 0;
   for (std::size_t v = 0; v < values.size(); v += 2) sum += double{values[v]}, square += double{values[v + 1]};
   report.loss = static_cast<float>(sum / batch);
-  report.psnr = square > 0 ? static_cast<float>(-10 * std::log10(square / batch)) : 99.0f;
+  float const mean_square = static_cast<float>(square / batch);
+  report.psnr = mean_square > 0 ? -10.0f * std::log10(mean_square) : 99.0f;
   return report;
 }
 
