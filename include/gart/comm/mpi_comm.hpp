@@ -56,7 +56,6 @@ class mpi_comm {
   /// Ends all ranks at once with that exit code: what a rank does that cannot go on. Says nothing itself.
   [[noreturn]] void abort(int code);
 
-
  private:
   struct state;
   std::shared_ptr<state> state_;
