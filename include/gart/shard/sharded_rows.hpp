@@ -90,7 +90,7 @@ class sharded_rows {
   /// An element of each row that is here becomes one of each Gaussian, by number.
   void gather(E& exec, buffer<u32, E>& words) {
     index_t const total = this->total(static_cast<index_t>(words.size()));
-    std::vector<u64> const counts = counts_of(total), sends(counts.size(), words.size());
+    std::vector<u64> const counts = counts_of(total);
     std::vector<u64> begin(counts.size());
     std::exclusive_scan(counts.begin(), counts.end(), begin.begin(), u64{0});
     gathered_.resize(total);
