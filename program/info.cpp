@@ -66,10 +66,10 @@ int run_info() {
                     to_string(r.arithmetic), to_string(r.lt_format), r.tile_size, r.window}]
         .insert(r.sh_degree);
   }
-  std::puts("\nbackend  tracer  backward         kernel  arithmetic  LT format  tile  window  SH degrees");
+  std::puts("\nbackend  tracer  backward            kernel  arithmetic  LT format  tile  window  SH degrees");
   for (auto const& [names, degrees] : configurations) {
     auto const& [backend, tracer, backward, kernel_degree, arithmetic, lt_format, tile_size, window] = names;
-    std::printf("%-8s %-7s %-16s %-7d %-11s %-10s %-5d %-7d", backend.c_str(), tracer.c_str(), backward.c_str(),
+    std::printf("%-8s %-7s %-19s %-7d %-11s %-10s %-5d %-7d", backend.c_str(), tracer.c_str(), backward.c_str(),
                 kernel_degree, arithmetic.c_str(), lt_format.c_str(), tile_size, window);
     for (int const degree : degrees) std::printf(" %d", degree);
     std::puts("");
