@@ -25,9 +25,10 @@ option(GART_BUILD_FUZZ "Build the fuzzers of the readers (Clang; tests/fuzz/READ
 
 set(GART_CUDA AUTO CACHE STRING "CUDA policy: ON, OFF, or AUTO (where nvcc is found)")
 set(GART_EMBREE AUTO CACHE STRING "Embree tracer: ON, OFF, or AUTO (where Embree is found)")
+set(GART_DISTRIBUTED AUTO CACHE STRING "Training on several ranks: ON, OFF, or AUTO (where MPI is found)")
 if(NOT GART_BUILD_BACKENDS)
   foreach(_option IN ITEMS GART_BUILD_PROGRAM GART_VARIANTS GART_BUILD_EXAMPLES GART_BUILD_TESTS GART_BUILD_BENCH
-                           GART_BUILD_FUZZ GART_CUDA GART_EMBREE)
+                           GART_BUILD_FUZZ GART_CUDA GART_EMBREE GART_DISTRIBUTED)
     if(${_option} AND NOT "${${_option}}" STREQUAL "AUTO")
       message(FATAL_ERROR "${_option} is ${${_option}} and needs the libraries, which GART_BUILD_BACKENDS=OFF leaves out: "
                           "configure with -D${_option}=OFF, or with -DGART_BUILD_BACKENDS=ON")
@@ -35,6 +36,7 @@ if(NOT GART_BUILD_BACKENDS)
   endforeach()
   set(GART_CUDA OFF)
   set(GART_EMBREE OFF)
+  set(GART_DISTRIBUTED OFF)
 endif()
 
 include(CheckLanguage)
@@ -96,4 +98,16 @@ if(GART_EMBREE STREQUAL "AUTO")
   set(GART_EMBREE ${embree_FOUND})
 elseif(GART_EMBREE)
   find_package(embree REQUIRED)
+endif()
+
+# MPI in C++ is called through its C interface: the C++ bindings of old versions are not looked for.
+set(MPI_CXX_SKIP_MPICXX ON)
+if(GART_DISTRIBUTED STREQUAL "AUTO")
+  find_package(MPI QUIET COMPONENTS CXX)
+  set(GART_DISTRIBUTED ${MPI_CXX_FOUND})
+  if(NOT GART_DISTRIBUTED)
+    message(STATUS "gart: no MPI found, building without training on several ranks")
+  endif()
+elseif(GART_DISTRIBUTED)
+  find_package(MPI REQUIRED COMPONENTS CXX)
 endif()

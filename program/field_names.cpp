@@ -25,6 +25,8 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(train_options, refine_poses), "--refine-poses"},
       {GART_CLI_FIELD(train_options, lt_budget), "--lt-budget"},
       {GART_CLI_FIELD(train_options, check_finite), "--check-finite"},
+      {GART_CLI_FIELD(train_options, batch), "--batch"},
+      {GART_CLI_FIELD(train_options, shard_block), "shard_block"},  // no option
       {GART_CLI_FIELD(train_options, seed), "--seed"},
       {GART_CLI_FIELD(render_options, alpha_min), "--alpha-min"},
       {GART_CLI_FIELD(render_options, transmittance_min), "--t-min"},

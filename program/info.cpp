@@ -1,5 +1,6 @@
 #include "commands.hpp"
 #include "progress.hpp"
+#include "ranks.hpp"
 
 #include <gart/core/version.hpp>
 #include <gart/io/splat_file.hpp>
@@ -43,6 +44,11 @@ void print_devices() {
 #else
   std::puts("embree     not in this build");
 #endif
+#if defined(GART_WITH_MPI)
+  std::printf("ranks      MPI: mpirun -n N gart train; launched as %d\n", ranks::launched());
+#else
+  std::puts("ranks      not in this build (MPI)");
+#endif
   std::string formats;
   for (auto const* format : gart::splat_formats()) formats += std::string(formats.empty() ? "" : ", ") + format->name;
   std::printf("models     %s\n", formats.c_str());
@@ -55,14 +61,15 @@ int run_info() {
   std::map<std::tuple<std::string, std::string, std::string, int, std::string, std::string, int, int>, std::set<int>>
       configurations;
   for (auto const& r : gart::compiled_configurations()) {
-    configurations[{to_string(r.backend), to_string(r.tracer), r.backward + (r.depth ? "+depth" : ""), r.kernel_degree,
+    configurations[{to_string(r.backend), to_string(r.tracer),
+                    r.backward + (r.depth ? "+depth" : "") + (r.ranks ? "+ranks" : ""), r.kernel_degree,
                     to_string(r.arithmetic), to_string(r.lt_format), r.tile_size, r.window}]
         .insert(r.sh_degree);
   }
-  std::puts("\nbackend  tracer  backward         kernel  arithmetic  LT format  tile  window  SH degrees");
+  std::puts("\nbackend  tracer  backward            kernel  arithmetic  LT format  tile  window  SH degrees");
   for (auto const& [names, degrees] : configurations) {
     auto const& [backend, tracer, backward, kernel_degree, arithmetic, lt_format, tile_size, window] = names;
-    std::printf("%-8s %-7s %-16s %-7d %-11s %-10s %-5d %-7d", backend.c_str(), tracer.c_str(), backward.c_str(),
+    std::printf("%-8s %-7s %-19s %-7d %-11s %-10s %-5d %-7d", backend.c_str(), tracer.c_str(), backward.c_str(),
                 kernel_degree, arithmetic.c_str(), lt_format.c_str(), tile_size, window);
     for (int const degree : degrees) std::printf(" %d", degree);
     std::puts("");

@@ -3,6 +3,7 @@
 #include "commands.hpp"
 #include "field_names.hpp"
 #include "help.hpp"
+#include "ranks.hpp"
 
 #include <gart/core/version.hpp>
 
@@ -31,8 +32,11 @@ int flushed(int code) {
   return code == 0 ? gart_cli::exit_failed : code;
 }
 
+// One rank's error is the end of all: the others would wait for it.
 int fail(std::string const& what, int code) {
-  std::fprintf(stderr, "gart: error: %s\n", what.c_str());
+  gart_cli::ranks::wait_to_speak();
+  std::fprintf(stderr, "gart: error: %s%s\n", gart_cli::ranks::name().c_str(), what.c_str());
+  if (gart_cli::ranks::size() > 1) std::fflush(stderr), gart_cli::ranks::end_all(code);
   return code;
 }
 
@@ -65,6 +69,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (CLI::ParseError const& e) {
+    if (ranks::launched_rank() > 0) return e.get_exit_code() == 0 ? 0 : exit_usage;  // rank 0 says it
     if (e.get_exit_code() == 0) return flushed(app.exit(e));
     std::string topic = "gart";
     for (CLI::App const* sub : app.get_subcommands()) topic += " " + sub->get_name();
@@ -75,6 +80,8 @@ int main(int argc, char** argv) {
     std::fputs(app.help().c_str(), stderr);
     return exit_usage;
   }
+  // Commands that have nothing to share out are rank 0's.
+  if (ranks::launched_rank() > 0 && !app.got_subcommand("train")) return 0;
   try {
     return flushed(selected());
   } catch (usage_error const& e) {

@@ -95,6 +95,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--set", a.set, "NAME=VALUE,...",
                  "Rules by name, for measuring them: error.fill=0.25,\nrates.opacity=0.05 and so on "
                  "(docs/training.md); a name that\nthere is not lists those there are"));
+  in_group(r.add(train, "--batch", a.batch, "N",
+                 "Views a step: the mean of their gradients, at rates times\nsqrt(N). What is counted in steps then "
+                 "counts images"))
+      ->check(between(1, 4096));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
   in_group(r.add(train, "--seed", a.seed, "N",
                  "Seed of everything random; on the serial backend the same\nseed gives the same bits"))
@@ -165,6 +169,12 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "Steps between builds of the bvh tracer's tree, which is\nrefitted in between; the images are the "
                  "same"))
       ->check(between(1, 1e6));
+  in_group(train.add_option("--parallel", a.parallel,
+                            "How ranks share a step (mpirun -n 4 gart train ...,\ndocs/scale.md): strips of one view, "
+                            "the training of one\nrank itself, or views, a --batch of one for each"))
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(one_of({"strips", "views"}));
   add_threads(train, a.threads);
   in_group(train.get_option("--threads"));
 
@@ -271,6 +281,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   // Until it is settled it decides nothing.
   o.background = gart::from_string(a.background, gart::background_kind::black);
   o.check_finite = a.check_finite;
+  o.batch = a.batch;
   o.seed = a.seed;
   o.render.alpha_min = a.alpha_min;
   o.render.transmittance_min = a.t_min;

@@ -19,6 +19,7 @@ struct train_arguments {
   std::filesystem::path dataset, out;
   bool resume = false, quiet = false, check_finite = false;
   int threads = 0, stop_at = 0;
+  std::string parallel = "strips";
   nlohmann::json raised = nlohmann::json::object();  // options raised by a resuming command line: what they were
   float checkpoint_minutes = 10;
 
@@ -27,7 +28,7 @@ struct train_arguments {
   std::string arithmetic = "exact", lt_format = "auto";
   std::string preset = "exact";
   gart::train_options defaults;
-  int iterations = defaults.iterations;
+  int iterations = defaults.iterations, batch = defaults.batch;
   double time_budget = 0;  // seconds of training; 0: none
   gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
   int kernel_degree = 2, tile_size = 0, window = 0;

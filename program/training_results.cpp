@@ -72,7 +72,7 @@ gart::scores training_run::test(int step, gart::keep_view const& keep, gart::pla
 void training_run::save_checkpoint() {
   course_.close_point();
   session_->save(a_.checkpoint_file());
-  write_json(a_.history_file(), course_.to_json());
+  if (writes_) write_json(a_.history_file(), course_.to_json());
 }
 
 // The model first: where the disk is full, the smaller and more precious one is there.
@@ -80,10 +80,11 @@ void training_run::save() {
   gart::model_file const file{session_->model(), gart::render_options_of(train_options_of(a_), data_.extent),
                               configuration_.kernel_degree};
   gaussians_ = file.model.size();
-  gart::save_model(a_.model_file(), file);
-  if (auto const exposures = session_->exposures(); !exposures.empty())
+  if (writes_) gart::save_model(a_.model_file(), file);
+  if (auto const exposures = session_->exposures(); writes_ && !exposures.empty())
     gart::write_exposures(a_.out / "exposures.json", exposures);
-  if (auto const poses = session_->poses(); !poses.empty()) gart::write_cameras(a_.out / "poses.json", poses);
+  if (auto const poses = session_->poses(); writes_ && !poses.empty())
+    gart::write_cameras(a_.out / "poses.json", poses);
   try {
     save_checkpoint();
   } catch (gart::io_error const& e) {
@@ -92,7 +93,7 @@ void training_run::save() {
 }
 
 void training_run::conclude() {
-  remove_results(a_.out);
+  if (writes_) remove_results(a_.out);
   std::vector<report_view> shown;
   stopwatch const writing;
   double const tests_before = test_seconds_;
@@ -100,6 +101,7 @@ void training_run::conclude() {
   gart::scores const result = test(
       session_->steps_done(),
       [&](std::size_t i, gart::view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
+        if (!writes_) return;
         gart::write_png(a_.out / "renders" / (s.name + ".png"), gart::to_8bit(render));
         gart::write_png(a_.out / "renders" / (s.name + "_truth.png"), gart::to_8bit(truth));
         if (in_report(i, data_.test.size())) shown.push_back(make_report_view(s.name, s.psnr, s.ssim, render, truth));
@@ -107,15 +109,20 @@ void training_run::conclude() {
                    static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
       },
       a_.refine_poses ? aligned_to_photographs(aligned) : gart::place_view());
-  if (!aligned.empty()) gart::write_cameras(a_.out / "poses_test.json", aligned);
+  if (writes_ && !aligned.empty()) gart::write_cameras(a_.out / "poses_test.json", aligned);
   say_.state("testing on training views", 1);
   stopwatch const training_views;
   gart::scores const training = score(gart::evenly_spread(data_.train, data_.test.size()), {},
                                       a_.refine_poses ? as_learned() : gart::place_view());
   test_seconds_ += training_views.seconds();
+  gart::u64 const most_bytes = ranks::largest(session_->peak_bytes()),
+                  most_sent = ranks::largest(session_->sent_bytes());
+  if (!writes_) return;
   write_json(a_.history_file(), course_.to_json());
   save_seconds_ += writing.seconds() - (test_seconds_ - tests_before);
-  nlohmann::json const metrics = metrics_of(result, training);
+  nlohmann::json metrics = metrics_of(result, training);
+  metrics["ranks"] = ranks::size(), metrics["batch"] = a_.batch;
+  metrics["peak_bytes"] = most_bytes, metrics["sent_bytes"] = most_sent;
   write_json(a_.out / "metrics.json", metrics);
   gart::write_file(a_.out / "report.html", report_page(metrics, read_json(a_.config_file()), course_, shown));
   if (a_.quiet) return;

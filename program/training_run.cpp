@@ -3,6 +3,7 @@
 #include "choices.hpp"
 #include "commands.hpp"
 #include "output.hpp"
+#include "ranks.hpp"
 
 #include <gart/runtime/model_file.hpp>
 
@@ -32,14 +33,15 @@ int training_run::run() {
 
 void training_run::prepare() {
   stopwatch const loading;
-  if (fs::is_directory(a_.out)) enter();
+  if (writes_ && fs::is_directory(a_.out)) enter();
   if (a_.resume) continue_run(a_);
+  share_out();
   if (a_.dataset.empty()) throw usage_error("DATASET is missing (see gart train --help)");
-  configuration_ = gart::resolve(configuration_request_of(a_));  // what is not there is known before images are read
+  configuration_ = gart::resolve(request());  // what is not there is known before images are read
   course_ = course_of(a_);
   load();
   chosen_ = choose(a_, data_);
-  configuration_ = gart::resolve(configuration_request_of(a_));
+  configuration_ = gart::resolve(request());
   a_.backend = to_string(configuration_.backend), a_.tracer = to_string(configuration_.tracer),
   a_.backward = configuration_.backward;
   a_.lt_format = to_string(configuration_.lt_format), a_.tile_size = configuration_.tile_size,
@@ -67,16 +69,32 @@ void training_run::prepare() {
                         " Gaussians, more than --max-gaussians " + std::to_string(a_.max_gaussians));
     }
   }
-  prepare_folder(a_.out);
-  enter();
-  prepare_folder(a_.out / "renders");
-  session_ = gart::make_session(configuration_request_of(a_), train_options_of(a_), data_,
-                                a_.start.empty() ? nullptr : &start_);
+  if (writes_) {
+    prepare_folder(a_.out);
+    enter();
+    prepare_folder(a_.out / "renders");
+  }
+  session_ = gart::make_session(request(), train_options_of(a_), data_, a_.start.empty() ? nullptr : &start_);
   a_.resume ? go_on() : begin_anew();
   trials_ = session_->trials().size();
   say_choices();
   say_.note(a_.backend + " backend, " + a_.tracer + " tracer, " + configuration_.backward + " backward pass");
   load_seconds_ = loading.seconds();
+}
+
+// A step among the ranks there are.
+void training_run::share_out() {
+  if (a_.parallel == "views" && a_.batch == 1 && !a_.resume) a_.batch = ranks::size();
+  ranks::start(a_.batch > 1);
+  if (ranks::size() == 1) return;
+  say_.note(std::to_string(ranks::size()) + " ranks, each a part of the Gaussians and of every step: " +
+            (a_.batch == 1 ? "strips of a view" : "a batch of " + std::to_string(a_.batch) + " views"));
+}
+
+gart::configuration_request training_run::request() const {
+  auto wanted = configuration_request_of(a_);
+  wanted.ranks = ranks::comm();
+  return wanted;
 }
 
 void training_run::say_choices() {
@@ -119,10 +137,12 @@ void training_run::load() {
 // The first checkpoint is written before the first step: what cannot be saved is then known before it costs anything.
 // An earlier run's results go, lest they be taken for this one's.
 void training_run::begin_anew() {
-  remove_run(a_.out);
-  nlohmann::json config = config_of(a_, data_);
-  config["chosen"] = chosen_;
-  write_json(a_.config_file(), config);
+  if (writes_) {
+    remove_run(a_.out);
+    nlohmann::json config = config_of(a_, data_);
+    config["chosen"] = chosen_;
+    write_json(a_.config_file(), config);
+  }
   session_->save(a_.checkpoint_file());
 }
 
@@ -146,7 +166,8 @@ void training_run::go_on() {
     config["options"][name] = now[name];
     config["raised"].push_back({{"option", name}, {"step", step}, {"from", before}, {"to", now[name]}});
   }
-  if (!a_.raised.empty()) {
+  ranks::barrier();  // all have read it
+  if (!a_.raised.empty() && writes_) {
     remove_results(a_.out);
     write_json(a_.config_file(), config);
   }

@@ -4,6 +4,7 @@
 #include "history.hpp"
 #include "interrupt.hpp"
 #include "progress.hpp"
+#include "ranks.hpp"
 #include "run_folder.hpp"
 #include "scores.hpp"
 #include "train_arguments.hpp"
@@ -42,12 +43,17 @@ struct recent_steps {
 
 class training_run {
  public:
-  explicit training_run(train_arguments& a) : a_(a), say_(a.quiet), course_(course_of(a)) {}
+  explicit training_run(train_arguments& a)
+      : a_(a), writes_(ranks::launched_rank() == 0), say_(a.quiet || !writes_), course_(course_of(a)) {
+    ranks::start(false);
+  }
   int run();  // the exit code
 
  private:
   // Before the first step (training_run.cpp).
   void prepare();
+  void share_out();
+  gart::configuration_request request() const;
   void say_choices();
   void enter();
   void load();
@@ -75,6 +81,7 @@ class training_run {
   nlohmann::json metrics_of(gart::scores const& result, gart::scores const& training);
 
   train_arguments& a_;
+  bool writes_;  // this rank does
   std::optional<run_lock> lock_;
   progress say_;
   history course_;

@@ -23,11 +23,11 @@ bool training_run::train(interrupt_guard const& interrupt) {
     // The first steps load images and are no measure of the others.
     session_->set_iterations(before < 100 ? a_.iterations : length);
     double const done_before = progress_at(before);
-    if (interrupt.wanted() || (a_.stop_at > 0 && before >= a_.stop_at)) return false;
+    if (ranks::agreed(interrupt.wanted()) || (a_.stop_at > 0 && before >= a_.stop_at)) return false;
     session_->profile().enable(before % profile_every == profile_every - 1);
     stopwatch const step;
     gart::step_report const report = checked_step();
-    double const seconds = step.seconds();
+    double const seconds = ranks::agreed(step.seconds());
     if (session_->profile().enabled()) ++profiled_steps_, profiled_seconds_ += seconds;
     session_->profile().enable(false);
     if (report.backward != configuration_.backward && !fell_back_) {
@@ -52,13 +52,16 @@ bool training_run::train(interrupt_guard const& interrupt) {
     bool const by_time = a_.time_budget > 0;
     if (by_time && passes(200)) course_.close_point();
     int const between = a_.steps_between_tests();
-    bool const due = by_time && a_.eval_every < 0 ? passes(5) : between > 0 && report.step % between == 0;
+    bool const due = by_time && a_.eval_every < 0
+                         ? passes(5)
+                         : between > 0 && report.step / between != (report.step - a_.batch) / between;
     if (!report.trial && due && report.step < a_.length(report.step, course_.seconds)) test(report.step);
-    if (a_.checkpoint_minutes > 0 && since_start.seconds() - last_checkpoint > 60 * a_.checkpoint_minutes) {
+    double const elapsed = a_.checkpoint_minutes > 0 ? ranks::agreed(since_start.seconds()) : 0;
+    if (a_.checkpoint_minutes > 0 && elapsed - last_checkpoint > 60 * a_.checkpoint_minutes) {
       stopwatch const saving;
       save_checkpoint();
       save_seconds_ += saving.seconds();
-      last_checkpoint = since_start.seconds();
+      last_checkpoint = elapsed;
     }
   }
 }

@@ -38,6 +38,7 @@ std::string peculiarities(configuration_info const& r) {
   if (r.lt_format != none && r.lt_format != weight && r.lt_format != float4)
     add(std::string("LT format ") + to_string(r.lt_format));
   if (r.depth) add("with depth");
+  if (r.ranks) add("on several ranks");
   if (r.tile_size != 8) add("tiles of " + std::to_string(r.tile_size));
   if (r.window != usual_window(r)) add("window " + std::to_string(r.window));
   return out;
@@ -65,8 +66,8 @@ bool matches(configuration_request const& wanted, configuration_info const& ther
   return matches(wanted.backend, there.backend) && matches(wanted.tracer, there.tracer) &&
          (wanted.backward == "auto" || wanted.backward == there.backward) && wanted.sh_degree == there.sh_degree &&
          wanted.depth == there.depth && wanted.kernel_degree == there.kernel_degree &&
-         wanted.arithmetic == there.arithmetic && matches(wanted.lt_format, there.lt_format) &&
-         (wanted.tile_size == 0 || wanted.tile_size == there.tile_size) &&
+         wanted.arithmetic == there.arithmetic && (wanted.ranks != nullptr) == there.ranks &&
+         matches(wanted.lt_format, there.lt_format) && (wanted.tile_size == 0 || wanted.tile_size == there.tile_size) &&
          (wanted.window == 0 || wanted.window == there.window) &&
          ((wanted.device == 0 && !wanted.stream) || there.backend == backend_kind::cuda);
 }
@@ -78,6 +79,7 @@ std::string as_text(configuration_request const& r) {
   if (r.arithmetic != arithmetic_kind::exact) out += std::string(", ") + to_string(r.arithmetic) + " arithmetic";
   if (r.lt_format != lt_format_kind::automatic) out += std::string(", LT format ") + to_string(r.lt_format);
   if (r.depth) out += ", with depth";
+  if (r.ranks) out += ", on several ranks";
   if (r.tile_size != 0) out += ", tiles of " + std::to_string(r.tile_size);
   if (r.window != 0) out += ", window " + std::to_string(r.window);
   if (r.device != 0) out += ", device " + std::to_string(r.device);

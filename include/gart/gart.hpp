@@ -7,6 +7,8 @@
 #include <gart/backward/backward.hpp>
 #include <gart/bvh/walk.hpp>
 #include <gart/camera/models.hpp>
+#include <gart/comm/mpi_comm.hpp>
+#include <gart/comm/self_comm.hpp>
 #include <gart/core/version.hpp>
 #include <gart/exec/cuda.hpp>
 #include <gart/exec/parallel.hpp>

@@ -85,7 +85,7 @@ with tempfile.TemporaryDirectory() as temporary:
 
     # Neither what only gart's own sources include, nor what components that were not asked for link.
     never = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in
-             ("nlohmann_json", "Eigen3", "doctest", "CLI11", "embree", "CUDAToolkit")]
+             ("nlohmann_json", "Eigen3", "doctest", "CLI11", "embree", "MPI", "CUDAToolkit")]
     host = build(here / "downstream", f"-DVERSION={a.version}", *never)
     capture, model = folder / "capture", folder / "model.ply"
     expect(run(host / "use_headers"), f"version {a.version}")

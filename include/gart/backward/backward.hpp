@@ -72,7 +72,7 @@ class backward_pass {
         prints_ = &frame.tracer().prints();
       } else {
         own_prints_.template measure<typename Frame::response>(exec, frame.seen(), view, frame.options().alpha_min,
-                                                               frame.options().near);
+                                                               frame.options().near, frame.options().rows);
         prints_ = &own_prints_;
       }
       if (byte_budget && prints_->slots() * slot_bytes > byte_budget) return false;
@@ -114,6 +114,13 @@ class backward_pass {
   /// Of the last differentiate(), [N][moment_stride]: at error_place the error that is seen through each Gaussian,
   /// where the pixels' errors were given.
   span<float const> moments() const { return moments_; }
+  /// Of a strategy with sums in a fixed order, after differentiate(): what was summed, a row of
+  /// pair_gradient<sh_degree>::quads for each (primitive, tile) pair, those of primitive i from pair_offsets()[i] on.
+  span<quad const> pair_rows() const requires ordered { return rows_; }
+  /// The boxes, cut to what was traced.
+  span<footprint_slots const> ranges() const requires ordered { return prints_->ranges(); }
+  /// Where the rows of each primitive begin.
+  span<u64 const> pair_offsets() const requires ordered { return prints_->pair_offsets(); }
 
   /// Bytes of the LT buffer for the view last prepared; 0 where the strategy records nothing.
   std::size_t lt_bytes() const { return records ? slots_.size() * slot_bytes : 0; }
@@ -130,6 +137,8 @@ class backward_pass {
  private:
   template <class F, strategy S>
   friend void differentiate(F&, backward_pass<F, S>&, image_gradients const&, gaussians_view<float>, span<float const>);
+  template <class F, strategy S>
+  friend void sum_gradients(F&, backward_pass<F, S>&, image_gradients const&, gaussians_view<float>, span<float const>);
   using entry = typename record_type::entry;
   static constexpr std::size_t slot_bytes = sizeof(entry) + (records_depths ? sizeof(float) : 0);
   enum standing { nothing, prepared, rendered };
@@ -138,7 +147,8 @@ class backward_pass {
     if (stands_at_ < least || frame_ != &frame || preparation_ != frame.preparation()) throw invalid_argument(what);
   }
 
-  void run(Frame& frame, image_gradients const& image, gaussians_view<float> gradients, span<float const> error) {
+  // All but what finish_gradients does.
+  void sum(Frame& frame, image_gradients const& image, gaussians_view<float> gradients, span<float const> error) {
     using response = typename Frame::response;
     require(frame, rendered, "differentiate: call backward_pass.render first, after frame.prepare");
     execution_type& exec = frame.exec();
@@ -153,7 +163,6 @@ class backward_pass {
       throw invalid_argument("differentiate: the error must have a value for each pixel of the view");
     if (gradients.count != scene.count || gradients.sh_degree != sh_degree)
       throw invalid_argument("differentiate: the gradients must have the number and the SH degree of the Gaussians");
-    stage_scope stage(exec, "backward");
     moments_.resize(std::size_t{moment_stride} * scene.count);
     // The ordered sums write every Gaussian themselves.
     if constexpr (!(ordered && Strategy::gather::geometry)) moments_.zero();
@@ -168,7 +177,7 @@ class backward_pass {
                                                                      rows_.data(), gradients.sh, moments_.data()});
     }
     if constexpr (Strategy::scatter::any) {
-      pixel_order const order{view.width, view.height};
+      pixel_order const order{view.width, view.height, frame.options().rows};
       frame.with_rays([&]<class Rays>(Rays const& rays) {
         frame.trace("backward/scatter", order.launch_size(),
                     scatter_program<sh_degree, response, typename Strategy::scatter, execution_type, Rays>{
@@ -188,14 +197,6 @@ class backward_pass {
                         depth_});
       });
     }
-    auto const finish = [&]<class Filter>(Filter const& filter) {
-      parallel_for(exec, "backward/finish", scene.count,
-                   backward_kernels::finish<Filter>{scene, frame.gaussians(), moments_, gradients, filter});
-    };
-    if (frame.options().antialias > 0)
-      visit_camera(view, [&](auto const& model) { finish(model.filter(frame.options().antialias)); });
-    else
-      finish(backward_kernels::no_filter{});
   }
 
   // The gradients by depth and transmittance, where there are any.
@@ -257,7 +258,19 @@ class backward_pass {
 template <class Frame, strategy Strategy>
 void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, image_gradients const& image,
                    gaussians_view<float> gradients, span<float const> error = {}) {
-  pass.run(frame, image, gradients, error);
+  stage_scope stage(frame.exec(), "backward");
+  pass.sum(frame, image, gradients, error);
+  finish_gradients(frame.exec(), frame.scene(), frame.gaussians(), frame.view(), frame.options().antialias,
+                   pass.moments(), gradients);
+}
+
+/// The first part of it: gradients.sh, and pass.moments(), from which finish_gradients (backward/finish.hpp) makes the
+/// other gradients. Both are sums over pixels, which ranks that trace parts of an image add up in between.
+template <class Frame, strategy Strategy>
+void sum_gradients(Frame& frame, backward_pass<Frame, Strategy>& pass, image_gradients const& image,
+                   gaussians_view<float> gradients, span<float const> error = {}) {
+  stage_scope stage(frame.exec(), "backward");
+  pass.sum(frame, image, gradients, error);
 }
 
 /// The same by colour alone, [H][W][3].

@@ -3,7 +3,9 @@
 /// The last step of the backward pass: from the moments of each Gaussian to the gradients of its mean, log-scale,
 /// quaternion and opacity (math/hit_gradient.hpp), back through the filter of the pixels where there is one.
 
+#include <gart/camera/models.hpp>
 #include <gart/core/span.hpp>
+#include <gart/exec/parallel.hpp>
 #include <gart/math/hit_gradient.hpp>
 #include <gart/math/widened.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -50,5 +52,20 @@ struct finish {
 };
 
 }  // namespace backward_kernels
+
+/// `gaussians`: those of `scene` in the view's frame; `moments`: [N][moment_stride], the sums over the view's pixels.
+/// antialias: the filter of the pixels that the scene was seen through; 0: none. Overwrites all but gradients.sh.
+template <execution E, class View>
+void finish_gradients(E& exec, gaussians_view<float const> scene, span<ray_gaussian const> gaussians, View const& view,
+                      float antialias, span<float const> moments, gaussians_view<float> gradients) {
+  auto const finish = [&]<class Filter>(Filter const& filter) {
+    parallel_for(exec, "backward/finish", scene.count,
+                 backward_kernels::finish<Filter>{scene, gaussians, moments, gradients, filter});
+  };
+  if (antialias > 0)
+    visit_camera(view, [&](auto const& model) { finish(model.filter(antialias)); });
+  else
+    finish(backward_kernels::no_filter{});
+}
 
 }  // namespace gart::inline GART_ISA

@@ -47,12 +47,14 @@ struct adam_rule {
   float beta1 = 0, beta2 = 0, epsilon = 0, second_correction = 1;  ///< 1 / sqrt(1 - b2^t)
 
   ///@{
-  /// Of a step, counted from 1.
+  /// Of a step, counted from 1; of steps of a batch of images `step` counts images. A batch is as many steps of one
+  /// image at once, where these are small: betas^batch, epsilon / sqrt(batch), and rates times sqrt(batch), which are
+  /// the caller's (Malladi et al., On the SDEs and Scaling Rules for Adaptive Gradient Algorithms, 2022).
   adam_rule() = default;
-  adam_rule(adam_options const& o, int step)
-      : beta1(o.beta1),
-        beta2(o.beta2),
-        epsilon(o.epsilon),
+  adam_rule(adam_options const& o, int step, int batch = 1)
+      : beta1(batch == 1 ? o.beta1 : std::pow(o.beta1, static_cast<float>(batch))),
+        beta2(batch == 1 ? o.beta2 : std::pow(o.beta2, static_cast<float>(batch))),
+        epsilon(batch == 1 ? o.epsilon : o.epsilon / std::sqrt(static_cast<float>(batch))),
         second_correction(static_cast<float>(1.0 / std::sqrt(1.0 - std::pow(static_cast<double>(o.beta2), step)))) {}
   ///@}
   /// 1 / (1 - b1^t), which the rates carry.
@@ -188,12 +190,12 @@ struct adam_kernel {
 
 }  // namespace detail
 
-/// Step `step` (from 1). Coefficients above `active_sh_degree` are left alone. `skipped`, one element or empty, counts
-/// up by the elements that were not finite.
+/// Step `step` (from 1), or with a batch the step after which there have been `step` images. Coefficients above
+/// `active_sh_degree` are left alone. `skipped`, one element or empty, counts up by the elements that were not finite.
 template <execution E>
 void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optimizer_state<E>& state,
                learning_rates const& rates, int step, int active_sh_degree, span<u64> skipped = {},
-               adam_options const& options = {}) {
+               adam_options const& options = {}, int batch = 1) {
   if (model.size() == 0) return;
   double const correction = adam_rule::first_correction(options, step);
   auto const rate = [&](float r) { return static_cast<float>(r * correction); };
@@ -217,7 +219,7 @@ void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optim
         p, gradient.view(), state.first.view(), state.second.view());
     k.rows = p.count;
     k.group_tiles = p.count / k.rows_per_tile + (p.count % k.rows_per_tile != 0);
-    k.rule = adam_rule(options, step);
+    k.rule = adam_rule(options, step, batch);
     k.skipped = skipped.data();
     parallel_for(exec, "adam", tile_range{parameter_arrays * k.group_tiles, 256}, k);
   };

@@ -32,6 +32,7 @@
 #include <gart/optim/options.hpp>
 #include <gart/optim/random.hpp>
 #include <gart/optim/rows.hpp>
+#include <gart/optim/schedule.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -59,6 +60,7 @@ struct error_penalty_kernel {
 // Keys whose order is that of the draws; what cannot be drawn comes last.
 struct error_key_kernel {
   gaussians_view<float const> model;
+  row_owners owners;
   float const* sum;
   float dead_opacity;
   random_source random;
@@ -70,10 +72,10 @@ struct error_key_kernel {
     bool const lives = is_alive(model, i, dead_opacity);
     float const weight = sum[i] * sigmoid(model.opacity[i]);
     bool const fits = lives && weight > 0 && is_finite(weight);
-    float const u = (static_cast<float>(random.words(i).v[0] >> 8) + 0.5f) * 0x1p-24f;
+    float const u = (static_cast<float>(random.words(owners.global(i)).v[0] >> 8) + 0.5f) * 0x1p-24f;
     dead[i] = !lives, drawable[i] = fits;
     key[i] = fits ? float_to_bits(-logf(u) / weight) : 0xffffffffu;
-    id[i] = i;
+    id[i] = static_cast<u32>(owners.global(i));
   }
 };
 
@@ -86,46 +88,26 @@ struct error_target_kernel {
   }
 };
 
-// Draw j takes the j-th dead row, and past those the rows that are new.
-struct error_rows {
-  u32 const* source;
-  u32 const* dead;
-  index_t dead_count, first_new;
-  GART_HD index_t from(index_t draw) const { return source[draw]; }
-  GART_HD index_t to(index_t draw) const { return draw < dead_count ? dead[draw] : first_new + (draw - dead_count); }
-};
-
-struct error_copy_body {
-  gaussians_view<float> model, first, second;
-  error_rows rows;
-  GART_KERNEL void operator()(index_t draw, index_t column) const {
-    index_t const from = rows.from(draw), to = rows.to(draw);
-    row_element(model, to, column) = row_element(model, from, column);
-    row_element(first, to, column) = row_element(second, to, column) = 0;
-  }
-};
-
+// Row k becomes a half of what it is.
 struct error_split_kernel {
   gaussians_view<float> model;
-  error_rows rows;
+  u32 const* rows;
+  row_owners owners;
+  bool second;  // of the halves
   float least_opacity;
-  GART_KERNEL void operator()(index_t draw) const {
-    std::size_t const pair[2] = {rows.from(draw), rows.to(draw)};
-    float const* const q = model.quaternion + 4 * pair[0];
-    float const* const m = model.mean + 3 * pair[0];
-    float const* const s = model.log_scale + 3 * pair[0];
+  GART_KERNEL void operator()(index_t k) const {
+    if (!owners.owns(rows[k])) return;
+    std::size_t const row = owners.local(rows[k]);
+    float const* const q = model.quaternion + 4 * row;
+    float* const m = model.mean + 3 * row;
+    float* const s = model.log_scale + 3 * row;
     vec3 const mean(m[0], m[1], m[2]);
     split_half const half =
-        split_long_axis(vec3(s[0], s[1], s[2]), {q[0], q[1], q[2], q[3]}, sigmoid(model.opacity[pair[0]]));
+        split_long_axis(vec3(s[0], s[1], s[2]), {q[0], q[1], q[2], q[3]}, sigmoid(model.opacity[row]));
     float const opacity = half.opacity > least_opacity ? half.opacity : least_opacity;
-    for (int side = 0; side < 2; ++side) {
-      vec3 const center = side ? mean - half.offset : mean + half.offset;
-      for (int k = 0; k < 3; ++k) {
-        model.mean[3 * pair[side] + k] = center[k];
-        model.log_scale[3 * pair[side] + k] = half.log_scale[k];
-      }
-      model.opacity[pair[side]] = logf(opacity / (1.0f - opacity));
-    }
+    vec3 const center = second ? mean - half.offset : mean + half.offset;
+    for (int c = 0; c < 3; ++c) m[c] = center[c], s[c] = half.log_scale[c];
+    model.opacity[row] = logf(opacity / (1.0f - opacity));
   }
 };
 
@@ -165,22 +147,32 @@ class error_growth {
   /// Every step, with the moments that the step's backward pass left ([N][moment_stride]), before the optimizer's step:
   /// adds to the statistic, and to `gradient` that of the penalty.
   void accumulate(gaussians<E> const& model, span<float const> moments, gaussians<E>& gradient) {
+    add_errors(model, moments);
+    add_penalty(model, gradient, model.size());
+  }
+  /// The first part of it: the errors of one of a step's views.
+  void add_errors(gaussians<E> const& model, span<float const> moments) {
     index_t const n = model.size();
     if (n == 0) return;
     if (error_sum.size() != n) clear_statistic(n);
     parallel_for(*exec_, "error_sum", n, detail::error_sum_kernel{moments.data(), error_sum.data()});
-    if (options_.opacity_penalty > 0)
-      parallel_for(*exec_, "error_penalty", n,
+  }
+  /// And the second; `total`: Gaussians of the scene, where `model` are not all.
+  void add_penalty(gaussians<E> const& model, gaussians<E>& gradient, index_t total) {
+    if (model.size() && options_.opacity_penalty > 0)
+      parallel_for(*exec_, "error_penalty", model.size(),
                    detail::error_penalty_kernel{model.opacity.data(), gradient.opacity.data(),
-                                                options_.opacity_penalty / static_cast<float>(n)});
+                                                options_.opacity_penalty / static_cast<float>(total)});
   }
 
   /// From the next step on the schedules are those of a run of so many steps.
   void set_iterations(int iterations) { iterations_ = iterations; }
+  /// Steps are counted in images, of which each has so many.
+  void set_batch(int images) { batch_ = images; }
 
   /// Whether the step densifies.
   bool due(int step) const {
-    return options_.every > 0 && step > options_.from && step % options_.every == 0 &&
+    return step > options_.from && passes(step, options_.every, batch_) &&
            static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
   }
 
@@ -192,20 +184,24 @@ class error_growth {
   }
 
   /// After the optimizer's step.
-  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step) {
-    return due(step) ? densify(model, state, step) : density_change{};
+  template <class Rows = all_rows>
+  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {}) {
+    return due(step) ? densify(model, state, step, rows) : density_change{};
   }
 
-  /// Splits those with the most error, and moves the dead.
-  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step) {
+  /// Splits those with the most error, and moves the dead. `rows`: all_rows, or as it.
+  template <class Rows = all_rows>
+  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {}) {
     stage_scope stage(*exec_, "densify");
     density_change change;
-    index_t const n = model.size();
+    index_t const here = model.size(), n = rows.total(here);
+    row_owners const owners = rows.owners();
     if (n == 0) return change;
-    if (error_sum.size() != n) clear_statistic(n);
-    dead_.resize(n), drawable_.resize(n), key_.resize(n), id_.resize(n), place_.resize(n);
-    parallel_for(*exec_, "error_keys", n,
+    if (error_sum.size() != here) clear_statistic(here);
+    dead_.resize(here), drawable_.resize(here), key_.resize(here), id_.resize(here), place_.resize(n);
+    parallel_for(*exec_, "error_keys", here,
                  detail::error_key_kernel{std::as_const(model).view(),
+                                          owners,
                                           error_sum.data(),
                                           options_.dead_opacity,
                                           {seed_, static_cast<u32>(step), random_use::growth},
@@ -213,6 +209,7 @@ class error_growth {
                                           drawable_.data(),
                                           key_.data(),
                                           id_.data()});
+    for (buffer<u32, E>* each : {&dead_, &drawable_, &key_, &id_}) rows.gather(*exec_, *each);
     exclusive_scan(*exec_, span<u32 const>(drawable_), place_.view(), totals_.view().subspan(0, 1));
     exclusive_scan(*exec_, span<u32 const>(dead_), place_.view(), totals_.view().subspan(1, 1));
     u64 totals[2];
@@ -224,18 +221,22 @@ class error_growth {
     change.added = std::min(goal > n ? goal - n : 0, drawable - change.relocated);
     if (change.any()) {
       sort_pairs(*exec_, key_.view(), id_.view(), 32);
-      target_.resize(dead);
+      index_t const draws = change.relocated + change.added;
+      target_.resize(std::max(dead, draws));
       if (dead)
         parallel_for(*exec_, "error_targets", n,
                      detail::error_target_kernel{dead_.data(), place_.data(), target_.data()});
-      index_t const draws = change.relocated + change.added;
-      model.resize_keep(n + change.added);
-      state.first.resize_keep(n + change.added), state.second.resize_keep(n + change.added);
-      detail::error_rows const rows{id_.data(), target_.data(), change.relocated, n};
-      for_each_element(*exec_, "error_copy", draws, model.sh_degree(),
-                       detail::error_copy_body{model.view(), state.first.view(), state.second.view(), rows});
-      parallel_for(*exec_, "error_split", draws,
-                   detail::error_split_kernel{model.view(), rows, 1.01f * options_.dead_opacity});
+      // Past the dead, the rows that are new.
+      parallel_for(*exec_, "error_append", change.added, detail::number_rows{target_.data() + change.relocated, n});
+      index_t const next = rows.here(n + change.added);
+      model.resize_keep(next), state.first.resize_keep(next), state.second.resize_keep(next);
+      span<u32 const> const from(id_.data(), draws), to(target_.data(), draws);
+      rows.copy(*exec_, model, from, to);
+      clear_moments(*exec_, state, to, owners);
+      for (bool const second : {false, true})
+        parallel_for(*exec_, "error_split", draws,
+                     detail::error_split_kernel{model.view(), (second ? to : from).data(), owners, second,
+                                                1.01f * options_.dead_opacity});
     }
     clear_statistic(model.size());
     return change;
@@ -250,7 +251,7 @@ class error_growth {
   E* exec_;
   error_growth_options options_;
   index_t max_gaussians_;
-  int iterations_;
+  int iterations_, batch_ = 1;
   u64 seed_;
   buffer<u32, E> dead_, drawable_, key_, id_, target_;
   buffer<u64, E> place_, totals_;

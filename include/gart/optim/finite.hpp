@@ -10,6 +10,7 @@
 /// Cost: reads 12 bytes of each parameter (708 a Gaussian at SH degree 3, where Adam moves 1,652) and waits for the
 /// queue. Errors: not_finite, which names the group, how many numbers of it, the first Gaussian and what to look at.
 
+#include <gart/comm/row_owners.hpp>
 #include <gart/core/error.hpp>
 #include <gart/exec/concepts.hpp>
 #include <gart/math/arith.hpp>
@@ -52,8 +53,11 @@ struct count_not_finite_kernel {
 template <execution E>
 class finite_check {
  public:
-  /// Nothing is counted yet.
-  explicit finite_check(E& exec) : exec_(exec), counts_(exec, kinds + 1) { counts_.zero(); }
+  /// Nothing is counted yet. `owners`: where the rows looked at are not all of the scene.
+  explicit finite_check(E& exec, row_owners const& owners = {})
+      : exec_(exec), owners_(owners), counts_(exec, kinds + 1) {
+    counts_.zero();
+  }
 
   /// For adam_step.
   span<u64> skipped() const { return {counts_.data() + kinds, 1}; }
@@ -108,7 +112,7 @@ class finite_check {
     std::size_t const stride = values.size() / set.size();
     std::size_t at = 0;
     while (at + 1 < values.size() && is_finite(values[at])) ++at;
-    std::size_t const gaussian = at / stride;
+    std::size_t const gaussian = owners_.global(static_cast<index_t>(at / stride));
     static constexpr char const* sets[] = {"", "Adam's first moment of ", "Adam's second moment of "};
     std::string const name = std::string(sets[moment]) + title;
     std::string const numbers =
@@ -126,6 +130,7 @@ class finite_check {
   }
 
   E& exec_;
+  row_owners owners_;
   buffer<u64, E> counts_;
 };
 

@@ -28,6 +28,7 @@
 #include <gart/optim/options.hpp>
 #include <gart/optim/random.hpp>
 #include <gart/optim/rows.hpp>
+#include <gart/optim/schedule.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -78,12 +79,6 @@ struct mcmc_list_kernel {
   }
 };
 
-struct mcmc_append_kernel {
-  u32* target;
-  index_t first;
-  GART_KERNEL void operator()(index_t i) const { target[i] = first + i; }
-};
-
 template <execution E>
 struct mcmc_draw_kernel {
   u64 const* before;  // exclusive sums of the weights
@@ -109,14 +104,16 @@ struct mcmc_draw_kernel {
 
 struct mcmc_share_kernel {
   gaussians_view<float> model;
-  u32 const* copies;
+  u32 const* copies;  // by number
+  row_owners owners;
   float least_opacity;
   int kernel_degree;
 
   GART_KERNEL void operator()(index_t i) const {
-    if (copies[i] == 0) return;
+    u32 const copied = copies[owners.global(i)];
+    if (copied == 0) return;
     double const o = fmin(sigmoid_in_double(static_cast<double>(model.opacity[i])), 1 - 1e-7);
-    relocated_shape const shape = relocation(o, copies[i] + 1, kernel_degree);
+    relocated_shape const shape = relocation(o, copied + 1, kernel_degree);
     double const opacity = fmin(fmax(shape.opacity, static_cast<double>(least_opacity)), 1 - 1e-7);
     model.opacity[i] = static_cast<float>(logit_in_double(opacity));
     float const shift = static_cast<float>(log(shape.scale_factor));
@@ -124,22 +121,10 @@ struct mcmc_share_kernel {
   }
 };
 
-struct mcmc_copy_body {
-  gaussians_view<float> model, first, second;
-  u32 const* source;
-  u32 const* target;
-  bool grows;  // else it relocates
-
-  GART_KERNEL void operator()(index_t draw, index_t column) const {
-    index_t const from = source[draw], to = target[draw], cleared = grows ? to : from;
-    row_element(model, to, column) = row_element(model, from, column);
-    row_element(first, cleared, column) = row_element(second, cleared, column) = 0;
-  }
-};
-
 struct mcmc_noise_kernel {
   gaussians_view<float> model;
   random_source random;
+  row_owners owners;
   float amount, dead_opacity;
 
   GART_KERNEL void operator()(index_t i) const {
@@ -149,7 +134,7 @@ struct mcmc_noise_kernel {
     quaternion const turn{q[0], q[1], q[2], q[3]};
     if (!(gate > 0) || !(norm2(turn) > quaternion_norm2_min)) return;
     mat3 const rotation = to_matrix(turn);
-    random_normals const n = normals(random.words(i));
+    random_normals const n = normals(random.words(owners.global(i)));
     vec3 moved(0.0f);  // the covariance times n, axis by axis
     for (int c = 0; c < 3; ++c) {
       vec3 const axis = rotation[c];
@@ -216,12 +201,14 @@ class mcmc {
   void set_growth(float growth) { options_.growth = growth; }
   /// From the next step on the schedules are those of a run of so many steps.
   void set_iterations(int iterations) { iterations_ = iterations; }
+  /// Steps are counted in images, of which each has so many.
+  void set_batch(int images) { batch_ = images; }
 
   /// Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale) / extent; before the
-  /// optimizer's step.
-  void add_penalties(gaussians<E> const& model, gaussians<E>& gradient) {
+  /// optimizer's step. `total`: Gaussians of the scene, where `model` are not all; 0: they are.
+  void add_penalties(gaussians<E> const& model, gaussians<E>& gradient, index_t total = 0) {
     if (model.size() == 0) return;
-    float const n = static_cast<float>(model.size());
+    float const n = static_cast<float>(total ? total : model.size());
     parallel_for(*exec_, "mcmc_penalties", model.size(),
                  detail::mcmc_penalty_kernel{model.view(), gradient.view(), options_.opacity_penalty / n,
                                              options_.scale_penalty / (3 * n * extent_)});
@@ -229,26 +216,29 @@ class mcmc {
 
   /// Whether the step densifies.
   bool due(int step) const {
-    return options_.every > 0 && step > options_.from && step % options_.every == 0 &&
+    return step > options_.from && passes(step, options_.every, batch_) &&
            static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
   }
 
   /// After the optimizer's step: relocation and growth where they are due, and the noise. `mean_rate` is the rate the
   /// means had in this step.
-  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, float mean_rate) {
+  template <class Rows = all_rows>
+  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, float mean_rate,
+                            Rows&& rows = {}) {
     density_change change;
-    if (due(step)) change = densify(model, state, step);
-    add_noise(model, step, mean_rate);
+    if (due(step)) change = densify(model, state, step, rows);
+    add_noise(model, step, mean_rate, rows.owners());
     return change;
   }
 
-  /// Relocates and grows.
-  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step) {
+  /// Relocates and grows. `rows`: all_rows, or as it.
+  template <class Rows = all_rows>
+  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {}) {
     stage_scope stage(*exec_, "densify");
     density_change change;
-    index_t const n = model.size();
+    index_t const n = rows.total(model.size());
     if (n == 0) return change;
-    weigh(model, options_.dead_opacity);
+    weigh(model, options_.dead_opacity, rows);
     u64 totals[2];
     exec_->copy_out(totals, totals_.data(), sizeof totals);
     if (totals[0] == 0) return change;
@@ -257,7 +247,7 @@ class mcmc {
     if (change.relocated) {
       target_.resize(change.relocated);
       parallel_for(*exec_, "mcmc_list", n, detail::mcmc_list_kernel{dead_.data(), dead_before_.data(), target_.data()});
-      draw(model, state, n, change.relocated, {seed_, static_cast<u32>(step), random_use::relocation});
+      draw(model, state, n, change.relocated, {seed_, static_cast<u32>(step), random_use::relocation}, rows);
     }
 
     double const wanted = std::ceil(static_cast<double>(options_.growth) * n);
@@ -265,54 +255,60 @@ class mcmc {
     if (goal > n) {
       change.added = goal - n;
       // Relocation may have left Gaussians at the opacity that counts as dead; all but broken ones may be drawn here.
-      weigh(model, 0);
-      model.resize_keep(goal), state.first.resize_keep(goal), state.second.resize_keep(goal);
+      weigh(model, 0, rows);
+      index_t const next = rows.here(goal);
+      model.resize_keep(next), state.first.resize_keep(next), state.second.resize_keep(next);
       target_.resize(change.added);
-      parallel_for(*exec_, "mcmc_append", change.added, detail::mcmc_append_kernel{target_.data(), n});
-      draw(model, state, n, change.added, {seed_, static_cast<u32>(step), random_use::growth});
+      parallel_for(*exec_, "mcmc_append", change.added, detail::number_rows{target_.data(), n});
+      draw(model, state, n, change.added, {seed_, static_cast<u32>(step), random_use::growth}, rows);
     }
     return change;
   }
 
   /// mean += noise * mean_rate / extent^2 * sigmoid(-100 (opacity - dead_opacity)) * covariance * normal.
-  void add_noise(gaussians<E>& model, int step, float mean_rate) {
+  void add_noise(gaussians<E>& model, int step, float mean_rate, row_owners const& owners = {}) {
     if (options_.noise == 0) return;
     parallel_for(*exec_, "mcmc_noise", model.size(),
                  detail::mcmc_noise_kernel{model.view(),
                                            {seed_, static_cast<u32>(step), random_use::noise},
+                                           owners,
                                            options_.noise * mean_rate / (extent_ * extent_),
                                            options_.dead_opacity});
   }
 
  private:
-  void weigh(gaussians<E> const& model, float dead_opacity) {
-    index_t const n = model.size();
-    weight_.resize(n), dead_.resize(n), before_.resize(n), dead_before_.resize(n);
-    parallel_for(*exec_, "mcmc_weights", n,
+  template <class Rows>
+  void weigh(gaussians<E> const& model, float dead_opacity, Rows& rows) {
+    index_t const here = model.size(), n = rows.total(here);
+    weight_.resize(here), dead_.resize(here), before_.resize(n), dead_before_.resize(n);
+    parallel_for(*exec_, "mcmc_weights", here,
                  detail::mcmc_weight_kernel{model.view(), dead_opacity, weight_.data(), dead_.data()});
+    rows.gather(*exec_, weight_), rows.gather(*exec_, dead_);
     exclusive_scan(*exec_, span<u32 const>(weight_), before_.view(), totals_.view().subspan(0, 1));
     exclusive_scan(*exec_, span<u32 const>(dead_), dead_before_.view(), totals_.view().subspan(1, 1));
   }
 
   // `draws` copies of Gaussians among the first n, by weight, into the rows of target_.
-  void draw(gaussians<E>& model, optimizer_state<E>& state, index_t n, index_t draws, random_source const& random) {
+  template <class Rows>
+  void draw(gaussians<E>& model, optimizer_state<E>& state, index_t n, index_t draws, random_source const& random,
+            Rows& rows) {
     buffer<u32, E>& copies = dead_;
     source_.resize(draws);
     copies.zero();
     parallel_for(*exec_, "mcmc_draw", draws,
                  detail::mcmc_draw_kernel<E>{before_.data(), totals_.data(), n, random, source_.data(), copies.data()});
-    parallel_for(*exec_, "mcmc_share", n,
-                 detail::mcmc_share_kernel{model.view(), copies.data(), options_.dead_opacity, kernel_degree_});
-    for_each_element(*exec_, "mcmc_copy", draws, model.sh_degree(),
-                     detail::mcmc_copy_body{model.view(), state.first.view(), state.second.view(), source_.data(),
-                                            target_.data(), random.use == random_use::growth});
+    parallel_for(
+        *exec_, "mcmc_share", std::min(model.size(), rows.here(n)),
+        detail::mcmc_share_kernel{model.view(), copies.data(), rows.owners(), options_.dead_opacity, kernel_degree_});
+    rows.copy(*exec_, model, source_, target_);
+    clear_moments(*exec_, state, random.use == random_use::growth ? target_ : source_, rows.owners());
   }
 
   E* exec_;
   mcmc_options options_;
   int kernel_degree_;  // of the Gaussians that are relocated
   index_t max_gaussians_;
-  int iterations_;
+  int iterations_, batch_ = 1;
   float extent_;
   u64 seed_;
   buffer<u32, E> weight_, dead_, target_, source_;

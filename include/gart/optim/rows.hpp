@@ -4,8 +4,10 @@
 /// (scene/parameter_table.hpp): columns 0-2 mean, 3-5 log_scale, 6-9 quaternion, 10 opacity, 11.. sh. What moves,
 /// copies or clears whole Gaussians is one launch over (row, column), coalesced on a device.
 
+#include <gart/comm/row_owners.hpp>
 #include <gart/exec/concepts.hpp>
 #include <gart/math/ray_gaussian.hpp>
+#include <gart/optim/adam.hpp>
 #include <gart/scene/gaussians.hpp>
 
 namespace gart::inline GART_ISA {
@@ -70,6 +72,60 @@ void for_each_element(E& exec, char const* label, index_t rows, int sh_degree, B
   index_t const tiles = rows / kernel::rows_per_tile + (rows % kernel::rows_per_tile != 0);
   parallel_for(exec, label, tile_range{tiles, 256}, kernel{body, rows, row_width(sh_degree)});
 }
+
+namespace detail {
+
+struct copy_row_body {
+  gaussians_view<float> model;
+  u32 const *from, *to;
+  GART_KERNEL void operator()(index_t k, index_t column) const {
+    row_element(model, to[k], column) = row_element(model, from[k], column);
+  }
+};
+
+struct clear_moments_body {
+  gaussians_view<float> first, second;
+  u32 const* rows;
+  row_owners owners;
+  GART_KERNEL void operator()(index_t k, index_t column) const {
+    if (!owners.owns(rows[k])) return;
+    index_t const row = owners.local(rows[k]);
+    row_element(first, row, column) = row_element(second, row, column) = 0;
+  }
+};
+
+struct number_rows {
+  u32* rows;
+  u32 first;
+  GART_KERNEL void operator()(index_t i) const { rows[i] = first + i; }
+};
+
+}  // namespace detail
+
+/// Adam's moments of Gaussians, by their numbers, become zero: of those that are here.
+template <execution E>
+void clear_moments(E& exec, optimizer_state<E>& state, span<u32 const> rows, row_owners const& owners) {
+  for_each_element(exec, "clear_moments", static_cast<index_t>(rows.size()), state.first.sh_degree(),
+                   detail::clear_moments_body{state.first.view(), state.second.view(), rows.data(), owners});
+}
+
+/// Where the rows of a scene are, as densification asks: here, all of them. Several ranks have another
+/// (shard/sharded_rows.hpp), with the same members, which all ranks call together.
+class all_rows {
+ public:
+  row_owners owners() const { return {}; }             ///< this rank has all
+  index_t total(index_t here) const { return here; }   ///< Gaussians of the scene, of which `here` are here
+  index_t here(index_t total) const { return total; }  ///< of so many, those that are here
+  /// An element of each row that is here becomes one of each Gaussian, by number.
+  template <execution E>
+  void gather(E&, buffer<u32, E>&) const {}
+  /// Gaussian to[k] becomes a copy of from[k], by numbers; `from` and `to` have none in common.
+  template <execution E>
+  void copy(E& exec, gaussians<E>& model, span<u32 const> from, span<u32 const> to) const {
+    for_each_element(exec, "copy_rows", static_cast<index_t>(from.size()), model.sh_degree(),
+                     detail::copy_row_body{model.view(), from.data(), to.data()});
+  }
+};
 
 /// What a densification did. Where the count changed, gradients and other per-Gaussian buffers have a new size.
 struct density_change {

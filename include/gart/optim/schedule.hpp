@@ -41,6 +41,9 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
   return rates;
 }
 
+/// Whether a step that ends at `step` images, and has `batch` of them, is one that comes every so many.
+inline bool passes(int step, int every, int batch) { return every > 0 && step / every != (step - batch) / every; }
+
 /// One degree more every `every` steps, sooner where the run is too short for that: the full degree is reached within
 /// the first third of any run.
 inline int sh_interval(int degree, int every, int steps) { return std::max(1, std::min(every, steps / (3 * degree))); }

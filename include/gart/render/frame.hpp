@@ -70,7 +70,7 @@ class frame {
         *exec_, "preprocess", scene.count,
         render_kernels::prepare_gaussians<response>{seen_, view.position, options.alpha_min, gaussians_.view()});
     tracer_.prepare(*exec_, seen_, gaussians(), view,
-                    trace_options{options.alpha_min, options.near, options.rebuild_every});
+                    trace_options{options.alpha_min, options.near, options.rebuild_every, options.rows});
     prepared_ = true;
     ++preparations_;
   }
@@ -79,7 +79,7 @@ class frame {
   template <hit_record Record = record_none>
   void render(image_targets const& targets, Record const& record = {}) {
     require_prepared("render");
-    pixel_order const order{view_->width, view_->height};
+    pixel_order const order{view_->width, view_->height, options_.rows};
     with_rays([&]<class Rays>(Rays const& rays) {
       trace("forward", order.launch_size(),
             composite<sh_degree, Record, Rays>{{}, rays, order, scene_.sh, active_degree_, options_, targets, record});

@@ -7,6 +7,7 @@
 #include <gart/core/types.hpp>
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
+#include <gart/scene/image_rows.hpp>
 
 #include <string>
 
@@ -34,6 +35,9 @@ struct render_options {
   float antialias = approximation_options{}.antialias;
   int rebuild_every = approximation_options{}.rebuild_every;  ///< views between two builds of the bvh tracer's tree
   vec3 background{0.0f};                                      ///< linear RGB behind the last hit
+  /// What is traced of the image; whole rows of tiles. Pixels of other rows are left as they are, or written without
+  /// a hit.
+  image_rows rows = {};
 
   /// Those of the options that trade exactness for time.
   approximation_options approximations() const {

@@ -7,6 +7,19 @@
 
 namespace gart::inline GART_ISA {
 
+/// Of what a view of that size was rendered to.
+template <execution E>
+rendered rendered_of(camera const& view, buffer<float, E> const& color, buffer<float, E> const& transmittance,
+                     buffer<float, E> const& depth, buffer<u32, E> const& hits) {
+  rendered out;
+  out.color.width = out.transmittance.width = out.depth.width = out.hits.width = view.width;
+  out.color.height = out.transmittance.height = out.depth.height = out.hits.height = view.height;
+  out.transmittance.channels = out.depth.channels = out.hits.channels = 1;
+  out.color.data = color.to_host(), out.transmittance.data = transmittance.to_host();
+  out.depth.data = depth.to_host(), out.hits.data = hits.to_host();
+  return out;
+}
+
 /// Of a frame that is prepared.
 template <class Frame>
 rendered render_image(Frame& frame) {
@@ -16,13 +29,7 @@ rendered render_image(Frame& frame) {
   buffer<float, E> color(frame.exec(), 3 * pixels), transmittance(frame.exec(), pixels), depth(frame.exec(), pixels);
   buffer<u32, E> hits(frame.exec(), pixels);
   frame.render({color.data(), transmittance.data(), depth.data(), hits.data()});
-  rendered out;
-  out.color.width = out.transmittance.width = out.depth.width = out.hits.width = view.width;
-  out.color.height = out.transmittance.height = out.depth.height = out.hits.height = view.height;
-  out.transmittance.channels = out.depth.channels = out.hits.channels = 1;
-  out.color.data = color.to_host(), out.transmittance.data = transmittance.to_host();
-  out.depth.data = depth.to_host(), out.hits.data = hits.to_host();
-  return out;
+  return rendered_of(view, color, transmittance, depth, hits);
 }
 
 }  // namespace gart::inline GART_ISA

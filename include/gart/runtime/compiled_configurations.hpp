@@ -16,13 +16,13 @@
 namespace gart::inline GART_ISA {
 
 /// A session of one configuration.
-template <execution E, class Traits, class Tracer, strategy Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
 class compiled_session final : public session {
  public:
   /// As make_session has it; `start` is of the configuration's degree.
   compiled_session(configuration_request const& request, train_options const& options, dataset const& data,
                    gaussian_model const& start)
-      : exec_(policy_of<E>(request)), trainer_(exec_, options, data, start) {}
+      : exec_(policy_of<E>(request)), trainer_(exec_, options, data, start, comm_of<Comm>(request)) {}
   step_report step() override { return trainer_.step(); }
   int steps_done() const override { return trainer_.steps_done(); }
   void set_iterations(int iterations) override { trainer_.set_iterations(iterations); }
@@ -40,34 +40,40 @@ class compiled_session final : public session {
   }
   std::size_t peak_bytes() const override { return exec_.memory.peak; }
   std::size_t lt_bytes() const override { return trainer_.lt_bytes(); }
-  configuration_info configuration() const override { return configuration_of<E, Traits, Tracer, Strategy>(); }
+  u64 sent_bytes() const override {
+    if constexpr (Comm::alone)
+      return 0;
+    else
+      return trainer_.sent_bytes();
+  }
+  configuration_info configuration() const override { return configuration_of<E, Traits, Tracer, Strategy, Comm>(); }
 
  private:
   E exec_;
-  trainer<E, Traits, Tracer, Strategy> trainer_;
+  trainer<E, Traits, Tracer, Strategy, Comm> trainer_;
 };
 
-/// One configuration.
-template <execution E, class Traits, class Tracer, strategy Strategy>
+/// One configuration; with a communicator other than self_comm for training on several ranks.
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
 void register_configuration_of(int rank, bool (*available)(std::string*) = always_available) {
-  register_configuration({configuration_of<E, Traits, Tracer, Strategy>(), rank, available,
+  register_configuration({configuration_of<E, Traits, Tracer, Strategy, Comm>(), rank, available,
                           [](configuration_request const& request) -> std::unique_ptr<renderer> {
                             return std::make_unique<compiled_renderer<E, Traits, Tracer, Strategy>>(request);
                           },
                           [](configuration_request const& request, train_options const& options, dataset const& data,
                              gaussian_model const& start) -> std::unique_ptr<session> {
-                            return std::make_unique<compiled_session<E, Traits, Tracer, Strategy>>(request, options,
-                                                                                                   data, start);
+                            return std::make_unique<compiled_session<E, Traits, Tracer, Strategy, Comm>>(
+                                request, options, data, start);
                           }});
 }
 
 /// One for each SH degree, 0 to 3.
-template <execution E, class Tracer, strategy Strategy>
+template <execution E, class Tracer, strategy Strategy, class Comm = self_comm>
 void register_configurations(int rank, bool (*available)(std::string*) = always_available) {
-  register_configuration_of<E, scene_traits<0>, Tracer, Strategy>(rank, available);
-  register_configuration_of<E, scene_traits<1>, Tracer, Strategy>(rank, available);
-  register_configuration_of<E, scene_traits<2>, Tracer, Strategy>(rank, available);
-  register_configuration_of<E, scene_traits<3>, Tracer, Strategy>(rank, available);
+  register_configuration_of<E, scene_traits<0>, Tracer, Strategy, Comm>(rank, available);
+  register_configuration_of<E, scene_traits<1>, Tracer, Strategy, Comm>(rank, available);
+  register_configuration_of<E, scene_traits<2>, Tracer, Strategy, Comm>(rank, available);
+  register_configuration_of<E, scene_traits<3>, Tracer, Strategy, Comm>(rank, available);
 }
 
 /// Those with gradients of depth: the primitive strategy for each SH degree.

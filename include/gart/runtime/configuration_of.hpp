@@ -3,6 +3,7 @@
 /// What templates are as a configuration, and the policy that a request asks for.
 
 #include <gart/backward/strategies.hpp>
+#include <gart/comm/self_comm.hpp>
 #include <gart/core/isa.hpp>
 #include <gart/exec/concepts.hpp>
 #include <gart/runtime/request.hpp>
@@ -12,7 +13,7 @@
 namespace gart::inline GART_ISA {
 
 /// What the templates are called at run time.
-template <execution E, class Traits, class Tracer, strategy Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
 configuration_info configuration_of() {
   using response = typename Traits::response;
   configuration_info configuration;
@@ -26,6 +27,7 @@ configuration_info configuration_of() {
   configuration.depth = has_depth<Strategy>;
   configuration.tile_size = Tracer::tile_size;
   configuration.window = Tracer::window;
+  configuration.ranks = !Comm::alone;
   if constexpr (!E::device) configuration.instruction_set = instruction_set;
   return configuration;
 }
@@ -39,6 +41,15 @@ E policy_of(configuration_request const& request) {
     return E(request.threads);
   else
     return E();
+}
+
+/// The communicator that a request asks for.
+template <class Comm>
+Comm comm_of(configuration_request const& request) {
+  if constexpr (Comm::alone)
+    return Comm();
+  else
+    return *request.ranks;
 }
 
 }  // namespace gart::inline GART_ISA

@@ -11,6 +11,8 @@
 
 namespace gart {
 
+class mpi_comm;
+
 /// `automatic`, "auto" and 0: the best there is on this machine.
 struct configuration_request {
   backend_kind backend = backend_kind::automatic;  ///< where it computes
@@ -28,6 +30,9 @@ struct configuration_request {
   /// Of the cuda policy: a cudaStream_t of the caller's that all work goes to (cudaStreamLegacy for the default one);
   /// null: one of its own.
   void* stream = nullptr;
+  /// The ranks that train together (comm/mpi_comm.hpp), all of which make the same calls; null: this process by itself.
+  /// Must outlive what is made for the request.
+  mpi_comm const* ranks = nullptr;
 };
 
 /// One that was compiled.
@@ -42,6 +47,7 @@ struct configuration_info {
   bool depth = false;                                   ///< gradients of depth and transmittance too
   int tile_size = 8,                                    ///< pixels a side
       window = 0;                                       ///< hits of a ray that are kept at a time
+  bool ranks = false;                                   ///< trains on several ranks
   std::string instruction_set = "";  ///< that a host configuration was compiled for (core/isa.hpp); empty on a device
 };
 

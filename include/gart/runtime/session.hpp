@@ -22,7 +22,8 @@
 
 namespace gart {
 
-/// A training run.
+/// A training run. On several ranks (configuration_request.ranks) all call the same members, in the same order; what is
+/// said of the run is of all, and save() writes one file.
 class session {
  public:
   /// The policy's memory goes with it.
@@ -58,7 +59,8 @@ class session {
   virtual profiler& profile() = 0;
   /// Most bytes of the policy's memory that were in use at a time.
   virtual std::size_t peak_bytes() const = 0;
-  virtual std::size_t lt_bytes() const = 0;  ///< of the last step; 0 where the strategy records nothing
+  virtual std::size_t lt_bytes() const = 0;     ///< of the last step; 0 where the strategy records nothing
+  virtual u64 sent_bytes() const { return 0; }  ///< that this rank has sent to others in its steps
   /// What was chosen for the request.
   virtual configuration_info configuration() const = 0;
 };

@@ -7,6 +7,7 @@
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/camera/models.hpp>
 #include <gart/exec/stage.hpp>
+#include <gart/scene/image_rows.hpp>
 #include <gart/scene/parameters.hpp>
 #include <gart/tiles/footprint_slots.hpp>
 
@@ -21,11 +22,15 @@ struct measure {
   Bounds bounds;
   vec3d frame;
   float alpha_min;
+  image_rows rows;
   span<footprint_slots> ranges;
   span<float> depths;
   span<u32> areas, tiles;
   GART_KERNEL void operator()(index_t i) const {
-    footprint const f = footprint_of<Response>(bounds, load_parameters(scene, i), frame, alpha_min);
+    footprint f = footprint_of<Response>(bounds, load_parameters(scene, i), frame, alpha_min);
+    if (f.box.y0 < rows.first) f.box.y0 = static_cast<u16>(rows.first);
+    if (f.box.y1 > rows.end) f.box.y1 = static_cast<u16>(rows.end);
+    if (f.box.empty()) f.box = {}, f.seam = 0;
     ranges[i].box = f.box, ranges[i].seam = f.seam;
     depths[i] = f.depth;
     areas[i] = f.box.area();
@@ -55,10 +60,11 @@ class footprints {
         pair_offsets_(exec),
         totals_(exec, 2) {}
 
-  /// View: a camera or a camera model. invalid_argument for one that no ray can be cast by, or a near distance that is
-  /// not positive.
+  /// View: a camera or a camera model. Boxes are cut to `rows`. invalid_argument for a camera that no ray can be cast
+  /// by, or a near distance that is not positive.
   template <class Response = generalized_gaussian<>, class View>
-  void measure(E& exec, gaussians_view<float const> scene, View const& view, float alpha_min, float near) {
+  void measure(E& exec, gaussians_view<float const> scene, View const& view, float alpha_min, float near,
+               image_rows rows = {}) {
     require_camera(view);
     index_t const n = scene.count;
     ranges_.resize(n), depths_.resize(n), areas_.resize(n), tiles_.resize(n), area_offsets_.resize(n),
@@ -73,7 +79,7 @@ class footprints {
         auto const bounds = model.bounds(near);
         parallel_for(exec, "footprint/measure", n,
                      tile_kernels::measure<Response, Size, std::remove_const_t<decltype(bounds)>>{
-                         scene, bounds, model.position, alpha_min, ranges_, depths_, areas_, tiles_});
+                         scene, bounds, model.position, alpha_min, rows, ranges_, depths_, areas_, tiles_});
       });
     }
     stage_scope stage(exec, "scan");

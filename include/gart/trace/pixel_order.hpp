@@ -6,6 +6,7 @@
 #include <gart/core/isa.hpp>
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
+#include <gart/scene/image_rows.hpp>
 
 #include <cstddef>
 
@@ -20,6 +21,7 @@ struct pixel {
 struct pixel_order {
   static constexpr int block_width = 8, block_height = 4;  ///< in pixels
   int width = 0, height = 0;                               ///< of the image, in pixels
+  image_rows rows = {};                                    ///< what is traced of it
 
   /// Blocks across the image, the last one cut.
   GART_HD int blocks_x() const { return (width + block_width - 1) / block_width; }
@@ -42,8 +44,8 @@ struct pixel_order {
     index_t const block = y / block_height * static_cast<index_t>(blocks_x()) + x / block_width;
     return block * (block_width * block_height) + y % block_height * block_width + x % block_width;
   }
-  /// Whether the pixel is of the image, not of a block's part beyond it.
-  GART_HD bool inside(pixel p) const { return p.x < width && p.y < height; }
+  /// Whether the pixel is of the image's rows that are traced, not of a block's part beyond it.
+  GART_HD bool inside(pixel p) const { return p.x < width && p.y < height && rows.contains(p.y); }
   /// Its place in an array [H][W].
   GART_HD std::size_t address(pixel p) const { return static_cast<std::size_t>(p.y) * width + p.x; }
 };

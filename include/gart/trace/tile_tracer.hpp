@@ -157,7 +157,7 @@ class tile_tracer : public tracer_base {
       grid_ = {model.width, model.height};
       rays_.cast(exec, model);
       depth_ = model.depth();
-      prints_.template measure<Response>(exec, scene, model, options.alpha_min, options.near);
+      prints_.template measure<Response>(exec, scene, model, options.alpha_min, options.near, options.rows);
       map_.build(exec, grid_, prints_, orders_.of(exec, model, rays_, prints_.depths().data(), gaussians.data()));
     });
     if constexpr (E::device) map_.rank_tiles(exec);

@@ -20,6 +20,7 @@ struct trace_options {
   float alpha_min = 1.0f / 255.0f;  ///< a Gaussian is hit where sigma * rho >= alpha_min
   float near = 0.01f;               ///< hits lie at t > near
   int rebuild_every = 1;            ///< views between two builds of a structure that can be refitted
+  image_rows rows = {};             ///< what is traced of the image
 };
 
 /// What every tracer needs of the scene: the Gaussians in one frame, and the distance hits begin at.

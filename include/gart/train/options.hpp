@@ -3,6 +3,7 @@
 /// Everything a training run is made of besides the data, with the defaults of the literature (3DGS, 3DGS-MCMC,
 /// gsplat).
 
+#include <gart/comm/row_owners.hpp>
 #include <gart/core/names.hpp>
 #include <gart/core/types.hpp>
 #include <gart/optim/options.hpp>
@@ -59,15 +60,19 @@ struct train_options {
   /// After each step parameters and Adam's moments are searched for what is not finite, and not_finite is thrown at the
   /// first (optim/finite.hpp).
   bool check_finite = false;
-  u64 seed = 1;                       ///< of all numbers drawn at random
-  float near = 0.002f;                ///< hits lie at t > near, times the scene's extent
-  approximation_options render = {};  ///< what is traded for time
-  learning_rates rates = {};          ///< of Adam, by group of parameters
-  adam_options adam = {};             ///< of Adam
-  pose_options poses = {};            ///< of learned poses
-  error_growth_options error = {};    ///< of growth by error
-  mcmc_options mcmc = {};             ///< of growth by MCMC
-  adc_options adc = {};               ///< of adaptive density control
+  /// Views a step: the mean of their gradients, by rates times sqrt(batch) (optim/adam.hpp). All that is counted in
+  /// steps, `iterations` too, then counts images. Needs a trainer with a communicator.
+  int batch = 1;
+  index_t shard_block = row_owners::usual_block;  ///< Gaussians in a row that one of several ranks has
+  u64 seed = 1;                                   ///< of all numbers drawn at random
+  float near = 0.002f;                            ///< hits lie at t > near, times the scene's extent
+  approximation_options render = {};              ///< what is traded for time
+  learning_rates rates = {};                      ///< of Adam, by group of parameters
+  adam_options adam = {};                         ///< of Adam
+  pose_options poses = {};                        ///< of learned poses
+  error_growth_options error = {};                ///< of growth by error
+  mcmc_options mcmc = {};                         ///< of growth by MCMC
+  adc_options adc = {};                           ///< of adaptive density control
 };
 
 /// What a scene of that extent is traced with.

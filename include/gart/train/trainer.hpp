@@ -8,10 +8,19 @@
 ///   while (run.steps_done() < options.iterations) run.step();
 ///   write_splat_ply("model.ply", run.model());
 ///
+/// On several ranks the Gaussians are spread over them, with their moments (comm/row_owners.hpp), and each takes a part
+/// of every step (shard/work_units.hpp): strips of one view, or views of a batch. With a strategy that is `ordered` the
+/// bits of a run are those of any number of ranks. All ranks make the same calls; what is said of the Gaussians is of
+/// all of them, but for scene() and gradients(), which are of this rank's rows. docs/scale.md has more.
+///
+///   mpi_comm ranks;
+///   trainer<openmp_exec, traits, tracer, deterministic_strategy, mpi_comm> run(exec, options, data, start, ranks);
+///
 /// The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step),
 /// so a state holds parameters, moments and counters only.
 
 #include <gart/backward/fallback.hpp>
+#include <gart/comm/self_comm.hpp>
 #include <gart/exposure/exposure_field.hpp>
 #include <gart/exposure/exposure_training.hpp>
 #include <gart/io/dataset.hpp>
@@ -30,6 +39,7 @@
 #include <gart/scene/traits.hpp>
 #include <gart/train/depth_supervision.hpp>
 #include <gart/train/options.hpp>
+#include <gart/train/shards.hpp>
 #include <gart/train/state.hpp>
 #include <gart/train/step_report.hpp>
 #include <gart/train/training_images.hpp>
@@ -53,17 +63,19 @@ struct loss_input {
   depth_pixels depth;        ///< to add to, of a strategy with_depth; else empty
 };
 
-/// A training run on one policy, by one tracer and one strategy.
-template <execution E, class Traits, class Tracer, strategy Strategy>
+/// A training run on one policy, by one tracer and one strategy, on the ranks of a communicator.
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
+requires communicator<Comm, E>
 class trainer {
  public:
   static constexpr int sh_degree = Traits::sh_degree;  ///< of the coefficients that are stored
 
   /// Starts from `start`, of that degree. Errors: invalid_argument for another degree, or where no view is left to
-  /// train on; out_of_memory.
-  trainer(E& exec, train_options const& options, dataset const& data, gaussian_model const& start);
+  /// train on, and for options that several ranks do not have; out_of_memory.
+  trainer(E& exec, train_options const& options, dataset const& data, gaussian_model const& start, Comm comm = Comm());
   /// The dataset must outlive the trainer.
-  trainer(E& exec, train_options const& options, dataset const&& temporary, gaussian_model const& start) = delete;
+  trainer(E& exec, train_options const& options, dataset const&& temporary, gaussian_model const& start,
+          Comm comm = Comm()) = delete;
 
   /// One step, with the loss of the options.
   step_report step();
@@ -75,20 +87,22 @@ class trainer {
   int steps_done() const { return step_; }
   void set_iterations(int iterations);  ///< as session has it
   /// The Gaussians, in host memory.
-  gaussian_model model() const { return scene_.to_host(); }
+  gaussian_model model() const { return whole_of(scene_.to_host()); }
   /// A view of the Gaussians to host memory.
   rendered render(camera const& view, vec3 background);
   /// Everything the next step depends on.
   training_state state() const;
   /// Takes up the run that the state is of. Errors: invalid_argument for another degree.
   void set_state(training_state const& state);
-  /// Writes the state to a checkpoint.
-  void save(std::filesystem::path const& path) const { write_checkpoint(path, state()); }
+  /// Writes the state to a checkpoint: one file, whatever the number of ranks.
+  void save(std::filesystem::path const& path) const;
   /// Takes up the run of a checkpoint.
   void load(std::filesystem::path const& path) { set_state(read_checkpoint(path, sh_degree)); }
   exposure_field exposures() const;         ///< of the views that were trained on; empty where none are learned
   std::vector<named_camera> poses() const;  ///< of the training views; empty where none are learned
   std::size_t lt_bytes() const { return lt_bytes_; }  ///< of the last step
+  /// Bytes that this rank has sent to others in its steps.
+  u64 sent_bytes() const requires(!Comm::alone) { return shards_.sent; }
   /// The Gaussians, in the policy's memory.
   gaussians<E>& scene() { return scene_; }
   /// Of the last step, in their shape.
@@ -99,7 +113,50 @@ class trainer {
 
   template <class Pass, class Loss>
   void differentiate_by(Pass& pass, Loss&& loss, std::size_t view, learning_rates const& rates);
-  void update(camera const& view, learning_rates const& rates, int degree, span<float const> moments);
+  template <class Rows>
+  void optimize(learning_rates const& rates, int degree, Rows&& rows);
+  learning_rates rates_of_step() const;
+  training_state state_on(int root) const;
+
+  // With ranks (trainer_ranks_impl.hpp).
+  void require_ranks() const;
+  template <class Loss>
+  step_report step_in_ranks(Loss&& loss);
+  template <class Loss>
+  void trace_unit(Loss& loss, std::size_t index, int image, int degree, learning_rates const& rates,
+                  step_report& report);
+  void gather_values(int views, std::vector<float>& values);
+  void take_gradients(camera const& view, int v, int image);
+  rendered render_in_ranks(camera const& view, vec3 background);
+  bool in_ranks() const { return !Comm::alone && (comm_.size() > 1 || options_.batch > 1); }
+  // What of values of all Gaussians is this rank's, and the way back.
+  decltype(auto) part_of(gaussian_model const& all) const {
+    if constexpr (Comm::alone)
+      return (all);
+    else
+      return shards_.rows.part_of(all);
+  }
+  template <class T>
+  std::vector<T> part_of(std::vector<T> const& all) const {
+    if constexpr (Comm::alone)
+      return all;
+    else
+      return shards_.rows.part_of(all, 1);
+  }
+  gaussian_model whole_of(gaussian_model mine, int root = -1) const {
+    if constexpr (Comm::alone)
+      return mine;
+    else
+      return shards_.rows.whole_of(mine, root);
+  }
+  template <class T>
+  std::vector<T> whole_of(std::vector<T> mine, int root) const {
+    if constexpr (Comm::alone)
+      return mine;
+    else
+      return shards_.rows.whole_of(mine, 1, root);
+  }
+
   bool grows_by_error() const { return options_.densify == densify_kind::error; }
   vec3 background_of(int step) const;
   static mcmc_options mcmc_options_of(train_options const& options) {
@@ -121,6 +178,8 @@ class trainer {
   E& exec_;
   train_options options_;
   dataset const& data_;
+  mutable Comm comm_;
+  mutable std::conditional_t<Comm::alone, no_shards, shards<E, Comm, Traits, Tracer>> shards_;
   gaussians<E> scene_, gradients_;
   optimizer_state<E> state_;
   frame_type frame_;
@@ -139,7 +198,7 @@ class trainer {
   std::optional<pose_training> poses_;             // where options.refine_poses asks for them
   pose_differentiation<E> by_pose_;
   std::optional<finite_check<E>> finite_;  // where options.check_finite asks for it
-  index_t started_with_ = 0;               // Gaussians
+  index_t started_with_ = 0, total_ = 0;   // Gaussians of all ranks
   int step_ = 0;
   float growth_ = 1;
   std::size_t lt_bytes_ = 0;
@@ -148,3 +207,4 @@ class trainer {
 }  // namespace gart::inline GART_ISA
 
 #include <gart/train/trainer_impl.hpp>
+#include <gart/train/trainer_ranks_impl.hpp>

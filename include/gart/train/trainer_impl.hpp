@@ -10,15 +10,17 @@
 
 namespace gart::inline GART_ISA {
 
-template <execution E, class Traits, class Tracer, strategy Strategy>
-trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& options, dataset const& data,
-                                              gaussian_model const& start)
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+trainer<E, Traits, Tracer, Strategy, Comm>::trainer(E& exec, train_options const& options, dataset const& data,
+                                                    gaussian_model const& start, Comm comm)
     : exec_(exec),
       options_(options),
       data_(data),
-      scene_(exec, start),
-      gradients_(exec, static_cast<index_t>(start.size()), sh_degree),
-      state_(exec, static_cast<index_t>(start.size()), sh_degree),
+      comm_(std::move(comm)),
+      shards_(exec, comm_, std::max<index_t>(options.shard_block, 1)),
+      scene_(exec, part_of(start)),
+      gradients_(exec, scene_.size(), sh_degree),
+      state_(exec, scene_.size(), sh_degree),
       frame_(exec),
       passes_(exec),
       loss_(exec),
@@ -38,7 +40,9 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
       depth_(exec),
       transmittance_(exec),
       by_pose_(exec),
-      started_with_(static_cast<index_t>(start.size())) {
+      started_with_(static_cast<index_t>(start.size())),
+      total_(started_with_) {
+  require_ranks();
   if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
   if (options.depth_weight > 0) {
@@ -47,9 +51,14 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
     if (!mapped)
       throw invalid_argument("train_options.depth_weight: no training view has a depth map (dataset_options.depth)");
   }
-  if (options.check_finite) finite_.emplace(exec);
+  if constexpr (Comm::alone) {
+    if (options.check_finite) finite_.emplace(exec);
+  } else {
+    if (options.check_finite) finite_.emplace(exec, shards_.rows.owners());
+  }
   // Sums in a fixed order were asked for: no budget of our own takes them away.
-  if (options.lt_budget == 0 && !Strategy::ordered) options_.lt_budget = exec.free_bytes() / 2;
+  if (options.lt_budget == 0 && !Strategy::ordered)
+    options_.lt_budget = exec.free_bytes() / 2 / static_cast<u64>(comm_.size());
   if (options.exposure) exposures_.emplace(exec, data.train.size());
   if (options.refine_poses) {
     std::vector<camera> captured;
@@ -58,10 +67,11 @@ trainer<E, Traits, Tracer, Strategy>::trainer(E& exec, train_options const& opti
   }
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
+  error_.set_batch(options.batch), mcmc_.set_batch(options.batch);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy>
-void trainer<E, Traits, Tracer, Strategy>::set_iterations(int iterations) {
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+void trainer<E, Traits, Tracer, Strategy, Comm>::set_iterations(int iterations) {
   if (iterations == options_.iterations) return;
   options_.iterations = iterations;
   error_.set_iterations(iterations), mcmc_.set_iterations(iterations), adc_.set_iterations(iterations);
@@ -69,23 +79,23 @@ void trainer<E, Traits, Tracer, Strategy>::set_iterations(int iterations) {
   mcmc_.set_growth(growth_);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy>
-step_report trainer<E, Traits, Tracer, Strategy>::step() {
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+step_report trainer<E, Traits, Tracer, Strategy, Comm>::step() {
   return step([this](loss_input<E> const& in) {
     loss_.evaluate(in.image, in.truth, in.width, in.height, options_.ssim_weight, in.gradient, in.value);
   });
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 template <class Loss>
-step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
+step_report trainer<E, Traits, Tracer, Strategy, Comm>::step(Loss&& loss) {
+  if constexpr (!Comm::alone)
+    if (in_ranks()) return step_in_ranks(loss);
   std::size_t const index = order_.at(step_);
   dataset_view const& view = data_.train[index];
   camera const seen = poses_ ? poses_->view(index) : view.view;
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
-  learning_rates rates = options_.rates;
-  rates.sh_rest = sh_rest_of(rates, data_.points.size() > 0, options_.iterations);
-  rates = rates_at(rates, data_.extent, step_, options_.iterations);
+  learning_rates const rates = rates_of_step();
   render_options const render = render_options_of(options_, data_.extent, background_of(step_));
   std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
   color_.resize(floats), color_gradient_.resize(floats);
@@ -101,12 +111,14 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   bool const moves = poses_ && poses_->learns(step_, options_.iterations);
   if (moves) by_pose_(frame_, std::as_const(gradients_).view(), value_.view().subspan(2, pose_gradient::floats));
   ++step_;
-  update(seen, rates, degree, moments);
+  if (grows_by_error()) error_.add_errors(scene_, moments);
+  if (options_.densify == densify_kind::adc) adc_.accumulate(scene_, gradients_, seen);
+  optimize(rates, degree, all_rows());
 
   step_report report;
   if (finite_) report.skipped = (*finite_)(scene_, state_, "step " + std::to_string(step_) + ", view " + view.name);
   report.step = step_;
-  report.gaussians = scene_.size();
+  report.gaussians = total_;
   report.view = view.name;
   report.backward = used;
   std::vector<float> const value = value_.to_host();
@@ -117,10 +129,10 @@ step_report trainer<E, Traits, Tracer, Strategy>::step(Loss&& loss) {
   return report;
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy>
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 template <class Pass, class Loss>
-void trainer<E, Traits, Tracer, Strategy>::differentiate_by(Pass& pass, Loss&& loss, std::size_t index,
-                                                            learning_rates const& rates) {
+void trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pass, Loss&& loss, std::size_t index,
+                                                                  learning_rates const& rates) {
   dataset_view const& view = data_.train[index];
   image_targets targets;
   targets.color = color_.data();
@@ -158,24 +170,24 @@ void trainer<E, Traits, Tracer, Strategy>::differentiate_by(Pass& pass, Loss&& l
 }
 
 // The optimizer's step and what grows, moves and prunes the Gaussians.
-template <execution E, class Traits, class Tracer, strategy Strategy>
-void trainer<E, Traits, Tracer, Strategy>::update(camera const& view, learning_rates const& rates, int degree,
-                                                  span<float const> moments) {
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <class Rows>
+void trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates const& rates, int degree, Rows&& rows) {
   bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
-  if (grows_by_error()) error_.accumulate(scene_, moments, gradients_);
-  if (use_mcmc) mcmc_.add_penalties(scene_, gradients_);
-  if (use_adc) adc_.accumulate(scene_, gradients_, view);
+  if (grows_by_error()) error_.add_penalty(scene_, gradients_, total_);
+  if (use_mcmc) mcmc_.add_penalties(scene_, gradients_, total_);
   adam_step(exec_, scene_, gradients_, state_, rates, step_, degree, finite_ ? finite_->skipped() : span<u64>{},
-            options_.adam);
+            options_.adam, options_.batch);
   density_change change;
-  if (grows_by_error()) change = error_.after_step(scene_, state_, step_);
-  if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean);
+  if (grows_by_error()) change = error_.after_step(scene_, state_, step_, rows);
+  if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean, rows);
   if (use_adc) change = adc_.after_step(scene_, state_, step_);
+  total_ += change.added - change.removed;
   if (change.added || change.removed) gradients_.resize_keep(scene_.size());
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy>
-vec3 trainer<E, Traits, Tracer, Strategy>::background_of(int step) const {
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+vec3 trainer<E, Traits, Tracer, Strategy, Comm>::background_of(int step) const {
   switch (options_.background) {
     case background_kind::black:
       return vec3(0.0f);
@@ -188,14 +200,16 @@ vec3 trainer<E, Traits, Tracer, Strategy>::background_of(int step) const {
   }
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy>
-rendered trainer<E, Traits, Tracer, Strategy>::render(camera const& view, vec3 background) {
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+rendered trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& view, vec3 background) {
+  if constexpr (!Comm::alone)
+    if (in_ranks()) return render_in_ranks(view, background);
   frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background));
   return render_image(frame_);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy>
-exposure_field trainer<E, Traits, Tracer, Strategy>::exposures() const {
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+exposure_field trainer<E, Traits, Tracer, Strategy, Comm>::exposures() const {
   std::vector<view_exposure> views;
   exposure_state const learned = exposures_ ? exposures_->state() : exposure_state{};
   for (std::size_t i = 0; i < learned.visits.size(); ++i) {
@@ -208,32 +222,47 @@ exposure_field trainer<E, Traits, Tracer, Strategy>::exposures() const {
   return exposure_field(std::move(views));
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy>
-std::vector<named_camera> trainer<E, Traits, Tracer, Strategy>::poses() const {
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+std::vector<named_camera> trainer<E, Traits, Tracer, Strategy, Comm>::poses() const {
   std::vector<named_camera> out;
   for (std::size_t i = 0; poses_ && i < data_.train.size(); ++i) out.push_back({data_.train[i].name, poses_->view(i)});
   return out;
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy>
-training_state trainer<E, Traits, Tracer, Strategy>::state() const {
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+training_state trainer<E, Traits, Tracer, Strategy, Comm>::state() const {
+  return state_on(-1);
+}
+
+// On that rank alone, or on all of them (-1).
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+training_state trainer<E, Traits, Tracer, Strategy, Comm>::state_on(int root) const {
   training_state s;
-  s.scene = scene_.to_host(), s.first = state_.first.to_host(), s.second = state_.second.to_host();
+  s.scene = whole_of(scene_.to_host(), root);
+  s.first = whole_of(state_.first.to_host(), root), s.second = whole_of(state_.second.to_host(), root);
   s.step = step_, s.growth = growth_, s.seed = options_.seed;
   if (exposures_) s.exposures = exposures_->state();
   if (poses_) s.poses = poses_->state();
-  s.error_sum = error_.error_sum.to_host();
-  s.gradient_sum = adc_.gradient_sum.to_host(), s.touched = adc_.touched.to_host();
+  s.error_sum = whole_of(error_.error_sum.to_host(), root);
+  s.gradient_sum = whole_of(adc_.gradient_sum.to_host(), root), s.touched = whole_of(adc_.touched.to_host(), root);
   return s;
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy>
-void trainer<E, Traits, Tracer, Strategy>::set_state(training_state const& s) {
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+void trainer<E, Traits, Tracer, Strategy, Comm>::save(std::filesystem::path const& path) const {
+  training_state const s = state_on(0);
+  if (comm_.rank() == 0) write_checkpoint(path, s);
+  comm_.barrier();  // there is one when any rank goes on
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+void trainer<E, Traits, Tracer, Strategy, Comm>::set_state(training_state const& s) {
   if (s.scene.sh_degree != sh_degree) throw invalid_argument("trainer: the state has another SH degree");
-  scene_.assign(s.scene), state_.first.assign(s.first), state_.second.assign(s.second);
+  scene_.assign(part_of(s.scene)), state_.first.assign(part_of(s.first)), state_.second.assign(part_of(s.second));
+  total_ = static_cast<index_t>(s.scene.size());
   gradients_ = gaussians<E>(exec_, scene_.size(), sh_degree);
-  error_.error_sum.assign(s.error_sum);
-  adc_.gradient_sum.assign(s.gradient_sum), adc_.touched.assign(s.touched);
+  error_.error_sum.assign(part_of(s.error_sum));
+  adc_.gradient_sum.assign(part_of(s.gradient_sum)), adc_.touched.assign(part_of(s.touched));
   if (exposures_) {
     if (s.exposures.visits.size() != data_.train.size())
       throw invalid_argument("trainer: the state has exposures of another number of training views");

@@ -1,0 +1,19 @@
+// The OpenMP policy with tile lists, on several ranks.
+#include <gart/comm/mpi_comm.hpp>
+#include <gart/exec/parallel.hpp>
+#include <gart/runtime/compiled_configurations.hpp>
+#include <gart/trace/tile_tracer.hpp>
+
+namespace {
+
+using namespace gart;
+
+template <strategy Strategy>
+void register_on_ranks(int rank) {
+  register_configurations<openmp_exec, tile_tracer<openmp_exec>, Strategy, mpi_comm>(rank);
+}
+
+}  // namespace
+
+GART_REGISTER_CONFIGURATIONS(gart_rank_configurations, register_on_ranks<deterministic_strategy>(16),
+                             register_on_ranks<primitive_strategy>(17))

@@ -1,0 +1,51 @@
+#pragma once
+/// \file
+/// Ranks that train together: processes of one host or of several, of which each has a part of the Gaussians. A
+/// communicator is a handle, cheap to copy, with the members
+///   static constexpr bool alone;      there is one rank, known when compiled: nothing is exchanged
+///   int rank(); int size();           which one this is, 0 to size() - 1
+///   exchange(exec, sends, receives)   point-to-point messages as one group, in the memory of the policy, on its queue;
+///                                     messages between two ranks arrive in the order of the lists; one to itself too
+///   exchange(sends, receives)         the same in host memory, waited for
+///   all_gather(mine, all, bytes)      `bytes` of each rank, in the order of ranks, to all
+///   all_reduce(values)                element by element the sum over ranks, added in the order of ranks: the same
+///                                     bits on every rank, in every run
+///   exclusive_scan(value)             the sum of the values of the ranks before this one
+///   broadcast(data, bytes, root)      what the root has, to all
+///   barrier()                         waits for all ranks
+/// All but the first exchange are for what is small, and of host memory. Every rank makes the same calls in the same
+/// order. Errors: invalid_argument for a rank that there is not; what the transport finds ends all ranks.
+
+#include <gart/core/span.hpp>
+#include <gart/exec/concepts.hpp>
+
+#include <concepts>
+
+namespace gart {
+
+/// Bytes to a rank, or from it.
+struct message {
+  int rank = 0;           ///< the other one
+  void* data = nullptr;   ///< where they are, or go
+  std::size_t bytes = 0;  ///< how many; the receiver knows
+};
+
+/// A communicator for the policy E.
+template <class C, class E>
+concept communicator = execution<E> && std::copyable<C> &&
+    requires(C& c, C const& k, E& exec, span<message const> messages, void const* mine, void* all, std::size_t bytes,
+             span<double> numbers, span<u64> counts) {
+  { C::alone } -> std::convertible_to<bool>;
+  { k.rank() } -> std::same_as<int>;
+  { k.size() } -> std::same_as<int>;
+  c.exchange(exec, messages, messages);
+  c.exchange(messages, messages);
+  c.all_gather(mine, all, bytes);
+  c.all_reduce(numbers);
+  c.all_reduce(counts);
+  { c.exclusive_scan(u64{}) } -> std::same_as<u64>;
+  c.broadcast(all, bytes, 0);
+  c.barrier();
+};
+
+}  // namespace gart

@@ -1,0 +1,64 @@
+#pragma once
+/// \file
+/// Ranks by MPI, in host memory: what `mpirun` started. Compiled into gart::distributed; a program needs no header of
+/// MPI.
+///
+///   mpi_comm ranks;                                        // all that were started together
+///   trainer<openmp_exec, traits, tracer, deterministic_strategy, mpi_comm> run(exec, options, data, start, ranks);
+///
+/// The first one made starts MPI, unless the program has; the program's end ends it. A program that was started alone
+/// is one rank. MPI is called by one thread. Messages of any size go in pieces of at most 1 GiB.
+///
+/// Errors: invalid_argument for a rank that there is not. What MPI itself finds wrong, a rank that is gone for one, it
+/// says and ends all ranks.
+
+#include <gart/comm/communicator.hpp>
+#include <gart/core/error.hpp>
+
+#include <memory>
+#include <string>
+
+namespace gart {
+
+/// All ranks of an MPI job.
+class mpi_comm {
+ public:
+  static constexpr bool alone = false;  ///< known when it runs
+
+  /// All that were started together.
+  mpi_comm();
+  int rank() const;           ///< this process
+  int size() const;           ///< ranks in all
+  std::string host() const;   ///< the name of the machine that this rank is on
+  int ranks_on_host() const;  ///< with this one
+
+  /// By a policy of host memory.
+  template <execution E>
+  void exchange(E&, span<message const> sends, span<message const> receives) {
+    static_assert(!E::device, "mpi_comm's messages are of host memory");
+    exchange(sends, receives);
+  }
+  /// Grouped; returns when all have arrived.
+  void exchange(span<message const> sends, span<message const> receives);
+  /// `bytes` of each.
+  void all_gather(void const* mine, void* all, std::size_t bytes);
+  ///@{
+  /// In the order of ranks.
+  void all_reduce(span<double> values);
+  void all_reduce(span<u64> values);
+  ///@}
+  /// Of the ranks before this one.
+  u64 exclusive_scan(u64 value);
+  /// From the root.
+  void broadcast(void* data, std::size_t bytes, int root);
+  /// Waits for all.
+  void barrier();
+  /// Ends all ranks at once with that exit code: what a rank does that cannot go on. Says nothing itself.
+  [[noreturn]] void abort(int code);
+
+ private:
+  struct state;
+  std::shared_ptr<state> state_;
+};
+
+}  // namespace gart

@@ -1,0 +1,43 @@
+#pragma once
+/// \file
+/// Which rank has which Gaussian: by blocks of numbers, dealt out in turn. The Gaussian of number g (64 bits: of the
+/// scene, where a rank's own rows have 32) lies in block g / block, of rank g / block % ranks, and is row
+///   g / block / ranks * block + g % block
+/// there. So rows of a rank are in the order of their numbers, what is appended to the scene is appended to the ranks'
+/// arrays, and growth balances itself: nothing is ever dealt out anew.
+
+#include <gart/core/macros.hpp>
+#include <gart/core/types.hpp>
+
+namespace gart {
+
+/// The arithmetic of one rank; as it stands, of a rank that has all.
+struct row_owners {
+  static constexpr index_t usual_block = 4096;  ///< rows
+  int ranks = 1, rank = 0;                      ///< in all, and which one this is
+  index_t block = usual_block;                  ///< rows that stay together
+
+  /// Who has Gaussian g.
+  GART_HD constexpr int owner(u64 g) const { return static_cast<int>(g / block % static_cast<u64>(ranks)); }
+  /// Whether this rank has it.
+  GART_HD constexpr bool owns(u64 g) const { return ranks == 1 || owner(g) == rank; }
+  /// Its row there.
+  GART_HD constexpr index_t local(u64 g) const {
+    return static_cast<index_t>(ranks == 1 ? g : g / block / static_cast<u64>(ranks) * block + g % block);
+  }
+  /// The number of a row of this rank's.
+  GART_HD constexpr u64 global(index_t row) const {
+    return ranks == 1 ? u64{row}
+                      : (u64{row / block} * static_cast<u64>(ranks) + static_cast<u64>(rank)) * block + row % block;
+  }
+  /// How many of the first `total` Gaussians rank r has.
+  GART_HD constexpr index_t owned(u64 total, int r) const {
+    u64 const blocks = total / block, rest = total % block, turn = blocks % static_cast<u64>(ranks);
+    u64 const whole = blocks / static_cast<u64>(ranks) + (static_cast<u64>(r) < turn);
+    return static_cast<index_t>(whole * block + (static_cast<u64>(r) == turn ? rest : 0));
+  }
+  /// How many of them this rank has.
+  GART_HD constexpr index_t owned(u64 total) const { return owned(total, rank); }
+};
+
+}  // namespace gart

@@ -1,0 +1,18 @@
+#pragma once
+/// \file
+/// Some rows of an image: what one of several ranks traces of it, or all.
+
+#include <gart/core/macros.hpp>
+
+namespace gart {
+
+/// Rows [first, end); all, unless it says otherwise. No image has more than 65,535.
+struct image_rows {
+  static constexpr int most = 65536;  ///< more than there are
+  int first = 0, end = most;          ///< rows of pixels
+
+  /// Whether row y is one of them.
+  GART_HD constexpr bool contains(int y) const { return y >= first && y < end; }
+};
+
+}  // namespace gart

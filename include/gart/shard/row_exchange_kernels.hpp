@@ -1,0 +1,181 @@
+#pragma once
+/// \file
+/// The kernels of row_exchange.hpp.
+
+#include <gart/backward/gather.hpp>
+#include <gart/camera/models.hpp>
+#include <gart/optim/rows.hpp>
+#include <gart/scene/image_rows.hpp>
+#include <gart/tiles/footprint_slots.hpp>
+
+namespace gart::inline GART_ISA::detail {
+
+// The box of a row in a view; cost is, by rows of tiles, by how much their pairs are more than those of the row above.
+template <class Response, class E, int Size, class Bounds>
+struct box_kernel {
+  gaussians_view<float const> scene;
+  Bounds bounds;
+  vec3d frame;
+  float alpha_min;
+  footprint_slots* boxes;
+  u64* cost;
+  GART_KERNEL void operator()(index_t i) const {
+    footprint const f = footprint_of<Response>(bounds, load_parameters(scene, i), frame, alpha_min);
+    footprint_slots const range(0, f.box, f.seam);
+    boxes[i] = range;
+    if (f.box.empty()) return;
+    pixel_box const tiles = tiles_of<Size>(range);
+    E::atomic_add(cost + tiles.y0, u64{tiles.width()});
+    E::atomic_add(cost + tiles.y1, ~u64{tiles.width()} + 1);
+  }
+};
+
+// The part of a box in some rows, as footprints cut it.
+GART_HD inline pixel_box cut(pixel_box box, image_rows const& rows) {
+  if (box.y0 < rows.first) box.y0 = static_cast<u16>(rows.first);
+  if (box.y1 > rows.end) box.y1 = static_cast<u16>(rows.end);
+  return box;
+}
+
+struct select_kernel {
+  footprint_slots const* boxes;
+  image_rows rows;
+  u32* flags;
+  GART_KERNEL void operator()(index_t i) const { flags[i] = !cut(boxes[i].box, rows).empty(); }
+};
+
+// The pairs of a box that began above the rows, or begins with them; 0 of others. Of `range`, cut to the rows or not.
+template <int Size>
+GART_HD inline u32 continued_pairs(footprint_slots range, image_rows const& rows) {
+  range.box = cut(range.box, rows);
+  return rows.first > 0 && range.box.y0 == rows.first ? tiles_of<Size>(range).area() : 0;
+}
+
+template <int Size>
+struct list_kernel {
+  footprint_slots const* boxes;
+  image_rows rows;
+  u32 const* flags;
+  u64 const* places;
+  u32 *list, *pairs;
+  GART_KERNEL void operator()(index_t i) const {
+    if (!flags[i]) return;
+    list[places[i]] = i, pairs[places[i]] = continued_pairs<Size>(boxes[i], rows);
+  }
+};
+
+// Rows, and the Gaussian's number behind each.
+struct pack_kernel {
+  gaussians_view<float const> scene;
+  row_owners owners;
+  u32 const* list;
+  float* out;
+  index_t width;
+  GART_KERNEL void operator()(index_t k) const {
+    float* const to = out + std::size_t{k} * width;
+    index_t const row = list[k];
+    index_t column = 0;
+    for_each_array(
+        [&](parameter_array const& a, float const* values) {
+          index_t const n = a.width(scene.sh_degree);
+          for (index_t c = 0; c < n; ++c) to[column++] = values[std::size_t{row} * n + c];
+        },
+        scene);
+    to[column] = bits_to_float(static_cast<u32>(owners.global(row)));
+  }
+};
+
+struct ids_kernel {
+  float const* in;
+  index_t width;
+  u32 *ids, *order;
+  GART_KERNEL void operator()(index_t k) const {
+    ids[k] = float_to_bits(in[std::size_t{k} * width + width - 1]), order[k] = k;
+  }
+};
+
+struct unpack_kernel {
+  gaussians_view<float> scene;
+  float const* in;
+  index_t width;
+  u32 const* order;
+  GART_KERNEL void operator()(index_t k) const {
+    float const* const from = in + std::size_t{order[k]} * width;
+    index_t column = 0;
+    for_each_array(
+        [&](parameter_array const& a, float* values) {
+          index_t const n = a.width(scene.sh_degree);
+          for (index_t c = 0; c < n; ++c) values[std::size_t{k} * n + c] = from[column++];
+        },
+        scene);
+  }
+};
+
+template <index_t Coefficients>
+struct pack_sums_kernel {
+  float const *sh_gradient, *moments;
+  u32 const* order;
+  float* out;
+  GART_KERNEL void operator()(index_t k) const {
+    float* const to = out + std::size_t{order[k]} * (Coefficients + moment_stride);
+    for (index_t c = 0; c < Coefficients; ++c) to[c] = sh_gradient[std::size_t{k} * Coefficients + c];
+    for (index_t c = 0; c < moment_stride; ++c) to[Coefficients + c] = moments[std::size_t{k} * moment_stride + c];
+  }
+};
+
+// By where the row lay when it came.
+template <int Size>
+struct count_pairs_kernel {
+  footprint_slots const* ranges;
+  image_rows rows;
+  u32 const* order;
+  u32* counts;
+  GART_KERNEL void operator()(index_t k) const { counts[order[k]] = continued_pairs<Size>(ranges[k], rows); }
+};
+
+template <int ShDegree>
+struct pack_pairs_kernel {
+  static constexpr index_t coefficients = 3 * sh_basis<ShDegree>::size;
+  u64 const* pair_offsets;
+  quad const* rows;
+  u32 const* order;
+  u32 const* counts;
+  u64 const* places;
+  float* out;
+  GART_KERNEL void operator()(index_t k) const {
+    using row = pair_gradient<ShDegree>;
+    u32 const at = order[k];
+    for (u32 p = 0; p < counts[at]; ++p) {
+      float* const to = out + (places[at] + p) * (coefficients + moment_stride);
+      float const* const from = reinterpret_cast<float const*>(rows + (pair_offsets[k] + p) * row::quads);
+      for (index_t c = 0; c < coefficients; ++c) to[c] = from[c];
+      for (index_t c = 0; c < moment_stride; ++c) to[coefficients + c] = from[4 * row::sh_quads + c];
+    }
+  }
+};
+
+// One rank's sums to those of this rank's rows, or its pairs one after another.
+template <index_t Coefficients>
+struct add_sums_kernel {
+  u32 const* list;
+  float const* in;
+  u64 const* places;  // of the pairs of each; null where sums have no fixed order
+  u32 const* pairs;
+  float const* pairs_in;
+  float *sh_gradient, *moments;
+  GART_KERNEL void operator()(index_t k) const {
+    constexpr index_t width = Coefficients + moment_stride;
+    if (!places || pairs[k] == 0) return add(list[k], in + std::size_t{k} * width);
+    for (u32 p = 0; p < pairs[k]; ++p) add(list[k], pairs_in + (places[k] + p) * width);
+  }
+
+ private:
+  GART_HD void add(index_t row, float const* from) const {
+    float* const sh = sh_gradient + std::size_t{row} * Coefficients;
+    float* const m = moments + std::size_t{row} * moment_stride;
+    for (index_t c = 0; c < Coefficients; ++c) sh[c] += from[c];
+    for (index_t c = 0; c < moment_stride; ++c) m[c] += from[Coefficients + c];
+  }
+};
+
+}  // namespace gart::inline GART_ISA::detail

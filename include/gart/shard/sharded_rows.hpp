@@ -1,0 +1,225 @@
+#pragma once
+/// \file
+/// The rows of a scene that is spread over ranks (comm/row_owners.hpp), as densification asks for them
+/// (optim/rows.hpp: all_rows has the same members), and the way of whole models to the ranks and back.
+///
+/// What is drawn must not depend on the number of ranks: a word of each Gaussian goes to all, every rank draws as one
+/// alone would, and only the rows that are copied travel. Memory while it does: 4 bytes of each Gaussian of the scene
+/// for each such word. All ranks call the same members together.
+
+#include <gart/comm/communicator.hpp>
+#include <gart/optim/rows.hpp>
+
+#include <numeric>
+#include <vector>
+
+namespace gart::inline GART_ISA {
+
+namespace detail {
+
+// Words in the order of ranks to the order of Gaussians.
+struct interleave_kernel {
+  u32 const* by_rank;
+  u64 const* begin;  // of each rank's words
+  row_owners owners;
+  u32* out;
+  GART_KERNEL void operator()(index_t g) const { out[g] = by_rank[begin[owners.owner(g)] + owners.local(g)]; }
+};
+
+// Rows of a model to a buffer, or from it.
+struct pack_rows_body {
+  gaussians_view<float const> model;
+  u32 const* rows;
+  float* out;
+  index_t width;
+  GART_KERNEL void operator()(index_t k, index_t column) const {
+    out[std::size_t{k} * width + column] = row_element(model, rows[k], column);
+  }
+};
+struct unpack_rows_body {
+  gaussians_view<float> model;
+  u32 const* rows;
+  float const* in;
+  index_t width;
+  GART_KERNEL void operator()(index_t k, index_t column) const {
+    row_element(model, rows[k], column) = in[std::size_t{k} * width + column];
+  }
+};
+
+}  // namespace detail
+
+/// One message for each rank, of consecutive parts of a buffer: counts[r] elements of `bytes` to or from rank r.
+inline std::vector<message> messages_of(std::vector<u64> const& counts, void* data, std::size_t bytes) {
+  std::vector<message> out;
+  char* at = static_cast<char*>(data);
+  for (std::size_t r = 0; r < counts.size(); ++r) {
+    if (counts[r]) out.push_back({static_cast<int>(r), at, counts[r] * bytes});
+    at += counts[r] * bytes;
+  }
+  return out;
+}
+
+/// A group of messages, as a communicator takes them.
+inline span<message const> as_span(std::vector<message> const& m) { return {m.data(), m.size()}; }
+
+/// Comm: a communicator for E.
+template <execution E, class Comm>
+requires communicator<Comm, E>
+class sharded_rows {
+ public:
+  /// `block`: Gaussians that stay together.
+  sharded_rows(E& exec, Comm comm, index_t block)
+      : comm_(std::move(comm)),
+        owners_{comm_.size(), comm_.rank(), block},
+        gathered_(exec),
+        packed_(exec),
+        arrived_(exec) {}
+
+  /// Who has which.
+  row_owners owners() const { return owners_; }
+  /// Gaussians in all.
+  index_t total(index_t here) {
+    u64 sum = here;
+    comm_.all_reduce(span<u64>(&sum, 1));
+    require_count(sum);
+    return static_cast<index_t>(sum);
+  }
+  /// Of so many, those of this rank.
+  index_t here(index_t total) const { return owners_.owned(total); }
+
+  /// An element of each row that is here becomes one of each Gaussian, by number.
+  void gather(E& exec, buffer<u32, E>& words) {
+    index_t const total = this->total(static_cast<index_t>(words.size()));
+    std::vector<u64> const counts = counts_of(total);
+    std::vector<u64> begin(counts.size());
+    std::exclusive_scan(counts.begin(), counts.end(), begin.begin(), u64{0});
+    gathered_.resize(total);
+    std::vector<message> to;
+    for (int r = 0; r < owners_.ranks; ++r)
+      if (words.size()) to.push_back({r, words.data(), words.size() * sizeof(u32)});
+    comm_.exchange(exec, as_span(to), as_span(messages_of(counts, gathered_.data(), sizeof(u32))));
+    buffer<u64, E> const begins(exec, begin);
+    words.resize(total);
+    parallel_for(exec, "shard/interleave", total,
+                 detail::interleave_kernel{gathered_.data(), begins.data(), owners_, words.data()});
+    exec.synchronize();  // `begins` goes
+  }
+
+  /// Gaussian to[k] becomes a copy of from[k], by numbers, wherever they are; from[] and to[] have none in common.
+  void copy(E& exec, gaussians<E>& model, span<u32 const> from, span<u32 const> to) {
+    std::vector<u32> sources(from.size()), targets(to.size());
+    exec.copy_out(sources.data(), from.data(), from.size() * sizeof(u32));
+    exec.copy_out(targets.data(), to.data(), to.size() * sizeof(u32));
+    // In the order of the list on both sides.
+    auto const ranks = static_cast<std::size_t>(owners_.ranks);
+    std::vector<std::vector<u32>> leave(ranks), arrive(ranks);
+    for (std::size_t k = 0; k < sources.size(); ++k) {
+      if (owners_.owns(sources[k]))
+        leave[static_cast<std::size_t>(owners_.owner(targets[k]))].push_back(owners_.local(sources[k]));
+      if (owners_.owns(targets[k]))
+        arrive[static_cast<std::size_t>(owners_.owner(sources[k]))].push_back(owners_.local(targets[k]));
+    }
+    move_rows(exec, model, leave, model, arrive);
+  }
+
+  /// Rows leave[r] of `from` become rows arrive[s] of `to`: of each pair of ranks as many, in one order.
+  void move_rows(E& exec, gaussians<E> const& from, std::vector<std::vector<u32>> const& leave, gaussians<E>& to,
+                 std::vector<std::vector<u32>> const& arrive) {
+    index_t const width = row_width(from.sh_degree());
+    std::vector<u64> sent, received;
+    buffer<u32, E> const out(exec, joined(leave, sent)), in(exec, joined(arrive, received));
+    packed_.resize(out.size() * width), arrived_.resize(in.size() * width);
+    for_each_element(exec, "shard/pack", static_cast<index_t>(out.size()), from.sh_degree(),
+                     detail::pack_rows_body{from.view(), out.data(), packed_.data(), width});
+    comm_.exchange(exec, as_span(messages_of(sent, packed_.data(), width * sizeof(float))),
+                   as_span(messages_of(received, arrived_.data(), width * sizeof(float))));
+    for_each_element(exec, "shard/unpack", static_cast<index_t>(in.size()), from.sh_degree(),
+                     detail::unpack_rows_body{to.view(), in.data(), arrived_.data(), width});
+    exec.synchronize();  // the lists go
+  }
+
+  /// Of values of each Gaussian, `width` a row, those of this rank's rows.
+  template <class T>
+  std::vector<T> part_of(std::vector<T> const& all, std::size_t width) const {
+    std::vector<T> mine;
+    for_each_block(all.size() / width, owners_.rank, [&](std::size_t first, std::size_t count, std::size_t) {
+      mine.insert(mine.end(), all.begin() + offset(first * width), all.begin() + offset((first + count) * width));
+    });
+    return mine;
+  }
+  /// Of a whole model the rows of this rank.
+  gaussian_model part_of(gaussian_model const& all) const {
+    gaussian_model mine;
+    mine.sh_degree = all.sh_degree;
+    for_each_array(
+        [&](parameter_array const& a, auto& to, auto const& from) { to = part_of(from, a.width(all.sh_degree)); }, mine,
+        all);
+    return mine;
+  }
+
+  /// The way back: the rows of all ranks, on all ranks, or on `root` alone.
+  template <class T>
+  std::vector<T> whole_of(std::vector<T> const& mine, std::size_t width, int root = -1) {
+    u64 total = mine.size() / width;
+    comm_.all_reduce(span<u64>(&total, 1));
+    std::vector<u64> counts = counts_of(total);
+    bool const takes = root < 0 || root == owners_.rank;
+    std::vector<T> by_rank(takes ? total * width : 0), all(by_rank.size());
+    std::vector<message> to, from;
+    std::size_t at = 0;
+    for (int r = 0; r < owners_.ranks; ++r) {
+      std::size_t const n = counts[static_cast<std::size_t>(r)] * width;
+      if (!mine.empty() && (root < 0 || r == root))
+        to.push_back({r, const_cast<T*>(mine.data()), mine.size() * sizeof(T)});
+      if (takes && n) from.push_back({r, by_rank.data() + at, n * sizeof(T)});
+      at += n;
+    }
+    comm_.exchange(as_span(to), as_span(from));
+    at = 0;
+    for (int r = 0; takes && r < owners_.ranks; at += counts[static_cast<std::size_t>(r++)])
+      for_each_block(total, r, [&](std::size_t first, std::size_t count, std::size_t row) {
+        std::copy_n(by_rank.begin() + offset((at + row) * width), count * width, all.begin() + offset(first * width));
+      });
+    return all;
+  }
+  /// The same of a model.
+  gaussian_model whole_of(gaussian_model const& mine, int root = -1) {
+    gaussian_model all;
+    all.sh_degree = mine.sh_degree;
+    for_each_array([&](parameter_array const& a, auto& to,
+                       auto const& from) { to = whole_of(from, a.width(mine.sh_degree), root); },
+                   all, mine);
+    return all;
+  }
+
+ private:
+  static std::ptrdiff_t offset(std::size_t at) { return static_cast<std::ptrdiff_t>(at); }
+  std::vector<u64> counts_of(u64 total) const {
+    std::vector<u64> out;
+    for (int r = 0; r < owners_.ranks; ++r) out.push_back(owners_.owned(total, r));
+    return out;
+  }
+  static std::vector<u32> joined(std::vector<std::vector<u32>> const& lists, std::vector<u64>& counts) {
+    std::vector<u32> all;
+    for (auto const& one : lists) all.insert(all.end(), one.begin(), one.end()), counts.push_back(one.size());
+    return all;
+  }
+  // f(first Gaussian, how many, first row) for each block of a rank's.
+  template <class F>
+  void for_each_block(std::size_t total, int rank, F const& f) const {
+    std::size_t row = 0;
+    for (std::size_t first = static_cast<std::size_t>(rank) * owners_.block; first < total;
+         first += std::size_t{owners_.block} * static_cast<std::size_t>(owners_.ranks)) {
+      std::size_t const count = std::min<std::size_t>(owners_.block, total - first);
+      f(first, count, row);
+      row += count;
+    }
+  }
+
+  Comm comm_;
+  row_owners owners_;
+  buffer<u32, E> gathered_;
+  buffer<float, E> packed_, arrived_;
+};
+
+}  // namespace gart::inline GART_ISA

@@ -1,0 +1,88 @@
+#include "ranks.hpp"
+
+#include "commands.hpp"
+
+#if defined(GART_WITH_MPI)
+#include <gart/comm/mpi_comm.hpp>
+#endif
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <initializer_list>
+#include <memory>
+#include <thread>
+#include <vector>
+
+namespace gart_cli {
+
+namespace {
+
+// OpenMPI's mpirun; MPICH's and Intel's; Slurm's srun with PMIx says the rank alone.
+int first_of(std::initializer_list<char const*> names, int otherwise) {
+  for (char const* name : names)
+    if (char const* const value = std::getenv(name)) return std::atoi(value);
+  return otherwise;
+}
+
+#if defined(GART_WITH_MPI)
+std::unique_ptr<gart::mpi_comm>& started() {
+  static std::unique_ptr<gart::mpi_comm> all;
+  return all;
+}
+#endif
+
+}  // namespace
+
+int ranks::launched() { return first_of({"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"}, 1); }
+int ranks::launched_rank() {
+  return launched() > 1 ? first_of({"OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID"}, 0) : 0;
+}
+
+#if defined(GART_WITH_MPI)
+void ranks::start(bool wanted) {
+  if (!started() && (launched() > 1 || wanted)) started() = std::make_unique<gart::mpi_comm>();
+}
+gart::mpi_comm* ranks::comm() { return started().get(); }
+int ranks::size() { return comm() ? comm()->size() : 1; }
+std::string ranks::name() {
+  if (size() == 1) return {};
+  return "rank " + std::to_string(comm()->rank()) + " of " + std::to_string(size()) + " (" + comm()->host() + "): ";
+}
+void ranks::broadcast(void* data, std::size_t bytes) {
+  if (size() > 1) comm()->broadcast(data, bytes, 0);
+}
+gart::u64 ranks::largest(gart::u64 value) {
+  if (size() == 1) return value;
+  std::vector<gart::u64> all(static_cast<std::size_t>(size()));
+  comm()->all_gather(&value, all.data(), sizeof value);
+  return *std::max_element(all.begin(), all.end());
+}
+void ranks::barrier() {
+  if (size() > 1) comm()->barrier();
+}
+void ranks::end_all(int code) {
+  if (size() > 1) comm()->abort(code);
+  std::exit(code);
+}
+#else
+void ranks::start(bool wanted) {
+  if (launched() > 1 || wanted)
+    throw usage_error(
+        "this gart was built without MPI, and trains alone and a view a step (install libopenmpi-dev and "
+        "build it again, or start it without mpirun and with --batch 1)");
+}
+gart::mpi_comm* ranks::comm() { return nullptr; }
+int ranks::size() { return 1; }
+std::string ranks::name() { return {}; }
+void ranks::broadcast(void*, std::size_t) {}
+gart::u64 ranks::largest(gart::u64 value) { return value; }
+void ranks::barrier() {}
+void ranks::end_all(int code) { std::exit(code); }
+#endif
+
+void ranks::wait_to_speak() {
+  if (launched_rank() > 0) std::this_thread::sleep_for(std::chrono::seconds(1));
+}
+
+}  // namespace gart_cli

@@ -1,0 +1,50 @@
+#pragma once
+// The ranks that a launcher (mpirun, srun) started this program as. Rank 0 talks and writes; what one decides by its
+// clock or by a signal all do, because it is agreed on.
+
+#include <gart/core/types.hpp>
+
+#include <cstddef>
+#include <string>
+#include <type_traits>
+
+namespace gart {
+class mpi_comm;
+}
+
+namespace gart_cli {
+
+class ranks {
+ public:
+  // How many the launcher says it has started, and which one this is: 1 and 0 where there is none. Starts nothing.
+  static int launched();
+  static int launched_rank();
+
+  // Starts MPI where several were launched, or `wanted` says that one needs it. usage_error where this build has none.
+  static void start(bool wanted);
+  // Null where it was not started.
+  static gart::mpi_comm* comm();
+  static int size();
+  // "rank 2 of 4 (node1): " where there are several, else nothing.
+  static std::string name();
+
+  // Rank 0's, on all of them.
+  template <class T>
+  static T agreed(T value) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    broadcast(&value, sizeof value);
+    return value;
+  }
+  // The largest of all.
+  static gart::u64 largest(gart::u64 value);
+  static void barrier();
+  // After an error of this rank's: ends the others too. Where all have met the same error rank 0 is the one to say so,
+  // for which the others wait a second.
+  static void wait_to_speak();
+  [[noreturn]] static void end_all(int code);
+
+ private:
+  static void broadcast(void* data, std::size_t bytes);
+};
+
+}  // namespace gart_cli

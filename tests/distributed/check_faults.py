@@ -1,0 +1,117 @@
+"""A training on several ranks of which one dies or fails: all end within 30 s, what is said names the rank, and the
+checkpoint that was there before is whole: one rank goes on from it.
+
+usage: check_faults.py GART WORK_FOLDER LAUNCHER...     the launcher up to the number of ranks
+"""
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+gart, folder, launcher = sys.argv[1], pathlib.Path(sys.argv[2]), sys.argv[3:]
+shutil.rmtree(folder, ignore_errors=True)
+folder.mkdir(parents=True)
+capture = folder / "capture"
+
+
+def run(*command, **options):
+    return subprocess.run([str(c) for c in command], capture_output=True, text=True, timeout=120, **options)
+
+
+def expect(condition, what):
+    if not condition:
+        sys.exit(f"FAILED: {what}")
+
+
+def write_capture():
+    """Four views of nothing much, as transforms.json with PNGs that python alone can write."""
+    import json
+    import struct
+    import zlib
+    (capture / "images").mkdir(parents=True)
+
+    def png(width, height, value):
+        rows = b"".join(b"\0" + bytes((value + 3 * x + 5 * y) % 256 for x in range(width) for _ in range(3))
+                        for y in range(height))
+        chunk = lambda kind, data: (struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)))
+        return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
+                chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+
+    frames = []
+    for i in range(4):
+        name = f"images/{i}.png"
+        (capture / name).write_bytes(png(48, 40, 40 * i))
+        frames.append({"file_path": name, "transform_matrix": [[1, 0, 0, 0.3 * i], [0, 1, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]]})
+    (capture / "transforms.json").write_text(json.dumps(
+        {"fl_x": 50, "fl_y": 50, "cx": 24, "cy": 20, "w": 48, "h": 40, "frames": frames}))
+
+
+def options(out, steps):
+    return [gart, "train", capture, "--out", folder / out, "--iterations", steps, "--max-gaussians", 300, "--points", 200,
+            "--test-every", 0, "--sh-degree", 1, "--no-auto", "--background", "black", "--exposure", "off", "--threads", 1]
+
+
+def ranks_of(launch):
+    """Process by rank, of those that the launcher started."""
+    found = {}
+    for process in pathlib.Path("/proc").iterdir():
+        if not process.name.isdigit():
+            continue
+        try:
+            environment = (process / "environ").read_bytes().split(b"\0")
+            words = (process / "cmdline").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if os.fsencode(folder / "killed") not in words or os.path.basename(words[0]) != b"gart":
+            continue
+        for entry in environment:
+            if entry.startswith((b"OMPI_COMM_WORLD_RANK=", b"PMI_RANK=")):
+                found[int(entry.split(b"=")[1])] = int(process.name)
+    return found
+
+
+write_capture()
+
+# The same run by 1 and by 3 ranks, where sums have a fixed order, and what is said.
+alone = run(*launcher, 1, *options("alone", 60), "--batch", 2, "--backward", "deterministic")
+expect(alone.returncode == 0, f"1 rank: {alone.stderr}")
+three = run(*launcher, 3, *options("three", 60), "--batch", 2, "--backward", "deterministic")
+expect(three.returncode == 0, f"3 ranks: {three.stderr}")
+expect((folder / "alone/model.ply").read_bytes() == (folder / "three/model.ply").read_bytes(), "the models differ")
+expect((folder / "alone/checkpoint.gart").read_bytes() == (folder / "three/checkpoint.gart").read_bytes(),
+       "the checkpoints differ")
+expect(three.stdout.count("trained ") == 1 and three.stderr.count("3 ranks, ") == 1, f"rank 0 alone talks:\n{three.stderr}")
+
+# A rank that is killed.
+launch = subprocess.Popen([str(c) for c in [*launcher, 3, *options("killed", 1000000)]], stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, text=True)
+began = time.monotonic()
+while not (folder / "killed/checkpoint.gart").exists() or len(ranks_of(launch)) < 3:
+    expect(launch.poll() is None and time.monotonic() - began < 100, "the run does not begin")
+    time.sleep(0.1)
+time.sleep(1)
+os.kill(ranks_of(launch)[1], signal.SIGKILL)
+killed = time.monotonic()
+output = "".join(launch.communicate(timeout=60))
+print(f"all ended {time.monotonic() - killed:.1f} s after rank 1 was killed")
+expect(time.monotonic() - killed < 30, "the others did not end within 30 s")
+expect(launch.returncode != 0, "a killed rank is no success")
+expect("rank 1" in output, f"the message does not name rank 1:\n{output}")
+resumed = run(gart, "train", "--resume", "--out", folder / "killed", "--stop-at", 5, "--threads", 1)
+expect(resumed.returncode == 130, f"one rank does not go on from the checkpoint: {resumed.stderr}")
+
+# A rank that fails: it alone is told of a model that is not there.
+script = folder / "rank1.sh"
+script.write_text(f"""#!/bin/sh
+if [ "${{OMPI_COMM_WORLD_RANK:-$PMI_RANK}}" = 1 ]; then exec "$@" --start {folder}/no_such_model.ply; fi
+exec "$@"
+""")
+script.chmod(0o755)
+began = time.monotonic()
+failed = run(*launcher, 3, script, *options("failed", 100000))
+expect(time.monotonic() - began < 60 and failed.returncode != 0, "a rank that fails ends all")
+expect("rank 1 of 3" in failed.stderr and "no_such_model.ply" in failed.stderr, f"its message:\n{failed.stderr}")
+print("passed")

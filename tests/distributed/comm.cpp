@@ -1,0 +1,86 @@
+// A communicator's messages and sums, by MPI and by one rank alone.
+#include <doctest/doctest.h>
+
+#include <gart/comm/mpi_comm.hpp>
+#include <gart/comm/self_comm.hpp>
+#include <gart/exec/serial.hpp>
+
+#include <vector>
+
+using namespace gart;
+static_assert(communicator<self_comm, serial_exec> && communicator<mpi_comm, serial_exec>);
+
+namespace {
+
+template <class Comm>
+void check(Comm comm) {
+  serial_exec exec;
+  int const size = comm.size(), rank = comm.rank();
+  auto const n = static_cast<std::size_t>(size);
+  REQUIRE((rank >= 0 && rank < size));
+
+  // Each rank sends (rank + 1) words of 100 rank + to, to each; one message to itself among them, and none to the next.
+  std::vector<std::vector<u32>> out(n), in(n);
+  std::vector<message> sends, receives;
+  for (int r = 0; r < size; ++r) {
+    auto const k = static_cast<std::size_t>(r);
+    out[k].assign(static_cast<std::size_t>(rank) + 1, static_cast<u32>(100 * rank + r));
+    in[k].assign(k + 1, 0u);
+    sends.push_back({r, out[k].data(), out[k].size() * sizeof(u32)});
+    receives.push_back({r, in[k].data(), in[k].size() * sizeof(u32)});
+  }
+  comm.exchange(exec, {sends.data(), n}, {receives.data(), n});
+  for (int r = 0; r < size; ++r)
+    for (u32 const word : in[static_cast<std::size_t>(r)]) CHECK(word == static_cast<u32>(100 * r + rank));
+
+  // Two messages between the same ranks arrive in their order.
+  u32 const first = static_cast<u32>(rank), second = first + 1000;
+  u32 got[2] = {};
+  message const two[] = {{(rank + 1) % size, const_cast<u32*>(&first), 4},
+                         {(rank + 1) % size, const_cast<u32*>(&second), 4}};
+  message const from[] = {{(rank + size - 1) % size, got, 4}, {(rank + size - 1) % size, got + 1, 4}};
+  comm.exchange({two, 2}, {from, 2});
+  CHECK(got[0] == static_cast<u32>((rank + size - 1) % size));
+  CHECK(got[1] == got[0] + 1000);
+
+  double const mine[2] = {1.0 * rank, -2.0 * rank};
+  std::vector<double> all(2 * n);
+  comm.all_gather(mine, all.data(), sizeof mine);
+  for (std::size_t r = 0; r < n; ++r) {
+    CHECK(all[2 * r] == 1.0 * static_cast<double>(r));
+    CHECK(all[2 * r + 1] == -2.0 * static_cast<double>(r));
+  }
+
+  // In the order of ranks: 1 + 2^-53 + 2^-53 is 1, any other order is more.
+  double sum[1] = {rank == 0 ? 1.0 : 0x1p-53};
+  comm.all_reduce(span<double>(sum, 1));
+  CHECK(sum[0] == 1.0);
+  u64 counts[2] = {static_cast<u64>(rank) + 1, ~u64{0}};
+  comm.all_reduce(span<u64>(counts, 2));
+  CHECK(counts[0] == n * (n + 1) / 2);
+  CHECK(counts[1] == u64{0} - n);  // it wraps
+
+  CHECK(comm.exclusive_scan(static_cast<u64>(rank) + 1) == static_cast<u64>(rank) * (static_cast<u64>(rank) + 1) / 2);
+  for (int root = 0; root < size; ++root) {
+    int value = rank == root ? 7 + root : 0;
+    comm.broadcast(&value, sizeof value, root);
+    CHECK(value == 7 + root);
+  }
+  comm.barrier();
+}
+
+}  // namespace
+
+TEST_CASE("messages, sums and broadcasts between ranks") {
+  check(mpi_comm());
+  check(self_comm());
+}
+
+TEST_CASE("a rank that there is not is refused") {
+  mpi_comm comm;
+  int value = 0;
+  message const wrong{comm.size(), &value, sizeof value};
+  CHECK_THROWS_AS(comm.exchange({&wrong, 1}, {}), invalid_argument);
+  CHECK_THROWS_AS(comm.broadcast(&value, sizeof value, -1), invalid_argument);
+  CHECK_THROWS_AS(self_comm().exchange({&wrong, 1}, {}), invalid_argument);
+}

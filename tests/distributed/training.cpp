@@ -1,0 +1,234 @@
+// Training on the ranks that there are, held against the trainer of one: bit by bit where sums have a fixed order.
+#include <train/capture.hpp>
+
+#include <gart/comm/mpi_comm.hpp>
+#include <gart/exec/parallel.hpp>
+#include <gart/io/file.hpp>
+#include <gart/trace/bvh_tracer.hpp>
+#include <gart/trace/tile_tracer.hpp>
+#include <gart/train/trainer.hpp>
+
+#include <doctest/doctest.h>
+
+#include <unistd.h>
+
+using namespace gart;
+
+namespace {
+
+using exec_type = serial_exec;
+using tiles = tile_tracer<exec_type>;
+template <class Strategy, class Comm = self_comm, class Tracer = tiles>
+using trainer_of = trainer<exec_type, scene_traits<1>, Tracer, Strategy, Comm>;
+using plain = trainer_of<deterministic_strategy>;
+using shared = trainer_of<deterministic_strategy, mpi_comm>;
+
+// One rank that does all that several do.
+struct lone_comm : self_comm {
+  static constexpr bool alone = false;
+};
+
+train_options short_run(densify_kind densify) {
+  train_options o;
+  o.iterations = 300, o.max_gaussians = 230, o.densify = densify, o.background = background_kind::random;
+  o.error.from = 40, o.error.every = 20, o.mcmc.from = 40, o.mcmc.every = 20;
+  o.error.dead_opacity = o.mcmc.dead_opacity = 0.1f;  // so that some die
+  o.shard_block = 8;
+  return o;
+}
+
+bool same(std::vector<float> const& a, std::vector<float> const& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
+}
+bool same(gaussian_model const& a, gaussian_model const& b) {
+  bool equal = a.size() == b.size();
+  for_each_array([&](parameter_array const&, auto const& x, auto const& y) { equal = equal && same(x, y); }, a, b);
+  return equal;
+}
+
+double largest_difference(std::vector<float> const& a, std::vector<float> const& b) {
+  double most = 0, size = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    most = std::max(most, std::fabs(double{a[i]} - double{b[i]}));
+    size = std::max(size, std::fabs(double{b[i]}));
+  }
+  return size > 0 ? most / size : most;
+}
+
+// The gradients of all ranks' rows, in the order of numbers.
+template <class Trainer>
+gaussian_model all_gradients(Trainer& run, exec_type& exec, index_t block) {
+  return sharded_rows<exec_type, mpi_comm>(exec, mpi_comm(), block).whole_of(run.gradients().to_host());
+}
+
+}  // namespace
+
+TEST_CASE("by strips the bits are those of one rank, whatever the number of ranks") {
+  exec_type exec;
+  dataset const data = gart_test::capture(exec, 3);
+  for (densify_kind const densify : {densify_kind::error, densify_kind::mcmc}) {
+    train_options const options = short_run(densify);
+    gaussian_model const start = gart_test::cloud(11, 0.5f);
+    plain one(exec, options, data, start);
+    shared all(exec, options, data, start, mpi_comm());
+    while (one.steps_done() < options.iterations) {
+      step_report const a = one.step(), b = all.step();
+      REQUIRE(a.gaussians == b.gaussians);
+      REQUIRE(a.step == b.step);
+      REQUIRE(a.loss == b.loss);
+      REQUIRE(a.psnr == b.psnr);
+      if (a.step % 50 != 1) continue;
+      rendered const x = one.render(data.train[1].view, vec3(0.5f)), y = all.render(data.train[1].view, vec3(0.5f));
+      REQUIRE(same(x.color.data, y.color.data));
+      REQUIRE(same(x.depth.data, y.depth.data));
+      REQUIRE(x.hits.data == y.hits.data);
+    }
+    CHECK(one.model().size() == 230);  // it has grown
+    CHECK(same(one.model(), all.model()));
+    CHECK(same(one.state().second, all.state().second));
+    CHECK(same(one.state().error_sum, all.state().error_sum));
+    if (mpi_comm().size() > 1) CHECK(all.sent_bytes() > 0);
+  }
+}
+
+TEST_CASE("with sums in any order, gradients are as near as rounding") {
+  exec_type exec;
+  dataset const data = gart_test::capture(exec, 4);
+  train_options const options = short_run(densify_kind::none);
+  gaussian_model const start = gart_test::cloud(12, 0.5f);
+  auto const check = [&]<class Strategy, class Tracer>(Strategy, std::type_identity<Tracer>) {
+    trainer_of<Strategy, self_comm, Tracer> one(exec, options, data, start);
+    trainer_of<Strategy, mpi_comm, Tracer> all(exec, options, data, start, mpi_comm());
+    one.step(), all.step();
+    gaussian_model const a = all_gradients(all, exec, options.shard_block), b = one.gradients().to_host();
+    REQUIRE(a.size() == b.size());
+    for_each_array(
+        [&](parameter_array const& array, auto const& x, auto const& y) {
+          INFO(array.title);
+          CHECK(largest_difference(x, y) < 1e-6);
+        },
+        a, b);
+  };
+  check(primitive_strategy(), std::type_identity<tiles>());
+  check(pixel_strategy(), std::type_identity<bvh_tracer<exec_type>>());  // rows by their tracers' rays
+}
+
+TEST_CASE("a batch is the mean of its views, the same for any number of ranks") {
+  exec_type exec;
+  dataset const data = gart_test::capture(exec, 5);
+  train_options options = short_run(densify_kind::none);
+  gaussian_model const start = gart_test::cloud(13, 0.5f);
+  options.batch = 3;
+  shared all(exec, options, data, start, mpi_comm());
+  float const loss = all.step().loss;
+  CHECK(all.steps_done() == 3);
+  gaussian_model const mean = all_gradients(all, exec, options.shard_block);
+  std::vector<double> opacity(start.size()), place(start.mean.size());
+  double losses = 0;
+  train_options single = options;
+  single.batch = 1;
+  for (int image = 0; image < 3; ++image) {
+    plain one(exec, single, data, start);
+    training_state state = one.state();
+    state.step = image;
+    one.set_state(state);
+    losses += double{one.step().loss} / 3;
+    gaussian_model const g = one.gradients().to_host();
+    for (std::size_t i = 0; i < opacity.size(); ++i) opacity[i] += double{g.opacity[i]} / 3;
+    for (std::size_t i = 0; i < place.size(); ++i) place[i] += double{g.mean[i]} / 3;
+  }
+  CHECK(double{loss} == doctest::Approx(losses).epsilon(1e-6));
+  CHECK(largest_difference(mean.opacity, std::vector<float>(opacity.begin(), opacity.end())) < 1e-6);
+  CHECK(largest_difference(mean.mean, std::vector<float>(place.begin(), place.end())) < 1e-6);
+
+  for (densify_kind const densify : {densify_kind::error, densify_kind::mcmc}) {
+    train_options grown = short_run(densify);
+    grown.batch = 3, grown.iterations = 150;
+    trainer_of<deterministic_strategy, lone_comm> one(exec, grown, data, start);
+    shared many(exec, grown, data, start, mpi_comm());
+    while (many.steps_done() < grown.iterations) REQUIRE(one.step().loss == many.step().loss);
+    CHECK(many.model().size() == 230);
+    CHECK(same(one.model(), many.model()));
+  }
+}
+
+TEST_CASE("a checkpoint is one file of today's format, and goes on with any number of ranks") {
+  exec_type exec;
+  mpi_comm ranks;
+  dataset const data = gart_test::capture(exec, 6);
+  train_options const options = short_run(densify_kind::error);
+  gaussian_model const start = gart_test::cloud(14, 0.5f);
+  std::string const name = "distributed_" + std::to_string(ranks.size()) + "_";
+  std::string const by_all = name + "all.gart", by_one = name + std::to_string(ranks.rank()) + ".gart";
+  shared all(exec, options, data, start, ranks);
+  plain one(exec, options, data, start);
+  while (one.steps_done() < 90) one.step(), all.step();
+  all.save(by_all), one.save(by_one);
+  auto const bytes = [](std::string const& path) { return read_file(path); };
+  CHECK(bytes(by_all) == bytes(by_one));
+  shared resumed(exec, options, data, start, ranks);
+  resumed.load(by_one);
+  plain alone(exec, options, data, start);
+  alone.load(by_all);
+  while (one.steps_done() < 150) one.step(), resumed.step(), alone.step();
+  CHECK(same(one.model(), resumed.model()));
+  CHECK(same(one.model(), alone.model()));
+  ranks.barrier();
+  ::unlink(by_one.c_str());
+  if (ranks.rank() == 0) ::unlink(by_all.c_str());
+}
+
+TEST_CASE("more ranks than Gaussians, than rows of tiles, than anything to see") {
+  exec_type exec;
+  dataset data = gart_test::capture(exec, 7);
+  train_options options = short_run(densify_kind::none);
+  options.shard_block = 1;
+  auto const check = [&](gaussian_model const& start, int steps) {
+    plain one(exec, options, data, start);
+    shared all(exec, options, data, start, mpi_comm());
+    for (int i = 0; i < steps; ++i) REQUIRE(one.step().loss == all.step().loss);
+    CHECK(same(one.model(), all.model()));
+  };
+  gaussian_model two = gart_test::cloud(15, 0.5f);
+  for_each_array([](parameter_array const& a, auto& values) { values.resize(2 * a.width(1)); }, two);
+  check(two, 20);
+  gaussian_model behind = two;  // of all cameras
+  for (float& x : behind.mean) x = 1000;
+  check(behind, 3);
+  gaussian_model none;
+  none.resize(0, 1);
+  check(none, 3);
+  for (auto& view : data.train) {  // a row of tiles, not whole
+    view.view.height = 5, view.view.cy = 2.5f;
+    view.image.height = 5, view.image.data.resize(static_cast<std::size_t>(view.view.width) * 5 * 3);
+  }
+  check(gart_test::cloud(16, 0.5f), 5);
+}
+
+TEST_CASE("what several ranks do not train yet is refused by field") {
+  exec_type exec;
+  dataset const data = gart_test::capture(exec, 8);
+  train_options const good = short_run(densify_kind::none);
+  auto const refused = [&](train_options options, char const* field) {
+    options.batch = std::max(options.batch, 2);
+    try {
+      shared run(exec, options, data, gart_test::cloud(1, 0.5f), mpi_comm());
+      FAIL("not refused");
+    } catch (invalid_argument const& e) {
+      CHECK(std::string(e.what()).find(field) != std::string::npos);
+    }
+  };
+  train_options o = good;
+  o.densify = densify_kind::adc;
+  refused(o, "train_options.densify");
+  o = good, o.refine_poses = true;
+  refused(o, "train_options.refine_poses");
+  o = good, o.exposure = true;
+  refused(o, "train_options.exposure");
+  o = good, o.shard_block = 0;
+  refused(o, "train_options.shard_block");
+  o = good, o.batch = -1;
+  CHECK_THROWS_AS(shared(exec, o, data, gart_test::cloud(1, 0.5f), mpi_comm()), invalid_argument);
+  o.batch = 2;
+  CHECK_THROWS_AS(plain(exec, o, data, gart_test::cloud(1, 0.5f)), invalid_argument);
+}
