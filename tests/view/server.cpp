@@ -131,7 +131,10 @@ frame frame_of(std::string const& bytes) {
   return {json::parse(bytes.substr(4, length)), bytes.substr(4 + length)};
 }
 
-bool is(std::string const& answer, int status) { return answer.find("HTTP/1.1 " + std::to_string(status)) == 0; }
+// Refusals of an upgrade are HTTP/1.0.
+bool is(std::string const& answer, int status) {
+  return answer.substr(0, 7) == "HTTP/1." && answer.substr(8, 5) == " " + std::to_string(status) + " ";
+}
 
 }  // namespace
 
