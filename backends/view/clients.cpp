@@ -93,12 +93,13 @@ bool clients::take_text(int id, std::string& to) {
   return !to.empty();
 }
 
-bool clients::take_frame(int id, std::vector<u8>& to) {
+bool clients::take_frame(int id, std::vector<u8>& to, double now) {
   std::lock_guard const lock(mutex_);
   auto const found = clients_.find(id);
   if (found == clients_.end() || found->second.frame.empty()) return false;
   to = std::exchange(found->second.frame, {});
-  changed_.notify_all();  // the next one may be rendered
+  found->second.view_time = now;  // who moves on sends the next view when this one is there
+  changed_.notify_all();          // the next one may be rendered
   return true;
 }
 

@@ -201,7 +201,7 @@ struct sockets::state {
     if (all.take_text(c.client, text)) {
       std::vector<u8> bytes = padded(reinterpret_cast<u8 const*>(text.data()), text.size());
       if (send(wsi, bytes, LWS_WRITE_TEXT) != 0) return -1;
-    } else if (std::vector<u8> frame; all.take_frame(c.client, frame)) {
+    } else if (std::vector<u8> frame; all.take_frame(c.client, frame, seconds_now())) {
       std::vector<u8> bytes = padded(frame.data(), frame.size());
       if (send(wsi, bytes, LWS_WRITE_BINARY) != 0) return -1;
     }
