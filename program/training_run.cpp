@@ -15,8 +15,10 @@ namespace fs = std::filesystem;
 
 int training_run::run() {
   prepare();
+  serve();
   std::optional<interrupt_guard> interrupt(std::in_place);  // until a run that it stops is saved
   bool const finished = train(*interrupt);
+  view_.reset();  // there is nothing to see any more
   stopwatch const saving;
   save();
   save_seconds_ += saving.seconds();
@@ -87,6 +89,7 @@ void training_run::share_out() {
   if (a_.parallel == "views" && a_.batch == 1 && !a_.resume) a_.batch = ranks::size();
   ranks::start(a_.batch > 1);
   if (ranks::size() == 1) return;
+  if (a_.viewed) throw usage_error("--view shows the training of one rank: leave it out, or start one rank");
   say_.note(std::to_string(ranks::size()) + " ranks, each a part of the Gaussians and of every step: " +
             (a_.batch == 1 ? "strips of a view" : "a batch of " + std::to_string(a_.batch) + " views"));
 }
