@@ -12,6 +12,14 @@ function ticksOf(low, high, n) {
   return ticks;
 }
 
+// 1, 2 and 5 of each power of ten; the powers alone where those are many.
+function logTicks(low, high) {
+  const steps = high - low > 2 ? [1] : [1, 2, 5], ticks = [];
+  for (let power = Math.floor(low); power <= high; ++power)
+    for (const k of steps) if (power + Math.log10(k) >= low && power + Math.log10(k) <= high) ticks.push(k * 10 ** power);
+  return ticks;
+}
+
 export function drawChart(canvas, points, {color, logarithmic, dots, describe}) {
   const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
   if (!width || !height) return;
@@ -32,9 +40,7 @@ export function drawChart(canvas, points, {color, logarithmic, dots, describe}) 
   draw.font = '10.5px system-ui, sans-serif';
   draw.lineWidth = 1;
   const rule = style.getPropertyValue('--rule'), soft = style.getPropertyValue('--soft');
-  const ticks = logarithmic
-    ? ticksOf(low, high, 3).map((t) => 10 ** t)
-    : ticksOf(low, high, 3);
+  const ticks = logarithmic ? logTicks(low, high) : ticksOf(low, high, 3);
   for (const t of ticks) {
     draw.strokeStyle = rule;
     draw.beginPath();

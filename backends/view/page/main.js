@@ -84,8 +84,8 @@ function welcome(message) {
   $('state').textContent = hello.right === 'control' ? 'Connected' : 'Connected, to look';
   $('name').textContent = hello.model.name;
   document.title = `${hello.model.name} – gart`;
-  $('about').textContent =
-    `${count(hello.model.gaussians)} Gaussians, SH degree ${hello.model.sh_degree}, kernel degree ${hello.model.kernel_degree}`;
+  const {gaussians, sh_degree: bands, kernel_degree: kernel} = hello.model;
+  $('about').textContent = `${count(gaussians)} Gaussians, SH degree ${bands}${kernel === 2 ? '' : `, kernel degree ${kernel}`}`;
   $('frame-id').title = `gart ${hello.gart}`;
   frusta = frustaOf(cameras, hello.model.extent);
   list.fill(cameras);

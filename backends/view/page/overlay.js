@@ -55,6 +55,9 @@ export function penFor(canvas, camera, pose, rect) {
       draw.beginPath();
       draw.arc(here[0], here[1], radius, 0, 2 * Math.PI);
       draw.fill();
+      draw.lineWidth = 1.5;
+      draw.strokeStyle = 'rgba(0, 0, 0, 0.55)';
+      draw.stroke();
       return here;
     },
     label(text, [x, y]) {
