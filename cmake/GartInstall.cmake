@@ -20,13 +20,14 @@ set(_package_of_TurboJPEG::TurboJPEG "TurboJPEG")
 set(_package_of_ZLIB::ZLIB "ZLIB")
 set(_package_of_ZSTD::ZSTD "ZSTD")
 set(_package_of_WebP::WebP "WebP")
+set(_package_of_Libwebsockets::Libwebsockets "Libwebsockets")
 set(_package_of_embree "embree")
 set(_package_of_CUDA::cudart "CUDAToolkit")
 set(_package_of_CUDA::cudart_static "CUDAToolkit")
 
 set(_components)
 set(_config_components)
-foreach(component IN ITEMS headers io runtime reference cpu embree cuda all)
+foreach(component IN ITEMS headers io runtime view reference cpu embree cuda all)
   set(target gart_${component})
   set(exported_name ${component})
   if(component STREQUAL "headers")
@@ -56,7 +57,7 @@ foreach(component IN ITEMS headers io runtime reference cpu embree cuda all)
     endif()
     if(name STREQUAL "gart")
       list(APPEND needs headers)
-    elseif(name MATCHES "^gart_(io|runtime|reference|cpu|embree|cuda)$")
+    elseif(name MATCHES "^gart_(io|runtime|view|reference|cpu|embree|cuda)$")
       list(APPEND needs ${CMAKE_MATCH_1})
     elseif(DEFINED _package_of_${name})
       list(APPEND packages "${_package_of_${name}}")
@@ -91,5 +92,5 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/gartConfig.cmake.in ${
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/gartConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/gartConfig.cmake ${PROJECT_BINARY_DIR}/gartConfigVersion.cmake
               ${PROJECT_SOURCE_DIR}/backends/io/FindTurboJPEG.cmake ${PROJECT_SOURCE_DIR}/backends/io/FindZSTD.cmake
-              ${PROJECT_SOURCE_DIR}/backends/io/FindWebP.cmake
+              ${PROJECT_SOURCE_DIR}/backends/io/FindWebP.cmake ${PROJECT_SOURCE_DIR}/backends/view/FindLibwebsockets.cmake
         DESTINATION ${_package_dir})

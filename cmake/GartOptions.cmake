@@ -25,9 +25,10 @@ option(GART_BUILD_FUZZ "Build the fuzzers of the readers (Clang; tests/fuzz/READ
 
 set(GART_CUDA AUTO CACHE STRING "CUDA policy: ON, OFF, or AUTO (where nvcc is found)")
 set(GART_EMBREE AUTO CACHE STRING "Embree tracer: ON, OFF, or AUTO (where Embree is found)")
+set(GART_VIEW AUTO CACHE STRING "The viewer's server: ON, OFF, or AUTO (where libwebsockets is found)")
 if(NOT GART_BUILD_BACKENDS)
   foreach(_option IN ITEMS GART_BUILD_PROGRAM GART_VARIANTS GART_BUILD_EXAMPLES GART_BUILD_TESTS GART_BUILD_BENCH
-                           GART_BUILD_FUZZ GART_CUDA GART_EMBREE)
+                           GART_BUILD_FUZZ GART_CUDA GART_EMBREE GART_VIEW)
     if(${_option} AND NOT "${${_option}}" STREQUAL "AUTO")
       message(FATAL_ERROR "${_option} is ${${_option}} and needs the libraries, which GART_BUILD_BACKENDS=OFF leaves out: "
                           "configure with -D${_option}=OFF, or with -DGART_BUILD_BACKENDS=ON")
@@ -35,6 +36,7 @@ if(NOT GART_BUILD_BACKENDS)
   endforeach()
   set(GART_CUDA OFF)
   set(GART_EMBREE OFF)
+  set(GART_VIEW OFF)
 endif()
 
 include(CheckLanguage)
@@ -96,4 +98,12 @@ if(GART_EMBREE STREQUAL "AUTO")
   set(GART_EMBREE ${embree_FOUND})
 elseif(GART_EMBREE)
   find_package(embree REQUIRED)
+endif()
+
+list(APPEND CMAKE_MODULE_PATH ${PROJECT_SOURCE_DIR}/backends/view)
+if(GART_VIEW STREQUAL "AUTO")
+  find_package(Libwebsockets QUIET)
+  set(GART_VIEW ${Libwebsockets_FOUND})
+elseif(GART_VIEW)
+  find_package(Libwebsockets REQUIRED)
 endif()

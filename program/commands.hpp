@@ -35,6 +35,7 @@ struct usage_error : gart::error {
 
 void add_train(CLI::App& app, command& selected);
 void add_render(CLI::App& app, command& selected);
+void add_view(CLI::App& app, command& selected);
 void add_eval(CLI::App& app, command& selected);
 void add_synth(CLI::App& app, command& selected);
 void add_bench(CLI::App& app, command& selected);

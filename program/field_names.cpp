@@ -4,6 +4,7 @@
 #include <gart/render/options.hpp>
 #include <gart/runtime/session.hpp>
 #include <gart/train/options.hpp>
+#include <gart/view/server.hpp>
 
 namespace gart_cli {
 
@@ -46,6 +47,8 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(configuration_request, tile_size), "--tile-size"},
       {GART_CLI_FIELD(configuration_request, window), "--window"},
       {GART_CLI_FIELD(configuration_request, depth), "--depth-weight"},
+      {GART_CLI_FIELD(view_server_options, listen), "--listen"},
+      {GART_CLI_FIELD(view_server_options, port), "--port"},
   };
   return names;
 }

@@ -55,6 +55,7 @@ int main(int argc, char** argv) {
   command selected;
   add_train(app, selected);
   add_render(app, selected);
+  add_view(app, selected);
   add_eval(app, selected);
   add_bench(app, selected);
   add_tradeoff(app, selected);

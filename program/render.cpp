@@ -9,6 +9,7 @@
 #include <gart/io/dataset.hpp>
 #include <gart/io/exposure_file.hpp>
 #include <gart/io/image_file.hpp>
+#include <gart/view/camera_path.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -24,15 +25,37 @@ namespace {
 namespace fs = std::filesystem;
 
 struct render_arguments {
-  fs::path model, cameras, out, json, exposures;
+  fs::path model, cameras, path, out, json, exposures;
   configuration_options configuration;
   std::string background = "black", camera;
-  int downscale = 1, samples = 1;
+  int downscale = 1, samples = 1, frames = 0;
+  bool closed = false;
   float alpha_min = -1, t_min = -1;
   int max_hits = -1;
   image_choice images;
   bool depth = false, quiet = false;
 };
+
+// Those of the file, or the frames of the path through those of the other one.
+std::vector<gart::named_camera> cameras_of(render_arguments const& a) {
+  if (a.path.empty() == a.cameras.empty())
+    throw usage_error(a.path.empty() ? "CAMERAS is missing (name a dataset or a camera JSON, or --path FILE)"
+                                     : "CAMERAS and --path: give one of both");
+  if (a.path.empty()) {
+    if (a.frames > 0 || a.closed) throw usage_error("--frames and --closed are of a --path: name its keyframes");
+    return gart::load_cameras(a.cameras);
+  }
+  if (a.frames < 2) throw usage_error("--path: how many frames? (give --frames 2 or more)");
+  std::vector<gart::camera> keyframes;
+  for (gart::named_camera const& c : gart::load_cameras(a.path)) keyframes.push_back(c.view);
+  std::vector<gart::named_camera> cameras;
+  char name[32];
+  for (gart::camera const& view : gart::smooth_path(keyframes, a.frames, a.closed)) {
+    std::snprintf(name, sizeof name, "frame_%05zu", cameras.size());
+    cameras.push_back({name, view});
+  }
+  return cameras;
+}
 
 int run_render(render_arguments const& a) {
   image_choice images = a.images;
@@ -41,7 +64,7 @@ int run_render(render_arguments const& a) {
   if (images.has("hits") && a.samples > 1)
     throw usage_error("--images hits: a mean over --samples counts no hits (leave one of them out)");
   gart::model_file file = gart::load_model(a.model);
-  auto cameras = gart::load_cameras(a.cameras);
+  auto cameras = cameras_of(a);
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   prepare_folder(a.out);
   if (!a.json.empty()) prepare_file(a.json);
@@ -114,8 +137,16 @@ void add_render(CLI::App& app, command& selected) {
                    "A dataset (all its views), or a JSON list of {\"name\", \"width\",\n"
                    "\"height\", \"fx\", \"fy\", \"cx\", \"cy\", \"c2w\"}, in pixels, camera to world\nwith x right, y "
                    "down, z forward")
-      ->type_name("")
-      ->required();
+      ->type_name("");
+  render
+      ->add_option("--path", a->path,
+                   "In place of CAMERAS: keyframes, as a camera JSON. The images are\nframe_00000 and so on along a "
+                   "smooth path through them")
+      ->type_name("FILE");
+  render->add_option("--frames", a->frames, "Images along --path, evenly in time")
+      ->type_name("N")
+      ->check(between(2, 1e6));
+  render->add_flag("--closed", a->closed, "--path goes on from the last keyframe to the first");
   render->add_option("--out", a->out, "Folder of the images; made where there is none")->type_name("DIR")->required();
   render
       ->add_option("--camera", a->camera,
@@ -173,7 +204,9 @@ void add_render(CLI::App& app, command& selected) {
       "\nWrites DIR/NAME.png for each camera, NAME as the dataset or file has it. The first view pays for the start.\n"
       "\nExamples:\n"
       "  gart render run/model.ply lego --out images --background white\n"
-      "  gart render scene.ply path.json --out frames --images colour,depth,normal --json timings.json");
+      "  gart render scene.ply path.json --out frames --images colour,depth,normal --json timings.json\n"
+      "  gart render run/model.ply --path keyframes.json --frames 240 --out film\n"
+      "  ffmpeg -framerate 30 -i film/frame_%05d.png film.mp4      makes a video of it");
   render->callback([a, &selected] { selected = [a] { return run_render(*a); }; });
 }
 

@@ -12,13 +12,6 @@
 
 namespace gart_cli {
 
-// The mean distance of what each pixel sees, along its ray; 0 where it sees less than half.
-gart::image_float mean_distances(gart::rendered const& r);
-
-// Normals of the surface that the distances make, in the world's axes, towards the camera: [H][W][3], zero where a
-// pixel or both of its neighbours in a direction have no distance.
-gart::image_float normals_of(gart::image_float const& distances, gart::camera const& view);
-
 struct image_choice {
   std::string images = "colour";  // names, by commas
   std::string format = "png";     // of all but colour: png or npy

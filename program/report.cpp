@@ -6,6 +6,7 @@
 
 #include <gart/core/version.hpp>
 #include <gart/io/image_file.hpp>
+#include <gart/view/image_modes.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -33,27 +34,10 @@ std::string base64(std::vector<gart::u8> const& bytes) {
   return text;
 }
 
-// Dark violet over red to pale yellow: lightness rises with the error, so that it also reads in grey.
-struct color_stop {
-  float r, g, b;
-};
-constexpr color_stop error_colors[] = {{10, 8, 26},   {74, 20, 96},   {150, 38, 96},
-                                       {218, 76, 62}, {249, 149, 54}, {252, 240, 170}};
-constexpr int last_color = 5;
-
-void put_error_color(float share, gart::u8* rgb) {
-  float const at = std::clamp(share, 0.0f, 1.0f) * last_color;
-  int const i = std::min(static_cast<int>(at), last_color - 1);
-  float const f = at - static_cast<float>(i);
-  color_stop const &a = error_colors[i], &b = error_colors[i + 1];
-  rgb[0] = static_cast<gart::u8>(a.r + f * (b.r - a.r));
-  rgb[1] = static_cast<gart::u8>(a.g + f * (b.g - a.g));
-  rgb[2] = static_cast<gart::u8>(a.b + f * (b.b - a.b));
-}
-
 std::string error_gradient() {
   std::string css = "linear-gradient(90deg";
-  for (auto const& c : error_colors) css += ", rgb(" + fixed(c.r, 0) + "," + fixed(c.g, 0) + "," + fixed(c.b, 0) + ")";
+  for (auto const& c : gart::error_colors)
+    css += ", rgb(" + std::to_string(c[0]) + "," + std::to_string(c[1]) + "," + std::to_string(c[2]) + ")";
   return css + ")";
 }
 
@@ -151,7 +135,7 @@ std::string pictures(json const& m, std::vector<report_view> const& views) {
                                 : "All " + std::to_string(total) + ", also in renders/.") +
           "</p><div class=\"heads\"><span>Render</span><span>Photograph</span><span>Absolute error 0"
           "<i class=\"scale\" style=\"background:" +
-          error_gradient() + "\"></i>" + fixed(report_error_scale, 2) + "</span></div>";
+          error_gradient() + "\"></i>" + fixed(gart::usual_error_scale, 2) + "</span></div>";
   for (auto const& v : views) {
     std::string const name = html_escape(v.name);
     auto const image = [&](std::vector<gart::u8> const& jpeg, char const* what) {
@@ -289,13 +273,13 @@ bool in_report(std::size_t index, std::size_t total) {
 
 report_view make_report_view(std::string const& name, double psnr, double ssim, gart::image_float const& render,
                              gart::image_float const& truth) {
-  gart::image8 error(render.width, render.height, 3);
-  std::size_t const pixels = static_cast<std::size_t>(render.width) * render.height;
-  for (std::size_t p = 0; p < pixels; ++p) {
+  gart::image_float difference(render.width, render.height, 1);
+  for (std::size_t p = 0; p < difference.data.size(); ++p) {
     float sum = 0;
     for (int c = 0; c < 3; ++c) sum += std::abs(render.data[3 * p + c] - truth.data[3 * p + c]);
-    put_error_color(sum / 3 / report_error_scale, error.data.data() + 3 * p);
+    difference.data[p] = sum / 3;
   }
+  gart::image8 const error = gart::error_in_colors(difference, gart::usual_error_scale);
   int const factor = std::max(1, (render.width + widest_image - 1) / widest_image);
   auto const jpeg = [&](gart::image8 const& image) {
     return gart::encode_jpeg(factor > 1 ? gart::box_downscale(image, factor) : image, 88);

@@ -23,10 +23,9 @@ struct report_view {
 // Views that the page has room for, out of `total`: at most 12, evenly spread.
 bool in_report(std::size_t index, std::size_t total);
 // Scaled down by a whole factor where the images are wide. The error is the mean over channels of |render - truth|,
-// coloured over [0, report_error_scale].
+// coloured over [0, gart::usual_error_scale].
 report_view make_report_view(std::string const& name, double psnr, double ssim, gart::image_float const& render,
                              gart::image_float const& truth);
-inline constexpr float report_error_scale = 0.25f;
 
 std::string report_page(nlohmann::json const& metrics, nlohmann::json const& config, history const& course,
                         std::vector<report_view> const& views);

@@ -48,23 +48,45 @@ bool is_json_list(fs::path const& file) {
   return false;
 }
 
+namespace {
+
+named_camera camera_of(record const& r) {
+  named_camera c;
+  c.view.width = r.size("width"), c.view.height = r.size("height");
+  camera_format const* const model = camera_model_of(r, "PINHOLE");
+  c.view.kind = *model->kind;
+  if (c.view.kind != camera_kind::equirectangular)
+    for (char const* key : {"fx", "fy", "cx", "cy"}) set_member(c.view, key, r.number(key));
+  read_lens_members(r, *model, c.view);
+  read_pose(r, "c2w", false, c.view);
+  check_camera(c.view, r.where);
+  return c;
+}
+
+json object_of(named_camera const& c) {
+  camera const& v = c.view;
+  camera_fields const fields = fields_of(v);
+  json one = {{"name", c.name}, {"width", v.width}, {"height", v.height}};
+  if (fields.model != "PINHOLE") one["camera_model"] = fields.model;
+  for (auto const& [key, value] : fields.values) one[key] = value;
+  json rows = json::array();
+  for (int i = 0; i < 3; ++i) rows.push_back({v.rotation[0][i], v.rotation[1][i], v.rotation[2][i], v.position[i]});
+  rows.push_back({0, 0, 0, 1});
+  one["c2w"] = rows;
+  return one;
+}
+
+}  // namespace
+
 std::vector<named_camera> read_camera_json(fs::path const& file) {
   json const root = read_json(file);
   std::vector<named_camera> cameras;
   for (std::size_t i = 0; i < root.size(); ++i) {
     record const r{root[i], nullptr, file.string() + ", camera " + std::to_string(i)};
     if (!r.own.is_object()) throw io_error(r.where, "is not a JSON object", "write {\"name\", \"width\", ...}");
-    named_camera c;
-    c.name = r.text("name");
-    c.view.width = r.size("width"), c.view.height = r.size("height");
-    camera_format const* const model = camera_model_of(r, "PINHOLE");
-    c.view.kind = *model->kind;
-    if (c.view.kind != camera_kind::equirectangular)
-      for (char const* key : {"fx", "fy", "cx", "cy"}) set_member(c.view, key, r.number(key));
-    read_lens_members(r, *model, c.view);
-    read_pose(r, "c2w", false, c.view);
-    check_camera(c.view, r.where);
-    cameras.push_back(std::move(c));
+    std::string const name = r.text("name");
+    cameras.push_back(camera_of(r));
+    cameras.back().name = name;
   }
   if (cameras.empty()) throw io_error(file.string(), "holds no camera", "add one");
   std::vector<std::string*> names;
@@ -123,21 +145,28 @@ camera seen_through(camera const& view, std::string const& text) {
   return c;
 }
 
+std::string camera_json(named_camera const& camera) {
+  return io::object_of(camera).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+named_camera parse_camera_json(std::string_view object, std::string const& where) {
+  io::json root;
+  try {
+    root = io::json::parse(object);
+  } catch (io::json::exception const& e) {
+    throw io_error(where, std::string("is not valid JSON: ") + e.what(), "write {\"width\", ...}");
+  }
+  io::record const r{root, nullptr, where};
+  if (!r.own.is_object()) throw io_error(where, "is not a JSON object", "write {\"width\", ...}");
+  named_camera c = io::camera_of(r);
+  if (r.has("name")) c.name = r.text("name");
+  return c;
+}
+
 void write_cameras(std::filesystem::path const& path, std::vector<named_camera> const& cameras) {
   using nlohmann::json;
   json out = json::array();
-  for (named_camera const& c : cameras) {
-    camera const& v = c.view;
-    camera_fields const fields = fields_of(v);
-    json one = {{"name", c.name}, {"width", v.width}, {"height", v.height}};
-    if (fields.model != "PINHOLE") one["camera_model"] = fields.model;
-    for (auto const& [key, value] : fields.values) one[key] = value;
-    json rows = json::array();
-    for (int i = 0; i < 3; ++i) rows.push_back({v.rotation[0][i], v.rotation[1][i], v.rotation[2][i], v.position[i]});
-    rows.push_back({0, 0, 0, 1});
-    one["c2w"] = rows;
-    out.push_back(one);
-  }
+  for (named_camera const& c : cameras) out.push_back(io::object_of(c));
   write_file(path, out.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 

@@ -33,3 +33,7 @@
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
 #include <gart/train/trainer.hpp>
+#include <gart/view/camera_path.hpp>
+#include <gart/view/image_modes.hpp>
+#include <gart/view/pacing.hpp>
+#include <gart/view/server.hpp>

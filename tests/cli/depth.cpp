@@ -1,7 +1,7 @@
 // Depth through the program: maps to train on, and images of more than colour.
 #include "program.hpp"
 
-#include <render_images.hpp>
+#include <gart/view/image_modes.hpp>
 
 #include <gart/camera/models.hpp>
 #include <gart/io/depth_file.hpp>
@@ -104,7 +104,7 @@ TEST_CASE("normals are those of the surface, up to its edges") {
     }
   }
   map.at(5, 5, 0) = 0;
-  auto const normals = gart_cli::normals_of(map, view);
+  auto const normals = gart::normals_of(map, view);
   for (int y = 0; y < view.height; ++y) {
     for (int x = 0; x < view.width; ++x) {
       gart::vec3 const n(normals.at(x, y, 0), normals.at(x, y, 1), normals.at(x, y, 2));

@@ -11,6 +11,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -30,6 +31,11 @@ camera_fields fields_of(camera const& view);
 /// `angle`, the degrees across the image's shorter side, where none is given: by itself 180 for what can see that, else
 /// 60. The sphere is twice as wide as high. Errors: unsupported, invalid_argument for what is no such camera.
 camera seen_through(camera const& view, std::string const& model);
+
+/// A camera as one object of such a list, on one line.
+std::string camera_json(named_camera const& camera);
+/// And back; it may have no name. `where` is what errors say it is of.
+named_camera parse_camera_json(std::string_view object, std::string const& where);
 
 /// Writes all of them, in order.
 void write_cameras(std::filesystem::path const& path, std::vector<named_camera> const& cameras);

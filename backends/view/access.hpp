@@ -1,0 +1,48 @@
+#pragma once
+// Who may come in: tokens in the path, the Host and Origin that a browser sends.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace gart::view {
+
+// 128 random bits of the system, in hex.
+std::string new_token();
+
+enum class right { none, view, control };
+
+// A path "/TOKEN/rest", and whose token it is.
+struct request_path {
+  right of = right::none;
+  std::string rest;
+};
+
+class access {
+ public:
+  // `hosts` are the names by which this machine may be called, `port` where it listens.
+  access(std::vector<std::string> hosts, int port);
+
+  request_path path_of(std::string_view path) const;
+  // Whether a Host header names this server: a page of another name that resolves to this machine does not.
+  bool host_is_ours(std::string_view host) const;
+  // Whether an Origin header is that of a page from this Host.
+  static bool origin_is(std::string_view origin, std::string_view host);
+
+  std::string address(right of) const;  // for the browser
+
+ private:
+  std::vector<std::string> hosts_;
+  int port_;
+  std::string control_ = new_token(), view_ = new_token();
+};
+
+// What to listen at: a numeric address, and the names under which browsers may ask for it. invalid_argument for what is
+// no IPv4 address or name of this machine.
+struct listen_place {
+  std::string address;
+  std::vector<std::string> hosts;  // the first is the one to print
+};
+listen_place listen_place_of(std::string const& listen);
+
+}  // namespace gart::view

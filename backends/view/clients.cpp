@@ -1,0 +1,245 @@
+#include "clients.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+namespace gart::view {
+
+namespace {
+
+constexpr std::size_t texts_most = 64, actions_most = 64;
+
+// The close of a connection, by RFC 6455: what was said is not what was agreed on.
+constexpr int policy_violation = 1008;
+
+}  // namespace
+
+clients::clients(view_scene scene, view_server_options const& options) : scene_(std::move(scene)), options_(options) {}
+
+int clients::add(bool control) {
+  std::lock_guard const lock(mutex_);
+  int const id = next_id_++;
+  client& c = clients_[id];
+  c.control = control;
+  c.texts.push_back(hello_text(scene_, control));
+  c.status = status_, c.curve = curve_;
+  count_ = static_cast<int>(clients_.size());
+  return id;
+}
+
+void clients::remove(int id) {
+  std::lock_guard const lock(mutex_);
+  clients_.erase(id);
+  count_ = static_cast<int>(clients_.size());
+}
+
+verdict clients::receive(int id, std::string_view text, double now) {
+  client_message message;
+  try {
+    message = parse_message(text);
+  } catch (invalid_argument const& e) {
+    return {policy_violation, e.what()};
+  }
+  std::lock_guard const lock(mutex_);
+  auto const found = clients_.find(id);
+  if (found == clients_.end()) return {};
+  client& c = found->second;
+  auto const index_in_range = [&](int i) { return i < static_cast<int>(scene_.cameras.size()); };
+  if (auto* const view = std::get_if<view_message>(&message)) {
+    if (view->photo && !index_in_range(*view->photo)) return {policy_violation, "'photo' is no camera of the scene"};
+    c.view = std::move(*view), c.view_time = now, c.fresh = true, c.still_done = false;
+  } else if (auto* const pick = std::get_if<pick_message>(&message)) {
+    c.pick = std::move(*pick);
+  } else if (auto* const path = std::get_if<path_message>(&message)) {
+    c.path = std::move(*path);
+  } else if (!c.control) {
+    c.texts.push_back(refused_text(std::holds_alternative<train_message>(message) ? "train" : "share",
+                                   "this address may look, and not control"));
+  } else if (!scene_.training) {
+    c.texts.push_back(
+        refused_text(std::holds_alternative<train_message>(message) ? "train" : "share", "there is no training here"));
+  } else if (auto const* const train = std::get_if<train_message>(&message)) {
+    if (actions_.size() < actions_most) actions_.push_back(train->action);
+  } else if (auto const* const share = std::get_if<share_message>(&message)) {
+    share_ = share->value;
+  }
+  changed_.notify_all();
+  return {};
+}
+
+bool clients::take_text(int id, std::string& to) {
+  std::lock_guard const lock(mutex_);
+  auto const found = clients_.find(id);
+  if (found == clients_.end()) return false;
+  client& c = found->second;
+  if (!c.texts.empty()) {
+    to = std::move(c.texts.front());
+    c.texts.pop_front();
+    return true;
+  }
+  std::string& newest = c.status.empty() ? c.curve : c.status;
+  to = std::exchange(newest, std::string());
+  return !to.empty();
+}
+
+bool clients::take_frame(int id, std::vector<u8>& to) {
+  std::lock_guard const lock(mutex_);
+  auto const found = clients_.find(id);
+  if (found == clients_.end() || found->second.frame.empty()) return false;
+  to = std::exchange(found->second.frame, {});
+  changed_.notify_all();  // the next one may be rendered
+  return true;
+}
+
+bool clients::has_output(int id) const {
+  std::lock_guard const lock(mutex_);
+  auto const found = clients_.find(id);
+  if (found == clients_.end()) return false;
+  client const& c = found->second;
+  return !c.texts.empty() || !c.status.empty() || !c.curve.empty() || !c.frame.empty();
+}
+
+bool clients::overflows(int id) const {
+  std::lock_guard const lock(mutex_);
+  auto const found = clients_.find(id);
+  return found != clients_.end() && found->second.texts.size() > texts_most;
+}
+
+bool clients::rests(client const& c, double now) const {
+  return !c.view->moving || now - c.view_time >= options_.rest_seconds;
+}
+
+int clients::moving(double now) const {
+  int n = 0;
+  for (auto const& [id, c] : clients_) n += c.view && c.frame.empty() && !rests(c, now);
+  return n;
+}
+
+// What is asked for once comes first, then views that move, then those at rest, which take longest.
+std::optional<job> clients::job_of(int id, client& c, double now, int urgency) {
+  if (urgency == 0) {
+    if (c.pick) return job{id, *std::exchange(c.pick, {})};
+    if (c.path) return job{id, *std::exchange(c.path, {})};
+    return {};
+  }
+  if (!c.view || !c.frame.empty()) return {};
+  int const width = c.view->view.width, height = c.view->view.height;
+  if (urgency == 1 && c.fresh && !rests(c, now)) {
+    c.fresh = false;
+    c.pacing.start_from(pacing_);
+    auto const [w, h] = c.pacing.size(width, height, 1000 * options_.frame_seconds / std::max(1, moving(now)));
+    return job{id, *c.view, false, w, h};
+  }
+  if (urgency == 2 && rests(c, now) && !c.still_done) {
+    c.fresh = false, c.still_done = true;
+    return job{id, *c.view, true, width, height};
+  }
+  return {};
+}
+
+std::optional<job> clients::choose(double now) {
+  for (int urgency = 0; urgency < 3; ++urgency) {
+    // Each in turn, from the one after the last that was served.
+    auto const first = clients_.upper_bound(last_served_);
+    auto const serve = [&](auto from, auto to) -> std::optional<job> {
+      for (auto i = from; i != to; ++i) {
+        if (auto found = job_of(i->first, i->second, now, urgency)) {
+          last_served_ = i->first;
+          return found;
+        }
+      }
+      return {};
+    };
+    if (auto found = serve(first, clients_.end())) return found;
+    if (auto found = serve(clients_.begin(), first)) return found;
+  }
+  return {};
+}
+
+// Seconds until a view that moved comes to rest; infinite where none does.
+double clients::next_rest(double now) const {
+  double least = HUGE_VAL;
+  for (auto const& [id, c] : clients_)
+    if (c.view && c.frame.empty() && !c.still_done && !rests(c, now))
+      least = std::min(least, c.view_time + options_.rest_seconds - now);
+  return least;
+}
+
+std::optional<job> clients::next_job(double now, double wait_seconds) {
+  using clock = std::chrono::steady_clock;
+  auto const began = clock::now();
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    double const passed = std::chrono::duration<double>(clock::now() - began).count();
+    if (auto found = choose(now + passed)) return found;
+    double const left = std::min(wait_seconds - passed, next_rest(now + passed) + 1e-3);
+    if (passed >= wait_seconds) return {};
+    changed_.wait_for(lock, std::chrono::duration<double>(std::max(left, 1e-3)));
+  }
+}
+
+void clients::finish_frame(job const& done, std::vector<u8> bytes, double milliseconds) {
+  {
+    std::lock_guard const lock(mutex_);
+    double const pixels = static_cast<double>(done.width) * done.height;
+    pacing_.measured(milliseconds, pixels);
+    auto const found = clients_.find(done.client);
+    if (found == clients_.end()) return;
+    found->second.pacing.measured(milliseconds, pixels);
+    found->second.frame = std::move(bytes);
+  }
+  wake();
+}
+
+void clients::say(int id, std::string text) {
+  {
+    std::lock_guard const lock(mutex_);
+    auto const found = clients_.find(id);
+    if (found == clients_.end()) return;
+    found->second.texts.push_back(std::move(text));
+  }
+  wake();
+}
+
+void clients::say_all(std::string const& text) {
+  {
+    std::lock_guard const lock(mutex_);
+    for (auto& [id, c] : clients_) c.texts.push_back(text);
+  }
+  wake();
+}
+
+std::optional<train_action> clients::next_action() {
+  std::lock_guard const lock(mutex_);
+  if (actions_.empty()) return {};
+  train_action const first = actions_.front();
+  actions_.pop_front();
+  return first;
+}
+
+std::optional<double> clients::next_share() {
+  std::lock_guard const lock(mutex_);
+  return std::exchange(share_, {});
+}
+
+void clients::set_status(view_status const& status) {
+  {
+    std::lock_guard const lock(mutex_);
+    status_ = status_text(status);
+    for (auto& [id, c] : clients_) c.status = status_;
+  }
+  wake();
+}
+
+void clients::set_curve(view_curve const& curve) {
+  {
+    std::lock_guard const lock(mutex_);
+    curve_ = curve_text(curve);
+    for (auto& [id, c] : clients_) c.curve = curve_;
+  }
+  wake();
+}
+
+}  // namespace gart::view

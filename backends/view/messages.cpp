@@ -1,0 +1,176 @@
+// What a client sends, read strictly: every field there, in its range, and no other one.
+
+#include <gart/core/error.hpp>
+#include <gart/io/camera_file.hpp>
+#include <gart/view/message.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <initializer_list>
+
+namespace gart {
+
+namespace {
+
+using nlohmann::json;
+
+[[noreturn]] void refuse(std::string const& field, std::string const& what) {
+  throw invalid_argument("'" + field + "' " + what);
+}
+
+// A message, whose fields are asked for by name; `done` refuses those that nobody asked for.
+class fields {
+ public:
+  explicit fields(json const& object) : object_(object) {}
+
+  json const& at(char const* key) {
+    json const* const value = find(key);
+    if (!value) refuse(key, "is missing");
+    return *value;
+  }
+  json const* find(char const* key) {
+    asked_.push_back(key);
+    auto const it = object_.find(key);
+    return it == object_.end() ? nullptr : &*it;
+  }
+  double number(char const* key, double least, double most) { return in_range(at(key), key, least, most); }
+  int whole(char const* key, int least, int most) {
+    double const v = number(key, least, most);
+    if (v != std::floor(v)) refuse(key, "is not a whole number");
+    return static_cast<int>(v);
+  }
+  // Ids are counted by the client: what a double holds exactly.
+  u64 id() {
+    double const v = number("id", 0, 9007199254740991.0);
+    if (v != std::floor(v)) refuse("id", "is not a whole number");
+    return static_cast<u64>(v);
+  }
+  bool flag(char const* key) {
+    json const& value = at(key);
+    if (!value.is_boolean()) refuse(key, "is not true or false");
+    return value.get<bool>();
+  }
+  std::string const& text(char const* key) {
+    json const& value = at(key);
+    if (!value.is_string()) refuse(key, "is not a text");
+    return value.get_ref<std::string const&>();
+  }
+  template <named E>
+  E name(char const* key) {
+    try {
+      return from_string<E>(text(key).substr(0, 40));
+    } catch (invalid_argument const& e) {
+      refuse(key, e.what());
+    }
+  }
+  camera view(char const* key) { return camera_of(at(key), key); }
+
+  static camera camera_of(json const& value, std::string const& field) {
+    if (!value.is_object()) refuse(field, "is not an object");
+    try {
+      camera const view = parse_camera_json(value.dump(), field).view;
+      if (view.width > view_size_most || view.height > view_size_most)
+        refuse(field, "is larger than " + std::to_string(view_size_most) + " pixels a side");
+      return view;
+    } catch (json::exception const&) {
+      refuse(field, "holds text that is not UTF-8");
+    } catch (io_error const& e) {
+      throw invalid_argument(e.what());
+    } catch (unsupported const& e) {
+      throw invalid_argument(e.what());
+    }
+  }
+  static double in_range(json const& value, std::string const& field, double least, double most) {
+    if (!value.is_number()) refuse(field, "is not a number");
+    double const v = value.get<double>();
+    if (!(v >= least && v <= most)) refuse(field, "is out of its range");
+    return v;
+  }
+  static vec3 point(json const& value, std::string const& field) {
+    if (!value.is_array() || value.size() != 3) refuse(field, "is not a list of 3 numbers");
+    vec3 p;
+    for (int k = 0; k < 3; ++k)
+      p[k] = static_cast<float>(in_range(value[static_cast<std::size_t>(k)], field, -1e18, 1e18));
+    return p;
+  }
+  view_settings settings() {
+    view_settings s;
+    if (json const* const crop = find("crop"); crop && !crop->is_null()) {
+      if (!crop->is_object() || crop->size() != 2 || !crop->contains("min") || !crop->contains("max"))
+        refuse("crop", "is not {\"min\", \"max\"}");
+      s.crop = view_box{point((*crop)["min"], "crop.min"), point((*crop)["max"], "crop.max")};
+      for (int k = 0; k < 3; ++k)
+        if (s.crop->low[k] > s.crop->high[k]) refuse("crop", "has a min that is larger than its max");
+    }
+    if (json const* const near = find("near"); near && !near->is_null())
+      s.near = static_cast<float>(in_range(*near, "near", 1e-6, 1e9));
+    return s;
+  }
+  void done() const {
+    for (auto const& [key, value] : object_.items()) {
+      bool known = key == "type";
+      for (char const* one : asked_) known = known || key == one;
+      if (!known) refuse(key.substr(0, 40), "is no field of this message");
+    }
+  }
+
+ private:
+  json const& object_;
+  std::vector<char const*> asked_;
+};
+
+json object_in(std::string_view text) {
+  if (text.size() > message_bytes) throw invalid_argument("the message is longer than 16384 bytes");
+  int deepest = 0;
+  // Nothing below the depth is kept, so that what is nested without end costs no stack.
+  auto const keep = [&](int depth, json::parse_event_t, json&) {
+    deepest = std::max(deepest, depth);
+    return depth <= message_depth;
+  };
+  json const root = json::parse(text.begin(), text.end(), keep, false);
+  if (root.is_discarded() && deepest <= message_depth) throw invalid_argument("the message is not valid JSON");
+  if (deepest > message_depth) throw invalid_argument("the message is nested too deep");
+  if (!root.is_object()) throw invalid_argument("the message is not a JSON object");
+  return root;
+}
+
+}  // namespace
+
+client_message parse_message(std::string_view text) {
+  json const root = object_in(text);
+  fields f(root);
+  std::string const type = f.text("type");
+  client_message out;
+  if (type == "view") {
+    view_message m;
+    m.id = f.id(), m.view = f.view("camera"), m.mode = f.name<view_mode>("mode"), m.moving = f.flag("moving");
+    m.settings = f.settings();
+    if (json const* const photo = f.find("photo"); photo && !photo->is_null()) m.photo = f.whole("photo", 0, 1 << 24);
+    out = m;
+  } else if (type == "pick") {
+    pick_message m;
+    m.id = f.id(), m.view = f.view("camera");
+    m.x = static_cast<float>(f.number("x", 0, m.view.width)), m.y = static_cast<float>(f.number("y", 0, m.view.height));
+    m.settings = f.settings();
+    out = m;
+  } else if (type == "path") {
+    path_message m;
+    m.id = f.id(), m.frames = f.whole("frames", 2, path_frames_most), m.closed = f.flag("closed");
+    json const& list = f.at("keyframes");
+    if (!list.is_array() || list.size() < 2) refuse("keyframes", "is not a list of 2 cameras or more");
+    for (std::size_t i = 0; i < list.size(); ++i)
+      m.keyframes.push_back(fields::camera_of(list[i], "keyframes[" + std::to_string(i) + "]"));
+    out = m;
+  } else if (type == "train") {
+    out = train_message{f.name<train_action>("action")};
+  } else if (type == "share") {
+    out = share_message{f.number("value", 0.01, 1)};
+  } else {
+    refuse("type", "is none of view, pick, path, train, share");
+  }
+  f.done();
+  return out;
+}
+
+}  // namespace gart

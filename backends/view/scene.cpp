@@ -1,0 +1,70 @@
+// What a viewer is told of a model, and a part of a model.
+
+#include <gart/view/scene.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace gart {
+
+namespace {
+
+// The values between which all but a hundredth on either side lie.
+std::pair<float, float> robust_range(std::vector<float> values) {
+  std::erase_if(values, [](float v) { return !std::isfinite(v); });
+  if (values.empty()) return {-1.0f, 1.0f};
+  auto const at = [&](std::size_t hundredth) {
+    auto const place = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) * hundredth / 100);
+    std::nth_element(values.begin(), place, values.end());
+    return *place;
+  };
+  float const low = at(1);
+  return {low, at(99)};
+}
+
+}  // namespace
+
+view_scene scene_of(std::string name, gaussian_model const& model, int kernel_degree,
+                    std::vector<view_camera> cameras) {
+  view_scene scene;
+  scene.name = std::move(name), scene.gaussians = model.size(), scene.sh_degree = model.sh_degree;
+  scene.kernel_degree = kernel_degree;
+  std::vector<float> along(model.size());
+  for (int k = 0; k < 3; ++k) {
+    for (std::size_t i = 0; i < model.size(); ++i) along[i] = model.mean[3 * i + static_cast<std::size_t>(k)];
+    std::tie(scene.bounds.low[k], scene.bounds.high[k]) = robust_range(along);
+  }
+  vec3 up(0.0f);
+  for (view_camera const& c : cameras) up -= c.view.rotation[1];
+  float const length = std::sqrt(glm::dot(up, up));
+  // Cameras that look everywhere agree on nothing.
+  if (length > 0.1f * static_cast<float>(cameras.size()) && length > 0) scene.up = up / length;
+  scene.cameras = std::move(cameras);
+  return scene;
+}
+
+gaussian_model cropped(gaussian_model const& model, view_box const& box) {
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    bool inside = true;
+    for (std::size_t k = 0; k < 3; ++k) {
+      int const axis = static_cast<int>(k);
+      inside = inside && model.mean[3 * i + k] >= box.low[axis] && model.mean[3 * i + k] <= box.high[axis];
+    }
+    if (inside) kept.push_back(i);
+  }
+  gaussian_model out;
+  out.resize(kept.size(), model.sh_degree);
+  for_each_array(
+      [&](parameter_array const& a, auto& to, auto const& from) {
+        std::size_t const width = a.width(model.sh_degree);
+        for (std::size_t i = 0; i < kept.size(); ++i)
+          std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(kept[i] * width), width,
+                      to.begin() + static_cast<std::ptrdiff_t>(i * width));
+      },
+      out, model);
+  return out;
+}
+
+}  // namespace gart

@@ -1,0 +1,111 @@
+// The thread that renders: what each client is given for what it asked.
+
+#include "clients.hpp"
+#include "sockets.hpp"
+
+#include <gart/camera/models.hpp>
+#include <gart/io/image_file.hpp>
+#include <gart/view/camera_path.hpp>
+#include <gart/view/image_modes.hpp>
+#include <gart/view/server.hpp>
+
+#include <chrono>
+#include <cmath>
+
+namespace gart {
+
+namespace {
+
+using clock = std::chrono::steady_clock;
+
+double seconds_now() { return std::chrono::duration<double>(clock::now().time_since_epoch()).count(); }
+
+constexpr int quality_moving = 80, quality_still = 95;
+
+// A camera whose middle pixel is the image point, and the pixel that it lies in. The sphere has no such part: all of
+// it, small.
+struct pick_place {
+  camera view;
+  int x, y;
+};
+pick_place place_of(pick_message const& pick) {
+  camera c = pick.view;
+  if (c.kind == camera_kind::equirectangular) {
+    c = resized(c, std::min(c.width, 1024), std::min(c.height, 512));
+    auto const pixel = [](float at, int from, int to) {
+      return std::min(to - 1, static_cast<int>(at * static_cast<float>(to) / static_cast<float>(from)));
+    };
+    return {c, pixel(pick.x, pick.view.width, c.width), pixel(pick.y, pick.view.height, c.height)};
+  }
+  constexpr int side = 9;
+  c.cx += 0.5f * side - pick.x, c.cy += 0.5f * side - pick.y;
+  c.width = c.height = side;
+  return {c, side / 2, side / 2};
+}
+
+}  // namespace
+
+struct view_server::state {
+  view_server_options options;
+  view::clients all;
+  view::sockets doors;
+
+  state(view_scene scene, view_server_options const& o)
+      : options(o), all(std::move(scene), options), doors(all, options) {}
+
+  void answer(view::job const& j, view_message const& m, view_render const& render) {
+    std::optional<image8> photo;
+    if (m.mode == view_mode::error && m.photo && options.photo) photo = options.photo(*m.photo);
+    camera const view = j.still ? m.view : resized(m.view, j.width, j.height);
+    auto const start = clock::now();
+    rendered const image = render(view, m.settings);
+    shown_image const seen = shown(image, view, m.mode, photo ? &*photo : nullptr, all.scene().background);
+    std::vector<u8> const jpeg = encode_jpeg(seen.image, j.still ? quality_still : quality_moving);
+    double const ms = std::chrono::duration<double, std::milli>(clock::now() - start).count();
+    frame_header const header{m.id,   view.width, view.height, m.view.width, m.view.height,
+                              m.mode, ms,         j.still,     seen.low,     seen.high};
+    all.finish_frame(j, frame_bytes(header, jpeg), ms);
+  }
+
+  void answer(view::job const& j, pick_message const& m, view_render const& render) {
+    pick_place const at = place_of(m);
+    image_float const distances = mean_distances(render(at.view, m.settings));
+    float const t = distances.at(at.x, at.y, 0);
+    vec3 const direction = ray_direction(m.view, m.x, m.y);
+    vec3d point = m.view.position;
+    for (int k = 0; k < 3; ++k) point[k] += static_cast<double>(t) * direction[k];
+    all.say(j.client, picked_text(m.id, t, point));
+  }
+
+  void answer(view::job const& j, path_message const& m, view_render const&) {
+    all.say(j.client, path_text(m.id, smooth_path(m.keyframes, m.frames, m.closed)));
+  }
+};
+
+view_server::view_server(view_scene scene, view_server_options options)
+    : state_(std::make_unique<state>(std::move(scene), options)) {}
+view_server::~view_server() = default;
+
+std::string view_server::control_address() const { return state_->doors.address(view::right::control); }
+std::string view_server::view_address() const { return state_->doors.address(view::right::view); }
+int view_server::port() const { return state_->doors.port(); }
+int view_server::clients() const noexcept { return state_->all.count(); }
+
+double view_server::render_next(view_render const& render, double wait_seconds) {
+  auto const job = state_->all.next_job(seconds_now(), wait_seconds);
+  if (!job) return 0;
+  double const start = seconds_now();
+  try {
+    std::visit([&](auto const& message) { state_->answer(*job, message, render); }, job->wanted);
+  } catch (std::exception const& e) {
+    state_->all.say(job->client, error_text(e.what()));
+  }
+  return seconds_now() - start;
+}
+
+void view_server::set_status(view_status const& status) { state_->all.set_status(status); }
+void view_server::set_curve(view_curve const& curve) { state_->all.set_curve(curve); }
+std::optional<train_action> view_server::next_action() { return state_->all.next_action(); }
+std::optional<double> view_server::next_share() { return state_->all.next_share(); }
+
+}  // namespace gart

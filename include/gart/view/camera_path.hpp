@@ -1,0 +1,42 @@
+#pragma once
+/// \file
+/// A smooth path of a camera through keyframes: what a viewer plays and `gart render` follows.
+///
+/// Everything is interpolated by Barry and Goldman's pyramid of a Catmull-Rom spline: positions by straight lines,
+/// rotations by slerp (Schlag, Graphics Gems II), focal lengths in proportion, principal points by straight lines. The
+/// path goes through every keyframe, and so does its velocity without a jump. The time between two keyframes is the
+/// square root of the way between them, distance and angle (centripetal: close keyframes make no loops), so that no
+/// stretch is without time. Size, model and lens are those of the first keyframe. In double.
+///
+/// Errors: invalid_argument for less than two keyframes or frames, and for keyframes of different camera models.
+
+#include <gart/scene/camera.hpp>
+
+#include <vector>
+
+namespace gart {
+
+/// The path, by time.
+class camera_path {
+ public:
+  /// Through these; a closed one goes on from the last to the first.
+  explicit camera_path(std::vector<camera> keyframes, bool closed = false);
+
+  /// When it passes a keyframe; for their number, the end of a closed path.
+  double time_of(std::size_t keyframe) const { return times_[keyframe]; }
+  /// When it ends; it begins at 0.
+  double end() const { return times_.back(); }
+  /// The camera at a time from 0 to end().
+  camera at(double time) const;
+
+ private:
+  std::vector<camera> keyframes_;
+  std::vector<double> times_;
+  bool closed_;
+};
+
+/// `frames` cameras along the path, evenly in time, the first and the last one at its ends; of a closed path the end is
+/// left out, for it is the start.
+std::vector<camera> smooth_path(std::vector<camera> const& keyframes, int frames, bool closed = false);
+
+}  // namespace gart

@@ -1,0 +1,112 @@
+#pragma once
+/// \file
+/// What the page of a viewer and its server say to each other, without the sockets: one JSON object a message as text,
+/// and frames in bytes. docs/view.md has the fields of each.
+///
+/// parse_message reads what a client sent, from outside and therefore held to: at most message_bytes, objects no deeper
+/// than message_depth, every field there and in its range, no other one. Errors: invalid_argument naming the field.
+/// The texts of the other direction are whole JSON objects; a frame is {u32 length of the header, header JSON, JPEG}.
+
+#include <gart/core/names.hpp>
+#include <gart/core/span.hpp>
+#include <gart/core/types.hpp>
+#include <gart/scene/camera.hpp>
+#include <gart/view/scene.hpp>
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace gart {
+
+inline constexpr std::size_t message_bytes = 16384;  ///< of the largest message that a client may send
+inline constexpr int message_depth = 6;              ///< of objects and lists in each other
+inline constexpr int view_size_most = 4096;          ///< pixels a side of a view that a client may ask for
+inline constexpr int path_frames_most = 10000;       ///< cameras of a path that a client may ask for
+
+/// A view to be rendered.
+struct view_message {
+  u64 id = 0;                          ///< of the message, sent back with its frame
+  camera view;                         ///< of the size of the page's canvas
+  view_mode mode = view_mode::colour;  ///< what is shown of it
+  bool moving = false;                 ///< soon followed by another: time is worth more than pixels
+  view_settings settings;              ///< what is left out
+  std::optional<int> photo;            ///< index of the camera whose photograph view_mode::error is against
+};
+
+/// The point that is seen through one of a view's pixels is to be found.
+struct pick_message {
+  u64 id = 0;              ///< of the message
+  camera view;             ///< the view
+  float x = 0, y = 0;      ///< image point, pixels
+  view_settings settings;  ///< what is left out
+};
+
+/// A smooth path through keyframes is wanted.
+struct path_message {
+  u64 id = 0;                     ///< of the message
+  std::vector<camera> keyframes;  ///< two at least
+  int frames = 0;                 ///< cameras along the path
+  bool closed = false;            ///< whether it ends where it began
+};
+
+/// What a viewer may ask of a training.
+enum class train_action { pause, resume, step, save, stop };
+/// Their names.
+constexpr auto names_of(train_action) {
+  return std::array<name_of<train_action>, 5>{{{train_action::pause, "pause"},
+                                               {train_action::resume, "resume"},
+                                               {train_action::step, "step"},
+                                               {train_action::save, "save"},
+                                               {train_action::stop, "stop"}}};
+}
+/// Asks it; needs the right of control.
+struct train_message {
+  train_action action = train_action::pause;  ///< which
+};
+/// Sets the share of a training's time that views may take; needs the right of control.
+struct share_message {
+  double value = 0;  ///< 0.01 to 1
+};
+
+/// Anything that a client may send.
+using client_message = std::variant<view_message, pick_message, path_message, train_message, share_message>;
+
+/// Reads a client's text.
+client_message parse_message(std::string_view text);
+
+/// The first text to a client: what there is to see, and whether it may control.
+std::string hello_text(view_scene const& scene, bool control);
+/// The state of a training.
+std::string status_text(view_status const& status);
+/// A training's losses and scores so far.
+std::string curve_text(view_curve const& curve);
+/// The answer to a pick; `t` along the ray, nothing hit where it is not positive.
+std::string picked_text(u64 id, float t, vec3d point);
+/// The answer to a path.
+std::string path_text(u64 id, std::vector<camera> const& cameras);
+/// A message was not allowed, and why.
+std::string refused_text(std::string_view what, std::string_view why);
+/// Something failed.
+std::string error_text(std::string_view what);
+/// The server ends.
+std::string bye_text(std::string_view why);
+
+/// What a frame's header says.
+struct frame_header {
+  u64 id = 0;                           ///< of the message that asked for it
+  int width = 0, height = 0;            ///< of the JPEG, pixels
+  int full_width = 0, full_height = 0;  ///< that were asked for
+  view_mode mode = view_mode::colour;   ///< what it shows
+  double milliseconds = 0;              ///< that it took to render
+  bool still = false;                   ///< full size, not to be replaced by a better one
+  float low = 0, high = 0;              ///< values at the ends of the colour map, where it has one
+};
+/// The bytes of a frame.
+std::vector<u8> frame_bytes(frame_header const& header, std::vector<u8> const& jpeg);
+
+}  // namespace gart

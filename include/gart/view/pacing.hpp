@@ -1,0 +1,70 @@
+#pragma once
+/// \file
+/// How large a view may be to be there in time, and how much time views may take from what else there is to do. Pure
+/// functions of measured times: no clock, no threads.
+
+#include <gart/core/isa.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace gart::inline GART_ISA {
+
+/// Sizes of views that are rendered within a time, by the milliseconds a pixel that the last ones took. A view's own
+/// fixed cost is taken for one of its pixels, so that sizes come down to where the time is met, and stay there.
+class frame_pacing {
+ public:
+  /// A view of so many pixels took so long.
+  void measured(double milliseconds, double pixels) {
+    if (!(milliseconds > 0) || !(pixels > 0)) return;
+    double const now = milliseconds / pixels;
+    rate_ = rate_ > 0 ? 0.5 * (rate_ + now) : now;
+  }
+  /// Milliseconds a pixel; 0 where nothing was measured.
+  double rate() const { return rate_; }
+  /// Takes another's measure where there is none of its own.
+  void start_from(frame_pacing const& other) {
+    if (!(rate_ > 0)) rate_ = other.rate_;
+  }
+
+  /// The size, in the shape of the full one, that takes about so many milliseconds; at most the full one, at least an
+  /// eighth of its sides. Sides are whole parts in 32 of the full ones, so that a size does not change with every view.
+  /// With nothing measured it is a quarter of the sides.
+  std::pair<int, int> size(int full_width, int full_height, double milliseconds) const {
+    double const pixels = static_cast<double>(full_width) * full_height;
+    double const wanted = rate_ > 0 ? std::sqrt(milliseconds / (rate_ * pixels)) : 0.25;
+    int const parts = std::clamp(static_cast<int>(32 * std::min(wanted, 1.0)), 4, 32);
+    return {std::max(1, full_width * parts / 32), std::max(1, full_height * parts / 32)};
+  }
+
+ private:
+  double rate_ = 0;
+};
+
+/// Keeps views to a share of the time of a training: work earns them time, each view spends it. What is saved up is
+/// bounded, so that a viewer who comes late does not stop the training.
+class time_share {
+ public:
+  /// Between 0 and 1, of all time.
+  explicit time_share(double share) { set(share); }
+  /// The same, from here on.
+  void set(double share) { share_ = std::clamp(share, 0.0, 1.0); }
+  /// Of all time.
+  double share() const { return share_; }
+  /// So many seconds went into training.
+  void worked(double seconds) {
+    double const earned = share_ < 1 ? seconds * share_ / (1 - share_) : saved_most;
+    saved_ = std::min(saved_ + earned, saved_most);
+  }
+  /// So many seconds went into a view.
+  void viewed(double seconds) { saved_ -= seconds; }
+  /// Whether a view may be rendered now. What it takes beyond what was saved is earned before the next one.
+  bool may_view() const { return saved_ > 0 || share_ >= 1; }
+
+ private:
+  static constexpr double saved_most = 0.1;  // seconds
+  double share_ = 0, saved_ = 0;
+};
+
+}  // namespace gart::inline GART_ISA

@@ -1,0 +1,95 @@
+#pragma once
+/// \file
+/// What a viewer is told of a scene and of a training, and what it may ask to be shown of a view.
+
+#include <gart/core/names.hpp>
+#include <gart/math/glm.hpp>
+#include <gart/scene/camera.hpp>
+#include <gart/scene/gaussians.hpp>
+
+#include <array>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gart {
+
+/// What of a view is shown.
+enum class view_mode {
+  colour,  ///< as a photograph would be
+  depth,   ///< the mean distance along the ray, in colours
+  normal,  ///< of the surface that the distances make, in the world's axes, (n + 1) / 2
+  alpha,   ///< how much of the ray is stopped, in grey
+  hits,    ///< Gaussians met, in colours
+  error,   ///< the absolute difference to a photograph, mean over the colours, in colours
+};
+/// Their names.
+constexpr auto names_of(view_mode) {
+  return std::array<name_of<view_mode>, 6>{{{view_mode::colour, "colour"},
+                                            {view_mode::depth, "depth"},
+                                            {view_mode::normal, "normal"},
+                                            {view_mode::alpha, "alpha"},
+                                            {view_mode::hits, "hits"},
+                                            {view_mode::error, "error"}}};
+}
+
+/// A box along the axes of the world.
+struct view_box {
+  vec3 low{0.0f}, high{0.0f};  ///< corners
+  /// Whether they are the same.
+  friend bool operator==(view_box const&, view_box const&) = default;
+};
+
+/// What a view leaves out.
+struct view_settings {
+  std::optional<view_box> crop;  ///< Gaussians whose mean lies outside
+  std::optional<float> near;     ///< hits nearer than that along the ray, in place of render_options.near
+};
+
+/// A camera of the capture.
+struct view_camera {
+  std::string name;    ///< as the capture has it
+  camera view;         ///< the camera
+  bool test = false;   ///< held out of the training
+  bool photo = false;  ///< whether there is a photograph of it
+};
+
+/// What there is to see.
+struct view_scene {
+  std::string name;                  ///< of the model, as people call it
+  std::size_t gaussians = 0;         ///< their number
+  int sh_degree = 0;                 ///< of their colours
+  int kernel_degree = 2;             ///< of their response
+  view_box bounds;                   ///< from the 1st to the 99th hundredth of the means, along each axis
+  vec3 up{0.0f, -1.0f, 0.0f};        ///< away from the ground
+  std::vector<view_camera> cameras;  ///< of the capture
+  bool training = false;             ///< whether it changes
+  vec3 background{0.0f};             ///< behind the last hit
+};
+
+/// The scene of a model and of a capture's cameras. Up is the mean of the cameras' own, or -y where there are none.
+view_scene scene_of(std::string name, gaussian_model const& model, int kernel_degree,
+                    std::vector<view_camera> cameras = {});
+
+/// The Gaussians whose mean lies in the box.
+gaussian_model cropped(gaussian_model const& model, view_box const& box);
+
+/// A training, while it runs.
+struct view_status {
+  int step = 0, of = 0;         ///< done, and in all
+  double loss = 0;              ///< of the last steps
+  std::size_t gaussians = 0;    ///< their number
+  double seconds = 0;           ///< of training
+  bool paused = false;          ///< whether it waits to be told to go on
+  double steps_per_second = 0;  ///< of the last steps
+  double view_share = 0;        ///< the share of time that views may take
+};
+
+/// A training's course.
+struct view_curve {
+  std::vector<std::pair<int, double>> loss;  ///< step and loss
+  std::vector<std::pair<int, double>> test;  ///< step and PSNR of the test views, dB
+};
+
+}  // namespace gart

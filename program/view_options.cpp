@@ -1,0 +1,47 @@
+#include "view_options.hpp"
+
+#include "options.hpp"
+
+namespace gart_cli {
+
+void add_view_options(CLI::App& app, view_options& options, std::string const& prefix) {
+  app.add_option("--" + prefix + "listen", options.listen,
+                 "Address or name of this machine that the viewer is served at;\n0.0.0.0 is all of them: any who have "
+                 "the printed address get in,\nand nothing is encrypted")
+      ->type_name("ADDRESS")
+      ->capture_default_str();
+  app.add_option("--" + prefix + "port", options.port, "Its port, 0: one that is free")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(0, 65535));
+}
+
+std::vector<gart::view_camera> view_cameras_of(gart::dataset const& data) {
+  std::vector<gart::view_camera> cameras;
+  for (auto const* views : {&data.train, &data.test})
+    for (gart::dataset_view const& v : *views)
+      cameras.push_back({v.name, v.view, views == &data.test, !v.image.empty()});
+  return cameras;
+}
+
+gart::view_server_options server_options_of(view_options const& options, gart::dataset const& data) {
+  gart::view_server_options out;
+  out.listen = options.listen, out.port = options.port;
+  out.photo = [&data](int index) {
+    auto const i = static_cast<std::size_t>(index);
+    return i < data.train.size() ? data.train[i].image : data.test.at(i - data.train.size()).image;
+  };
+  out.log = [](std::string const& line) { std::fprintf(stderr, "gart: viewer: %s\n", line.c_str()); };
+  return out;
+}
+
+void say_addresses(gart::view_server const& server, view_options const& options, std::FILE* to) {
+  std::fprintf(to, "Look and control: %s\nLook alone:       %s\n", server.control_address().c_str(),
+               server.view_address().c_str());
+  if (options.listen == "127.0.0.1" || options.listen == "localhost")
+    std::fprintf(to, "From another machine: ssh -L %d:127.0.0.1:%d THIS_MACHINE, then the same address there.\n",
+                 server.port(), server.port());
+  std::fflush(to);
+}
+
+}  // namespace gart_cli
