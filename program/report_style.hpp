@@ -44,14 +44,22 @@ circle.dim { fill: var(--dim); } text.dim, tr.dim { fill: var(--soft); color: va
 circle.line-1 { fill: var(--one); } circle.line-2 { fill: var(--two); }
 circle.line-3 { fill: var(--three); } circle.line-4 { fill: var(--four); } circle.line-5 { fill: var(--five); }
 circle.line-6 { fill: var(--six); }
-.view { margin-bottom: 22px; } .view .images { display: grid; grid-template-columns: repeat(3, 1fr); gap: 8px; }
+.view { margin-bottom: 22px; } .view .images { display: grid; grid-template-columns: repeat(2, 1fr); gap: 8px; }
 .view img { display: block; width: 100%; border-radius: 6px; border: 1px solid var(--rule); }
 .view figcaption { display: flex; gap: 14px; font-size: 13px; margin-bottom: 6px; }
 .view figcaption b { color: var(--ink); }
 h3 { font-size: 13px; font-weight: 600; margin: 0 0 6px; }
 .side { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 220px), 1fr)); gap: 8px; }
 .view .side figcaption { margin: 4px 0 0; }
-.heads { display: grid; grid-template-columns: repeat(3, 1fr); gap: 8px; font-size: 13px; color: var(--soft); margin:
+.slide { --at: 50%; position: relative; overflow: hidden; border-radius: 6px; }
+.slide img + img { position: absolute; inset: 0; clip-path: inset(0 calc(100% - var(--at)) 0 0); }
+.slide i { position: absolute; left: var(--at); top: 0; bottom: 0; width: 2px; margin-left: -1px; background: #fff;
+  box-shadow: 0 0 4px rgba(0, 0, 0, 0.6); }
+.slide i::after { content: ""; position: absolute; left: -9px; top: calc(50% - 14px); width: 20px; height: 28px;
+  border-radius: 10px; background: #fff; box-shadow: 0 1px 4px rgba(0, 0, 0, 0.4); }
+.slide input { position: absolute; inset: 0; width: 100%; height: 100%; margin: 0; opacity: 0; cursor: ew-resize; }
+.slide:focus-within { outline: 2px solid var(--one); outline-offset: 2px; }
+.heads { display: grid; grid-template-columns: repeat(2, 1fr); gap: 8px; font-size: 13px; color: var(--soft); margin:
   12px 0 8px; }
 .scale { display: inline-block; width: 84px; height: 9px; border-radius: 3px; margin: 0 6px; vertical-align: middle; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; font-size: 14px; }

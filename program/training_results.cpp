@@ -93,7 +93,7 @@ void training_run::save() {
 
 void training_run::conclude() {
   remove_results(a_.out);
-  std::vector<report_view> shown;
+  report_views shown;
   stopwatch const writing;
   double const tests_before = test_seconds_;
   std::vector<gart::named_camera> aligned;
@@ -102,7 +102,7 @@ void training_run::conclude() {
       [&](std::size_t i, gart::view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
         gart::write_png(a_.out / "renders" / (s.name + ".png"), gart::to_8bit(render));
         gart::write_png(a_.out / "renders" / (s.name + "_truth.png"), gart::to_8bit(truth));
-        if (in_report(i, data_.test.size())) shown.push_back(make_report_view(s.name, s.psnr, s.ssim, render, truth));
+        shown.add(i, data_.test.size(), s.name, s.psnr, s.ssim, render, truth);
         say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
                    static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
       },
@@ -117,7 +117,8 @@ void training_run::conclude() {
   save_seconds_ += writing.seconds() - (test_seconds_ - tests_before);
   nlohmann::json const metrics = metrics_of(result, training);
   write_json(a_.out / "metrics.json", metrics);
-  gart::write_file(a_.out / "report.html", report_page(metrics, read_json(a_.config_file()), course_, shown));
+  gart::write_file(a_.out / "report.html",
+                   report_page(metrics, read_json(a_.config_file()), course_, shown.worst_first()));
   if (a_.quiet) return;
   say_.clear();
   std::printf("trained %s steps in %s, %s Gaussians\n", with_commas(session_->steps_done()).c_str(),

@@ -1,5 +1,6 @@
 // gart's camera JSON (docs/cameras.md): made of a pose and a lens, and read from files.
 
+import {kindOf} from './lens.js';
 import {toRows, fromRows} from './pose.js';
 
 export const largestSide = 4096;
@@ -46,6 +47,18 @@ export function angleLike(camera, stage) {
   const shown = fitted(camera, stage);
   const angle = 2 * Math.atan(Math.min(stage.width, stage.height) / 2 / (shown.fy ?? shown.f)) * 180 / Math.PI;
   return Math.min(lenses.pinhole.most, Math.max(lenses.pinhole.least, angle));
+}
+
+// The free lens that shows what this camera does: one that the page offers by name where it is one, and otherwise the
+// camera's own, which keeps its shape of image.
+export function lensLike(camera, stage) {
+  const kind = kindOf(camera), bent = /^(k$|[kps][0-9x]|omega|alpha|beta)/;
+  if (kind === 'sphere') return {name: 'sphere'};
+  if (Object.entries(camera).some(([key, value]) => bent.test(key) && value !== 0)) return {camera};
+  if (kind === 'perspective') return {name: 'pinhole', angle: angleLike(camera, stage)};
+  if (kind !== 'fisheye') return {camera};
+  const shown = fitted(camera, stage), angle = (Math.min(stage.width, stage.height) / (shown.fy ?? shown.f)) * 180 / Math.PI;
+  return {name: 'fisheye', angle: Math.min(lenses.fisheye.most, Math.max(lenses.fisheye.least, angle))};
 }
 
 export const poseOf = (camera) => fromRows(camera.c2w);

@@ -154,7 +154,7 @@ async function pick(place) {
   const pixel = shown && pixelAt(place);
   if (!pixel || pixel.x < 0 || pixel.y < 0 || pixel.x >= pixel.camera.width || pixel.y >= pixel.camera.height) return null;
   try {
-    return await ask({type: 'pick', ...pixel}, 10);
+    return await ask({type: 'pick', ...pixel, crop: view.crop}, 10);
   } catch (fault) {
     say(fault.message);
     return null;
@@ -249,6 +249,7 @@ function fillLenses() {
 function writeLens() {
   const {camera, name, angle} = view.lens, offered = view.offered;
   $('lens').value = camera ? `own ${camera.camera_model}` : name;
+  $('lens').title = camera ? 'The lens of a camera of the capture or of a file' : '';
   $('angle-row').hidden = !offered?.most;
   if (!offered?.most) return;
   $('angle').min = offered.least, $('angle').max = offered.most, $('angle').value = angle;

@@ -47,6 +47,8 @@ export function keyframes(ui, page) {
     const frames = Math.max(2, Math.round(seconds * rate));
     // All of one size, so that the frames of gart render --path are.
     const same = keys.map((key, i) => ({...page.resized(key), name: `key${String(i).padStart(3, '0')}`}));
+    const most = 16000 / new TextEncoder().encode(JSON.stringify(same[0])).length;
+    if (same.length > most) throw new Error(`One path has room for ${Math.floor(most)} keyframes. Save them, and use gart render --path.`);
     path ??= {frames, closed: ui.closed.checked, cameras: await page.ask(same, frames, ui.closed.checked)};
     return path.cameras;
   }

@@ -1,7 +1,7 @@
 // What is looked at: pose, lens, mode and crop, told to gart as they change. While a hand moves the camera gart may trace
 // fewer pixels; a moment after the last motion it is asked for all of them.
 
-import {angleLike, cameraOf, largestSide, lenses, poseOf, resized} from './camera.js';
+import {angleLike, cameraOf, largestSide, lenses, lensLike, poseOf} from './camera.js';
 import {kindOf} from './lens.js';
 import {lookingAt} from './pose.js';
 import {add, scale} from './vector.js';
@@ -77,12 +77,9 @@ export class View {
     return {x: (this.stage.cssWidth - width) / 2, y: (this.stage.cssHeight - height) / 2, width, height};
   }
 
-  // A camera's image at the size of the stage, its angle of view kept: pinholes fill it.
+  // A camera's image at the size of the stage: what the page's own lenses show fills it.
   onStage(camera) {
-    if (kindOf(camera) === 'perspective' && !camera.k1 && camera.camera_model === undefined)
-      return cameraOf(poseOf(camera), {name: 'pinhole', angle: angleLike(camera, this.stage)}, this.stage);
-    const s = Math.min(this.stage.width / camera.width, this.stage.height / camera.height);
-    return resized(camera, Math.max(2, Math.round(camera.width * s)), Math.max(2, Math.round(camera.height * s)));
+    return cameraOf(poseOf(camera), lensLike(camera, this.stage), this.stage);
   }
 
   lookThrough(entry) {
@@ -96,9 +93,7 @@ export class View {
   show(camera, moving) {
     this.leave();
     this.pose = poseOf(camera);
-    this.lens = kindOf(camera) === 'perspective' && camera.camera_model === undefined
-      ? {name: 'pinhole', angle: angleLike(camera, this.stage)}
-      : {camera};
+    this.lens = lensLike(camera, this.stage);
     this.changed(moving);
   }
 
@@ -109,7 +104,7 @@ export class View {
     this.through = null;
     this.lens = kindOf(entry.camera) === 'perspective'
       ? {name: 'pinhole', angle: angleLike(entry.camera, this.stage)}
-      : {camera: entry.camera};
+      : lensLike(entry.camera, this.stage);
     this.left();
   }
 
