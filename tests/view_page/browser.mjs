@@ -31,7 +31,11 @@ export async function openPage(browser, address, options = {}) {
     message: (type) => until(`a message ${type}`, () => received.find((m) => m.type === type)),
     last: () => views().at(-1),
     // The frame at rest of the newest view, once nothing moves any more.
-    rest: () => until('a frame at rest', async () => {
+    rest: async () => {
+      await page.waitForTimeout(120);  // for what was just done to be told
+      return self.atRest();
+    },
+    atRest: () => until('a frame at rest', async () => {
       const view = views().at(-1), frame = frames.at(-1);
       if (!view || !frame || view.moving || !frame.header.still || frame.header.id !== view.id) return null;
       if ((await page.getAttribute('#stage', 'data-frame')) !== String(view.id)) return null;
@@ -56,7 +60,7 @@ export async function openPage(browser, address, options = {}) {
     },
   };
   await self.message('hello');
-  await self.rest();
+  await self.atRest();
   return self;
 }
 

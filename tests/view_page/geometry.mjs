@@ -17,10 +17,10 @@ export function pixelOf(camera, point) {
 }
 
 // Right, down and forward at right angles and of length 1, right-handed.
-export function isRotation(camera) {
+export function isRotation(camera, within = 1e-9) {
   const [r, d, f] = [0, 1, 2].map((k) => column(camera.c2w, k));
   const cross = [r[1] * d[2] - r[2] * d[1], r[2] * d[0] - r[0] * d[2], r[0] * d[1] - r[1] * d[0]];
-  return apart(cross, f) < 1e-9 && Math.abs(length(r) - 1) < 1e-9 && Math.abs(dot(r, d)) < 1e-9;
+  return apart(cross, f) < within && Math.abs(length(r) - 1) < within && Math.abs(dot(r, d)) < within;
 }
 
 // A splat PLY of round, opaque Gaussians of SH degree 0: [x, y, z, radius, [r, g, b]] each.

@@ -10,7 +10,7 @@ const sameImage = 34;
 
 export const images = {
   async 'a frame at rest is what gart render makes of its camera, through each lens'({browser, server, gart, work}) {
-    const p = await openPage(browser, server.control, {viewport: {width: 640, height: 420}});
+    const p = await openPage(browser, server.control, {viewport: {width: 800, height: 420}});
     const frames = [];
     for (const lens of ['pinhole', 'fisheye', 'sphere']) {
       await p.page.selectOption('#lens', lens);
@@ -33,7 +33,7 @@ export const images = {
   },
 
   async 'every mode is shown, and its legend says what its colours are'({browser, server}) {
-    const p = await openPage(browser, server.control, {viewport: {width: 640, height: 420}});
+    const p = await openPage(browser, server.control, {viewport: {width: 800, height: 420}});
     assert.deepEqual(p.received[0].modes, ['colour', 'depth', 'normal', 'alpha', 'hits', 'error']);
     await p.tab('view');
     const seen = new Map();

@@ -23,6 +23,7 @@ export const navigation = {
     assert.ok(dot(minus(placeOf(after), placeOf(before)), model.up) > 0);
 
     await p.page.mouse.wheel(0, -300);
+    await p.until('a nearer view', () => apart(pivot, placeOf(p.last().camera)) < 0.95 * far);
     const {view: {camera: near}} = await p.rest();
     const ratio = apart(pivot, placeOf(near)) / far;
     assert.ok(ratio > 0.3 && ratio < 0.9, `the wheel brought it to ${ratio} of the distance`);

@@ -10,7 +10,7 @@ const read = async (download) => JSON.parse(fs.readFileSync(await download.path(
 
 export const paths = {
   async 'keyframes make a path, which plays, is saved, and comes back'({browser, server, gart, work}) {
-    const p = await openPage(browser, server.control, {viewport: {width: 700, height: 460}});
+    const p = await openPage(browser, server.control, {viewport: {width: 800, height: 420}});
     await p.tab('path');
     const keys = [];
     for (const by of [[60, 0], [70, 20], [50, -30]]) {
@@ -22,11 +22,12 @@ export const paths = {
     await p.page.fill('#seconds', '0.6');
     const before = p.views().length;
     await p.page.click('#play');
+    await p.until('the replay to begin', async () => (await p.page.textContent('#play')) === 'Stop');
     await p.until('the path', () => p.received.find((m) => m.type === 'path'));
     const asked = p.sent.find((m) => m.type === 'path'), {cameras} = p.received.find((m) => m.type === 'path');
     assert.equal(asked.frames, 18);
     assert.equal(cameras.length, 18);
-    assert.ok(cameras.every(isRotation));
+    assert.ok(cameras.every((camera) => isRotation(camera, 1e-6)));
     assert.ok(apart(placeOf(cameras[0]), placeOf(keys[0])) < 1e-5);
     assert.ok(apart(placeOf(cameras.at(-1)), placeOf(keys[2])) < 1e-5);
     assert.ok(Math.min(...cameras.map((c) => apart(placeOf(c), placeOf(keys[1])))) < 0.12, 'it passes the second');
@@ -63,7 +64,7 @@ export const paths = {
   },
 
   async 'a video of the path is recorded'({browser, server}) {
-    const p = await openPage(browser, server.control, {viewport: {width: 700, height: 460}});
+    const p = await openPage(browser, server.control, {viewport: {width: 800, height: 420}});
     await p.tab('path');
     await p.page.click('#add-key');
     await p.drag([200, 200], [90, 0]);

@@ -2,7 +2,7 @@
 
 import fs from 'node:fs';
 import path from 'node:path';
-import {chromium} from 'playwright-core';
+import {createRequire} from 'node:module';
 import {gartAt, endAll} from './gart.mjs';
 import {navigation} from './navigation.mjs';
 import {images} from './images.mjs';
@@ -13,6 +13,7 @@ import {people} from './people.mjs';
 import {training} from './training.mjs';
 
 const [, , program, folder, ...wanted] = process.argv;
+const {chromium} = createRequire(path.join(path.resolve(folder), 'here.js'))('playwright-core');
 const work = path.join(folder, 'work');
 fs.rmSync(work, {recursive: true, force: true});
 fs.mkdirSync(work, {recursive: true});

@@ -74,8 +74,9 @@ export function cropBox(form, toggle, resetButton, changed) {
     },
     // The drag of the handle at that place; null where there is none.
     grab({x, y}) {
-      const one = handles.find(({at}) => Math.hypot(at[0] - x, at[1] - y) < grip);
-      if (!one) return null;
+      const far = ({at}) => Math.hypot(at[0] - x, at[1] - y);
+      const one = handles.reduce((best, handle) => (!best || far(handle) < far(best) ? handle : best), null);
+      if (!one || far(one) > grip) return null;
       const length2 = one.perUnit[0] ** 2 + one.perUnit[1] ** 2;
       if (length2 < 1e-6) return null;
       return {
