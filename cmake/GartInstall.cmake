@@ -27,7 +27,7 @@ set(_package_of_CUDA::cudart_static "CUDAToolkit")
 
 set(_components)
 set(_config_components)
-foreach(component IN ITEMS headers io runtime view reference cpu embree cuda all)
+foreach(component IN ITEMS headers io runtime reference cpu embree cuda view all)
   set(target gart_${component})
   set(exported_name ${component})
   if(component STREQUAL "headers")

@@ -204,6 +204,19 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->type_name("N")
       ->capture_default_str()
       ->check(between(0, 1e9));
+
+  group = "Viewer";
+  in_group(train.add_flag("--view", a.viewed,
+                          "Look at the training in a browser, at the addresses printed\n(see gart view --help); pause, "
+                          "step, save and stop it there"));
+  in_group(
+      train.add_option("--view-share", a.view_share,
+                       "Share of the time that views may take while it trains; with\nnobody looking they take none"))
+      ->type_name("X")
+      ->capture_default_str()
+      ->check(between(0.01, 1));
+  add_view_options(train, a.view, "view-");
+  in_group(train.get_option("--view-listen")), in_group(train.get_option("--view-port"));
 }
 
 void fill_in(CLI::App const& train, train_arguments& a) {

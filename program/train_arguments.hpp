@@ -2,6 +2,7 @@
 // What `gart train` was asked for, and its way into config.json and back.
 
 #include "options.hpp"
+#include "view_options.hpp"
 
 #include <gart/runtime/choose.hpp>
 #include <gart/runtime/session.hpp>
@@ -21,6 +22,9 @@ struct train_arguments {
   int threads = 0, stop_at = 0;
   nlohmann::json raised = nlohmann::json::object();  // options raised by a resuming command line: what they were
   float checkpoint_minutes = 10;
+  bool viewed = false;
+  view_options view;
+  double view_share = 0.1;
 
   // What follows decides the result and is recorded.
   std::string backend = "auto", tracer = "auto", backward = "auto", densify = "error", background = "auto", start;

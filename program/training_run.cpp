@@ -14,8 +14,10 @@ namespace fs = std::filesystem;
 
 int training_run::run() {
   prepare();
+  serve();
   std::optional<interrupt_guard> interrupt(std::in_place);  // until a run that it stops is saved
   bool const finished = train(*interrupt);
+  view_.reset();  // there is nothing to see any more
   stopwatch const saving;
   save();
   save_seconds_ += saving.seconds();

@@ -7,6 +7,7 @@
 #include "run_folder.hpp"
 #include "scores.hpp"
 #include "train_arguments.hpp"
+#include "training_view.hpp"
 
 #include <gart/runtime/session.hpp>
 
@@ -60,6 +61,10 @@ class training_run {
   double progress_at(int step) const { return a_.progress(step, course_.seconds); }
   gart::step_report checked_step();
   void say_new_trials();
+  void serve();
+  bool attend(interrupt_guard const& interrupt, double seconds, gart::step_report const& report,
+              recent_steps const& recent);  // false where a viewer stops it
+  void show_curve();
   void show(gart::step_report const& report, recent_steps const& recent);
 
   // Scores and files (training_results.cpp).
@@ -86,6 +91,7 @@ class training_run {
   gart::gaussian_model start_;
   gart::vec3 eval_background_{0.0f};
   std::unique_ptr<gart::session> session_;
+  std::unique_ptr<training_view> view_;
   std::size_t gaussians_ = 0;
   int steps_ = 0, profiled_steps_ = 0;
   int finite_steps_ = 0;               // steps of this process after which everything was finite, by --check-finite

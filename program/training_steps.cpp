@@ -53,14 +53,48 @@ bool training_run::train(interrupt_guard const& interrupt) {
     if (by_time && passes(200)) course_.close_point();
     int const between = a_.steps_between_tests();
     bool const due = by_time && a_.eval_every < 0 ? passes(5) : between > 0 && report.step % between == 0;
-    if (!report.trial && due && report.step < a_.length(report.step, course_.seconds)) test(report.step);
+    if (!report.trial && due && report.step < a_.length(report.step, course_.seconds)) {
+      test(report.step);
+      show_curve();
+    }
     if (a_.checkpoint_minutes > 0 && since_start.seconds() - last_checkpoint > 60 * a_.checkpoint_minutes) {
       stopwatch const saving;
       save_checkpoint();
       save_seconds_ += saving.seconds();
       last_checkpoint = since_start.seconds();
     }
+    if (view_ && !view_->idle() && !attend(interrupt, seconds, report, recent)) return false;
   }
+}
+
+void training_run::serve() {
+  if (!a_.viewed) return;
+  view_ = std::make_unique<training_view>(a_, *session_, data_, eval_background_);
+  say_.clear();
+  say_addresses(view_->server(), a_.view, stdout);
+  show_curve();
+}
+
+bool training_run::attend(interrupt_guard const& interrupt, double seconds, gart::step_report const& report,
+                          recent_steps const& recent) {
+  gart::view_status status;
+  status.step = report.step, status.of = a_.iterations, status.loss = recent.loss;
+  status.gaussians = report.gaussians, status.seconds = course_.seconds;
+  status.steps_per_second = recent.seconds > 0 ? 1 / recent.seconds : 0;
+  return view_->attend(seconds, status, interrupt, [this] {
+    stopwatch const saving;
+    save_checkpoint();
+    save_seconds_ += saving.seconds();
+    say_.note("saved " + a_.checkpoint_file().string() + ", as a viewer asked");
+  });
+}
+
+void training_run::show_curve() {
+  if (!view_) return;
+  gart::view_curve curve;
+  for (auto const& p : course_.train) curve.loss.emplace_back(p.step, p.loss);
+  for (auto const& p : course_.test) curve.test.emplace_back(p.step, p.psnr);
+  view_->set_curve(curve);
 }
 
 // Of a run that ends at a time, a point for each two hundredth of it, whatever the number of steps.

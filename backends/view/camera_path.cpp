@@ -48,25 +48,56 @@ mat3 matrix_of(rotation const& q) {
   return m;
 }
 
-// Between two, and beyond them, along the shorter way.
-rotation between(rotation const& a, rotation b, double s) {
-  double cosine = dot(a, b);
-  if (cosine < 0) b = -1.0 * b, cosine = -cosine;
-  if (cosine > 1 - 1e-12) return unit((1 - s) * a + s * b);
-  double const angle = std::acos(std::min(cosine, 1.0)), sine = std::sin(angle);
-  return unit((std::sin((1 - s) * angle) / sine) * a + (std::sin(s * angle) / sine) * b);
+rotation operator*(rotation const& a, rotation const& b) {
+  return {a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+          a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
 }
-vec3d between(vec3d const& a, vec3d const& b, double s) { return (1 - s) * a + s * b; }
-double between(double a, double b, double s) { return (1 - s) * a + s * b; }
 
-// Barry and Goldman: the value at `time` between the second and the third of four knots.
+// The way from one value to another, and where a way leads to: what a vector space and rotations have in common. Of
+// rotations it is half the turn about an axis in the body's frame, the shorter way round.
 template <class V>
-V spline(std::array<V, 4> const& p, std::array<double, 4> const& knot, double time) {
-  auto const mix = [&](V const& a, V const& b, std::size_t from, std::size_t to) {
-    return between(a, b, (time - knot[from]) / (knot[to] - knot[from]));
+V way(V const& from, V const& to) {
+  return to - from;
+}
+template <class V>
+V gone(V const& from, V const& by) {
+  return from + by;
+}
+vec3d way(rotation const& from, rotation const& to) {
+  rotation q = rotation{from.w, -from.x, -from.y, -from.z} * to;
+  if (q.w < 0) q = -1.0 * q;
+  vec3d const v(q.x, q.y, q.z);
+  double const sine = std::sqrt(glm::dot(v, v));
+  return (sine > 1e-12 ? std::atan2(sine, q.w) / sine : 1.0) * v;
+}
+rotation gone(rotation const& from, vec3d const& by) {
+  double const angle = std::sqrt(glm::dot(by, by)), s = angle > 1e-12 ? std::sin(angle) / angle : 1.0;
+  return unit(from * rotation{std::cos(angle), s * by.x, s * by.y, s * by.z});
+}
+
+// The stretch between two keyframes, with those before and after; null beyond the ends of an open path.
+struct stretch {
+  camera const *before, *from, *to, *after;
+  double time_before, time, time_after;
+};
+
+// At a share of the stretch: the cubic Bezier curve whose speed at a keyframe is that of Catmull and Rom, in the
+// cumulative form of Kim, Kim and Shin, which needs no sums of values.
+template <class Value>
+auto at_share(stretch const& s, double share, Value const& value) {
+  auto const from = value(*s.from), to = value(*s.to);
+  auto const straight = way(from, to) / s.time;
+  auto const speed = [&](auto const& before, double time_before, auto const& after, double time_after) {
+    return (before * time_after + after * time_before) / (time_before + time_after);
   };
-  V const a = mix(p[0], p[1], 0, 1), b = mix(p[1], p[2], 1, 2), c = mix(p[2], p[3], 2, 3);
-  return mix(mix(a, b, 0, 2), mix(b, c, 1, 3), 1, 2);
+  auto const start =
+      s.before ? speed(way(value(*s.before), from) / s.time_before, s.time_before, straight, s.time) : straight;
+  auto const end = s.after ? speed(straight, s.time, way(to, value(*s.after)) / s.time_after, s.time_after) : straight;
+  auto const first = start * (s.time / 3), last = end * (s.time / 3);
+  auto const middle = way(gone(from, first), gone(to, -last));
+  double const rest = 1 - share, square = share * share;
+  return gone(gone(gone(from, first * (1 - rest * rest * rest)), middle * (square * (3 - 2 * share))),
+              last * (square * share));
 }
 
 double distance(camera const& a, camera const& b) {
@@ -105,19 +136,16 @@ camera camera_path::at(double time) const {
   std::size_t const passed =
       static_cast<std::size_t>(std::upper_bound(times_.begin(), times_.end(), time) - times_.begin());
   std::size_t const i = std::min(passed - 1, stretches - 1);
-  // Beyond the ends of an open path it goes on as it came, for as long.
   auto const length = [&](std::size_t k) { return times_[k + 1] - times_[k]; };
   bool const first = !closed_ && i == 0, last = !closed_ && i + 1 == stretches;
-  double const before = first ? length(i) : length((i + stretches - 1) % stretches),
-               after = last ? length(i) : length((i + 1) % stretches);
-  std::array<double, 4> const knots = {times_[i] - before, times_[i], times_[i + 1], times_[i + 1] + after};
-  camera const &from = keyframes_[i], &to = keyframes_[(i + 1) % n];
-  auto const through = [&](auto const& value) {
-    auto const a = value(from), b = value(to);
-    return spline(std::array{first ? between(b, a, 2.0) : value(keyframes_[(i + n - 1) % n]), a, b,
-                             last ? between(a, b, 2.0) : value(keyframes_[(i + 2) % n])},
-                  knots, time);
-  };
+  stretch const here{first ? nullptr : &keyframes_[(i + n - 1) % n],
+                     &keyframes_[i],
+                     &keyframes_[(i + 1) % n],
+                     last ? nullptr : &keyframes_[(i + 2) % n],
+                     length((i + stretches - 1) % stretches),
+                     length(i),
+                     length((i + 1) % stretches)};
+  auto const through = [&](auto const& value) { return at_share(here, (time - times_[i]) / length(i), value); };
   camera c = keyframes_.front();
   c.position = through([](camera const& k) { return k.position; });
   c.rotation = matrix_of(through([](camera const& k) { return rotation_of(k.rotation); }));

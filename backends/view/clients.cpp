@@ -25,14 +25,19 @@ int clients::add(bool control) {
   c.control = control;
   c.texts.push_back(hello_text(scene_, control));
   c.status = status_, c.curve = curve_;
-  count_ = static_cast<int>(clients_.size());
+  counted();
   return id;
 }
 
 void clients::remove(int id) {
   std::lock_guard const lock(mutex_);
   clients_.erase(id);
+  counted();
+}
+
+void clients::counted() {
   count_ = static_cast<int>(clients_.size());
+  wishes_ = static_cast<int>(clients_.size() + actions_.size() + share_.has_value());
 }
 
 verdict clients::receive(int id, std::string_view text, double now) {
@@ -62,8 +67,10 @@ verdict clients::receive(int id, std::string_view text, double now) {
         refused_text(std::holds_alternative<train_message>(message) ? "train" : "share", "there is no training here"));
   } else if (auto const* const train = std::get_if<train_message>(&message)) {
     if (actions_.size() < actions_most) actions_.push_back(train->action);
+    counted();
   } else if (auto const* const share = std::get_if<share_message>(&message)) {
     share_ = share->value;
+    counted();
   }
   changed_.notify_all();
   return {};
@@ -216,12 +223,15 @@ std::optional<train_action> clients::next_action() {
   if (actions_.empty()) return {};
   train_action const first = actions_.front();
   actions_.pop_front();
+  counted();
   return first;
 }
 
 std::optional<double> clients::next_share() {
   std::lock_guard const lock(mutex_);
-  return std::exchange(share_, {});
+  auto const asked = std::exchange(share_, {});
+  counted();
+  return asked;
 }
 
 void clients::set_status(view_status const& status) {

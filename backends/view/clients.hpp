@@ -53,6 +53,7 @@ class clients {
 
   void say_all(std::string const& text);
   int count() const noexcept { return count_.load(std::memory_order_relaxed); }
+  bool idle() const noexcept { return wishes_.load(std::memory_order_relaxed) == 0; }
   view_scene const& scene() const { return scene_; }
 
   std::function<void()> wake = [] {};  // called when there is something to send
@@ -77,13 +78,14 @@ class clients {
   std::optional<job> choose(double now);
   double next_rest(double now) const;
   int moving(double now) const;
+  void counted();  // after a change of clients_, actions_ or share_
 
   view_scene const scene_;
   view_server_options const options_;
   std::mutex mutable mutex_;
   std::condition_variable changed_;
   std::map<int, client> clients_;
-  std::atomic<int> count_ = 0;
+  std::atomic<int> count_ = 0, wishes_ = 0;  // clients; they and what they asked of the training
   int next_id_ = 1, last_served_ = 0;
   frame_pacing pacing_;  // of all: what a new client starts from
   std::string status_, curve_;

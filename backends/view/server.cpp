@@ -90,6 +90,7 @@ std::string view_server::control_address() const { return state_->doors.address(
 std::string view_server::view_address() const { return state_->doors.address(view::right::view); }
 int view_server::port() const { return state_->doors.port(); }
 int view_server::clients() const noexcept { return state_->all.count(); }
+bool view_server::idle() const noexcept { return state_->all.idle(); }
 
 double view_server::render_next(view_render const& render, double wait_seconds) {
   auto const job = state_->all.next_job(seconds_now(), wait_seconds);

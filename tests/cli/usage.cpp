@@ -8,7 +8,7 @@ using namespace cli_test;
 
 TEST_CASE("every command's help teaches: a sentence, what it writes, two examples, defaults") {
   folder const here;
-  for (std::string const command : {"train", "render", "eval", "tradeoff", "synth", "info"}) {
+  for (std::string const command : {"train", "render", "view", "eval", "tradeoff", "synth", "info"}) {
     CAPTURE(command);
     auto const help = here.gart(command + " --help");
     CHECK(help.code == 0);

@@ -16,34 +16,9 @@
 namespace gart_fuzz {
 namespace {
 
-bool finite(std::vector<float> const& values) {
-  return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
-}
-
-bool finite(gart::vec3d const& v) {
-  bool all = true;
-  for (int i = 0; i < 3; ++i) all = all && std::isfinite(static_cast<float>(v[i]));
-  return all;
-}
-
 void check_points(gart::point_cloud const& points) {
   promise(points.position.size() % 3 == 0 && points.color.size() == points.position.size(), "points without colours");
   promise(finite(points.position), "a point that is not finite");
-}
-
-void check_camera(gart::camera const& c) {
-  promise(c.width >= 1 && c.height >= 1, "a camera without pixels");
-  bool const sphere = c.kind == gart::camera_kind::equirectangular;
-  promise(sphere || (c.fx > 0 && c.fy > 0 && finite({c.fx, c.fy, c.cx, c.cy})), "intrinsics that are not finite");
-  promise(finite({c.lens.k1, c.lens.k2, c.lens.p1, c.lens.p2}), "a lens that is not finite");
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      float dot = 0;
-      for (int k = 0; k < 3; ++k) dot += c.rotation[i][k] * c.rotation[j][k];
-      promise(std::abs(dot - (i == j ? 1.0f : 0.0f)) < 1e-3f, "a pose that is no rotation");
-    }
-  }
-  promise(finite(c.position), "a position that is not finite");
 }
 
 void check_cameras(std::vector<gart::named_camera> const& cameras) {

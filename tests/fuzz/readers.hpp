@@ -24,6 +24,7 @@ bool blender(std::string_view input);     // transforms_train.json and transform
 bool camera_json(std::string_view input);
 bool exposures(std::string_view input);  // asked for a view, written and read again
 bool depth(std::string_view input);      // and written again as .npy
+bool view_message(std::string_view input);  // what a viewer's client may send; refused by the field's name
 bool png(std::string_view input);
 bool jpeg(std::string_view input);
 bool checkpoint(std::string_view input);      // loaded by a session, which then takes a step

@@ -39,6 +39,7 @@ constexpr reader readers[] = {
     {"camera_json", gart_fuzz::camera_json},
     {"exposures", gart_fuzz::exposures},
     {"depth", gart_fuzz::depth},
+    {"view_message", gart_fuzz::view_message},
     {"png", gart_fuzz::png},
     {"jpeg", gart_fuzz::jpeg},
     {"checkpoint", gart_fuzz::checkpoint},

@@ -4,13 +4,17 @@
 #include "fuzz/readers.hpp"
 
 #include <gart/core/error.hpp>
+#include <gart/scene/camera.hpp>
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace gart_fuzz {
 
@@ -18,6 +22,31 @@ namespace fs = std::filesystem;
 
 inline void promise(bool kept, std::string const& what) {
   if (!kept) throw broken_promise(what);
+}
+
+inline bool finite(std::vector<float> const& values) {
+  return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
+}
+
+inline bool finite(gart::vec3d const& v) {
+  bool all = true;
+  for (int i = 0; i < 3; ++i) all = all && std::isfinite(static_cast<float>(v[i]));
+  return all;
+}
+
+inline void check_camera(gart::camera const& c) {
+  promise(c.width >= 1 && c.height >= 1, "a camera without pixels");
+  bool const sphere = c.kind == gart::camera_kind::equirectangular;
+  promise(sphere || (c.fx > 0 && c.fy > 0 && finite({c.fx, c.fy, c.cx, c.cy})), "intrinsics that are not finite");
+  promise(finite({c.lens.k1, c.lens.k2, c.lens.p1, c.lens.p2}), "a lens that is not finite");
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      float dot = 0;
+      for (int k = 0; k < 3; ++k) dot += c.rotation[i][k] * c.rotation[j][k];
+      promise(std::abs(dot - (i == j ? 1.0f : 0.0f)) < 1e-3f, "a pose that is no rotation");
+    }
+  }
+  promise(finite(c.position), "a position that is not finite");
 }
 
 // A folder of this process and this reader, gone when the process ends.

@@ -22,7 +22,7 @@ parser.add_argument("--version", required=True)
 parser.add_argument("--cxx", required=True)
 parser.add_argument("--nvcc")
 parser.add_argument("--jobs", default="1")
-parser.add_argument("--component", action="append", default=[], help="cuda, embree: what was built beside cpu")
+parser.add_argument("--component", action="append", default=[], help="cuda, embree, view: what was built beside cpu")
 parser.add_argument("--program", action="store_true")
 a = parser.parse_args()
 here = pathlib.Path(__file__).resolve().parent

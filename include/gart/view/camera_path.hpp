@@ -2,11 +2,12 @@
 /// \file
 /// A smooth path of a camera through keyframes: what a viewer plays and `gart render` follows.
 ///
-/// Everything is interpolated by Barry and Goldman's pyramid of a Catmull-Rom spline: positions by straight lines,
-/// rotations by slerp (Schlag, Graphics Gems II), focal lengths in proportion, principal points by straight lines. The
-/// path goes through every keyframe, and so does its velocity without a jump. The time between two keyframes is the
-/// square root of the way between them, distance and angle (centripetal: close keyframes make no loops), so that no
-/// stretch is without time. Size, model and lens are those of the first keyframe. In double.
+/// Between two keyframes lies a cubic Bezier curve whose speed at either end is that of a Catmull-Rom spline, by the way
+/// to the keyframes on both sides: of positions, of rotations (the cumulative form of Kim, Kim and Shin, "A general
+/// construction scheme for unit quaternion curves", 1995), of the logarithms of focal lengths, of principal points. The
+/// path goes through every keyframe, and its speed has no jump there. The time between two keyframes is the square root
+/// of the way between them, distance and angle (centripetal: close keyframes make no loops), so that no stretch is
+/// without time. Size, model and lens are those of the first keyframe. In double.
 ///
 /// Errors: invalid_argument for less than two keyframes or frames, and for keyframes of different camera models.
 

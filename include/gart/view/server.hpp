@@ -59,8 +59,10 @@ class view_server {
   std::string view_address() const;
   /// The port that it listens at.
   int port() const;
-  /// Pages that are open: one atomic load.
+  /// Pages that are open.
   int clients() const noexcept;
+  /// Whether no page is open and nothing is left that was asked for: one atomic load.
+  bool idle() const noexcept;
 
   /// Waits at most so long for a view that is wanted, renders it and hands it on. The seconds that this took without
   /// the wait; 0 where nothing was wanted.

@@ -1,0 +1,52 @@
+#pragma once
+// The viewer of a training that runs: what it is shown between steps, and what is asked of it.
+
+#include "interrupt.hpp"
+#include "train_arguments.hpp"
+
+#include <gart/runtime/renderer.hpp>
+#include <gart/view/pacing.hpp>
+#include <gart/view/server.hpp>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+
+namespace gart_cli {
+
+class training_view {
+ public:
+  // Serves from here on. The session and the dataset must outlive it.
+  training_view(train_arguments const& a, gart::session& session, gart::dataset const& data, gart::vec3 background);
+
+  // Whether nobody is there and nothing was asked: one atomic load, and all that a training without a viewer pays.
+  bool idle() const noexcept { return server_.idle() && !paused_; }
+
+  // Between two steps, of which the last took so long: tells how it stands, renders what there is time for, does what
+  // was asked, and waits while it is paused. `save` writes the checkpoint. False where the training is to stop.
+  bool attend(double step_seconds, gart::view_status status, interrupt_guard const& interrupt,
+              std::function<void()> const& save);
+  void set_curve(gart::view_curve const& curve) { server_.set_curve(curve); }
+  gart::view_server const& server() const { return server_; }
+  // Seconds that went into views.
+  double seconds() const { return seconds_; }
+
+ private:
+  using clock = std::chrono::steady_clock;
+  gart::rendered render(gart::camera const& view, gart::view_settings const& settings);
+
+  train_arguments const& a_;
+  gart::session& session_;
+  float extent_;
+  gart::vec3 background_;
+  gart::view_server server_;
+  gart::view_render const render_;
+  gart::time_share share_;
+  std::unique_ptr<gart::renderer> part_;  // of views that leave something out
+  bool paused_ = false;
+  double seconds_ = 0;
+  clock::time_point told_{};
+};
+
+}  // namespace gart_cli
