@@ -48,7 +48,11 @@ const connection = connect({
   frame: frameShower(frame, frameShown),
   picked: answer,
   path: answer,
-  status: (message) => training.status(message),
+  status(message) {
+    training.status(message);
+    // What is at rest is asked for again, for the model has changed since; views have their share of time, and no more.
+    if (!message.paused && !document.hidden) view.refresh();
+  },
   curve: (message) => training.curve(message),
   refused: ({what, why}) => say(`Refused: ${what}, ${why}`),
   error: ({what}) => {

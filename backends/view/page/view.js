@@ -21,6 +21,7 @@ export class View {
   world = {pivot: [0, 0, 0], up: [0, 0, 1], extent: 1, speed: 0.35};
 
   #id = 0;
+  #shownId = 0;
   #sent = new Map();
   #dirty = false;
   #moving = false;
@@ -171,8 +172,14 @@ export class View {
     if (sent) this.#sent.set(id, {camera, pose: this.pose, rect: this.rectOf(camera), through: this.through});
   }
 
+  // The same again, once what was asked for last is there.
+  refresh() {
+    if (!this.#moving && !this.#dirty && this.#shownId === this.#id) this.changed();
+  }
+
   // What a frame was asked for with; those before it are forgotten.
   asked(id) {
+    this.#shownId = id;
     for (const old of this.#sent.keys()) if (old < id) this.#sent.delete(old);
     return this.#sent.get(id);
   }
