@@ -56,6 +56,7 @@ export const tools = {
     const box = await p.page.locator('#stage').boundingBox();
     for (const ball of balls.slice(0, 2)) {
       const [x, y] = pixelOf(camera, ball.slice(0, 3));
+      assert.ok(x > 0 && y > 0 && x < camera.width && y < camera.height, 'home shows all of the scene');
       await p.page.mouse.click(box.x + x, box.y + y);
       await p.until('an answer', () => p.received.filter((m) => m.type === 'picked').length === balls.indexOf(ball) + 1);
     }

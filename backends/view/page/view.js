@@ -44,7 +44,7 @@ export class View {
     this.home();
   }
 
-  // As the capture's first camera sees the scene, or from aside and above.
+  // As the capture’s first camera sees the scene, or from aside and above, from where all of it is in view.
   home() {
     this.leave();
     const {up, extent} = this.world;
@@ -53,7 +53,7 @@ export class View {
       this.lens = {name: 'pinhole', angle: kindOf(this.first) === 'perspective' ? angleLike(this.first, this.stage) : 75};
     } else {
       const side = Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0];
-      this.pose = lookingAt(add(this.centre, add(scale(side, 1.6 * extent), scale(up, 0.8 * extent))), this.centre, up);
+      this.pose = lookingAt(add(this.centre, add(scale(side, 2.1 * extent), scale(up, extent))), this.centre, up);
       this.lens = {name: 'pinhole', angle: 60};
     }
     this.world.pivot = pivotAhead(this.pose, this.centre, extent);
