@@ -1,9 +1,24 @@
 // Who may come in, and what people find who do not see the page or have a narrow one.
 
 import assert from 'node:assert/strict';
+import fs from 'node:fs';
 import {openPage} from './browser.mjs';
 
+const source = new URL('../../backends/view/page/', import.meta.url);
+
 export const people = {
+  async 'the page is at most 150 KB, names no outside address and has no inline script or style'() {
+    const files = fs.readdirSync(source).map((name) => ({name, text: fs.readFileSync(new URL(name, source), 'utf8')}));
+    const size = files.reduce((sum, {text}) => sum + Buffer.byteLength(text), 0);
+    assert.ok(size <= 150e3, `${size} bytes`);
+    for (const {name, text} of files) {
+      const addresses = (text.match(/\w+:\/\/[^\s'"`]+/g) ?? []).filter((a) => a !== 'http://www.w3.org/2000/svg');
+      assert.deepEqual(addresses, [], name);
+      if (name.endsWith('.html')) assert.ok(!/<style|\sstyle=|\son\w+=|<script(?![^>]*\ssrc=)/.test(text), `${name} has something inline`);
+      assert.ok(!/innerHTML|eval\(|new Function/.test(text), `${name} makes code or markup of text`);
+    }
+  },
+
   async 'a wrong token is refused'({browser, server}) {
     const wrong = server.control.replace(/[0-9a-f]{32}/, '0'.repeat(32));
     const page = await browser.newPage();
