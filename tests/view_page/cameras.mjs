@@ -50,7 +50,7 @@ export const cameras = {
 
   async 'a camera is looked through that is clicked on in the view'({browser, server}) {
     const p = await openPage(browser, server.control), {cameras: all, model} = p.received[0];
-    await p.page.mouse.move(450, 300);
+    await p.page.mouse.move(290, 280);
     const near = placeOf(p.last().camera);
     await p.page.mouse.wheel(0, 1200);
     await p.until('a farther view', () => apart(placeOf(p.last().camera), near) > 0.1);

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import {openPage} from './browser.mjs';
 import {along, apart, dot, forwardOf, isRotation, minus, placeOf} from './geometry.mjs';
 
-const middle = [450, 300];
+const middle = [290, 280];
 
 export const navigation = {
   async 'a drag orbits: the point ahead stays where it is, at its distance'({browser, server}) {
@@ -12,7 +12,7 @@ export const navigation = {
     const {model} = p.received[0], before = p.last().camera;
     assert.equal(await p.page.title(), `${model.name} – gart`);
     const far = dot(minus(model.center, placeOf(before)), forwardOf(before));
-    await p.drag(middle, [150, 40]);
+    await p.drag(middle, [120, 40]);
     const {view: {camera: after}} = await p.rest();
     assert.ok(apart(placeOf(before), placeOf(after)) > 0.1 * far, 'the camera did not move');
     assert.ok(isRotation(after));
@@ -69,14 +69,14 @@ export const navigation = {
   },
 
   async 'frames are smaller while the camera moves where they have to be, and whole at rest'({browser, server}) {
-    const p = await openPage(browser, server.control, {viewport: {width: 1400, height: 900}, deviceScaleFactor: 2});
+    const p = await openPage(browser, server.control, {viewport: {width: 1100, height: 700}, deviceScaleFactor: 2});
     const whole = (await p.rest()).header;
     assert.deepEqual([whole.width, whole.height], whole.full);
     const first = p.frames.length;
     const box = await p.page.locator('#stage').boundingBox();
     await p.page.mouse.move(box.x + 300, box.y + 300);
     await p.page.mouse.down();
-    for (let i = 0; i < 60; ++i) {
+    for (let i = 0; i < 40; ++i) {
       await p.page.mouse.move(box.x + 300 + 4 * (i % 30), box.y + 300 + 2 * (i % 20));
       await p.page.waitForTimeout(25);
     }

@@ -40,10 +40,9 @@ export const training = {
 
     await p.page.click('#pause');
     await p.until('it to go on', () => !status().paused && status().step > at + 3);
-    const saved = () => fs.statSync(path.join(work, 'live', 'model.ply'), {throwIfNoEntry: false})?.mtimeMs ?? 0;
-    const before = saved();
+    const saved = () => fs.statSync(path.join(work, 'live', 'checkpoint.gart')).mtimeMs, before = saved();
     await p.page.click('#save');
-    await p.until('a saved model', () => saved() > before);
+    await p.until('a checkpoint', () => saved() > before);
     await p.page.click('#stop');
     await p.page.click('#sure button[value=stop]');
     const code = await server.ended;
