@@ -60,6 +60,10 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
     say("--init-scale", short_number(start.value.scale), a.initial_scale != 0 ? by_option : start.why);
   }
   gart::train_options const options = train_options_of(a);
+  if (options.densify != gart::densify_kind::none) {
+    auto const budget = gart::choose_budget(data, options);
+    say("budget", with_commas(budget.value), budget.why);
+  }
   gart::configuration_request const wanted = configuration_request_of(a);
   auto const plan = gart::plan_trials(wanted, options, data.train.size());
   bool const measured = !plan.held_out.empty();

@@ -48,7 +48,9 @@ void add_arguments(CLI::App& train, train_arguments& a) {
             "Steps, one training view each. With --resume it may be\nraised: rates, degrees and densification then "
             "follow the new\nlength, so rates that had fallen rise again"))
       ->check(between(1, 1e9));
-  in_group(r.add(train, "--max-gaussians", a.max_gaussians, "N", "Gaussians at most; memory and time grow with them"))
+  in_group(r.add(train, "--max-gaussians", a.max_gaussians, "N",
+                 "Gaussians at most; memory and time grow with them. Growth by\nerror ends at one for each 100 "
+                 "training pixels where that is\nless (and over 100,000)"))
       ->check(between(1, static_cast<double>(gart::most_gaussians)));
   in_group(r.add(train, "--time-budget", a.time_budget, "S",
                  "Seconds of training after which the run ends, where\n--iterations do not end it before, 0: no limit. "

@@ -1,5 +1,6 @@
 #include <gart/camera/models.hpp>
 #include <gart/exposure/exposure_field.hpp>
+#include <gart/optim/error_growth.hpp>
 #include <gart/runtime/choose.hpp>
 
 #include <algorithm>
@@ -167,6 +168,17 @@ chosen<starting_points> choose_start(dataset const& data, train_options const& o
   return {start, !start.random ? "the capture's points lie on surfaces"
                  : sparse      ? "random points are mostly in empty space, and the dead move"
                                : "random points"};
+}
+
+chosen<index_t> choose_budget(dataset const& data, train_options const& options) {
+  index_t const most = options.max_gaussians;
+  if (options.densify != densify_kind::error) return {most, "as many as there may be"};
+  index_t const budget = growth_budget(options.error, most, data.training_pixels());
+  if (budget == most) return {most, "as many as there may be; the photographs have pixels for them"};
+  char text[96];
+  std::snprintf(text, sizeof text, "one for %g training pixels, and at least %d: more would learn them by heart",
+                static_cast<double>(options.error.pixels_each), options.error.least_budget);
+  return {budget, text};
 }
 
 chosen<float> choose_sh_gain(train_options const& options) {

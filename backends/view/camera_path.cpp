@@ -16,7 +16,6 @@ struct rotation {
 };
 
 rotation operator*(double s, rotation const& q) { return {s * q.w, s * q.x, s * q.y, s * q.z}; }
-rotation operator+(rotation const& a, rotation const& b) { return {a.w + b.w, a.x + b.x, a.y + b.y, a.z + b.z}; }
 double dot(rotation const& a, rotation const& b) { return a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z; }
 rotation unit(rotation const& q) { return (1 / std::sqrt(dot(q, q))) * q; }
 

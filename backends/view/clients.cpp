@@ -9,7 +9,8 @@ namespace gart::view {
 
 namespace {
 
-constexpr std::size_t texts_most = 64, actions_most = 64;
+// What waits for a client that reads nothing is bounded: answers, which may be long, and all texts.
+constexpr std::size_t answers_most = 2, texts_most = 64, actions_most = 64;
 
 // The close of a connection, by RFC 6455: what was said is not what was agreed on.
 constexpr int policy_violation = 1008;
@@ -84,6 +85,7 @@ bool clients::take_text(int id, std::string& to) {
   if (!c.texts.empty()) {
     to = std::move(c.texts.front());
     c.texts.pop_front();
+    changed_.notify_all();
     return true;
   }
   std::string& newest = c.status.empty() ? c.curve : c.status;
@@ -91,12 +93,13 @@ bool clients::take_text(int id, std::string& to) {
   return !to.empty();
 }
 
-bool clients::take_frame(int id, std::vector<u8>& to) {
+bool clients::take_frame(int id, std::vector<u8>& to, double now) {
   std::lock_guard const lock(mutex_);
   auto const found = clients_.find(id);
   if (found == clients_.end() || found->second.frame.empty()) return false;
   to = std::exchange(found->second.frame, {});
-  changed_.notify_all();  // the next one may be rendered
+  found->second.view_time = now;  // who moves on sends the next view when this one is there
+  changed_.notify_all();          // the next one may be rendered
   return true;
 }
 
@@ -127,6 +130,7 @@ int clients::moving(double now) const {
 // What is asked for once comes first, then views that move, then those at rest, which take longest.
 std::optional<job> clients::job_of(int id, client& c, double now, int urgency) {
   if (urgency == 0) {
+    if (c.texts.size() >= answers_most) return {};
     if (c.pick) return job{id, *std::exchange(c.pick, {})};
     if (c.path) return job{id, *std::exchange(c.path, {})};
     return {};

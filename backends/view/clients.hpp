@@ -38,7 +38,7 @@ class clients {
   void remove(int client);
   verdict receive(int client, std::string_view text, double now);
   bool take_text(int client, std::string& to);
-  bool take_frame(int client, std::vector<u8>& to);
+  bool take_frame(int client, std::vector<u8>& to, double now);
   bool has_output(int client) const;
   bool overflows(int client) const;  // it takes nothing of what it asked for
 
@@ -62,7 +62,7 @@ class clients {
   struct client {
     bool control = false;
     std::optional<view_message> view;  // the newest
-    double view_time = 0;              // when it came
+    double view_time = 0;              // when it came, or the last frame went
     bool fresh = false;                // not rendered in any size
     bool still_done = false;           // rendered whole
     std::optional<pick_message> pick;

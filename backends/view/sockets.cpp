@@ -21,7 +21,7 @@ namespace {
 
 constexpr char const* protocol_name = "gart-view";
 // Codes of a close, by RFC 6455.
-constexpr int no_text = 1003, too_large = 1009;
+constexpr int no_text = 1003, policy_violation = 1008, too_large = 1009;
 // What waits in the system for a slow line is old before it arrives.
 constexpr int send_buffer = 256 * 1024;
 constexpr unsigned connections_most = 96;
@@ -191,17 +191,17 @@ struct sockets::state {
     if (lws_remaining_packet_payload(wsi) != 0 || !lws_is_final_fragment(wsi)) return 0;
     verdict const said = all.receive(c.client, std::exchange(c.incoming, {}), seconds_now());
     if (!said.reason.empty()) return close(wsi, said.code, said.reason);
+    if (all.overflows(c.client)) return close(wsi, policy_violation, "nothing of what was sent is read");
     if (all.has_output(c.client)) lws_callback_on_writable(wsi);
     return 0;
   }
 
   int write(lws* wsi, connection& c) {
-    if (all.overflows(c.client)) return close(wsi, too_large, "nothing of what was sent is read");
     std::string text;
     if (all.take_text(c.client, text)) {
       std::vector<u8> bytes = padded(reinterpret_cast<u8 const*>(text.data()), text.size());
       if (send(wsi, bytes, LWS_WRITE_TEXT) != 0) return -1;
-    } else if (std::vector<u8> frame; all.take_frame(c.client, frame)) {
+    } else if (std::vector<u8> frame; all.take_frame(c.client, frame, seconds_now())) {
       std::vector<u8> bytes = padded(frame.data(), frame.size());
       if (send(wsi, bytes, LWS_WRITE_BINARY) != 0) return -1;
     }

@@ -66,7 +66,7 @@ class folder {
     }
     int status = 0;
     for (int waited_ms = 0; waited_ms < 120'000; waited_ms += 20) {
-      if (fs::exists(path_ / "stderr.txt") && text_of(path_ / "stderr.txt").find(sign) != std::string::npos) break;
+      if (has_said(sign)) break;
       if (waitpid(child, &status, WNOHANG) == child) return outcome_of(status);
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
@@ -82,6 +82,11 @@ class folder {
   nlohmann::json json(std::string const& name) const { return nlohmann::json::parse(text_of(path_ / name)); }
 
  private:
+  bool has_said(std::string const& sign) const {
+    for (char const* name : {"stdout.txt", "stderr.txt"})
+      if (fs::exists(path_ / name) && text_of(path_ / name).find(sign) != std::string::npos) return true;
+    return false;
+  }
   outcome outcome_of(int status) const {
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of(path_ / "stdout.txt"), text_of(path_ / "stderr.txt")};
   }

@@ -132,6 +132,21 @@ TEST_CASE("a capture's depth maps are distances along the rays") {
   CHECK(half.at(3, 3, 0) == 3);
 }
 
+TEST_CASE("where a map of z says nothing there is no depth, whatever the ray") {
+  // To 189 degrees from the axis: behind the camera, and at the corners past what a fisheye has rays for.
+  one_view const wide(R"(, "camera_model": "OPENCV_FISHEYE", "fl_y": 1.5, "k1": 0)");
+  std::string text;
+  for (gart::u8 const c : gart::read_file(wide.folder.path / "transforms.json")) text += static_cast<char>(c);
+  text.replace(text.find("\"fl_x\": 4"), 9, "\"fl_x\": 1.5");
+  wide.folder.put("transforms.json", text);
+  gart::image_float map(8, 8, 1, 0.0f);
+  map.at(4, 4, 0) = 2;
+  gart::write_depth_png(wide.folder.path / "depths" / "a.png", map, 0.001);
+  auto const got = wide.map();
+  for (int y = 0; y < 8; ++y)
+    for (int x = 0; x < 8; ++x) CHECK((x == 4 && y == 4 ? got.at(x, y, 0) > 2 : got.at(x, y, 0) == 0));
+}
+
 TEST_CASE("a capture's depth map that does not fit is refused by its file") {
   one_view const view;
   CHECK(holds(view.refused(), "a.png: the depth map of images/a.png is not there"));

@@ -224,3 +224,17 @@ TEST_CASE_TEMPLATE("the statistic adds up steps, and the penalty is that of the 
   }
   CHECK(got.mean == g.mean);
 }
+
+TEST_CASE("growth ends where the capture has too few pixels for more") {
+  gart::error_growth_options options;
+  auto const budget = [&](gart::index_t most, gart::u64 pixels) { return gart::growth_budget(options, most, pixels); };
+  CHECK(budget(1'000'000, 22'809'600) == 228'096);     // 44 photographs of 540 x 960
+  CHECK(budget(1'000'000, 108'732'000) == 1'000'000);  // 255 of 800 x 533
+  CHECK(budget(1'000'000, 912'384) == 100'000);        // no capture is too small for so many
+  CHECK(budget(20'000, 912'384) == 20'000);
+  options.least_budget = 0;
+  CHECK(budget(1'000'000, 912'384) == 9'123);
+  CHECK(budget(1'000'000, 0) == 0);
+  options.pixels_each = 0;
+  CHECK(budget(1'000'000, 912'384) == 1'000'000);
+}

@@ -31,20 +31,10 @@ gart::camera disturbed(gart::camera const& c, std::mt19937_64& random, double de
   return gart::moved(c, {t.x, t.y, t.z, w.x, w.y, w.z}, 1);
 }
 
-template <class E>
-using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::primitive_strategy>;
-
-// The Gaussians of the capture stand still: poses alone are learned.
-gart::train_options still(int iterations) {
-  gart::train_options options;
-  options.iterations = iterations;
-  options.max_gaussians = 400;
-  options.densify = gart::densify_kind::none;
-  options.sh_every = 1;
+gart::train_options learning_poses(int iterations) {
+  gart::train_options options = still(iterations);
   options.refine_poses = true;
   options.poses.warm_up = 0;
-  auto& r = options.rates;
-  r.mean = r.mean_final = r.log_scale = r.quaternion = r.opacity = r.sh_dc = r.sh_rest = 0;
   return options;
 }
 
@@ -68,7 +58,7 @@ TEST_CASE_TEMPLATE("poses that were disturbed are found again, and images then a
     data.train[v].view = gart::moved(truth[v], {0, 0, 0, w.x, w.y, w.z}, 1);
     before = degrees_between(truth[v], data.train[v].view);
   }
-  auto const options = still(480);
+  auto const options = learning_poses(480);
   run_of<E> run(exec, options, data, cloud(seed, 0.6f));
   double first = 0, last = 0;
   for (int k = 0; k < 4; ++k) first += double{run.step().psnr} / 4;
@@ -92,7 +82,7 @@ TEST_CASE_TEMPLATE("a state carries poses, and one of another number of views is
   CAPTURE(seed);
   E exec;
   auto data = capture(exec, seed);
-  auto const options = still(40);
+  auto const options = learning_poses(40);
   run_of<E> run(exec, options, data, cloud(seed + 1, 0.6f));
   for (int i = 0; i < 9; ++i) run.step();
   auto const state = run.state();

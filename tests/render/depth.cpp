@@ -45,7 +45,7 @@ std::vector<weighted_depth> const& weights() {
 
 template <class Tracer, class E, class Strategy>
 void check_scene(E& exec, expectation const& e, weighted_depth const& w, Strategy) {
-  CAPTURE(Strategy::name);
+  CAPTURE(std::string(Strategy::name));
   auto const& s = e.scene;
   detail::with_degree(s.model.sh_degree, [&](auto degree) {
     // At other degrees one strategy stands for all: geometry does not know them.

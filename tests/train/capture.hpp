@@ -5,6 +5,7 @@
 #include <support/trace_scene.hpp>
 
 #include <gart/io/dataset.hpp>
+#include <gart/train/trainer.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -46,6 +47,21 @@ gart::dataset capture(E& exec, std::uint64_t seed) {
     data.train.push_back(std::move(view));
   }
   return data;
+}
+
+template <class E, class Strategy = gart::primitive_strategy>
+using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy>;
+
+// The Gaussians of the capture stand still: what is learned besides them is learned alone.
+inline gart::train_options still(int iterations) {
+  gart::train_options options;
+  options.iterations = iterations;
+  options.max_gaussians = 400;
+  options.densify = gart::densify_kind::none;
+  options.sh_every = 1;
+  auto& r = options.rates;
+  r.mean = r.mean_final = r.log_scale = r.quaternion = r.opacity = r.sh_dc = r.sh_rest = 0;
+  return options;
 }
 
 }  // namespace gart_test

@@ -40,9 +40,6 @@ double off(Run& run, gart::dataset const& data) {
   return sum / count;
 }
 
-template <class E, class Strategy>
-using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy>;
-
 gart::train_options options_of(float weight) {
   gart::train_options options;
   options.iterations = 60, options.densify = gart::densify_kind::none, options.depth_weight = weight;

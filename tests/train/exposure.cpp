@@ -23,19 +23,9 @@ gart::exposure_state some_state(std::mt19937_64& random, std::size_t views) {
   return {values(random, n), std::vector<float>(n), std::vector<float>(n), std::vector<gart::u32>(views)};
 }
 
-template <class E>
-using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::primitive_strategy>;
-
-// The Gaussians of the capture stand still: exposures alone are learned.
-gart::train_options still(int iterations) {
-  gart::train_options options;
-  options.iterations = iterations;
-  options.max_gaussians = 400;
-  options.densify = gart::densify_kind::none;
-  options.sh_every = 1;
+gart::train_options learning_exposures(int iterations) {
+  gart::train_options options = still(iterations);
   options.exposure = true;
-  auto& r = options.rates;
-  r.mean = r.mean_final = r.log_scale = r.quaternion = r.opacity = r.sh_dc = r.sh_rest = 0;
   return options;
 }
 
@@ -114,7 +104,7 @@ TEST_CASE_TEMPLATE("gains of photographs are found, and the images then agree", 
   float const gains[] = {0.6f, 0.8f, 0.9f, 0.7f};
   for (std::size_t v = 0; v < data.train.size(); ++v)
     for (auto& level : data.train[v].image.data) level = static_cast<gart::u8>(std::lround(gains[v] * level));
-  auto const options = still(600);
+  auto const options = learning_exposures(600);
   run_of<E> run(exec, options, data, cloud(seed, 0.6f));
   float const before = run.step().psnr;
   gart::step_report last;
@@ -136,7 +126,7 @@ TEST_CASE_TEMPLATE("a state carries exposures, and one of another number of view
   CAPTURE(seed);
   E exec;
   auto data = capture(exec, seed);
-  auto options = still(40);
+  auto options = learning_exposures(40);
   run_of<E> run(exec, options, data, cloud(seed + 1, 0.6f));
   for (int i = 0; i < 9; ++i) run.step();
   auto const state = run.state();

@@ -12,9 +12,6 @@ using namespace gart_test;
 
 namespace {
 
-template <class E>
-using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::primitive_strategy>;
-
 gart::train_options options_with(gart::densify_kind densify) {
   gart::train_options options;
   options.iterations = 60;

@@ -7,9 +7,6 @@ using namespace gart_test;
 
 namespace {
 
-using run_of = gart::trainer<gart::serial_exec, gart::scene_traits<1>, gart::tile_tracer<gart::serial_exec>,
-                             gart::primitive_strategy>;
-
 gart::train_options options_of(gart::densify_kind densify, int iterations) {
   gart::train_options options;
   options.iterations = iterations, options.densify = densify;
@@ -36,8 +33,8 @@ TEST_CASE("a length that is set is as good as one that was known") {
   auto const data = capture(exec, seed);
   auto const start = cloud(seed + 1, 0.7f);
   constexpr int length = 150;
-  run_of known(exec, options_of(densify, length), data, start), told(exec, options_of(densify, 9000), data, start),
-      untold(exec, options_of(densify, 9000), data, start);
+  run_of<gart::serial_exec> known(exec, options_of(densify, length), data, start),
+      told(exec, options_of(densify, 9000), data, start), untold(exec, options_of(densify, 9000), data, start);
   told.set_iterations(length);
   for (int i = 0; i < length; ++i) known.step(), told.step(), untold.step();
   CHECK(known.model().size() != start.size());
@@ -47,7 +44,7 @@ TEST_CASE("a length that is set is as good as one that was known") {
   CHECK_FALSE(same_bits(known.model(), untold.model()));
 
   // Under way, it goes on from where it stands: the rate of the means ends where that of the run ends.
-  run_of late(exec, options_of(densify, 9000), data, start);
+  run_of<gart::serial_exec> late(exec, options_of(densify, 9000), data, start);
   for (int i = 0; i < 100; ++i) late.step();
   late.set_iterations(100);
   auto const before = late.model();

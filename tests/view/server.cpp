@@ -370,3 +370,20 @@ TEST_CASE("a server that ends says so") {
   r.reset();
   CHECK(json::parse(c->hear().payload)["type"] == "bye");
 }
+
+TEST_CASE("a client that asks and reads nothing is closed before what waits for it grows") {
+  running r;
+  auto const c = r.client(true, 4096);
+  gart::camera const view = camera_at({0, 0, 0}, 0, 1024, 512);
+  // What it is sent no longer fits into the system's buffers.
+  bool closed = false;
+  for (int i = 0; i < 20'000 && !closed; ++i) {
+    try {
+      if (i % 50 == 0) c->say(view_text(view, false, i));
+      c->say(R"({"type":"train","action":"stop"})");
+    } catch (std::exception const&) {
+      closed = true;
+    }
+  }
+  CHECK(r.has_logged("nothing of what was sent is read"));
+}

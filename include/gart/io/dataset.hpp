@@ -26,7 +26,7 @@ struct dataset_view {
   std::string name;   ///< unique in the dataset, fit for a file name: renders/NAME.png
   camera view;        ///< for the image as it is held (after dataset_options.downscale)
   image8 image;       ///< 3 channels, or 4 with straight alpha
-  image8 mask;        ///< 1 channel, 0 = ignore; empty where there is none
+  image8 mask;        ///< 1 channel, 0 = ignore, else the gradient's weight in parts of 255; empty: none
   image_float depth;  ///< distance along the ray, 0 = not measured; empty where none was asked for
 };
 
@@ -50,6 +50,13 @@ struct dataset {
   bool alpha = false;                     ///< images carry alpha: composited over the background chosen
   /// Random starting points lie in this box; Blender's [-1.3, 1.3]^3, else around the cameras.
   vec3d bounds_min{-1.3}, bounds_max{1.3};  ///< corners
+
+  /// Pixels of all training views.
+  u64 training_pixels() const {
+    u64 sum = 0;
+    for (dataset_view const& v : train) sum += u64(v.view.width) * u64(v.view.height);
+    return sum;
+  }
 };
 
 /// Which depth maps to read of a capture, and what their values are. A frame's map is what `depth_file_path` of a

@@ -64,12 +64,8 @@ GART_HD inline sine_cosine small_sine_cosine(fixed_double x) {
   return {x + x * s, c + 1.0};
 }
 
-/// Of `part` / `whole` quarters of a turn, which are whole numbers or halves: angles that lie a quarter apart have the
-/// same bits, but for their places and signs.
-GART_HD inline sine_cosine sine_cosine_of_quarters(double part, double whole) {
-  double const quarters = floor(part / whole + 0.5);
-  sine_cosine const s =
-      small_sine_cosine(fixed_double(part - quarters * whole) / fixed_double(whole) * 1.5707963267948966);
+/// Of the angle so many quarters of a turn on.
+GART_HD inline sine_cosine turned(sine_cosine const& s, double quarters) {
   switch (static_cast<int>(quarters) & 3) {
     case 0:
       return s;
@@ -82,23 +78,21 @@ GART_HD inline sine_cosine sine_cosine_of_quarters(double part, double whole) {
   }
 }
 
+/// Of `part` / `whole` quarters of a turn, which are whole numbers or halves: angles that lie a quarter apart have the
+/// same bits, but for their places and signs.
+GART_HD inline sine_cosine sine_cosine_of_quarters(double part, double whole) {
+  double const quarters = floor(part / whole + 0.5);
+  return turned(small_sine_cosine(fixed_double(part - quarters * whole) / fixed_double(whole) * 1.5707963267948966),
+                quarters);
+}
+
 /// Of an angle of up to a turn.
 GART_HD inline sine_cosine sine_cosine_of(fixed_double x) {
   double const quarters = floor(static_cast<double>(x * 0.6366197723675814 + 0.5));
   // pi / 2 in two parts, the first of few digits.
   fixed_double const rest =
       (x - fixed_double(quarters) * 1.5707963267341256) - fixed_double(quarters) * 6.077100506506192e-11;
-  sine_cosine const s = small_sine_cosine(rest);
-  switch (static_cast<int>(quarters) & 3) {
-    case 0:
-      return s;
-    case 1:
-      return {s.cosine, -s.sine};
-    case 2:
-      return {-s.sine, -s.cosine};
-    default:
-      return {-s.cosine, s.sine};
-  }
+  return turned(small_sine_cosine(rest), quarters);
 }
 
 }  // namespace gart::inline GART_ISA

@@ -12,8 +12,9 @@
 /// and Spirakis 2006: the least of -ln(u) / weight, u uniform), and splits each along its long axis
 /// (long_axis_split.hpp). As many are drawn as there are dead Gaussians, whose rows the second halves take, and as the
 /// count is to grow. It grows on a square-root curve, early, to the budget at the share `fill` of the run, and at most
-/// doubles at a time. First halves keep Adam's moments, second ones start with none. After `fill` only the dead are
-/// replaced, after `until` nothing moves.
+/// doubles at a time. The budget follows the capture's pixels where they are few (growth_budget): a Gaussian that
+/// covers a pixel or two of each photograph learns its noise, and what is wrong with its pose. First halves keep Adam's
+/// moments, second ones start with none. After `fill` only the dead are replaced, after `until` nothing moves.
 ///
 /// A small penalty on the mean opacity, paid by all Gaussians, takes those that no view needs; they fade until they are
 /// dead. A Gaussian whose opacity or geometry is not finite counts as dead. Where no error is attributed, or none is
@@ -130,6 +131,14 @@ struct error_split_kernel {
 
 }  // namespace detail
 
+/// The count that growth ends at, in a capture of so many training pixels: `most`, or what options.pixels_each leaves.
+inline index_t growth_budget(error_growth_options const& options, index_t most, u64 pixels) {
+  if (!(options.pixels_each > 0)) return most;
+  double const fit = static_cast<double>(pixels) / static_cast<double>(options.pixels_each);
+  double const limit = most, least = std::min(limit, static_cast<double>(std::max(options.least_budget, 0)));
+  return static_cast<index_t>(std::clamp(fit, least, limit));
+}
+
 /// Steps count from 1.
 template <execution E>
 class error_growth {
@@ -137,7 +146,7 @@ class error_growth {
   /// The error seen through each Gaussian since the last densification, [N]: what a checkpoint must hold.
   buffer<float, E> error_sum;
 
-  /// For a run of so many steps, up to so many Gaussians.
+  /// For a run of so many steps, up to so many Gaussians (growth_budget).
   error_growth(E& exec, error_growth_options const& options, index_t max_gaussians, int iterations, u64 seed)
       : error_sum(exec),
         exec_(&exec),

@@ -56,6 +56,10 @@ struct error_growth_options {
   float until = 5.0f / 6;          ///< share of the run after which the dead stay where they are
   float dead_opacity = 0.005f;     ///< as least_opacity has it for the alpha_min traced with
   float opacity_penalty = 0.003f;  ///< times the mean opacity
+  /// The count ends at one Gaussian for so many pixels of the training views: more would learn them by heart. 0: at
+  /// max_gaussians, whatever the capture.
+  float pixels_each = 100;
+  int least_budget = 100'000;  ///< that pixels_each leaves to the smallest capture
 };
 
 /// Of adaptive density control (optim/adc.hpp).

@@ -75,6 +75,10 @@ struct starting_points {
 /// Where training starts; the reason names the numbers.
 chosen<starting_points> choose_start(dataset const& data, train_options const& options);
 
+/// The count that the options let the capture grow to: max_gaussians, or what growth by error takes its pixels for
+/// (growth_budget).
+chosen<index_t> choose_budget(dataset const& data, train_options const& options);
+
 /// All of these, as `gart train` takes them: what `request` leaves to gart's choice, and in the options background,
 /// exposure and sh_gain, in place of what they say. A choice that is to be another is set afterwards.
 struct recommendation {

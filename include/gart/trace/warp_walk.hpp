@@ -185,9 +185,9 @@ class walk_tile_warps {
       return more;
     }
 
-    // The first floats of a word to shared memory, and zero for the others: bands above the active degree may end
-    // within one. What __pipeline_memcpy_async does, whose zeros are a number known to the compiler.
-    __device__ GART_INLINE static void copy_word(quad* to, quad const* from, int floats) {
+    // The first floats of a word to shared memory, and zero for the others: the active bands may end within one. What
+    // __pipeline_memcpy_async does, whose zeros are a number known to the compiler.
+    __device__ GART_INLINE static void copy_part(quad* to, quad const* from, int floats) {
       asm volatile(
           "cp.async.cg.shared.global [%0], [%1], 16, %2;" ::"r"(static_cast<u32>(__cvta_generic_to_shared(to))),
           "l"(__cvta_generic_to_global(from)), "r"(4 * floats)
@@ -209,10 +209,11 @@ class walk_tile_warps {
             int const word = w + reader, in_row = word - gaussian_words;
             bool const of_gaussian = in_row < 0;
             int const left = k_.program.row_floats_read() - 4 * in_row;
-            if (of_gaussian || (in_row < row_words && left > 0))
-              copy_word(reinterpret_cast<quad*>(&to) + word,
-                        of_gaussian ? gaussian + word : reinterpret_cast<quad const*>(row) + in_row,
-                        of_gaussian || left >= 4 ? 4 : left);
+            quad const* const from = of_gaussian ? gaussian + word : reinterpret_cast<quad const*>(row) + in_row;
+            if (of_gaussian || (in_row < row_words && left >= 4))
+              __pipeline_memcpy_async(reinterpret_cast<quad*>(&to) + word, from, sizeof(quad));
+            else if (in_row < row_words && left > 0)
+              copy_part(reinterpret_cast<quad*>(&to) + word, from, left);
           }
         } else {
           if (reader < gaussian_words)

@@ -2,8 +2,8 @@
 /// \file
 /// A smooth path of a camera through keyframes: what a viewer plays and `gart render` follows.
 ///
-/// Between two keyframes lies a cubic Bezier curve whose speed at either end is that of a Catmull-Rom spline, by the way
-/// to the keyframes on both sides: of positions, of rotations (the cumulative form of Kim, Kim and Shin, "A general
+/// Between two keyframes lies a cubic Bezier curve whose speed at either end is that of a Catmull-Rom spline, by the
+/// way to the keyframes on both sides: of positions, of rotations (the cumulative form of Kim, Kim and Shin, "A general
 /// construction scheme for unit quaternion curves", 1995), of the logarithms of focal lengths, of principal points. The
 /// path goes through every keyframe, and its speed has no jump there. The time between two keyframes is the square root
 /// of the way between them, distance and angle (centripetal: close keyframes make no loops), so that no stretch is

@@ -1,0 +1,147 @@
+// A path rendered to frames, and a training that is looked at and controlled from outside.
+#include "program.hpp"
+
+#include <gart/io/camera_file.hpp>
+#include <gart/io/dataset.hpp>
+#include <gart/view/camera_path.hpp>
+#include <view/socket_client.hpp>
+
+#include <support/policies.hpp>
+
+using namespace cli_test;
+
+namespace {
+
+// The first address that a program prints into a file, once it is there.
+struct address {
+  int port = 0;
+  std::string path;
+};
+address printed_address(fs::path const& file, std::string const& before) {
+  for (int waited_ms = 0; waited_ms < 120'000; waited_ms += 20) {
+    std::string const text = fs::exists(file) ? text_of(file) : std::string();
+    std::size_t const line = text.find(before), at = text.find("http://127.0.0.1:", line);
+    if (line != text.npos && at != text.npos && text.find('\n', at) != text.npos) {
+      std::string const url = text.substr(at + 17, text.find('\n', at) - at - 17);
+      return {std::stoi(url), url.substr(url.find('/'))};
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return {};
+}
+
+std::string upgrade(address const& to) {
+  std::string const host = "127.0.0.1:" + std::to_string(to.port);
+  return "GET " + to.path + "socket HTTP/1.1\r\nHost: " + host + "\r\nOrigin: http://" + host +
+         "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+         "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: gart-view\r\n\r\n";
+}
+
+// The next text of a kind for which `is` holds.
+template <class Is>
+nlohmann::json heard(gart_test::socket_client& client, std::string const& type, Is const& is) {
+  for (int i = 0; i < 10'000; ++i) {
+    auto const message = client.hear();
+    REQUIRE(message.opcode != 0);
+    if (message.opcode != 1) continue;
+    auto const text = nlohmann::json::parse(message.payload);
+    if (text["type"] == type && is(text)) return text;
+  }
+  FAIL("never said: ", type);
+  return {};
+}
+
+}  // namespace
+
+TEST_CASE("render goes along a smooth path through keyframes") {
+  folder const here;
+  gart::write_splat_ply(here / "model.ply", one_gaussian());
+  std::vector<gart::named_camera> keys(3);
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    gart::camera& c = keys[i].view;
+    c.width = c.height = 16, c.fx = c.fy = 16, c.cx = c.cy = 8;
+    c.position = {0.4 * static_cast<double>(i), 0.1 * static_cast<double>(i * i), -4};
+    keys[i].name = "key" + std::to_string(i);
+  }
+  gart::write_cameras(here / "keys.json", keys);
+  auto const run = here.gart("render model.ply --path keys.json --frames 5 --out film --backend serial --quiet");
+  REQUIRE_MESSAGE(run.code == 0, run.err);
+  std::vector<gart::named_camera> frames;
+  for (auto const& view : gart::smooth_path({keys[0].view, keys[1].view, keys[2].view}, 5))
+    frames.push_back({"frame_0000" + std::to_string(frames.size()), view});
+  gart::write_cameras(here / "frames.json", frames);
+  REQUIRE(here.gart("render model.ply frames.json --out one_by_one --backend serial --quiet").code == 0);
+  for (auto const& frame : frames)
+    CHECK(text_of(here / ("film/" + frame.name + ".png")) == text_of(here / ("one_by_one/" + frame.name + ".png")));
+  CHECK(text_of(here / "film/frame_00000.png") != text_of(here / "film/frame_00004.png"));
+
+  for (char const* wrong : {"", " keys.json --path keys.json --frames 5", " --path keys.json", " keys.json --frames 5",
+                            " keys.json --closed", " --path keys.json --frames 1"}) {
+    CAPTURE(wrong);
+    CHECK(here.gart("render model.ply" + std::string(wrong) + " --out none").code == 2);
+  }
+}
+
+TEST_CASE("a training is watched, paused, stepped, saved and stopped by a viewer") {
+  folder const here;
+  write_capture(here / "capture");
+  outcome ended;
+  std::thread program([&] {
+    ended = here.gart(
+        "train capture --out run --iterations 1000000 --max-gaussians 60 --sh-degree 0 --no-auto --backend openmp "
+        "--threads 1 --eval-every 50000 --view --view-share 0.2");
+  });
+  address const control = printed_address(here / "stdout.txt", "Look and control");
+  {
+    REQUIRE(control.port > 0);
+    gart_test::socket_client client(control.port);
+    REQUIRE(has(client.ask(upgrade(control)), " 101 "));
+    auto const any = [](nlohmann::json const&) { return true; };
+    auto const hello = heard(client, "hello", any);
+    CHECK(hello["training"] == true);
+    CHECK(hello["cameras"].size() == 6);
+    CHECK(hello["cameras"][5]["test"] == true);
+    auto const first = heard(client, "status", any);
+    CHECK(first["view_share"] == 0.2);
+    client.say(R"({"type":"share","value":0.5})");
+    heard(client, "status", [](nlohmann::json const& s) { return s["view_share"] == 0.5; });
+
+    client.say(R"({"type":"train","action":"pause"})");
+    auto const paused = heard(client, "status", [](nlohmann::json const& s) { return s["paused"] == true; });
+    int const step = paused["step"];
+    client.say(R"({"type":"train","action":"step"})");
+    heard(client, "status", [&](nlohmann::json const& s) { return s["paused"] == true && s["step"] == step + 1; });
+    client.say(R"({"type":"view","id":1,"mode":"colour","moving":false,"camera":)" +
+               hello["cameras"][0]["camera"].dump() + "}");
+    while (client.hear().opcode != 2) continue;
+
+    auto const before = fs::last_write_time(here / "run/checkpoint.gart");
+    client.say(R"({"type":"train","action":"save"})");
+    for (int i = 0; i < 1000 && fs::last_write_time(here / "run/checkpoint.gart") == before; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    CHECK(fs::last_write_time(here / "run/checkpoint.gart") != before);
+    client.say(R"({"type":"train","action":"resume"})");
+    heard(client, "status", [&](nlohmann::json const& s) { return s["paused"] == false && s["step"] > step + 1; });
+    client.say(R"({"type":"train","action":"stop"})");
+    heard(client, "bye", any);
+  }
+  program.join();
+  CHECK(ended.code == 130);
+  CHECK(fs::exists(here / "run/model.ply"));
+  CHECK(has(ended.err, "Stopped after step"));
+}
+
+TEST_CASE("view serves a model until Ctrl-C, and refuses what it cannot listen at") {
+  folder const here;
+  gart::write_splat_ply(here / "model.ply", one_gaussian());
+  auto const wrong = here.gart("view model.ply --listen nowhere.invalid");
+  CHECK(wrong.code == 1);
+  CHECK_MESSAGE(has(wrong.err, "--listen"), wrong.err);
+  CHECK(here.gart("view model.ply --port 70000").code == 2);
+  CHECK(here.gart("view nothing.ply").code == 1);
+  auto const ended = here.gart_interrupted_at("Ctrl-C ends it", "view model.ply --backend serial");
+  CHECK(ended.code == 130);
+  CHECK(has(ended.out, "Look and control: http://127.0.0.1:"));
+  CHECK(has(ended.out, "Look alone:"));
+  CHECK(has(ended.out, "ssh -L"));
+}
