@@ -35,10 +35,10 @@ export const navigation = {
     for (let i = 0; i < 3 && !(await p.page.evaluate(() => document.activeElement.id === 'stage')); ++i)
       await p.page.keyboard.press('Tab');
     assert.equal(await p.page.evaluate(() => document.activeElement.id), 'stage', 'Tab does not lead to the view');
-    const hold = async (key, ms = 250) => {
+    const hold = async (key) => {
       const before = p.last().camera;
       await p.page.keyboard.down(key);
-      await p.page.waitForTimeout(ms);
+      await p.until(`${key} to move the camera`, () => apart(placeOf(p.last().camera), placeOf(before)) > 0.02);
       await p.page.keyboard.up(key);
       const {view: {camera: after}} = await p.rest();
       return {before, after, way: minus(placeOf(after), placeOf(before))};
@@ -76,7 +76,8 @@ export const navigation = {
     const box = await p.page.locator('#stage').boundingBox();
     await p.page.mouse.move(box.x + 300, box.y + 300);
     await p.page.mouse.down();
-    for (let i = 0; i < 40; ++i) {
+    const movingNow = () => p.frames.slice(first).map((f) => f.header).filter((h) => !h.still);
+    for (let i = 0; i < 400 && (i < 40 || movingNow().length < 3); ++i) {
       await p.page.mouse.move(box.x + 300 + 4 * (i % 30), box.y + 300 + 2 * (i % 20));
       await p.page.waitForTimeout(25);
     }
@@ -84,7 +85,7 @@ export const navigation = {
     const up = Date.now();
     const {header} = await p.rest();
     assert.deepEqual([header.width, header.height], header.full, 'at rest it is whole');
-    const moving = p.frames.slice(first).map((f) => f.header).filter((h) => !h.still);
+    const moving = movingNow();
     assert.ok(moving.length >= 3, `${moving.length} frames while it moved`);
     assert.ok(moving.every((h) => h.width <= h.full[0]));
     if (whole.ms > 150) assert.ok(moving.at(-1).width < 0.9 * whole.width, `${moving.at(-1).width} of ${whole.width}`);
