@@ -40,6 +40,7 @@ void add_eval(CLI::App& app, command& selected);
 void add_synth(CLI::App& app, command& selected);
 void add_bench(CLI::App& app, command& selected);
 void add_tradeoff(CLI::App& app, command& selected);
+void add_compare(CLI::App& app, command& selected);
 void add_convert(CLI::App& app, command& selected);
 void add_info(CLI::App& app, command& selected);
 

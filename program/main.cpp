@@ -63,6 +63,7 @@ int main(int argc, char** argv) {
   add_eval(app, selected);
   add_bench(app, selected);
   add_tradeoff(app, selected);
+  add_compare(app, selected);
   add_synth(app, selected);
   add_convert(app, selected);
   add_info(app, selected);

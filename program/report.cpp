@@ -1,12 +1,8 @@
 #include "report.hpp"
 
+#include "page_parts.hpp"
 #include "progress.hpp"
-#include "report_style.hpp"
 #include "svg_chart.hpp"
-
-#include <gart/core/version.hpp>
-#include <gart/io/image_file.hpp>
-#include <gart/view/image_modes.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -16,43 +12,6 @@ namespace gart_cli {
 namespace {
 
 using nlohmann::json;
-
-constexpr std::size_t most_views = 12;
-constexpr int widest_image = 480;
-
-std::string base64(std::vector<gart::u8> const& bytes) {
-  static constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::size_t const n = std::min<std::size_t>(3, bytes.size() - i);
-    unsigned word = bytes[i] << 16;
-    if (n > 1) word |= bytes[i + 1] << 8;
-    if (n > 2) word |= bytes[i + 2];
-    for (std::size_t k = 0; k < 4; ++k) text += k <= n ? digits[word >> (18 - 6 * k) & 63] : '=';
-  }
-  return text;
-}
-
-std::string error_gradient() {
-  std::string css = "linear-gradient(90deg";
-  for (auto const& c : gart::error_colors)
-    css += ", rgb(" + std::to_string(c[0]) + "," + std::to_string(c[1]) + "," + std::to_string(c[2]) + ")";
-  return css + ")";
-}
-
-double number_of(json const& all, char const* key) {
-  return all.contains(key) && all[key].is_number() ? all[key].get<double>() : std::nan("");
-}
-
-std::string text_of(json const& all, char const* key) {
-  return all.contains(key) && all[key].is_string() ? html_escape(all[key].get<std::string>()) : "";
-}
-
-std::string count_of(json const& all, char const* key) {
-  double const v = number_of(all, key);
-  return std::isfinite(v) ? with_commas(static_cast<std::uint64_t>(v)) : "-";
-}
 
 std::string headline(std::string const& value, std::string const& unit, std::string const& label) {
   return "<div><b>" + value + (unit.empty() ? "" : "<small>" + unit + "</small>") + "</b><span>" + label +
@@ -119,44 +78,6 @@ std::string curves(history const& course, double iterations) {
   }
   std::string const plots = to_svg(psnr) + to_svg(timed) + to_svg(loss) + to_svg(count) + to_svg(ssim);
   return plots.empty() ? "" : "<h2>Course of the training</h2><section class=\"charts\">" + plots + "</section>";
-}
-
-std::string pictures(json const& m, std::vector<report_view> const& views) {
-  std::size_t const total = m.contains("views") ? m["views"].size() : 0;
-  std::string html = "<h2>Test views</h2>";
-  if (total == 0) {
-    return html +
-           "<p class=\"soft\">The capture has no test views, so nothing here tells how well the model does on "
-           "photographs that it was not trained on.</p>";
-  }
-  html += "<p class=\"soft\">" +
-          (views.size() < total ? std::to_string(views.size()) + " of " + std::to_string(total) +
-                                      " views, evenly spread; all are in renders/."
-                                : "All " + std::to_string(total) + ", also in renders/.") +
-          "</p><div class=\"heads\"><span>Render</span><span>Photograph</span><span>Absolute error 0"
-          "<i class=\"scale\" style=\"background:" +
-          error_gradient() + "\"></i>" + fixed(gart::usual_error_scale, 2) + "</span></div>";
-  for (auto const& v : views) {
-    std::string const name = html_escape(v.name);
-    auto const image = [&](std::vector<gart::u8> const& jpeg, char const* what) {
-      return "<img loading=\"lazy\" alt=\"" + name + ", " + what + "\" src=\"data:image/jpeg;base64," + base64(jpeg) +
-             "\">";
-    };
-    html += "<figure class=\"view\"><figcaption><b>" + name + "</b><span>" + fixed(v.psnr, 2) +
-            " dB</span><span>SSIM " + fixed(v.ssim, 4) + "</span></figcaption><div class=\"images\">" +
-            image(v.render, "render") + image(v.truth, "photograph") + image(v.error, "error") + "</div></figure>";
-  }
-  html +=
-      "<details><summary>Scores of every test view</summary><div class=\"columns\">"
-      "<table><tr><th>View</th><th class=\"n\">PSNR, dB</th><th class=\"n\">SSIM</th><th "
-      "class=\"n\">affine, dB</th><th class=\"n\">Render, ms</th></tr>";
-  for (auto const& v : m["views"]) {
-    html += "<tr><td class=\"v\">" + text_of(v, "name") + "</td><td class=\"n\">" + fixed(number_of(v, "psnr"), 2) +
-            "</td><td class=\"n\">" + fixed(number_of(v, "ssim"), 4) + "</td><td class=\"n\">" +
-            fixed(number_of(v, "psnr_affine_colour"), 2) + "</td><td class=\"n\">" +
-            fixed(number_of(v, "milliseconds"), 1) + "</td></tr>";
-  }
-  return html + "</table></div></details>";
 }
 
 std::string bars(std::vector<std::pair<std::string, double>> rows, std::string const& unit, double whole) {
@@ -265,48 +186,23 @@ std::string settings(json const& m, json const& config) {
 
 }  // namespace
 
-bool in_report(std::size_t index, std::size_t total) {
-  if (total <= most_views) return true;
-  // The first of each of `most_views` equal parts.
-  return index == 0 || index * most_views / total != (index - 1) * most_views / total;
-}
-
-report_view make_report_view(std::string const& name, double psnr, double ssim, gart::image_float const& render,
-                             gart::image_float const& truth) {
-  gart::image_float difference(render.width, render.height, 1);
-  for (std::size_t p = 0; p < difference.data.size(); ++p) {
-    float sum = 0;
-    for (int c = 0; c < 3; ++c) sum += std::abs(render.data[3 * p + c] - truth.data[3 * p + c]);
-    difference.data[p] = sum / 3;
-  }
-  gart::image8 const error = gart::error_in_colors(difference, gart::usual_error_scale);
-  int const factor = std::max(1, (render.width + widest_image - 1) / widest_image);
-  auto const jpeg = [&](gart::image8 const& image) {
-    return gart::encode_jpeg(factor > 1 ? gart::box_downscale(image, factor) : image, 88);
-  };
-  return {name, psnr, ssim, jpeg(gart::to_8bit(render)), jpeg(gart::to_8bit(truth)), jpeg(error)};
-}
-
 std::string report_page(json const& metrics, json const& config, history const& course,
                         std::vector<report_view> const& views) {
   std::string const title = text_of(metrics, "scene");
-  std::string page = "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>" + title +
-                     " - gart</title><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><style>";
-  page += report_style;
-  page += "</style></head><body><main><header><h1>" + title + "</h1><p class=\"soft\">" + text_of(metrics, "format") +
-          " capture, " + count_of(metrics, "train_views") + " training views of " + text_of(metrics, "image_size") +
-          " pixels. " + count_of(metrics, "iterations") + " iterations with the " + text_of(metrics, "backend") +
-          " backend, the " + text_of(metrics, "tracer") + " tracer and the " + text_of(metrics, "backward") +
+  std::string page = page_start(title);
+  page += "<header><h1>" + title + "</h1><p class=\"soft\">" + text_of(metrics, "format") + " capture, " +
+          count_of(metrics, "train_views") + " training views of " + text_of(metrics, "image_size") + " pixels. " +
+          count_of(metrics, "iterations") + " iterations with the " + text_of(metrics, "backend") + " backend, the " +
+          text_of(metrics, "tracer") + " tracer and the " + text_of(metrics, "backward") +
           " backward pass.</p></header>";
   page += figures(metrics);
   page += comparison(metrics);
   page += curves(course, number_of(metrics, "iterations"));
-  page += pictures(metrics, views);
+  page += report_pictures(metrics, views);
   page += costs(metrics);
   page += choices(metrics);
   page += settings(metrics, config);
-  page += "<footer>gart " + std::string(gart::version) + "</footer></main></body></html>\n";
-  return page;
+  return page + page_end();
 }
 
 }  // namespace gart_cli

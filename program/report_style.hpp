@@ -5,10 +5,11 @@ namespace gart_cli {
 
 inline constexpr char report_style[] = R"css(
 :root { color-scheme: light dark; --page: #fbfbfa; --card: #ffffff; --ink: #1c1e21; --soft: #667079; --rule: #e4e6e8;
-  --one: #2563c9; --two: #d9730d; --bar: #c9d8f0;
+  --one: #2563c9; --two: #d9730d; --three: #2c8a5a; --four: #9a3fb0; --five: #b8283f; --six: #7b7a1e; --bar: #c9d8f0;
   --dim: #b9c0c6; }
 @media (prefers-color-scheme: dark) { :root { --page: #131517; --card: #1b1e21; --ink: #e6e8ea; --soft: #98a1aa;
-  --rule: #2d3236; --one: #74a7f5; --two: #f0a04b; --bar: #2c4468; --dim: #566069; } }
+  --rule: #2d3236; --one: #74a7f5; --two: #f0a04b; --three: #63c795; --four: #cf8ee0; --five: #f0808d; --six: #c9c763;
+  --bar: #2c4468; --dim: #566069; } }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--page); color: var(--ink); font: 15px/1.5 system-ui, sans-serif; }
 main { max-width: 1180px; margin: 0 auto; padding: 40px 24px 64px; }
@@ -29,19 +30,36 @@ figure { margin: 0; }
 .key i { display: inline-block; width: 14px; height: 3px; border-radius: 2px; margin-right: 6px; vertical-align:
   middle; }
 .swatch-1 { background: var(--one); } .swatch-2 { background: var(--two); }
+.swatch-3 { background: var(--three); } .swatch-4 { background: var(--four); } .swatch-5 { background: var(--five); }
+.swatch-6 { background: var(--six); }
 svg { display: block; width: 100%; height: auto; } .grid { stroke: var(--rule); stroke-width: 1; }
 .tick { fill: var(--soft); font: 11px system-ui, sans-serif; font-variant-numeric: tabular-nums; }
 polyline { fill: none; stroke-width: 1.6; stroke-linejoin: round; stroke-linecap: round; }
 polyline.line-1 { stroke: var(--one); } polyline.line-2 { stroke: var(--two); }
+polyline.line-3 { stroke: var(--three); } polyline.line-4 { stroke: var(--four); }
+polyline.line-5 { stroke: var(--five); } polyline.line-6 { stroke: var(--six); }
 circle.dim { fill: var(--dim); } text.dim, tr.dim { fill: var(--soft); color: var(--soft); }
 .label { fill: var(--ink); font: 11px system-ui, sans-serif; } .leader { stroke: var(--rule); stroke-width: 1; }
 .wide { overflow-x: auto; }
 circle.line-1 { fill: var(--one); } circle.line-2 { fill: var(--two); }
-.view { margin-bottom: 22px; } .view .images { display: grid; grid-template-columns: repeat(3, 1fr); gap: 8px; }
+circle.line-3 { fill: var(--three); } circle.line-4 { fill: var(--four); } circle.line-5 { fill: var(--five); }
+circle.line-6 { fill: var(--six); }
+.view { margin-bottom: 22px; } .view .images { display: grid; grid-template-columns: repeat(2, 1fr); gap: 8px; }
 .view img { display: block; width: 100%; border-radius: 6px; border: 1px solid var(--rule); }
 .view figcaption { display: flex; gap: 14px; font-size: 13px; margin-bottom: 6px; }
 .view figcaption b { color: var(--ink); }
-.heads { display: grid; grid-template-columns: repeat(3, 1fr); gap: 8px; font-size: 13px; color: var(--soft); margin:
+h3 { font-size: 13px; font-weight: 600; margin: 0 0 6px; }
+.side { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 220px), 1fr)); gap: 8px; }
+.view .side figcaption { margin: 4px 0 0; }
+.slide { --at: 50%; position: relative; overflow: hidden; border-radius: 6px; }
+.slide img + img { position: absolute; inset: 0; clip-path: inset(0 calc(100% - var(--at)) 0 0); }
+.slide i { position: absolute; left: var(--at); top: 0; bottom: 0; width: 2px; margin-left: -1px; background: #fff;
+  box-shadow: 0 0 4px rgba(0, 0, 0, 0.6); }
+.slide i::after { content: ""; position: absolute; left: -9px; top: calc(50% - 14px); width: 20px; height: 28px;
+  border-radius: 10px; background: #fff; box-shadow: 0 1px 4px rgba(0, 0, 0, 0.4); }
+.slide input { position: absolute; inset: 0; width: 100%; height: 100%; margin: 0; opacity: 0; cursor: ew-resize; }
+.slide:focus-within { outline: 2px solid var(--one); outline-offset: 2px; }
+.heads { display: grid; grid-template-columns: repeat(2, 1fr); gap: 8px; font-size: 13px; color: var(--soft); margin:
   12px 0 8px; }
 .scale { display: inline-block; width: 84px; height: 9px; border-radius: 3px; margin: 0 6px; vertical-align: middle; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; font-size: 14px; }

@@ -1,5 +1,5 @@
 #pragma once
-// Line charts as inline SVG. Colours come from the page's style sheet (classes line-1, line-2, grid, tick), so that a
+// Line charts as inline SVG. Colours come from the page's style sheet (classes line-1 to line-6, grid, tick), so that a
 // chart follows the page into dark mode.
 
 #include <string>
@@ -16,7 +16,7 @@ struct chart_series {
 
 struct chart {
   std::string title, unit, x_label;
-  std::vector<chart_series> series;  // at most two
+  std::vector<chart_series> series;  // at most six
   bool logarithmic = false;          // y; values that are not positive are left out
   double x_max = 0;
   bool from_zero = false;  // y

@@ -94,7 +94,7 @@ void training_run::save() {
 
 void training_run::conclude() {
   if (writes_) remove_results(a_.out);
-  std::vector<report_view> shown;
+  report_views shown;
   stopwatch const writing;
   double const tests_before = test_seconds_;
   std::vector<gart::named_camera> aligned;
@@ -104,7 +104,7 @@ void training_run::conclude() {
         if (!writes_) return;
         gart::write_png(a_.out / "renders" / (s.name + ".png"), gart::to_8bit(render));
         gart::write_png(a_.out / "renders" / (s.name + "_truth.png"), gart::to_8bit(truth));
-        if (in_report(i, data_.test.size())) shown.push_back(make_report_view(s.name, s.psnr, s.ssim, render, truth));
+        shown.add(i, data_.test.size(), s.name, s.psnr, s.ssim, render, truth);
         say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
                    static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
       },
@@ -124,7 +124,8 @@ void training_run::conclude() {
   metrics["ranks"] = ranks::size(), metrics["batch"] = a_.batch;
   metrics["peak_bytes"] = most_bytes, metrics["sent_bytes"] = most_sent;
   write_json(a_.out / "metrics.json", metrics);
-  gart::write_file(a_.out / "report.html", report_page(metrics, read_json(a_.config_file()), course_, shown));
+  gart::write_file(a_.out / "report.html",
+                   report_page(metrics, read_json(a_.config_file()), course_, shown.worst_first()));
   if (a_.quiet) return;
   say_.clear();
   std::printf("trained %s steps in %s, %s Gaussians\n", with_commas(session_->steps_done()).c_str(),

@@ -62,6 +62,14 @@ TEST_CASE("train leaves every file it promises, and they agree") {
   CHECK(has(page, psnr));
   CHECK(has(page, "<polyline"));
   CHECK(has(page, "data:image/jpeg;base64,/9j/"));
+  auto const heading = [&](std::size_t view) {
+    return page.find("<b>" + metrics["views"][view]["name"].get<std::string>() + "</b>");
+  };
+  bool const second_is_worse = metrics["views"][1]["psnr"] < metrics["views"][0]["psnr"];
+  REQUIRE(heading(0) != page.npos);
+  REQUIRE(heading(1) != page.npos);
+  CHECK((heading(1) < heading(0)) == second_is_worse);  // the worst comes first
+  CHECK(has(page, "<div class=\"slide\">"));
   CHECK_FALSE(has(page, "http"));  // one page, without a network
   CHECK_FALSE(has(page, "src=\"renders"));
 }

@@ -1,0 +1,90 @@
+// The crop box: six numbers, and six handles in the middles of its faces. Gaussians whose centres are outside are not
+// traced.
+
+import {add, scale} from './vector.js';
+import {stroked} from './overlay.js';
+
+const axes = ['x', 'y', 'z'];
+const grip = 16;  // pixels about a handle that are the handle
+
+export function cropBox(form, toggle, resetButton, changed) {
+  let whole = {min: [-1, -1, -1], max: [1, 1, 1]}, box = null, handles = [];
+  const fields = [];
+  for (const side of ['min', 'max'])
+    axes.forEach((axis, k) => {
+      const label = document.createElement('label');
+      label.append(`${axis} ${side === 'min' ? 'from' : 'to'}`);
+      const input = Object.assign(document.createElement('input'), {type: 'number', step: 'any', name: `${side}-${axis}`});
+      input.addEventListener('change', () => {
+        if (Number.isFinite(input.valueAsNumber)) set(side, k, input.valueAsNumber);
+        else write();
+      });
+      label.append(input);
+      form.append(label);
+      fields.push({input, side, k});
+    });
+
+  const write = () => {
+    form.disabled = resetButton.disabled = !box;
+    toggle.checked = Boolean(box);
+    for (const {input, side, k} of fields) input.value = Number((box ?? whole)[side][k].toPrecision(4));
+  };
+  // A face stops at the one opposite.
+  function set(side, k, value) {
+    const thin = 1e-3 * (whole.max[k] - whole.min[k] || 1);
+    box[side][k] = side === 'min' ? Math.min(value, box.max[k] - thin) : Math.max(value, box.min[k] + thin);
+    write();
+    changed();
+  }
+  const use = (on) => {
+    box = on ? structuredClone(whole) : null;
+    write();
+    changed();
+  };
+  toggle.addEventListener('change', () => use(toggle.checked));
+  resetButton.addEventListener('click', () => use(true));
+
+  const middleOf = (side, k) => {
+    const p = scale(add(box.min, box.max), 0.5);
+    p[k] = box[side][k];
+    return p;
+  };
+  return {
+    bounds(min, max) {
+      whole = {min: [...min], max: [...max]};
+      write();
+    },
+    value: () => box,
+    draw(pen, color) {
+      handles = [];
+      if (!box) return;
+      const corner = (i) => axes.map((_, k) => (i >> k & 1 ? box.max[k] : box.min[k]));
+      stroked(pen, color, 1.5, () => {
+        for (let i = 0; i < 8; ++i)
+          for (let k = 0; k < 3; ++k) if (!(i >> k & 1)) pen.line(corner(i), corner(i | 1 << k));
+      });
+      for (const {side, k} of fields) {
+        pen.draw.fillStyle = color;
+        const middle = middleOf(side, k), at = pen.dot(middle, 6);
+        const ahead = [...middle];
+        ahead[k] += 1e-2 * (whole.max[k] - whole.min[k]);
+        const next = at && pen.place(ahead);
+        if (next) handles.push({side, k, at, perUnit: [next[0] - at[0], next[1] - at[1]], unit: ahead[k] - middle[k]});
+      }
+    },
+    // The drag of the handle at that place; null where there is none.
+    grab({x, y}) {
+      const far = ({at}) => Math.hypot(at[0] - x, at[1] - y);
+      const one = handles.reduce((best, handle) => (!best || far(handle) < far(best) ? handle : best), null);
+      if (!one || far(one) > grip) return null;
+      const length2 = one.perUnit[0] ** 2 + one.perUnit[1] ** 2;
+      if (length2 < 1e-6) return null;
+      return {
+        drag(_, [dx, dy]) {
+          const steps = (dx * one.perUnit[0] + dy * one.perUnit[1]) / length2;
+          set(one.side, one.k, box[one.side][one.k] + steps * one.unit);
+        },
+      };
+    },
+  };
+}

@@ -1,0 +1,318 @@
+// The page: what the reader sees and touches, tied to the view and to gart.
+
+import {connect} from './connection.js';
+import {View} from './view.js';
+import {frameShower, rateMeter} from './frames.js';
+import {penFor} from './overlay.js';
+import {drawFrusta, frustaOf, pointedAt} from './frusta.js';
+import {listenTo} from './gestures.js';
+import {lenses, poseOf} from './camera.js';
+import {isPinhole} from './lens.js';
+import {styles} from './navigation.js';
+import {modes, showLegend} from './legend.js';
+import {cropBox} from './crop.js';
+import {ruler} from './measure.js';
+import {keyframes} from './path.js';
+import {recorder} from './record.js';
+import {photoSplit} from './photo.js';
+import {trainingPanel} from './training.js';
+import {cameraList} from './cameras.js';
+import {radios} from './radios.js';
+import {tabs} from './tabs.js';
+import {saveFile} from './files.js';
+import {norm, sub} from './vector.js';
+
+const $ = (id) => document.getElementById(id);
+const stage = $('stage'), lines = $('lines'), frame = $('frame');
+const say = (text) => ($('say').textContent = text);
+const count = (n) => n.toLocaleString('en');
+
+let cameras = [], frusta = [], tips = [], pointed = null, shown = null, hello = null, asked = 0;
+const answers = new Map();
+const meter = rateMeter();
+
+// What gart answers by the number of the question.
+const ask = (question, seconds) => new Promise((resolve, reject) => {
+  const id = ++asked;
+  if (!connection.send({...question, id})) return reject(new Error('There is no connection.'));
+  const late = setTimeout(() => answers.delete(id) && reject(new Error('gart did not answer.')), 1000 * seconds);
+  answers.set(id, (message) => (clearTimeout(late), resolve(message)));
+});
+const answer = (message) => {
+  answers.get(message.id)?.(message);
+  answers.delete(message.id);
+};
+
+const connection = connect({
+  hello: welcome,
+  frame: frameShower(frame, frameShown),
+  picked: answer,
+  path: answer,
+  status(message) {
+    training.status(message);
+    // What is at rest is asked for again, for the model has changed since; views have their share of time, and no more.
+    if (!message.paused && !document.hidden) view.refresh();
+  },
+  curve: (message) => training.curve(message),
+  refused: ({what, why}) => say(`Refused: ${what}, ${why}`),
+  error: ({what}) => {
+    $('state').textContent = what;
+    say(what);
+  },
+  closed(seconds, why) {
+    lost(`The connection is lost${why ? ` (${why})` : ''}. Trying again in ${seconds} s.`);
+  },
+  ended: (why) => lost(`gart has ended${why ? `: ${why}` : ''}.`),
+});
+function lost(text) {
+  $('lost').firstElementChild.textContent = text;
+  $('lost').hidden = false;
+  $('state').textContent = 'Not connected';
+  $('state').classList.add('bad');
+}
+$('again').addEventListener('click', () => connection.again());
+
+const view = new View(connection, () => {
+  photo.through(null);
+  list.mark(null);
+  if (view.mode === 'error') setMode('colour');
+  writeLens();
+});
+
+function welcome(message) {
+  const again = hello !== null;
+  hello = message;
+  cameras = hello.cameras;
+  $('lost').hidden = true;
+  $('state').classList.remove('bad');
+  $('state').textContent = hello.right === 'control' ? 'Connected' : 'Connected, to look';
+  $('name').textContent = hello.model.name;
+  document.title = `${hello.model.name} – gart`;
+  const {gaussians, sh_degree: bands, kernel_degree: kernel} = hello.model;
+  $('about').textContent = `${count(gaussians)} Gaussians, SH degree ${bands}${kernel === 2 ? '' : `, kernel degree ${kernel}`}`;
+  $('frame-id').title = `gart ${hello.gart}`;
+  frusta = frustaOf(cameras, hello.model.extent);
+  list.fill(cameras);
+  panel.offer('cameras', cameras.length > 0);
+  panel.offer('training', hello.training);
+  training.rights(hello.right);
+  modeChoice.offer((name) => hello.modes.includes(name));
+  if (again) return view.changed();
+  crop.bounds(hello.model.min, hello.model.max);
+  fillLenses();
+  view.start(hello);
+  writeLens();
+  if (hello.training && !narrow()) panel.choose('training');
+}
+
+// ---- the stage
+
+const narrow = () => matchMedia('(max-width: 700px)').matches;
+
+new ResizeObserver(() => {
+  const {clientWidth, clientHeight} = stage, ratio = Math.min(2, devicePixelRatio || 1);
+  lines.width = clientWidth * ratio, lines.height = clientHeight * ratio;
+  view.resize(clientWidth, clientHeight, ratio);
+  draw();
+}).observe(stage);
+
+function frameShown(header) {
+  const next = view.asked(header.id);
+  if (next) shown = next;
+  if (!shown) return;
+  const {rect} = shown;
+  Object.assign(frame.style, {left: `${rect.x}px`, top: `${rect.y}px`, width: `${rect.width}px`, height: `${rect.height}px`});
+  photo.layout(shown.through ? rect : null);
+  showLegend($('legend'), header.mode, header.scale);
+  meter.add();
+  const [w, h] = header.full, part = header.width !== w || header.height !== h;
+  $('size').textContent = part ? `${header.width} × ${header.height} of ${w} × ${h}` : `${w} × ${h}`;
+  $('ms').textContent = `${header.ms < 10 ? header.ms.toFixed(1) : Math.round(header.ms)} ms`;
+  $('fps').textContent = header.still ? 'at rest' : `${Math.round(meter.rate())} fps`;
+  $('frame-id').textContent = `#${header.id}`;
+  Object.assign(stage.dataset, {frame: header.id, still: header.still, mode: header.mode, size: `${header.width}x${header.height}`});
+  draw();
+}
+
+function draw() {
+  const pen = penFor(lines, shown?.camera, shown?.pose, shown?.rect ?? {});
+  if (!pen) return;
+  const style = getComputedStyle(document.documentElement);
+  const colors = {accent: '#ffd166', second: style.getPropertyValue('--two')};
+  tips = [];
+  if ($('show-frusta').checked && frusta.length) {
+    // Not the one that is looked through, nor any whose tip is at the eye.
+    const near = 1e-3 * view.world.extent;
+    tips = drawFrusta(pen, frusta.filter((f) => norm(sub(f.place, shown.pose.place)) > near), colors, pointed);
+  }
+  crop.draw(pen, '#7fd1ae');
+  measure.draw(pen, '#ffd166');
+  pen.done();
+}
+
+const pixelAt = ({x, y}) => {
+  const {camera, rect} = shown;
+  return {camera, x: ((x - rect.x) / rect.width) * camera.width, y: ((y - rect.y) / rect.height) * camera.height};
+};
+async function pick(place) {
+  const pixel = shown && pixelAt(place);
+  if (!pixel || pixel.x < 0 || pixel.y < 0 || pixel.x >= pixel.camera.width || pixel.y >= pixel.camera.height) return null;
+  try {
+    return await ask({type: 'pick', ...pixel, crop: view.crop}, 10);
+  } catch (fault) {
+    say(fault.message);
+    return null;
+  }
+}
+async function measureAt(place) {
+  const found = await pick(place);
+  if (found) measure.picked(found);
+  measureChanged();
+}
+function measureChanged() {
+  stage.classList.toggle('measuring', measure.active());
+  $('crosshair').hidden = !measure.active();
+  draw();
+}
+
+const middle = () => ({x: stage.clientWidth / 2, y: stage.clientHeight / 2});
+const keys = {
+  o: () => setStyle('orbit'), f: () => setStyle('fly'), g: () => setStyle('walk'),
+  r: () => $('reset').click(), l: () => view.level(), h: () => $('help').showModal(), '?': () => $('help').showModal(),
+  k: () => path.add(), p: () => path.toggle(),
+  m: () => (measure.toggle(), measureChanged()),
+  Enter: () => measure.active() && measureAt(middle()),
+  c: () => !$('compare').disabled && photo.show(!$('compare').checked),
+  '[': () => list.next(-1), ']': () => list.next(1),
+};
+Object.keys(modes).forEach((name, i) => (keys[i + 1] = () => hello?.modes.includes(name) && setMode(name)));
+
+const moving = (move) => (...given) => hello && (path.stop(), move(...given));
+listenTo(stage, {
+  turn: moving((turn) => view.turn(turn)),
+  zoom: moving((factor) => view.zoom(factor)),
+  shift: moving((pixels) => view.shift(pixels)),
+  step: moving((step) => {
+    if (view.style === 'orbit') setStyle('fly');
+    view.step(step);
+  }),
+  grab: (place) => (measure.active() ? null : crop.grab(place)),
+  hover(place) {
+    const over = measure.active() ? null : pointedAt(tips, place);
+    stage.classList.toggle('pointing', over !== null);
+    if (over !== pointed) pointed = over, draw();
+  },
+  tap(place) {
+    if (!shown) return;
+    if (measure.active()) return measureAt(place);
+    const index = pointedAt(tips, place);
+    if (index !== null) jump(cameras.find((c) => c.index === index));
+  },
+  async doubleTap(place) {
+    if (measure.active()) return measureAt(place);
+    const found = await pick(place);
+    if (found?.hit) view.world.pivot = found.point, say('Turning about that point.');
+  },
+  key: (name) => (keys[name] ? (keys[name](), true) : false),
+});
+
+// ---- the controls
+
+const panel = tabs($('tabs'), () => training?.draw());
+const styleChoice = radios($('styles'), 'style', Object.fromEntries(Object.entries(styles).map(([k, s]) => [k, s.title])), setStyle);
+const modeChoice = radios($('modes'), 'mode', Object.fromEntries(Object.entries(modes).map(([k, m]) => [k, m.title])), setMode);
+function setStyle(style) {
+  view.setStyle(style);
+  styleChoice.set(style);
+  say(styles[style].title);
+}
+// The error is that of a photograph: it takes a camera that has one.
+function setMode(mode) {
+  if (mode === 'error' && !view.through?.photo) {
+    const seen = cameras.filter((c) => c.photo), far = (c) => norm(sub(poseOf(c.camera).place, view.pose.place));
+    if (!seen.length) return modeChoice.set(view.mode);
+    jump(seen.reduce((best, c) => (far(c) < far(best) ? c : best)));
+  }
+  view.mode = mode;
+  modeChoice.set(mode);
+  view.changed();
+  say(modes[mode].title);
+}
+
+function fillLenses() {
+  const own = new Map(cameras.filter((c) => !isPinhole(c.camera)).map((c) => [c.camera.camera_model, c.camera]).reverse());
+  const option = (value, title) => Object.assign(document.createElement('option'), {value, textContent: title});
+  $('lens').replaceChildren(...Object.entries(lenses).map(([name, {title}]) => option(name, title)),
+    ...[...own.keys()].map((model) => option(`own ${model}`, `${model}, the capture’s`)));
+  $('lens').onchange = () => {
+    const name = $('lens').value;
+    view.setLens(name.startsWith('own ') ? {camera: own.get(name.slice(4))} : {name, angle: name === 'fisheye' ? 180 : 60});
+    writeLens();
+  };
+}
+function writeLens() {
+  const {camera, name, angle} = view.lens, offered = view.offered;
+  $('lens').value = camera ? `own ${camera.camera_model}` : name;
+  $('lens').title = camera ? 'The lens of a camera of the capture or of a file' : '';
+  $('angle-row').hidden = !offered?.most;
+  if (!offered?.most) return;
+  $('angle').min = offered.least, $('angle').max = offered.most, $('angle').value = angle;
+  $('angle-now').textContent = `${Math.round(angle)}°`;
+}
+$('angle').addEventListener('input', () => {
+  view.leave();
+  view.lens = {...view.lens, angle: Number($('angle').value)};
+  view.changed(true);
+  writeLens();
+});
+$('reset').addEventListener('click', () => (path.stop(), view.home(), writeLens(), say('Home')));
+$('level').addEventListener('click', () => view.level());
+$('save-pose').addEventListener('click', () => saveFile('camera.json', [view.camera()]));
+$('help-button').addEventListener('click', () => $('help').showModal());
+$('show-frusta').addEventListener('change', draw);
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => (training.draw(), draw()));
+
+const photo = photoSplit(stage, $('photo'), $('divider'), $('compare'));
+function jump(entry) {
+  path.stop();
+  view.lookThrough(entry);
+  photo.through(entry);
+  list.mark(entry.index);
+  pointed = null;
+  say(`Camera ${entry.name}${entry.test ? ', of the test views' : ''}`);
+}
+const list = cameraList({list: $('camera-list'), find: $('find'), previous: $('previous'), next: $('next')}, jump);
+
+const crop = cropBox($('crop'), $('crop-on'), $('crop-reset'), () => {
+  view.crop = crop.value();
+  view.changed(true);
+  draw();
+});
+const measure = ruler($('measure'), $('distance'), say);
+$('measure').addEventListener('click', measureChanged);
+
+const path = keyframes({
+  list: $('keys'), add: $('add-key'), play: $('play'), seconds: $('seconds'), closed: $('closed'), hint: $('path-hint'),
+  saveKeys: $('save-keys'), savePath: $('save-path'), record: $('record'), load: $('load-keys'),
+}, {
+  camera: () => view.camera(),
+  resized: (camera) => view.onStage(camera),
+  show(camera, atRest) {
+    view.show(camera, !atRest);
+    writeLens();
+  },
+  rest: () => view.changed(),
+  ask: async (all, frames, closed) => (await ask({type: 'path', keyframes: all, frames, closed}, 30)).cameras,
+  say,
+});
+recorder($('record'), frame, path.play, say);
+
+const training = trainingPanel({
+  progress: $('progress'), at: $('at-step'), rate: $('rate'), gaussians: $('gaussians'), pause: $('pause'), step: $('step'),
+  save: $('save'), stop: $('stop'), sure: $('sure'), share: $('share'), shareNow: $('share-now'), onlooker: $('onlooker'),
+  loss: $('loss-chart'), test: $('test-chart'), lossNow: $('loss-now'), testNow: $('test-now'),
+}, (message) => connection.send(message), say);
+
+styleChoice.set('orbit');
+modeChoice.set('colour');
+panel.choose(narrow() ? null : 'view');

@@ -1,0 +1,29 @@
+#pragma once
+// What the pages that gart writes share: values of a JSON that may lack them, as HTML; and images inside of the page.
+
+#include <gart/scene/image.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <string>
+#include <vector>
+
+namespace gart_cli {
+
+// Not a number where there is none.
+double number_of(nlohmann::json const& all, char const* key);
+// Escaped; "" where there is none.
+std::string text_of(nlohmann::json const& all, char const* key);
+// With commas; "-" where there is none.
+std::string count_of(nlohmann::json const& all, char const* key);
+
+// Scaled down by a whole factor where it is wide.
+std::vector<gart::u8> page_jpeg(gart::image8 const& image);
+// An <img> with the file in it.
+std::string page_image(std::vector<gart::u8> const& jpeg, std::string const& alt);
+
+// All before the first heading: the title, escaped, and the style sheet.
+std::string page_start(std::string const& title);
+std::string page_end();
+
+}  // namespace gart_cli

@@ -1,0 +1,90 @@
+// A page of the viewer, with all that goes over its socket.
+
+import assert from 'node:assert/strict';
+
+export async function openPage(browser, address, options = {}) {
+  const context = await browser.newContext({viewport: {width: 900, height: 600}, acceptDownloads: true, ...options});
+  const page = await context.newPage();
+  const sent = [], received = [], frames = [], faults = [];
+  page.on('pageerror', (error) => faults.push(error.stack));
+  page.on('console', (message) => message.type() === 'error' && faults.push(message.text()));
+  page.on('websocket', (socket) => {
+    socket.on('framesent', ({payload}) => sent.push(JSON.parse(payload)));
+    socket.on('framereceived', ({payload}) => {
+      if (typeof payload === 'string') return received.push(JSON.parse(payload));
+      const length = payload.readUInt32LE(0);
+      frames.push({header: JSON.parse(payload.subarray(4, 4 + length).toString()), jpeg: payload.subarray(4 + length)});
+    });
+  });
+  await page.goto(address);
+
+  const views = () => sent.filter((m) => m.type === 'view');
+  const until = async (what, done, seconds = 20) => {
+    for (const end = Date.now() + 1000 * seconds; Date.now() < end; await page.waitForTimeout(20)) {
+      const value = await done();
+      if (value) return value;
+    }
+    assert.fail(`${seconds} s went by without ${what}; the page says "${await page.textContent('#state')}"`);
+  };
+  const self = {
+    page, context, sent, received, frames, faults, until, views,
+    message: (type) => until(`a message ${type}`, () => received.find((m) => m.type === type)),
+    last: () => views().at(-1),
+    // The frame at rest of the newest view, once nothing moves any more.
+    rest: async () => {
+      await page.waitForTimeout(120);  // for what was just done to be told
+      return self.atRest();
+    },
+    atRest: () => until('a frame at rest', async () => {
+      const view = views().at(-1), frame = frames.at(-1);
+      if (!view || !frame || view.moving || !frame.header.still || frame.header.id !== view.id) return null;
+      if ((await page.getAttribute('#stage', 'data-frame')) !== String(view.id)) return null;
+      return {view, ...frame};
+    }),
+    choose: (mode) => page.check(`#modes input[value=${mode}]`),
+    tab: (name) => page.click(`#tab-${name}`),
+    drag: async (from, by, steps = 8) => {
+      const box = await page.locator('#stage').boundingBox();
+      await page.mouse.move(box.x + from[0], box.y + from[1]);
+      await page.mouse.down();
+      await page.mouse.move(box.x + from[0] + by[0], box.y + from[1] + by[1], {steps});
+      await page.mouse.up();
+    },
+    saved: async (click) => {
+      const [download] = await Promise.all([page.waitForEvent('download'), click()]);
+      return download;
+    },
+    close: async () => {
+      await context.close();
+      assert.deepEqual(faults, [], 'the browser reported faults');
+    },
+  };
+  await self.message('hello');
+  await self.atRest();
+  return self;
+}
+
+// PSNR of two images, in dB, decoded by the browser.
+export async function psnr(browser, a, b) {
+  const page = await browser.newPage();
+  const urls = [a, b].map((bytes) =>
+    `data:image/${bytes[0] === 0x89 ? 'png' : 'jpeg'};base64,${Buffer.from(bytes).toString('base64')}`);
+  const value = await page.evaluate(async (sources) => {
+    const pixels = await Promise.all(sources.map(async (source) => {
+      const image = new Image();
+      image.src = source;
+      await image.decode();
+      const canvas = new OffscreenCanvas(image.naturalWidth, image.naturalHeight), draw = canvas.getContext('2d');
+      draw.drawImage(image, 0, 0);
+      return draw.getImageData(0, 0, canvas.width, canvas.height);
+    }));
+    if (pixels[0].width !== pixels[1].width || pixels[0].height !== pixels[1].height)
+      throw new Error(`sizes differ: ${pixels.map((p) => `${p.width} x ${p.height}`).join(', ')}`);
+    let sum = 0;
+    const [p, q] = pixels.map((image) => image.data);
+    for (let i = 0; i < p.length; ++i) if (i % 4 !== 3) sum += (p[i] - q[i]) ** 2;
+    return -10 * Math.log10(sum / (p.length * 0.75) / 65025);
+  }, urls);
+  await page.close();
+  return value;
+}

@@ -1,0 +1,80 @@
+// Keyframes: added, replayed, saved, loaded again; and a video.
+
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import path from 'node:path';
+import {openPage} from './browser.mjs';
+import {apart, isRotation, placeOf} from './geometry.mjs';
+
+const read = async (download) => JSON.parse(fs.readFileSync(await download.path(), 'utf8'));
+
+export const paths = {
+  async 'keyframes make a path, which plays, is saved, and comes back'({browser, server, gart, work}) {
+    const p = await openPage(browser, server.control, {viewport: {width: 800, height: 420}});
+    await p.tab('path');
+    const keys = [];
+    for (const by of [[60, 0], [70, 20], [50, -30]]) {
+      await p.drag([200, 200], by);
+      keys.push((await p.rest()).view.camera);
+      await p.page.click('#add-key');
+    }
+    assert.equal(await p.page.locator('#keys li').count(), 3);
+    await p.page.fill('#seconds', '0.6');
+    const before = p.views().length;
+    await p.page.click('#play');
+    await p.until('the replay to begin', async () => (await p.page.textContent('#play')) === 'Stop');
+    await p.until('the path', () => p.received.find((m) => m.type === 'path'));
+    const asked = p.sent.find((m) => m.type === 'path'), {cameras} = p.received.find((m) => m.type === 'path');
+    assert.equal(asked.frames, 18);
+    assert.equal(cameras.length, 18);
+    assert.ok(cameras.every((camera) => isRotation(camera, 1e-6)));
+    assert.ok(apart(placeOf(cameras[0]), placeOf(keys[0])) < 1e-5);
+    assert.ok(apart(placeOf(cameras.at(-1)), placeOf(keys[2])) < 1e-5);
+    assert.ok(Math.min(...cameras.map((c) => apart(placeOf(c), placeOf(keys[1])))) < 0.12, 'it passes the second');
+    await p.until('the replay to end', async () => (await p.page.textContent('#play')) === 'Play' && !p.last().moving);
+    const {view} = await p.rest();
+    assert.ok(apart(placeOf(view.camera), placeOf(keys[2])) < 1e-5, 'it ends at the last keyframe');
+    const played = p.views().slice(before).map((v) => placeOf(v.camera));
+    assert.ok(played.filter((at) => keys.every((key) => apart(at, placeOf(key)) > 1e-6)).length >= 3, 'it shows what is between');
+
+    const saved = await read(await p.saved(() => p.page.click('#save-keys')));
+    assert.equal(saved.length, 3);
+    saved.forEach((camera, i) => assert.ok(apart(placeOf(camera), placeOf(keys[i])) < 1e-9));
+    fs.writeFileSync(path.join(work, 'path.json'), JSON.stringify(await read(await p.saved(() => p.page.click('#save-path')))));
+    assert.equal(JSON.parse(fs.readFileSync(path.join(work, 'path.json'))).length, 18);
+    fs.writeFileSync(path.join(work, 'few.json'), JSON.stringify(JSON.parse(fs.readFileSync(path.join(work, 'path.json'))).slice(0, 2)));
+    await gart.run('render', 'run/model.ply', 'few.json', '--out', 'path', '--backend', 'openmp', '--quiet');
+    assert.equal(fs.readdirSync(path.join(work, 'path')).filter((file) => file.endsWith('.png')).length, 2);
+
+    await p.page.reload();
+    await p.until('the page again', () => p.received.filter((m) => m.type === 'hello').length === 2);
+    await p.tab('path');
+    assert.equal(await p.page.locator('#keys li').count(), 0);
+    const file = (name, text) => ({name, mimeType: 'application/json', buffer: Buffer.from(text)});
+    await p.page.setInputFiles('#load-keys', file('keys.json', JSON.stringify(saved)));
+    await p.until('the keyframes', async () => (await p.page.locator('#keys li').count()) === 3);
+    await p.page.click('#keys li:nth-child(2) .wide');
+    await p.until('the second keyframe', () => apart(placeOf(p.last().camera), placeOf(keys[1])) < 1e-9);
+    for (const [text, what] of [['{', 'not JSON'], ['[{"width": 3}]', 'Camera 0: height'], ['[]', 'no list']]) {
+      await p.page.setInputFiles('#load-keys', file('bad.json', text));
+      await p.until(what, async () => (await p.page.textContent('#say')).includes(what));
+    }
+    assert.equal(await p.page.locator('#keys li').count(), 3, 'a bad file changes nothing');
+    await p.close();
+  },
+
+  async 'a video of the path is recorded'({browser, server}) {
+    const p = await openPage(browser, server.control, {viewport: {width: 800, height: 420}});
+    await p.tab('path');
+    await p.page.click('#add-key');
+    await p.drag([200, 200], [90, 0]);
+    await p.page.click('#add-key');
+    await p.page.fill('#seconds', '0.8');
+    const video = await p.saved(() => p.page.click('#record'));
+    const bytes = fs.readFileSync(await video.path());
+    const webm = bytes.readUInt32BE(0) === 0x1a45dfa3, mp4 = bytes.subarray(4, 8).toString() === 'ftyp';
+    assert.ok(webm || mp4, 'no video file');
+    assert.ok(bytes.length > 1000, `${bytes.length} bytes`);
+    await p.close();
+  },
+};

@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# run.sh GART FOLDER [CASE...]: the browser tests of the page, against a built gart. playwright-core goes to FOLDER, where
+# it stays. Exit code 77, with the reason, where something is not here that they need.
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+gart=$1 folder=$2
+shift 2
+skip() {
+  echo "skipped: $*"
+  exit 77
+}
+"$gart" view --help >/dev/null 2>&1 || skip "this gart has no view (libwebsockets was not there when it was built)"
+for program in node npm chromium; do
+  command -v "$program" >/dev/null || skip "$program is not here (apt-get install nodejs npm chromium)"
+done
+mkdir -p "$folder"
+cp "$here/package.json" "$here/package-lock.json" "$folder"
+if [[ ! -d $folder/node_modules/playwright-core ]]; then
+  (cd "$folder" && npm ci --no-audit --no-fund --silent) || skip "npm could not fetch playwright-core (is there a network?)"
+fi
+exec node "$here/run.mjs" "$gart" "$folder" "$@"
