@@ -45,7 +45,7 @@ double trained(E& exec, std::vector<gart::camera> const& taken_by, std::vector<g
   }
   data.extent = 4;
   gart::train_options options;
-  options.iterations = 400;
+  options.iterations = 200;
   options.densify = gart::densify_kind::none;
   gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::primitive_strategy> run(exec, options, data,
                                                                                               start);
