@@ -22,8 +22,8 @@ bool colmap_txt(std::string_view input);  // likewise
 bool transforms(std::string_view input);  // nerfstudio's and instant-ngp's transforms.json
 bool blender(std::string_view input);     // transforms_train.json and transforms_test.json, between them a line "===="
 bool camera_json(std::string_view input);
-bool exposures(std::string_view input);  // asked for a view, written and read again
-bool depth(std::string_view input);      // and written again as .npy
+bool exposures(std::string_view input);     // asked for a view, written and read again
+bool depth(std::string_view input);         // and written again as .npy
 bool view_message(std::string_view input);  // what a viewer's client may send; refused by the field's name
 bool png(std::string_view input);
 bool jpeg(std::string_view input);
