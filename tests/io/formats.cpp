@@ -107,7 +107,11 @@ TEST_CASE("each format gives back what it was given, within its quantum") {
       REQUIRE(back.size() == model.size());
       CHECK(back.sh_degree == std::min(degree, format->room.sh_degree));
       auto const e = difference(model, back);
-      auto const& most = quantum.at(format->name);
+      auto most = quantum.at(format->name);
+      // Its means have 24 bits in all, of which at most 20 are behind the point.
+      if (std::string(format->name) == "SPZ")
+        for (float const x : model.mean)
+          most.mean = std::max(most.mean, 0.51 * std::exp2(std::ceil(std::log2(std::abs(double{x}))) - 23));
       CHECK(e.mean <= most.mean);
       CHECK(e.log_scale <= most.log_scale);
       CHECK(e.rotation <= most.rotation);
