@@ -48,7 +48,7 @@ inline std::vector<named_lens> const& lenses() {
     auto& radial_tangential = add("OPENCV", kind::perspective, 0.6, 0.7);
     radial_tangential.k1 = 0.1f, radial_tangential.k2 = -0.02f, radial_tangential.p1 = 0.002f,
     radial_tangential.p2 = -0.001f;
-    add("RADIAL", kind::perspective, 0.6, 0.7).k1 = -0.12f;
+    add("RADIAL", kind::perspective, 0.6, 0.7).k1 = -0.06f;
     add("EQUIRECTANGULAR", kind::equirectangular, 1, 3.2);
     return out;
   }();

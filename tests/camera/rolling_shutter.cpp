@@ -131,7 +131,9 @@ TEST_CASE("a line of a rolling shutter has the rays of a camera that stands stil
             moved = std::max(moved, std::abs(c.position[k] + double{got.origin[k]} - motion.position(t)[k]));
           }
         }
-      CHECK(turned < 1e-6);
+      // The ray of a lens that stands still may be found in floats, to a few of their roundings (camera/undistort.hpp).
+      bool const in_floats = lens.kind == gart::camera_kind::perspective && lens.lens.any() && !lens.lens.more();
+      CHECK(turned < (in_floats ? 5e-6 : 1e-6));
       CHECK(moved < 1e-6);
       // There and back.
       gart::line_poses const back = gart::poses_of_lines(c);
