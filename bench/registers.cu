@@ -19,6 +19,7 @@ struct gather_row {
   using response = Response;
   using terms = Terms;
   using entry = Entry;
+  using rays = pixel_rays;
   static constexpr int sh_degree = ShDegree, tile_size = 8;
   static constexpr gather_sums sums = Sums;
   static constexpr slot_validity validity = slot_validity::recomputed;

@@ -39,8 +39,9 @@ struct render_arguments {
 // Those of the file, or the frames of the path through those of the other one.
 std::vector<gart::named_camera> cameras_of(render_arguments const& a) {
   if (a.path.empty() == a.cameras.empty())
-    throw usage_error(a.path.empty() ? "CAMERAS is missing (name a dataset or a camera JSON, or --path FILE)"
-                                     : "CAMERAS and --path: give one of both");
+    throw usage_error(
+        a.path.empty() ? "CAMERAS is missing: name a dataset or a camera JSON, or --path FILE (see gart render --help)"
+                       : "CAMERAS and --path: give one of both");
   if (a.path.empty()) {
     if (a.frames > 0 || a.closed) throw usage_error("--frames and --closed are of a --path: name its keyframes");
     return gart::load_cameras(a.cameras);
@@ -63,8 +64,8 @@ int run_render(render_arguments const& a) {
   check_images(images);
   if (images.has("hits") && a.samples > 1)
     throw usage_error("--images hits: a mean over --samples counts no hits (leave one of them out)");
-  gart::model_file file = gart::load_model(a.model);
   auto cameras = cameras_of(a);
+  gart::model_file file = gart::load_model(a.model);
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   prepare_folder(a.out);
   if (!a.json.empty()) prepare_file(a.json);

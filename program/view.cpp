@@ -53,8 +53,10 @@ int run_view(view_arguments const& a) {
 
 void add_view(CLI::App& app, command& selected) {
   auto a = std::make_shared<view_arguments>();
-  CLI::App* view =
-      app.add_subcommand("view", "Look at a model in the browser, traced as it is, on this machine's CPU or GPU.");
+  CLI::App* view = app.add_subcommand(
+      "view",
+      "Look at a model in the browser, traced as it is, on this machine's CPU or GPU. Writes no file: what\n"
+      "is kept (cameras, paths, videos) is saved by the browser.");
   view->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")
       ->type_name("")
       ->required();

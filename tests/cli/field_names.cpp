@@ -26,9 +26,9 @@ TEST_CASE("a message names options where the library names fields") {
   }
 }
 
-TEST_CASE("every option that a field is shown as is one of train") {
+TEST_CASE("every option that a field is shown as is one of train or of view") {
   folder const here;
-  std::string const help = here.gart("train --help").out;
+  std::string const help = here.gart("train --help").out + here.gart("view --help").out;
   for (auto const& [field, option] : gart_cli::field_names()) {
     CAPTURE(field);
     if (option.substr(0, 2) == "--") CHECK_MESSAGE(has(help, "  " + std::string(option)), option);

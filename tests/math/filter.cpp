@@ -39,7 +39,7 @@ class source {
   std::mt19937_64 random_;
 };
 
-Matrix3d axes_of(gart::camera const& c) {
+Matrix3d camera_axes(gart::camera const& c) {
   Matrix3d r;
   for (int column = 0; column < 3; ++column)
     for (int row = 0; row < 3; ++row) r(row, column) = c.rotation[column][row];
@@ -62,7 +62,7 @@ Vector3d direction_of(gart::camera const& c, Vector2d const& point) {
 
 // The angle of a pixel about the image point that shows `m`: the root of the solid angle of a tenth of its width.
 double pixel_angle(gart::camera const& c, Vector3d const& m) {
-  Vector3d const q = axes_of(c).transpose() * m;
+  Vector3d const q = camera_axes(c).transpose() * m;
   Vector2d const slopes = distorted(c, {q.x() / q.z(), q.y() / q.z()});
   Vector2d const at(slopes.x() * c.fx + c.cx, slopes.y() * c.fy + c.cy);
   double const half = 0.05;
@@ -143,7 +143,7 @@ TEST_CASE("the filter is as wide as a pixel reaches, whatever the lens, and chan
   for (int trial = 0; trial < 200; ++trial) {
     gart::camera const c = from.camera(trial % 2 == 1);
     double const pixels = from.uniform(0.1, 2);
-    Matrix3d const axes = axes_of(c);
+    Matrix3d const axes = camera_axes(c);
     gart::visit_camera(c, [&](auto const& model) {
       auto const filter = model.filter(static_cast<float>(pixels));
       for (int k = 0; k < 10; ++k) {

@@ -64,18 +64,19 @@ struct loss_input {
 };
 
 /// A training run on one policy, by one tracer and one strategy, on the ranks of a communicator.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 requires communicator<Comm, E>
-class trainer {
+class basic_trainer {
  public:
   static constexpr int sh_degree = Traits::sh_degree;  ///< of the coefficients that are stored
 
   /// Starts from `start`, of that degree. Errors: invalid_argument for another degree, or where no view is left to
   /// train on, and for options that several ranks do not have; out_of_memory.
-  trainer(E& exec, train_options const& options, dataset const& data, gaussian_model const& start, Comm comm = Comm());
+  basic_trainer(E& exec, train_options const& options, dataset const& data, gaussian_model const& start,
+                Comm comm = Comm());
   /// The dataset must outlive the trainer.
-  trainer(E& exec, train_options const& options, dataset const&& temporary, gaussian_model const& start,
-          Comm comm = Comm()) = delete;
+  basic_trainer(E& exec, train_options const& options, dataset const&& temporary, gaussian_model const& start,
+                Comm comm = Comm()) = delete;
 
   /// One step, with the loss of the options.
   step_report step();
@@ -203,6 +204,11 @@ class trainer {
   float growth_ = 1;
   std::size_t lt_bytes_ = 0;
 };
+
+/// The same by itself, where no communicator is named. An alias, since nvcc makes of a class's default argument one of
+/// each member template too.
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
+using trainer = basic_trainer<E, Traits, Tracer, Strategy, Comm>;
 
 }  // namespace gart::inline GART_ISA
 

@@ -11,8 +11,9 @@
 namespace gart::inline GART_ISA {
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-trainer<E, Traits, Tracer, Strategy, Comm>::trainer(E& exec, train_options const& options, dataset const& data,
-                                                    gaussian_model const& start, Comm comm)
+basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_options const& options,
+                                                                dataset const& data, gaussian_model const& start,
+                                                                Comm comm)
     : exec_(exec),
       options_(options),
       data_(data),
@@ -71,7 +72,7 @@ trainer<E, Traits, Tracer, Strategy, Comm>::trainer(E& exec, train_options const
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void trainer<E, Traits, Tracer, Strategy, Comm>::set_iterations(int iterations) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_iterations(int iterations) {
   if (iterations == options_.iterations) return;
   options_.iterations = iterations;
   error_.set_iterations(iterations), mcmc_.set_iterations(iterations), adc_.set_iterations(iterations);
@@ -80,7 +81,7 @@ void trainer<E, Traits, Tracer, Strategy, Comm>::set_iterations(int iterations) 
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-step_report trainer<E, Traits, Tracer, Strategy, Comm>::step() {
+step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step() {
   return step([this](loss_input<E> const& in) {
     loss_.evaluate(in.image, in.truth, in.width, in.height, options_.ssim_weight, in.gradient, in.value);
   });
@@ -88,7 +89,7 @@ step_report trainer<E, Traits, Tracer, Strategy, Comm>::step() {
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 template <class Loss>
-step_report trainer<E, Traits, Tracer, Strategy, Comm>::step(Loss&& loss) {
+step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step(Loss&& loss) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return step_in_ranks(loss);
   std::size_t const index = order_.at(step_);
@@ -131,8 +132,8 @@ step_report trainer<E, Traits, Tracer, Strategy, Comm>::step(Loss&& loss) {
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 template <class Pass, class Loss>
-void trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pass, Loss&& loss, std::size_t index,
-                                                                  learning_rates const& rates) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pass, Loss&& loss, std::size_t index,
+                                                                        learning_rates const& rates) {
   dataset_view const& view = data_.train[index];
   image_targets targets;
   targets.color = color_.data();
@@ -172,7 +173,7 @@ void trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pass, Lo
 // The optimizer's step and what grows, moves and prunes the Gaussians.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 template <class Rows>
-void trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates const& rates, int degree, Rows&& rows) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates const& rates, int degree, Rows&& rows) {
   bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
   if (grows_by_error()) error_.add_penalty(scene_, gradients_, total_);
   if (use_mcmc) mcmc_.add_penalties(scene_, gradients_, total_);
@@ -187,7 +188,7 @@ void trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates const& 
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-vec3 trainer<E, Traits, Tracer, Strategy, Comm>::background_of(int step) const {
+vec3 basic_trainer<E, Traits, Tracer, Strategy, Comm>::background_of(int step) const {
   switch (options_.background) {
     case background_kind::black:
       return vec3(0.0f);
@@ -201,7 +202,7 @@ vec3 trainer<E, Traits, Tracer, Strategy, Comm>::background_of(int step) const {
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-rendered trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& view, vec3 background) {
+rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& view, vec3 background) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return render_in_ranks(view, background);
   frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background));
@@ -209,7 +210,7 @@ rendered trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& view, 
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-exposure_field trainer<E, Traits, Tracer, Strategy, Comm>::exposures() const {
+exposure_field basic_trainer<E, Traits, Tracer, Strategy, Comm>::exposures() const {
   std::vector<view_exposure> views;
   exposure_state const learned = exposures_ ? exposures_->state() : exposure_state{};
   for (std::size_t i = 0; i < learned.visits.size(); ++i) {
@@ -223,20 +224,20 @@ exposure_field trainer<E, Traits, Tracer, Strategy, Comm>::exposures() const {
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-std::vector<named_camera> trainer<E, Traits, Tracer, Strategy, Comm>::poses() const {
+std::vector<named_camera> basic_trainer<E, Traits, Tracer, Strategy, Comm>::poses() const {
   std::vector<named_camera> out;
   for (std::size_t i = 0; poses_ && i < data_.train.size(); ++i) out.push_back({data_.train[i].name, poses_->view(i)});
   return out;
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-training_state trainer<E, Traits, Tracer, Strategy, Comm>::state() const {
+training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::state() const {
   return state_on(-1);
 }
 
 // On that rank alone, or on all of them (-1).
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-training_state trainer<E, Traits, Tracer, Strategy, Comm>::state_on(int root) const {
+training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::state_on(int root) const {
   training_state s;
   s.scene = whole_of(scene_.to_host(), root);
   s.first = whole_of(state_.first.to_host(), root), s.second = whole_of(state_.second.to_host(), root);
@@ -249,14 +250,14 @@ training_state trainer<E, Traits, Tracer, Strategy, Comm>::state_on(int root) co
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void trainer<E, Traits, Tracer, Strategy, Comm>::save(std::filesystem::path const& path) const {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::save(std::filesystem::path const& path) const {
   training_state const s = state_on(0);
   if (comm_.rank() == 0) write_checkpoint(path, s);
   comm_.barrier();  // there is one when any rank goes on
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void trainer<E, Traits, Tracer, Strategy, Comm>::set_state(training_state const& s) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_state(training_state const& s) {
   if (s.scene.sh_degree != sh_degree) throw invalid_argument("trainer: the state has another SH degree");
   scene_.assign(part_of(s.scene)), state_.first.assign(part_of(s.first)), state_.second.assign(part_of(s.second));
   total_ = static_cast<index_t>(s.scene.size());

@@ -25,7 +25,7 @@ struct add_gradients_body {
 }  // namespace train_kernels
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void trainer<E, Traits, Tracer, Strategy, Comm>::require_ranks() const {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::require_ranks() const {
   auto const refuse = [](std::string const& what) {
     throw invalid_argument(what + " with several ranks, or a batch of views");
   };
@@ -44,7 +44,7 @@ void trainer<E, Traits, Tracer, Strategy, Comm>::require_ranks() const {
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-learning_rates trainer<E, Traits, Tracer, Strategy, Comm>::rates_of_step() const {
+learning_rates basic_trainer<E, Traits, Tracer, Strategy, Comm>::rates_of_step() const {
   learning_rates rates = options_.rates;
   rates.sh_rest = sh_rest_of(rates, data_.points.size() > 0, options_.iterations);
   return rates_at(rates, data_.extent, step_, options_.iterations);
@@ -53,7 +53,7 @@ learning_rates trainer<E, Traits, Tracer, Strategy, Comm>::rates_of_step() const
 // A step over options.batch views, in as many rounds as it takes all ranks to trace them.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 template <class Loss>
-step_report trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(Loss&& loss) {
+step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(Loss&& loss) {
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates rates = rates_of_step();
   int const ranks = comm_.size(), batch = options_.batch;
@@ -103,8 +103,8 @@ step_report trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(Loss&& los
 // This rank's unit of a round: its rows of the image, the loss of the whole, its sums of the gradients.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 template <class Loss>
-void trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(Loss& loss, std::size_t index, int image, int degree,
-                                                            learning_rates const& rates, step_report& report) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(Loss& loss, std::size_t index, int image, int degree,
+                                                                  learning_rates const& rates, step_report& report) {
   dataset_view const& view = data_.train[index];
   std::size_t const pixels = static_cast<std::size_t>(view.view.width) * view.view.height;
   color_.resize(3 * pixels), color_gradient_.resize(3 * pixels);
@@ -145,7 +145,7 @@ void trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(Loss& loss, std::siz
 
 // What the loss was of each view of the round.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void trainer<E, Traits, Tracer, Strategy, Comm>::gather_values(int views, std::vector<float>& values) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::gather_values(int views, std::vector<float>& values) {
   std::vector<float> const mine = value_.to_host();
   std::vector<float> all(2 * static_cast<std::size_t>(comm_.size()));
   comm_.all_gather(mine.data(), all.data(), 2 * sizeof(float));
@@ -159,7 +159,7 @@ void trainer<E, Traits, Tracer, Strategy, Comm>::gather_values(int views, std::v
 // From the sums over the pixels of the round's view v, which is the image'th of the step, to gradients of this rank's
 // rows.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(camera const& view, int v, int image) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(camera const& view, int v, int image) {
   index_t const n = scene_.size();
   gaussians<E>& to = image == 0 ? gradients_ : shards_.view_gradients;
   to.resize_keep(n), shards_.moments.resize(std::size_t{moment_stride} * n), shards_.prepared.resize(n);
@@ -179,7 +179,7 @@ void trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(camera const& vi
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-rendered trainer<E, Traits, Tracer, Strategy, Comm>::render_in_ranks(camera const& view, vec3 background) {
+rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_in_ranks(camera const& view, vec3 background) {
   render_options render = render_options_of(options_, data_.extent, background);
   auto& round = shards_.round;
   round.fetch(std::as_const(scene_).view(), {view}, render);
