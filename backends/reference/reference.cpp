@@ -225,8 +225,9 @@ void check(gaussian_model const& model, camera const& view, render_options const
            std::vector<double> const& depth_gradient) {
   if (active_degree < 0 || active_degree > model.sh_degree || model.sh_degree > 3)
     throw invalid_argument("reference: the active SH degree must lie between 0 and the model's, and that be at most 3");
-  if (view.kind != camera_kind::perspective || view.lens.more())
-    throw unsupported("reference: it has the rays of pinholes and of OpenCV's lenses (k1, k2, p1, p2) alone");
+  if (view.kind != camera_kind::perspective || view.lens.more() || view.shutter != shutter_kind::global)
+    throw unsupported(
+        "reference: it has the rays of pinholes and of OpenCV's lenses (k1, k2, p1, p2) alone, that stand still");
   if (kernel_degree < 1) throw invalid_argument("reference: the kernel's degree must be at least 1");
   if (!(options.alpha_min > 0)) throw invalid_argument("reference: alpha_min must be positive");
   if (!color_gradient.empty() && color_gradient.size() != 3 * pixels.size())

@@ -45,10 +45,10 @@ TEMPLATES = """#include <gart/exec/parallel.hpp>
 #include <gart/train/trainer_impl.hpp>
 namespace gart {
 using shape = generalized_gaussian<4>;
-template class trainer<openmp_exec, scene_traits<1>, tile_tracer<openmp_exec>, primitive_strategy>;
-template class trainer<openmp_exec, scene_traits<3, shape>, bvh_tracer<openmp_exec, shape>, hybrid_strategy>;
-template class trainer<serial_exec, scene_traits<0>, tile_tracer<serial_exec>, deterministic_strategy>;
-template class trainer<serial_exec, scene_traits<2>, bvh_tracer<serial_exec>, lane_strategy>;
+template class basic_trainer<openmp_exec, scene_traits<1>, tile_tracer<openmp_exec>, primitive_strategy, self_comm>;
+template class basic_trainer<openmp_exec, scene_traits<3, shape>, bvh_tracer<openmp_exec, shape>, hybrid_strategy, self_comm>;
+template class basic_trainer<serial_exec, scene_traits<0>, tile_tracer<serial_exec>, deterministic_strategy, self_comm>;
+template class basic_trainer<serial_exec, scene_traits<2>, bvh_tracer<serial_exec>, lane_strategy, self_comm>;
 }  // namespace gart
 """
 

@@ -119,15 +119,15 @@ struct rolling_bounds {
     double const rest = 0.5 * h * h * (spin * spin * far + 2 * spin * speed) + h * spin * longest +
                         4 * rounding_of_hits * (far + longest);
     // Widths across the direction it is seen in.
-    double const distance = length(out.center), near = distance > 0 ? 1 / distance : 0;
-    vec3d const d = out.center * near;
+    double const distance = length(out.center), nearness = distance > 0 ? 1 / distance : 0;
+    vec3d const d = out.center * nearness;
     double along = 0;
     for (int k = 0; k < 3; ++k) along += dot(a[k], d) * dot(a[k], d);
     double const tiny = 1e-9 * (far + longest) + 1e-30;
-    double const across2 = 0.5 * (trace - along), across = sqrt(across2 > 0 ? across2 : 0.0) + tiny;
+    double const width2 = 0.5 * (trace - along), width = sqrt(width2 > 0 ? width2 : 0.0) + tiny;
     double const q_along = dot(q, d), q2 = dot(q, q), q_across2 = q2 - q_along * q_along;
-    double const k1 = rest / across;
-    double const k2 = (sqrt(q_across2 > 0 ? q_across2 : 0.0) + 0.05 * sqrt(q2) + tiny) / (across + rest);
+    double const k1 = rest / width;
+    double const k2 = (sqrt(q_across2 > 0 ? q_across2 : 0.0) + 0.05 * sqrt(q2) + tiny) / (width + rest);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
         double const inner = (1 + k1) * c[i][j] + (i == j ? (1 + 1 / k1) * rest * rest : 0.0);
