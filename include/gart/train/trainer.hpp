@@ -126,9 +126,9 @@ class basic_trainer {
   template <class Loss>
   void trace_unit(Loss& loss, std::size_t index, int image, int degree, learning_rates const& rates,
                   step_report& report);
-  void gather_values(int views, std::vector<float>& values);
-  void take_gradients(camera const& view, int v, int image);
-  rendered render_in_ranks(camera const& view, vec3 background);
+  void gather_values(int views, std::vector<float>& values) requires(!Comm::alone);
+  void take_gradients(camera const& view, int v, int image) requires(!Comm::alone);
+  rendered render_in_ranks(camera const& view, vec3 background) requires(!Comm::alone);
   bool in_ranks() const { return !Comm::alone && (comm_.size() > 1 || options_.batch > 1); }
   // What of values of all Gaussians is this rank's, and the way back.
   decltype(auto) part_of(gaussian_model const& all) const {

@@ -145,7 +145,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(Loss& loss, st
 
 // What the loss was of each view of the round.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::gather_values(int views, std::vector<float>& values) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::gather_values(int views, std::vector<float>& values) requires(
+    !Comm::alone) {
   std::vector<float> const mine = value_.to_host();
   std::vector<float> all(2 * static_cast<std::size_t>(comm_.size()));
   comm_.all_gather(mine.data(), all.data(), 2 * sizeof(float));
@@ -159,7 +160,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::gather_values(int views, 
 // From the sums over the pixels of the round's view v, which is the image'th of the step, to gradients of this rank's
 // rows.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(camera const& view, int v, int image) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(camera const& view, int v,
+                                                                      int image) requires(!Comm::alone) {
   index_t const n = scene_.size();
   gaussians<E>& to = image == 0 ? gradients_ : shards_.view_gradients;
   to.resize_keep(n), shards_.moments.resize(std::size_t{moment_stride} * n), shards_.prepared.resize(n);
@@ -179,7 +181,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(camera con
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_in_ranks(camera const& view, vec3 background) {
+rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_in_ranks(camera const& view,
+                                                                           vec3 background) requires(!Comm::alone) {
   render_options render = render_options_of(options_, data_.extent, background);
   auto& round = shards_.round;
   round.fetch(std::as_const(scene_).view(), {view}, render);
