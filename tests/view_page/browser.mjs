@@ -32,13 +32,14 @@ export async function openPage(browser, address, options = {}) {
     last: () => views().at(-1),
     // The frame at rest of the newest view, once nothing moves any more.
     rest: async () => {
-      await page.waitForTimeout(120);  // for what was just done to be told
+      await page.waitForTimeout(120);  // for what was just done to reach the page
       return self.atRest();
     },
     atRest: () => until('a frame at rest', async () => {
       const view = views().at(-1), frame = frames.at(-1);
       if (!view || !frame || view.moving || !frame.header.still || frame.header.id !== view.id) return null;
       if ((await page.getAttribute('#stage', 'data-frame')) !== String(view.id)) return null;
+      if ((await page.getAttribute('#stage', 'aria-busy')) !== 'false') return null;
       return {view, ...frame};
     }),
     choose: (mode) => page.check(`#modes input[value=${mode}]`),

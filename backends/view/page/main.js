@@ -77,7 +77,7 @@ const view = new View(connection, () => {
   list.mark(null);
   if (view.mode === 'error') setMode('colour');
   writeLens();
-});
+}, () => stage.setAttribute('aria-busy', true));
 
 function welcome(message) {
   const again = hello !== null;
@@ -131,6 +131,7 @@ function frameShown(header) {
   $('fps').textContent = header.still ? 'at rest' : `${Math.round(meter.rate())} fps`;
   $('frame-id').textContent = `#${header.id}`;
   Object.assign(stage.dataset, {frame: header.id, still: header.still, mode: header.mode, size: `${header.width}x${header.height}`});
+  if (header.still && view.upTo(header.id)) stage.setAttribute('aria-busy', false);
   draw();
 }
 

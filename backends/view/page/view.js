@@ -29,10 +29,12 @@ export class View {
   #sentAt = -1e9;
   #wanted = false;
 
-  // connection: as connect() makes it. left(): the view no longer looks through a camera of the capture.
-  constructor(connection, left) {
+  // connection: as connect() makes it. left(): the view no longer looks through a camera of the capture. late(): what is
+  // shown is no longer what is wanted.
+  constructor(connection, left, late) {
     this.connection = connection;
     this.left = left;
+    this.late = late;
     this.pose = lookingAt([0, -2, 0], [0, 0, 0], this.world.up);
   }
 
@@ -150,6 +152,7 @@ export class View {
 
   changed(moving = false) {
     this.#dirty = true;
+    this.late();
     if (moving) this.#moving = true, this.#movedAt = performance.now();
     if (!this.#wanted) this.#wanted = true, requestAnimationFrame(() => this.#tick());
   }
@@ -172,9 +175,14 @@ export class View {
     if (sent) this.#sent.set(id, {camera, pose: this.pose, rect: this.rectOf(camera), through: this.through});
   }
 
+  // Whether nothing newer is wanted than the frame of that number.
+  upTo(id) {
+    return !this.#moving && !this.#dirty && id === this.#id;
+  }
+
   // The same again, once what was asked for last is there.
   refresh() {
-    if (!this.#moving && !this.#dirty && this.#shownId === this.#id) this.changed();
+    if (this.upTo(this.#shownId)) this.changed();
   }
 
   // What a frame was asked for with; those before it are forgotten.

@@ -16,27 +16,6 @@
 
 namespace gart::inline GART_ISA {
 
-/// What a shutter exposes when.
-struct shutter_lines_of {
-  int count = 1;          ///< lines
-  bool columns = false;   ///< rather than rows
-  bool from_end = false;  ///< the last line first
-
-  shutter_lines_of() = default;
-  /// Of a camera.
-  GART_HD explicit shutter_lines_of(camera const& c)
-      : columns(c.shutter == shutter_kind::left_to_right || c.shutter == shutter_kind::right_to_left),
-        from_end(c.shutter == shutter_kind::bottom_to_top || c.shutter == shutter_kind::right_to_left) {
-    count = columns ? c.width : c.height;
-  }
-  /// The time of a place on the image, in double or as fixed, -1/2 to 1/2.
-  template <class N>
-  GART_HD N time_at(N u, N v) const {
-    N const s = (columns ? u : v) / N(static_cast<double>(count)) - N(0.5);
-    return from_end ? -s : s;
-  }
-};
-
 /// Boxes of ellipsoids. Bounds: of the lens that stands still.
 template <class Bounds>
 struct rolling_bounds {

@@ -22,11 +22,29 @@ inline mat3d axes_of(camera const& view) {
   return out;
 }
 
-/// How many lines the shutter passes one after another: rows or columns.
-inline int shutter_lines(camera const& view) {
-  bool const columns = view.shutter == shutter_kind::left_to_right || view.shutter == shutter_kind::right_to_left;
-  return columns ? view.width : view.height;
-}
+/// What a shutter exposes when.
+struct shutter_lines_of {
+  int count = 1;          ///< lines
+  bool columns = false;   ///< rather than rows
+  bool from_end = false;  ///< the last line first
+
+  shutter_lines_of() = default;
+  /// Of a camera.
+  GART_HD explicit shutter_lines_of(camera const& c)
+      : columns(c.shutter == shutter_kind::left_to_right || c.shutter == shutter_kind::right_to_left),
+        from_end(c.shutter == shutter_kind::bottom_to_top || c.shutter == shutter_kind::right_to_left) {
+    count = columns ? c.width : c.height;
+  }
+  /// The time of a place on the image, in double or as fixed, -1/2 to 1/2.
+  template <class N>
+  GART_HD N time_at(N u, N v) const {
+    N const s = (columns ? u : v) / N(static_cast<double>(count)) - N(0.5);
+    return from_end ? -s : s;
+  }
+};
+
+/// How many lines the shutter passes one after another.
+inline int shutter_lines(camera const& view) { return shutter_lines_of(view).count; }
 
 /// The camera as it stands at a time of the read-out, -1/2 to 1/2, without a motion.
 inline camera at_time(camera view, double s) {
@@ -67,12 +85,9 @@ inline camera rolling_between(camera first, camera const& last, shutter_kind shu
 /// The camera with a part of its image, from its top left corner: its shutter goes over that alone.
 inline camera cropped(camera c, int width, int height) {
   if (c.shutter != shutter_kind::global) {
-    int const before = shutter_lines(c);
-    camera out = c;
-    out.width = width, out.height = height;
-    double const share = static_cast<double>(shutter_lines(out)) / before;
-    bool const from_end = c.shutter == shutter_kind::bottom_to_top || c.shutter == shutter_kind::right_to_left;
-    double const middle = (from_end ? 0.5 : -0.5) * (1 - share);
+    shutter_lines_of const before(c);
+    double const share = static_cast<double>(before.columns ? width : height) / before.count;
+    double const middle = (before.from_end ? 0.5 : -0.5) * (1 - share);
     camera const at = at_time(c, middle);
     c.travel = vec3(turn_of(vec3d(c.turn) * -middle) * vec3d(c.travel) * share), c.turn *= static_cast<float>(share);
     c.position = at.position, c.rotation = at.rotation;

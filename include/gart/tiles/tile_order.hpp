@@ -113,13 +113,9 @@ class any_depth_order : public detail::depth_bits {
     if (!planes_) return depth_key(p.depth, shift_);
     tile_plane const plane = planes_[tile];
     if (!(plane.reach > 0)) return depth_key(p.depth, shift_);
-    constexpr float inset = tile_plane::inset;
-    float const x0 = static_cast<float>(cell.x0 % Size) + inset - plane.widen_x;
-    float const x1 = static_cast<float>((cell.x1 - 1) % Size + 1) - inset + plane.widen_x;
-    float const y0 = static_cast<float>(cell.y0 % Size) + inset - plane.widen_y;
-    float const y1 = static_cast<float>((cell.y1 - 1) % Size + 1) - inset + plane.widen_y;
+    tile_rectangle const r = plane.rectangle<Size>(cell);
     rectangle_depth const in(p.gaussian, mat3(plane.dx, plane.dy, plane.origin), plane.reach);
-    return key_of(in(x0, x1, y0, y1), p.depth);
+    return key_of(in(r.x0, r.x1, r.y0, r.y1), p.depth);
   }
 
  private:
@@ -148,15 +144,11 @@ class moving_depth_order : public detail::depth_bits {
   GART_HD u32 key(primitive const& p, pixel_box const& cell, u32 tile) const {
     tile_plane const plane = planes_[tile];
     if (!(plane.reach > 0)) return depth_key(p.depth, shift_);
-    constexpr float inset = tile_plane::inset;
-    float const x0 = static_cast<float>(cell.x0 % Size) + inset - plane.widen_x;
-    float const x1 = static_cast<float>((cell.x1 - 1) % Size + 1) - inset + plane.widen_x;
-    float const y0 = static_cast<float>(cell.y0 % Size) + inset - plane.widen_y;
-    float const y1 = static_cast<float>((cell.y1 - 1) % Size + 1) - inset + plane.widen_y;
+    tile_rectangle const r = plane.rectangle<Size>(cell);
     vec3 const first = rays_.of(cell.x0, cell.y0).origin, last = rays_.of(cell.x1 - 1, cell.y1 - 1).origin;
     moving_rectangle_depth const in(p.gaussian, mat3(plane.dx, plane.dy, plane.origin), plane.reach,
                                     0.5f * (first + last), 0.5f * (last - first));
-    return key_of(in(x0, x1, y0, y1), p.depth);
+    return key_of(in(r.x0, r.x1, r.y0, r.y1), p.depth);
   }
 
  private:

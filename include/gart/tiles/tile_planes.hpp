@@ -13,6 +13,11 @@
 
 namespace gart::inline GART_ISA {
 
+/// A part of a tile's grid, in pixels counted from the tile's.
+struct tile_rectangle {
+  float x0, x1, y0, y1;  ///< borders
+};
+
 /// The grid of a tile's rays.
 struct alignas(16) tile_plane {
   vec3 origin;    ///< of the grid, at the tile's corner
@@ -24,6 +29,15 @@ struct alignas(16) tile_plane {
 
   /// Rays go through the middle of pixels, 0.5; the rest is for the rounding of their directions.
   static constexpr float inset = 0.45f;
+
+  /// Where the rays of a part of a tile of Size pixels a side pass.
+  template <int Size>
+  GART_HD GART_INLINE tile_rectangle rectangle(pixel_box const& cell) const {
+    return {static_cast<float>(cell.x0 % Size) + inset - widen_x,
+            static_cast<float>((cell.x1 - 1) % Size + 1) - inset + widen_x,
+            static_cast<float>(cell.y0 % Size) + inset - widen_y,
+            static_cast<float>((cell.y1 - 1) % Size + 1) - inset + widen_y};
+  }
 };
 
 /// Kernel over tiles: finds the plane of each.
