@@ -9,7 +9,6 @@ skip() {
   echo "skipped: $*"
   exit 77
 }
-[[ ${GART_TEST_BROWSER:-0} != 0 ]] || skip "GART_TEST_BROWSER=1 runs it, on a machine with nothing else to do: its steps have time limits"
 "$gart" view --help >/dev/null 2>&1 || skip "this gart has no view (libwebsockets was not there when it was built)"
 for program in node npm chromium; do
   command -v "$program" >/dev/null || skip "$program is not here (apt-get install nodejs npm chromium)"
