@@ -37,15 +37,15 @@ export async function openPage(browser, address, options = {}) {
     last: () => views().at(-1),
     // The frame at rest of the newest view, once nothing moves any more.
     rest: async () => {
-      await page.waitForTimeout(120);  // for what was just done to reach the page
+      // What was just done has reached the page when it draws anew.
+      await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
       return self.atRest();
     },
     atRest: () => until('a frame at rest', async () => {
       const view = views().at(-1), frame = frames.at(-1);
       if (!view || !frame || view.moving || !frame.header.still || frame.header.id !== view.id) return null;
-      if ((await page.getAttribute('#stage', 'data-frame')) !== String(view.id)) return null;
-      if ((await page.getAttribute('#stage', 'aria-busy')) !== 'false') return null;
-      return {view, ...frame};
+      const [shown, busy] = await page.$eval('#stage', (stage) => [stage.dataset.frame, stage.ariaBusy]);
+      return shown === String(view.id) && busy === 'false' ? {view, ...frame} : null;
     }),
     choose: (mode) => page.check(`#modes input[value=${mode}]`),
     tab: (name) => page.click(`#tab-${name}`),
