@@ -83,7 +83,14 @@ export const paths = {
     await p.drag([200, 200], [90, 0]);
     await p.page.click('#add-key');
     await p.page.fill('#seconds', '0.8');
-    const video = await p.saved(() => p.page.click('#record'));
+    const downloads = [];
+    p.page.on('download', (download) => downloads.push(download));
+    await p.page.click('#record');
+    await p.until('the recorder to end', async () => (await p.page.getAttribute('#record', 'aria-pressed')) === 'false');
+    const said = await p.page.textContent('#say');
+    assert.equal(said, 'The video is saved.');
+    await p.until('the file', () => downloads.length === 1);
+    const [video] = downloads;
     const bytes = fs.readFileSync(await video.path());
     const webm = bytes.readUInt32BE(0) === 0x1a45dfa3, mp4 = bytes.subarray(4, 8).toString() === 'ftyp';
     assert.ok(webm || mp4, 'no video file');

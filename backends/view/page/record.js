@@ -10,6 +10,9 @@ const longestWait = 10000;  // milliseconds, for what is still being encoded
 
 const passed = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
 
+// No step of a recorder is waited for longer: what it has by then is the video.
+const inTime = (step) => Promise.race([step, passed(longestWait)]);
+
 // play() ends when the path has, and whole() when the last view of it is on the canvas at full resolution.
 export function recorder(button, canvas, {play, whole}, say) {
   const type = globalThis.MediaRecorder && kinds.find((kind) => MediaRecorder.isTypeSupported(kind));
@@ -24,22 +27,22 @@ export function recorder(button, canvas, {play, whole}, say) {
     tape.addEventListener('dataavailable', ({data}) => data.size && parts.push(data));
     const started = heard('start');
     tape.start();
-    await started;
+    await inTime(started);
     await play();
-    await Promise.race([whole(), passed(longestWait)]);
+    await inTime(whole());
     // What is still being encoded when the recorder stops is lost; on a slow machine that is all of it. So it goes on
     // until the last frame has come, and nothing after it.
     const begun = parts.length;
     for (const end = performance.now() + longestWait; performance.now() < end;) {
       const before = parts.length, answer = heard('dataavailable');
       tape.requestData();
-      await answer;
+      await inTime(answer);
       if (parts.length === before && before > begun) break;
       await passed(askEvery);
     }
     const stopped = heard('stop');
     tape.stop();
-    await stopped;
+    await inTime(stopped);
     tape.stream.getTracks().forEach((track) => track.stop());
     return new Blob(parts, {type});
   }
