@@ -129,7 +129,7 @@ class View:
             # In another order each time, so that what a machine does besides falls on each.
             order = list(ways)[repeat % 3:] + list(ways)[:repeat % 3]
             for way in order:
-                runs[way].append(self.training(name, dataset, way, ways[way]))
+                runs[way].append(self.one_training(name, dataset, way, ways[way]))
                 self.say(f"{name}, {way}: {runs[way][-1]['seconds']:.2f} s, {runs[way][-1]['processor_seconds']:.2f} s "
                          "of the processor")
         usual = {way: {key: statistics.median(r[key] for r in rows) for key in ("seconds", "processor_seconds")}
@@ -143,7 +143,7 @@ class View:
                      f"{100 * slower['processor_seconds']:.2f} %")
         return out
 
-    def training(self, name, dataset, way, options):
+    def one_training(self, name, dataset, way, options):
         folder = os.path.join(self.temporary, "viewed")
         shutil.rmtree(folder, ignore_errors=True)
         command = [self.program("gart"), "train", dataset, "--out", folder, "--backend", self.a.backend, "--no-auto",
