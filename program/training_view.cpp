@@ -88,9 +88,10 @@ bool training_view::attend(double step_seconds, gart::view_status status, interr
     if (step) return true;
     if (paused_) {
       seconds_ += server_.render_next(render_, 0.1);
-    } else if (share_.may_view()) {
-      double const taken = server_.render_next(render_, 0);
-      share_.viewed(taken), seconds_ += taken;
+    } else {
+      if (share_.may_view()) seconds_ += server_.render_next(render_, 0);
+      // All that a step does for its viewers is of their share, not the images alone.
+      share_.viewed(duration<double>(clock::now() - now).count());
     }
   }
   return true;
