@@ -97,7 +97,7 @@ exr read(fs::path const& path) {
 }  // namespace
 
 TEST_CASE("an image of floats is what its EXR file holds") {
-  scratch_folder const folder("exr");
+  scratch_folder const folder;
   fs::path const path = folder.path / "image.exr";
   gart::image_float image(37, 35, 3);  // the last block is short
   for (std::size_t k = 0; k < image.data.size(); ++k) image.data[k] = 0.01f * static_cast<float>(k % 100) - 0.2f;
@@ -119,7 +119,7 @@ TEST_CASE("an image of floats is what its EXR file holds") {
 }
 
 TEST_CASE("lines of an EXR file that zlib makes no smaller are stored as they are") {
-  scratch_folder const folder("exr");
+  scratch_folder const folder;
   fs::path const path = folder.path / "noise.exr";
   std::mt19937 random(3);
   gart::image_float image(8, 20, 1);
