@@ -40,7 +40,7 @@ std::vector<u8> inflated(u8 const* bytes, std::size_t size, int window, std::siz
   return out;
 }
 
-std::vector<u8> deflated(std::vector<u8> const& bytes, std::string const& file) {
+std::vector<u8> zlib_stream(std::vector<u8> const& bytes, std::string const& file) {
   uLongf size = compressBound(static_cast<uLong>(bytes.size()));
   std::vector<u8> out(size);
   if (compress(out.data(), &size, bytes.data(), static_cast<uLong>(bytes.size())) != Z_OK)

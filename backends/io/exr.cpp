@@ -94,7 +94,7 @@ void write_exr(std::filesystem::path const& path, image_float const& image, std:
       for (std::size_t const c : order)
         for (std::size_t x = 0; x < width; ++x)
           put(raw, image.data[(static_cast<std::size_t>(y) * width + x) * count + c]);
-    std::vector<u8> const small = io::deflated(predicted(raw), path.string());
+    std::vector<u8> const small = io::zlib_stream(predicted(raw), path.string());
     bool const pays = small.size() < raw.size();  // else it is stored as it is, which readers tell by its size
     put(blocks, static_cast<std::int32_t>(top));
     put(blocks, static_cast<std::int32_t>(pays ? small.size() : raw.size()));
