@@ -4,7 +4,7 @@
 #include <oracle/oracle.hpp>
 #include <oracle/scenes.hpp>
 #include <support/policies.hpp>
-#include <support/trace_scene.hpp>
+#include <support/scene_by_kind.hpp>
 
 #include <algorithm>
 #include <cmath>
