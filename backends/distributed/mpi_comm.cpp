@@ -42,7 +42,7 @@ void in_pieces(std::size_t bytes, F const& f) {
 
 struct mpi_comm::state {
   MPI_Comm all = MPI_COMM_NULL;
-  int rank = 0, size = 1, on_host = 1;
+  int rank = 0, size = 1, on_host = 1, rank_on_host = 0;
 
   // Of its own, so that messages of the program's cannot be taken for these.
   state() {
@@ -51,7 +51,7 @@ struct mpi_comm::state {
     MPI_Comm_rank(all, &rank), MPI_Comm_size(all, &size);
     MPI_Comm host = MPI_COMM_NULL;
     MPI_Comm_split_type(all, MPI_COMM_TYPE_SHARED, rank, MPI_INFO_NULL, &host);
-    MPI_Comm_size(host, &on_host);
+    MPI_Comm_size(host, &on_host), MPI_Comm_rank(host, &rank_on_host);
     MPI_Comm_free(&host);
   }
   ~state() {
@@ -84,6 +84,7 @@ mpi_comm::mpi_comm() : state_(std::make_shared<state>()) {}
 int mpi_comm::rank() const { return state_->rank; }
 int mpi_comm::size() const { return state_->size; }
 int mpi_comm::ranks_on_host() const { return state_->on_host; }
+int mpi_comm::rank_on_host() const { return state_->rank_on_host; }
 
 std::string mpi_comm::host() const {
   char name[MPI_MAX_PROCESSOR_NAME] = {};

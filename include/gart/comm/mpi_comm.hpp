@@ -31,6 +31,8 @@ class mpi_comm {
   int size() const;           ///< ranks in all
   std::string host() const;   ///< the name of the machine that this rank is on
   int ranks_on_host() const;  ///< with this one
+  int rank_on_host() const;   ///< which of these this is
+  int sharers() const { return ranks_on_host(); }  ///< of the host's memory
 
   /// By a policy of host memory.
   template <execution E>
