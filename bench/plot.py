@@ -13,7 +13,7 @@ import os
 import re
 
 from charts import SOFT, Svg, bars, lines, scatter, stacked
-from tables import clock_of, formats, source, table
+from tables import clock_of, formats, source, table, viewed_training, viewer
 from training_pages import TrainingPages
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -177,14 +177,15 @@ class Pages(TrainingPages):
             for top, which, title, error in (
                     (90, "image", "root mean square error of the colour", lambda r: r["image"]["rms"]),
                     (510, "gradients", "relative error of the gradient, worst group", lambda r: r["gradient_worst"])):
-                points = [(r["name"], r[time], error(r), r["front"][which]) for r in runs if error(r)]
+                points = [(r["name"], r[time], error(r), r["front"][which]) for r in runs if error(r)]  # none of a format
                 scatter(svg, top, points, unit, title)
             svg.text(20, 940, source(result), size=11, color=SOFT)
             svg.write(self.figure("tradeoff_" + name))
             worst = lambda r: max(r["gradients"], key=lambda group: r["gradients"][group] or 0)
+            gradient = lambda r: f"{r['gradient_worst']:.1e} ({worst(r)})" if r["gradient_worst"] is not None else "-"
             marks = lambda r: "".join(mark for mark, which in (("i", "image"), ("g", "gradients")) if r["front"][which])
             rows = [[f"`{r['name']}`", marks(r), f"{r['image']['max']:.1e}", f"{r['image']['psnr']:.1f}",
-                     f"{r['gradient_worst']:.1e} ({worst(r)})", f"{r['prepare_ms']:.1f}", f"{r['forward_ms']:.1f}",
+                     gradient(r), f"{r['prepare_ms']:.1f}", f"{r['forward_ms']:.1f}",
                      f"{r['backward_ms']:.1f}", f"{r['total_ms']:.1f}", f"{r['processor_ms']:.1f}", f"{exact[time] / r[time]:.2f}x",
                      f"{r['lt_bytes'] / 1e6:.1f}", f"{r['peak_bytes'] / 1e6:.0f}"] for r in runs]
             sections += [f"### {subject}", "", f"![Error against time, {name}](figures/tradeoff_{name}.svg)", ""]
@@ -206,6 +207,14 @@ class Pages(TrainingPages):
         found = sorted(glob.glob(os.path.join(self.results, "formats_*.json")))
         if found:
             self.tables["formats"] = formats([self.load(os.path.basename(path)[:-5]) for path in found])
+
+    def viewer(self):
+        found = sorted(glob.glob(os.path.join(self.results, "view_*.json")))
+        results = [self.load(os.path.basename(path)[:-5]) for path in found]
+        for name, make, trained in (("view", viewer, False), ("view_training", viewed_training, True)):
+            some = [r for r in results if r["what"].startswith("view_training_") == trained]
+            if some:
+                self.tables[name] = make(some)
 
     def write_tables(self):
         for path in sorted(glob.glob(os.path.join(self.docs, "*.md"))):
@@ -241,6 +250,7 @@ def main():
     pages.cpu()
     pages.tradeoff()
     pages.formats()
+    pages.viewer()
     pages.presets()
     pages.cutoffs()
     pages.auto()

@@ -15,6 +15,8 @@ What (comma-separated; default tests and paper):
   paper       strategies, memory and stages
   tradeoff    `gart tradeoff` on the first scene and on every --model: what each approximation costs and buys
   formats     every --model in each format and setting, by its test views: bytes, PSNR, SSIM (bench/formats.py)
+  view        every --model served by `gart view`: frames a second, input to frame, time to rest; training of every
+              --capture without a viewer, with one, with a client (bench/view.py)
   presets     `gart train` with each --preset on every --capture: what they cost in quality
   rules       `gart train` with each rule of docs/training.md changed alone, --seeds of each (3): a file
               rules_NAME.json a capture, written after each rule
@@ -52,9 +54,11 @@ import time
 from common import Failure, commit_of, first_match, last_line, machine, run
 from formats import Formats
 from training import LONG_PARTS, Trainings
+from view import View
 
 TRAININGS = ("presets", "rules", "auto", "curves", "long")
-PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff", "formats") + TRAININGS
+PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff", "formats",
+         "view") + TRAININGS
 SKIPPED = 77
 
 # Rows of docs/traits.md: name, SH degree, kernel degree, options of gart bench.
@@ -67,7 +71,7 @@ TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
                ("window 16", 3, 2, {"window": 16}), ("window 64", 3, 2, {"window": 64})])
 
 
-class Bench(Trainings, Formats):
+class Bench(Trainings, Formats, View):
     def __init__(self, a):
         self.a = a
         self.commit = commit_of(a.commit)
@@ -365,6 +369,8 @@ def arguments():
                         help="of " + ",".join(LONG_PARTS) + ": the trainings of long to run")
     parser.add_argument("--clock", default="wall", choices=("wall", "processor"),
                         help="tradeoff: what the fronts are drawn over; processor where a CPU has other work")
+    parser.add_argument("--pixels", type=int, default=1000000, help="view: pixels of the page's canvas")
+    parser.add_argument("--seconds", type=float, default=10, help="view: of motion that are measured")
     parser.add_argument("--commit", help="what was built, where the folder is no git checkout")
     a = parser.parse_args()
     wanted = a.what + (["sanitize"] if a.sanitize else [])

@@ -24,3 +24,26 @@ def formats(results):
                  for r in result["runs"]]
         rows.append([f"{result['scene']}: {source(result)}"] + [""] * 7)
     return table(["model", "format", "bytes", "a Gaussian", "of the PLY", "PSNR, dB", "lost, dB", "SSIM"], rows)
+
+
+def viewer(results):
+    """What a viewer reaches while it moves and at rest, by every view_NAME.json."""
+    rows = []
+    for result in results:
+        for r in result["runs"]:
+            size = lambda sides: " x ".join(str(round(side)) for side in sides)
+            rows.append([r["scene"], f"{r['gaussians']:,}", size(r["canvas"]), f"{r['frames_a_second']:.1f}",
+                         size(r["moving_size"]), f"{r['input_to_frame_ms']['median']:.0f}",
+                         f"{r['input_to_frame_ms']['share_95']:.0f}", f"{r['motion_to_whole_s']['median']:.2f}",
+                         f"{r['rest_ms']:.0f}", source(result)])
+    return table(["model", "Gaussians", "canvas", "frames a second", "of", "input to frame, ms", "95 of 100 within",
+                  "motion to whole, s", "of it the whole view, ms", ""], rows)
+
+
+def viewed_training(results):
+    """What a viewer takes from a training, by every view_training_NAME.json."""
+    words = {"without": "no viewer", "nobody": "a viewer that nobody opens", "client": "a page that moves all the time"}
+    rows = [[result["scene"], words[r["viewer"]], f"{r['seconds']:.2f}", f"{100 * r['slower']:.2f} %",
+             f"{r['processor_seconds']:.2f}", f"{100 * r['slower_processor']:.2f} %", source(result)]
+            for result in results for r in result["runs"]]
+    return table(["capture", "with", "seconds", "slower", "of the processor", "slower", ""], rows)

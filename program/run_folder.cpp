@@ -44,6 +44,18 @@ bool is_run(fs::path const& folder) {
 
 }  // namespace
 
+std::string background_of_run(fs::path const& model) {
+  fs::path const folder = model.parent_path();
+  if (!is_run(folder) || !fs::exists(folder / "config.json")) return {};
+  nlohmann::json const config = read_json(folder / "config.json");
+  if (!config.is_object() || !config.contains("chosen") || !config["chosen"].is_array()) return {};
+  for (auto const& choice : config["chosen"])
+    if (choice.is_object() && choice.value("option", nlohmann::json()) == "--background" &&
+        choice.value("value", nlohmann::json()).is_string())
+      return choice["value"];
+  return {};
+}
+
 run_lock::run_lock(fs::path const& folder) : file_(folder / ".gart.lock") {
   for (;;) {
     descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);

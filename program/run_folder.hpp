@@ -3,6 +3,7 @@
 // replaces is an earlier run's, all of it.
 
 #include <filesystem>
+#include <string>
 
 namespace gart_cli {
 
@@ -23,6 +24,9 @@ class run_lock {
 
 // io_error, naming it, for a file that a run would replace where no run of gart's left it.
 void refuse_foreign_files(std::filesystem::path const& folder);
+
+// The background that a model of a run was trained on, by the config.json that lies beside it; empty where none does.
+std::string background_of_run(std::filesystem::path const& model);
 
 // What a run leaves at its end: metrics, the report, the test views' poses and the images of renders/.
 void remove_results(std::filesystem::path const& folder);

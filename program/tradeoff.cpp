@@ -76,10 +76,18 @@ class tradeoff_run {
       say_.state(
           "measuring " + std::to_string(i + 1) + "/" + std::to_string(settings_.size()) + "  " + settings_[i].name(),
           static_cast<double>(i) / static_cast<double>(settings_.size()));
+      auto const absent = [&](std::string const& why) {
+        result["absent"].push_back({{"name", settings_[i].name()}, {"why", why}});
+      };
       try {
+        through_format(settings_[i]);
         gart::resolve(settings_[i].use.configuration);
       } catch (gart::unsupported const& e) {
-        result["absent"].push_back({{"name", settings_[i].name()}, {"why", in_options(e.what())}});
+        absent(in_options(e.what()));
+        continue;
+      } catch (
+          gart::io_error const& e) {  // a kernel or a library that the format has no room for, or that is not there
+        absent(e.what());
         continue;
       }
       result["settings"].push_back(measure(settings_[i]));
@@ -161,8 +169,23 @@ class tradeoff_run {
             {"reference", {{"alpha_min", reference_.alpha_min}, {"t_min", reference_.transmittance_min}}}};
   }
 
+  // Takes the model through a file of the setting's format, which may hold fewer bands.
+  void through_format(setting& s) {
+    packed_ = {}, file_bytes_ = 0;
+    if (s.use.format.empty()) return;
+    fs::path const file = a_.out / ("packed" + s.use.format);
+    gart::splat_traits traits;
+    gart::read_splats(a_.model, &traits);
+    gart::write_splats(file, file_.model, traits, s.use.packing);
+    packed_ = gart::read_splats(file);
+    file_bytes_ = fs::file_size(file);
+    fs::remove(file);
+    s.use.configuration.sh_degree = std::min(s.use.configuration.sh_degree, packed_.sh_degree);
+  }
+
   json measure(setting const& s) {
-    gart::gaussian_model const model = gart::with_sh_degree(file_.model, s.use.configuration.sh_degree);
+    gart::gaussian_model const model =
+        gart::with_sh_degree(s.use.format.empty() ? file_.model : packed_, s.use.configuration.sh_degree);
     auto const renderer = gart::make_renderer(s.use.configuration);
     renderer->set_model(model);
     error_sums errors;
@@ -176,7 +199,8 @@ class tradeoff_run {
       for (auto const& [label, samples] : time(*renderer, s, model, view, gradient)) {
         stages[label] += share * (s.use.render.rebuild_every > 1 ? mean(samples) : median(samples));
       }
-      errors.add_gradients(v, renderer->gradients());
+      // A format may store the Gaussians in another order: they are not those of the reference, one by one.
+      if (s.use.format.empty()) errors.add_gradients(v, renderer->gradients());
       lt_bytes += share * static_cast<double>(renderer->lt_bytes());
       gart::image_float const image = renderer->render(view, s.use.render).color;
       errors.add_image(v, s.use.shrink == 1 ? image : enlarged(image, v.view.width, v.view.height));
@@ -228,9 +252,13 @@ class tradeoff_run {
   json entry(setting const& s, gart::configuration_info const& configuration, error_sums const& errors,
              std::map<std::string, double> const& stages, double lt_bytes, std::size_t peak_bytes) const {
     auto const of = [&](char const* label) { return stages.count(label) ? stages.at(label) : 0.0; };
+    bool const packed = !s.use.format.empty();
     auto const groups = errors.gradients();
     double worst = 0;
     for (auto const& [name, error] : groups) worst = error <= worst ? worst : error;
+    json gradients = groups;
+    if (packed)
+      for (char const* group : tradeoff_groups) gradients[group] = nullptr;
     auto without_processor = stages;
     without_processor.erase(processor);
     double const total = of("gradients"), forward = of("forward"), backward = of("backward");
@@ -245,9 +273,10 @@ class tradeoff_run {
             {"approximations", approximations_of(s.use.render.approximations(), configuration)},
             {"rebuild_every", s.use.render.rebuild_every},
             {"shrink", s.use.shrink},
+            {"file_bytes", packed ? json(file_bytes_) : json()},
             {"image", {{"max", errors.image_max()}, {"rms", errors.image_rms()}, {"psnr", errors.psnr()}}},
-            {"gradients", groups},
-            {"gradient_worst", worst},
+            {"gradients", gradients},
+            {"gradient_worst", packed ? json() : json(worst)},
             {"total_ms", total},
             {"prepare_ms", total - forward - backward},
             {"forward_ms", forward},
@@ -261,6 +290,8 @@ class tradeoff_run {
   tradeoff_arguments const& a_;
   progress say_;
   gart::model_file file_;
+  gart::gaussian_model packed_;    // as it came back from the setting's format
+  std::uintmax_t file_bytes_ = 0;  // of the file
   std::vector<setting> settings_;
   view_set set_;
   std::string background_;

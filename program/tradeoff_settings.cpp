@@ -97,6 +97,11 @@ std::vector<setting> settings_of(configuration const& exact) {
   for (int const shrink : {2, 4}) {
     t.add("resolution", "1/" + std::to_string(shrink), [&](c& x) { x.shrink = shrink; });
   }
+  for (gart::splat_format const* const f : gart::splat_formats())
+    if (f->write && f->extension != std::string(".ply"))
+      t.add("format", std::string(f->extension).substr(1), [&](c& x) { x.format = f->extension; });
+  t.add("together", "format=spz+sh_bits=8",
+        [](c& x) { x.format = ".spz", x.packing.sh1_bits = x.packing.sh_bits = 8; });
   t.add("together", "alpha_min=0.02+t_min=0.01",
         [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f; });
   t.add("together", "alpha_min=0.01+t_min=0.03+arithmetic=fast", [](c& x) {

@@ -1,6 +1,7 @@
 #pragma once
 // The table of `gart tradeoff`: every knob that buys speed with accuracy, each turned alone, and a few together.
 
+#include <gart/io/splat_file.hpp>
 #include <gart/runtime/session.hpp>
 
 #include <string>
@@ -12,7 +13,9 @@ namespace gart_cli {
 struct configuration {
   gart::configuration_request configuration;
   gart::render_options render;
-  int shrink = 1;  // traced at 1 / shrink of the width and the height, shown at full size
+  int shrink = 1;      // traced at 1 / shrink of the width and the height, shown at full size
+  std::string format;  // ending of the file that the model has gone through; empty: none
+  gart::splat_packing packing;
 };
 
 struct setting {

@@ -223,9 +223,9 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(train.add_flag("--view", a.viewed,
                           "Look at the training in a browser, at the addresses printed\n(see gart view --help); pause, "
                           "step, save and stop it there"));
-  in_group(
-      train.add_option("--view-share", a.view_share,
-                       "Share of the time that views may take while it trains; with\nnobody looking they take none"))
+  in_group(train.add_option("--view-share", a.view_share,
+                            "Time that views may take while it trains, as a share of the\ntraining's own; with nobody "
+                            "looking they take none"))
       ->type_name("X")
       ->capture_default_str()
       ->check(between(0.01, 1));

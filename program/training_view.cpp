@@ -31,20 +31,25 @@ training_view::training_view(train_arguments const& a, gart::session& session, g
       extent_(data.extent),
       background_(background),
       server_(scene_of(a, session, data, background), options_of(a, data)),
-      render_([this](gart::camera const& view, gart::view_settings const& settings) { return render(view, settings); }),
+      render_(
+          [this](gart::camera const& view, gart::view_settings const& left_out) {
+            return left_out.crop || left_out.near ? part().images(view, left_out) : session_.render(view, background_);
+          },
+          [this](gart::camera const& view, gart::view_settings const& left_out) {
+            return left_out.crop || left_out.near ? part().colours(view, left_out)
+                                                  : session_.render_8bit(view, background_);
+          }),
       share_(a.view_share) {}
 
 // What leaves something out is rendered from a copy of the Gaussians as they are now.
-gart::rendered training_view::render(gart::camera const& view, gart::view_settings const& settings) {
-  if (!settings.crop && !settings.near) return session_.render(view, background_);
+gart::view_render training_view::part() {
   gart::gaussian_model model = session_.model();
   if (!part_ || part_->configuration().sh_degree != model.sh_degree) {
     gart::configuration_request request = configuration_request_of(a_);
     request.sh_degree = model.sh_degree;
     part_ = gart::make_renderer(request);
   }
-  return gart::render_of(*part_, std::move(model), gart::render_options_of(train_options_of(a_), extent_, background_))(
-      view, settings);
+  return gart::render_of(*part_, std::move(model), gart::render_options_of(train_options_of(a_), extent_, background_));
 }
 
 bool training_view::attend(double step_seconds, gart::view_status status, interrupt_guard const& interrupt,
@@ -83,9 +88,10 @@ bool training_view::attend(double step_seconds, gart::view_status status, interr
     if (step) return true;
     if (paused_) {
       seconds_ += server_.render_next(render_, 0.1);
-    } else if (share_.may_view()) {
-      double const taken = server_.render_next(render_, 0);
-      share_.viewed(taken), seconds_ += taken;
+    } else {
+      if (share_.may_view()) seconds_ += server_.render_next(render_, 0);
+      // All that a step does for its viewers is of their share, not the images alone.
+      share_.viewed(duration<double>(clock::now() - now).count());
     }
   }
   return true;

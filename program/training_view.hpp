@@ -34,7 +34,7 @@ class training_view {
 
  private:
   using clock = std::chrono::steady_clock;
-  gart::rendered render(gart::camera const& view, gart::view_settings const& settings);
+  gart::view_render part();
 
   train_arguments const& a_;
   gart::session& session_;

@@ -1,6 +1,8 @@
+#include "choices.hpp"
 #include "commands.hpp"
 #include "interrupt.hpp"
 #include "options.hpp"
+#include "run_folder.hpp"
 #include "view_options.hpp"
 
 #include <gart/io/dataset.hpp>
@@ -21,9 +23,16 @@ struct view_arguments {
   fs::path model, capture;
   configuration_options configuration;
   view_options view;
-  std::string background = "black";
+  std::string background = "auto";
   int downscale = 1, test_every = 8;
 };
+
+// What the run was trained on that left the model, else what suits the capture.
+std::string background_of(view_arguments const& a, gart::dataset const& data) {
+  if (a.background != "auto") return a.background;
+  if (std::string const trained = background_of_run(a.model); !trained.empty()) return trained;
+  return a.capture.empty() ? "black" : background_for(gart::inspect(data)).value;
+}
 
 int run_view(view_arguments const& a) {
   gart::model_file file = gart::load_model(a.model);
@@ -35,7 +44,7 @@ int run_view(view_arguments const& a) {
   }
   auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
   gart::render_options options = file.render;
-  options.background = background_color(a.background);
+  options.background = background_color(background_of(a, data));
   gart::view_scene scene =
       gart::scene_of(a.model.filename().string(), file.model, file.kernel_degree, view_cameras_of(data));
   scene.background = options.background;
@@ -65,10 +74,12 @@ void add_view(CLI::App& app, command& selected) {
           "The capture it was trained on, for its cameras and photographs:\na folder or file as for gart train")
       ->type_name("");
   add_view_options(*view, a->view, "");
-  view->add_option("--background", a->background, "black or white: what it was trained on")
+  view->add_option("--background", a->background,
+                   "black or white. auto: by the config.json of a run beside the\nmodel, else as gart train chooses "
+                   "for the capture, else black")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(one_of({"black", "white"}));
+      ->check(one_of({"auto", "black", "white"}));
   view->add_option("--downscale", a->downscale, "Shrink photographs and their cameras by this whole factor")
       ->type_name("N")
       ->capture_default_str()
@@ -87,7 +98,7 @@ void add_view(CLI::App& app, command& selected) {
       "then open the address that gart prints. The port must be the same on both sides.\n"
       "\nExamples:\n"
       "  gart view run/model.ply\n"
-      "  gart view run/model.ply capture --background white\n"
+      "  gart view run/model.ply capture\n"
       "  gart view scene.spz --port 8765");
   view->callback([a, &selected] { selected = [a] { return run_view(*a); }; });
 }

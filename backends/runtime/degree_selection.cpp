@@ -94,6 +94,7 @@ class degree_selection final : public session {
   int steps_done() const override { return trial_ ? trial_->start.step : inner_->steps_done(); }
   gaussian_model model() const override { return trial_ ? trial_->start.scene : inner_->model(); }
   rendered render(camera const& view, vec3 background) override { return inner_->render(view, background); }
+  image8 render_8bit(camera const& view, vec3 background) override { return inner_->render_8bit(view, background); }
   void save(std::filesystem::path const& path) const override { write_checkpoint(path, state()); }
   void load(std::filesystem::path const& path) override { set_state(read_checkpoint(path)); }
   training_state state() const override {

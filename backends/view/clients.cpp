@@ -103,12 +103,19 @@ bool clients::take_frame(int id, std::vector<u8>& to, double now) {
   return true;
 }
 
+bool clients::waits(client const& c) {
+  return !c.texts.empty() || !c.status.empty() || !c.curve.empty() || !c.frame.empty();
+}
+
 bool clients::has_output(int id) const {
   std::lock_guard const lock(mutex_);
   auto const found = clients_.find(id);
-  if (found == clients_.end()) return false;
-  client const& c = found->second;
-  return !c.texts.empty() || !c.status.empty() || !c.curve.empty() || !c.frame.empty();
+  return found != clients_.end() && waits(found->second);
+}
+
+bool clients::has_output() const {
+  std::lock_guard const lock(mutex_);
+  return std::any_of(clients_.begin(), clients_.end(), [](auto const& one) { return waits(one.second); });
 }
 
 bool clients::overflows(int id) const {

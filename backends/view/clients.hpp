@@ -40,6 +40,7 @@ class clients {
   bool take_text(int client, std::string& to);
   bool take_frame(int client, std::vector<u8>& to, double now);
   bool has_output(int client) const;
+  bool has_output() const;           // any of them
   bool overflows(int client) const;  // it takes nothing of what it asked for
 
   // The thread that renders.
@@ -72,6 +73,7 @@ class clients {
     std::vector<u8> frame;      // the newest, to be sent
     frame_pacing pacing;
   };
+  static bool waits(client const& c);  // whether there is something to send to it
   // All with mutex_ held.
   bool rests(client const& c, double now) const;
   std::optional<job> job_of(int id, client& c, double now, int urgency);

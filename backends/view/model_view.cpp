@@ -1,5 +1,6 @@
 // A model and the part of it that a crop box leaves.
 
+#include <gart/io/image_file.hpp>
 #include <gart/view/model_view.hpp>
 
 #include <algorithm>
@@ -17,6 +18,12 @@ struct model_view {
   std::optional<view_box> crop;  // of what the renderer holds
   std::size_t left = 0;          // Gaussians that it holds
 
+  render_options with(view_settings const& settings) {
+    take(settings.crop);
+    render_options out = options;
+    if (settings.near) out.near = *settings.near;
+    return out;
+  }
   void take(std::optional<view_box> const& box) {
     if (box == crop) return;
     gaussian_model const part = box ? cropped(model, *box) : gaussian_model();
@@ -41,12 +48,14 @@ view_render render_of(renderer& by, gaussian_model model, render_options options
   auto const held = std::make_shared<model_view>(model_view{by, std::move(model), options, {}, 0});
   held->left = held->model.size();
   if (held->left > 0) by.set_model(held->model);
-  return [held](camera const& view, view_settings const& settings) {
-    held->take(settings.crop);
-    render_options options = held->options;
-    if (settings.near) options.near = *settings.near;
-    return held->left > 0 ? held->by.render(view, options) : nothing(view, options.background);
-  };
+  return {[held](camera const& view, view_settings const& settings) {
+            render_options const with = held->with(settings);
+            return held->left > 0 ? held->by.render(view, with) : nothing(view, with.background);
+          },
+          [held](camera const& view, view_settings const& settings) {
+            render_options const with = held->with(settings);
+            return held->left > 0 ? held->by.render_8bit(view, with) : to_8bit(nothing(view, with.background).color);
+          }};
 }
 
 }  // namespace gart

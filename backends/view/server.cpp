@@ -58,8 +58,10 @@ struct view_server::state {
     if (m.mode == view_mode::error && m.photo && options.photo) photo = options.photo(*m.photo);
     camera const view = j.still ? m.view : resized(m.view, j.width, j.height);
     auto const start = clock::now();
-    rendered const image = render(view, m.settings);
-    shown_image const seen = shown(image, view, m.mode, photo ? &*photo : nullptr, all.scene().background);
+    shown_image const seen =
+        m.mode == view_mode::colour && render.colours
+            ? shown_image{render.colours(view, m.settings)}
+            : shown(render.images(view, m.settings), view, m.mode, photo ? &*photo : nullptr, all.scene().background);
     std::vector<u8> const jpeg = encode_jpeg(seen.image, j.still ? quality_still : quality_moving);
     double const ms = std::chrono::duration<double, std::milli>(clock::now() - start).count();
     frame_header const header{m.id,   view.width, view.height, m.view.width, m.view.height,
@@ -69,7 +71,7 @@ struct view_server::state {
 
   void answer(view::job const& j, pick_message const& m, view_render const& render) {
     pick_place const at = place_of(m);
-    image_float const distances = mean_distances(render(at.view, m.settings));
+    image_float const distances = mean_distances(render.images(at.view, m.settings));
     float const t = distances.at(at.x, at.y, 0);
     ray const through = ray_through(m.view, m.x, m.y);
     vec3d point = m.view.position;

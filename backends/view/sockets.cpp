@@ -306,10 +306,10 @@ sockets::sockets(clients& all, view_server_options const& options) : state_(std:
   s.thread = std::thread([&s] {
     while (!s.ends.load() && lws_service(s.context, 0) >= 0) {
     }
-    // What is left to say is given a moment.
+    // What is left to say is given a moment, where anyone takes it.
     double const until = seconds_now() + 0.2;
     s.all.say_all(bye_text("gart ends"));
-    while (seconds_now() < until && lws_service(s.context, 0) >= 0) lws_cancel_service(s.context);
+    while (s.all.has_output() && seconds_now() < until && lws_service(s.context, 0) >= 0) lws_cancel_service(s.context);
   });
 }
 

@@ -4,6 +4,7 @@
 #include <gart/io/camera_file.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/view/camera_path.hpp>
+#include <run_folder.hpp>
 #include <view/socket_client.hpp>
 
 #include <support/policies.hpp>
@@ -129,6 +130,24 @@ TEST_CASE("a training is watched, paused, stepped, saved and stopped by a viewer
   CHECK(ended.code == 130);
   CHECK(fs::exists(here / "run/model.ply"));
   CHECK(has(ended.err, "Stopped after step"));
+}
+
+TEST_CASE("the background that a model was trained on is known by the config.json beside it") {
+  folder const here;
+  auto const background_with = [&](std::string const& config) {
+    std::ofstream(here / "config.json") << config;
+    return gart_cli::background_of_run(here / "model.ply");
+  };
+  CHECK(gart_cli::background_of_run(here / "model.ply").empty());
+  std::string const head = R"({"gart":"1","options":{},"chosen":)";
+  CHECK(background_with(
+            head + R"([{"option":"--tracer","value":"tiles"},{"option":"--background","value":"white"}]})") == "white");
+  for (std::string const& other :
+       {head + "[]}", head + "3}", head + R"([3,{"option":"--background","value":1}]})", std::string("{"),
+        std::string(R"({"chosen":[{"option":"--background","value":"white"}]})")}) {
+    CAPTURE(other);
+    CHECK(background_with(other).empty());
+  }
 }
 
 TEST_CASE("view serves a model until Ctrl-C, and refuses what it cannot listen at") {

@@ -85,6 +85,11 @@ TEST_CASE_TEMPLATE("a view in memory of the policy is the view on the host", E, 
     for (index_t i = 0; i < pixels; ++i)
       for (int c = 0; c < 3; ++c) wanted[4 * i + c] = rounded.data[3 * i + c];
     CHECK(rgba.to_host() == wanted);
+    gart::image8 const alone = renderer->render_8bit(view, options);
+    CHECK(alone.width == view.width);
+    CHECK(alone.height == view.height);
+    CHECK(alone.channels == 3);
+    CHECK(alone.data == rounded.data);
     gart::render_targets screen;
     screen.rgba = bytes_alone.data();
     renderer->render_to(view, options, screen);

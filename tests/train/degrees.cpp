@@ -219,6 +219,12 @@ TEST_CASE("the threshold decides, the scores are those of the views held out, an
     for (std::size_t const v : held_out) {
       auto const& view = f.data.train[v];
       auto const picture = run->render(view.view, gart::vec3(0.0f)).color;
+      auto const bytes = run->render_8bit(view.view, gart::vec3(0.0f));
+      REQUIRE(bytes.data.size() == picture.data.size());
+      double rounded = 0;
+      for (std::size_t i = 0; i < bytes.data.size(); ++i)
+        rounded = std::max(rounded, std::abs(255.0 * std::clamp(picture.data[i], 0.0f, 1.0f) - bytes.data[i]));
+      CHECK(rounded <= 0.5001);
       double error = 0;
       for (std::size_t i = 0; i < picture.data.size(); ++i) {
         double const d = std::clamp(static_cast<double>(picture.data[i]), 0.0, 1.0) - view.image.data[i] / 255.0;

@@ -1,6 +1,7 @@
 // Views of a model and of what a crop box leaves are those of a renderer that holds the same Gaussians.
 #include "cameras.hpp"
 
+#include <gart/io/image_file.hpp>
 #include <gart/runtime/renderer.hpp>
 #include <gart/view/model_view.hpp>
 
@@ -47,7 +48,9 @@ TEST_CASE("a crop box, another one, none, and one that leaves nothing") {
   gart::view_box const left{{-10, -10, -10}, {0, 10, 10}}, right{{0, -10, -10}, {10, 10, 10}},
       nowhere{{5, 5, 5}, {6, 6, 6}};
   auto const of = [&](std::optional<gart::view_box> crop, std::optional<float> near = {}) {
-    return render(view, {crop, near}).color.data;
+    auto const image = render.images(view, {crop, near});
+    CHECK(render.colours(view, {crop, near}).data == gart::to_8bit(image.color).data);
+    return image.color.data;
   };
   CHECK(of({}) == expected(m, options.near));
   CHECK(of(left) == expected(gart::cropped(m, left), options.near));
@@ -55,7 +58,7 @@ TEST_CASE("a crop box, another one, none, and one that leaves nothing") {
   CHECK(of(left) != of({}));
   CHECK(of({}, 3.0f) == expected(m, 3.0f));
   CHECK(of({}, 3.0f) != of({}));
-  auto const empty = render(view, {nowhere, {}});
+  auto const empty = render.images(view, {nowhere, {}});
   CHECK(empty.color.at(3, 4, 1) == 0.4f);
   CHECK(empty.transmittance.at(3, 4, 0) == 1);
   CHECK(of({}) == expected(m, options.near));

@@ -2,8 +2,12 @@
 
 import assert from 'node:assert/strict';
 
+// Seconds until what is waited for is taken to never come: a fault, however much else the machine has to do.
+const longest = 90;
+
 export async function openPage(browser, address, options = {}) {
   const context = await browser.newContext({viewport: {width: 900, height: 600}, acceptDownloads: true, ...options});
+  context.setDefaultTimeout(1000 * longest);
   const page = await context.newPage();
   const sent = [], received = [], frames = [], faults = [];
   page.on('pageerror', (error) => faults.push(error.stack));
@@ -19,12 +23,13 @@ export async function openPage(browser, address, options = {}) {
   await page.goto(address);
 
   const views = () => sent.filter((m) => m.type === 'view');
-  const until = async (what, done, seconds = 20) => {
-    for (const end = Date.now() + 1000 * seconds; Date.now() < end; await page.waitForTimeout(20)) {
+  const until = async (what, done) => {
+    for (const end = Date.now() + 1000 * longest; Date.now() < end; await page.waitForTimeout(20)) {
       const value = await done();
       if (value) return value;
     }
-    assert.fail(`${seconds} s went by without ${what}; the page says "${await page.textContent('#state')}"`);
+    const said = await page.textContent('#state', {timeout: 5000}).catch(() => 'nothing');
+    assert.fail(`${longest} s went by without ${what}; the page says "${said}"`);
   };
   const self = {
     page, context, sent, received, frames, faults, until, views,
@@ -32,15 +37,15 @@ export async function openPage(browser, address, options = {}) {
     last: () => views().at(-1),
     // The frame at rest of the newest view, once nothing moves any more.
     rest: async () => {
-      await page.waitForTimeout(120);  // for what was just done to reach the page
+      // What was just done has reached the page when it draws anew.
+      await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
       return self.atRest();
     },
     atRest: () => until('a frame at rest', async () => {
       const view = views().at(-1), frame = frames.at(-1);
       if (!view || !frame || view.moving || !frame.header.still || frame.header.id !== view.id) return null;
-      if ((await page.getAttribute('#stage', 'data-frame')) !== String(view.id)) return null;
-      if ((await page.getAttribute('#stage', 'aria-busy')) !== 'false') return null;
-      return {view, ...frame};
+      const [shown, busy] = await page.$eval('#stage', (stage) => [stage.dataset.frame, stage.ariaBusy]);
+      return shown === String(view.id) && busy === 'false' ? {view, ...frame} : null;
     }),
     choose: (mode) => page.check(`#modes input[value=${mode}]`),
     tab: (name) => page.click(`#tab-${name}`),

@@ -11,14 +11,14 @@ export const gartAt = (program, folder) => ({
   // Resolves with stdout; fails with stderr.
   run: async (...given) => (await run(program, given, {cwd: folder, maxBuffer: 1 << 26})).stdout,
 
-  // {control, look, child, ended}: the two addresses, and a promise of the exit code. Left alone after 30 s.
+  // {control, look, child, ended}: the two addresses, and a promise of the exit code. Left alone after 90 s.
   serve(...given) {
     const child = spawn(program, given, {cwd: folder, stdio: ['ignore', 'pipe', 'pipe']});
     running.add(child);
     let text = '';
     const ended = new Promise((resolve) => child.on('exit', (code) => (running.delete(child), resolve(code))));
     return new Promise((resolve, reject) => {
-      const late = setTimeout(() => reject(new Error(`gart ${given.join(' ')} printed no address:\n${text}`)), 30000);
+      const late = setTimeout(() => reject(new Error(`gart ${given.join(' ')} printed no address:\n${text}`)), 90000);
       const read = (data) => {
         text += data;
         const found = text.match(/http:\/\/[^\s]+\/[0-9a-f]{32}\//g);

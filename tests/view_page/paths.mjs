@@ -8,6 +8,19 @@ import {apart, isRotation, placeOf} from './geometry.mjs';
 
 const read = async (download) => JSON.parse(fs.readFileSync(await download.path(), 'utf8'));
 
+// The size and the length of a video, by the browser that plays it to its end.
+async function played(browser, bytes, kind) {
+  const page = await browser.newPage();
+  const seen = await page.evaluate((source) => new Promise((resolve, reject) => {
+    const video = Object.assign(document.createElement('video'), {muted: true, src: source});
+    video.onerror = () => reject(new Error(video.error.message));
+    video.onended = () => resolve({width: video.videoWidth, height: video.videoHeight, seconds: video.currentTime});
+    video.play().catch(reject);
+  }), `data:video/${kind};base64,${bytes.toString('base64')}`);
+  await page.close();
+  return seen;
+}
+
 export const paths = {
   async 'keyframes make a path, which plays, is saved, and comes back'({browser, server, gart, work}) {
     const p = await openPage(browser, server.control, {viewport: {width: 800, height: 420}});
@@ -70,11 +83,21 @@ export const paths = {
     await p.drag([200, 200], [90, 0]);
     await p.page.click('#add-key');
     await p.page.fill('#seconds', '0.8');
-    const video = await p.saved(() => p.page.click('#record'));
+    const downloads = [];
+    p.page.on('download', (download) => downloads.push(download));
+    await p.page.click('#record');
+    await p.until('the recorder to end', async () => (await p.page.getAttribute('#record', 'aria-pressed')) === 'false');
+    const said = await p.page.textContent('#say');
+    assert.equal(said, 'The video is saved.');
+    await p.until('the file', () => downloads.length === 1);
+    const [video] = downloads;
     const bytes = fs.readFileSync(await video.path());
     const webm = bytes.readUInt32BE(0) === 0x1a45dfa3, mp4 = bytes.subarray(4, 8).toString() === 'ftyp';
     assert.ok(webm || mp4, 'no video file');
-    assert.ok(bytes.length > 1000, `${bytes.length} bytes`);
+    // It has frames, of the canvas's size, and the path takes the time that it is to take.
+    const [width, height] = p.frames.at(-1).header.full, seen = await played(browser, bytes, webm ? 'webm' : 'mp4');
+    assert.deepEqual([seen.width, seen.height], [width, height]);
+    assert.ok(seen.seconds > 0.5, `${seen.seconds} s`);
     await p.close();
   },
 };

@@ -12,7 +12,7 @@ import {paths} from './paths.mjs';
 import {people} from './people.mjs';
 import {training} from './training.mjs';
 
-const [, , program, folder, ...wanted] = process.argv;
+const [, , program, folder, executablePath, ...wanted] = process.argv;
 const {chromium} = createRequire(path.join(path.resolve(folder), 'here.js'))('playwright-core');
 const work = path.join(folder, 'work');
 fs.rmSync(work, {recursive: true, force: true});
@@ -27,7 +27,7 @@ await gart.run('train', 'capture', '--out', 'run', '--iterations', '60', '--max-
 console.log(`${seconds()} s  a capture and a model`);
 
 const browser = await chromium.launch({
-  executablePath: '/usr/bin/chromium',
+  executablePath,
   args: ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
     '--disable-background-networking', '--disable-component-update', '--disable-sync'],
 });

@@ -9,14 +9,16 @@ skip() {
   echo "skipped: $*"
   exit 77
 }
-[[ ${GART_TEST_BROWSER:-0} != 0 ]] || skip "GART_TEST_BROWSER=1 runs it, on a machine with nothing else to do: its steps have time limits"
 "$gart" view --help >/dev/null 2>&1 || skip "this gart has no view (libwebsockets was not there when it was built)"
+"$gart" info | grep -q '^embree .*not in this build' && skip "this gart makes no capture (it was built without Embree)"
 for program in node npm chromium; do
   command -v "$program" >/dev/null || skip "$program is not here (apt-get install nodejs npm chromium)"
 done
 mkdir -p "$folder"
-cp "$here/package.json" "$here/package-lock.json" "$folder"
-if [[ ! -d $folder/node_modules/playwright-core ]]; then
-  (cd "$folder" && npm ci --no-audit --no-fund --silent) || skip "npm could not fetch playwright-core (is there a network?)"
+# npm writes its own lock last: what was fetched in part is fetched again.
+if [[ ! -f $folder/node_modules/.package-lock.json ]] || ! cmp -s "$here/package-lock.json" "$folder/package-lock.json"; then
+  cp "$here/package.json" "$here/package-lock.json" "$folder"
+  (cd "$folder" && timeout 120 npm ci --no-audit --no-fund --silent --prefer-offline --fetch-retries=1 --fetch-timeout=20000) ||
+    skip "npm could not fetch playwright-core (is there a network?)"
 fi
-exec node "$here/run.mjs" "$gart" "$folder" "$@"
+exec node "$here/run.mjs" "$gart" "$folder" "$(command -v chromium)" "$@"

@@ -8,7 +8,7 @@ import {openPage} from './browser.mjs';
 export const training = {
   async 'a training is paused, stepped, resumed and stopped from the page'({browser, gart, work}) {
     const server = await gart.serve('train', 'capture', '--out', 'live', '--iterations', '100000', '--max-gaussians', '800',
-      '--backend', 'openmp', '--eval-every', '50', '--view');
+      '--backend', 'openmp', '--eval-every', '10', '--view');
     const p = await openPage(browser, server.control);
     assert.equal(p.received[0].training, true);
     const status = () => p.received.filter((m) => m.type === 'status').at(-1);
@@ -19,8 +19,8 @@ export const training = {
     await p.page.click('#pause');
     await p.until('the pause', () => status().paused);
     await p.until('the button to resume', async () => (await p.page.textContent('#pause')) === 'Resume');
-    const at = status().step;
-    await p.page.waitForTimeout(600);
+    const at = status().step, told = p.received.length;
+    await p.until('more to be told', () => p.received.slice(told).filter((m) => m.type === 'status').length > 2);
     assert.equal(status().step, at, 'it went on');
     await p.page.click('#step');
     await p.until('one step', () => status().step === at + 1);
@@ -32,7 +32,8 @@ export const training = {
     // Not by the page's kindness alone.
     await looker.page.evaluate(() => new Promise((resolve) => {
       const socket = new WebSocket(new URL('socket', location.href.replace('http', 'ws')), 'gart-view');
-      socket.onopen = () => (socket.send('{"type":"train","action":"resume"}'), setTimeout(resolve, 400));
+      socket.onopen = () => socket.send('{"type":"train","action":"resume"}');
+      socket.onmessage = ({data}) => typeof data === 'string' && JSON.parse(data).type === 'refused' && resolve();
     }));
     await looker.until('a refusal', () => looker.received.some((m) => m.type === 'refused'));
     assert.equal(status().step, at + 1, 'one who may look made it go on');

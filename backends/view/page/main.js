@@ -28,7 +28,7 @@ const say = (text) => ($('say').textContent = text);
 const count = (n) => n.toLocaleString('en');
 
 let cameras = [], frusta = [], tips = [], pointed = null, shown = null, hello = null, asked = 0;
-const answers = new Map();
+const answers = new Map(), waiting = [];
 const meter = rateMeter();
 
 // What gart answers by the number of the question.
@@ -131,9 +131,15 @@ function frameShown(header) {
   $('fps').textContent = header.still ? 'at rest' : `${Math.round(meter.rate())} fps`;
   $('frame-id').textContent = `#${header.id}`;
   Object.assign(stage.dataset, {frame: header.id, still: header.still, mode: header.mode, size: `${header.width}x${header.height}`});
-  if (header.still && view.upTo(header.id)) stage.setAttribute('aria-busy', false);
+  if (header.still && view.upTo(header.id)) {
+    stage.setAttribute('aria-busy', false);
+    for (const resolve of waiting.splice(0)) resolve();
+  }
   draw();
 }
+
+// When what is wanted last is on the canvas, whole.
+const atRest = () => new Promise((resolve) => waiting.push(resolve));
 
 function draw() {
   const pen = penFor(lines, shown?.camera, shown?.pose, shown?.rect ?? {});
@@ -306,7 +312,7 @@ const path = keyframes({
   ask: async (all, frames, closed) => (await ask({type: 'path', keyframes: all, frames, closed}, 30)).cameras,
   say,
 });
-recorder($('record'), frame, path.play, say);
+recorder($('record'), frame, {play: path.play, whole: atRest}, say);
 
 const training = trainingPanel({
   progress: $('progress'), at: $('at-step'), rate: $('rate'), gaussians: $('gaussians'), pause: $('pause'), step: $('step'),

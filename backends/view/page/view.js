@@ -8,7 +8,7 @@ import {add, scale} from './vector.js';
 import {levelled, pivotAhead, shifted, styles} from './navigation.js';
 
 const restAfter = 150;    // milliseconds without a motion
-const sendEvery = 25;     // at least, between two views
+const sendEvery = 15;     // at least, between two views: each time that a screen is drawn anew
 const mostWaiting = 1e5;  // bytes that have not left the browser
 
 export class View {

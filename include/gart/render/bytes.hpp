@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// An image's colour in 8 bits a channel, made where it was rendered: [H][W][3] in floats to [H][W][4], red, green,
-/// blue and 255. Clamped and rounded as to_8bit (io/image_file.hpp) does it; NaN becomes 0. Cost: a launch over the
-/// pixels.
+/// An image's colour in 8 bits a channel, made where it was rendered: [H][W][3] in floats to [H][W][3], or to
+/// [H][W][4] with 255 after red, green and blue. Clamped and rounded as to_8bit (io/image_file.hpp) does it; NaN
+/// becomes 0. Cost: a launch over the pixels.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
@@ -14,24 +14,25 @@ namespace render_kernels {
 
 struct color_to_bytes {
   float const* color;
-  u8* rgba;
+  u8* bytes;
+  int channels;
   GART_KERNEL void operator()(index_t pixel) const {
-    u8* const out = rgba + std::size_t{4} * pixel;
+    u8* const out = bytes + static_cast<std::size_t>(channels) * pixel;
     for (int c = 0; c < 3; ++c) {
       float const v = color[std::size_t{3} * pixel + c];
       out[c] = static_cast<u8>(v > 0 ? (v < 1 ? v : 1.0f) * 255.0f + 0.5f : 0.0f);
     }
-    out[3] = 255;
+    if (channels == 4) out[3] = 255;
   }
 };
 
 }  // namespace render_kernels
 
-/// Colours [pixels][3], floats, to `rgba`, [pixels][4]: 0 to 1 becomes 0 to 255, rounded, what lies outside is clamped;
-/// alpha is 255.
+/// Colours [pixels][3], floats, to `bytes`, [pixels][channels], 3 or 4 of them: 0 to 1 becomes 0 to 255, rounded, what
+/// lies outside is clamped; a fourth channel is 255.
 template <execution E>
-void color_to_bytes(E& exec, float const* color, index_t pixels, u8* rgba) {
-  parallel_for(exec, "8 bits", pixels, render_kernels::color_to_bytes{color, rgba});
+void color_to_bytes(E& exec, float const* color, index_t pixels, u8* bytes, int channels) {
+  parallel_for(exec, "8 bits", pixels, render_kernels::color_to_bytes{color, bytes, channels});
 }
 
 }  // namespace gart::inline GART_ISA

@@ -28,6 +28,7 @@ class compiled_session final : public session {
   void set_iterations(int iterations) override { trainer_.set_iterations(iterations); }
   gaussian_model model() const override { return trainer_.model(); }
   rendered render(camera const& view, vec3 background) override { return trainer_.render(view, background); }
+  image8 render_8bit(camera const& view, vec3 background) override { return trainer_.render_8bit(view, background); }
   void save(std::filesystem::path const& path) const override { trainer_.save(path); }
   void load(std::filesystem::path const& path) override { trainer_.load(path); }
   training_state state() const override { return trainer_.state(); }

@@ -5,7 +5,6 @@
 
 #include <gart/backward/backward.hpp>
 #include <gart/pose/differentiate_pose.hpp>
-#include <gart/render/bytes.hpp>
 #include <gart/render/render_image.hpp>
 #include <gart/runtime/configuration_of.hpp>
 #include <gart/runtime/registry.hpp>
@@ -45,11 +44,15 @@ class compiled_renderer final : public renderer {
     prepare(view, options);
     return render_image(frame_);
   }
+  image8 render_8bit(camera const& view, render_options const& options) override {
+    prepare(view, options);
+    return render_image_8bit(frame_);
+  }
   void render_to(camera const& view, render_options const& options, render_targets const& targets) override {
     prepare(view, options);
     image_targets const images = images_of(targets, targets.rgba != nullptr);
     frame_.render(images);
-    if (targets.rgba) color_to_bytes(exec_, images.color, pixels_of(view), targets.rgba);
+    if (targets.rgba) color_to_bytes(exec_, images.color, pixels_of(view), targets.rgba, 4);
   }
 
   void differentiate(camera const& view, render_options const& options, image_float const& color_gradient) override {
@@ -67,7 +70,7 @@ class compiled_renderer final : public renderer {
     image_targets const images = images_of(targets, true);
     pass_.render(frame_, images);
     gart::differentiate(frame_, pass_, {color_gradient, std::size_t{3} * pixels_of(view)}, gradients);
-    if (targets.rgba) color_to_bytes(exec_, images.color, pixels_of(view), targets.rgba);
+    if (targets.rgba) color_to_bytes(exec_, images.color, pixels_of(view), targets.rgba, 4);
   }
   pose_gradient differentiate_pose() override {
     if (gradients_.size() != scene_.count || scene_.count == 0)

@@ -48,6 +48,9 @@ class renderer {
 
   /// A view to host memory.
   virtual rendered render(camera const& view, render_options const& options) = 0;
+  /// Its colours alone, as to_8bit makes them, [H][W][3]: made where it is rendered, so that 3 bytes a pixel are copied
+  /// in place of 24.
+  virtual image8 render_8bit(camera const& view, render_options const& options) = 0;
   /// A view to memory of the policy.
   virtual void render_to(camera const& view, render_options const& options, render_targets const& targets) = 0;
 

@@ -40,6 +40,8 @@ class session {
   virtual gaussian_model model() const = 0;
   /// A view of the Gaussians to host memory.
   virtual rendered render(camera const& view, vec3 background) = 0;
+  /// Its colours alone, in 8 bits a channel, as renderer has it.
+  virtual image8 render_8bit(camera const& view, vec3 background) = 0;
   /// Everything the next step depends on: parameters, Adam's moments, step, random state. Written atomically; resuming
   /// gives the same bits as not having stopped, on the serial policy. load throws io_error for a checkpoint of another
   /// degree, a truncated or foreign file.

@@ -91,6 +91,8 @@ class basic_trainer {
   gaussian_model model() const { return whole_of(scene_.to_host()); }
   /// A view of the Gaussians to host memory.
   rendered render(camera const& view, vec3 background);
+  /// Its colours alone, in 8 bits a channel: [H][W][3].
+  image8 render_8bit(camera const& view, vec3 background);
   /// Everything the next step depends on.
   training_state state() const;
   /// Takes up the run that the state is of. Errors: invalid_argument for another degree.

@@ -2,6 +2,7 @@
 /// \file
 /// Template bodies of trainer.hpp.
 
+#include <gart/io/image_file.hpp>
 #include <gart/train/trainer.hpp>
 
 #include <algorithm>
@@ -207,6 +208,14 @@ rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& 
     if (in_ranks()) return render_in_ranks(view, background);
   frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background));
   return render_image(frame_);
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+image8 basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_8bit(camera const& view, vec3 background) {
+  if constexpr (!Comm::alone)
+    if (in_ranks()) return to_8bit(render_in_ranks(view, background).color);
+  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background));
+  return render_image_8bit(frame_);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>

@@ -8,12 +8,26 @@
 #include <gart/runtime/renderer.hpp>
 #include <gart/view/scene.hpp>
 
+#include <concepts>
 #include <functional>
+#include <utility>
 
 namespace gart {
 
-/// Renders a view to host memory. Called from one thread at a time; what it throws is told to the client.
-using view_render = std::function<rendered(camera const& view, view_settings const& settings)>;
+/// Renders views to host memory: any function from a camera and settings to images. Called from one thread at a time;
+/// what it throws is told to the client.
+struct view_render {
+  /// Everything a pixel can tell.
+  std::function<rendered(camera const& view, view_settings const& settings)> images;
+  /// Its colours alone, as to_8bit makes them of `images`, [H][W][3]: what view_mode::colour shows, where it is given.
+  /// On a device it spares the copy of the rest.
+  std::function<image8(camera const& view, view_settings const& settings)> colours;
+
+  view_render() = default;
+  /// Of a function that renders everything, and one of the colours alone where there is one.
+  template <std::invocable<camera const&, view_settings const&> F>
+  view_render(F all, decltype(colours) alone = {}) : images(std::move(all)), colours(std::move(alone)) {}
+};
 
 /// That of a model, by a renderer that is used for nothing else and outlives it.
 view_render render_of(renderer& by, gaussian_model model, render_options options);

@@ -42,21 +42,18 @@ class frame_pacing {
   double rate_ = 0;
 };
 
-/// Keeps views to a share of the time of a training: work earns them time, each view spends it. What is saved up is
-/// bounded, so that a viewer who comes late does not stop the training.
+/// Keeps views to a share of the time that a training takes, so that it is slower by no more than that: work earns them
+/// time, each view spends it. What is saved up is bounded, so that a viewer who comes late does not stop the training.
 class time_share {
  public:
-  /// Between 0 and 1, of all time.
+  /// Between 0 and 1 of the training's own time; 1: as much as is wanted.
   explicit time_share(double share) { set(share); }
   /// The same, from here on.
   void set(double share) { share_ = std::clamp(share, 0.0, 1.0); }
-  /// Of all time.
+  /// Of the training's own time.
   double share() const { return share_; }
   /// So many seconds went into training.
-  void worked(double seconds) {
-    double const earned = share_ < 1 ? seconds * share_ / (1 - share_) : saved_most;
-    saved_ = std::min(saved_ + earned, saved_most);
-  }
+  void worked(double seconds) { saved_ = std::min(saved_ + seconds * share_, saved_most); }
   /// So many seconds went into a view.
   void viewed(double seconds) { saved_ -= seconds; }
   /// Whether a view may be rendered now. What it takes beyond what was saved is earned before the next one.
