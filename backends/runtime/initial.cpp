@@ -167,6 +167,10 @@ gaussian_model initial_model(dataset const& data, train_options const& options, 
   point_cloud points = start.measured ? points_of_maps(data, start.count, options.seed, options.held_out)
                        : start.random ? random_points(data.bounds_min, data.bounds_max, start.count, options.seed)
                                       : data.points;
+  if (start.measured && points.size() == 0)
+    throw invalid_argument(
+        "train_options.depth_weight: no depth map has a distance where its photograph is opaque and not masked "
+        "(correct the maps, or train without them)");
   if (points.size() > options.max_gaussians) {
     // A random subset: the first n of a shuffle.
     random_source const source{options.seed, 1, random_use::user};

@@ -174,6 +174,8 @@ TEST_CASE("training on depth starts from what the maps measured, where the captu
   data.train[0].mask = gart::image8(20, 20, 1, 0);
   data.train[1].image = gart::image8(20, 20, 4, 0);
   CHECK(gart::points_of_maps(data, 50, 5).size() == 0);
+  CHECK_THROWS_WITH_AS(gart::initial_model(data, options, 1), doctest::Contains("no depth map has a distance"),
+                       gart::invalid_argument);
   data.points.position.assign(30, 0.0f), data.points.color.assign(30, 0);
   CHECK_FALSE(gart::choose_start(data, options).value.measured);
 }
