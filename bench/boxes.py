@@ -8,14 +8,11 @@ the rim (tests/camera/boxes.cpp). The result, OUT/camera_boxes.json, has of each
 the mean area of boxes over that of exact ones. About 50 microseconds of a core an ellipsoid.
 """
 import argparse
-import datetime
-import json
 import os
 import re
-import shlex
 import sys
 
-from common import commit_of, last_line, machine, run
+from common import command_line, commit_of, last_line, machine, now, run, write_json
 
 ROW = re.compile(r"^\| (\w+) \| (\S+) \| (\S+) \| (\d+) \| (\d+) \| (\d+) \| (\S+) \|$", re.MULTILINE)
 
@@ -39,15 +36,9 @@ def main():
         return 1
     result = {"what": "mean area of boxes over that of exact ones, random ellipsoids against their silhouettes in double",
               "machine": machine(), "commit": commit_of(a.commit),
-              "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
-              "command": " ".join(shlex.quote(x) for x in ["python3"] + sys.argv), "seed": a.seed,
+              "date": now(), "command": command_line(), "seed": a.seed,
               "passed": done.returncode == 0, "rows": rows}
-    os.makedirs(a.out, exist_ok=True)
-    path = os.path.join(a.out, "camera_boxes.json")
-    with open(path + ".part", "w") as file:
-        json.dump(result, file, indent=1)
-        file.write("\n")
-    os.replace(path + ".part", path)
+    write_json(os.path.join(a.out, "camera_boxes.json"), result)
     return 0 if done.returncode == 0 else 1
 
 

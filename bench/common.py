@@ -1,8 +1,12 @@
-"""What the parts of bench/run.py share: other programs run, the machine and the commit told."""
+"""What the scripts share: other programs run, the machine and the commit told, results written."""
+import datetime
+import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
+import sys
 
 
 class Failure(Exception):
@@ -45,3 +49,20 @@ def commit_of(argument):
         return "unknown"
     changed = run(["git", "-C", folder, "status", "--porcelain", "--untracked-files=no"]).stdout.strip()
     return head.stdout.strip() + (" with changes" if changed else "")
+
+
+def now():
+    return datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d %H:%M UTC")
+
+
+def command_line():
+    return " ".join(shlex.quote(x) for x in ["python3"] + sys.argv)
+
+
+def write_json(path, value):
+    """Whole or not at all; makes the folder."""
+    os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+    with open(path + ".part", "w") as file:
+        json.dump(value, file, indent=1)
+        file.write("\n")
+    os.replace(path + ".part", path)

@@ -13,16 +13,14 @@ The result, OUT/lenses.json, has of each its score, what it is over the pinholes
 captures and runs; captures that are there already are taken as they are. What is after -- goes to every training.
 """
 import argparse
-import datetime
 import json
 import math
 import os
-import shlex
 import shutil
 import sys
 import tempfile
 
-from common import commit_of, last_line, machine, run
+from common import command_line, commit_of, last_line, machine, now, run, write_json
 from poses import angles, link_rest, matmul, transposed, turn
 
 ACROSS = 0.69  # radians that a view of gart synth has across
@@ -118,16 +116,10 @@ def main():
         rows.append(row)
         print(json.dumps(row), file=sys.stderr, flush=True)
     result = {"what": "lenses", "machine": machine(), "commit": commit_of(a.commit),
-              "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
-              "command": " ".join(shlex.quote(x) for x in ["python3"] + sys.argv), "views": a.views,
+              "date": now(), "command": command_line(), "views": a.views,
               "pinhole_size": a.size, "angle": a.angle, "rolling_degrees": a.rolling, "iterations": a.iterations,
               "seed": a.seed, "runs": rows}
-    os.makedirs(a.out, exist_ok=True)
-    path = os.path.join(a.out, "lenses.json")
-    with open(path + ".part", "w") as file:
-        json.dump(result, file, indent=1)
-        file.write("\n")
-    os.replace(path + ".part", path)
+    write_json(os.path.join(a.out, "lenses.json"), result)
     if not a.keep:
         shutil.rmtree(folder)
     return 1 if any("error" in r for r in rows) else 0

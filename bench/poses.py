@@ -13,19 +13,17 @@ similarity that brings all of them nearest (the scene may move with its cameras)
 COLMAP's binary files.
 """
 import argparse
-import datetime
 import json
 import math
 import os
 import random
-import shlex
 import shutil
 import statistics
 import struct
 import sys
 import tempfile
 
-from common import commit_of, last_line, machine, run
+from common import command_line, commit_of, last_line, machine, now, run, write_json
 
 RUNS = {"clean": (False, False), "clean_refined": (False, True), "disturbed": (True, False),
         "disturbed_refined": (True, True)}
@@ -244,16 +242,10 @@ def main():
             runs.append(row)
             print(json.dumps(row), file=sys.stderr, flush=True)
         result = {"what": "poses", "machine": machine(), "commit": commit_of(a.commit),
-                  "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
-                  "command": " ".join(shlex.quote(x) for x in ["python3"] + sys.argv),
+                  "date": now(), "command": command_line(),
                   "capture": name, "views": len(before), "iterations": a.iterations, "degrees": a.degrees,
                   "share_of_extent": a.share, "seed": a.seed, "runs": runs}
-        os.makedirs(a.out, exist_ok=True)
-        path = os.path.join(a.out, f"poses_{name}.json")
-        with open(path + ".part", "w") as file:
-            json.dump(result, file, indent=1)
-            file.write("\n")
-        os.replace(path + ".part", path)
+        write_json(os.path.join(a.out, f"poses_{name}.json"), result)
         if not a.keep:
             shutil.rmtree(folder)
     return 1 if failed else 0

@@ -15,8 +15,7 @@ What (comma-separated; default tests and paper):
   paper       strategies, memory and stages
   tradeoff    `gart tradeoff` on the first scene and on every --model: what each approximation costs and buys
   formats     every --model in each format and setting, by its test views: bytes, PSNR, SSIM (bench/formats.py)
-  view        every --model served by `gart view`: frames a second, input to frame, time to rest; training of every
-              --capture without a viewer, with one, with a client (bench/view.py)
+  view        every --model served by `gart view`, and what a viewer takes from training every --capture (bench/view.py)
   presets     `gart train` with each --preset on every --capture: what they cost in quality
   rules       `gart train` with each rule of docs/training.md changed alone, --seeds of each (3): a file
               rules_NAME.json a capture, written after each rule
@@ -40,7 +39,6 @@ Exit code: 0, or 1 when a test or a measurement failed; what failed is in the fi
 """
 import argparse
 import array
-import datetime
 import glob
 import json
 import os
@@ -51,7 +49,7 @@ import sys
 import tempfile
 import time
 
-from common import Failure, commit_of, first_match, last_line, machine, run
+from common import Failure, command_line, commit_of, first_match, last_line, machine, now, run, write_json
 from formats import Formats
 from training import LONG_PARTS, Trainings
 from view import View
@@ -94,18 +92,11 @@ class Bench(Trainings, Formats, View):
         self.say("FAILED  " + text)
 
     def stamp(self):
-        return {"machine": self.machine, "commit": self.commit,
-                "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d %H:%M UTC")}
+        return {"machine": self.machine, "commit": self.commit, "date": now()}
 
     def write(self, what, runs, **more):
-        os.makedirs(self.a.out, exist_ok=True)
         path = os.path.join(self.a.out, what + ".json")
-        result = {"what": what, **self.stamp(),
-                  "command": " ".join(shlex.quote(x) for x in ["python3"] + sys.argv), **more, "runs": runs}
-        with open(path + ".part", "w") as f:
-            json.dump(result, f, indent=1)
-            f.write("\n")
-        os.replace(path + ".part", path)
+        write_json(path, {"what": what, **self.stamp(), "command": command_line(), **more, "runs": runs})
         self.say(f"wrote {path}")
 
     def scene(self, thousands):

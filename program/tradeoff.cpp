@@ -85,9 +85,8 @@ class tradeoff_run {
       } catch (gart::unsupported const& e) {
         absent(in_options(e.what()));
         continue;
-      } catch (
-          gart::io_error const& e) {  // a kernel or a library that the format has no room for, or that is not there
-        absent(e.what());
+      } catch (gart::io_error const& e) {
+        absent(e.what());  // the format has no room for the kernel, or a library is not there
         continue;
       }
       result["settings"].push_back(measure(settings_[i]));
@@ -174,9 +173,7 @@ class tradeoff_run {
     packed_ = {}, file_bytes_ = 0;
     if (s.use.format.empty()) return;
     fs::path const file = a_.out / ("packed" + s.use.format);
-    gart::splat_traits traits;
-    gart::read_splats(a_.model, &traits);
-    gart::write_splats(file, file_.model, traits, s.use.packing);
+    gart::write_splats(file, file_.model, gart::traits_of(file_.render, file_.kernel_degree), s.use.packing);
     packed_ = gart::read_splats(file);
     file_bytes_ = fs::file_size(file);
     fs::remove(file);

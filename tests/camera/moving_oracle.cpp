@@ -7,6 +7,7 @@
 #include <oracle/oracle.hpp>
 #include <oracle/scenes.hpp>
 #include <support/policies.hpp>
+#include <support/relative_error.hpp>
 
 #include <Eigen/Geometry>
 
@@ -84,13 +85,6 @@ results by(E& exec, rolling_scene const& r, std::vector<float> const& weights) {
   return {color.to_host(), gradients.to_host(), gart::differentiate_pose(frame, std::as_const(gradients).view())};
 }
 
-double apart(std::vector<float> const& got, std::vector<double> const& expected) {
-  double error = 0, norm = 0;
-  for (std::size_t i = 0; i < got.size(); ++i)
-    error += (got[i] - expected[i]) * (got[i] - expected[i]), norm += expected[i] * expected[i];
-  return std::isfinite(error) ? std::sqrt(error / norm) : HUGE_VAL;
-}
-
 }  // namespace
 
 TEST_CASE_TEMPLATE("image, gradients and pose through a rolling shutter are the oracle's", E, GART_TEST_POLICIES) {
@@ -150,11 +144,11 @@ TEST_CASE_TEMPLATE("image, gradients and pose through a rolling shutter are the 
           worst =
               std::max(worst, std::abs(got.color[3 * p + c] - base.pixels[p].color[c]) - 2 * base.pixels[p].rounding);
     CHECK(worst < 1e-5);
-    CHECK(apart(got.gradients.mean, expected.mean) < 1e-4);
-    CHECK(apart(got.gradients.log_scale, expected.log_scale) < 1e-4);
-    CHECK(apart(got.gradients.quaternion, expected.quaternion) < 1e-4);
-    CHECK(apart(got.gradients.opacity, expected.opacity) < 1e-4);
-    CHECK(apart(got.gradients.sh, expected.sh) < 1e-4);
+    CHECK(gart_test::relative_error(got.gradients.mean, expected.mean) < 1e-4);
+    CHECK(gart_test::relative_error(got.gradients.log_scale, expected.log_scale) < 1e-4);
+    CHECK(gart_test::relative_error(got.gradients.quaternion, expected.quaternion) < 1e-4);
+    CHECK(gart_test::relative_error(got.gradients.opacity, expected.opacity) < 1e-4);
+    CHECK(gart_test::relative_error(got.gradients.sh, expected.sh) < 1e-4);
     double error = 0, norm = 0;
     for (int k = 0; k < 6; ++k) {
       double const own = k < 3 ? got.pose.translation[k] : got.pose.rotation[k - 3];

@@ -5,6 +5,7 @@
 
 #include <extremes/scenes.hpp>
 #include <support/policies.hpp>
+#include <support/relative_error.hpp>
 #include <support/trace_scene.hpp>
 
 #include <cmath>
@@ -81,16 +82,6 @@ inline constexpr parameter_group parameter_groups[] = {{"mean", &gart::gaussian_
 inline std::vector<double> oracle::parameters::*const oracle_groups[] = {
     &oracle::parameters::mean, &oracle::parameters::log_scale, &oracle::parameters::quaternion,
     &oracle::parameters::opacity, &oracle::parameters::sh};
-
-// Of all of a group, as one vector.
-inline double relative_error(std::vector<float> const& got, std::vector<double> const& expected) {
-  double error = 0, norm = 0;
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    error += (got[i] - expected[i]) * (got[i] - expected[i]);
-    norm += expected[i] * expected[i];
-  }
-  return error == 0 ? 0 : std::sqrt(error / norm);
-}
 
 inline std::vector<float> random_gradient(number_source& random, gart::camera const& view) {
   std::vector<float> g(std::size_t{3} * view.width * view.height);

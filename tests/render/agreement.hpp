@@ -4,6 +4,7 @@
 #include <oracle/oracle.hpp>
 #include <oracle/scenes.hpp>
 #include <support/policies.hpp>
+#include <support/relative_error.hpp>
 #include <support/trace_scene.hpp>
 
 #include <algorithm>
@@ -104,17 +105,6 @@ inline gradient_group const gradient_groups[] = {
     {"quaternion", &gart::gaussian_model::quaternion, &oracle::parameters::quaternion},
     {"opacity", &gart::gaussian_model::opacity, &oracle::parameters::opacity},
     {"sh", &gart::gaussian_model::sh, &oracle::parameters::sh}};
-
-// norm(difference) / norm(expected); infinite where a value is not finite.
-inline double relative_error(std::vector<float> const& got, std::vector<double> const& expected) {
-  double error = 0, norm = 0;
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    error += (got[i] - expected[i]) * (got[i] - expected[i]);
-    norm += expected[i] * expected[i];
-  }
-  if (!std::isfinite(error)) return INFINITY;
-  return error == 0 ? 0 : std::sqrt(error / norm);
-}
 
 // What the undecided orders of a pixel's hits may do to its gradient, where it is compared. One swap does all of it or
 // nothing, and one pixel may carry much of a group: no more than gradients may be off by. Among hundreds of hits it is
