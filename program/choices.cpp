@@ -53,7 +53,8 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   if (a.start.empty()) {
     auto const start = gart::choose_start(data, train_options_of(a));
     say("start", with_commas(start.value.count),
-        start.value.random                        ? "the capture has no points: random ones"
+        start.value.measured                      ? "the capture has no points: of its depth maps"
+        : start.value.random                      ? "the capture has no points: random ones"
         : start.value.count == data.points.size() ? "the capture's points"
                                                   : "a random subset of the capture's points");
     say("--init-opacity", short_number(start.value.opacity), a.initial_opacity != 0 ? by_option : start.why);

@@ -189,10 +189,12 @@ void add_render(CLI::App& app, command& selected) {
                    "colours")
       ->type_name("LIST")
       ->capture_default_str();
-  render->add_option("--format", a->images.format, "Of all but colour: png, or npy (float32 as they are)")
+  render
+      ->add_option("--format", a->images.format,
+                   "Of all but colour: png, or floats as they are: npy, or exr, which\nhas the colour too, NAME.exr")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(one_of({"png", "npy"}));
+      ->check(one_of({"png", "npy", "exr"}));
   render->add_option("--depth-unit", a->images.depth_unit, "Distance of a step of NAME_depth.png")
       ->type_name("U")
       ->capture_default_str()

@@ -3,6 +3,7 @@
 #include "commands.hpp"
 
 #include <gart/io/depth_file.hpp>
+#include <gart/io/exr_file.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/view/image_modes.hpp>
 
@@ -56,17 +57,23 @@ void check_images(image_choice const& choice) {
 
 void write_images(fs::path const& folder, std::string const& name, gart::rendered const& image,
                   gart::camera const& view, image_choice const& choice, nlohmann::json& entry) {
-  bool const npy = choice.format == "npy";
-  auto const file = [&](char const* what) { return folder / (name + "_" + what + (npy ? ".npy" : ".png")); };
+  bool const exr = choice.format == "exr", floats = exr || choice.format == "npy";
+  // As they are, by letters of EXR's channels.
+  auto const write_floats = [&](std::string const& what, image_float const& values, char const* channels) {
+    fs::path const file = folder / (name + what + "." + choice.format);
+    exr ? gart::write_exr(file, values, channels) : gart::write_npy(file, values);
+  };
+  auto const file = [&](char const* what) { return folder / (name + "_" + what + ".png"); };
   auto const preview = [&](char const* what) { return folder / (name + "_" + what + "_preview.png"); };
+  if (exr && choice.has("colour")) write_floats("", image.color, "RGB");
   if (choice.has("depth") || choice.has("normal")) {
     image_float const map = gart::mean_distances(image);
     if (choice.has("depth")) {
       auto const [nearest, farthest] = gart::range_of(map);
-      if (npy) {
-        gart::write_npy(file("depth"), map);
+      if (floats) {
+        write_floats("_depth", map, "Z");
       } else {
-        check_steps(name, "depth", farthest, choice.depth_unit, "raise --depth-unit, or take --format npy");
+        check_steps(name, "depth", farthest, choice.depth_unit, "raise --depth-unit, or take --format exr");
         gart::write_depth_png(file("depth"), map, choice.depth_unit);
       }
       gart::write_png(preview("depth"), gart::in_colors(map, nearest, farthest));
@@ -74,21 +81,21 @@ void write_images(fs::path const& folder, std::string const& name, gart::rendere
     }
     if (choice.has("normal")) {
       image_float const normals = gart::normals_of(map, view);
-      npy ? gart::write_npy(file("normal"), normals)
-          : gart::write_png(file("normal"), gart::to_8bit(gart::normal_colors(normals)));
+      floats ? write_floats("_normal", normals, "XYZ")
+             : gart::write_png(file("normal"), gart::to_8bit(gart::normal_colors(normals)));
     }
   }
   if (choice.has("alpha")) {
     image_float const alpha = gart::alpha_of(image);
-    npy ? gart::write_npy(file("alpha"), alpha) : gart::write_png(file("alpha"), gart::to_8bit(alpha));
+    floats ? write_floats("_alpha", alpha, "A") : gart::write_png(file("alpha"), gart::to_8bit(alpha));
   }
   if (choice.has("hits")) {
     image_float const hits = gart::hits_of(image);
     auto const most = gart::range_of(hits).second;
-    if (npy) {
-      gart::write_npy(file("hits"), hits);
+    if (floats) {
+      write_floats("_hits", hits, "Y");
     } else {
-      check_steps(name, "number of hits", most, 1, "take --format npy");
+      check_steps(name, "number of hits", most, 1, "take --format exr");
       gart::write_depth_png(file("hits"), hits, 1);
     }
     gart::write_png(preview("hits"), gart::in_colors(hits, 0, most));

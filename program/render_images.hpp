@@ -14,7 +14,7 @@ namespace gart_cli {
 
 struct image_choice {
   std::string images = "colour";  // names, by commas
-  std::string format = "png";     // of all but colour: png or npy
+  std::string format = "png";     // of all but colour: png, npy or exr
   double depth_unit = 0.001;      // of a step of 16 bits
 
   bool has(std::string const& name) const;
@@ -23,8 +23,8 @@ struct image_choice {
 // usage_error for a name that there is not.
 void check_images(image_choice const& choice);
 
-// Writes the images that are chosen, colour aside, and adds to `entry` what they say in numbers. usage_error where 16
-// bits do not hold them.
+// Writes the images that are chosen, the colour as EXR alone, and adds to `entry` what they say in numbers. usage_error
+// where 16 bits do not hold them.
 void write_images(std::filesystem::path const& folder, std::string const& name, gart::rendered const& image,
                   gart::camera const& view, image_choice const& choice, nlohmann::json& entry);
 

@@ -73,7 +73,9 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(one_of({"auto", "0", "1", "2", "3"}));
   in_group(r.add(train, "--sh-gain", a.sh_gain, "DB", "PSNR on the held-out views that a band must buy by the end"))
       ->check(between(1e-6, 100));
-  in_group(r.add(train, "--points", a.points, "N", "Gaussians placed at random where the capture has no points"))
+  in_group(r.add(train, "--points", a.points, "N",
+                 "Gaussians to start with where the capture has no points: at\nrandom, or where its depth maps are "
+                 "trained on, of these"))
       ->check(between(1, 2147483647.0));
   in_group(r.add(train, "--init-opacity", a.initial_opacity, "A",
                  "Opacity of the first Gaussians, below 1; 0: 0.5 for random\npoints with error or mcmc, else 0.1"))

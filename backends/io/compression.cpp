@@ -40,6 +40,15 @@ std::vector<u8> inflated(u8 const* bytes, std::size_t size, int window, std::siz
   return out;
 }
 
+std::vector<u8> zlib_stream(std::vector<u8> const& bytes, std::string const& file) {
+  uLongf size = compressBound(static_cast<uLong>(bytes.size()));
+  std::vector<u8> out(size);
+  if (compress(out.data(), &size, bytes.data(), static_cast<uLong>(bytes.size())) != Z_OK)
+    throw io_error(file, "cannot be deflated", "free some memory");
+  out.resize(size);
+  return out;
+}
+
 u32 zip_checksum(u8 const* bytes, std::size_t size) {
   uLong sum = crc32(0, nullptr, 0);
   for (std::size_t at = 0; at < size;) {

@@ -14,6 +14,8 @@ inline constexpr int gzip_window = 16 + 15, raw_window = -15;
 
 // The first bytes that these hold, `most` of them or what there is.
 std::vector<u8> inflated(u8 const* bytes, std::size_t size, int window, std::size_t most, std::string const& file);
+// A stream with zlib's header.
+std::vector<u8> zlib_stream(std::vector<u8> const& bytes, std::string const& file);
 u32 zip_checksum(u8 const* bytes, std::size_t size);
 
 // One frame of zstd, and the `size` bytes in one. io_error naming the package, where gart was built without zstd.

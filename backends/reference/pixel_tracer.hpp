@@ -3,6 +3,8 @@
 // of them out of a block of pixels, the hits of a ray in order, their compositing and its gradient (reference.hpp has
 // the definitions).
 
+#include "rays.hpp"
+
 #include <gart/reference/reference.hpp>
 
 #include <algorithm>
@@ -51,14 +53,14 @@ struct harmonics {
 
 // One Gaussian, relative to the camera's centre.
 struct body {
-  vec3d mean, inverse_scale, origin;  // origin: the camera in the body's space, o_g
-  double w;                           // the unit quaternion (w, axis)
+  vec3d mean, inverse_scale;
+  double w;  // the unit quaternion (w, axis)
   vec3d axis;
   double norm;  // of the quaternion as stored
   double sigma;
   // Of the sphere around all hits, seen from the camera: direction, and the sine and cosine of its angular radius.
   vec3d direction;
-  double sine, cosine;
+  double sine, cosine, radius, distance;
   bool around_camera;
   bool valid = false;
 
@@ -66,6 +68,8 @@ struct body {
   vec3d rotate(vec3d const& v) const { return v + 2 * w * cross(axis, v) + 2.0 * cross(axis, cross(axis, v)); }
   vec3d rotate_back(vec3d const& v) const { return v - 2 * w * cross(axis, v) + 2.0 * cross(axis, cross(axis, v)); }
   vec3d to_unit(vec3d const& v) const { return rotate_back(v) * inverse_scale; }
+  // A ray's origin in the body's space, o_g.
+  vec3d origin_of(pixel_ray const& r) const { return to_unit(r.origin - mean); }
 };
 
 // rho = exp(-4.5 (|p| / 3)^n).
@@ -78,24 +82,29 @@ struct kernel {
   double reach(double ratio) const { return 3 * std::pow(std::log(ratio) / 4.5, 1.0 / degree); }
 };
 
-// The cone around some rays from the camera.
+// The cone around some rays, that begin in a ball about the camera's position.
 struct cone {
   vec3d axis{0.0};
-  double sine = 0, cosine = 1;
+  double sine = 0, cosine = 1, ball = 0;
   bool everything;
 
-  cone(std::vector<vec3d> const& rays, std::vector<u32> const& members, bool backwards_too) {
-    for (u32 const k : members) axis += rays[k];
-    axis /= length(axis);
-    for (u32 const k : members) cosine = std::min(cosine, dot(axis, rays[k]));
+  cone(std::vector<pixel_ray> const& rays, std::vector<u32> const& members, bool backwards_too) {
+    for (u32 const k : members) axis += rays[k].direction, ball = std::max(ball, length(rays[k].origin));
+    axis /= std::max(length(axis), 1e-300);
+    for (u32 const k : members)
+      if (dot(rays[k].direction, rays[k].direction) > 0) cosine = std::min(cosine, dot(axis, rays[k].direction));
     sine = std::sqrt(std::max(0.0, (1 - cosine) * (1 + cosine)));
     // A cone of a right angle and more, or rays that are hit behind their origin: no test.
     everything = !(cosine > 1e-3) || backwards_too;
   }
-  // The angle between the axes is at most the sum of the half-angles, less what double may round.
+  // The angle between the axes is at most the sum of the half-angles, less what double may round. Seen from a ball in
+  // place of a point, a sphere is as much larger.
   bool may_meet(body const& g) const {
-    return g.valid &&
-           (everything || g.around_camera || dot(axis, g.direction) >= cosine * g.cosine - sine * g.sine - 1e-9);
+    if (!g.valid) return false;
+    if (everything || g.around_camera || !(g.radius + ball < g.distance)) return true;
+    double const share = (g.radius + ball) / g.distance;
+    double const own_sine = ball > 0 ? share : g.sine, own = ball > 0 ? std::sqrt((1 - share) * (1 + share)) : g.cosine;
+    return dot(axis, g.direction) >= cosine * own - sine * own_sine - 1e-9;
   }
 };
 
@@ -119,16 +128,17 @@ class pixel_tracer {
         active_(static_cast<std::size_t>(sh_coefficients(active_degree))) {}
 
   // The hits that count, in order.
-  std::vector<reference_hit> hits(vec3d const& d, harmonics const& basis, std::vector<u32> const& candidates) const {
+  std::vector<reference_hit> hits(pixel_ray const& ray, harmonics const& basis,
+                                  std::vector<u32> const& candidates) const {
     std::vector<reference_hit> list;
     double const alpha_min = options_.alpha_min, near = options_.near;
     for (u32 const id : candidates) {
       body const& g = bodies_[id];
-      vec3d const d_g = g.to_unit(d);
+      vec3d const d_g = g.to_unit(ray.direction), o_g = g.origin_of(ray);
       reference_hit h;
       h.id = id;
-      h.t = -dot(g.origin, d_g) / dot(d_g, d_g);
-      h.p = g.origin + h.t * d_g;
+      h.t = -dot(o_g, d_g) / dot(d_g, d_g);
+      h.p = o_g + h.t * d_g;
       h.raw = g.sigma * kernel_.response(dot(h.p, h.p));
       h.alpha = std::min(opaque, h.raw);
       if (h.alpha >= alpha_min && h.t > near) list.push_back(h);
@@ -162,8 +172,8 @@ class pixel_tracer {
 
   // Adds the gradient of one pixel; slots of `sums` are the places of Gaussians in `slot`.
   template <class Sums>
-  void differentiate(std::vector<reference_hit> const& list, vec3d const& d, harmonics const& basis, vec3d const& g,
-                     double by_depth, Sums&& sums) const {
+  void differentiate(std::vector<reference_hit> const& list, pixel_ray const& ray, harmonics const& basis,
+                     vec3d const& g, double by_depth, Sums&& sums) const {
     vec3d behind(options_.background);
     double depth_behind = 0;
     for (std::size_t i = list.size(); i-- > 0;) {
@@ -175,8 +185,8 @@ class pixel_tracer {
         for (std::size_t k = 0; k < active_; ++k) to[11 + 3 * k + c] += weight * g[c] * basis.y[k];
       }
       double const by_alpha = h.transmittance * (dot(g, h.color - behind) + by_depth * (h.t - depth_behind));
-      if (h.raw < opaque) add_geometry(bodies_[h.id], h, d, h.raw * by_alpha, to);
-      if (by_depth != 0) add_distance(bodies_[h.id], h, d, weight * by_depth, to);
+      if (h.raw < opaque) add_geometry(bodies_[h.id], h, ray, h.raw * by_alpha, to);
+      if (by_depth != 0) add_distance(bodies_[h.id], h, ray, weight * by_depth, to);
       depth_behind = h.alpha * h.t + (1 - h.alpha) * depth_behind;
       behind = h.alpha * h.color + (1 - h.alpha) * behind;
     }
@@ -195,25 +205,25 @@ class pixel_tracer {
     }
   }
 
-  // alpha = sigma rho(|p|) with p = S^-1 R^T (t d - mean); t is where |p| is least, so moving it changes nothing. `a`
-  // is alpha dL/dalpha. to: mean, log-scale, quaternion, opacity.
-  void add_geometry(body const& g, reference_hit const& h, vec3d const& d, double a, double* to) const {
+  // alpha = sigma rho(|p|) with p = S^-1 R^T (o + t d - mean); t is where |p| is least, so moving it changes nothing.
+  // `a` is alpha dL/dalpha. to: mean, log-scale, quaternion, opacity.
+  void add_geometry(body const& g, reference_hit const& h, pixel_ray const& ray, double a, double* to) const {
     double const b = a * kernel_.slope(dot(h.p, h.p));
-    vec3d const by_body = -b * h.p * g.inverse_scale;  // dL by R^T (t d - mean)
-    vec3d const by_point = g.rotate(by_body), x = h.t * d - g.mean;
+    vec3d const by_body = -b * h.p * g.inverse_scale;  // dL by R^T (o + t d - mean)
+    vec3d const by_point = g.rotate(by_body), x = ray.origin + h.t * ray.direction - g.mean;
     for (int k = 0; k < 3; ++k) to[k] -= by_point[k], to[3 + k] += b * h.p[k] * h.p[k];
     add_rotation(g, x, by_body, to);
     to[10] += a * (1 - g.sigma);
   }
 
-  // t = -o_g.d_g / d_g.d_g with o_g = S^-1 R^T (-mean) and d_g = S^-1 R^T d, by both. `a` is dL/dt.
-  void add_distance(body const& g, reference_hit const& h, vec3d const& d, double a, double* to) const {
-    vec3d const d_g = g.to_unit(d), moved = h.p + h.t * d_g;
+  // t = -o_g.d_g / d_g.d_g with o_g = S^-1 R^T (o - mean) and d_g = S^-1 R^T d, by both. `a` is dL/dt.
+  void add_distance(body const& g, reference_hit const& h, pixel_ray const& ray, double a, double* to) const {
+    vec3d const d_g = g.to_unit(ray.direction), o_g = g.origin_of(ray), moved = h.p + h.t * d_g;
     double const e = -a / dot(d_g, d_g);
     vec3d const by_origin = e * d_g * g.inverse_scale, by_direction = e * moved * g.inverse_scale;
     vec3d const by_camera = g.rotate(by_origin);
-    for (int k = 0; k < 3; ++k) to[k] -= by_camera[k], to[3 + k] -= e * (g.origin[k] + moved[k]) * d_g[k];
-    add_rotation(g, -g.mean, by_origin, to), add_rotation(g, d, by_direction, to);
+    for (int k = 0; k < 3; ++k) to[k] -= by_camera[k], to[3 + k] -= e * (o_g[k] + moved[k]) * d_g[k];
+    add_rotation(g, ray.origin - g.mean, by_origin, to), add_rotation(g, ray.direction, by_direction, to);
   }
 
   // x . R v with R v = v + 2 w u x v + 2 u x (u x v), by (w, u); then through the division by the norm.

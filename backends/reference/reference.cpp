@@ -14,52 +14,6 @@ using namespace by_definition;
 
 namespace {
 
-// Where the lens model sends an undistorted point, less `target`, and the derivatives of that.
-struct lens_error {
-  double x, y, xx, xy, yy;
-};
-
-lens_error lens_error_at(distortion const& lens, double x, double y, double target_x, double target_y) {
-  double const k1 = lens.k1, k2 = lens.k2, p1 = lens.p1, p2 = lens.p2, r2 = x * x + y * y;
-  double const radial = 1 + k1 * r2 + k2 * r2 * r2, slope = 2 * k1 + 4 * k2 * r2;
-  return {x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) - target_x,
-          y * radial + 2 * p2 * x * y + p1 * (r2 + 2 * y * y) - target_y,
-          radial + slope * x * x + 2 * p1 * y + 6 * p2 * x, slope * x * y + 2 * p1 * x + 2 * p2 * y,
-          radial + slope * y * y + 2 * p2 * x + 6 * p1 * y};
-}
-
-struct point {
-  double x, y;
-  bool converged;
-};
-
-point undistorted(camera const& view, double u, double v) {
-  double const target_x = (u - view.cx) / view.fx, target_y = (v - view.cy) / view.fy;
-  double x = target_x, y = target_y;
-  bool converged = !view.lens.any();
-  for (int i = 0; i < 100 && !converged; ++i) {
-    lens_error const e = lens_error_at(view.lens, x, y, target_x, target_y);
-    double const det = e.xx * e.yy - e.xy * e.xy;
-    x -= (e.x * e.yy - e.y * e.xy) / det, y -= (e.y * e.xx - e.x * e.xy) / det;
-    converged = std::abs(e.x) + std::abs(e.y) < 1e-14 * (1 + std::abs(target_x) + std::abs(target_y));
-  }
-  return {x, y, converged};
-}
-
-vec3d ray_through(camera const& view, u32 pixel) {
-  u32 const width = static_cast<u32>(view.width);
-  auto const [x, y, converged] = undistorted(view, pixel % width + 0.5, pixel / width + 0.5);
-  if (!converged) {
-    throw invalid_argument("reference: the lens cannot be inverted at pixel (" + std::to_string(pixel % width) + ", " +
-                           std::to_string(pixel / width) + "); leave it out, or undistort the capture");
-  }
-  vec3d d(0.0);
-  double const point[3] = {x, y, 1};
-  for (int axis = 0; axis < 3; ++axis)
-    for (int k = 0; k < 3; ++k) d[k] += static_cast<double>(view.rotation[axis][k]) * point[axis];
-  return d / length(d);
-}
-
 // The filter of a view's pixels, of numbers that may be complex: a derivative is then the imaginary part of a value at
 // a point moved by an imaginary step, without a difference and exact to double.
 class filter {
@@ -70,7 +24,8 @@ class filter {
     for (int k = 0; k <= steps; ++k) {
       double const u = view.width * (k / double{steps}), v = view.height * (k / double{steps});
       for (auto const& [at_u, at_v] : {std::pair{u, 0.0}, {u, 1.0 * view.height}, {0.0, v}, {1.0 * view.width, v}}) {
-        point const p = undistorted(view, at_u, at_v);
+        lens_point const p =
+            unbent(view.lens, false, (at_u - view.cx) / double{view.fx}, (at_v - view.cy) / double{view.fy});
         x0_ = std::min(x0_, p.x), x1_ = std::max(x1_, p.x), y0_ = std::min(y0_, p.y), y1_ = std::max(y1_, p.y);
       }
     }
@@ -174,9 +129,9 @@ body body_of(gaussian_model const& m, std::size_t i, vec3d const& camera, double
   if (!(norm2 > 1e-8) || !(g.sigma >= alpha_min)) return g;
   g.norm = std::sqrt(norm2);
   g.w = q[0] / g.norm, g.axis = vec3d(q[1], q[2], q[3]) / g.norm;
-  g.origin = g.to_unit(-g.mean);
   // |x - mean| <= |p| times the largest scale.
   double const radius = 1.000001 * largest * k.reach(g.sigma / alpha_min), distance = length(g.mean);
+  g.radius = radius, g.distance = distance;
   g.around_camera = !(radius < distance);
   g.valid = true;
   if (g.around_camera) return g;
@@ -225,9 +180,11 @@ void check(gaussian_model const& model, camera const& view, render_options const
            std::vector<double> const& depth_gradient) {
   if (active_degree < 0 || active_degree > model.sh_degree || model.sh_degree > 3)
     throw invalid_argument("reference: the active SH degree must lie between 0 and the model's, and that be at most 3");
-  if (view.kind != camera_kind::perspective || view.lens.more() || view.shutter != shutter_kind::global)
+  if (options.antialias > 0 &&
+      (view.kind != camera_kind::perspective || view.lens.more() || view.shutter != shutter_kind::global))
     throw unsupported(
-        "reference: it has the rays of pinholes and of OpenCV's lenses (k1, k2, p1, p2) alone, that stand still");
+        "reference: it has the filter of pixels (options.antialias) of pinholes and of OpenCV's lenses (k1, k2, p1, "
+        "p2) alone, that stand still");
   if (kernel_degree < 1) throw invalid_argument("reference: the kernel's degree must be at least 1");
   if (!(options.alpha_min > 0)) throw invalid_argument("reference: alpha_min must be positive");
   if (!color_gradient.empty() && color_gradient.size() != 3 * pixels.size())
@@ -269,8 +226,8 @@ reference_image trace_reference(gaussian_model const& model, camera const& view,
                      std::vector<double>(n),
                      std::vector<double>(model.sh.size())};
 
-  std::vector<vec3d> rays(pixels.size());
-  for (std::size_t k = 0; k < pixels.size(); ++k) rays[k] = ray_through(view, pixels[k]);
+  std::vector<pixel_ray> rays(pixels.size());
+  for (std::size_t k = 0; k < pixels.size(); ++k) rays[k] = ray_of(view, pixels[k]);
   std::vector<body> bodies(n);
   filter const view_filter(view, options.antialias);
 #pragma omp parallel for
@@ -287,7 +244,7 @@ reference_image trace_reference(gaussian_model const& model, camera const& view,
       if (around.may_meet(bodies[i])) candidates.push_back(static_cast<u32>(i));
     block_sums sums(backwards ? candidates.size() : 0, tracer.stored());
     for (u32 const k : blocks[b]) {
-      harmonics const basis(rays[k]);
+      harmonics const basis(rays[k].direction);
       auto const list = tracer.hits(rays[k], basis, candidates);
       tracer.composite(list, k, out);
       if (!backwards) continue;

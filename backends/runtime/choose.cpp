@@ -159,15 +159,18 @@ chosen<bool> choose_exposure(capture_traits const& t) {
 
 chosen<starting_points> choose_start(dataset const& data, train_options const& options) {
   starting_points start;
-  start.random = data.points.size() == 0;
+  bool const mapped = options.depth_weight > 0 && std::any_of(data.train.begin(), data.train.end(),
+                                                              [](dataset_view const& v) { return !v.depth.empty(); });
+  start.measured = data.points.size() == 0 && mapped, start.random = data.points.size() == 0 && !mapped;
   bool const sparse = start.random && (options.densify == densify_kind::error || options.densify == densify_kind::mcmc);
-  std::size_t const points = start.random ? options.random_points : data.points.size();
+  std::size_t const points = start.random || start.measured ? options.random_points : data.points.size();
   start.count = static_cast<index_t>(std::min<std::size_t>(points, options.max_gaussians));
   start.opacity = options.initial_opacity != 0 ? options.initial_opacity : sparse ? 0.5f : 0.1f;
   start.scale = options.initial_scale != 0 ? options.initial_scale : sparse ? 0.1f : 1.0f;
-  return {start, !start.random ? "the capture's points lie on surfaces"
-                 : sparse      ? "random points are mostly in empty space, and the dead move"
-                               : "random points"};
+  return {start, start.measured  ? "what depth maps measured lies on surfaces"
+                 : !start.random ? "the capture's points lie on surfaces"
+                 : sparse        ? "random points are mostly in empty space, and the dead move"
+                                 : "random points"};
 }
 
 chosen<index_t> choose_budget(dataset const& data, train_options const& options) {

@@ -1,3 +1,4 @@
+#include <gart/camera/models.hpp>
 #include <gart/core/error.hpp>
 #include <gart/optim/random.hpp>
 #include <gart/runtime/choose.hpp>
@@ -126,11 +127,50 @@ point_cloud random_points(vec3d lo, vec3d hi, index_t count, u64 seed) {
   return out;
 }
 
+point_cloud points_of_maps(dataset const& data, index_t count, u64 seed, std::vector<std::size_t> const& but) {
+  std::vector<dataset_view const*> views;
+  std::vector<u64> until;  // pixels up to and with each
+  u64 pixels = 0;
+  for (std::size_t i = 0; i < data.train.size(); ++i) {
+    dataset_view const& v = data.train[i];
+    if (v.depth.empty() || v.image.empty() || std::find(but.begin(), but.end(), i) != but.end()) continue;
+    pixels += v.depth.data.size();
+    views.push_back(&v), until.push_back(pixels);
+  }
+  random_source const source{seed, 2, random_use::user};
+  point_cloud out;
+  // Where most pixels have no distance, the tries end before the points are complete.
+  u64 const tries = pixels ? 20 * u64{count} : 0;
+  for (u64 k = 0; k < tries && out.size() < count; ++k) {
+    auto const w = source.words(k);
+    u64 const at = below(w.v[0], w.v[1], pixels);
+    auto const found = static_cast<std::size_t>(std::upper_bound(until.begin(), until.end(), at) - until.begin());
+    dataset_view const& v = *views[found];
+    std::size_t const pixel = static_cast<std::size_t>(at - (found ? until[found - 1] : 0));
+    int const x = static_cast<int>(pixel) % v.view.width, y = static_cast<int>(pixel) / v.view.width;
+    float const distance = v.depth.data[pixel];
+    bool const clear = v.image.channels == 4 && v.image.at(x, y, 3) < 128;
+    if (!(distance > 0) || clear || (!v.mask.empty() && v.mask.data[pixel] == 0)) continue;
+    ray const r = ray_through(v.view, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+    for (int c = 0; c < 3; ++c) {
+      out.position.push_back(
+          static_cast<float>(v.view.position[c] + double{r.origin[c]} + double{distance} * r.direction[c]));
+      out.color.push_back(v.image.at(x, y, v.image.channels >= 3 ? c : 0));
+    }
+  }
+  return out;
+}
+
 gaussian_model initial_model(dataset const& data, train_options const& options, int sh_degree) {
   if (options.max_gaussians == 0) throw invalid_argument("train_options.max_gaussians must be at least 1");
   starting_points const start = choose_start(data, options).value;
-  point_cloud points =
-      start.random ? random_points(data.bounds_min, data.bounds_max, start.count, options.seed) : data.points;
+  point_cloud points = start.measured ? points_of_maps(data, start.count, options.seed, options.held_out)
+                       : start.random ? random_points(data.bounds_min, data.bounds_max, start.count, options.seed)
+                                      : data.points;
+  if (start.measured && points.size() == 0)
+    throw invalid_argument(
+        "train_options.depth_weight: no depth map has a distance where its photograph is opaque and not masked "
+        "(correct the maps, or train without them)");
   if (points.size() > options.max_gaussians) {
     // A random subset: the first n of a shuffle.
     random_source const source{options.seed, 1, random_use::user};

@@ -1,5 +1,6 @@
-"""Compiles every case of cases/ twice. With GART_WHOLE it is a model of a concept, and has to compile. Without, one member
-of it is missing or misspelt: it must not compile, and the message has to name the member. A case is one file:
+"""Compiles every case of cases/ twice. With GART_WHOLE it is a model of a concept, and has to compile: in one file
+with the others, each in a namespace of its own, where it instantiates nothing of gart by name. Without, one member of it is
+missing or misspelt: it must not compile, and the message has to name the member. A case is one file:
 
     // expects: P::row_floats       what the message has to say; `a or b`: of two compilers
     #ifdef GART_WHOLE
@@ -21,7 +22,26 @@ import tempfile
 
 FLAGS = ["-std=c++20", "-Wall", "-Wextra", "-fopenmp", "-ffp-contract=off", "-fsyntax-only"]
 EXPECTS = re.compile(r"^// expects: (.+)$", re.M)
+INSTANTIATES = re.compile(r"^ *template (?:class|struct) ", re.M)
 MESSAGE = re.compile(r"^\S+:\d+:\d+: +(?:\w+ )?(?:error|note): (.*)$", re.M)
+
+
+def compiled(cxx, include, source, *options):
+    return subprocess.run([cxx, *FLAGS, *options, f"-I{include}", str(source)], capture_output=True, text=True,
+                          env={**os.environ, "LC_ALL": "C"})
+
+
+def whole_complaint(cxx, include, cases):
+    """What the compiler says of the cases with all their members; empty where nothing."""
+    lines = sorted({line for case in cases for line in re.findall(r"^#include <.+>$", case.read_text(), re.M)})
+    for case in cases:
+        included = [f'#include "{case}"']
+        lines += [f"namespace whole_{case.stem} {{", *included, "}"] if len(cases) > 1 else included
+    with tempfile.TemporaryDirectory() as folder:
+        source = pathlib.Path(folder) / "whole.cpp"
+        source.write_text("\n".join(lines) + "\n")
+        done = compiled(cxx, include, source, "-DGART_WHOLE")
+    return f"a case does not compile with all its members\n{done.stderr}" if done.returncode else ""
 
 
 def complaint(cxx, include, case):
@@ -30,13 +50,7 @@ def complaint(cxx, include, case):
     if not expected:
         return f"{case}: has no line `// expects: NAME`"
 
-    def compiled(*options):
-        return subprocess.run([cxx, *FLAGS, *options, f"-I{include}", str(case)], capture_output=True, text=True,
-                              env={**os.environ, "LC_ALL": "C"})
-
-    whole, broken = compiled("-DGART_WHOLE"), compiled()
-    if whole.returncode:
-        return f"{case}: does not compile with all its members\n{whole.stderr}"
+    broken = compiled(cxx, include, case)
     if not broken.returncode:
         return f"{case}: compiles without {expected[1]}"
     if not any(name in message for name in expected[1].split(" or ") for message in MESSAGE.findall(broken.stderr)):
@@ -53,7 +67,7 @@ def self_check(cxx, include):
         with tempfile.TemporaryDirectory() as folder:
             case = pathlib.Path(folder) / "case.cpp"
             case.write_text(fine + text + "\n")
-            said = complaint(cxx, include, case)
+            said = whole_complaint(cxx, include, [case]) or complaint(cxx, include, case)
         if (expected not in said) if expected else said:
             sys.exit(f"the check itself is broken: of a case with\n{text}\nit says `{said}`, not `{expected}`")
 
@@ -65,6 +79,10 @@ arguments = parser.parse_args()
 self_check(arguments.cxx, arguments.include)
 cases = sorted((pathlib.Path(__file__).parent / "cases").glob("*.cpp"))
 with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+    alone = [case for case in cases if INSTANTIATES.search(case.read_text())]
+    together = [[case for case in cases if case not in alone], *([case] for case in alone)]
+    whole = [pool.submit(whole_complaint, arguments.cxx, arguments.include, some) for some in together]
     found = [c for c in pool.map(lambda case: complaint(arguments.cxx, arguments.include, case), cases) if c]
+    found += [c for job in whole if (c := job.result())]
 print("\n".join(found) or f"{len(cases)} cases: each is refused for what it lacks, by name")
 sys.exit(1 if found else 0)

@@ -3,10 +3,14 @@ and all .hpp together; the options as a user names some of them; and templates a
 compiler gives no warning of any kind that a user may ask for (HOST). First it shows that a header that is not
 self-contained, one without `#pragma once`, one that opens the namespace GART_ISA with no such macro, and one that
 converts or shadows in silence, is seen.
+
+Most headers include most of the same. So one compilation takes a chain of them, each of which is included, directly or
+not, by the next: what comes before a header is what it would have brought anyway.
 """
 import argparse
 import concurrent.futures
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -26,15 +30,43 @@ gart::configuration_request const request{.backend = gart::backend_kind::openmp}
 """
 
 
+INCLUDED = re.compile(r"^ *# *include <(gart/[^>]+)>", re.M)
+
+
+def included_by(include, name):
+    """The headers of gart that a header includes, directly or not."""
+    found, left = set(), [name]
+    while left:
+        for other in INCLUDED.findall((include / left.pop()).read_text()):
+            if other not in found and (include / other).exists():
+                found.add(other)
+                left.append(other)
+    return found
+
+
+def chains(include, names):
+    """All of them, in lists of which each header is included by the next, and not the other way round too."""
+    brings = {name: included_by(include, name) for name in names}
+    left = sorted(names, key=lambda name: len(brings[name]))
+    while left:
+        chain = [left.pop()]
+        for name in reversed(left):
+            if name in brings[chain[0]] and chain[0] not in brings[name]:
+                chain.insert(0, name)
+        left = [name for name in left if name not in chain]
+        yield chain
+
+
 def failure(command, include, names, folder):
     """What the compiler says of a file that includes `names` twice; empty when it compiles."""
     with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".cc") as source:
-        source.write("".join(f"#include <{name}>\n" for name in names) * 2)
-        if any("GART_ISA" in (include / name).read_text() for name in names):
-            source.write("#if !defined(GART_ISA)\n#error GART_ISA is a macro of gart/core/isa.hpp: include it\n#endif\n")
+        for name in [*names, *names]:
+            source.write(f"#include <{name}>\n")
+            if "GART_ISA" in (include / name).read_text():
+                source.write(f"#if !defined(GART_ISA)\n#error {name} has no GART_ISA: include gart/core/isa.hpp\n#endif\n")
         source.flush()
         done = subprocess.run([*command, f"-I{include}", source.name], capture_output=True, text=True)
-    what = names[0] if len(names) == 1 else "all headers together"
+    what = names[0] if len(names) == 1 else f"{len(names)} headers, {names[0]} to {names[-1]}"
     return f"{what}: does not compile with {command[0]}\n{done.stdout}{done.stderr}" if done.returncode else ""
 
 
@@ -70,10 +102,20 @@ def self_check(host, folder):
         "shadows.hpp": ("#pragma once\ninline int shadowed;\ninline int shadows(int shadowed) { return shadowed; }\n",
                         False),
     }
+    folder = pathlib.Path(folder)
     for name, (text, compiles) in headers.items():
-        (pathlib.Path(folder) / name).write_text(text)
-        if (failure(host, pathlib.Path(folder), [name], folder) == "") != compiles:
+        (folder / name).write_text(text)
+        if (failure(host, folder, [name], folder) == "") != compiles:
             sys.exit(f"the check itself is broken: {name} should {'' if compiles else 'not '}compile")
+    if failure(host, folder, ["good.hpp", "converts.hpp"], folder) == "":
+        sys.exit("the check itself is broken: converts.hpp should not compile after another")
+    (folder / "gart").mkdir()
+    for name, text in {"a": "", "b": "#include <gart/a>\n", "c": "#include <gart/b>\n#include <gart/d>\n",
+                       "d": "#include <gart/c>\n"}.items():
+        (folder / "gart" / name).write_text(text)
+    found = sorted(sorted(chains(folder, ["gart/a", "gart/b", "gart/c", "gart/d"])), key=len)
+    if found not in ([["gart/c"], ["gart/a", "gart/b", "gart/d"]], [["gart/d"], ["gart/a", "gart/b", "gart/c"]]):
+        sys.exit(f"the check itself is broken: chains are {found}")
 
 
 parser = argparse.ArgumentParser()
@@ -96,7 +138,7 @@ with tempfile.TemporaryDirectory() as folder:
         if a.nvcc:
             units = [[name] for name in headers if name.endswith(".cuh")]
             jobs += [pool.submit(failure, [a.nvcc, *CUDA], include, unit, folder) for unit in [plain, *units]]
-        jobs += [pool.submit(failure, host, include, unit, folder) for unit in [plain, *([name] for name in plain)]]
+        jobs += [pool.submit(failure, host, include, unit, folder) for unit in [plain, *chains(include, plain)]]
         for what, text in {"options as a user names some of them": OPTIONS,
                            "templates as a user instantiates them": TEMPLATES}.items():
             jobs.append(pool.submit(program_failure, what, text, host, include, folder))

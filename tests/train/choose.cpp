@@ -1,8 +1,10 @@
 // What is chosen for a capture, from captures made by hand.
 #include <support/policies.hpp>
 
+#include <gart/camera/models.hpp>
 #include <gart/runtime/choose.hpp>
 #include <gart/runtime/degree_selection.hpp>
+#include <gart/runtime/initial.hpp>
 
 #include <algorithm>
 
@@ -126,6 +128,56 @@ TEST_CASE("training starts from the capture's points, or from random ones as MCM
   start = gart::choose_start(data, options).value;
   CHECK_FALSE(start.random);
   CHECK(start.count == 4);
+}
+
+TEST_CASE("training on depth starts from what the maps measured, where the capture has no points of its own") {
+  // A pinhole at the origin and one beside it look at the plane z = 3, of which the left half is measured.
+  gart::dataset data;
+  for (int v = 0; v < 2; ++v) {
+    gart::dataset_view view;
+    view.view.width = view.view.height = 20, view.view.fx = view.view.fy = 20, view.view.cx = view.view.cy = 10;
+    view.view.position = {0.25 * v, 0, 0};
+    view.image = gart::image8(20, 20, 3, static_cast<gart::u8>(50 + 100 * v));
+    view.depth = gart::image_float(20, 20, 1);
+    for (int y = 0; y < 20; ++y)
+      for (int x = 0; x < 10; ++x)
+        view.depth.at(x, y, 0) =
+            3 / gart::ray_direction(view.view, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f).z;
+    data.train.push_back(view);
+  }
+  gart::train_options options;
+  options.random_points = 300;
+  CHECK(gart::choose_start(data, options).value.random);
+  options.depth_weight = 1;
+  auto const start = gart::choose_start(data, options).value;
+  CHECK(start.measured);
+  CHECK_FALSE(start.random);
+  CHECK(start.count == 300);
+  CHECK(start.opacity == 0.1f);
+  CHECK(start.scale == 1.0f);
+  auto const points = gart::points_of_maps(data, 300, 5);
+  CHECK(points.size() == 300);
+  CHECK(points.position == gart::points_of_maps(data, 300, 5).position);
+  CHECK(points.position != gart::points_of_maps(data, 300, 6).position);
+  std::size_t second = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    bool const of_second = points.color[3 * i] == 150;
+    second += of_second;
+    CHECK(points.position[3 * i + 2] == doctest::Approx(3));
+    CHECK(points.position[3 * i] < (of_second ? 0.25f : 0.0f));
+  }
+  CHECK(second > 100);
+  CHECK(second < 200);
+  CHECK(gart::initial_model(data, options, 1).size() == 300);
+  // A view that is held out, a mask and what is clear have no part.
+  for (auto const c : gart::points_of_maps(data, 50, 5, {1}).color) CHECK(c == 50);
+  data.train[0].mask = gart::image8(20, 20, 1, 0);
+  data.train[1].image = gart::image8(20, 20, 4, 0);
+  CHECK(gart::points_of_maps(data, 50, 5).size() == 0);
+  CHECK_THROWS_WITH_AS(gart::initial_model(data, options, 1), doctest::Contains("no depth map has a distance"),
+                       gart::invalid_argument);
+  data.points.position.assign(30, 0.0f), data.points.color.assign(30, 0);
+  CHECK_FALSE(gart::choose_start(data, options).value.measured);
 }
 
 TEST_CASE("bands are measured where views and steps allow, on views evenly spread, within a quarter of the run") {

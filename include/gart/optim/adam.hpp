@@ -115,8 +115,12 @@ struct adam_kernel {
 #if !defined(__CUDACC__)
     if constexpr (!E::device) return update_rows(group, row, count);
 #endif
+    // Four elements a lane: by single ones a step is bound by the loads in flight, not by the memory's bandwidth.
     std::size_t const base = std::size_t{row} * group.stride;
-    team.for_each(count * group.stride, [&](index_t e) {
+    index_t const elements = count * group.stride, quads = elements / 4;
+    team.for_each(quads, [&](index_t q) { update_quad(group, base, row, 4 * q); });
+    team.for_each(elements - 4 * quads, [&](index_t k) {
+      index_t const e = 4 * quads + k;
       if (!SeenOnly || seen(row + e / group.stride)) update(group, base + e, e % group.stride);
     });
   }
@@ -126,15 +130,48 @@ struct adam_kernel {
     return (mean[0] != 0) | (mean[1] != 0) | (mean[2] != 0);
   }
 
-  GART_KERNEL void update(adam_group const& group, std::size_t i, index_t column) const {
-    if (column >= group.active) return;
-    float const g = group.gradient[i], rate = column < group.head ? group.rate_head : group.rate_rest;
-    auto const to = rule.moved<float>({group.parameter[i], group.first[i], group.second[i]}, g, rate);
+  // One element; whether it was finite.
+  GART_KERNEL bool move(adam_group const& group, index_t column, float g, adam_element<float>& e) const {
+    float const rate = column < group.head ? group.rate_head : group.rate_rest;
+    auto const to = rule.moved<float>(e, g, rate);
     if (!is_finite(g) || !is_finite(to.second) || !is_finite(to.parameter)) {
       if (skipped) E::atomic_add(skipped, u64{1});
-      return;
+      return false;
     }
-    group.parameter[i] = to.parameter, group.first[i] = to.first, group.second[i] = to.second;
+    e = to;
+    return true;
+  }
+
+  GART_KERNEL void update(adam_group const& group, std::size_t i, index_t column) const {
+    if (column >= group.active) return;
+    adam_element<float> e{group.parameter[i], group.first[i], group.second[i]};
+    if (move(group, column, group.gradient[i], e))
+      group.parameter[i] = e.parameter, group.first[i] = e.first, group.second[i] = e.second;
+  }
+
+  // Elements e to e + 3 of a tile, which begins at `base` with a row; what is not to move is written as it was.
+  GART_KERNEL void update_quad(adam_group const& group, std::size_t base, index_t row, index_t e) const {
+    index_t columns[4];
+    bool wanted[4];
+    index_t next = e % group.stride;
+    for (index_t k = 0; k < 4; ++k) {
+      columns[k] = next, next = next + 1 < group.stride ? next + 1 : 0;
+      wanted[k] = columns[k] < group.active && (!SeenOnly || seen(row + (e + k) / group.stride));
+    }
+    if (!(wanted[0] | wanted[1] | wanted[2] | wanted[3])) return;
+    std::size_t const i = base + e;
+    quad const g = *reinterpret_cast<quad const*>(group.gradient + i);
+    quad p = *reinterpret_cast<quad const*>(group.parameter + i);
+    quad m = *reinterpret_cast<quad const*>(group.first + i);
+    quad v = *reinterpret_cast<quad const*>(group.second + i);
+    for (int k = 0; k < 4; ++k) {
+      adam_element<float> to{p.v[k], m.v[k], v.v[k]};
+      if (wanted[k] && move(group, columns[k], g.v[k], to))
+        p.v[k] = to.parameter, m.v[k] = to.first, v.v[k] = to.second;
+    }
+    *reinterpret_cast<quad*>(group.parameter + i) = p;
+    *reinterpret_cast<quad*>(group.first + i) = m;
+    *reinterpret_cast<quad*>(group.second + i) = v;
   }
 
 #if !defined(__CUDACC__)

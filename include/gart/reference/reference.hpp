@@ -9,6 +9,7 @@
 ///   a hit where alpha >= alpha_min and t > near,
 ///   colour = sum_i T_i alpha_i c_i + T background, T_(i+1) = T_i (1 - alpha_i), hits in the order (t, id), until
 ///   T < transmittance_min (the hit that crosses counts) or max_hits of them.
+/// Rays are those of any camera, in double: without one centre too, and none where a lens gives none.
 /// With options.antialias, the standard deviation of the pixels' filter, a Gaussian is first widened as in
 /// math/widened.hpp, by the definition there.
 /// Backwards, with g = dL/dcolour and B_i what is seen behind hit i with T = 1,
@@ -52,7 +53,8 @@ std::vector<u32> all_pixels(camera const& view);
 /// `color_gradient`, dL/dcolour as [n][3], also the gradient of every parameter, summed over these pixels; with a
 /// `depth_gradient`, dL/ddepth as [n], that of the depth besides. Errors:
 /// invalid_argument for a pixel outside the image or named twice, a gradient of another size, a degree the model does
-/// not have, and a pixel at which the lens cannot be inverted.
+/// not have, and a pixel at which a lens of k1, k2, p1 and p2 cannot be inverted; unsupported for a filter of pixels
+/// through any camera but a pinhole and such a lens.
 reference_image trace_reference(gaussian_model const& model, camera const& view, render_options const& options,
                                 int active_degree, std::vector<u32> const& pixels,
                                 std::vector<double> const& color_gradient = {}, int kernel_degree = 2,

@@ -63,14 +63,16 @@ inline constexpr float usual_sh_gain = 0.02f;  ///< in dB
 /// The choice: usual_sh_gain for runs of at least measured_from steps, else 0.
 chosen<float> choose_sh_gain(train_options const& options);
 
-/// The capture's points, or random ones in its bounds. A capture's points lie on surfaces, and opacity 0.1 and a scale
-/// of 1.0 (times the distance to the neighbours) fill the gaps between them. Random points are mostly in empty space:
-/// with MCMC, which moves them, 0.5 and 0.1 let rays through from the first step. What the options say stands.
+/// The capture's points; where it has none and depth is trained on, points that its depth maps measured; else random
+/// ones in its bounds. A capture's points lie on surfaces, and opacity 0.1 and a scale of 1.0 (times the distance to
+/// the neighbours) fill the gaps between them. Random points are mostly in empty space: with MCMC, which moves them,
+/// 0.5 and 0.1 let rays through from the first step. What the options say stands.
 struct starting_points {
-  bool random = false;  ///< else the capture's own
-  index_t count = 0;    ///< of points
-  float opacity = 0,    ///< of the first Gaussians
-      scale = 0;        ///< times the distance to the neighbours
+  bool random = false;    ///< in the capture's bounds
+  bool measured = false;  ///< of its depth maps; neither: the capture's own
+  index_t count = 0;      ///< of points
+  float opacity = 0,      ///< of the first Gaussians
+      scale = 0;          ///< times the distance to the neighbours
 };
 /// Where training starts; the reason names the numbers.
 chosen<starting_points> choose_start(dataset const& data, train_options const& options);
