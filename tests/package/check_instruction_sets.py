@@ -98,13 +98,15 @@ with tempfile.TemporaryDirectory() as temporary:
             "-DGART_CUDA=OFF", "-DGART_EMBREE=OFF", "-DGART_DISTRIBUTED=OFF", "-DGART_VIEW=OFF",
             "-DGART_BUILD_PROGRAM=OFF", "-DGART_BUILD_EXAMPLES=OFF",
             "-DGART_BUILD_TESTS=OFF", f"-DGART_SANITIZE={'ON' if a.sanitize else 'OFF'}")
-        run(a.cmake, "--build", binary, "--parallel", a.jobs)
-        run(a.cmake, "--install", binary, "--prefix", folder / library)
+        # What it links with it.
+        run(a.cmake, "--build", binary, "--parallel", a.jobs, "--target", "gart_cpu", "gart_runtime", "gart_io")
     archives = {}
     for library in libraries:
         archives[library] = folder / "archives" / library
-        archives[library].parent.mkdir(exist_ok=True)
-        archives[library].symlink_to(next((folder / library).rglob("libgart_cpu.a")).parent)
+        archives[library].mkdir(parents=True)
+        for name in ("libgart_cpu.a", "libgart_runtime.a", "libgart_io.a"):
+            built = folder / own if library == own else folder / f"build_{library}"
+            (archives[library] / name).symlink_to(next(built.rglob(name)))
 
     binary = folder / "programs"
     run(a.cmake, "-S", project, "-B", binary, "-G", a.generator, f"-DCMAKE_PREFIX_PATH={folder / own}",
