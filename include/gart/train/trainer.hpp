@@ -45,6 +45,7 @@
 #include <gart/train/training_images.hpp>
 #include <gart/train/view_order.hpp>
 
+#include <functional>
 #include <optional>
 
 namespace gart::inline GART_ISA {
@@ -62,6 +63,10 @@ struct loss_input {
   span<float> value;         ///< [2]
   depth_pixels depth;        ///< to add to, of a strategy with_depth; else empty
 };
+
+/// A loss, called once a step: by its type a trainer would be compiled again for each.
+template <execution E>
+using loss_function = std::function<void(loss_input<E> const&)>;
 
 /// A training run on one policy, by one tracer and one strategy, on the ranks of a communicator.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -82,7 +87,9 @@ class basic_trainer {
   step_report step();
   /// One step, with a loss of one's own, called with a loss_input.
   template <class Loss>
-  step_report step(Loss&& loss);
+  step_report step(Loss&& loss) {
+    return step_by(std::ref(loss));
+  }
 
   /// Steps done.
   int steps_done() const { return step_; }
@@ -114,8 +121,9 @@ class basic_trainer {
  private:
   using frame_type = frame<E, Traits, Tracer>;
 
-  template <class Pass, class Loss>
-  void differentiate_by(Pass& pass, Loss&& loss, std::size_t view, learning_rates const& rates);
+  step_report step_by(loss_function<E> const& loss);
+  template <class Pass>
+  void differentiate_by(Pass& pass, loss_function<E> const& loss, std::size_t view, learning_rates const& rates);
   template <class Rows>
   void optimize(learning_rates const& rates, int degree, Rows&& rows);
   learning_rates rates_of_step() const;
@@ -123,11 +131,9 @@ class basic_trainer {
 
   // With ranks (trainer_ranks_impl.hpp).
   void require_ranks() const;
-  template <class Loss>
-  step_report step_in_ranks(Loss&& loss);
-  template <class Loss>
-  void trace_unit(Loss& loss, std::size_t index, int image, int degree, learning_rates const& rates,
-                  step_report& report);
+  step_report step_in_ranks(loss_function<E> const& loss) requires(!Comm::alone);
+  void trace_unit(loss_function<E> const& loss, std::size_t index, int image, int degree, learning_rates const& rates,
+                  step_report& report) requires(!Comm::alone);
   void gather_values(int views, std::vector<float>& values) requires(!Comm::alone);
   void take_gradients(camera const& view, int v, int image) requires(!Comm::alone);
   rendered render_in_ranks(camera const& view, vec3 background) requires(!Comm::alone);

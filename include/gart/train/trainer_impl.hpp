@@ -89,8 +89,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step() {
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-template <class Loss>
-step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step(Loss&& loss) {
+step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_function<E> const& loss) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return step_in_ranks(loss);
   std::size_t const index = order_.at(step_);
@@ -132,8 +131,9 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step(Loss&& loss) 
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-template <class Pass, class Loss>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pass, Loss&& loss, std::size_t index,
+template <class Pass>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pass, loss_function<E> const& loss,
+                                                                        std::size_t index,
                                                                         learning_rates const& rates) {
   dataset_view const& view = data_.train[index];
   image_targets targets;

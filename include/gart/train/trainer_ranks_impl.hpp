@@ -52,8 +52,8 @@ learning_rates basic_trainer<E, Traits, Tracer, Strategy, Comm>::rates_of_step()
 
 // A step over options.batch views, in as many rounds as it takes all ranks to trace them.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-template <class Loss>
-step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(Loss&& loss) {
+step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss_function<E> const& loss) requires(
+    !Comm::alone) {
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates rates = rates_of_step();
   int const ranks = comm_.size(), batch = options_.batch;
@@ -102,9 +102,9 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(Loss
 
 // This rank's unit of a round: its rows of the image, the loss of the whole, its sums of the gradients.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-template <class Loss>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(Loss& loss, std::size_t index, int image, int degree,
-                                                                  learning_rates const& rates, step_report& report) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<E> const& loss, std::size_t index,
+                                                                  int image, int degree, learning_rates const& rates,
+                                                                  step_report& report) requires(!Comm::alone) {
   dataset_view const& view = data_.train[index];
   std::size_t const pixels = static_cast<std::size_t>(view.view.width) * view.view.height;
   color_.resize(3 * pixels), color_gradient_.resize(3 * pixels);
