@@ -122,12 +122,11 @@ TEST_CASE_TEMPLATE("error budget: atomics in any order against sums in one order
   gart::gaussian_model const model = cloud(random, 200);
   gart::camera const view = looking_along_z(64, 48, 60);
   auto const gradient = random_gradient(random, view);
-  using tracer = gart::tile_tracer<E>;
   E exec;
   std::vector<outcome> by_pixel, ordered;
   for (int k = 0; k < 5; ++k) {
-    by_pixel.push_back(run_one<gart::pixel_strategy, tracer>(exec, model, view, {}, gradient));
-    ordered.push_back(run_one<gart::deterministic_strategy, tracer>(exec, model, view, {}, gradient));
+    by_pixel.push_back(run_one(exec, tracer_kind::tiles, "pixel", model, view, {}, gradient));
+    ordered.push_back(run_one(exec, tracer_kind::tiles, "deterministic", model, view, {}, gradient));
   }
   for (auto const& group : parameter_groups) {
     double spread = 0;

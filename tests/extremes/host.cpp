@@ -1,6 +1,6 @@
 // What needs no device: memory that ends at any allocation, starting points in one place, what is stored in which type.
 #include <extremes/scenes.hpp>
-#include <extremes/ways.hpp>
+#include <extremes/way.hpp>
 
 #include <gart/runtime/initial.hpp>
 
@@ -32,9 +32,7 @@ TEST_CASE("memory that ends at any allocation is an error, and the next try with
   std::vector<float> const gradient(std::size_t{3} * view.width * view.height, 0.5f);
   using tracer = gart::tile_tracer<limited_exec>;
   limited_exec exec;
-  auto const run = [&] {
-    return gart_test::run_one<gart::primitive_strategy, tracer>(exec, model, view, {}, gradient);
-  };
+  auto const run = [&] { return gart_test::run_by<gart::primitive_strategy, tracer>(exec, model, view, {}, gradient); };
   exec.most = std::size_t{1} << 30;
   auto const expected = run();
   std::size_t const needed = static_cast<std::size_t>(exec.memory.peak);

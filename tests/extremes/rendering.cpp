@@ -313,14 +313,12 @@ TEST_CASE_TEMPLATE("the largest and the smallest finite numbers in every slot of
       append_copy(m, good, 0);
       last_slot(m, slot) = place;
     }
-  using gart::primitive_strategy;
-  auto const tiles = run_one<primitive_strategy, gart::tile_tracer<E>>(exec, m, view, options, gradient);
-  auto const bvh = run_one<primitive_strategy, gart::bvh_tracer<E>>(exec, m, view, options, gradient);
+  auto const tiles = run_one(exec, tracer_kind::tiles, "primitive", m, view, options, gradient);
+  auto const bvh = run_one(exec, tracer_kind::bvh, "primitive", m, view, options, gradient);
   check_finite(tiles), check_finite(bvh), check_same_image(tiles, bvh);
   CHECK(tiles.color == all.front().color);
 #if defined(GART_WITH_EMBREE)
   if constexpr (!E::device)
-    CHECK_THROWS_AS((run_one<primitive_strategy, gart::embree_tracer<E>>(exec, m, view, options, gradient)),
-                    gart::unsupported);
+    CHECK_THROWS_AS(run_one(exec, tracer_kind::embree, "primitive", m, view, options, gradient), gart::unsupported);
 #endif
 }

@@ -1,9 +1,8 @@
 // A strategy that the library has not: its gradients against the oracle, and a training by it.
 #include <models/geometry_strategy.hpp>
 #include <render/expected.hpp>
-#include <train/capture.hpp>
-
-#include <gart/train/trainer.hpp>
+#include <support/trace_scene.hpp>
+#include <train/runs.hpp>
 
 using namespace gart_test;
 
@@ -32,8 +31,7 @@ course train(E& exec, gart::dataset const& data, gart::u64 seed, gart::u64 lt_bu
   gart::train_options options;
   options.lt_budget = lt_budget, options.iterations = 40;
   options.densify = gart::densify_kind::none;
-  gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy> run(exec, options, data,
-                                                                              cloud(seed + 1, 0.7f));
+  run_of<E, Strategy> run(exec, options, data, cloud(seed + 1, 0.7f));
   course out;
   while (run.steps_done() < options.iterations) {
     auto const report = run.step();

@@ -3,7 +3,7 @@
 #include <oracle/oracle.hpp>
 #include <oracle/scenes.hpp>
 #include <support/policies.hpp>
-#include <support/trace_scene.hpp>
+#include <support/scene_by_kind.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -83,38 +83,35 @@ double relative(gart::vec3d const& got, double const (&expected)[3]) {
   return std::isfinite(error) ? std::sqrt(error / norm) : HUGE_VAL;
 }
 
-template <int Degree, class Strategy, class Tracer, class E>
-gart::pose_gradient pose_by(E& exec, expectation const& e) {
-  auto const& s = e.scene;
-  using frame_type = frame_by<Degree, Tracer, E>;
-  gart::gaussians<E> const scene(exec, s.model);
-  gart::gaussians<E> gradients(exec, scene.size(), Degree);
-  frame_type frame(exec);
-  gart::backward_pass<frame_type, Strategy> pass(exec);
-  gart::buffer<float, E> color(exec, e.weights.size()), weights(exec, e.weights);
-  frame.prepare(scene.view(), s.view, s.options, s.active_degree);
-  REQUIRE(pass.prepare(frame));
-  pass.render(frame, {color.data()});
-  gart::differentiate(frame, pass, weights, gradients);
-  return gart::differentiate_pose(frame, std::as_const(gradients).view());
-}
+// What the sum over Gaussians asks of a frame.
+template <class E, int Degree>
+struct stored {
+  using execution_type = E;
+  static constexpr int sh_degree = Degree;
+  E* policy;
+  gart::gaussians_view<float const> gaussians;
+  gart::camera seen_by;
+  E& exec() const { return *policy; }
+  gart::gaussians_view<float const> scene() const { return gaussians; }
+  gart::camera const& view() const { return seen_by; }
+};
 
+// By the gradients of each tracer and strategy.
 template <class E, class F>
 void by_all(expectation const& e, F const& check) {
   E exec;
-  detail::with_degree(e.scene.model.sh_degree, [&](auto degree) {
-    auto const by = [&]<tracer_kind Kind, class Tracer>(std::integral_constant<tracer_kind, Kind>,
-                                                        std::type_identity<Tracer>) {
-      gart::strategies::for_each([&]<class Strategy>(Strategy) {
-        if constexpr (compiled_for<Strategy>(Kind, degree)) {
-          CAPTURE(std::string(Strategy::name));
-          check(pose_by<degree, Strategy, Tracer>(exec, e));
-        }
+  auto const& s = e.scene;
+  gart::gaussians<E> const scene(exec, s.model);
+  for (tracer_kind const kind : {tracer_kind::bvh, tracer_kind::tiles})
+    for (std::string const& strategy : strategies_for(kind, s.model.sh_degree)) {
+      CAPTURE(gart::to_string(kind));
+      CAPTURE(strategy);
+      gart::gaussians<E> const gradients(
+          exec, scene_gradients(exec, s.model, s.view, s.options, s.active_degree, kind, strategy, e.weights));
+      detail::with_degree(s.model.sh_degree, [&](auto degree) {
+        check(gart::differentiate_pose(stored<E, degree>{&exec, scene.view(), s.view}, gradients.view()));
       });
-    };
-    by(std::integral_constant<tracer_kind, tracer_kind::bvh>{}, std::type_identity<gart::bvh_tracer<E>>{});
-    by(std::integral_constant<tracer_kind, tracer_kind::tiles>{}, std::type_identity<gart::tile_tracer<E>>{});
-  });
+    }
 }
 
 std::vector<expectation> const& expectations() {
@@ -156,23 +153,6 @@ TEST_CASE_TEMPLATE("gradients of poses agree with differences of the oracle's im
   }
   MESSAGE("worst relative error " << worst);
 }
-
-namespace {
-
-// What the sum over Gaussians asks of a frame.
-template <class E>
-struct stored {
-  using execution_type = E;
-  static constexpr int sh_degree = 2;
-  E* policy;
-  gart::gaussians_view<float const> gaussians;
-  gart::camera seen_by;
-  E& exec() const { return *policy; }
-  gart::gaussians_view<float const> scene() const { return gaussians; }
-  gart::camera const& view() const { return seen_by; }
-};
-
-}  // namespace
 
 TEST_CASE_TEMPLATE("sums over any number of Gaussians are those in double, broken ones left out", E,
                    GART_TEST_POLICIES) {
@@ -219,7 +199,7 @@ TEST_CASE_TEMPLATE("sums over any number of Gaussians are those in double, broke
       for (int k = 0; k < 3; ++k) expected[3 + k] += double{turn[k]};
     }
     gart::gaussians<E> const scene(exec, model), by(exec, gradients);
-    stored<E> const frame{&exec, scene.view(), view};
+    stored<E, 2> const frame{&exec, scene.view(), view};
     auto const got = gart::differentiate_pose(frame, by.view());
     for (int k = 0; k < 3; ++k) {
       CHECK(std::abs(got.translation[k] - expected[k]) <= 1e-5 * (1 + std::sqrt(static_cast<double>(count))));

@@ -1,8 +1,7 @@
 // Poses as they are learned with the Gaussians, and cameras tracked against a model that stays as it is.
 #include <gart/runtime/compiled_renderer.hpp>
 #include <gart/runtime/track.hpp>
-#include <gart/train/trainer.hpp>
-#include <train/capture.hpp>
+#include <train/runs.hpp>
 
 #include <cmath>
 #include <limits>

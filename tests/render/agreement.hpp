@@ -5,7 +5,7 @@
 #include <oracle/scenes.hpp>
 #include <support/policies.hpp>
 #include <support/relative_error.hpp>
-#include <support/trace_scene.hpp>
+#include <support/scene_by_kind.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,9 @@
 // What a pixel shows of one Gaussian through its filter, against the integral over the pixel in double; and what a
 // filter must leave alone.
 #include <support/policies.hpp>
-#include <support/trace_scene.hpp>
+#include <support/scene_by_kind.hpp>
+
+#include <gart/render/antialiased.hpp>
 
 #include <Eigen/Geometry>
 

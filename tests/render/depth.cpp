@@ -1,6 +1,7 @@
 // Gradients of a random linear function of an image's colour, depth and transmittance, group by group, against the
 // oracle, and what a pass says that was not asked for them.
 #include <render/expected.hpp>
+#include <support/trace_scene.hpp>
 
 #include <gart/core/error.hpp>
 

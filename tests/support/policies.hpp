@@ -1,15 +1,18 @@
 #pragma once
 // The policies a test body runs over: TEST_CASE_TEMPLATE("...", E, GART_TEST_POLICIES). Compiled by a host compiler
-// they are the two host policies; by nvcc, with GART_TEST_CUDA, cuda_exec.
+// they are the two host policies; by nvcc, with GART_TEST_CUDA, cuda_exec. GART_TEST_EACH_POLICY(X) is X(E) for each:
+// explicit instantiations of what several tests use.
 
 #include <doctest/doctest.h>
 
 #if defined(GART_TEST_CUDA)
 #include <gart/exec/cuda_launch.cuh>
 #define GART_TEST_POLICIES gart::cuda_exec
+#define GART_TEST_EACH_POLICY(X) X(gart::cuda_exec)
 #else
 #include <gart/exec/parallel.hpp>
 #define GART_TEST_POLICIES gart::serial_exec, gart::openmp_exec
+#define GART_TEST_EACH_POLICY(X) X(gart::serial_exec) X(gart::openmp_exec)
 #endif
 
 #include <cstdint>

@@ -1,29 +1,21 @@
 #pragma once
 // Renders, gradients and hit lists of a small scene through the library's templates, for comparison with the oracle.
+// What is chosen at run time is in scene_by_kind.hpp, compiled once for all tests.
+
+#include <support/scene_by_kind.hpp>
 
 #include <gart/backward/backward.hpp>
-#include <gart/runtime/kinds.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
 #if defined(GART_WITH_EMBREE)
 #include <gart/trace/embree_tracer.hpp>
 #endif
 
-#include <concepts>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace gart_test {
-
-using gart::tracer_kind;
-
-template <class E>
-struct traced {
-  std::vector<float> color, transmittance, depth;  // [H][W][3], [H][W], [H][W]
-  std::vector<gart::u32> hits;                     // [H][W]
-};
 
 // Counts with a null list, then writes into the places found by the count.
 struct list_program : gart::ray_program_base {
@@ -73,20 +65,6 @@ auto with_tracer(tracer_kind kind, F&& body) {
   throw std::runtime_error("no such tracer for this policy");
 }
 
-template <class F>
-auto with_degree(int degree, F&& body) {
-  switch (degree) {
-    case 0:
-      return body(std::integral_constant<int, 0>{});
-    case 1:
-      return body(std::integral_constant<int, 1>{});
-    case 2:
-      return body(std::integral_constant<int, 2>{});
-    default:
-      return body(std::integral_constant<int, 3>{});
-  }
-}
-
 }  // namespace detail
 
 template <int Degree, class Tracer, class E>
@@ -104,21 +82,6 @@ traced<E> render_by(E& exec, gart::gaussian_model const& model, gart::camera con
   frame.render({color.data(), transmittance.data(), depth.data(), hits.data()});
   return {color.to_host(), transmittance.to_host(), depth.to_host(), hits.to_host()};
 }
-
-template <class E>
-traced<E> render_scene(E& exec, gart::gaussian_model const& model, gart::camera const& view,
-                       gart::render_options const& options, int active_degree, tracer_kind kind) {
-  return detail::with_tracer<E>(kind, [&]<class Tracer>(std::type_identity<Tracer>) {
-    return detail::with_degree(model.sh_degree, [&](auto degree) {
-      return render_by<degree, Tracer>(exec, model, view, options, active_degree);
-    });
-  });
-}
-
-// An error a pixel, [H][W], and what of it the backward pass attributes to each Gaussian.
-struct attributed_error {
-  std::vector<float> of_pixels, of_gaussians;
-};
 
 template <int Degree, class Strategy, class Tracer, class E>
 gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, gart::camera const& view,
@@ -166,61 +129,9 @@ gart::gaussian_model depth_gradients_by(E& exec, gart::gaussian_model const& mod
   return gradients.to_host();
 }
 
-// Whether a strategy is compiled here for a tracer and a degree: at degree 3 all for tile lists, for a BVH those that
-// record or scatter otherwise (others differ in the gather alone, which does not know the tracer); at other degrees one
-// for each tracer, for the sake of the compiler's time.
-template <class Strategy>
-inline constexpr bool differs_in_gather =
-    std::derived_from<Strategy, gart::primitive_strategy> && !std::same_as<Strategy, gart::primitive_strategy>;
-
-template <class Strategy>
-constexpr bool compiled_for(tracer_kind kind, int degree) {
-  if (kind == tracer_kind::embree || (kind == tracer_kind::bvh && degree != 3))
-    return std::same_as<Strategy, gart::pixel_strategy>;
-  if (kind == tracer_kind::bvh) return !differs_in_gather<Strategy>;
-  return degree == 3 || std::same_as<Strategy, gart::primitive_strategy>;
-}
-
-inline std::vector<std::string> strategies_for(tracer_kind kind, int degree) {
-  std::vector<std::string> names;
-  gart::strategies::for_each([&]<class Strategy>(Strategy) {
-    if (compiled_for<Strategy>(kind, degree)) names.emplace_back(Strategy::name);
-  });
-  return names;
-}
-
-template <class E>
-gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model, gart::camera const& view,
-                                     gart::render_options const& options, int active_degree, tracer_kind kind,
-                                     std::string const& strategy, std::vector<float> const& color_gradient,
-                                     attributed_error* error = nullptr) {
-  std::optional<gart::gaussian_model> out;
-  detail::with_degree(model.sh_degree, [&](auto degree) {
-    auto const by = [&]<tracer_kind Kind, class Tracer>(std::integral_constant<tracer_kind, Kind>,
-                                                        std::type_identity<Tracer>) {
-      gart::strategies::with(strategy, [&]<class Strategy>(Strategy) {
-        if constexpr (compiled_for<Strategy>(Kind, degree))
-          out =
-              gradients_by<degree, Strategy, Tracer>(exec, model, view, options, active_degree, color_gradient, error);
-      });
-    };
-    if (kind == tracer_kind::bvh)
-      by(std::integral_constant<tracer_kind, tracer_kind::bvh>{}, std::type_identity<gart::bvh_tracer<E>>{});
-    if (kind == tracer_kind::tiles)
-      by(std::integral_constant<tracer_kind, tracer_kind::tiles>{}, std::type_identity<gart::tile_tracer<E>>{});
-#if defined(GART_WITH_EMBREE)
-    if constexpr (!E::device)
-      if (kind == tracer_kind::embree)
-        by(std::integral_constant<tracer_kind, tracer_kind::embree>{}, std::type_identity<gart::embree_tracer<E>>{});
-#endif
-  });
-  if (!out) throw std::runtime_error("not compiled here: " + strategy);
-  return *out;
-}
-
-template <class Response = gart::generalized_gaussian<>, class E>
-std::vector<std::vector<gart::hit>> hit_lists(E& exec, gart::gaussian_model const& model, gart::camera const& view,
-                                              gart::render_options const& options, tracer_kind kind) {
+template <class Response, class E>
+std::vector<std::vector<gart::hit>> hit_lists_of(E& exec, gart::gaussian_model const& model, gart::camera const& view,
+                                                 gart::render_options const& options, tracer_kind kind) {
   return detail::with_tracer<E, Response>(kind, [&]<class Tracer>(std::type_identity<Tracer>) {
     // A list has no colours: of whichever degree.
     gart::gaussians<E> const scene(exec, gart::with_sh_degree(model, 0));

@@ -2,10 +2,9 @@
 // A capture so small that a training on it takes a moment: views of one cloud, to be learnt from another.
 
 #include <support/policies.hpp>
-#include <support/trace_scene.hpp>
+#include <support/scene_by_kind.hpp>
 
 #include <gart/io/dataset.hpp>
-#include <gart/train/trainer.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -28,6 +27,10 @@ inline gart::gaussian_model cloud(std::uint64_t seed, float spread) {
   return m;
 }
 
+// A view of a cloud. Its body is in runs.cpp (gart_test's BODIES train_runs).
+template <class E>
+traced<E> pictured(E& exec, gart::gaussian_model const& model, gart::camera const& view);
+
 template <class E>
 gart::dataset capture(E& exec, std::uint64_t seed) {
   gart::gaussian_model const truth = cloud(seed, 0.6f);
@@ -40,28 +43,13 @@ gart::dataset capture(E& exec, std::uint64_t seed) {
     float const angle = 0.4f * static_cast<float>(v), c = std::cos(angle), s = std::sin(angle);
     view.view.rotation = gart::mat3(gart::vec3(c, 0, -s), gart::vec3(0, 1, 0), gart::vec3(s, 0, c));
     view.view.position = gart::vec3d(-4.0 * s, 0, -4.0 * c);
-    auto const picture = render_scene(exec, truth, view.view, gart::render_options{}, 1, tracer_kind::tiles);
+    auto const picture = pictured(exec, truth, view.view);
     view.image = gart::image8(view.view.width, view.view.height, 3);
     for (std::size_t i = 0; i < picture.color.size(); ++i)
       view.image.data[i] = static_cast<gart::u8>(std::lround(255 * std::clamp(picture.color[i], 0.0f, 1.0f)));
     data.train.push_back(std::move(view));
   }
   return data;
-}
-
-template <class E, class Strategy = gart::primitive_strategy>
-using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy>;
-
-// The Gaussians of the capture stand still: what is learned besides them is learned alone.
-inline gart::train_options still(int iterations) {
-  gart::train_options options;
-  options.iterations = iterations;
-  options.max_gaussians = 400;
-  options.densify = gart::densify_kind::none;
-  options.sh_every = 1;
-  auto& r = options.rates;
-  r.mean = r.mean_final = r.log_scale = r.quaternion = r.opacity = r.sh_dc = r.sh_rest = 0;
-  return options;
 }
 
 }  // namespace gart_test

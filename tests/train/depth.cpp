@@ -1,8 +1,7 @@
 // Training by depth: what is asked for must be there, and the depth comes nearer to the maps than without.
-#include <train/capture.hpp>
+#include <train/runs.hpp>
 
 #include <gart/core/error.hpp>
-#include <gart/train/trainer.hpp>
 
 using namespace gart_test;
 
@@ -15,7 +14,7 @@ gart::dataset mapped_capture(E& exec) {
   gart::dataset data = capture(exec, seed());
   gart::gaussian_model const truth = cloud(seed(), 0.6f);
   for (gart::dataset_view& v : data.train) {
-    auto const seen = render_scene(exec, truth, v.view, gart::render_options{}, 1, tracer_kind::tiles);
+    auto const seen = pictured(exec, truth, v.view);
     v.depth = gart::image_float(v.view.width, v.view.height, 1);
     for (std::size_t i = 0; i < seen.depth.size(); ++i) {
       float const alpha = 1 - seen.transmittance[i];

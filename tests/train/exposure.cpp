@@ -1,7 +1,5 @@
 // Exposures as they are learned: their gradients against sums in double, and known gains found again.
-#include "capture.hpp"
-
-#include <gart/train/trainer.hpp>
+#include "runs.hpp"
 
 #include <cmath>
 #include <limits>

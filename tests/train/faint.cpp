@@ -1,7 +1,5 @@
 // Gaussians fainter than alpha_min get no gradient: a trainer has its densification count them as dead.
-#include "capture.hpp"
-
-#include <gart/train/trainer.hpp>
+#include "runs.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -27,8 +25,7 @@ gart::gaussian_model densified(E& exec, gart::densify_kind densify, float alpha_
   options.error.every = options.mcmc.every = options.adc.every = 1;
   options.adc.gradient = 1e30f;
   options.render.alpha_min = alpha_min;
-  gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::primitive_strategy> run(exec, options, data,
-                                                                                              start);
+  run_of<E> run(exec, options, data, start);
   run.step();
   return run.model();
 }

@@ -1,7 +1,5 @@
 // A check of every step: a sound training passes it, and a number that is not finite is found wherever it is.
-#include "capture.hpp"
-
-#include <gart/train/trainer.hpp>
+#include "runs.hpp"
 
 #include <limits>
 #include <string>

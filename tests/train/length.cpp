@@ -1,7 +1,5 @@
 // The length that schedules go by, set while a run is under way: every schedule follows, as if it had been known.
-#include "capture.hpp"
-
-#include <gart/train/trainer.hpp>
+#include "runs.hpp"
 
 using namespace gart_test;
 

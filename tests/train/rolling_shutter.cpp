@@ -1,9 +1,8 @@
 // A capture through a rolling shutter is learnt as well as one of cameras that stand still; by who ignores it, worse.
-#include "capture.hpp"
+#include "runs.hpp"
 
 #include <gart/camera/models.hpp>
 #include <gart/render/render_image.hpp>
-#include <gart/train/trainer.hpp>
 
 #include <vector>
 
@@ -47,8 +46,7 @@ double trained(E& exec, std::vector<gart::camera> const& taken_by, std::vector<g
   gart::train_options options;
   options.iterations = 200;
   options.densify = gart::densify_kind::none;
-  gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::primitive_strategy> run(exec, options, data,
-                                                                                              start);
+  run_of<E> run(exec, options, data, start);
   for (int i = 0; i < options.iterations; ++i) run.step();
   double squares = 0;
   std::size_t count = 0;

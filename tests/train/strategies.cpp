@@ -1,8 +1,6 @@
 // Training by each strategy: the same loss curve, also where a step has to do with less memory, and with sums in a
 // fixed order the same bits twice.
-#include "capture.hpp"
-
-#include <gart/train/trainer.hpp>
+#include "runs.hpp"
 
 #include <concepts>
 #include <string>
@@ -28,8 +26,7 @@ course train(E& exec, gart::dataset const& data, u64 seed, u64 lt_budget = 0) {
   options.lt_budget = lt_budget;
   options.iterations = steps;
   options.densify = gart::densify_kind::none;
-  gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy> run(exec, options, data,
-                                                                              cloud(seed + 1, 0.7f));
+  run_of<E, Strategy> run(exec, options, data, cloud(seed + 1, 0.7f));
   course out;
   for (int i = 0; i < steps; ++i) {
     auto const report = run.step();

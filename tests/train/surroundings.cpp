@@ -1,9 +1,8 @@
 // What a trainer takes from its surroundings where the options say nothing: the LT buffer's budget from the memory that
 // is free, and the rate of the bands from whether the capture has points.
-#include "capture.hpp"
+#include "runs.hpp"
 
 #include <gart/exec/serial.hpp>
-#include <gart/train/trainer.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -23,7 +22,7 @@ template <class Strategy, class E>
 std::string taken_by(E& exec, gart::dataset const& data, gart::u64 lt_budget) {
   gart::train_options options;
   options.lt_budget = lt_budget, options.densify = gart::densify_kind::none;
-  gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy> run(exec, options, data, cloud(5, 0.7f));
+  run_of<E, Strategy> run(exec, options, data, cloud(5, 0.7f));
   return run.step().backward;
 }
 
@@ -33,9 +32,7 @@ float moved(gart::dataset const& data) {
   gart::train_options options;
   options.densify = gart::densify_kind::none, options.sh_every = 1;
   gart::gaussian_model const start = cloud(5, 0.7f);
-  gart::trainer<gart::serial_exec, gart::scene_traits<1>, gart::tile_tracer<gart::serial_exec>,
-                gart::primitive_strategy>
-      run(exec, options, data, start);
+  run_of<gart::serial_exec> run(exec, options, data, start);
   for (int i = 0; i < 3; ++i) run.step();
   gart::gaussian_model const model = run.model();
   float most = 0;

@@ -1,8 +1,6 @@
 // A capture in other units, its poses and starting points with it, trains along the same curve: every length of a
 // training is stated in the scene's extent.
-#include "capture.hpp"
-
-#include <gart/train/trainer.hpp>
+#include "runs.hpp"
 
 #include <cmath>
 #include <vector>
@@ -27,8 +25,7 @@ std::vector<float> losses(E& exec, gart::dataset data, gart::gaussian_model star
   options.error.from = options.mcmc.from = options.adc.from = 10;
   options.error.every = options.mcmc.every = options.adc.every = 10;
   options.adc.gradient = 2e-3f;
-  gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::deterministic_strategy> run(exec, options, data,
-                                                                                                  start);
+  run_of<E, gart::deterministic_strategy> run(exec, options, data, start);
   std::vector<float> out;
   for (int i = 0; i < steps; ++i) out.push_back(run.step().loss);
   CHECK(run.scene().size() > 150);

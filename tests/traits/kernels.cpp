@@ -1,5 +1,6 @@
 // Generalised Gaussians of every degree: hits, image and gradients against the oracle, and one tracer against another.
 #include <render/agreement.hpp>
+#include <support/trace_scene.hpp>
 
 #include <cstring>
 
@@ -64,7 +65,7 @@ void require_same_bits(lists const& a, lists const& b) {
 // The hits by tile lists, which those of every other tracer equal.
 template <class Response, class E>
 lists hits_by_every_tracer(E& exec, oracle::scene const& s) {
-  auto const by = [&](tracer_kind kind) { return hit_lists<Response>(exec, s.model, s.view, s.options, kind); };
+  auto const by = [&](tracer_kind kind) { return hit_lists_of<Response>(exec, s.model, s.view, s.options, kind); };
   lists const hits = by(tracer_kind::tiles);
   require_same_bits(hits, by(tracer_kind::bvh));
 #if defined(GART_WITH_EMBREE)

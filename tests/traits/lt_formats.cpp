@@ -1,5 +1,6 @@
 // What a slot of the LT buffer keeps of a hit in each format, and what that costs in gradients, against the oracle.
 #include <render/agreement.hpp>
+#include <support/trace_scene.hpp>
 
 #include <cstring>
 

@@ -1,0 +1,37 @@
+#pragma once
+// Trainings of the small capture. The trainers that several tests take are compiled once, in runs.cpp (gart_test's
+// BODIES train_runs): here they are not to be instantiated.
+
+#include <train/capture.hpp>
+
+#include <gart/trace/tile_tracer.hpp>
+#include <gart/train/trainer.hpp>
+
+namespace gart_test {
+
+template <class E, class Strategy = gart::primitive_strategy>
+using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy>;
+
+// The Gaussians of the capture stand still: what is learned besides them is learned alone.
+inline gart::train_options still(int iterations) {
+  gart::train_options options;
+  options.iterations = iterations;
+  options.max_gaussians = 400;
+  options.densify = gart::densify_kind::none;
+  options.sh_every = 1;
+  auto& r = options.rates;
+  r.mean = r.mean_final = r.log_scale = r.quaternion = r.opacity = r.sh_dc = r.sh_rest = 0;
+  return options;
+}
+
+}  // namespace gart_test
+
+// Of a policy: `extern` in all files but one.
+#define GART_TEST_TRAINER(E, Strategy) \
+  template class gart::basic_trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy, gart::self_comm>
+#define GART_TEST_TRAINERS_ELSEWHERE(E)                  \
+  extern GART_TEST_TRAINER(E, gart::primitive_strategy); \
+  extern GART_TEST_TRAINER(E, gart::hybrid_strategy);    \
+  extern GART_TEST_TRAINER(E, gart::pixel_strategy);     \
+  extern GART_TEST_TRAINER(E, gart::deterministic_strategy);
+GART_TEST_EACH_POLICY(GART_TEST_TRAINERS_ELSEWHERE)
