@@ -59,6 +59,8 @@ std::vector<field> const& fields() {
       named("error.until", [](options& o) -> float& { return o.error.until; }),
       named("error.dead_opacity", [](options& o) -> float& { return o.error.dead_opacity; }),
       named("error.opacity_penalty", [](options& o) -> float& { return o.error.opacity_penalty; }),
+      named("error.split.share", [](options& o) -> float& { return o.error.split.share; }),
+      named("error.split.opacity", [](options& o) -> float& { return o.error.split.opacity; }),
       named("error.pixels_each", [](options& o) -> float& { return o.error.pixels_each; }),
       named("error.least_budget", [](options& o) -> int& { return o.error.least_budget; }),
       named("mcmc.growth", [](options& o) -> float& { return o.mcmc.growth; }),

@@ -41,7 +41,7 @@ TEST_CASE("halves end where the whole ended, and are as thick in their middles a
   for (int i = 0; i < 200; ++i) {
     vec3 const log_scale(3 * uniform(random), 3 * uniform(random), 3 * uniform(random));
     quaternion const q{uniform(random), uniform(random), uniform(random), uniform(random)};
-    split_half const half = split_long_axis(log_scale, q, 0.5f);
+    split_half const half = split_long_axis({}, log_scale, q, 0.5f);
     double const norm = std::sqrt(double{q.w} * q.w + double{q.x} * q.x + double{q.y} * q.y + double{q.z} * q.z);
     if (norm < 1e-2) continue;
     // The offset in the body's axes, by q^-1 v q.

@@ -93,6 +93,7 @@ struct error_split_kernel {
   gaussians_view<float> model;
   u32 const* rows;
   row_owners owners;
+  split_shape shape;
   bool second;  // of the halves
   float least_opacity;
   GART_KERNEL void operator()(index_t k) const {
@@ -103,7 +104,7 @@ struct error_split_kernel {
     float* const s = model.log_scale + 3 * row;
     vec3 const mean(m[0], m[1], m[2]);
     split_half const half =
-        split_long_axis(vec3(s[0], s[1], s[2]), {q[0], q[1], q[2], q[3]}, sigmoid(model.opacity[row]));
+        split_long_axis(shape, vec3(s[0], s[1], s[2]), {q[0], q[1], q[2], q[3]}, sigmoid(model.opacity[row]));
     float const opacity = half.opacity > least_opacity ? half.opacity : least_opacity;
     vec3 const center = second ? mean - half.offset : mean + half.offset;
     for (int c = 0; c < 3; ++c) m[c] = center[c], s[c] = half.log_scale[c];
@@ -235,7 +236,7 @@ class error_growth {
       clear_moments(*exec_, state, to, owners);
       for (bool const second : {false, true})
         parallel_for(*exec_, "error_split", draws,
-                     detail::error_split_kernel{model.view(), (second ? to : from).data(), owners, second,
+                     detail::error_split_kernel{model.view(), (second ? to : from).data(), owners, options_.split, second,
                                                 1.01f * options_.dead_opacity});
     }
     clear_statistic(model.size());

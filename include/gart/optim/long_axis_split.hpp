@@ -9,6 +9,7 @@
 /// training views by heart.
 
 #include <gart/math/quaternion.hpp>
+#include <gart/optim/options.hpp>
 
 #include <cmath>
 
@@ -21,19 +22,17 @@ struct split_half {
   float opacity;   ///< of each
 };
 
-/// q: the halves' centres lie at +-q 3 s.
-inline constexpr float split_share = 0.45f, split_opacity = 0.6f;  ///< what opacity is multiplied by
-
 /// The halves of a Gaussian of this opacity, in (0, 1).
-GART_HD inline split_half split_long_axis(vec3 const& log_scale, quaternion const& rotation, float opacity) {
+GART_HD inline split_half split_long_axis(split_shape const& shape, vec3 const& log_scale, quaternion const& rotation,
+                                          float opacity) {
   int const axis = log_scale.x >= log_scale.y   ? (log_scale.x >= log_scale.z ? 0 : 2)
                    : log_scale.y >= log_scale.z ? 1
                                                 : 2;
-  float const thickness = sqrtf(1.0f - split_share * split_share);
-  split_half out{vec3(0.0f), log_scale, split_opacity * opacity};
-  for (int k = 0; k < 3; ++k) out.log_scale[k] += logf(k == axis ? 1.0f - split_share : thickness);
+  float const thickness = sqrtf(1.0f - shape.share * shape.share);
+  split_half out{vec3(0.0f), log_scale, shape.opacity * opacity};
+  for (int k = 0; k < 3; ++k) out.log_scale[k] += logf(k == axis ? 1.0f - shape.share : thickness);
   if (norm2(rotation) > quaternion_norm2_min)
-    out.offset = to_matrix(rotation)[axis] * (3.0f * split_share * expf(log_scale[axis]));
+    out.offset = to_matrix(rotation)[axis] * (3.0f * shape.share * expf(log_scale[axis]));
   return out;
 }
 

@@ -49,6 +49,12 @@ struct mcmc_options {
   float opacity_penalty = 0.01f, scale_penalty = 0.014f;  ///< the scale in units of the extent
 };
 
+/// How one Gaussian becomes two along its longest axis (optim/long_axis_split.hpp).
+struct split_shape {
+  float share = 0.45f;   ///< q, in (0, 1): the halves' centres lie at +-q 3 s, and they are 1 - q times as long
+  float opacity = 0.6f;  ///< what opacity is multiplied by
+};
+
 /// Of growth by error (optim/error_growth.hpp).
 struct error_growth_options {
   int from = 500, every = 100;     ///< steps: the first, and from one to the next
@@ -56,6 +62,7 @@ struct error_growth_options {
   float until = 5.0f / 6;          ///< share of the run after which the dead stay where they are
   float dead_opacity = 0.005f;     ///< as least_opacity has it for the alpha_min traced with
   float opacity_penalty = 0.003f;  ///< times the mean opacity
+  split_shape split;               ///< how one becomes two
   /// The count ends at one Gaussian for so many pixels of the training views: more would learn them by heart. 0: at
   /// max_gaussians, whatever the capture.
   float pixels_each = 100;
