@@ -43,9 +43,10 @@ gart::place_view training_run::aligned_to_photographs(std::vector<gart::named_ca
   options.steps = 20, options.blur = 0.01f;
   return [this, renderer, options, exposures = session_->exposures(), &found](gart::dataset_view const& view) mutable {
     options.exposed = exposures.at(view.view);
-    found.push_back(
-        {view.name,
-         gart::track(*renderer, gart::composited(view.image, eval_background_), view.view, options, view.mask).view});
+    gart::camera at = view.view;
+    if (writes_)
+      at = gart::track(*renderer, gart::composited(view.image, eval_background_), at, options, view.mask).view;
+    found.push_back({view.name, ranks::agreed(at)});
     return found.back().view;
   };
 }

@@ -132,10 +132,10 @@ class basic_trainer {
   // With ranks (trainer_ranks_impl.hpp).
   void require_ranks() const;
   step_report step_in_ranks(loss_function<E> const& loss) requires(!Comm::alone);
-  void trace_unit(loss_function<E> const& loss, std::size_t index, int image, int degree, learning_rates const& rates,
+  void trace_unit(loss_function<E> const& loss, camera const& seen, int image, int degree, image_result& result,
                   step_report& report) requires(!Comm::alone);
-  void gather_values(int views, std::vector<float>& values) requires(!Comm::alone);
-  void take_gradients(camera const& view, int v, int image) requires(!Comm::alone);
+  void gather_results(span<image_result> round, bool metrics) requires(!Comm::alone);
+  void take_gradients(camera const& view, int v, int image, image_result& result) requires(!Comm::alone);
   rendered render_in_ranks(camera const& view, vec3 background) requires(!Comm::alone);
   bool in_ranks() const { return !Comm::alone && (comm_.size() > 1 || options_.batch > 1); }
   // What of values of all Gaussians is this rank's, and the way back.

@@ -69,7 +69,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
   }
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
-  error_.set_batch(options.batch), mcmc_.set_batch(options.batch);
+  error_.set_batch(options.batch), mcmc_.set_batch(options.batch), adc_.set_batch(options.batch);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -167,7 +167,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
       depth = supervision_.depth(), transmittance = supervision_.transmittance();
     else
       depth = depth_.to_host(), transmittance = transmittance_.to_host();
-    poses_->set_metric(index, {depth.data(), depth.size()}, {transmittance.data(), transmittance.size()});
+    poses_->set_metric(index, poses_->metric_of(index, depth, transmittance));
   }
 }
 
@@ -183,7 +183,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates c
   density_change change;
   if (grows_by_error()) change = error_.after_step(scene_, state_, step_, rows);
   if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean, rows);
-  if (use_adc) change = adc_.after_step(scene_, state_, step_);
+  if (use_adc) change = adc_.after_step(scene_, state_, step_, rows);
   total_ += change.added - change.removed;
   if (change.added || change.removed) gradients_.resize_keep(scene_.size());
 }
