@@ -158,7 +158,7 @@ void add_convert(CLI::App& app, command& selected) {
       ->type_name("NUMBERS");
   convert
       ->add_option("--sh-bits", a->sh_bits,
-                   "SPZ: bits of a coefficient of degree 1, and of those above, 1 to 8\n(default: 5,5)")
+                   "SPZ: bits of a coefficient of degree 1, and of those above, 1 to 8\n(default: 6,6)")
       ->type_name("A,B");
   convert
       ->add_option("--palette", a->packing.palette,
