@@ -20,7 +20,7 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr double root = 1.41421356237309504880;
-constexpr std::size_t palette_columns = 64, most_rows = 65536, gaussians_a_row = 6;
+constexpr std::size_t palette_columns = 64, most_rows = 65536, gaussians_a_row = 4;
 // Steps of logarithms of scales and of the coefficients of degree 0. Those above have a step that adds so much to the
 // squared error of the palette, in which they are.
 constexpr double scale_step = 1.0 / 16, base_step = 0.03, error_added = 0.2;
