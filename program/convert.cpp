@@ -162,8 +162,7 @@ void add_convert(CLI::App& app, command& selected) {
       ->type_name("A,B");
   convert
       ->add_option("--palette", a->packing.palette,
-                   "SOG: rows of coefficients that all Gaussians share, to 65536\n(default: a twelfth of their "
-                   "number)")
+                   "SOG: rows of coefficients that all Gaussians share, to 65536\n(default: one for four of them)")
       ->type_name("N")
       ->check(between(1, 65536));
   convert->add_flag("--quiet", a->quiet, "Say nothing but errors");
