@@ -1,9 +1,11 @@
 """The part `formats` of bench/run.py: what each format of models costs (docs/formats.md).
 
 Each --model NAME PLY CAPTURE is written in every format and setting by `gart convert` and scored against the capture's
-test views by `gart eval`, with the model itself. --train holds options of gart eval, as --downscale 4.
+test views by `gart eval`, with the model itself. --train holds options of gart eval, as --downscale 4; --filter chooses
+settings by their names, and the PLY is always among them.
 """
 import os
+import re
 import shlex
 
 from common import Failure, last_line, run
@@ -15,15 +17,15 @@ SETTINGS = (("PLY", ".ply", []),
             ("compressed PLY", ".compressed.ply", []),
             ("SPZ", ".spz", []),
             ("SPZ, bits 5,4", ".spz", ["--sh-bits", "5,4"]),
-            ("SPZ, bits 6,6", ".spz", ["--sh-bits", "6,6"]),
+            ("SPZ, bits 5,5", ".spz", ["--sh-bits", "5,5"]),
             ("SPZ, bits 8,8", ".spz", ["--sh-bits", "8,8"]),
             ("SPZ, SH 2", ".spz", ["--sh-degree", "2"]),
             ("SPZ, SH 1", ".spz", ["--sh-degree", "1"]),
             ("SPZ, SH 0", ".spz", ["--sh-degree", "0"]),
             ("SPZ, no opacity under 0.02", ".spz", ["--prune", "0.02"]),
             ("SOG", ".sog", []),
-            ("SOG, palette of 320", ".sog", ["--palette", "320"]),
-            ("SOG, palette of 2560", ".sog", ["--palette", "2560"]),
+            ("SOG, palette of 512", ".sog", ["--palette", "512"]),
+            ("SOG, palette of 4096", ".sog", ["--palette", "4096"]),
             ("SOG, SH 0", ".sog", ["--sh-degree", "0"]),
             ("splat", ".splat", []))
 
@@ -32,7 +34,8 @@ class Formats:
     def formats(self):
         for name, ply, capture in self.a.model:
             runs = []
-            for setting, ending, options in SETTINGS:
+            wanted = [s for s in SETTINGS if s is SETTINGS[0] or re.search(self.a.filter, s[0])]
+            for setting, ending, options in wanted:
                 out = os.path.join(self.temporary, "model" + ending)
                 scores = os.path.join(self.temporary, "scores.json")
                 done = run([self.program("gart"), "convert", ply, out, *options])

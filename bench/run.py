@@ -292,7 +292,7 @@ def arguments():
     parser.add_argument("--views", type=int, default=4, help="cameras of the strategies")
     parser.add_argument("--repeats", type=int, default=20, help="measured steps a camera; the median counts")
     parser.add_argument("--backend", default="cuda", help="of traits, tradeoff and the trainings")
-    parser.add_argument("--filter", default=".", help="stages and cpu: benchmarks by regular expression")
+    parser.add_argument("--filter", default=".", help="stages and cpu: benchmarks, formats: settings, by regular expression")
     parser.add_argument("--min-time", type=float, default=0.2, help="stages and cpu: seconds a benchmark")
     parser.add_argument("--model", nargs=3, action="append", default=[], metavar=("NAME", "PLY", "CAMERAS"),
                         help="tradeoff, and traits, which takes the first: a trained model and its capture or camera "

@@ -158,12 +158,11 @@ void add_convert(CLI::App& app, command& selected) {
       ->type_name("NUMBERS");
   convert
       ->add_option("--sh-bits", a->sh_bits,
-                   "SPZ: bits of a coefficient of degree 1, and of those above, 1 to 8\n(default: 5,5)")
+                   "SPZ: bits of a coefficient of degree 1, and of those above, 1 to 8\n(default: 6,6)")
       ->type_name("A,B");
   convert
       ->add_option("--palette", a->packing.palette,
-                   "SOG: rows of coefficients that all Gaussians share, to 65536\n(default: a twelfth of their "
-                   "number)")
+                   "SOG: rows of coefficients that all Gaussians share, to 65536\n(default: one for four of them)")
       ->type_name("N")
       ->check(between(1, 65536));
   convert->add_flag("--quiet", a->quiet, "Say nothing but errors");

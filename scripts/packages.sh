@@ -39,13 +39,16 @@ install_packages() {
     fail "apt-get could not install $missing: see above"
 }
 
-# What a test is skipped without.
+# A command that a test is skipped without, and its package where that has another name. What apt knows of its packages may
+# be missing or old: it is asked again where it cannot.
 wish_for() {
-  local package=$1 root=()
-  [[ $(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null) == installed ]] && return
+  local command=$1 package=${2:-$1} root=() install
+  command -v "$command" >/dev/null && return
+  say "packages: installing $package"
   [[ $(id -u) == 0 ]] || root=(sudo)
-  "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "$package" ||
-    say "no $package here: the test that needs it is skipped"
+  install=("${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "$package")
+  "${install[@]}" || { "${root[@]}" apt-get update -q && "${install[@]}"; } ||
+    say "no $command here: the test that needs it is skipped"
 }
 
 # The options that both builds share; the compiler cache where there is one.

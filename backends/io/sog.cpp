@@ -20,7 +20,10 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr double root = 1.41421356237309504880;
-constexpr std::size_t palette_columns = 64, most_rows = 65536, gaussians_a_row = 12;
+constexpr std::size_t palette_columns = 64, most_rows = 65536, gaussians_a_row = 4;
+// Steps of logarithms of scales and of the coefficients of degree 0. Those above have a step that adds so much to the
+// squared error of the palette, in which they are.
+constexpr double scale_step = 1.0 / 16, base_step = 0.03, error_added = 0.2;
 constexpr u8 first_tag = 252;  // of the largest component w; then x, y, z
 
 double squeezed(double x) { return x < 0 ? -std::log1p(-x) : std::log1p(x); }
@@ -177,7 +180,7 @@ class sog_writer {
     texture quats = blank(), scales = blank(), colors = blank();
     std::vector<float> base;
     for (std::size_t i = 0; i < n; ++i) base.insert(base.end(), &m_.sh[3 * k * i], &m_.sh[3 * k * i] + 3);
-    codebook const scale(m_.log_scale), color(base);
+    auto const scale = codebook::even(m_.log_scale, scale_step), color = codebook::even(base, base_step);
     for (std::size_t i = 0; i < n; ++i) {
       pack_rotation(&m_.quaternion[4 * i], &quats.rgba[4 * i]);
       for (std::size_t c = 0; c < 3; ++c) {
@@ -239,7 +242,7 @@ class sog_writer {
     std::size_t const usual = std::max(palette_columns, n / gaussians_a_row / palette_columns * palette_columns);
     std::size_t const count = std::min(packing.palette ? static_cast<std::size_t>(packing.palette) : usual, most_rows);
     palette const p = shared_rows(rows, weights(), 3 * rest, count);
-    codebook const value(p.rows);
+    auto const value = codebook::even(p.rows, std::sqrt(12 * error_added * p.error));
     std::size_t const lines = std::max<std::size_t>(1, (p.count() + palette_columns - 1) / palette_columns);
     texture table(static_cast<int>(palette_columns * rest), static_cast<int>(lines)), labels = blank();
     for (std::size_t i = 0; i < p.rows.size(); ++i) table.rgba[4 * (i / 3) + i % 3] = value.nearest(p.rows[i]);

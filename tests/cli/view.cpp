@@ -9,6 +9,8 @@
 
 #include <support/policies.hpp>
 
+#include <cstring>
+
 using namespace cli_test;
 
 namespace {
@@ -147,6 +149,51 @@ TEST_CASE("the background that a model was trained on is known by the config.jso
         std::string(R"({"chosen":[{"option":"--background","value":"white"}]})")}) {
     CAPTURE(other);
     CHECK(background_with(other).empty());
+  }
+}
+
+TEST_CASE("a view at rest is what render writes, before it is a JPEG") {
+  folder const here;
+  write_capture(here / "capture");
+  gart::write_splat_ply(here / "model.ply", one_gaussian());
+  outcome ended;
+  std::thread program([&] {
+    ended = here.gart_interrupted_at("gart: viewer:", "view model.ply capture --backend serial --background white");
+  });
+  address const look = printed_address(here / "stdout.txt", "Look alone");
+  std::vector<gart::named_camera> views;
+  std::vector<std::string> seen;
+  {
+    gart_test::socket_client client(look.port);
+    REQUIRE(has(client.ask(upgrade(look)), " 101 "));
+    auto const hello = heard(client, "hello", [](nlohmann::json const&) { return true; });
+    REQUIRE(hello["cameras"].size() == 6);
+    for (auto const& listed : hello["cameras"]) {
+      nlohmann::json camera = listed["camera"];
+      client.say(R"({"type":"view","id":1,"mode":"colour","moving":false,"camera":)" + camera.dump() + "}");
+      auto frame = client.hear();
+      while (frame.opcode == 1) frame = client.hear();
+      REQUIRE(frame.opcode == 2);
+      gart::u32 header = 0;
+      std::memcpy(&header, frame.payload.data(), 4);
+      seen.push_back(frame.payload.substr(4 + header));
+      camera["name"] = "view" + std::to_string(seen.size() - 1);
+      gart::write_file(here / (camera["name"].get<std::string>() + ".json"), nlohmann::json::array({camera}).dump());
+    }
+    client.say("no message");  // which is logged
+    while (client.hear().opcode == 1) continue;
+  }
+  program.join();
+  CHECK(ended.code == 130);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    CAPTURE(i);
+    std::string const name = "view" + std::to_string(i);
+    auto const run =
+        here.gart("render model.ply " + name + ".json --out out --backend serial --background white --quiet");
+    REQUIRE_MESSAGE(run.code == 0, run.err);
+    auto const jpeg = gart::encode_jpeg(gart::read_image(here / ("out/" + name + ".png")), 95);
+    CHECK(seen[i] == std::string(jpeg.begin(), jpeg.end()));
+    CHECK((i == 0 || seen[i] != seen[0]));
   }
 }
 

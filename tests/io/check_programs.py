@@ -1,10 +1,11 @@
 """gart convert against other programs, both ways: @playcanvas/splat-transform reads what gart writes as gart reads it,
 and the other way round; gltf-validator has nothing to say of a GLB but that it does not know the extension's names.
 
-    python3 check_programs.py GART
+    python3 check_programs.py GART FOLDER
 
-Skipped (exit 77) where there is no node, or where the packages are in no folder node_modules: of GART_NODE_MODULES, of
-the working folder, or npm's own. `npm install @playcanvas/splat-transform gltf-validator` puts them there."""
+npm fetches the packages of programs/package-lock.json to FOLDER, where they stay. Skipped (exit 77), with the reason,
+where there is no node or npm, or npm cannot fetch them."""
+import filecmp
 import json
 import math
 import os
@@ -16,6 +17,7 @@ import sys
 import tempfile
 
 PACKAGES = ("@playcanvas/splat-transform", "gltf-validator")
+LISTED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "programs")
 VALIDATE = """const v = require(process.argv[1]), fs = require('fs');
 v.validateBytes(new Uint8Array(fs.readFileSync(process.argv[2]))).then(r => console.log(JSON.stringify(r.issues)));"""
 
@@ -27,13 +29,30 @@ def run(*command):
     return done.stdout
 
 
-def modules():
-    if not shutil.which("node"):
-        return None
-    folders = [os.environ.get("GART_NODE_MODULES", ""), os.path.join(os.getcwd(), "node_modules")]
-    if shutil.which("npm"):
-        folders.append(run("npm", "root", "-g").strip())
-    return next((f for f in folders if f and all(os.path.isdir(os.path.join(f, p)) for p in PACKAGES)), None)
+def skip(why):
+    print("skipped: " + why)
+    sys.exit(77)
+
+
+def modules(folder):
+    for program in ("node", "npm"):
+        if not shutil.which(program):
+            skip(f"{program} is not here (apt-get install nodejs npm)")
+    os.makedirs(folder, exist_ok=True)
+    lock, wanted = (os.path.join(f, "package-lock.json") for f in (folder, LISTED))
+    # npm writes its own lock last: what was fetched in part is fetched again.
+    fetched = os.path.exists(os.path.join(folder, "node_modules", ".package-lock.json"))
+    if not (fetched and os.path.exists(lock) and filecmp.cmp(lock, wanted, shallow=False)):
+        for name in ("package.json", "package-lock.json"):
+            shutil.copy(os.path.join(LISTED, name), folder)
+        try:
+            npm = subprocess.run(["npm", "ci", "--no-audit", "--no-fund", "--silent", "--prefer-offline", "--ignore-scripts",
+                                  "--fetch-retries=1", "--fetch-timeout=20000"], cwd=folder, timeout=180)
+        except subprocess.TimeoutExpired:
+            npm = None
+        if npm is None or npm.returncode != 0:
+            skip("npm could not fetch " + " and ".join(PACKAGES) + " (is there a network?)")
+    return os.path.join(folder, "node_modules")
 
 
 def write(path, count):
@@ -88,10 +107,7 @@ def compare(what, ours, theirs, turn):
 
 
 def main():
-    gart, found = sys.argv[1], modules()
-    if not found:
-        print("skipped: no node with " + " and ".join(PACKAGES))
-        sys.exit(77)
+    gart, found = sys.argv[1], modules(sys.argv[2])
     other = lambda *a: run("node", os.path.join(found, PACKAGES[0], "bin", "cli.mjs"), "-q", "-w", "-g", "cpu", *a)
     with tempfile.TemporaryDirectory() as folder:
         at = lambda name: os.path.join(folder, name)

@@ -92,7 +92,7 @@ TEST_CASE("each format gives back what it was given, within its quantum") {
       {"GLB", {0, 1e-6, 1e-6, 1e-6, 0, 0}},
       {"SPZ", {0.51 / 1048576, 0.51 / 16, 0.003, 0.51 / 255, 0.51 / 255 / 0.15, 0.51 / 16}},
       {"compressed PLY", {0.02, 0.01, 0.003, 0.51 / 255, 0.02, 0.51 / 32}},
-      {"SOG", {3e-4, 0.6, 0.012, 0.51 / 255, 0.1, 1.2}},
+      {"SOG", {3e-4, 0.51 / 16, 0.012, 0.51 / 255, 0.51 * 0.03, 1.2}},
       {"splat", {0, 1e-6, 0.02, 0.51 / 255, 0.51 / 255 / 0.28209, 0}}};
   scratch_folder const folder;
   for (int degree = 0; degree <= 3; ++degree) {
@@ -135,6 +135,40 @@ TEST_CASE("SPZ's coefficients have the bits that are asked for") {
     last = rest;
   }
   CHECK(holds(error_of([&] { gart::write_splats(folder.path / "m.spz", model, {}, {.sh_bits = 9}); }), "1 to 8"));
+}
+
+TEST_CASE("SOG's palette has the rows that there are, and is nearer the more it has") {
+  if (without("SOG")) return;
+  scratch_folder const folder;
+  std::mt19937_64 random(seed());
+  CAPTURE(seed());
+  std::normal_distribution<float> normal;
+  std::vector<float> kinds(40 * 45);
+  for (float& v : kinds) v = 0.3f * normal(random);
+  auto const error = [&](gart::gaussian_model const& model, int rows) {
+    gart::write_splats(folder.path / "m.sog", model, {}, {.palette = rows});
+    auto const back = gart::read_splats(folder.path / "m.sog");
+    auto const of = matched(model, back);
+    double squares = 0;
+    for (std::size_t i = 0; i < model.size(); ++i) {
+      for (std::size_t c = 3; c < 48; ++c) {
+        double const d = static_cast<double>(model.sh[48 * i + c] - back.sh[48 * of[i] + c]);
+        squares += d * d;
+      }
+    }
+    return std::sqrt(squares / static_cast<double>(45 * model.size()));
+  };
+  // Forty kinds of Gaussians, a thousandth apart within each.
+  auto model = random_model(900, 3);
+  for (std::size_t i = 0; i < model.size(); ++i)
+    for (std::size_t c = 3; c < 48; ++c)
+      model.sh[48 * i + c] = kinds[45 * (i % 40) + c - 3] + 1e-3f * std::clamp(normal(random), -3.0f, 3.0f);
+  CHECK(error(model, 128) < 0.01);
+
+  model = random_model(900, 3);
+  double const few = error(model, 64), more = error(model, 256), all = error(model, 900);
+  CHECK(more < few);
+  CHECK(all < 0.01);
 }
 
 TEST_CASE("what a format has no room for is refused or listed") {

@@ -28,8 +28,8 @@ using splat_traits = std::map<std::string, std::string>;
 
 /// How the formats that pack their numbers are written.
 struct splat_packing {
-  int sh1_bits = 5;  ///< SPZ: of a coefficient of degree 1, 1 to 8
-  int sh_bits = 5;   ///< SPZ: of a coefficient of degree 2 or 3, 1 to 8
+  int sh1_bits = 6;  ///< SPZ: of a coefficient of degree 1, 1 to 8
+  int sh_bits = 6;   ///< SPZ: of a coefficient of degree 2 or 3, 1 to 8
   int palette = 0;   ///< SOG: rows of coefficients that all Gaussians share, to 65,536; 0: by their number
 };
 
