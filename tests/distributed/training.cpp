@@ -223,6 +223,8 @@ TEST_CASE("what several ranks do not train yet is refused by field") {
   refused(o, "train_options.densify");
   o = good, o.refine_poses = true;
   refused(o, "train_options.refine_poses");
+  o = good, o.refine_lens = true;
+  refused(o, "train_options.refine_lens");
   o = good, o.exposure = true;
   refused(o, "train_options.exposure");
   o = good, o.shard_block = 0;

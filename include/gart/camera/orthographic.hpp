@@ -7,6 +7,7 @@
 /// The box of an ellipsoid m + A s is m_x +- |A_x|, exactly; where it crosses the plane at `near`, what lies in front
 /// of that: an extreme behind it gives way to that of the section, an ellipse.
 
+#include <gart/camera/lens_slopes.hpp>
 #include <gart/camera/model.hpp>
 
 namespace gart::inline GART_ISA {
@@ -71,6 +72,17 @@ struct orthographic_filter {
   GART_HD GART_INLINE filter_at at(vec3 const&) const { return {sigma, vec3(0.0f)}; }
 };
 
+/// How its rays change with their image points: they keep their direction.
+struct orthographic_slopes {
+  mat3 rotation;  ///< camera to world
+  /// Of any point.
+  GART_HD ray_slopes operator()(float, float, vec3 const&) const {
+    ray_slopes out;
+    out.origin_x = rotation[0], out.origin_y = rotation[1];
+    return out;
+  }
+};
+
 /// The model.
 struct orthographic : camera_base {
   float fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels a world unit, principal point
@@ -99,6 +111,11 @@ struct orthographic : camera_base {
     return out;
   }
 
+  /// Focal lengths and principal point.
+  intrinsics focal() const { return {fx, fy, cx, cy}; }
+  /// How rays change with their image points.
+  orthographic_slopes slopes() const { return {rotation}; }
+
   /// For hits at t > near.
   orthographic_bounds bounds(float near) const {
     require_near(near);
@@ -120,6 +137,6 @@ struct orthographic : camera_base {
   }
 };
 
-static_assert(camera_model<orthographic> && !central_camera<orthographic>);
+static_assert(focal_camera<orthographic> && !central_camera<orthographic>);
 
 }  // namespace gart::inline GART_ISA

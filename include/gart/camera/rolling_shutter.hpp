@@ -163,6 +163,11 @@ struct rolling_shutter : camera_base {
     return out;
   }
 
+  /// Of a lens that has them: focal lengths and principal point.
+  intrinsics focal() const requires focal_camera<Lens> { return lens.focal(); }
+  /// The same: how rays change with their image points.
+  lens_slopes slopes() const requires focal_camera<Lens> { return lens.slopes().turning(lines, turn); }
+
   /// For hits at t > near.
   auto bounds(float near) const {
     using still = decltype(lens.bounds(near));
@@ -187,6 +192,6 @@ struct rolling_shutter : camera_base {
   bool one_to_one() const { return lens.one_to_one(); }
 };
 
-static_assert(camera_model<rolling_shutter<radial_lens>> && camera_model<rolling_shutter<equirectangular>>);
+static_assert(focal_camera<rolling_shutter<radial_lens>> && camera_model<rolling_shutter<equirectangular>>);
 
 }  // namespace gart::inline GART_ISA

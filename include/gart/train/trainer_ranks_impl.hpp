@@ -38,6 +38,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::require_ranks() const {
   if (options_.densify == densify_kind::adc)
     refuse("train_options.densify = adc does not train yet; take mcmc or error");
   if (options_.refine_poses) refuse("train_options.refine_poses is not there");
+  if (options_.refine_lens) refuse("train_options.refine_lens is not there");
   if (options_.exposure && options_.batch > 1)
     throw invalid_argument("train_options.exposure is learned a view a step: take train_options.batch = 1");
   if (has_depth<Strategy> || options_.depth_weight > 0) refuse("train_options.depth_weight is not there");
