@@ -22,7 +22,8 @@ gart::scores training_run::score(gart::some_views const& views, gart::keep_view 
                                  gart::place_view const& place) {
   return gart::evaluate(
       views, eval_background_, session_->exposures(),
-      [this](gart::camera const& c) { return session_->render(session_->as_learned(c), eval_background_); }, keep, place);
+      [this](gart::camera const& c) { return session_->render(session_->as_learned(c), eval_background_); }, keep,
+      place);
 }
 
 // Each test view at the pose where the model, which stays as it is, agrees best with its photograph.
@@ -43,11 +44,9 @@ gart::place_view training_run::aligned_to_photographs(std::vector<gart::named_ca
   options.steps = 20, options.blur = 0.01f;
   return [this, renderer, options, exposures = session_->exposures(), &found](gart::dataset_view const& view) mutable {
     options.exposed = exposures.at(view.view);
-    found.push_back(
-        {view.name,
-         gart::track(*renderer, gart::composited(view.image, eval_background_), session_->as_learned(view.view),
-                     options, view.mask)
-             .view});
+    found.push_back({view.name, gart::track(*renderer, gart::composited(view.image, eval_background_),
+                                            session_->as_learned(view.view), options, view.mask)
+                                    .view});
     return found.back().view;
   };
 }

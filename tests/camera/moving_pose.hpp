@@ -15,7 +15,7 @@ namespace gart_test {
 using gart::shutter_kind;
 
 inline constexpr shutter_kind shutters[] = {shutter_kind::top_to_bottom, shutter_kind::left_to_right,
-                                     shutter_kind::bottom_to_top, shutter_kind::right_to_left};
+                                            shutter_kind::bottom_to_top, shutter_kind::right_to_left};
 
 // Poses of lines by their definition: quaternions along the great circle, positions along the line.
 struct moving_pose {

@@ -84,7 +84,8 @@ expectation expect(oracle::scene const& s, seen_through const& through, std::mt1
     auto const a = moved(h), b = moved(-h), c = moved(2 * h), d = moved(-2 * h);
     for (std::size_t i = 0; i < 3 * pixels.size(); ++i) {
       // What is smooth has the same slope at twice the step, but for h^2, and the same hits.
-      double const near = (a.color[i] - b.color[i]) / (2 * double{h}), far = (c.color[i] - d.color[i]) / (4 * double{h});
+      double const near = (a.color[i] - b.color[i]) / (2 * double{h}),
+                   far = (c.color[i] - d.color[i]) / (4 * double{h});
       bool const smooth = std::abs(near - far) <= 1e-5 * std::abs(near) + 1e-7 && a.hits[i / 3] == base.hits[i / 3] &&
                           b.hits[i / 3] == base.hits[i / 3] && c.hits[i / 3] == base.hits[i / 3] &&
                           d.hits[i / 3] == base.hits[i / 3];
@@ -131,8 +132,7 @@ double worst_of(oracle::scene const& s) {
         ray_gradients_by<degree, Tracer>(exec, s.model, e.view, s.options, s.active_degree, e.weights, true).lens;
     double const by[] = {got.fx, got.fy, got.cx, got.cy};
     double error = 0, norm = 0;
-    for (std::size_t k = 0; k < 4; ++k)
-      error += (by[k] - e.by[k]) * (by[k] - e.by[k]), norm += e.by[k] * e.by[k];
+    for (std::size_t k = 0; k < 4; ++k) error += (by[k] - e.by[k]) * (by[k] - e.by[k]), norm += e.by[k] * e.by[k];
     REQUIRE(norm > 0);
     CHECK(std::sqrt(error / norm) <= 1e-5);
     worst = std::max(worst, std::isfinite(error) ? std::sqrt(error / norm) : HUGE_VAL);
@@ -163,8 +163,9 @@ TEST_CASE_TEMPLATE("a camera without a focal length, and a filter of the pixels,
   sphere.kind = gart::camera_kind::equirectangular, sphere.lens = {};
   image_weights const weights{std::vector<float>(static_cast<std::size_t>(3 * sphere.width * sphere.height)), {}, {}};
   auto const refused = [&](gart::camera const& view, gart::render_options const& options, char const* what) {
-    CHECK_THROWS_WITH_AS((ray_gradients_by<degree, gart::tile_tracer<E>>(exec, s.model, view, options, degree, weights, true)),
-                         doctest::Contains(what), gart::invalid_argument);
+    CHECK_THROWS_WITH_AS(
+        (ray_gradients_by<degree, gart::tile_tracer<E>>(exec, s.model, view, options, degree, weights, true)),
+        doctest::Contains(what), gart::invalid_argument);
   };
   refused(sphere, s.options, "no focal length");
   sphere.shutter = gart::shutter_kind::top_to_bottom, sphere.turn = {0.1f, 0, 0};

@@ -7,10 +7,10 @@
 ///   differentiate_rays(frame, color, {.color = color_gradient}, {.direction = by_direction});
 ///
 /// what a lens is learned by (lens/differentiate_lens.hpp), a camera whose pixels each have a ray of their own, or rays
-/// that something in front of the camera bends. Every ray is walked once more as the pixel strategy does, with nothing to
-/// add to Gaussians: the sums stay with the ray. Colours turn with the ray's direction, and are in it (math/sh_turn.hpp).
-/// Hits, and so the gradient, are the forward pass's for every tracer and camera, through the filter of the pixels too,
-/// as it stands: how the filter changes with a ray is not in it.
+/// that something in front of the camera bends. Every ray is walked once more as the pixel strategy does, with nothing
+/// to add to Gaussians: the sums stay with the ray. Colours turn with the ray's direction, and are in it
+/// (math/sh_turn.hpp). Hits, and so the gradient, are the forward pass's for every tracer and camera, through the
+/// filter of the pixels too, as it stands: how the filter changes with a ray is not in it.
 ///
 /// A direction is a unit, and its gradient stands across it. What a hit's threshold steps by has none.
 ///
@@ -116,8 +116,8 @@ struct ray_gradients : ray_program_base {
     std::size_t const at = 3 * order.address(order.at(i));
     vec3 const &d = s.own.direction, &w = s.by_turn;
     // A turn w moves the direction by w x d; what stands along it changes its length alone.
-    vec3 by = s.by_direction + cross_product<float>(w, d);
-    by -= d * (by.x * d.x + by.y * d.y + by.z * d.z);
+    vec3 by = s.by_direction + glm::cross(w, d);
+    by -= d * glm::dot(by, d);
     for (int k = 0; k < 3; ++k) {
       out.direction[at + static_cast<std::size_t>(k)] = by[k];
       if (out.origin) out.origin[at + static_cast<std::size_t>(k)] = s.by_origin[k];
@@ -139,7 +139,8 @@ void differentiate_rays(Frame& frame, span<float const> color, image_gradients c
     throw invalid_argument("differentiate_rays: the image and its gradient must have three values for each pixel");
   for (span<float const> const& one : {image.depth, image.transmittance})
     if (!one.empty() && one.size() != pixels)
-      throw invalid_argument("differentiate_rays: a gradient by depth or transmittance must have a value for each pixel");
+      throw invalid_argument(
+          "differentiate_rays: a gradient by depth or transmittance must have a value for each pixel");
   if ((!image.depth.empty() && !more.depth) || (!image.transmittance.empty() && !more.transmittance))
     throw invalid_argument("differentiate_rays needs the image's depth or transmittance: give it with the gradient");
   if (!out.direction) throw invalid_argument("differentiate_rays: ray_targets.direction is needed");

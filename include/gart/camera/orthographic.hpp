@@ -24,8 +24,8 @@ struct orthographic_bounds {
     vec3d const m = to_camera * e.center;
     mat3d const a = to_camera * e.axes;
     vec3d const ax(a[0][0], a[1][0], a[2][0]), ay(a[0][1], a[1][1], a[2][1]), az(a[0][2], a[1][2], a[2][2]);
-    double const depth = length(az), reach = fabs(e.center.x) + fabs(e.center.y) + fabs(e.center.z);
-    double const error = 2 * rounding_of_hits * (reach + length(ax) + length(ay) + depth);
+    double const depth = glm::length(az), reach = fabs(e.center.x) + fabs(e.center.y) + fabs(e.center.z);
+    double const error = 2 * rounding_of_hits * (reach + glm::length(ax) + glm::length(ay) + depth);
     footprint out;
     if (!(m.z + depth + error > near)) return out;
     double const nearest = m.z - depth - error;
@@ -39,12 +39,9 @@ struct orthographic_bounds {
   }
 
  private:
-  GART_HD static double dot(vec3d const& a, vec3d const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-  GART_HD static double length(vec3d const& a) { return sqrt(dot(a, a)); }
-
   // Of x over what of the ellipsoid has z >= n; (mx, ax): centre and row of the axis, (mz, az): of depth.
   GART_HD static detail::interval extent(double mx, vec3d const& ax, double mz, vec3d const& az, double n) {
-    double const half = length(ax), zz = dot(az, az), xz = dot(ax, az);
+    double const half = glm::length(ax), zz = glm::dot(az, az), xz = glm::dot(ax, az);
     detail::interval out;
     for (int side = -1; side <= 1; side += 2) {
       double const z = half > 0 ? mz + side * xz / half : mz;

@@ -6,7 +6,8 @@
 ///   lens_differentiation<E> by_lens(exec);
 ///   lens_gradient const g = by_lens(frame, color, {.color = color_gradient});
 ///
-///   dL/d fx = sum over pixels of -x / fx (dL/d ray . d ray / d x),   dL/d cx = sum of -1 / fx (dL/d ray . d ray / d x),
+///   dL/d fx = sum over pixels of -x / fx (dL/d ray . d ray / d x),   dL/d cx = sum of -1 / fx (dL/d ray . d ray / d
+///   x),
 /// x = (u - cx) / fx, and so for y. dL/d ray is backward/differentiate_rays.hpp, d ray / d x the camera's own
 /// (camera/lens_slopes.hpp). It holds for every tracer, any function of the image, and every camera that has a focal
 /// length, whatever its lens and shutter.
@@ -23,7 +24,7 @@ namespace gart::inline GART_ISA {
 
 /// dL/d focal lengths and principal point, in pixels.
 struct lens_gradient {
-  static constexpr int floats = 4;     ///< numbers
+  static constexpr int floats = 4;        ///< numbers
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< by each
   ///@{
   /// Zero, or from four numbers in this order.
@@ -48,15 +49,12 @@ struct weigh_pixels {
     std::size_t const pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(rays.view.height);
     float const u = static_cast<float>(x) + 0.5f, v = static_cast<float>(y) + 0.5f;
     ray_slopes const s = slopes(u, v, rays.of(x, y).direction);
-    float const by_x = dot(by_direction[i], s.direction_x) + dot(by_origin[i], s.origin_x);
-    float const by_y = dot(by_direction[i], s.direction_y) + dot(by_origin[i], s.origin_y);
+    float const by_x = glm::dot(by_direction[i], s.direction_x) + glm::dot(by_origin[i], s.origin_x);
+    float const by_y = glm::dot(by_direction[i], s.direction_y) + glm::dot(by_origin[i], s.origin_y);
     float const by_cx = -by_x / focal.fx, by_cy = -by_y / focal.fy;
     out[i] = by_cx * ((u - focal.cx) / focal.fx), out[pixels + i] = by_cy * ((v - focal.cy) / focal.fy);
     out[2 * pixels + i] = by_cx, out[3 * pixels + i] = by_cy;
   }
-
- private:
-  GART_HD static float dot(vec3 const& a, vec3 const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 };
 
 }  // namespace lens_kernels
@@ -66,9 +64,11 @@ template <execution E>
 class lens_differentiation {
  public:
   /// Allocates nothing; `exec` must outlive it.
-  explicit lens_differentiation(E& exec) : exec_(&exec), by_direction_(exec), by_origin_(exec), parts_(exec), out_(exec) {}
+  explicit lens_differentiation(E& exec)
+      : exec_(&exec), by_direction_(exec), by_origin_(exec), parts_(exec), out_(exec) {}
 
-  /// Into out, [4] in the policy's memory: a lens_gradient's numbers in order. The rest is as differentiate_rays has it.
+  /// Into out, [4] in the policy's memory: a lens_gradient's numbers in order. The rest is as differentiate_rays has
+  /// it.
   template <class Frame>
   void operator()(Frame& frame, span<float const> color, image_gradients const& image, span<float> out,
                   depth_and_transmittance const& more = {}) {

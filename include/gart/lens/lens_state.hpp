@@ -32,7 +32,8 @@ namespace gart::inline GART_ISA {
 inline camera through(camera view, lens_numbers const& by) {
   double const fx = double{view.fx}, fy = double{view.fy};
   view.fx = static_cast<float>(fx * (1 + by[0])), view.fy = static_cast<float>(fy * (1 + by[0]));
-  view.cx = static_cast<float>(double{view.cx} + fx * by[1]), view.cy = static_cast<float>(double{view.cy} + fy * by[2]);
+  view.cx = static_cast<float>(double{view.cx} + fx * by[1]),
+  view.cy = static_cast<float>(double{view.cy} + fy * by[2]);
   return view;
 }
 
@@ -40,7 +41,7 @@ inline camera through(camera view, lens_numbers const& by) {
 inline bool same_lens(camera const& a, camera const& b) {
   auto const all = [](camera const& c) {
     distortion const& l = c.lens;
-    return std::array<float, 22>{c.fx, c.fy, c.cx, c.cy, l.k1, l.k2, l.p1, l.p2,    l.k3,    l.k4,  l.k5,
+    return std::array<float, 22>{c.fx, c.fy, c.cx, c.cy, l.k1, l.k2, l.p1, l.p2, l.k3,    l.k4,    l.k5,
                                  l.k6, l.d1, l.d2, l.d3, l.s1, l.s2, l.s3, l.s4, l.omega, l.alpha, l.beta};
   };
   return a.kind == b.kind && a.width == b.width && a.height == b.height && all(a) == all(b);

@@ -76,7 +76,8 @@ class lens_training {
     return std::min(500, static_cast<int>(options_.warm_up * static_cast<float>(iterations)));
   }
   std::size_t find(camera const& view) const {
-    auto const at = std::find_if(captured_.begin(), captured_.end(), [&](camera const& c) { return same_lens(c, view); });
+    auto const at =
+        std::find_if(captured_.begin(), captured_.end(), [&](camera const& c) { return same_lens(c, view); });
     return static_cast<std::size_t>(at - captured_.begin());
   }
   lens_numbers numbers(std::size_t k) const {
@@ -84,8 +85,8 @@ class lens_training {
   }
 
   lens_options options_;
-  std::vector<camera> captured_;       // one view of each
-  std::vector<std::size_t> of_view_;   // the place there of each training view's
+  std::vector<camera> captured_;      // one view of each
+  std::vector<std::size_t> of_view_;  // the place there of each training view's
   lens_state state_;
 };
 

@@ -109,7 +109,7 @@ class basic_trainer {
   void save(std::filesystem::path const& path) const;
   /// Takes up the run of a checkpoint.
   void load(std::filesystem::path const& path) { set_state(read_checkpoint(path, sh_degree)); }
-  exposure_field exposures() const;         ///< of the views that were trained on; empty where none are learned
+  exposure_field exposures() const;  ///< of the views that were trained on; empty where none are learned
   /// The cameras of the training views, where poses or lenses are learned; else empty.
   std::vector<named_camera> poses() const;
   /// A camera of the capture, at whatever pose, with its lens as it is learned.
@@ -171,9 +171,7 @@ class basic_trainer {
   }
 
   // The camera of a training view, with what is learned of it.
-  camera seen_by(std::size_t index) const {
-    return as_learned(poses_ ? poses_->view(index) : data_.train[index].view);
-  }
+  camera seen_by(std::size_t index) const { return as_learned(poses_ ? poses_->view(index) : data_.train[index].view); }
   bool learns_poses() const { return poses_ && poses_->learns(step_, options_.iterations); }
   bool learns_lenses() const { return lenses_ && lenses_->learns(step_, options_.iterations); }
 
