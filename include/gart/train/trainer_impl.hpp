@@ -72,7 +72,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
     if (options.render.antialias > 0)
       throw invalid_argument(
           "train_options.refine_lens: the filter of the pixels has no gradient by the focal length; set "
-          "train_options.render.antialias to 0");
+          "render_options.antialias to 0");
     std::vector<named_camera> captured;
     for (dataset_view const& view : data.train) captured.push_back({view.name, view.view});
     lenses_.emplace(options.lens, captured);
