@@ -269,6 +269,8 @@ TEST_CASE("what several ranks do not train is refused by field") {
   refused(o, "train_options.shard_block");
   o = good, o.depth_weight = 1;
   refused(o, "train_options.depth_weight");
+  o = good, o.refine_lens = true;
+  refused(o, "train_options.refine_lens");
   o = good, o.shard_block = 0;
   refused(o, "train_options.shard_block");
   o = good, o.batch = -1;

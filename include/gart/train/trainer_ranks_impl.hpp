@@ -38,6 +38,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::require_ranks() const {
   if (options_.refine_poses && options_.shard_block % pose_differentiation<E>::run != 0)
     throw invalid_argument("train_options.shard_block is " + std::to_string(options_.shard_block) +
                            ": with refine_poses a multiple of " + std::to_string(pose_differentiation<E>::run));
+  if (options_.refine_lens) refuse("train_options.refine_lens is not there");
   if (has_depth<Strategy> || options_.depth_weight > 0) refuse("train_options.depth_weight is not there");
 }
 
