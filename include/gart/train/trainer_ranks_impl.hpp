@@ -56,7 +56,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates rates = rates_of_step();
   int const ranks = comm_.size(), batch = options_.batch, before = step_;
-  bool const moves = poses_ && poses_->learns(before, options_.iterations);
+  bool const moves = learns_poses();
   std::vector<image_result> images(static_cast<std::size_t>(batch));  // of the step, in their order
   lt_bytes_ = 0;
   step_report report;
@@ -67,7 +67,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
     std::vector<camera> cameras;
     for (int v = 0; v < views; ++v) {
       std::size_t const index = round.data()[v].view = order_.at(before + done + v);
-      cameras.push_back(poses_ ? poses_->view(index) : data_.train[index].view);
+      cameras.push_back(seen_by(index));
     }
     // Near distance and the like are those of any view; the background is the view's own.
     shards_.round.fetch(std::as_const(scene_).view(), cameras, render_options_of(options_, data_.extent));
@@ -118,7 +118,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   work_unit const unit = shards_.round.unit();
   image_targets targets;
   targets.color = color_.data();
-  bool const measures = poses_ && poses_->learns(step_, options_.iterations) && poses_->wants_metric(index);
+  bool const measures = learns_poses() && poses_->wants_metric(index);
   if (measures) {
     depth_.resize(pixels), transmittance_.resize(pixels);
     targets.depth = depth_.data(), targets.transmittance = transmittance_.data();
@@ -194,7 +194,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(camera con
   finish_gradients(exec_, scene, shards_.prepared, view, options_.render.antialias, shards_.moments, to.view());
   if (grows_by_error()) error_.add_errors(scene_, shards_.moments);
   if (options_.densify == densify_kind::adc) adc_.accumulate(scene_, to, view);
-  if (poses_ && poses_->learns(step_, options_.iterations)) {
+  if (learns_poses()) {
     span<double const> const runs =
         by_pose_.template sum_runs<sh_degree>(scene, std::as_const(to).view(), view.position);
     std::vector<double> mine(runs.size());
