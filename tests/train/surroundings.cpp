@@ -12,9 +12,9 @@ using namespace gart_test;
 
 namespace {
 
-// All but out of memory.
+// All but out of memory: the Gaussians have room, the LT buffer has none.
 struct poor_exec : gart::serial_exec {
-  static std::size_t free_bytes() { return 2; }
+  static std::size_t free_bytes() { return 60'000; }
 };
 static_assert(gart::host_execution<poor_exec>);
 
@@ -51,6 +51,24 @@ TEST_CASE("without a budget the LT buffer takes no more than half of what is fre
   CHECK(taken_by<gart::primitive_strategy>(poor, data, 0) == "pixel");
   CHECK(taken_by<gart::primitive_strategy>(poor, data, gart::u64{1} << 40) == "primitive");
   CHECK(taken_by<gart::deterministic_strategy>(poor, data, 0) == "deterministic");
+}
+
+TEST_CASE("a run that cannot have its Gaussians is refused in bytes before it starts") {
+  gart::serial_exec exec;
+  auto const data = capture(exec, 3);
+  poor_exec poor;
+  gart::train_options options;
+  auto const made = [&] { run_of<poor_exec>(poor, options, data, cloud(5, 0.7f)); };
+  options.densify = gart::densify_kind::mcmc, options.max_gaussians = 163;  // 16 bytes of 23 floats each: 59,984
+  made();
+  options.max_gaussians = 164;
+  CHECK_THROWS_WITH_AS(
+      made(), doctest::Contains("asked for 60352 bytes, 60000 bytes free (164 Gaussians of degree 1 on 1 rank"),
+      gart::out_of_memory);
+  options.densify = gart::densify_kind::none, options.max_gaussians = 1'000'000;
+  made();  // it stays at 150
+  CHECK(gart::least_bytes(200'000'000, 3, 1, 4096) == 188'800'000'000);
+  CHECK(gart::least_bytes(200'000'000, 3, 4, 4096) == 944ull * 50'000'384);  // blocks are whole
 }
 
 TEST_CASE("bands move fast from a capture's points, and at a twentieth of that from random ones") {

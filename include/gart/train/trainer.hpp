@@ -39,6 +39,7 @@
 #include <gart/render/render_image.hpp>
 #include <gart/scene/traits.hpp>
 #include <gart/train/depth_supervision.hpp>
+#include <gart/train/memory_need.hpp>
 #include <gart/train/options.hpp>
 #include <gart/train/shards.hpp>
 #include <gart/train/state.hpp>
@@ -135,6 +136,11 @@ class basic_trainer {
 
   // With ranks (trainer_ranks_impl.hpp).
   void require_ranks() const;
+  static train_options const& with_room(E& exec, Comm& comm, train_options const& options, dataset const& data,
+                                        gaussian_model const& start) {
+    require_room(exec, comm, options, data, sh_degree, start.size());
+    return options;
+  }
   step_report step_in_ranks(loss_function<E> const& loss) requires(!Comm::alone);
   void trace_unit(loss_function<E> const& loss, camera const& seen, int image, int degree, image_result& result,
                   step_report& report) requires(!Comm::alone);

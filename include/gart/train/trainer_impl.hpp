@@ -16,7 +16,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
                                                                 dataset const& data, gaussian_model const& start,
                                                                 Comm comm)
     : exec_(exec),
-      options_(options),
+      options_(with_room(exec, comm, options, data, start)),
       data_(data),
       comm_(std::move(comm)),
       shards_(exec, comm_, std::max<index_t>(options.shard_block, 1)),

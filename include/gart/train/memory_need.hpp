@@ -1,0 +1,56 @@
+#pragma once
+/// \file
+/// What a training needs of memory at the least, known before it starts: of each Gaussian that it may grow to, its
+/// parameters, their gradients and Adam's two moments, 16 bytes a float, 944 at degree 3. Over ranks Gaussians are
+/// spread in whole blocks (comm/row_owners.hpp). Records, lists, images and the LT buffer come on top: they depend on
+/// the views, and a step that finds no room for the LT buffer is done with less.
+///
+/// Errors: out_of_memory, in bytes, before anything is allocated.
+
+#include <gart/comm/communicator.hpp>
+#include <gart/comm/row_owners.hpp>
+#include <gart/core/error.hpp>
+#include <gart/io/dataset.hpp>
+#include <gart/optim/error_growth.hpp>
+#include <gart/train/options.hpp>
+
+#include <algorithm>
+#include <string>
+
+namespace gart::inline GART_ISA {
+
+/// The Gaussians that a run may come to, which starts with so many.
+inline u64 most_gaussians(train_options const& options, dataset const& data, u64 start) {
+  switch (options.densify) {
+    case densify_kind::error:
+      return std::max<u64>(start, growth_budget(options.error, options.max_gaussians, data.training_pixels()));
+    case densify_kind::mcmc:
+      return std::max<u64>(start, options.max_gaussians);
+    default:  // stays as it is, or grows by what it finds
+      return start;
+  }
+}
+
+/// Bytes of the rank that has most, for so many Gaussians on `ranks` ranks.
+inline u64 least_bytes(u64 gaussians, int sh_degree, int ranks, index_t block) {
+  u64 const floats = 11 + 3 * static_cast<u64>(sh_degree + 1) * static_cast<u64>(sh_degree + 1);
+  return 16 * floats * row_owners{ranks, 0, block}.owned(gaussians);
+}
+
+/// Throws where the policy has not even that. Ranks of one host share a host policy's memory.
+template <execution E, class Comm>
+void require_room(E& exec, Comm& comm, train_options const& options, dataset const& data, int sh_degree, u64 start) {
+  u64 sharers = 1;
+  if constexpr (!E::device && requires { comm.ranks_on_host(); }) sharers = static_cast<u64>(comm.ranks_on_host());
+  u64 const free = exec.free_bytes() / sharers, gaussians = most_gaussians(options, data, start);
+  u64 const need = least_bytes(gaussians, sh_degree, comm.size(), std::max<index_t>(options.shard_block, 1));
+  if (free == 0 || need <= free) return;
+  u64 const fit = free / (need / std::max<u64>(gaussians, 1) + 1);
+  throw out_of_memory(E::device ? "CUDA device" : "host", need, free,
+                      std::to_string(gaussians) + " Gaussians of degree " + std::to_string(sh_degree) + " on " +
+                          std::to_string(comm.size()) + (comm.size() == 1 ? " rank" : " ranks") +
+                          " need that much at the least; lower train_options.max_gaussians to less than " +
+                          std::to_string(fit) + ", or the degree, or take more ranks");
+}
+
+}  // namespace gart::inline GART_ISA
