@@ -6,6 +6,7 @@
 #include "ranks.hpp"
 
 #include <gart/runtime/model_file.hpp>
+#include <gart/train/memory_need.hpp>
 
 #include <mutex>
 
@@ -76,6 +77,7 @@ void training_run::prepare() {
     enter();
     prepare_folder(a_.out / "renders");
   }
+  if (ranks::size() > 1) say_memory();
   session_ = gart::make_session(request(), train_options_of(a_), data_, a_.start.empty() ? nullptr : &start_);
   a_.resume ? go_on() : begin_anew();
   trials_ = session_->trials().size();
@@ -98,6 +100,17 @@ gart::configuration_request training_run::request() const {
   auto wanted = configuration_request_of(a_);
   wanted.ranks = ranks::comm();
   return wanted;
+}
+
+// What the ranks will need, before they do.
+void training_run::say_memory() {
+  gart::train_options const options = train_options_of(a_);
+  gart::u64 const begin = a_.start.empty() ? gart::choose_start(data_, options).value.count : start_.size();
+  gart::u64 const most = gart::gaussians_at_end(options, data_, begin);
+  say_.note("each rank needs " +
+            as_bytes(static_cast<double>(
+                gart::least_bytes(most, configuration_.sh_degree, ranks::size(), options.shard_block))) +
+            " at the least, for its part of " + with_commas(most) + " Gaussians, and what the views take");
 }
 
 void training_run::say_choices() {

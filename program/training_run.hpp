@@ -55,6 +55,7 @@ class training_run {
   void prepare();
   void share_out();
   gart::configuration_request request() const;
+  void say_memory();
   void say_choices();
   void enter();
   void load();

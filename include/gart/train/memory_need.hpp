@@ -19,8 +19,8 @@
 
 namespace gart::inline GART_ISA {
 
-/// The Gaussians that a run may come to, which starts with so many.
-inline u64 most_gaussians(train_options const& options, dataset const& data, u64 start) {
+/// The Gaussians that a run may come to, which starts with so many: as many as it is to grow to.
+inline u64 gaussians_at_end(train_options const& options, dataset const& data, u64 start) {
   switch (options.densify) {
     case densify_kind::error:
       return std::max<u64>(start, growth_budget(options.error, options.max_gaussians, data.training_pixels()));
@@ -42,7 +42,7 @@ template <execution E, class Comm>
 void require_room(E& exec, Comm& comm, train_options const& options, dataset const& data, int sh_degree, u64 start) {
   u64 sharers = 1;
   if constexpr (!E::device && requires { comm.ranks_on_host(); }) sharers = static_cast<u64>(comm.ranks_on_host());
-  u64 const free = exec.free_bytes() / sharers, gaussians = most_gaussians(options, data, start);
+  u64 const free = exec.free_bytes() / sharers, gaussians = gaussians_at_end(options, data, start);
   u64 const need = least_bytes(gaussians, sh_degree, comm.size(), std::max<index_t>(options.shard_block, 1));
   if (free == 0 || need <= free) return;
   u64 const fit = free / (need / std::max<u64>(gaussians, 1) + 1);
