@@ -17,8 +17,8 @@ What (comma-separated; default tests and paper):
   formats     every --model in each format and setting, by its test views: bytes, PSNR, SSIM (bench/formats.py)
   view        every --model served by `gart view`, and what a viewer takes from training every --capture (bench/view.py)
   presets     `gart train` with each --preset on every --capture: what they cost in quality
-  rules       `gart train` with each rule of docs/training.md changed alone, --seeds of each (3): a file
-              rules_NAME.json a capture, written after each rule
+  rules       `gart train` with each rule of docs/training.md changed alone (--rules names some), --seeds of each (3):
+              a file rules_NAME.json a capture, written after each rule
   auto        `gart train --auto` against --no-auto on every --capture: scores, seconds, bytes, what was chosen and
               measured; a file auto_NAME.json each
   curves      a short training of every --capture by each strategy, same seed: the loss curves against each other and
@@ -42,22 +42,20 @@ import array
 import glob
 import json
 import os
-import re
 import shlex
 import shutil
 import sys
 import tempfile
-import time
 
-from common import Failure, command_line, commit_of, first_match, last_line, machine, now, run, write_json
+from checks import Checks
+from common import Failure, command_line, commit_of, last_line, machine, now, run, write_json
 from formats import Formats
-from training import LONG_PARTS, Trainings
+from training import LONG_PARTS, RULES, Trainings
 from view import View
 
 TRAININGS = ("presets", "rules", "auto", "curves", "long")
 PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff", "formats",
          "view") + TRAININGS
-SKIPPED = 77
 
 # Rows of docs/traits.md: name, SH degree, kernel degree, options of gart bench.
 TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
@@ -69,7 +67,7 @@ TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
                ("window 16", 3, 2, {"window": 16}), ("window 64", 3, 2, {"window": 64})])
 
 
-class Bench(Trainings, Formats, View):
+class Bench(Checks, Trainings, Formats, View):
     def __init__(self, a):
         self.a = a
         self.commit = commit_of(a.commit)
@@ -151,57 +149,6 @@ class Bench(Trainings, Formats, View):
             return json.load(f)
 
     # The parts.
-
-    def tests(self):
-        programs = sorted(p for p in glob.glob(os.path.join(self.a.build, "tests", "**", "test_*_cuda"), recursive=True)
-                          if os.access(p, os.X_OK) and os.path.isfile(p))
-        if not programs:
-            raise Failure(f"{self.a.build}/tests: no CUDA tests; configure with -DGART_CUDA=ON -DGART_BUILD_TESTS=ON")
-        runs = []
-        for program in programs:
-            name, start = os.path.basename(program), time.time()
-            done = run([program], env={**os.environ, "GART_SCENES": os.path.abspath(self.a.scenes)})
-            result = {0: "passed", SKIPPED: "skipped"}.get(done.returncode, "failed")
-            row = {"test": name, "result": result, "seconds": round(time.time() - start, 1)}
-            totals = re.search(r"assertions:\s*(\d+)", done.stdout)
-            if totals:
-                row["assertions"] = int(totals.group(1))
-            said = re.findall(r"MESSAGE: (.* differ)$", done.stdout, re.MULTILINE)
-            if said:
-                row["said"] = said
-            if result == "failed":
-                errors = re.findall(r"^.* ERROR: .*\n(?:.+\n)*", done.stdout, re.MULTILINE)
-                row["output"] = "".join(errors)[:3000] + done.stdout[-1000:] + done.stderr[-1000:]
-                self.fail(name)
-            self.say(f"{name}: {result}, {row['seconds']} s")
-            runs.append(row)
-        self.write("tests", runs)
-
-    def sanitize(self):
-        sanitizer = shutil.which("compute-sanitizer") or "/usr/local/cuda/bin/compute-sanitizer"
-        if not os.path.exists(sanitizer):
-            raise Failure("compute-sanitizer: not found; it comes with the CUDA toolkit")
-        stem = os.path.join(self.temporary, "small")
-        made = run([self.program("gart_bench"), "--gaussians", 3000, "--size", "96x64", "--write", stem])
-        if made.returncode != 0:
-            raise Failure(f"{stem}: could not be made: {last_line(made.stderr)}")
-        runs = []
-        for tool in ("memcheck", "racecheck"):
-            for tracer in self.a.tracers:
-                for backward in self.a.backwards:
-                    command = [sanitizer, "--tool", tool, "--error-exitcode", "99", self.program("gart"), "bench",
-                               stem + ".ply", stem + ".json", "--backend", "cuda", "--tracer", tracer, "--backward",
-                               backward, "--views", "1", "--warmups", "0", "--repeats", "1", "--quiet"]
-                    done = run(command)
-                    summary = first_match(r"(?:ERROR|RACECHECK) SUMMARY: (.*)$", done.stdout + done.stderr)
-                    row = {"tool": tool, "tracer": tracer, "backward": backward, "summary": summary,
-                           "clean": done.returncode == 0}
-                    if not row["clean"]:
-                        row["output"] = (done.stdout + done.stderr)[:3000]
-                        self.fail(f"{tool}, {tracer}, {backward}: {summary}")
-                    self.say(f"{tool}, {tracer}, {backward}: {summary}")
-                    runs.append(row)
-        self.write("sanitize", runs)
 
     def google_benchmark(self, what, program, arguments, **more):
         path = os.path.join(self.temporary, "stages.json")
@@ -355,7 +302,8 @@ def arguments():
     parser.add_argument("--train", default="",
                         help="the same: options of gart train, in one string; --iterations, where it is not among "
                              "them, is 1000 for curves and 30000 for the others")
-    parser.add_argument("--seeds", type=int, help="auto: runs of each kind, 1 where not given; long: seeds, 5")
+    parser.add_argument("--seeds", type=int, help="auto: runs of each kind, 1 where not given; rules: 3; long: seeds, 5")
+    parser.add_argument("--rules", type=listed, help="rules: those whose name begins with one of these, comma-separated")
     parser.add_argument("--long", type=listed, default=list(LONG_PARTS),
                         help="of " + ",".join(LONG_PARTS) + ": the trainings of long to run")
     parser.add_argument("--clock", default="wall", choices=("wall", "processor"),
@@ -370,6 +318,9 @@ def arguments():
     unknown = [w for w in wanted if w not in PARTS + ("paper",)]
     if unknown:
         parser.error(f"--what {unknown[0]}: not one of {', '.join(PARTS)}, paper")
+    unknown = [w for w in a.rules or [] if not any(name.startswith(w) for name, _ in RULES)]
+    if unknown:
+        parser.error(f"--rules {unknown[0]}: no rule's name begins so; there are: {'; '.join(n for n, _ in RULES)}")
     unknown = [w for w in a.long if w not in LONG_PARTS]
     if unknown:
         parser.error(f"--long {unknown[0]}: not one of {', '.join(LONG_PARTS)}")

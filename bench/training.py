@@ -30,6 +30,10 @@ RULES = (("all", []),
          ("full at a quarter of the run", ["--set", "error.fill=0.25"]),
          ("no penalty on opacity", ["--set", "error.opacity_penalty=0"]),
          ("penalty x 3", ["--set", "error.opacity_penalty=0.009"]),
+         ("halves nearer, q = 0.35", ["--set", "error.split.share=0.35"]),
+         ("halves nearer, q = 0.25", ["--set", "error.split.share=0.25"]),
+         ("a Gaussian for 200 pixels", ["--set", "error.pixels_each=200"]),
+         ("nothing moves once the budget is full", ["--set", "error.until=0.5"]),
          ("rates of means x 2", ["--set", "rates.mean=1.6e-4,rates.mean_final=1.6e-6"]),
          ("rate of opacity x 2", ["--set", "rates.opacity=0.05"]),
          ("nothing settles", ["--set", "rates.settled=1"]),
@@ -137,6 +141,8 @@ class Trainings:
         for name, capture in self.a.capture:
             runs, options = [], self.train_options(name)
             for rule, change in RULES:
+                if self.a.rules and not rule.startswith(tuple(self.a.rules)):
+                    continue
                 rows = []
                 for seed in range(1, (self.a.seeds or 3) + 1):
                     folder, metrics, _ = self.train(f"{name}, {rule}, seed {seed}", capture, options, "--no-auto",

@@ -3,6 +3,7 @@
 #include "options.hpp"
 #include "output.hpp"
 #include "progress.hpp"
+#include "ranks.hpp"
 #include "scores.hpp"
 
 #include <gart/io/dataset.hpp>
@@ -43,10 +44,39 @@ void refuse_other_images(fs::path const& pairs, std::vector<gart::dataset_view> 
   }
 }
 
+// Those of this rank's.
+gart::some_views dealt(gart::some_views const& views) {
+  gart::some_views mine;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if (ranks::takes(i)) mine.push_back(views[i]);
+  return mine;
+}
+
+// The scores of all ranks' views, in the order in which they were dealt out.
+void put_together(gart::scores& of, std::size_t count) {
+  using json = nlohmann::json;
+  if (ranks::size() == 1) return;
+  json mine = json::array();
+  for (gart::view_score const& v : of.views)
+    mine.push_back({v.name, v.psnr, v.ssim, v.affine_psnr, v.own_psnr, v.captured_psnr, v.milliseconds});
+  std::string bytes;
+  json::to_cbor(mine, bytes);
+  std::vector<json> parts;
+  for (std::string const& part : ranks::gathered(bytes)) parts.push_back(json::from_cbor(part));
+  of.views.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    json const& v = parts[i % parts.size()][i / parts.size()];
+    of.views.push_back({v[0], v[1], v[2], v[3], v[4], v[5], v[6]});
+  }
+  gart::take_means(of);
+}
+
 int run_eval(eval_arguments const& a) {
+  if (ranks::built) ranks::start(false);
+  bool const speaks = ranks::rank() == 0;
   gart::model_file file = gart::load_model(a.model);
   auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
-  prepare_file(a.out);
+  if (speaks) prepare_file(a.out);
   if (!a.renders.empty()) prepare_folder(a.renders);
   for (char const* side : {"render", "truth"})
     if (!a.pairs.empty()) prepare_folder(a.pairs / side);
@@ -68,10 +98,11 @@ int run_eval(eval_arguments const& a) {
   gart::exposure_field const exposures =
       a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures);
 
-  progress say(a.quiet);
+  progress say(a.quiet || !speaks);
   auto const draw = [&](gart::camera const& view) { return renderer->render(view, options); };
-  gart::scores const result = gart::evaluate(
-      gart::all_of(data.test), options.background, exposures, draw,
+  gart::some_views const tests = dealt(gart::all_of(data.test));
+  gart::scores result = gart::evaluate(
+      tests, options.background, exposures, draw,
       [&](std::size_t i, gart::view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
         if (!a.renders.empty()) {
           gart::write_png(a.renders / (s.name + ".png"), gart::to_8bit(render));
@@ -81,13 +112,17 @@ int run_eval(eval_arguments const& a) {
           gart::write_png(a.pairs / "render" / (s.name + ".png"), gart::to_8bit(render));
           gart::write_png(a.pairs / "truth" / (s.name + ".png"), gart::to_8bit(truth));
         }
-        say.state("scored " + std::to_string(i + 1) + "/" + std::to_string(data.test.size()) + "  " + s.name + " " +
+        say.state("scored " + std::to_string(i + 1) + "/" + std::to_string(tests.size()) + "  " + s.name + " " +
                       fixed(s.psnr, 2) + " dB",
-                  static_cast<double>(i + 1) / static_cast<double>(data.test.size()));
+                  static_cast<double>(i + 1) / static_cast<double>(tests.size()));
       });
+  put_together(result, data.test.size());
   say.state("scoring training views", 1);
-  gart::scores const training =
-      gart::evaluate(gart::evenly_spread(data.train, data.test.size()), options.background, exposures, draw);
+  gart::some_views const spread = gart::evenly_spread(data.train, data.test.size());
+  gart::scores training = gart::evaluate(dealt(spread), options.background, exposures, draw);
+  put_together(training, spread.size());
+  gart::u64 const most_bytes = ranks::largest(renderer->peak_bytes());
+  if (!speaks) return 0;
   auto const configuration = renderer->configuration();
   nlohmann::json metrics = to_json(result, training, data.train.size());
   metrics["format"] = data.format, metrics["split"] = data.split, metrics["resize_filter"] = data.resize_filter;
@@ -97,7 +132,7 @@ int run_eval(eval_arguments const& a) {
   metrics["backend"] = gart::to_string(configuration.backend),
   metrics["tracer"] = gart::to_string(configuration.tracer);
   metrics["approximations"] = approximations_of(options.approximations(), configuration);
-  metrics["peak_bytes"] = renderer->peak_bytes();
+  metrics["peak_bytes"] = most_bytes;
   write_json(a.out, metrics);
   say.clear();
   if (!a.quiet) {

@@ -24,6 +24,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(train_options, exposure), "--exposure"},
       {GART_CLI_FIELD(train_options, depth_weight), "--depth-weight"},
       {GART_CLI_FIELD(train_options, refine_poses), "--refine-poses"},
+      {GART_CLI_FIELD(train_options, refine_lens), "--refine-lens"},
       {GART_CLI_FIELD(train_options, lt_budget), "--lt-budget"},
       {GART_CLI_FIELD(train_options, check_finite), "--check-finite"},
       {GART_CLI_FIELD(train_options, batch), "--batch"},

@@ -83,7 +83,8 @@ int main(int argc, char** argv) {
     return exit_usage;
   }
   // Commands that have nothing to share out are rank 0's.
-  if (ranks::launched_rank() > 0 && !app.got_subcommand("train")) return 0;
+  bool const views = ranks::built && (app.got_subcommand("render") || app.got_subcommand("eval"));
+  if (ranks::launched_rank() > 0 && !views && !app.got_subcommand("train")) return 0;
   try {
     return flushed(selected());
   } catch (usage_error const& e) {

@@ -40,17 +40,32 @@ int ranks::launched_rank() {
 }
 
 #if defined(GART_WITH_MPI)
+bool const ranks::built = true;
 void ranks::start(bool wanted) {
   if (!started() && (launched() > 1 || wanted)) started() = std::make_unique<gart::mpi_comm>();
 }
 gart::mpi_comm* ranks::comm() { return started().get(); }
 int ranks::size() { return comm() ? comm()->size() : 1; }
+int ranks::rank() { return comm() ? comm()->rank() : 0; }
 std::string ranks::name() {
   if (size() == 1) return {};
   return "rank " + std::to_string(comm()->rank()) + " of " + std::to_string(size()) + " (" + comm()->host() + "): ";
 }
 void ranks::broadcast(void* data, std::size_t bytes) {
   if (size() > 1) comm()->broadcast(data, bytes, 0);
+}
+std::vector<std::string> ranks::gathered(std::string const& mine) {
+  if (size() == 1) return {mine};
+  std::vector<std::size_t> lengths(static_cast<std::size_t>(size()));
+  std::size_t const length = mine.size();
+  comm()->all_gather(&length, lengths.data(), sizeof length);
+  std::size_t const most = *std::max_element(lengths.begin(), lengths.end());
+  std::string padded = mine, all(most * lengths.size(), '\0');
+  padded.resize(most);
+  comm()->all_gather(padded.data(), all.data(), most);
+  std::vector<std::string> out;
+  for (std::size_t r = 0; r < lengths.size(); ++r) out.push_back(all.substr(r * most, lengths[r]));
+  return out;
 }
 gart::u64 ranks::largest(gart::u64 value) {
   if (size() == 1) return value;
@@ -66,6 +81,7 @@ void ranks::end_all(int code) {
   std::exit(code);
 }
 #else
+bool const ranks::built = false;
 void ranks::start(bool wanted) {
   if (launched() > 1 || wanted)
     throw usage_error(
@@ -74,8 +90,10 @@ void ranks::start(bool wanted) {
 }
 gart::mpi_comm* ranks::comm() { return nullptr; }
 int ranks::size() { return 1; }
+int ranks::rank() { return 0; }
 std::string ranks::name() { return {}; }
 void ranks::broadcast(void*, std::size_t) {}
+std::vector<std::string> ranks::gathered(std::string const& mine) { return {mine}; }
 gart::u64 ranks::largest(gart::u64 value) { return value; }
 void ranks::barrier() {}
 void ranks::end_all(int code) { std::exit(code); }

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 namespace gart {
 class mpi_comm;
@@ -20,11 +21,16 @@ class ranks {
   static int launched();
   static int launched_rank();
 
+  static bool const built;  // with MPI
+
   // Starts MPI where several were launched, or `wanted` says that one needs it. usage_error where this build has none.
   static void start(bool wanted);
   // Null where it was not started.
   static gart::mpi_comm* comm();
   static int size();
+  static int rank();
+  // Whether this one takes part i of what is dealt out in turn.
+  static bool takes(std::size_t i) { return i % static_cast<std::size_t>(size()) == static_cast<std::size_t>(rank()); }
   // "rank 2 of 4 (node1): " where there are several, else nothing.
   static std::string name();
 
@@ -35,6 +41,8 @@ class ranks {
     broadcast(&value, sizeof value);
     return value;
   }
+  // What each has to say, on all of them.
+  static std::vector<std::string> gathered(std::string const& mine);
   // The largest of all.
   static gart::u64 largest(gart::u64 value);
   static void barrier();

@@ -2,6 +2,7 @@
 #include "options.hpp"
 #include "output.hpp"
 #include "progress.hpp"
+#include "ranks.hpp"
 #include "render_images.hpp"
 #include "samples.hpp"
 
@@ -58,7 +59,25 @@ std::vector<gart::named_camera> cameras_of(render_arguments const& a) {
   return cameras;
 }
 
+// What each rank has drawn, in the order of the cameras, with the stages' mean.
+nlohmann::json of_all_ranks(nlohmann::json const& mine, std::size_t cameras) {
+  std::vector<nlohmann::json> parts;
+  for (std::string const& text : ranks::gathered(mine.dump())) parts.push_back(nlohmann::json::parse(text));
+  nlohmann::json all = parts.front();
+  all["views"] = nlohmann::json::array();
+  for (std::size_t i = 0; i < cameras; ++i) all["views"].push_back(parts[i % parts.size()]["views"][i / parts.size()]);
+  if (parts.size() > 1) all["ranks"] = parts.size();
+  for (auto& [label, time] : all["stages_ms"].items()) {
+    double sum = 0;
+    for (auto const& part : parts) sum += part["stages_ms"].value(label, 0.0);
+    time = sum / static_cast<double>(cameras);
+  }
+  return all;
+}
+
 int run_render(render_arguments const& a) {
+  if (ranks::built) ranks::start(false);
+  bool const speaks = ranks::rank() == 0;
   image_choice images = a.images;
   if (a.depth && !images.has("depth")) images.images += ",depth";
   check_images(images);
@@ -68,7 +87,7 @@ int run_render(render_arguments const& a) {
   gart::model_file file = gart::load_model(a.model);
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   prepare_folder(a.out);
-  if (!a.json.empty()) prepare_file(a.json);
+  if (!a.json.empty() && speaks) prepare_file(a.json);
 
   auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
   renderer->set_model(file.model);
@@ -81,17 +100,18 @@ int run_render(render_arguments const& a) {
   gart::exposure_field const exposures =
       a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures);
 
-  progress say(a.quiet);
+  progress say(a.quiet || !speaks);
   auto const configuration = renderer->configuration();
   nlohmann::json timings = {{"backend", gart::to_string(configuration.backend)},
                             {"tracer", gart::to_string(configuration.tracer)},
                             {"gaussians", file.model.size()},
                             {"approximations", approximations_of(options.approximations(), configuration)},
                             {"samples", a.samples},
+                            {"stages_ms", nlohmann::json::object()},
                             {"views", nlohmann::json::array()}};
   renderer->profile().enable(!a.json.empty());
-  double total = 0;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
+    if (!ranks::takes(i)) continue;
     auto& [name, view] = cameras[i];
     if (!a.camera.empty()) view = gart::seen_through(view, a.camera);
     if (a.downscale > 1)
@@ -100,7 +120,6 @@ int run_render(render_arguments const& a) {
     gart::rendered image = render_samples(*renderer, view, options, a.samples);
     if (!exposures.empty()) apply(exposures.at(view), image.color);
     double const ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    total += ms;
     if (images.has("colour")) gart::write_png(a.out / (name + ".png"), gart::to_8bit(image.color));
     nlohmann::json entry = {{"name", name}, {"width", view.width}, {"height", view.height}, {"milliseconds", ms}};
     write_images(a.out, name, image, view, images, entry);
@@ -109,15 +128,15 @@ int run_render(render_arguments const& a) {
     say.state("rendered " + std::to_string(i + 1) + "/" + std::to_string(cameras.size()) + "  " + fixed(ms, 1) + " ms",
               share);
   }
-  if (!a.json.empty()) {
-    for (auto const& [label, time] : renderer->profile().stages()) {
-      timings["stages_ms"][label] = time.milliseconds / static_cast<double>(cameras.size());
-    }
-    timings["peak_bytes"] = renderer->peak_bytes();
-    write_json(a.json, timings);
-  }
+  for (auto const& [label, time] : renderer->profile().stages()) timings["stages_ms"][label] = time.milliseconds;
+  timings["peak_bytes"] = ranks::largest(renderer->peak_bytes());
+  timings = of_all_ranks(timings, cameras.size());
+  if (!speaks) return 0;
+  if (!a.json.empty()) write_json(a.json, timings);
   say.clear();
   if (!a.quiet) {
+    double total = 0;
+    for (auto const& view : timings["views"]) total += view["milliseconds"].get<double>();
     std::printf("%zu views in %s, %.1f ms each (%s, %s)\n", cameras.size(), a.out.string().c_str(),
                 total / static_cast<double>(cameras.size()), gart::to_string(configuration.backend),
                 gart::to_string(configuration.tracer));

@@ -125,6 +125,9 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       r.add_flag(train, "--refine-poses", a.refine_poses,
                  "Learn the pose of each training view with the Gaussians, for\ncaptures whose poses are a little off; "
                  "test views are then\naligned to their photographs before they are scored"));
+  in_group(r.add_flag(train, "--refine-lens", a.refine_lens,
+                      "Learn the focal length and the centre of each camera of the\ncapture with the Gaussians, for "
+                      "calibrations that are a little\noff; test views are scored through what was learned"));
   in_group(r.add(train, "--downscale", a.downscale, "N", "Shrink images by this whole factor"))->check(between(1, 64));
   in_group(r.add(train, "--background", a.background, "NAME",
                  "white, black, or random (another at each step; tests on black);\nauto: white for transparent "
@@ -287,7 +290,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.initial_scale = a.initial_scale;
   o.exposure = a.exposure == "on";
   o.depth_weight = a.depth_weight;
-  o.refine_poses = a.refine_poses;
+  o.refine_poses = a.refine_poses, o.refine_lens = a.refine_lens;
   o.mcmc.noise *= a.mcmc_noise;
   o.mcmc.opacity_penalty *= a.mcmc_penalty, o.mcmc.scale_penalty *= a.mcmc_penalty;
   o.adam.seen_only = a.adam == "seen";

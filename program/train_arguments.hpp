@@ -48,7 +48,7 @@ struct train_arguments {
   float mcmc_noise = 1, mcmc_penalty = 1;
   float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;
   gart::u32 max_hits = defaults.render.max_hits;
-  bool antialias = false, refine_poses = false;
+  bool antialias = false, refine_poses = false, refine_lens = false;
   int rebuild_every = defaults.render.rebuild_every;
   double lt_budget_gb = 0;
   gart::u64 seed = defaults.seed;

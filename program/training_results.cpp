@@ -22,7 +22,8 @@ gart::scores training_run::score(gart::some_views const& views, gart::keep_view 
                                  gart::place_view const& place) {
   return gart::evaluate(
       views, eval_background_, session_->exposures(),
-      [this](gart::camera const& c) { return session_->render(c, eval_background_); }, keep, place);
+      [this](gart::camera const& c) { return session_->render(session_->as_learned(c), eval_background_); }, keep,
+      place);
 }
 
 // Each test view at the pose where the model, which stays as it is, agrees best with its photograph.
@@ -43,9 +44,10 @@ gart::place_view training_run::aligned_to_photographs(std::vector<gart::named_ca
   options.steps = 20, options.blur = 0.01f;
   return [this, renderer, options, exposures = session_->exposures(), &found](gart::dataset_view const& view) mutable {
     options.exposed = exposures.at(view.view);
-    found.push_back(
-        {view.name,
-         gart::track(*renderer, gart::composited(view.image, eval_background_), view.view, options, view.mask).view});
+    gart::camera at = session_->as_learned(view.view);
+    if (writes_)
+      at = gart::track(*renderer, gart::composited(view.image, eval_background_), at, options, view.mask).view;
+    found.push_back({view.name, ranks::agreed(at)});
     return found.back().view;
   };
 }
@@ -109,6 +111,8 @@ void training_run::conclude() {
                    static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
       },
       a_.refine_poses ? aligned_to_photographs(aligned) : gart::place_view());
+  if (a_.refine_lens && !a_.refine_poses)
+    for (auto const& view : data_.test) aligned.push_back({view.name, session_->as_learned(view.view)});
   if (writes_ && !aligned.empty()) gart::write_cameras(a_.out / "poses_test.json", aligned);
   say_.state("testing on training views", 1);
   stopwatch const training_views;
@@ -152,6 +156,7 @@ nlohmann::json training_run::metrics_of(gart::scores const& result, gart::scores
   m["image_size"] = image_size(), m["notes"] = data_.notes;
   m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
   m["exposure"] = a_.exposure == "on", m["refine_poses"] = a_.refine_poses;
+  m["refine_lens"] = a_.refine_lens;
   m["iterations"] = session_->steps_done(), m["time_budget"] = a_.time_budget, m["raised"] = raised_;
   m["gaussians"] = gaussians_, m["sh_degree"] = session_->configuration().sh_degree;
   m["floats_per_gaussian"] = 11 + 3 * gart::sh_coefficients(session_->configuration().sh_degree);

@@ -136,6 +136,10 @@ void write_checkpoint(std::filesystem::path const& path, training_state const& s
     out.add("pose", p.value), out.add("pose/first", p.first), out.add("pose/second", p.second);
     out.add("pose/metric", p.metric), out.add("pose/visits", p.visits);
   }
+  if (lens_state const& l = state.lenses; !l.value.empty()) {
+    out.add("lens", l.value), out.add("lens/first", l.first), out.add("lens/second", l.second);
+    out.add("lens/visits", l.visits);
+  }
   out.write(path);
 }
 
@@ -183,6 +187,14 @@ training_state state_of(checkpoint_reader const& in) {
     if (p.value.size() != numbers || p.first.size() != numbers || p.second.size() != numbers ||
         p.metric.size() != std::tuple_size_v<pose_numbers> * numbers)
       in.fail("its arrays pose* differ in length");
+  }
+  if (in.has("lens")) {
+    lens_state& l = s.lenses;
+    l.value = in.get<double>("lens"), l.visits = in.get<u32>("lens/visits");
+    l.first = in.get<double>("lens/first"), l.second = in.get<double>("lens/second");
+    std::size_t const numbers = std::tuple_size_v<lens_numbers> * l.visits.size();
+    if (l.value.size() != numbers || l.first.size() != numbers || l.second.size() != numbers)
+      in.fail("its arrays lens* differ in length");
   }
   if (in.has("sh_trials")) s.trials = in.get<band_trial>("sh_trials");
   for (band_trial const& t : s.trials)

@@ -117,6 +117,7 @@ class degree_selection final : public session {
   }
   exposure_field exposures() const override { return inner_->exposures(); }
   std::vector<named_camera> poses() const override { return inner_->poses(); }
+  camera as_learned(camera const& view) const override { return inner_->as_learned(view); }
   std::vector<band_trial> trials() const override { return trials_; }
   profiler& profile() override { return profile_; }
   std::size_t peak_bytes() const override { return std::max(peak_bytes_, inner_->peak_bytes()); }
@@ -178,7 +179,7 @@ class degree_selection final : public session {
     std::vector<double> psnr;
     for (std::size_t const index : plan_.held_out) {
       dataset_view const& view = data_.train[index];
-      image_float image = inner_->render(view.view, background).color;
+      image_float image = inner_->render(inner_->as_learned(view.view), background).color;
       apply(exposures.at(view.view), image);
       image_float const truth = composited(view.image, background);
       double const share = apply_mask(view.mask, truth, image);

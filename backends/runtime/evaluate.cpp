@@ -23,7 +23,6 @@ scores evaluate(some_views const& views, vec3 background, exposure_field const& 
                 keep_view const& keep, place_view const& place) {
   scores result;
   result.exposed = !exposures.empty(), result.placed = static_cast<bool>(place);
-  double psnr_sum = 0, ssim_sum = 0, affine_sum = 0, own_sum = 0, captured_sum = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     auto const& view = *views[i];
     view_score score;
@@ -53,25 +52,29 @@ scores evaluate(some_views const& views, vec3 background, exposure_field const& 
     score.psnr = score_psnr();
     score.ssim = ssim(scored, truth);
     score.affine_psnr = psnr_affine_color(image, truth, view.mask);
-    psnr_sum += score.psnr, ssim_sum += score.ssim, affine_sum += score.affine_psnr, own_sum += score.own_psnr;
     if (place) {
       image_float const kept = std::exchange(image, render(view.view).color);
       apply(exposures.at(view.view), image);
       score.captured_psnr = score_psnr();
       image = kept;
     }
-    captured_sum += score.captured_psnr;
     if (keep) keep(i, score, image, truth);
     result.views.push_back(std::move(score));
   }
-  if (!views.empty()) {
-    result.psnr = psnr_sum / static_cast<double>(views.size());
-    result.ssim = ssim_sum / static_cast<double>(views.size());
-    result.affine_psnr = affine_sum / static_cast<double>(views.size());
-    if (place) result.captured_psnr = captured_sum / static_cast<double>(views.size());
-    if (result.exposed) result.own_psnr = own_sum / static_cast<double>(views.size());
-  }
+  take_means(result);
   return result;
+}
+
+void take_means(scores& of) {
+  if (of.views.empty()) return;
+  auto const mean = [&](double view_score::*value) {
+    double sum = 0;
+    for (view_score const& v : of.views) sum += v.*value;
+    return sum / static_cast<double>(of.views.size());
+  };
+  of.psnr = mean(&view_score::psnr), of.ssim = mean(&view_score::ssim), of.affine_psnr = mean(&view_score::affine_psnr);
+  if (of.placed) of.captured_psnr = mean(&view_score::captured_psnr);
+  if (of.exposed) of.own_psnr = mean(&view_score::own_psnr);
 }
 
 }  // namespace gart

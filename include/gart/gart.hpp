@@ -17,6 +17,7 @@
 #include <gart/io/image_file.hpp>
 #include <gart/io/ply.hpp>
 #include <gart/io/splat_file.hpp>
+#include <gart/lens/differentiate_lens.hpp>
 #include <gart/loss/affine_color.hpp>
 #include <gart/loss/metrics.hpp>
 #include <gart/pose/differentiate_pose.hpp>

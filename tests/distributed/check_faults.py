@@ -1,8 +1,10 @@
-"""A training on several ranks of which one dies or fails: all end within 30 s, what is said names the rank, and the
-checkpoint that was there before is whole: one rank goes on from it.
+"""gart on several ranks. Trained, rendered and scored by three is the same, file by file, as by one. Of a training of which
+one rank dies or fails all end within 30 s, what is said names the rank, and the checkpoint that was there before is
+whole: one rank goes on from it.
 
 usage: check_faults.py GART WORK_FOLDER LAUNCHER...     the launcher up to the number of ranks
 """
+import json
 import os
 import pathlib
 import shutil
@@ -11,47 +13,16 @@ import subprocess
 import sys
 import time
 
+from small_capture import expect, options_of, run, write_capture
+
 gart, folder, launcher = sys.argv[1], pathlib.Path(sys.argv[2]), sys.argv[3:]
 shutil.rmtree(folder, ignore_errors=True)
 folder.mkdir(parents=True)
 capture = folder / "capture"
 
 
-def run(*command, **options):
-    return subprocess.run([str(c) for c in command], capture_output=True, text=True, timeout=120, **options)
-
-
-def expect(condition, what):
-    if not condition:
-        sys.exit(f"FAILED: {what}")
-
-
-def write_capture():
-    """Four views of nothing much, as transforms.json with PNGs that python alone can write."""
-    import json
-    import struct
-    import zlib
-    (capture / "images").mkdir(parents=True)
-
-    def png(width, height, value):
-        rows = b"".join(b"\0" + bytes((value + 3 * x + 5 * y) % 256 for x in range(width) for _ in range(3))
-                        for y in range(height))
-        chunk = lambda kind, data: (struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)))
-        return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
-                chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
-
-    frames = []
-    for i in range(4):
-        name = f"images/{i}.png"
-        (capture / name).write_bytes(png(48, 40, 40 * i))
-        frames.append({"file_path": name, "transform_matrix": [[1, 0, 0, 0.3 * i], [0, 1, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]]})
-    (capture / "transforms.json").write_text(json.dumps(
-        {"fl_x": 50, "fl_y": 50, "cx": 24, "cy": 20, "w": 48, "h": 40, "frames": frames}))
-
-
-def options(out, steps):
-    return [gart, "train", capture, "--out", folder / out, "--iterations", steps, "--max-gaussians", 300, "--points", 200,
-            "--test-every", 0, "--sh-degree", 1, "--no-auto", "--background", "black", "--exposure", "off", "--threads", 1]
+def options(out, steps, exposure="off", test_every=0):
+    return [gart, *options_of(capture, folder / out, steps, exposure, test_every)]
 
 
 def ranks_of(launch):
@@ -73,7 +44,7 @@ def ranks_of(launch):
     return found
 
 
-write_capture()
+write_capture(capture)
 
 # The same run by 1 and by 3 ranks, where sums have a fixed order, and what is said.
 alone = run(*launcher, 1, *options("alone", 60), "--batch", 2, "--backward", "deterministic")
@@ -84,6 +55,29 @@ expect((folder / "alone/model.ply").read_bytes() == (folder / "three/model.ply")
 expect((folder / "alone/checkpoint.gart").read_bytes() == (folder / "three/checkpoint.gart").read_bytes(),
        "the checkpoints differ")
 expect(three.stdout.count("trained ") == 1 and three.stderr.count("3 ranks, ") == 1, f"rank 0 alone talks:\n{three.stderr}")
+
+# With exposures and poses that are learned, and test views, which are aligned to their photographs.
+for name, count in (("one_posed", 1), ("three_posed", 3)):
+    done = run(*launcher, count, *options(name, 40, "on", 4), "--refine-poses", "--batch", 2, "--backward", "deterministic")
+    expect(done.returncode == 0, f"{name}: {done.stderr}")
+for file in ("model.ply", "exposures.json", "poses.json", "poses_test.json", "renders/0.png"):
+    expect((folder / "one_posed" / file).read_bytes() == (folder / "three_posed" / file).read_bytes(), f"{file} differs")
+
+# Views that are dealt out.
+for name, count in (("one", 1), ("three", 3)):
+    done = run(*launcher, count, gart, "render", folder / "three/model.ply", capture, "--out", folder / f"images_{name}",
+               "--json", folder / f"timings_{name}.json")
+    expect(done.returncode == 0 and done.stdout.count("4 views in") == 1, f"render by {name}: {done.stdout} {done.stderr}")
+    done = run(*launcher, count, gart, "eval", folder / "three/model.ply", capture, "--out", folder / f"scores_{name}.json",
+               "--renders", folder / f"images_{name}", "--test-every", 2)
+    expect(done.returncode == 0, f"eval by {name}: {done.stderr}")
+views = [[view["name"] for view in json.loads((folder / f"timings_{n}.json").read_text())["views"]] for n in ("one", "three")]
+expect(views[0] == views[1] and len(views[0]) == 4, f"the views' order: {views}")
+images = [{p.name: p.read_bytes() for p in (folder / f"images_{n}").iterdir()} for n in ("one", "three")]
+expect(images[0] == images[1] and len(images[0]) == 6, "the images differ")
+scores = [json.loads((folder / f"scores_{n}.json").read_text()) for n in ("one", "three")]
+for key in ("psnr", "ssim", "psnr_affine_colour"):
+    expect(scores[0][key] == scores[1][key], f"{key} differs: {scores[0][key]}, {scores[1][key]}")
 
 # A rank that is killed.
 launch = subprocess.Popen([str(c) for c in [*launcher, 3, *options("killed", 1000000)]], stdout=subprocess.PIPE,

@@ -33,6 +33,8 @@ train_options short_run(densify_kind densify) {
   o.iterations = 300, o.max_gaussians = 230, o.densify = densify, o.background = background_kind::random;
   o.error.from = 40, o.error.every = 20, o.mcmc.from = 40, o.mcmc.every = 20;
   o.error.dead_opacity = o.mcmc.dead_opacity = 0.1f;  // so that some die
+  o.adc.from = 40, o.adc.every = 20, o.adc.opacity_reset_every = 90, o.adc.until = 0.9f;
+  o.adc.gradient = 2e-6f, o.adc.dense = 0.05f, o.adc.prune_opacity = 0.1f;  // so that some split, some go
   o.shard_block = 8;
   return o;
 }
@@ -66,14 +68,18 @@ gaussian_model all_gradients(Trainer& run, exec_type& exec, index_t block) {
 TEST_CASE("by strips the bits are those of one rank, whatever the number of ranks") {
   exec_type exec;
   dataset const data = gart_test::capture(exec, 3);
-  for (densify_kind const densify : {densify_kind::error, densify_kind::mcmc}) {
+  for (densify_kind const densify : {densify_kind::error, densify_kind::mcmc, densify_kind::adc}) {
+    CAPTURE(to_string(densify));
     train_options const options = short_run(densify);
     gaussian_model const start = gart_test::cloud(11, 0.5f);
     plain one(exec, options, data, start);
     shared all(exec, options, data, start, mpi_comm());
+    bool rose = false, fell = false;
+    index_t count = start.size();
     while (one.steps_done() < options.iterations) {
       step_report const a = one.step(), b = all.step();
       REQUIRE(a.gaussians == b.gaussians);
+      rose = rose || a.gaussians > count, fell = fell || a.gaussians < count, count = a.gaussians;
       REQUIRE(a.step == b.step);
       REQUIRE(a.loss == b.loss);
       REQUIRE(a.psnr == b.psnr);
@@ -83,10 +89,15 @@ TEST_CASE("by strips the bits are those of one rank, whatever the number of rank
       REQUIRE(same(x.depth.data, y.depth.data));
       REQUIRE(x.hits.data == y.hits.data);
     }
-    CHECK(one.model().size() == 230);  // it has grown
+    if (densify == densify_kind::adc)
+      CHECK((rose && fell));
+    else
+      CHECK(one.model().size() == 230);  // it has grown
     CHECK(same(one.model(), all.model()));
     CHECK(same(one.state().second, all.state().second));
     CHECK(same(one.state().error_sum, all.state().error_sum));
+    CHECK(same(one.state().gradient_sum, all.state().gradient_sum));
+    CHECK(one.state().touched == all.state().touched);
     if (mpi_comm().size() > 1) CHECK(all.sent_bytes() > 0);
   }
 }
@@ -141,14 +152,49 @@ TEST_CASE("a batch is the mean of its views, the same for any number of ranks") 
   CHECK(largest_difference(mean.opacity, std::vector<float>(opacity.begin(), opacity.end())) < 1e-6);
   CHECK(largest_difference(mean.mean, std::vector<float>(place.begin(), place.end())) < 1e-6);
 
-  for (densify_kind const densify : {densify_kind::error, densify_kind::mcmc}) {
+  for (densify_kind const densify : {densify_kind::error, densify_kind::mcmc, densify_kind::adc}) {
+    CAPTURE(to_string(densify));
     train_options grown = short_run(densify);
-    grown.batch = 3, grown.iterations = 150;
+    grown.batch = 3, grown.iterations = 150, grown.exposure = true;
     trainer_of<deterministic_strategy, lone_comm> one(exec, grown, data, start);
     shared many(exec, grown, data, start, mpi_comm());
     while (many.steps_done() < grown.iterations) REQUIRE(one.step().loss == many.step().loss);
-    CHECK(many.model().size() == 230);
+    if (densify != densify_kind::adc) CHECK(many.model().size() == 230);
     CHECK(same(one.model(), many.model()));
+    CHECK(same(one.state().exposures.value, many.state().exposures.value));
+    CHECK(one.state().exposures.visits == many.state().exposures.visits);
+  }
+}
+
+TEST_CASE("exposures and poses are learned as by one rank, bit by bit") {
+  exec_type exec;
+  dataset data = gart_test::capture(exec, 9);
+  data.train[2].view.position.x += 0.05;
+  train_options options = short_run(densify_kind::error);
+  options.shard_block = 64, options.iterations = 120;  // three blocks
+  options.exposure = options.refine_poses = true;
+  gaussian_model const start = gart_test::cloud(17, 0.5f);
+  for (int const batch : {1, 3}) {
+    CAPTURE(batch);
+    options.batch = batch;
+    trainer_of<deterministic_strategy, lone_comm> one(exec, options, data, start);
+    shared all(exec, options, data, start, mpi_comm());
+    while (all.steps_done() < options.iterations) REQUIRE(one.step().loss == all.step().loss);
+    training_state const a = one.state(), b = all.state();
+    CHECK(a.poses.value == b.poses.value);
+    CHECK(a.poses.metric == b.poses.metric);
+    CHECK(a.poses.visits == b.poses.visits);
+    CHECK(same(a.exposures.value, b.exposures.value));
+    double moved = 0;
+    for (double const x : b.poses.value) moved = std::max(moved, std::fabs(x));
+    CHECK(moved > 1e-4);
+    CHECK(same(one.model(), all.model()));
+    if (batch > 1) continue;
+    plain usual(exec, options, data, start);
+    while (usual.steps_done() < options.iterations) usual.step();
+    CHECK(usual.state().poses.value == b.poses.value);
+    CHECK(same(usual.state().exposures.value, b.exposures.value));
+    CHECK(same(usual.model(), all.model()));
   }
 }
 
@@ -205,7 +251,7 @@ TEST_CASE("more ranks than Gaussians, than rows of tiles, than anything to see")
   check(gart_test::cloud(16, 0.5f), 5);
 }
 
-TEST_CASE("what several ranks do not train yet is refused by field") {
+TEST_CASE("what several ranks do not train is refused by field") {
   exec_type exec;
   dataset const data = gart_test::capture(exec, 8);
   train_options const good = short_run(densify_kind::none);
@@ -219,12 +265,12 @@ TEST_CASE("what several ranks do not train yet is refused by field") {
     }
   };
   train_options o = good;
-  o.densify = densify_kind::adc;
-  refused(o, "train_options.densify");
-  o = good, o.refine_poses = true;
-  refused(o, "train_options.refine_poses");
-  o = good, o.exposure = true;
-  refused(o, "train_options.exposure");
+  o.refine_poses = true;  // with blocks of 8
+  refused(o, "train_options.shard_block");
+  o = good, o.depth_weight = 1;
+  refused(o, "train_options.depth_weight");
+  o = good, o.refine_lens = true;
+  refused(o, "train_options.refine_lens");
   o = good, o.shard_block = 0;
   refused(o, "train_options.shard_block");
   o = good, o.batch = -1;

@@ -39,9 +39,11 @@ TEST_CASE("halves end where the whole ended, and are as thick in their middles a
   std::mt19937_64 random(gart_test::seed());
   std::uniform_real_distribution<float> uniform(-1, 1);
   for (int i = 0; i < 200; ++i) {
+    split_shape shape;
+    if (i % 2) shape = {0.25f, 0.5f};
     vec3 const log_scale(3 * uniform(random), 3 * uniform(random), 3 * uniform(random));
     quaternion const q{uniform(random), uniform(random), uniform(random), uniform(random)};
-    split_half const half = split_long_axis({}, log_scale, q, 0.5f);
+    split_half const half = split_long_axis(shape, log_scale, q, 0.5f);
     double const norm = std::sqrt(double{q.w} * q.w + double{q.x} * q.x + double{q.y} * q.y + double{q.z} * q.z);
     if (norm < 1e-2) continue;
     // The offset in the body's axes, by q^-1 v q.
@@ -74,7 +76,8 @@ TEST_CASE("halves end where the whole ended, and are as thick in their middles a
       if (k != longest)
         CHECK(std::exp(double{half.log_scale[k]} - log_scale[k]) ==
               doctest::Approx(std::sqrt(1 - q3 * q3)).epsilon(1e-4));
-    CHECK(half.opacity == doctest::Approx(0.3));
+    CHECK(q3 == doctest::Approx(double{shape.share}).epsilon(1e-4));
+    CHECK(half.opacity == doctest::Approx(0.5 * double{shape.opacity}));
   }
 }
 
@@ -223,6 +226,22 @@ TEST_CASE_TEMPLATE("the statistic adds up steps, and the penalty is that of the 
                    3 * 0.003 * (sigmoid(o + h) - sigmoid(o - h)) / (2 * h) / n) < 1e-6);
   }
   CHECK(got.mean == g.mean);
+}
+
+TEST_CASE("a split that leaves no halves is refused by field") {
+  gart::serial_exec exec;
+  auto const made = [&](float share, float opacity) {
+    gart::error_growth_options options;
+    options.split = {share, opacity};
+    gart::error_growth<gart::serial_exec>(exec, options, 10, 10, 1);
+  };
+  made(0.5f, 1.0f);
+  for (float const bad : {0.0f, 1.0f, -0.5f, NAN}) {
+    CHECK_THROWS_WITH_AS(made(bad, 0.5f), doctest::Contains("train_options.error.split.share"), gart::invalid_argument);
+    if (bad != 1.0f)
+      CHECK_THROWS_WITH_AS(made(0.5f, bad), doctest::Contains("train_options.error.split.opacity"),
+                           gart::invalid_argument);
+  }
 }
 
 TEST_CASE("growth ends where the capture has too few pixels for more") {

@@ -19,6 +19,7 @@
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -58,6 +59,13 @@ struct pixel {
   bool edge = false;          // undecided: a hit, the end of the ray, or which hit that is
   bool kink = false;          // some alpha is within rounding of 0.99, or some colour of 0: the derivative may jump
 };
+
+// Whether two are of the same hits, clamped alike: between them the colour is smooth.
+inline bool same_branches(pixel const& a, pixel const& b) {
+  return std::equal(a.list.begin(), a.list.end(), b.list.begin(), b.list.end(), [](hit const& x, hit const& y) {
+    return x.id == y.id && x.clamps == y.clamps && x.counted == y.counted;
+  });
+}
 
 struct picture {
   int width = 0, height = 0;

@@ -23,12 +23,6 @@ struct expectation {
   double translation[3], rotation[3];
 };
 
-bool same_branches(oracle::pixel const& a, oracle::pixel const& b) {
-  return std::equal(a.list.begin(), a.list.end(), b.list.begin(), b.list.end(), [](auto const& x, auto const& y) {
-    return x.id == y.id && x.clamps == y.clamps && x.counted == y.counted;
-  });
-}
-
 expectation expect(oracle::scene s, std::mt19937_64& random) {
   s.options.near = 1e-3f;  // what it cuts off is a step, and left out as steps are
   expectation out{s, {}, {}, {}};
@@ -50,7 +44,7 @@ expectation expect(oracle::scene s, std::mt19937_64& random) {
       moved.push_back(render(by));
       for (std::size_t p = 0; p < pixels; ++p)
         usable[p] = usable[p] && !base.pixels[p].edge && !base.pixels[p].kink &&
-                    same_branches(base.pixels[p], moved.back().pixels[p]);
+                    oracle::same_branches(base.pixels[p], moved.back().pixels[p]);
     }
   REQUIRE(std::count(usable.begin(), usable.end(), true) > static_cast<long>(pixels / 2));
   // Half the squared distance from the image of another pose has the difference for its gradient.

@@ -1,4 +1,6 @@
 // Images and hit lists of scene_by_kind.hpp.
+#include <gart/exec/parallel.hpp>  // the serial policy, which others are held to
+
 #include <support/policies.hpp>
 #include <support/trace_scene.hpp>
 
@@ -20,11 +22,16 @@ std::vector<std::vector<gart::hit>> hit_lists(E& exec, gart::gaussian_model cons
   return hit_lists_of<gart::generalized_gaussian<>>(exec, model, view, options, kind);
 }
 
+#define GART_TEST_HIT_LISTS(E)                                                                                 \
+  template std::vector<std::vector<gart::hit>> hit_lists(E&, gart::gaussian_model const&, gart::camera const&, \
+                                                         gart::render_options const&, tracer_kind);
 #define GART_TEST_IMAGES(E)                                                                                          \
   template traced<E> render_scene(E&, gart::gaussian_model const&, gart::camera const&, gart::render_options const&, \
                                   int, tracer_kind);                                                                 \
-  template std::vector<std::vector<gart::hit>> hit_lists(E&, gart::gaussian_model const&, gart::camera const&,       \
-                                                         gart::render_options const&, tracer_kind);
+  GART_TEST_HIT_LISTS(E)
 GART_TEST_EACH_POLICY(GART_TEST_IMAGES)
+#if defined(GART_TEST_CUDA)
+GART_TEST_HIT_LISTS(gart::serial_exec)
+#endif
 
 }  // namespace gart_test

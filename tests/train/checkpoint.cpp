@@ -53,6 +53,8 @@ training_state some_state(std::mt19937_64& random) {
   s.exposures.visits = {9};
   s.poses.value.assign(6, 0.125), s.poses.first.assign(6, 0.1), s.poses.second.assign(6, 0.2);
   s.poses.metric.assign(36, 0.3), s.poses.visits = {4};
+  s.lenses.value.assign(3, 0.125), s.lenses.first.assign(3, 0.1), s.lenses.second.assign(3, 0.2);
+  s.lenses.visits = {5};
   s.trials = {{3, 1000, 30.5, 30.25, 0.5, 0.02, 0.01}};
   return s;
 }
@@ -77,6 +79,10 @@ void check_same(training_state const& a, training_state const& b) {
   CHECK(a.poses.second == b.poses.second);
   CHECK(a.poses.metric == b.poses.metric);
   CHECK(a.poses.visits == b.poses.visits);
+  CHECK(a.lenses.value == b.lenses.value);
+  CHECK(a.lenses.first == b.lenses.first);
+  CHECK(a.lenses.second == b.lenses.second);
+  CHECK(a.lenses.visits == b.lenses.visits);
   REQUIRE(a.trials.size() == b.trials.size());
   CHECK(a.trials[0].with == b.trials[0].with);
 }

@@ -128,10 +128,11 @@ class lens_bounds {
     if (!(s.distance > 0)) return;
     // About the middle of the silhouette as it is across the centre's direction.
     vec3d w = m / s.distance;
-    vec3d const side = fabs(w.x) < 0.6 ? vec3d(1, 0, 0) : vec3d(0, 1, 0), a1 = unit(cross(side, w)), a2 = cross(w, a1);
+    vec3d const side = fabs(w.x) < 0.6 ? vec3d(1, 0, 0) : vec3d(0, 1, 0), a1 = glm::normalize(glm::cross(side, w)),
+                a2 = glm::cross(w, a1);
     flat_silhouette const first(s, a1, a2, w);
     if (!first.whole) return;
-    w = unit(w + a1 * first.z1 + a2 * first.z2);
+    w = glm::normalize(w + a1 * first.z1 + a2 * first.z2);
     double const across = sqrt(w.x * w.x + w.y * w.y), theta = atan2(across, w.z);
     bool const on_axis = !(across > 1e-9);
     double const cp = on_axis ? 1 : w.x / across, sp = on_axis ? 0 : w.y / across, cosine = w.z, sine = across;
@@ -196,10 +197,6 @@ class lens_bounds {
     cut(u, x, gx1, gx2, cp, sp), cut(v, y, gy1, gy2, sp, -cp);
   }
 
-  GART_HD static vec3d unit(vec3d const& a) { return a / sqrt(a.x * a.x + a.y * a.y + a.z * a.z); }
-  GART_HD static vec3d cross(vec3d const& a, vec3d const& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-  }
   GART_HD int cell_of(double theta) const {
     int const cell = static_cast<int>(theta / end_ * cells);
     return cell < cells ? cell : cells - 1;

@@ -120,14 +120,14 @@ class lens_curve {
     value = top / under, slope = (by_top - value * by_under) / under;
   }
 
-  /// T and its derivatives there.
+  /// A map of the plane at a point, and its derivatives there.
   template <class F>
-  struct beside_terms {
-    F x, y, xx, xy, yx, yy;  ///< T_x and T_y, then by x and by y
+  struct plane_map {
+    F x, y, xx, xy, yx, yy;  ///< where it leads, then of that x by x and y, of that y by x and y
   };
-  /// At (x, y).
+  /// T at (x, y).
   template <class F>
-  GART_HD beside_terms<F> beside_at(F x, F y) const {
+  GART_HD plane_map<F> beside_at(F x, F y) const {
     F const p1 = F(p1_), p2 = F(p2_), s1 = F(s_[0]), s2 = F(s_[1]), s3 = F(s_[2]), s4 = F(s_[3]), two = F(2);
     F const r2 = x * x + y * y, across = two * x * y, first = s1 + s2 * r2, second = s3 + s4 * r2;
     F const by_first = two * (s1 + two * s2 * r2), by_second = two * (s3 + two * s4 * r2);
@@ -137,6 +137,23 @@ class lens_curve {
             two * (p1 * x + p2 * y) + by_first * y,
             two * (p1 * x + p2 * y) + by_second * x,
             two * p2 * x + F(6) * p1 * y + by_second * y};
+  }
+  /// The image point of x, in units of the focal length about the principal point, and its derivatives.
+  template <class F>
+  GART_HD plane_map<F> image_of(F x, F y) const {
+    F value, slope;
+    radial(x * x + y * y, value, slope);
+    F const bend = F(2) * slope, a = x * value, b = y * value;
+    F const xx = value + bend * x * x, yy = value + bend * y * y, xy = bend * x * y;
+    if (!beside_) return {a, b, xx, xy, xy, yy};
+    plane_map<F> const t = after_ ? beside_at(a, b) : beside_at(x, y);
+    if (!after_) return {a + t.x, b + t.y, xx + t.xx, xy + t.xy, xy + t.yx, yy + t.yy};
+    return {a + t.x,
+            b + t.y,
+            xx + t.xx * xx + t.xy * xy,
+            xy + t.xx * xy + t.xy * yy,
+            xy + t.yx * xx + t.yy * xy,
+            yy + t.yx * xy + t.yy * yy};
   }
   /// How large T_x and T_y are at most, within `reach` of the axis.
   GART_HD void most_beside(double reach, double& x, double& y) const {
@@ -181,10 +198,11 @@ class lens_curve {
     F a = u, b = v;  // what T adds to, or an estimate of it
     if (beside_ && after_) {
       for (int i = 0; i < newton_steps; ++i) {
-        beside_terms<F> const t = beside_at(a, b);
-        if (!step_to(a + t.x - u, b + t.y - v, t, F(1), F(1), F(0), a, b)) return false;
+        plane_map<F> t = beside_at(a, b);
+        t.xx = F(1) + t.xx, t.yy = F(1) + t.yy;
+        if (!step_to(a + t.x - u, b + t.y - v, t, a, b)) return false;
       }
-      beside_terms<F> const t = beside_at(a, b);
+      plane_map<F> const t = beside_at(a, b);
       if (!near_zero(a + t.x - u, b + t.y - v, u, v)) return false;
     }
     F const r = root_of(a * a + b * b);
@@ -194,19 +212,11 @@ class lens_curve {
     x = a * scale, y = b * scale;
     if (!beside_ || after_) return true;
     for (int i = 0; i < newton_steps; ++i) {
-      F value, slope;
-      F const square = x * x + y * y;
-      radial(square, value, slope);
-      beside_terms<F> const t = beside_at(x, y);
-      F const bend = F(2) * slope;
-      if (!step_to(x * value + t.x - u, y * value + t.y - v, t, value + bend * x * x, value + bend * y * y,
-                   bend * x * y, x, y))
-        return false;
+      plane_map<F> const image = image_of(x, y);
+      if (!step_to(image.x - u, image.y - v, image, x, y)) return false;
     }
-    F value, slope;
-    radial(x * x + y * y, value, slope);
-    beside_terms<F> const t = beside_at(x, y);
-    return near_zero(x * value + t.x - u, y * value + t.y - v, u, v) && !(x * x + y * y > F(most * most));
+    plane_map<F> const image = image_of(x, y);
+    return near_zero(image.x - u, image.y - v, u, v) && !(x * x + y * y > F(most * most));
   }
 
  private:
@@ -216,12 +226,12 @@ class lens_curve {
   GART_HD static fixed_double root_of(fixed_double a) { return square_root(a); }
   GART_HD double larger_of(int i, int j) const { return fabs(s_[i]) + fabs(s_[j]); }
 
-  // A step of Newton's method; false where the lens folds.
+  // A step of Newton's method by these derivatives; false where the lens folds.
   template <class F>
-  GART_HD static bool step_to(F ex, F ey, beside_terms<F> const& t, F own_x, F own_y, F own_xy, F& x, F& y) {
-    F const xx = own_x + t.xx, xy = own_xy + t.xy, yx = own_xy + t.yx, yy = own_y + t.yy, det = xx * yy - xy * yx;
+  GART_HD static bool step_to(F ex, F ey, plane_map<F> const& by, F& x, F& y) {
+    F const det = by.xx * by.yy - by.xy * by.yx;
     if (!(det > F(1e-9))) return false;
-    x = x - (ex * yy - ey * xy) / det, y = y - (ey * xx - ex * yx) / det;
+    x = x - (ex * by.yy - ey * by.xy) / det, y = y - (ey * by.xx - ex * by.yx) / det;
     return true;
   }
   template <class F>

@@ -25,6 +25,9 @@
 ///     What no ray can be cast by.
 ///   bool one_to_one() const
 ///     Host side: whether no two pixels see one direction, and each sees one. Footprints need it. camera_base has true.
+///   slopes() const, intrinsics focal() const
+///     Of a camera with focal lengths and a principal point: how its rays change with their image points
+///     (camera/lens_slopes.hpp), by which these are learned.
 ///
 /// Which pixels of a tile come how near an ellipsoid needs no member: tiles/tile_planes.hpp has it from the rays.
 /// Kernels cast a pinhole's rays themselves; those of other models are cast once a view (camera/pixel_rays.hpp). Rays

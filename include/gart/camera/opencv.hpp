@@ -131,6 +131,11 @@ struct opencv : camera_base {
     return ray_of_slopes(flat.rotation, x, y);
   }
 
+  /// Focal lengths and principal point.
+  intrinsics focal() const { return flat.focal(); }
+  /// How rays change with their image points.
+  lens_slopes slopes() const { return {camera_kind::perspective, lens, flat.rotation}; }
+
   /// For hits at t > near.
   opencv_bounds bounds(float near) const {
     require_near(near);
@@ -177,6 +182,6 @@ struct opencv : camera_base {
   }
 };
 
-static_assert(central_camera<opencv>);
+static_assert(central_camera<opencv> && focal_camera<opencv>);
 
 }  // namespace gart::inline GART_ISA

@@ -7,6 +7,7 @@
 /// The box of an ellipsoid m + A s is m_x +- |A_x|, exactly; where it crosses the plane at `near`, what lies in front
 /// of that: an extreme behind it gives way to that of the section, an ellipse.
 
+#include <gart/camera/lens_slopes.hpp>
 #include <gart/camera/model.hpp>
 
 namespace gart::inline GART_ISA {
@@ -23,8 +24,8 @@ struct orthographic_bounds {
     vec3d const m = to_camera * e.center;
     mat3d const a = to_camera * e.axes;
     vec3d const ax(a[0][0], a[1][0], a[2][0]), ay(a[0][1], a[1][1], a[2][1]), az(a[0][2], a[1][2], a[2][2]);
-    double const depth = length(az), reach = fabs(e.center.x) + fabs(e.center.y) + fabs(e.center.z);
-    double const error = 2 * rounding_of_hits * (reach + length(ax) + length(ay) + depth);
+    double const depth = glm::length(az), reach = fabs(e.center.x) + fabs(e.center.y) + fabs(e.center.z);
+    double const error = 2 * rounding_of_hits * (reach + glm::length(ax) + glm::length(ay) + depth);
     footprint out;
     if (!(m.z + depth + error > near)) return out;
     double const nearest = m.z - depth - error;
@@ -38,12 +39,9 @@ struct orthographic_bounds {
   }
 
  private:
-  GART_HD static double dot(vec3d const& a, vec3d const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-  GART_HD static double length(vec3d const& a) { return sqrt(dot(a, a)); }
-
   // Of x over what of the ellipsoid has z >= n; (mx, ax): centre and row of the axis, (mz, az): of depth.
   GART_HD static detail::interval extent(double mx, vec3d const& ax, double mz, vec3d const& az, double n) {
-    double const half = length(ax), zz = dot(az, az), xz = dot(ax, az);
+    double const half = glm::length(ax), zz = glm::dot(az, az), xz = glm::dot(ax, az);
     detail::interval out;
     for (int side = -1; side <= 1; side += 2) {
       double const z = half > 0 ? mz + side * xz / half : mz;
@@ -69,6 +67,17 @@ struct orthographic_filter {
   GART_HD GART_INLINE float sigma_at(vec3 const&) const { return sigma; }
   /// It does not change with the mean.
   GART_HD GART_INLINE filter_at at(vec3 const&) const { return {sigma, vec3(0.0f)}; }
+};
+
+/// How its rays change with their image points: they keep their direction.
+struct orthographic_slopes {
+  mat3 rotation;  ///< camera to world
+  /// Of any point.
+  GART_HD ray_slopes operator()(float, float, vec3 const&) const {
+    ray_slopes out;
+    out.origin_x = rotation[0], out.origin_y = rotation[1];
+    return out;
+  }
 };
 
 /// The model.
@@ -99,6 +108,11 @@ struct orthographic : camera_base {
     return out;
   }
 
+  /// Focal lengths and principal point.
+  intrinsics focal() const { return {fx, fy, cx, cy}; }
+  /// How rays change with their image points.
+  orthographic_slopes slopes() const { return {rotation}; }
+
   /// For hits at t > near.
   orthographic_bounds bounds(float near) const {
     require_near(near);
@@ -120,6 +134,6 @@ struct orthographic : camera_base {
   }
 };
 
-static_assert(camera_model<orthographic> && !central_camera<orthographic>);
+static_assert(focal_camera<orthographic> && !central_camera<orthographic>);
 
 }  // namespace gart::inline GART_ISA

@@ -3,6 +3,7 @@
 /// The pinhole: u = fx x / z + cx, v = fy y / z + cy (COLMAP's SIMPLE_PINHOLE and PINHOLE). The one model whose rays
 /// kernels cast themselves, and whose tile lists are sorted by z.
 
+#include <gart/camera/lens_slopes.hpp>
 #include <gart/camera/model.hpp>
 #include <gart/camera/seen_slopes.hpp>
 #include <gart/camera/slope_filter.hpp>
@@ -48,6 +49,11 @@ struct pinhole : camera_base {
     return ray_of_slopes(rotation, divide(add(u, F(-cx)), F(fx)), divide(add(v, F(-cy)), F(fy)));
   }
 
+  /// Focal lengths and principal point.
+  intrinsics focal() const { return {fx, fy, cx, cy}; }
+  /// How rays change with their image points.
+  lens_slopes slopes() const { return {camera_kind::perspective, {}, rotation}; }
+
   /// z: along the camera's axis.
   GART_HD ray_depth depth() const { return {rotation[2], 0}; }
 
@@ -76,6 +82,6 @@ struct pinhole : camera_base {
   }
 };
 
-static_assert(central_camera<pinhole>);
+static_assert(central_camera<pinhole> && focal_camera<pinhole>);
 
 }  // namespace gart::inline GART_ISA

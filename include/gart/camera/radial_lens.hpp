@@ -9,6 +9,7 @@
 
 #include <gart/camera/axial_filter.hpp>
 #include <gart/camera/lens_bounds.hpp>
+#include <gart/camera/lens_slopes.hpp>
 #include <gart/camera/model.hpp>
 
 #include <vector>
@@ -85,6 +86,11 @@ struct radial_lens : camera_base {
     return std::hypot((double{u} - cx) / fx, (double{v} - cy) / fy) <= most_r;
   }
 
+  /// Focal lengths and principal point.
+  intrinsics focal() const { return {fx, fy, cx, cy}; }
+  /// How rays change with their image points.
+  lens_slopes slopes() const { return {kind, lens, rotation}; }
+
   /// For hits at t > near.
   lens_bounds bounds(float near) const {
     require_near(near);
@@ -157,6 +163,6 @@ struct radial_lens : camera_base {
   lens_bounds whole() const { return tabulated_bounds(kind, lens, fx, fy, cx, cy, width, height); }
 };
 
-static_assert(central_camera<radial_lens>);
+static_assert(central_camera<radial_lens> && focal_camera<radial_lens>);
 
 }  // namespace gart::inline GART_ISA

@@ -52,12 +52,6 @@ struct rolling_bounds {
  private:
   static constexpr int most_rounds = 8;
 
-  GART_HD static double dot(vec3d const& a, vec3d const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-  GART_HD static vec3d cross(vec3d const& a, vec3d const& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-  }
-  GART_HD static double length(vec3d const& a) { return sqrt(dot(a, a)); }
-
   // Whether the camera is within what `over` returns, whose axes are a triangle's. Where hits lie in front of such a
   // camera depends on the ellipsoid itself, and says nothing of a smaller one inside.
   GART_HD static bool around_camera(ellipsoid const& e) {
@@ -77,34 +71,34 @@ struct rolling_bounds {
   // All that it is in the axes of the middle of the read-out while the lines between these places are exposed.
   GART_HD ellipsoid over(ellipsoid const& e, double first, double end) const {
     double s = lines.template time_at<double>(0.5 * (first + end), 0.5 * (first + end));
-    double const h = 0.5 * (end - first) / lines.count, speed = length(travel), spin = length(turn);
+    double const h = 0.5 * (end - first) / lines.count, speed = glm::length(travel), spin = glm::length(turn);
     vec3d const arm = e.center - travel * s;
     mat3d const back = turn_of(turn * -s);
     ellipsoid out;
     out.center = back * arm;
     mat3d const a = back * e.axes;
-    vec3d const q = back * (cross(turn, arm) + travel) * h;  // but for its sign
+    vec3d const q = back * (glm::cross(turn, arm) + travel) * h;  // but for its sign
     double c[3][3];
     double trace = 0, longest2 = 0;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) c[i][j] = a[0][i] * a[0][j] + a[1][i] * a[1][j] + a[2][i] * a[2][j];
     for (int k = 0; k < 3; ++k) {
-      double const own = dot(e.axes[k], e.axes[k]);
+      double const own = glm::dot(e.axes[k], e.axes[k]);
       trace += c[k][k], longest2 = own > longest2 ? own : longest2;
     }
     // Of what is not orthogonal to the last digit the longest axis is no bound.
     double const longest = sqrt(longest2) * (1 + 1e-5);
-    double const far = length(e.center) + speed;
+    double const far = glm::length(e.center) + speed;
     double const rest = 0.5 * h * h * (spin * spin * far + 2 * spin * speed) + h * spin * longest +
                         4 * rounding_of_hits * (far + longest);
     // Widths across the direction it is seen in.
-    double const distance = length(out.center), nearness = distance > 0 ? 1 / distance : 0;
+    double const distance = glm::length(out.center), nearness = distance > 0 ? 1 / distance : 0;
     vec3d const d = out.center * nearness;
     double along = 0;
-    for (int k = 0; k < 3; ++k) along += dot(a[k], d) * dot(a[k], d);
+    for (int k = 0; k < 3; ++k) along += glm::dot(a[k], d) * glm::dot(a[k], d);
     double const tiny = 1e-9 * (far + longest) + 1e-30;
     double const width2 = 0.5 * (trace - along), width = sqrt(width2 > 0 ? width2 : 0.0) + tiny;
-    double const q_along = dot(q, d), q2 = dot(q, q), q_across2 = q2 - q_along * q_along;
+    double const q_along = glm::dot(q, d), q2 = glm::dot(q, q), q_across2 = q2 - q_along * q_along;
     double const k1 = rest / width;
     double const k2 = (sqrt(q_across2 > 0 ? q_across2 : 0.0) + 0.05 * sqrt(q2) + tiny) / (width + rest);
     for (int i = 0; i < 3; ++i)
@@ -152,16 +146,18 @@ struct rolling_shutter : camera_base {
       out.direction = unit_in_world(lens.rotation, d.x, d.y, d.z);
       return out;
     }
-    // Rodrigues' formula.
     number const angle = square_root(angle2);
     sine_cosine const by = sine_cosine_of(s * angle);
-    number const a[3] = {w[0] / angle, w[1] / angle, w[2] / angle};
-    number const along = (a[0] * d.x + a[1] * d.y + a[2] * d.z) * (number(1.0) - by.cosine);
-    out.direction = unit_in_world(lens.rotation, d.x * by.cosine + (a[1] * d.z - a[2] * d.y) * by.sine + a[0] * along,
-                                  d.y * by.cosine + (a[2] * d.x - a[0] * d.z) * by.sine + a[1] * along,
-                                  d.z * by.cosine + (a[0] * d.y - a[1] * d.x) * by.sine + a[2] * along);
+    vec3_of<number> const turned =
+        turned_about<number>({w[0] / angle, w[1] / angle, w[2] / angle}, by.sine, by.cosine, {d.x, d.y, d.z});
+    out.direction = unit_in_world(lens.rotation, turned.x, turned.y, turned.z);
     return out;
   }
+
+  /// Of a lens that has them: focal lengths and principal point.
+  intrinsics focal() const requires focal_camera<Lens> { return lens.focal(); }
+  /// The same: how rays change with their image points.
+  lens_slopes slopes() const requires focal_camera<Lens> { return lens.slopes().turning(lines, turn); }
 
   /// For hits at t > near.
   auto bounds(float near) const {
@@ -187,6 +183,6 @@ struct rolling_shutter : camera_base {
   bool one_to_one() const { return lens.one_to_one(); }
 };
 
-static_assert(camera_model<rolling_shutter<radial_lens>> && camera_model<rolling_shutter<equirectangular>>);
+static_assert(focal_camera<rolling_shutter<radial_lens>> && camera_model<rolling_shutter<equirectangular>>);
 
 }  // namespace gart::inline GART_ISA

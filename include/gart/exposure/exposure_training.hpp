@@ -104,6 +104,13 @@ class exposure_training {
 
   /// Turns dL/d exposed into dL/d image, and takes Adam's step for the view.
   void step(std::size_t view, span<float const> image, span<float> gradient, float rate) {
+    differentiate(view, image, gradient);
+    move(view, rate);
+  }
+
+  /// The first half of a step: turns dL/d exposed into dL/d image. What it says of the exposure, [12], stays until the
+  /// next call.
+  span<float const> differentiate(std::size_t view, span<float const> image, span<float> gradient) {
     constexpr index_t lanes = runs * runs;
     sums_.resize(std::size_t{lanes + runs} * exposure::floats);
     auto const by_lane = sums_.view().subspan(0, std::size_t{lanes} * exposure::floats);
@@ -114,13 +121,13 @@ class exposure_training {
     span<u32 const> const ends = ends_;
     segmented_reduce(*exec_, by_lane, exposure::floats, ends, by_run);
     segmented_reduce(*exec_, by_run, exposure::floats, ends.subspan(0, 2), gradient_.view());
-    std::size_t const row = view * exposure::floats;
-    int const visit = static_cast<int>(++visits_[view]);
-    adam_options const adam;
-    parallel_for(*exec_, "exposure_adam", exposure::floats,
-                 detail::exposure_adam_kernel{gradient_.data(), value_.data() + row, first_.data() + row,
-                                              second_.data() + row, adam_rule(adam, visit),
-                                              static_cast<float>(rate * adam_rule::first_correction(adam, visit))});
+    return gradient_;
+  }
+
+  /// The second, of another rank's view: by its gradient, [12], in host memory.
+  void move(std::size_t view, span<float const> gradient, float rate) {
+    gradient_.assign(std::vector<float>(gradient.begin(), gradient.end()));
+    move(view, rate);
   }
 
   /// For a checkpoint.
@@ -139,6 +146,17 @@ class exposure_training {
     return all;
   }
   exposure* at(std::size_t view) { return reinterpret_cast<exposure*>(value_.data()) + view; }
+
+  // Adam's step for the view, by gradient_.
+  void move(std::size_t view, float rate) {
+    std::size_t const row = view * exposure::floats;
+    int const visit = static_cast<int>(++visits_[view]);
+    adam_options const adam;
+    parallel_for(*exec_, "exposure_adam", exposure::floats,
+                 detail::exposure_adam_kernel{gradient_.data(), value_.data() + row, first_.data() + row,
+                                              second_.data() + row, adam_rule(adam, visit),
+                                              static_cast<float>(rate * adam_rule::first_correction(adam, visit))});
+  }
 
   E* exec_;
   buffer<float, E> value_, first_, second_;

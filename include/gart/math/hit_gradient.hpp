@@ -17,6 +17,11 @@
 /// The depth sum w t is composited as a channel of colour t, and t has a gradient of its own: at the point of largest
 /// response d_g.p = 0, so with e = w dL/d depth / |d_g|^2 the same sums take it in,
 ///   m1 += e d_g,  m2 += e (p d_g^T + d_g p^T).
+///
+/// A ray o + t d passes the point at t, so that what moves the Gaussian by dx moves the ray by -dx: of a hit
+///   dL/do = -M^T m1,   dL/dd = -M^T (t m1 + e p),
+/// the last term by how t itself changes, dt = -(p + t d_g).M dd / |d_g|^2. Both but for what colours see of d, and
+/// what changes its length.
 
 #include <gart/math/quaternion.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -96,6 +101,24 @@ GART_HD GART_INLINE void add_depth_moments(moments_of<F>& m, ray_peak_of<F> cons
   m.v[7] += p.y * ed.z + p.z * ed.y, m.v[8] += p.x * ed.z + p.z * ed.x, m.v[9] += p.x * ed.y + p.y * ed.x;
 }
 
+/// M^T v: from the Gaussian's own space to the world, for what is pulled back through M.
+GART_HD GART_INLINE vec3 to_world(ray_gaussian const& g, float x, float y, float z) {
+  return {g.m[0].x * x + g.m[1].x * y + g.m[2].x * z, g.m[0].y * x + g.m[1].y * y + g.m[2].y * z,
+          g.m[0].z * x + g.m[1].z * y + g.m[2].z * z};
+}
+
+/// What one hit adds to the gradient of its ray.
+struct ray_part {
+  vec3 origin, direction;  ///< dL/do, dL/dd
+};
+/// From its moments, the depth's in them; `by_depth` is w dL/d depth.
+GART_HD GART_INLINE ray_part ray_part_of(ray_gaussian const& g, ray_peak const& r, moments_of<float> const& m,
+                                         float by_depth) {
+  vec3 const along = to_world(g, m.v[1], m.v[2], m.v[3]), p = offset_of(r);
+  float const e = by_depth * fast_reciprocal(r.d.x * r.d.x + r.d.y * r.d.y + r.d.z * r.d.z);
+  return {-along, -r.t * along - to_world(g, e * p.x, e * p.y, e * p.z)};
+}
+
 /// Of a Gaussian's stored parameters.
 struct geometry_gradient {
   vec3 mean, log_scale;  ///< [3] each
@@ -108,18 +131,7 @@ GART_HD GART_INLINE geometry_gradient from_moments(float const* m, gaussian_para
                                                    ray_gaussian const& g) {
   geometry_gradient out;
   out.opacity = m[0] * sigmoid(-p.opacity);  // 1 - sigma would lose its digits as sigma nears 1
-  for (int j = 0; j < 3; ++j) {
-    float const column[3] = {j == 0   ? g.m[0].x
-                             : j == 1 ? g.m[0].y
-                                      : g.m[0].z,
-                             j == 0   ? g.m[1].x
-                             : j == 1 ? g.m[1].y
-                                      : g.m[1].z,
-                             j == 0   ? g.m[2].x
-                             : j == 1 ? g.m[2].y
-                                      : g.m[2].z};
-    out.mean[j] = column[0] * m[1] + column[1] * m[2] + column[2] * m[3];
-  }
+  out.mean = to_world(g, m[1], m[2], m[3]);
   out.log_scale = {m[4], m[5], m[6]};
   auto const anisotropy = [&](int j, int k) {
     float const ratio = exponential(p.log_scale[j] - p.log_scale[k]);

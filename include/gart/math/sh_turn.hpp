@@ -5,22 +5,25 @@
 /// G^a the generators of rotations in the basis of math/sh.hpp: antisymmetric, a band for itself, few entries a row. So
 /// the derivative of a function of colours by w needs what its gradient by the coefficients holds already:
 ///   dL/dw_a = sum_kl c_k G^a_kl dL/dc_l,   since dL/dc_l is a sum of Y_l over the hits.
+/// Of one hit, whose dL/dc_l is Y_l times the gradient of its colour, one channel will do: c_k summed with that
+/// gradient.
 
 #include <gart/core/macros.hpp>
 #include <gart/math/glm.hpp>
 
 namespace gart::inline GART_ISA {
 
-/// dL/dw of one Gaussian: its coefficients c and their gradient g, [size][3] each, of bands up to Degree.
-template <int Degree>
+/// dL/dw of one Gaussian: its coefficients c and their gradient g, [size][Channels] each, of bands up to Degree.
+template <int Degree, int Channels = 3>
 GART_HD GART_INLINE vec3 sh_turn(float const* c, float const* g) {
   vec3 out(0.0f);
   // c_k G_kl g_l and c_l G_lk g_k, for G_kl = 1.
   auto const pair = [&](int k, int l) {
     float sum = 0;
     GART_UNROLL
-    for (int channel = 0; channel < 3; ++channel)
-      sum += c[3 * k + channel] * g[3 * l + channel] - c[3 * l + channel] * g[3 * k + channel];
+    for (int channel = 0; channel < Channels; ++channel)
+      sum +=
+          c[Channels * k + channel] * g[Channels * l + channel] - c[Channels * l + channel] * g[Channels * k + channel];
     return sum;
   };
   if constexpr (Degree >= 1) {

@@ -11,18 +11,24 @@
 
 namespace gart::inline GART_ISA {
 
+/// v turned about a unit axis by an angle of that sine and cosine: Rodrigues' formula. F: double, or where bits count
+/// fixed_double.
+template <class F>
+GART_HD vec3_of<F> turned_about(vec3_of<F> const& axis, F sine, F cosine, vec3_of<F> const& v) {
+  F const along = (axis.x * v.x + axis.y * v.y + axis.z * v.z) * (F(1) - cosine);
+  return {v.x * cosine + (axis.y * v.z - axis.z * v.y) * sine + axis.x * along,
+          v.y * cosine + (axis.z * v.x - axis.x * v.z) * sine + axis.y * along,
+          v.z * cosine + (axis.x * v.y - axis.y * v.x) * sine + axis.z * along};
+}
+
 /// exp([w]x), the turn by |w| about w.
 GART_HD inline mat3d turn_of(vec3d const& w) {
-  double const angle2 = w.x * w.x + w.y * w.y + w.z * w.z, angle = sqrt(angle2);
-  double const a = angle > 1e-6 ? sin(angle) / angle : 1 - angle2 / 6;
-  double const b = angle > 1e-3 ? (1 - cos(angle)) / angle2 : 0.5 - angle2 / 24;
   mat3d out(1.0);
-  double const v[3] = {w.x, w.y, w.z};
-  for (int j = 0; j < 3; ++j)
-    for (int i = 0; i < 3; ++i) out[j][i] = (i == j ? 1 - b * angle2 : 0) + b * v[i] * v[j];
-  out[0][1] += a * w.z, out[1][0] -= a * w.z;
-  out[0][2] -= a * w.y, out[2][0] += a * w.y;
-  out[1][2] += a * w.x, out[2][1] -= a * w.x;
+  double const angle = glm::length(w);
+  if (!(angle > 0)) return out;
+  vec3d const axis = w / angle;
+  double const sine = sin(angle), cosine = cos(angle);
+  for (int k = 0; k < 3; ++k) out[k] = turned_about<double>(axis, sine, cosine, out[k]);
   return out;
 }
 

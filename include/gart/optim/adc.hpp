@@ -12,8 +12,10 @@
 /// threshold as in 3DGS. A Gaussian whose mean is behind the camera adds nothing in that step.
 ///
 /// Past the budget the largest statistics grow and the rest stay as they are. New Gaussians begin with zero moments.
-/// Gaussians that are not finite are removed. A split moves its halves by draws from itself. Cost: one small launch a
-/// step; a densification is O(N) with one host read, and holds a second copy of the parameters while it runs.
+/// Gaussians that are not finite are removed. A split moves its halves by draws from itself. What is removed closes the
+/// ranks of those behind it: every number may change, and where rows are spread over ranks they move with their
+/// numbers. Cost: one small launch a step; a densification is O(N) with one host read, and holds a second copy of the
+/// parameters while it runs.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>
@@ -23,6 +25,7 @@
 #include <gart/optim/options.hpp>
 #include <gart/optim/random.hpp>
 #include <gart/optim/rows.hpp>
+#include <gart/optim/schedule.hpp>
 #include <gart/scene/camera.hpp>
 
 #include <algorithm>
@@ -55,7 +58,9 @@ struct adc_accumulate_kernel {
   }
 };
 
-// What becomes of a Gaussian, by how many it leaves: 0 removed, 1 kept, 2 cloned or split.
+// What becomes of a Gaussian: it leaves none, itself, itself and a copy, or two others.
+inline constexpr u32 adc_gone = 0, adc_stays = 1, adc_cloned = 2, adc_split = 3;
+
 struct adc_rule {
   gaussians_view<float const> model;
   float const* sum;
@@ -73,80 +78,83 @@ struct adc_rule {
     bool finite = is_finite(model.opacity[i]);
     for (index_t c = 0; c < geometry_columns; ++c) finite = finite && is_finite(row_element(model, i, c));
     float const opacity = sigmoid(model.opacity[i]), scale = largest_scale(i);
-    if (!finite || !(opacity >= prune_opacity)) return 0;
+    if (!finite || !(opacity >= prune_opacity)) return adc_gone;
     bool const grows = statistic(i) >= gradient;
     bool const split = grows && scale > split_scale;
-    if ((split ? scale / 1.6f : scale) > prune_scale) return 0;
-    return grows ? 2 : 1;
+    if ((split ? scale / 1.6f : scale) > prune_scale) return adc_gone;
+    return split ? adc_split : grows ? adc_cloned : adc_stays;
   }
 };
 
 struct adc_plan_kernel {
   adc_rule rule;
-  u32* copies;
-  u32* grows;
+  u32* outcome;
+  GART_KERNEL void operator()(index_t i) const { outcome[i] = rule.outcome(i); }
+};
+
+struct adc_count_kernel {
+  u32 const* outcome;
+  u32 *copies, *grows;
   GART_KERNEL void operator()(index_t i) const {
-    copies[i] = rule.outcome(i);
-    grows[i] = copies[i] == 2;
+    grows[i] = outcome[i] >= adc_cloned;
+    copies[i] = grows[i] ? 2 : outcome[i];
   }
 };
 
 // Keys that sort the growing Gaussians first, the largest statistic first: the bits of a positive float are ordered.
 struct adc_key_kernel {
   adc_rule rule;
-  u32 const* copies;
+  u32 const* outcome;  // by number
+  row_owners owners;
   u32* key;
-  u32* id;
   GART_KERNEL void operator()(index_t i) const {
-    key[i] = copies[i] == 2 ? ~float_to_bits(rule.statistic(i)) : 0xffffffffu;
-    id[i] = i;
+    key[i] = outcome[owners.global(i)] >= adc_cloned ? ~float_to_bits(rule.statistic(i)) : 0xffffffffu;
   }
 };
 
 struct adc_demote_kernel {
   u32 const* id;
-  u32* copies;
+  u32 *outcome, *copies;
   index_t first;
-  GART_KERNEL void operator()(index_t rank) const { copies[id[first + rank]] = 1; }
+  GART_KERNEL void operator()(index_t rank) const { outcome[id[first + rank]] = copies[id[first + rank]] = adc_stays; }
 };
 
-// Where a row of the new arrays comes from, with two marks.
-inline constexpr u32 adc_fresh = 1u << 31, adc_split = 1u << 30, adc_row = adc_split - 1;
-
+// Where each row of the new arrays comes from, and what it is.
 struct adc_place_kernel {
-  adc_rule rule;
-  u32 const* copies;
+  u32 const* outcome;
   u64 const* offset;
-  u32* origin;
+  u32 *origin, *made;
   GART_KERNEL void operator()(index_t i) const {
-    if (copies[i] == 0) return;
-    bool const split = copies[i] == 2 && rule.largest_scale(i) > rule.split_scale;
-    origin[offset[i]] = split ? i | adc_fresh | adc_split : i;
-    if (copies[i] == 2) origin[offset[i] + 1] = split ? i | adc_fresh | adc_split : i | adc_fresh;
+    u32 const o = outcome[i];
+    if (o == adc_gone) return;
+    u64 const at = offset[i];
+    origin[at] = i, made[at] = o == adc_split ? adc_split : adc_stays;
+    if (o >= adc_cloned) origin[at + 1] = i, made[at + 1] = o;
   }
 };
 
-struct adc_gather_body {
-  gaussians_view<float const> from;
-  gaussians_view<float> to;
-  u32 const* origin;
-  bool clear_fresh;
+// What is new has no moments.
+struct adc_clear_body {
+  gaussians_view<float> first, second;
+  u32 const* made;
+  row_owners owners;
   GART_KERNEL void operator()(index_t row, index_t column) const {
-    u32 const o = origin[row];
-    row_element(to, row, column) = clear_fresh && (o & adc_fresh) ? 0.0f : row_element(from, o & adc_row, column);
+    if (made[owners.global(row)] != adc_stays) row_element(first, row, column) = row_element(second, row, column) = 0;
   }
 };
 
 struct adc_split_kernel {
   gaussians_view<float> model;
-  u32 const* origin;
+  u32 const* made;
+  row_owners owners;
   random_source random;
   GART_KERNEL void operator()(index_t i) const {
-    if (!(origin[i] & adc_split)) return;
+    u32 const number = static_cast<u32>(owners.global(i));
+    if (made[number] != adc_split) return;
     float const* const q = model.quaternion + std::size_t{4} * i;
     float* const mean = model.mean + std::size_t{3} * i;
     float* const log_scale = model.log_scale + std::size_t{3} * i;
-    random_normals const n = normals(random.words(i));
+    random_normals const n = normals(random.words(number));
     quaternion const turn{q[0], q[1], q[2], q[3]};
     vec3 v(n.v[0] * expf(log_scale[0]), n.v[1] * expf(log_scale[1]), n.v[2] * expf(log_scale[2]));
     if (norm2(turn) > quaternion_norm2_min) v = to_matrix(turn) * v;
@@ -183,6 +191,7 @@ class adaptive_density {
         iterations_(iterations),
         extent_(extent),
         seed_(seed),
+        outcome_(exec),
         copies_(exec),
         grows_(exec),
         origin_(exec),
@@ -191,8 +200,10 @@ class adaptive_density {
 
   /// From the next step on the schedules are those of a run of so many steps.
   void set_iterations(int iterations) { iterations_ = iterations; }
+  /// Steps are counted in images, of which each has so many.
+  void set_batch(int images) { batch_ = images; }
 
-  /// Every step, with the gradient of the step's view.
+  /// Every step, with the gradient of each of its views.
   void accumulate(gaussians<E> const& model, gaussians<E> const& gradient, camera const& view) {
     if (touched.size() != model.size()) clear_statistic(model.size());
     parallel_for(*exec_, "adc_accumulate", model.size(),
@@ -204,26 +215,26 @@ class adaptive_density {
   }
 
   /// Whether the step densifies.
-  bool due(int step) const {
-    return options_.every > 0 && step > options_.from && running(step) && step % options_.every == 0;
-  }
+  bool due(int step) const { return step > options_.from && running(step) && passes(step, options_.every, batch_); }
 
   /// After the optimizer's step: densification and the reset of opacities, where they are due.
-  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step) {
+  template <class Rows = all_rows>
+  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {}) {
     density_change change;
-    if (due(step)) change = densify(model, state, step);
-    if (options_.opacity_reset_every > 0 && running(step) && step % options_.opacity_reset_every == 0)
-      reset_opacity(model, state);
+    if (due(step)) change = densify(model, state, step, rows);
+    if (running(step) && passes(step, options_.opacity_reset_every, batch_)) reset_opacity(model, state);
     return change;
   }
 
-  /// Clones, splits and prunes.
-  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step) {
+  /// Clones, splits and prunes. `rows`: all_rows, or as it.
+  template <class Rows = all_rows>
+  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {}) {
     stage_scope stage(*exec_, "densify");
     density_change change;
-    index_t const n = model.size();
+    index_t const here = model.size(), n = rows.total(here);
+    row_owners const owners = rows.owners();
     if (n == 0) return change;
-    if (touched.size() != n) clear_statistic(n);
+    if (touched.size() != here) clear_statistic(here);
 
     bool const was_reset = options_.opacity_reset_every > 0 && step > options_.opacity_reset_every;
     detail::adc_rule const rule{std::as_const(model).view(),
@@ -233,8 +244,11 @@ class adaptive_density {
                                 options_.prune_opacity,
                                 options_.dense * extent_,
                                 was_reset ? options_.prune_scale * extent_ : INFINITY};
+    outcome_.resize(here);
+    parallel_for(*exec_, "adc_plan", here, detail::adc_plan_kernel{rule, outcome_.data()});
+    rows.gather(*exec_, outcome_);
     copies_.resize(n), grows_.resize(n), offset_.resize(n);
-    parallel_for(*exec_, "adc_plan", n, detail::adc_plan_kernel{rule, copies_.data(), grows_.data()});
+    parallel_for(*exec_, "adc_count", n, detail::adc_count_kernel{outcome_.data(), copies_.data(), grows_.data()});
     exclusive_scan(*exec_, span<u32 const>(grows_), offset_.view(), totals_.view().subspan(0, 1));
     exclusive_scan(*exec_, span<u32 const>(copies_), offset_.view(), totals_.view().subspan(1, 1));
     u64 totals[2];
@@ -244,11 +258,15 @@ class adaptive_density {
 
     if (total > max_gaussians_ && growing > 0) {
       u64 const room = max_gaussians_ > kept ? max_gaussians_ - kept : 0;
-      origin_.resize(n);
-      parallel_for(*exec_, "adc_keys", n, detail::adc_key_kernel{rule, copies_.data(), grows_.data(), origin_.data()});
-      sort_pairs(*exec_, grows_.view(), origin_.view(), 32);
-      parallel_for(*exec_, "adc_demote", static_cast<index_t>(growing - room),
-                   detail::adc_demote_kernel{origin_.data(), copies_.data(), static_cast<index_t>(room)});
+      buffer<u32, E>& key = grows_;
+      key.resize(here), origin_.resize(n);
+      parallel_for(*exec_, "adc_keys", here, detail::adc_key_kernel{rule, outcome_.data(), owners, key.data()});
+      rows.gather(*exec_, key);
+      parallel_for(*exec_, "adc_numbers", n, detail::number_rows{origin_.data(), 0});
+      sort_pairs(*exec_, key.view(), origin_.view(), 32);
+      parallel_for(
+          *exec_, "adc_demote", static_cast<index_t>(growing - room),
+          detail::adc_demote_kernel{origin_.data(), outcome_.data(), copies_.data(), static_cast<index_t>(room)});
       exclusive_scan(*exec_, span<u32 const>(copies_), offset_.view(), totals_.view().subspan(1, 1));
       growing = room, total = kept + room;
     }
@@ -256,14 +274,21 @@ class adaptive_density {
     change.added = static_cast<index_t>(growing);
     change.removed = static_cast<index_t>(n - kept);
     if (change.any()) {
-      index_t const next = static_cast<index_t>(total);
-      origin_.resize(next);
+      index_t const next = static_cast<index_t>(total), next_here = rows.here(next);
+      buffer<u32, E>& made = grows_;
+      origin_.resize(next), made.resize(next);
       parallel_for(*exec_, "adc_place", n,
-                   detail::adc_place_kernel{rule, copies_.data(), offset_.data(), origin_.data()});
-      gather(model, next, false), gather(state.first, next, true), gather(state.second, next, true);
-      parallel_for(
-          *exec_, "adc_split", next,
-          detail::adc_split_kernel{model.view(), origin_.data(), {seed_, static_cast<u32>(step), random_use::split}});
+                   detail::adc_place_kernel{outcome_.data(), offset_.data(), origin_.data(), made.data()});
+      for (gaussians<E>* each : {&model, &state.first, &state.second}) {
+        gaussians<E> taken(*exec_, next_here, each->sh_degree());
+        rows.take(*exec_, *each, taken, span<u32 const>(origin_));
+        *each = std::move(taken);
+      }
+      for_each_element(*exec_, "adc_clear", next_here, model.sh_degree(),
+                       detail::adc_clear_body{state.first.view(), state.second.view(), made.data(), owners});
+      parallel_for(*exec_, "adc_split", next_here,
+                   detail::adc_split_kernel{
+                       model.view(), made.data(), owners, {seed_, static_cast<u32>(step), random_use::split}});
     }
     clear_statistic(model.size());
     return change;
@@ -285,20 +310,13 @@ class adaptive_density {
     gradient_sum.zero(), touched.zero();
   }
 
-  void gather(gaussians<E>& rows, index_t count, bool clear_fresh) {
-    gaussians<E> next(*exec_, count, rows.sh_degree());
-    for_each_element(*exec_, "adc_gather", count, rows.sh_degree(),
-                     detail::adc_gather_body{std::as_const(rows).view(), next.view(), origin_.data(), clear_fresh});
-    rows = std::move(next);
-  }
-
   E* exec_;
   adc_options options_;
   index_t max_gaussians_;
-  int iterations_;
+  int iterations_, batch_ = 1;
   float extent_;
   u64 seed_;
-  buffer<u32, E> copies_, grows_, origin_;
+  buffer<u32, E> outcome_, copies_, grows_, origin_;
   buffer<u64, E> offset_, totals_;
 };
 

@@ -26,6 +26,7 @@
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>
+#include <gart/core/error.hpp>
 #include <gart/math/hit_gradient.hpp>
 #include <gart/optim/adam.hpp>
 #include <gart/optim/long_axis_split.hpp>
@@ -36,6 +37,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 namespace gart::inline GART_ISA {
 
@@ -129,7 +131,8 @@ class error_growth {
   /// The error seen through each Gaussian since the last densification, [N]: what a checkpoint must hold.
   buffer<float, E> error_sum;
 
-  /// For a run of so many steps, up to so many Gaussians (growth_budget).
+  /// For a run of so many steps, up to so many Gaussians (growth_budget). Errors: invalid_argument for a split that
+  /// leaves no halves.
   error_growth(E& exec, error_growth_options const& options, index_t max_gaussians, int iterations, u64 seed)
       : error_sum(exec),
         exec_(&exec),
@@ -143,7 +146,15 @@ class error_growth {
         id_(exec),
         target_(exec),
         place_(exec),
-        totals_(exec, 2) {}
+        totals_(exec, 2) {
+    split_shape const& split = options.split;
+    if (!(split.share > 0 && split.share < 1))
+      throw invalid_argument("train_options.error.split.share is " + std::to_string(split.share) +
+                             ": more than 0, less than 1");
+    if (!(split.opacity > 0 && split.opacity <= 1))
+      throw invalid_argument("train_options.error.split.opacity is " + std::to_string(split.opacity) +
+                             ": more than 0, at most 1");
+  }
 
   /// Every step, with the moments that the step's backward pass left ([N][moment_stride]), before the optimizer's step:
   /// adds to the statistic, and to `gradient` that of the penalty.

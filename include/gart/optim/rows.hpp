@@ -83,6 +83,15 @@ struct copy_row_body {
   }
 };
 
+struct take_row_body {
+  gaussians_view<float const> from;
+  gaussians_view<float> to;
+  u32 const* origin;
+  GART_KERNEL void operator()(index_t row, index_t column) const {
+    row_element(to, row, column) = row_element(from, origin[row], column);
+  }
+};
+
 struct clear_moments_body {
   gaussians_view<float> first, second;
   u32 const* rows;
@@ -124,6 +133,12 @@ class all_rows {
   void copy(E& exec, gaussians<E>& model, span<u32 const> from, span<u32 const> to) const {
     for_each_element(exec, "copy_rows", static_cast<index_t>(from.size()), model.sh_degree(),
                      detail::copy_row_body{model.view(), from.data(), to.data()});
+  }
+  /// Gaussian g of `to` becomes origin[g] of `from`, by numbers; `to` has as many as `origin`.
+  template <execution E>
+  void take(E& exec, gaussians<E> const& from, gaussians<E>& to, span<u32 const> origin) const {
+    for_each_element(exec, "take_rows", static_cast<index_t>(origin.size()), from.sh_degree(),
+                     detail::take_row_body{from.view(), to.view(), origin.data()});
   }
 };
 

@@ -20,6 +20,7 @@
 #include <gart/pose/pose_metric.hpp>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace gart::inline GART_ISA {
@@ -45,9 +46,12 @@ class pose_training {
 
   /// Whether view i has yet to be told how its image moves.
   bool wants_metric(std::size_t i) const { return state_.metric[36 * i] == 0; }
-  /// From its image's depth and transmittance, as pose_metric has them, before its first step.
-  void set_metric(std::size_t i, span<float const> depth, span<float const> transmittance) {
-    auto const metric = pose_metric(view(i), depth, transmittance, extent_);
+  /// It, from the image's depth and transmittance.
+  std::array<double, 36> metric_of(std::size_t i, span<float const> depth, span<float const> transmittance) const {
+    return pose_metric(view(i), depth, transmittance, extent_);
+  }
+  /// Told, before the view's first step.
+  void set_metric(std::size_t i, std::array<double, 36> const& metric) {
     std::copy(metric.begin(), metric.end(), state_.metric.begin() + static_cast<std::ptrdiff_t>(36 * i));
   }
 

@@ -35,6 +35,7 @@ class compiled_session final : public session {
   void set_state(training_state const& state) override { trainer_.set_state(state); }
   exposure_field exposures() const override { return trainer_.exposures(); }
   std::vector<named_camera> poses() const override { return trainer_.poses(); }
+  camera as_learned(camera const& view) const override { return trainer_.as_learned(view); }
   profiler& profile() override {
     exec_.synchronize();
     return exec_.profile;

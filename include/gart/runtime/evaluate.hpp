@@ -55,5 +55,7 @@ using keep_view =
 /// with its own, as the field gives it for the camera.
 scores evaluate(some_views const& views, vec3 background, exposure_field const& exposures, render_view const& render,
                 keep_view const& keep = {}, place_view const& place = {});
+/// Sets the means from the views': of scores that were put together from several.
+void take_means(scores& of);
 
 }  // namespace gart

@@ -54,8 +54,10 @@ class session {
   virtual void set_state(training_state const& state) = 0;
   /// Of the training views so far; empty where none are learned. render() shows the scene's own colours.
   virtual exposure_field exposures() const { return {}; }
-  /// The cameras of the training views as they are learned, in order; empty where none are.
+  /// The cameras of the training views as they are learned, in order; empty where neither poses nor lenses are.
   virtual std::vector<named_camera> poses() const { return {}; }
+  /// A camera of the capture, at whatever pose, with its lens as it is learned; as it is where none are.
+  virtual camera as_learned(camera const& view) const { return view; }
   virtual std::vector<band_trial> trials() const { return {}; }  ///< that are over
   /// Times of stages; waits for the policy.
   virtual profiler& profile() = 0;

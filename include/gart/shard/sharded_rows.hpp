@@ -110,16 +110,14 @@ class sharded_rows {
     std::vector<u32> sources(from.size()), targets(to.size());
     exec.copy_out(sources.data(), from.data(), from.size() * sizeof(u32));
     exec.copy_out(targets.data(), to.data(), to.size() * sizeof(u32));
-    // In the order of the list on both sides.
-    auto const ranks = static_cast<std::size_t>(owners_.ranks);
-    std::vector<std::vector<u32>> leave(ranks), arrive(ranks);
-    for (std::size_t k = 0; k < sources.size(); ++k) {
-      if (owners_.owns(sources[k]))
-        leave[static_cast<std::size_t>(owners_.owner(targets[k]))].push_back(owners_.local(sources[k]));
-      if (owners_.owns(targets[k]))
-        arrive[static_cast<std::size_t>(owners_.owner(sources[k]))].push_back(owners_.local(targets[k]));
-    }
-    move_rows(exec, model, leave, model, arrive);
+    send_rows(exec, model, sources, model, targets);
+  }
+  /// Gaussian g of `to` becomes origin[g] of `from`, by numbers; `to` has its rows of as many as `origin` has.
+  void take(E& exec, gaussians<E> const& from, gaussians<E>& to, span<u32 const> origin) {
+    std::vector<u32> sources(origin.size()), targets(origin.size());
+    exec.copy_out(sources.data(), origin.data(), origin.size() * sizeof(u32));
+    std::iota(targets.begin(), targets.end(), u32{0});
+    send_rows(exec, from, sources, to, targets);
   }
 
   /// Rows leave[r] of `from` become rows arrive[s] of `to`: of each pair of ranks as many, in one order.
@@ -193,6 +191,19 @@ class sharded_rows {
   }
 
  private:
+  // Gaussian targets[k] of `to` becomes sources[k] of `from`: in the order of the list on both sides.
+  void send_rows(E& exec, gaussians<E> const& from, std::vector<u32> const& sources, gaussians<E>& to,
+                 std::vector<u32> const& targets) {
+    auto const ranks = static_cast<std::size_t>(owners_.ranks);
+    std::vector<std::vector<u32>> leave(ranks), arrive(ranks);
+    for (std::size_t k = 0; k < sources.size(); ++k) {
+      if (owners_.owns(sources[k]))
+        leave[static_cast<std::size_t>(owners_.owner(targets[k]))].push_back(owners_.local(sources[k]));
+      if (owners_.owns(targets[k]))
+        arrive[static_cast<std::size_t>(owners_.owner(sources[k]))].push_back(owners_.local(targets[k]));
+    }
+    move_rows(exec, from, leave, to, arrive);
+  }
   static std::ptrdiff_t offset(std::size_t at) { return static_cast<std::ptrdiff_t>(at); }
   std::vector<u64> counts_of(u64 total) const {
     std::vector<u64> out;

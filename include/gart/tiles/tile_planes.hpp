@@ -53,11 +53,6 @@ struct tile_planes {
  private:
   static constexpr double least_cosine = 0.6, most_reach = 4;
 
-  GART_HD static double dot(vec3d const& a, vec3d const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-  GART_HD static vec3d cross(vec3d const& a, vec3d const& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-  }
-  GART_HD static double norm(vec3d const& a) { return sqrt(dot(a, a)); }
   GART_HD vec3d direction(int x, int y) const { return vec3d(rays.of(x, y).direction); }
 
   GART_HD tile_plane plane_of(pixel_box const& area) const {
@@ -66,14 +61,14 @@ struct tile_planes {
     GART_NO_UNROLL
     for (int y = 0; y < h; ++y)
       for (int x = 0; x < w; ++x) middle += direction(area.x0 + x, area.y0 + y);
-    double const length = norm(middle);
+    double const length = glm::length(middle);
     tile_plane none{};
     if (!(length > 0.5)) return none;
     middle = middle / length;
     bool wide = false;
     auto const on_plane = [&](int x, int y) {
       vec3d const d = direction(area.x0 + x, area.y0 + y);
-      double const along = dot(d, middle);
+      double const along = glm::dot(d, middle);
       wide = wide || !(along > least_cosine);
       return d / along;
     };
@@ -81,24 +76,26 @@ struct tile_planes {
     vec3d dx = w > 1 ? ((b - a) + (d - c)) / (2.0 * (w - 1)) : vec3d(0.0);
     vec3d dy = h > 1 ? ((c - a) + (d - b)) / (2.0 * (h - 1)) : vec3d(0.0);
     // One row or column of pixels: the grid is square.
-    if (w == 1 && h == 1) dx = cross(middle, fabs(middle.x) < 0.6 ? vec3d(1, 0, 0) : vec3d(0, 1, 0)) * 1e-4;
+    if (w == 1 && h == 1) dx = glm::cross(middle, fabs(middle.x) < 0.6 ? vec3d(1, 0, 0) : vec3d(0, 1, 0)) * 1e-4;
     if (h == 1)
-      dy = cross(middle, dx);
+      dy = glm::cross(middle, dx);
     else if (w == 1)
-      dx = cross(dy, middle);
-    vec3d const normal = cross(dx, dy);
-    double const area2 = dot(normal, normal);
-    if (!(area2 > 1e-6 * dot(dx, dx) * dot(dy, dy)) || !(dot(dx, dx) > 1e-24)) return none;
+      dx = glm::cross(dy, middle);
+    vec3d const normal = glm::cross(dx, dy);
+    double const area2 = glm::dot(normal, normal);
+    if (!(area2 > 1e-6 * glm::dot(dx, dx) * glm::dot(dy, dy)) || !(glm::dot(dx, dx) > 1e-24)) return none;
     vec3d const corner = (a + b + c + d) / 4.0 - dx * (0.5 * w) - dy * (0.5 * h);
     double off_x = 0, off_y = 0;
     GART_NO_UNROLL
     for (int y = 0; y < h; ++y)
       for (int x = 0; x < w; ++x) {
         vec3d const off = on_plane(x, y) - corner - dx * (x + 0.5) - dy * (y + 0.5);
-        double const ox = fabs(dot(cross(off, dy), normal)) / area2, oy = fabs(dot(cross(dx, off), normal)) / area2;
+        double const ox = fabs(glm::dot(glm::cross(off, dy), normal)) / area2,
+                     oy = fabs(glm::dot(glm::cross(dx, off), normal)) / area2;
         off_x = ox > off_x ? ox : off_x, off_y = oy > off_y ? oy : off_y;
       }
-    double const reach = norm(corner) + norm(dx) * (Size + off_x + 1) + norm(dy) * (Size + off_y + 1);
+    double const reach =
+        glm::length(corner) + glm::length(dx) * (Size + off_x + 1) + glm::length(dy) * (Size + off_y + 1);
     if (wide || !(reach < most_reach)) return none;
     return {vec3(corner), static_cast<float>(off_x * 1.000001), vec3(dx), static_cast<float>(off_y * 1.000001),
             vec3(dy),     static_cast<float>(reach * 1.01)};

@@ -6,6 +6,7 @@
 #include <gart/comm/row_owners.hpp>
 #include <gart/core/names.hpp>
 #include <gart/core/types.hpp>
+#include <gart/lens/options.hpp>
 #include <gart/optim/options.hpp>
 #include <gart/pose/options.hpp>
 #include <gart/render/options.hpp>
@@ -54,6 +55,7 @@ struct train_options {
   float depth_weight = 0;
   bool exposure = false;      ///< learn an exposure of each training view (exposure/exposure.hpp)
   bool refine_poses = false;  ///< learn the pose of each training view (pose/pose_training.hpp)
+  bool refine_lens = false;   ///< learn the focal length and centre of each camera (lens/lens_training.hpp)
   /// Bytes of the LT buffer above which a step is done with less; 0: half of what is free when the trainer is made,
   /// and no limit where sums are to be in a fixed order.
   u64 lt_budget = 0;
@@ -70,6 +72,7 @@ struct train_options {
   learning_rates rates = {};                      ///< of Adam, by group of parameters
   adam_options adam = {};                         ///< of Adam
   pose_options poses = {};                        ///< of learned poses
+  lens_options lens = {};                         ///< of learned lenses
   error_growth_options error = {};                ///< of growth by error
   mcmc_options mcmc = {};                         ///< of growth by MCMC
   adc_options adc = {};                           ///< of adaptive density control

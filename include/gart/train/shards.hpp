@@ -3,9 +3,12 @@
 /// What a trainer on several ranks has beside that of one: the exchange of rows, and the sums of a batch of views.
 /// trainer_ranks_impl.hpp has the step. With self_comm there is nothing of it.
 
+#include <gart/exposure/exposure.hpp>
+#include <gart/pose/differentiate_pose.hpp>
 #include <gart/shard/row_exchange.hpp>
 #include <gart/shard/sharded_rows.hpp>
 
+#include <array>
 #include <utility>
 
 namespace gart::inline GART_ISA {
@@ -17,6 +20,15 @@ struct no_shards {
   explicit no_shards(T&&...) {}
 };
 
+/// What was found of one of a step's images, by the ranks that traced it.
+struct image_result {
+  std::size_t view = 0;                   ///< of the training views
+  float loss = 0, mean_square = 0;        ///< of the whole image
+  float by_exposure[exposure::floats]{};  ///< the loss by the view's exposure, where that is learned
+  std::array<double, 36> metric{};        ///< of its pose (pose/pose_metric.hpp), where that was asked for
+  pose_gradient by_pose;                  ///< the loss by it, where that is learned
+};
+
 /// Comm: a communicator for E.
 template <execution E, class Comm, class Traits, class Tracer>
 struct shards {
@@ -26,6 +38,7 @@ struct shards {
 
   sharded_rows<E, Comm> rows;        ///< who has which
   exchange round;                    ///< of the views under way
+  sharded_rows<E, Comm> pose_runs;   ///< who has which sums of a pose's gradient
   antialiased<E> filter;             ///< of this rank's rows
   buffer<ray_gaussian, E> prepared;  ///< this rank's rows in a view's frame
   gaussians<E> view_gradients,       ///< of this rank's rows, by one view of a batch
@@ -37,6 +50,7 @@ struct shards {
   shards(E& exec, Comm const& comm, index_t block)
       : rows(exec, comm, block),
         round(exec, comm, block),
+        pose_runs(exec, comm, std::max<index_t>(block / pose_differentiation<E>::run, 1)),
         filter(exec),
         prepared(exec),
         view_gradients(exec, 0, sh_degree),

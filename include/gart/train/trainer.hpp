@@ -24,6 +24,7 @@
 #include <gart/exposure/exposure_field.hpp>
 #include <gart/exposure/exposure_training.hpp>
 #include <gart/io/dataset.hpp>
+#include <gart/lens/lens_training.hpp>
 #include <gart/loss/error_map.hpp>
 #include <gart/loss/image_loss.hpp>
 #include <gart/optim/adam.hpp>
@@ -108,8 +109,11 @@ class basic_trainer {
   void save(std::filesystem::path const& path) const;
   /// Takes up the run of a checkpoint.
   void load(std::filesystem::path const& path) { set_state(read_checkpoint(path, sh_degree)); }
-  exposure_field exposures() const;         ///< of the views that were trained on; empty where none are learned
-  std::vector<named_camera> poses() const;  ///< of the training views; empty where none are learned
+  exposure_field exposures() const;  ///< of the views that were trained on; empty where none are learned
+  /// The cameras of the training views, where poses or lenses are learned; else empty.
+  std::vector<named_camera> poses() const;
+  /// A camera of the capture, at whatever pose, with its lens as it is learned.
+  camera as_learned(camera const& view) const { return lenses_ ? lenses_->view(view) : view; }
   std::size_t lt_bytes() const { return lt_bytes_; }  ///< of the last step
   /// Bytes that this rank has sent to others in its steps.
   u64 sent_bytes() const requires(!Comm::alone) { return shards_.sent; }
@@ -132,10 +136,10 @@ class basic_trainer {
   // With ranks (trainer_ranks_impl.hpp).
   void require_ranks() const;
   step_report step_in_ranks(loss_function<E> const& loss) requires(!Comm::alone);
-  void trace_unit(loss_function<E> const& loss, std::size_t index, int image, int degree, learning_rates const& rates,
+  void trace_unit(loss_function<E> const& loss, camera const& seen, int image, int degree, image_result& result,
                   step_report& report) requires(!Comm::alone);
-  void gather_values(int views, std::vector<float>& values) requires(!Comm::alone);
-  void take_gradients(camera const& view, int v, int image) requires(!Comm::alone);
+  void gather_results(span<image_result> round, bool metrics) requires(!Comm::alone);
+  void take_gradients(camera const& view, int v, int image, image_result& result) requires(!Comm::alone);
   rendered render_in_ranks(camera const& view, vec3 background) requires(!Comm::alone);
   bool in_ranks() const { return !Comm::alone && (comm_.size() > 1 || options_.batch > 1); }
   // What of values of all Gaussians is this rank's, and the way back.
@@ -165,6 +169,11 @@ class basic_trainer {
     else
       return shards_.rows.whole_of(mine, 1, root);
   }
+
+  // The camera of a training view, with what is learned of it.
+  camera seen_by(std::size_t index) const { return as_learned(poses_ ? poses_->view(index) : data_.train[index].view); }
+  bool learns_poses() const { return poses_ && poses_->learns(step_, options_.iterations); }
+  bool learns_lenses() const { return lenses_ && lenses_->learns(step_, options_.iterations); }
 
   bool grows_by_error() const { return options_.densify == densify_kind::error; }
   vec3 background_of(int step) const;
@@ -206,6 +215,8 @@ class basic_trainer {
   buffer<float, E> depth_, transmittance_;         // of the step's image, where a pose asks for them
   std::optional<pose_training> poses_;             // where options.refine_poses asks for them
   pose_differentiation<E> by_pose_;
+  std::optional<lens_training> lenses_;  // where options.refine_lens asks for them
+  lens_differentiation<E> by_lens_;
   std::optional<finite_check<E>> finite_;  // where options.check_finite asks for it
   index_t started_with_ = 0, total_ = 0;   // Gaussians of all ranks
   int step_ = 0;

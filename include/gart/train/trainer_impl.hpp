@@ -37,11 +37,12 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       adc_(exec, adc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
       color_(exec),
       color_gradient_(exec),
-      value_(exec, 2 + pose_gradient::floats),
+      value_(exec, 2 + pose_gradient::floats + lens_gradient::floats),
       supervision_(exec, data, options.depth_weight),
       depth_(exec),
       transmittance_(exec),
       by_pose_(exec),
+      by_lens_(exec),
       started_with_(static_cast<index_t>(start.size())),
       total_(started_with_) {
   require_ranks();
@@ -67,9 +68,18 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
     for (dataset_view const& view : data.train) captured.push_back(view.view);
     poses_.emplace(options.poses, std::move(captured), data.extent);
   }
+  if (options.refine_lens) {
+    if (options.render.antialias > 0)
+      throw invalid_argument(
+          "train_options.refine_lens: the filter of the pixels has no gradient by the focal length; set "
+          "render_options.antialias to 0");
+    std::vector<named_camera> captured;
+    for (dataset_view const& view : data.train) captured.push_back({view.name, view.view});
+    lenses_.emplace(options.lens, captured);
+  }
   growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
-  error_.set_batch(options.batch), mcmc_.set_batch(options.batch);
+  error_.set_batch(options.batch), mcmc_.set_batch(options.batch), adc_.set_batch(options.batch);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -94,7 +104,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
     if (in_ranks()) return step_in_ranks(loss);
   std::size_t const index = order_.at(step_);
   dataset_view const& view = data_.train[index];
-  camera const seen = poses_ ? poses_->view(index) : view.view;
+  camera const seen = seen_by(index);
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates const rates = rates_of_step();
   render_options const render = render_options_of(options_, data_.extent, background_of(step_));
@@ -109,7 +119,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
     differentiate_by(pass, loss, index, rates);
     moments = pass.moments(), lt_bytes_ = pass.lt_bytes(), used = Pass::strategy_type::name;
   });
-  bool const moves = poses_ && poses_->learns(step_, options_.iterations);
+  bool const moves = learns_poses(), bends = learns_lenses();
   if (moves) by_pose_(frame_, std::as_const(gradients_).view(), value_.view().subspan(2, pose_gradient::floats));
   ++step_;
   if (grows_by_error()) error_.add_errors(scene_, moments);
@@ -124,6 +134,8 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
   report.backward = used;
   std::vector<float> const value = value_.to_host();
   if (moves) poses_->step(index, pose_gradient(value.data() + 2), step_ - 1, options_.iterations);
+  if (bends)
+    lenses_->step(index, lens_gradient(value.data() + 2 + pose_gradient::floats), step_ - 1, options_.iterations);
   report.loss = value[0];
   if constexpr (has_depth<Strategy>) report.loss += supervision_.value();
   report.psnr = value[1] > 0 ? -10.0f * std::log10(value[1]) : 99.0f;
@@ -138,7 +150,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
   dataset_view const& view = data_.train[index];
   image_targets targets;
   targets.color = color_.data();
-  bool const measures = poses_ && poses_->learns(step_, options_.iterations) && poses_->wants_metric(index);
+  bool const measures = learns_poses() && poses_->wants_metric(index);
   if constexpr (has_depth<Strategy>) {
     supervision_.begin(targets, color_.size() / 3);
   } else if (measures) {
@@ -157,17 +169,22 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
     if (grows_by_error()) error_map(exec_, image, truth, error_map_);
     if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }
-  if constexpr (has_depth<Strategy>)
-    differentiate(frame_, pass, supervision_.gradients(color_gradient_), gradients_, error_map_);
-  else
-    differentiate(frame_, pass, color_gradient_, gradients_, error_map_);
+  image_gradients image{color_gradient_};
+  depth_and_transmittance more;
+  if constexpr (has_depth<Strategy>) {
+    image = supervision_.gradients(color_gradient_);
+    more = {supervision_.pixels().depth.data(), supervision_.pixels().transmittance.data()};
+  }
+  differentiate(frame_, pass, image, gradients_, error_map_);
+  if (learns_lenses())
+    by_lens_(frame_, color_, image, value_.view().subspan(2 + pose_gradient::floats, lens_gradient::floats), more);
   if (measures) {
     std::vector<float> depth, transmittance;
     if constexpr (has_depth<Strategy>)
       depth = supervision_.depth(), transmittance = supervision_.transmittance();
     else
       depth = depth_.to_host(), transmittance = transmittance_.to_host();
-    poses_->set_metric(index, {depth.data(), depth.size()}, {transmittance.data(), transmittance.size()});
+    poses_->set_metric(index, poses_->metric_of(index, depth, transmittance));
   }
 }
 
@@ -183,7 +200,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates c
   density_change change;
   if (grows_by_error()) change = error_.after_step(scene_, state_, step_, rows);
   if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean, rows);
-  if (use_adc) change = adc_.after_step(scene_, state_, step_);
+  if (use_adc) change = adc_.after_step(scene_, state_, step_, rows);
   total_ += change.added - change.removed;
   if (change.added || change.removed) gradients_.resize_keep(scene_.size());
 }
@@ -235,7 +252,8 @@ exposure_field basic_trainer<E, Traits, Tracer, Strategy, Comm>::exposures() con
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 std::vector<named_camera> basic_trainer<E, Traits, Tracer, Strategy, Comm>::poses() const {
   std::vector<named_camera> out;
-  for (std::size_t i = 0; poses_ && i < data_.train.size(); ++i) out.push_back({data_.train[i].name, poses_->view(i)});
+  for (std::size_t i = 0; (poses_ || lenses_) && i < data_.train.size(); ++i)
+    out.push_back({data_.train[i].name, seen_by(i)});
   return out;
 }
 
@@ -253,6 +271,7 @@ training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::state_on(int ro
   s.step = step_, s.growth = growth_, s.seed = options_.seed;
   if (exposures_) s.exposures = exposures_->state();
   if (poses_) s.poses = poses_->state();
+  if (lenses_) s.lenses = lenses_->state();
   s.error_sum = whole_of(error_.error_sum.to_host(), root);
   s.gradient_sum = whole_of(adc_.gradient_sum.to_host(), root), s.touched = whole_of(adc_.touched.to_host(), root);
   return s;
@@ -282,6 +301,11 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_state(training_state 
     if (s.poses.visits.size() != data_.train.size())
       throw invalid_argument("trainer: the state has poses of another number of training views");
     poses_->set_state(s.poses);
+  }
+  if (lenses_) {
+    if (s.lenses.visits.size() != lenses_->state().visits.size())
+      throw invalid_argument("trainer: the state has lenses of another number of cameras");
+    lenses_->set_state(s.lenses);
   }
   options_.seed = s.seed;
   order_ = view_order(data_.train.size(), options_.held_out, options_.seed);

@@ -35,11 +35,10 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::require_ranks() const {
   if (comm_.size() == 1 && options_.batch == 1) return;
   if constexpr (Comm::alone)
     refuse("train_options.batch needs a trainer that has a communicator; self_comm has no step");
-  if (options_.densify == densify_kind::adc)
-    refuse("train_options.densify = adc does not train yet; take mcmc or error");
-  if (options_.refine_poses) refuse("train_options.refine_poses is not there");
-  if (options_.exposure && options_.batch > 1)
-    throw invalid_argument("train_options.exposure is learned a view a step: take train_options.batch = 1");
+  if (options_.refine_poses && options_.shard_block % pose_differentiation<E>::run != 0)
+    throw invalid_argument("train_options.shard_block is " + std::to_string(options_.shard_block) +
+                           ": with refine_poses a multiple of " + std::to_string(pose_differentiation<E>::run));
+  if (options_.refine_lens) refuse("train_options.refine_lens is not there");
   if (has_depth<Strategy> || options_.depth_weight > 0) refuse("train_options.depth_weight is not there");
 }
 
@@ -56,44 +55,50 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
     !Comm::alone) {
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates rates = rates_of_step();
-  int const ranks = comm_.size(), batch = options_.batch;
-  std::vector<float> values;  // of each view: loss, mean squared error
-  std::string name;
+  int const ranks = comm_.size(), batch = options_.batch, before = step_;
+  bool const moves = learns_poses();
+  std::vector<image_result> images(static_cast<std::size_t>(batch));  // of the step, in their order
   lt_bytes_ = 0;
   step_report report;
   for (int done = 0; done < batch;) {
     int const views = std::min(batch - done, ranks);
-    std::vector<std::size_t> indices;
+    span<image_result> const round =
+        span<image_result>(images).subspan(static_cast<std::size_t>(done), static_cast<std::size_t>(views));
     std::vector<camera> cameras;
     for (int v = 0; v < views; ++v) {
-      indices.push_back(order_.at(step_ + done + v));
-      cameras.push_back(data_.train[indices.back()].view);
+      std::size_t const index = round.data()[v].view = order_.at(before + done + v);
+      cameras.push_back(seen_by(index));
     }
     // Near distance and the like are those of any view; the background is the view's own.
     shards_.round.fetch(std::as_const(scene_).view(), cameras, render_options_of(options_, data_.extent));
     int const mine = shards_.round.unit().view;
-    trace_unit(loss, indices[static_cast<std::size_t>(mine)], done + mine, degree, rates, report);
-    gather_values(views, values);
-    for (int v = 0; v < views; ++v) take_gradients(cameras[static_cast<std::size_t>(v)], v, done + v);
-    name = data_.train[indices.back()].name;
+    trace_unit(loss, cameras[static_cast<std::size_t>(mine)], done + mine, degree, round.data()[mine], report);
+    gather_results(round, moves);
+    for (int v = 0; v < views; ++v) take_gradients(cameras[static_cast<std::size_t>(v)], v, done + v, round.data()[v]);
     done += views;
   }
   shards_.sent += shards_.round.take_traffic();
   step_ += batch;
+  // From what each image said of the exposures and poses that the step began with, whoever traced it.
+  for (int k = 0; k < batch; ++k) {
+    image_result const& image = images[static_cast<std::size_t>(k)];
+    if (exposures_) exposures_->move(image.view, {image.by_exposure, exposure::floats}, rates.exposure);
+    if (moves) poses_->step(image.view, image.by_pose, before + k, options_.iterations);
+  }
   float const haste = std::sqrt(static_cast<float>(batch));
   if (batch > 1)
     for (float* rate : {&rates.mean, &rates.log_scale, &rates.quaternion, &rates.opacity, &rates.sh_dc, &rates.sh_rest})
       *rate *= haste;
   optimize(rates, degree, shards_.rows);
 
+  report.step = step_, report.gaussians = total_, report.view = data_.train[images.back().view].name;
   if (finite_) {
-    u64 skipped = (*finite_)(scene_, state_, "step " + std::to_string(step_) + ", view " + name);
+    u64 skipped = (*finite_)(scene_, state_, "step " + std::to_string(step_) + ", view " + report.view);
     comm_.all_reduce(span<u64>(&skipped, 1));
     report.skipped = skipped;
   }
-  report.step = step_, report.gaussians = total_, report.view = name;
   double sum = 0, square = 0;
-  for (std::size_t v = 0; v < values.size(); v += 2) sum += double{values[v]}, square += double{values[v + 1]};
+  for (image_result const& image : images) sum += double{image.loss}, square += double{image.mean_square};
   report.loss = static_cast<float>(sum / batch);
   float const mean_square = static_cast<float>(square / batch);
   report.psnr = mean_square > 0 ? -10.0f * std::log10(mean_square) : 99.0f;
@@ -102,23 +107,39 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
 
 // This rank's unit of a round: its rows of the image, the loss of the whole, its sums of the gradients.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<E> const& loss, std::size_t index,
-                                                                  int image, int degree, learning_rates const& rates,
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<E> const& loss, camera const& seen,
+                                                                  int image, int degree, image_result& result,
                                                                   step_report& report) requires(!Comm::alone) {
+  std::size_t const index = result.view;
   dataset_view const& view = data_.train[index];
-  std::size_t const pixels = static_cast<std::size_t>(view.view.width) * view.view.height;
+  std::size_t const pixels = static_cast<std::size_t>(seen.width) * seen.height;
   color_.resize(3 * pixels), color_gradient_.resize(3 * pixels);
   vec3 const background = background_of(step_ + image);
   work_unit const unit = shards_.round.unit();
+  image_targets targets;
+  targets.color = color_.data();
+  bool const measures = learns_poses() && poses_->wants_metric(index);
+  if (measures) {
+    depth_.resize(pixels), transmittance_.resize(pixels);
+    targets.depth = depth_.data(), targets.transmittance = transmittance_.data();
+  }
   auto const by_image = [&] {
     stage_scope stage(exec_, "loss");
-    shards_.round.share_image(color_.data(), view.view, 3 * sizeof(float));
+    shards_.round.share_image(color_.data(), seen, 3 * sizeof(float));
+    if (measures)
+      for (buffer<float, E>* each : {&depth_, &transmittance_})
+        shards_.round.share_image(each->data(), seen, sizeof(float));
     span<float const> const shown = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
     truth_view const truth = images_.get(exec_, index, background);
-    loss(loss_input<E>{exec_, view, truth, view.view.width, view.view.height, shown, color_gradient_,
-                       value_.view().subspan(0, 2), depth_pixels{}});
+    loss(loss_input<E>{exec_, view, truth, seen.width, seen.height, shown, color_gradient_, value_.view().subspan(0, 2),
+                       depth_pixels{}});
     if (grows_by_error()) error_map(exec_, shown, truth, error_map_);
-    if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
+    if (exposures_)
+      exec_.copy_out(result.by_exposure, exposures_->differentiate(index, color_, color_gradient_).data(),
+                     sizeof result.by_exposure);
+    exec_.copy_out(&result.loss, value_.data(), sizeof(float));
+    exec_.copy_out(&result.mean_square, value_.data() + 1, sizeof(float));
+    if (measures) result.metric = poses_->metric_of(index, depth_.to_host(), transmittance_.to_host());
   };
   if (unit.empty()) {
     by_image();
@@ -127,14 +148,14 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   }
   render_options render = render_options_of(options_, data_.extent, background);
   render.rows = unit.rows;
-  frame_.prepare(shards_.round.scene(), view.view, render, degree);
+  frame_.prepare(shards_.round.scene(), seen, render, degree);
   gaussians<E>& sums = shards_.unit_gradients;
   sums.resize_keep(shards_.round.scene().count);
   passes_.with_room(frame_, options_.lt_budget, [&]<class Pass>(Pass& pass) {
     if constexpr (Strategy::ordered && !Pass::ordered) {
       throw pass.no_room();
     } else {
-      pass.render(frame_, {.color = color_.data()});
+      pass.render(frame_, targets);
       by_image();
       sum_gradients(frame_, pass, {color_gradient_}, sums.view(), error_map_);
       shards_.round.give_back(pass, sums.sh.data());
@@ -143,25 +164,24 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   });
 }
 
-// What the loss was of each view of the round.
+// What the first rank of each of the round's views has found, to all.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::gather_values(int views, std::vector<float>& values) requires(
-    !Comm::alone) {
-  std::vector<float> const mine = value_.to_host();
-  std::vector<float> all(2 * static_cast<std::size_t>(comm_.size()));
-  comm_.all_gather(mine.data(), all.data(), 2 * sizeof(float));
-  for (int v = 0; v < views; ++v) {
-    std::size_t rank = 0;  // the first that has the view
-    while (shards_.round.units()[rank].view != v) ++rank;
-    values.push_back(all[2 * rank]), values.push_back(all[2 * rank + 1]);
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::gather_results(span<image_result> round,
+                                                                      bool metrics) requires(!Comm::alone) {
+  std::vector<image_result> all(static_cast<std::size_t>(comm_.size()));
+  comm_.all_gather(&round.data()[shards_.round.unit().view], all.data(), sizeof(image_result));
+  for (std::size_t rank = all.size(); rank-- > 0;) round.data()[shards_.round.units()[rank].view] = all[rank];
+  for (std::size_t v = 0; metrics && v < round.size(); ++v) {
+    image_result const& found = round.data()[v];
+    if (poses_->wants_metric(found.view)) poses_->set_metric(found.view, found.metric);
   }
 }
 
 // From the sums over the pixels of the round's view v, which is the image'th of the step, to gradients of this rank's
 // rows.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(camera const& view, int v,
-                                                                      int image) requires(!Comm::alone) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(camera const& view, int v, int image,
+                                                                      image_result& result) requires(!Comm::alone) {
   index_t const n = scene_.size();
   gaussians<E>& to = image == 0 ? gradients_ : shards_.view_gradients;
   to.resize_keep(n), shards_.moments.resize(std::size_t{moment_stride} * n), shards_.prepared.resize(n);
@@ -173,6 +193,14 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(camera con
                    seen, view.position, options_.render.alpha_min, shards_.prepared.view()});
   finish_gradients(exec_, scene, shards_.prepared, view, options_.render.antialias, shards_.moments, to.view());
   if (grows_by_error()) error_.add_errors(scene_, shards_.moments);
+  if (options_.densify == densify_kind::adc) adc_.accumulate(scene_, to, view);
+  if (learns_poses()) {
+    span<double const> const runs =
+        by_pose_.template sum_runs<sh_degree>(scene, std::as_const(to).view(), view.position);
+    std::vector<double> mine(runs.size());
+    exec_.copy_out(mine.data(), runs.data(), runs.size() * sizeof(double));
+    result.by_pose = by_pose_.total(shards_.pose_runs.whole_of(mine, pose_gradient::floats));
+  }
   if (image > 0)
     for_each_element(exec_, "batch/add", n, sh_degree,
                      train_kernels::add_gradients_body{

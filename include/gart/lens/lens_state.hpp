@@ -1,0 +1,50 @@
+#pragma once
+/// \file
+/// Lenses as they are learned: three numbers for each camera of a capture, over the focal length as the capture has it,
+///   fx = fx_0 (1 + f),   fy = fy_0 (1 + f),   cx = cx_0 + fx_0 x,   cy = cy_0 + fy_0 y.
+/// One number for both focal lengths: pixels keep their shape, which sensors have for certain. In double: a step of a
+/// training may move a lens by less than a float tells.
+
+#include <gart/core/isa.hpp>
+#include <gart/core/types.hpp>
+#include <gart/scene/camera.hpp>
+
+#include <array>
+#include <vector>
+
+namespace gart {
+
+/// Three numbers of a lens: f, x, y.
+using lens_numbers = std::array<double, 3>;
+
+/// The lenses of a run and Adam's moments of them, as a checkpoint holds them.
+struct lens_state {
+  std::vector<double> value;          ///< [cameras][3]; empty: no lenses are learned
+  std::vector<double> first, second;  ///< [cameras][3]
+  std::vector<u32> visits;            ///< [cameras] steps that moved the lens
+};
+
+}  // namespace gart
+
+namespace gart::inline GART_ISA {
+
+/// The camera with its lens changed: all else stays.
+inline camera through(camera view, lens_numbers const& by) {
+  double const fx = double{view.fx}, fy = double{view.fy};
+  view.fx = static_cast<float>(fx * (1 + by[0])), view.fy = static_cast<float>(fy * (1 + by[0]));
+  view.cx = static_cast<float>(double{view.cx} + fx * by[1]),
+  view.cy = static_cast<float>(double{view.cy} + fy * by[2]);
+  return view;
+}
+
+/// Whether two views are through one camera of the capture, for all that it says: the same model, size and lens.
+inline bool same_lens(camera const& a, camera const& b) {
+  auto const all = [](camera const& c) {
+    distortion const& l = c.lens;
+    return std::array<float, 22>{c.fx, c.fy, c.cx, c.cy, l.k1, l.k2, l.p1, l.p2, l.k3,    l.k4,    l.k5,
+                                 l.k6, l.d1, l.d2, l.d3, l.s1, l.s2, l.s3, l.s4, l.omega, l.alpha, l.beta};
+  };
+  return a.kind == b.kind && a.width == b.width && a.height == b.height && all(a) == all(b);
+}
+
+}  // namespace gart::inline GART_ISA
