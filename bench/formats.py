@@ -7,6 +7,7 @@ settings by their names, and the PLY is always among them.
 import os
 import re
 import shlex
+import time
 
 from common import Failure, last_line, run
 from training import read_json
@@ -38,7 +39,9 @@ class Formats:
             for setting, ending, options in wanted:
                 out = os.path.join(self.temporary, "model" + ending)
                 scores = os.path.join(self.temporary, "scores.json")
+                began = time.monotonic()
                 done = run([self.program("gart"), "convert", ply, out, *options])
+                seconds = time.monotonic() - began
                 if done.returncode == 0:
                     done = run([self.program("gart"), "eval", out, capture, "--out", scores, "--backend",
                                 self.a.backend, "--quiet", *shlex.split(self.a.train)])
@@ -46,10 +49,11 @@ class Formats:
                     raise Failure(f"{name}, {setting}: {last_line(done.stderr)}")
                 result = read_json(scores)
                 row = {"setting": setting, "bytes": os.path.getsize(out), "gaussians": result["gaussians"],
-                       "sh_degree": result["sh_degree"], "psnr": result["psnr"], "ssim": result["ssim"]}
+                       "sh_degree": result["sh_degree"], "psnr": result["psnr"], "ssim": result["ssim"],
+                       "convert_seconds": seconds}
                 row["share"] = row["bytes"] / os.path.getsize(ply)
                 row["psnr_lost"] = (runs[0]["psnr"] if runs else row["psnr"]) - row["psnr"]
                 self.say(f"{name}, {setting}: {row['share']:.3f} of the PLY, {row['psnr']:.2f} dB, "
-                         f"{row['psnr_lost']:.3f} lost")
+                         f"{row['psnr_lost']:.3f} lost, converted in {seconds:.1f} s")
                 runs.append(row)
             self.write("formats_" + name, runs, scene=name)

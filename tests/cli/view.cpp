@@ -155,7 +155,10 @@ TEST_CASE("the background that a model was trained on is known by the config.jso
 TEST_CASE("a view at rest is what render writes, before it is a JPEG") {
   folder const here;
   write_capture(here / "capture");
-  gart::write_splat_ply(here / "model.ply", one_gaussian());
+  // Another from each side.
+  gart::gaussian_model model = one_gaussian();
+  model.mean = {0.4f, 0.1f, 0.2f}, model.log_scale = {-0.5f, -1.6f, -1.1f};
+  gart::write_splat_ply(here / "model.ply", model);
   outcome ended;
   std::thread program([&] {
     ended = here.gart_interrupted_at("gart: viewer:", "view model.ply capture --backend serial --background white");

@@ -247,8 +247,8 @@ class error_growth {
       clear_moments(*exec_, state, to, owners);
       for (bool const second : {false, true})
         parallel_for(*exec_, "error_split", draws,
-                     detail::error_split_kernel{model.view(), (second ? to : from).data(), owners, options_.split, second,
-                                                1.01f * options_.dead_opacity});
+                     detail::error_split_kernel{model.view(), (second ? to : from).data(), owners, options_.split,
+                                                second, 1.01f * options_.dead_opacity});
     }
     clear_statistic(model.size());
     return change;
