@@ -22,13 +22,6 @@ group const groups[] = {{"mean", &oracle::parameters::mean},
                         {"opacity", &oracle::parameters::opacity},
                         {"sh", &oracle::parameters::sh}};
 
-// Both renders take the same branch everywhere on this pixel.
-bool same_branches(oracle::pixel const& a, oracle::pixel const& b) {
-  return std::equal(a.list.begin(), a.list.end(), b.list.begin(), b.list.end(), [](auto const& x, auto const& y) {
-    return x.id == y.id && x.clamps == y.clamps && x.counted == y.counted;
-  });
-}
-
 struct difference {
   doubles color, transmittance, depth;  // per pixel, by one parameter
 };
@@ -58,8 +51,8 @@ void check(oracle::scene const& s, int kernel_degree = 2, double tolerance = 1e-
       x = kept;
       difference d{doubles(3 * pixels), doubles(pixels), doubles(pixels)};
       for (std::size_t p = 0; p < pixels; ++p) {
-        usable[p] = usable[p] && same_branches(base.pixels[p], plus.pixels[p]) &&
-                    same_branches(base.pixels[p], minus.pixels[p]);
+        usable[p] = usable[p] && oracle::same_branches(base.pixels[p], plus.pixels[p]) &&
+                    oracle::same_branches(base.pixels[p], minus.pixels[p]);
         for (int c = 0; c < 3; ++c) d.color[3 * p + c] = (plus.pixels[p].color[c] - minus.pixels[p].color[c]) / (2 * h);
         d.depth[p] = (plus.pixels[p].depth - minus.pixels[p].depth) / (2 * h);
         d.transmittance[p] = (plus.pixels[p].transmittance - minus.pixels[p].transmittance) / (2 * h);

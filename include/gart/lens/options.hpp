@@ -8,7 +8,7 @@ namespace gart {
 struct lens_options {
   float warm_up = 0.02f;              ///< share of the run in which lenses stay as they are, at most 500 steps
   float until = 0.9f;                 ///< share of the run at which the rates have come to their last
-  float rate = 1e-3f;                 ///< at first
+  float rate = 2e-3f;                 ///< at first
   float rate_final = 1e-5f;           ///< where it ends; exponential between
   float beta1 = 0.9f, beta2 = 0.99f;  ///< Adam's
 };
