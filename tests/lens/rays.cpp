@@ -1,8 +1,7 @@
 // Gradients of rays, a pixel for itself, against central differences of the oracle's images, which turns and shifts its
 // camera in double: a turn w moves a direction by w x d, a shift the origin.
 #include <lens/traced_rays.hpp>
-#include <oracle/oracle.hpp>
-#include <oracle/scenes.hpp>
+#include <oracle/moved_pictures.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -22,26 +21,9 @@ struct expectation {
 
 expectation expect(oracle::scene s, std::mt19937_64& random, bool with_depth) {
   s.options.near = 1e-3f;  // what it cuts off is a step, and left out as steps are
-  oracle::parameters const m(s.model);
-  double smallest = 1;
-  for (double l : m.log_scale) smallest = std::min(smallest, std::exp(l));
-  double const h = 2e-4 * smallest;
-  auto const render = [&](oracle::motion const& by) {
-    return oracle::render(m, s.view, s.options, s.active_degree, by);
-  };
-  auto const base = render({});
-  std::size_t const pixels = base.pixels.size();
-  std::vector<bool> usable(pixels, true);
-  std::vector<oracle::picture> moved;
-  for (int k = 0; k < 6; ++k)
-    for (double const step : {h, -h, 2 * h, -2 * h}) {
-      oracle::motion by;
-      (k < 3 ? by.shift[k] : by.turn[k - 3]) = step;
-      moved.push_back(render(by));
-      for (std::size_t p = 0; p < pixels; ++p)
-        usable[p] = usable[p] && !base.pixels[p].edge && !base.pixels[p].kink &&
-                    oracle::same_branches(base.pixels[p], moved.back().pixels[p]);
-    }
+  oracle::moved_pictures const pictures = oracle::move_camera(s);
+  std::vector<bool> const& usable = pictures.smooth;
+  std::size_t const pixels = usable.size();
   REQUIRE(std::count(usable.begin(), usable.end(), true) > static_cast<long>(pixels / 2));
   expectation out{s, {}, std::vector<double>(3 * pixels), std::vector<double>(3 * pixels)};
   std::normal_distribution<float> normal;
@@ -59,8 +41,8 @@ expectation expect(oracle::scene s, std::mt19937_64& random, bool with_depth) {
   };
   for (std::size_t p = 0; p < pixels; ++p)
     for (std::size_t k = 0; k < 6; ++k) {
-      auto const at = [&](std::size_t step) { return loss(moved[4 * k + step].pixels[p], p); };
-      (k < 3 ? out.by_shift : out.by_turn)[3 * p + k % 3] = (8 * (at(0) - at(1)) - (at(2) - at(3))) / (12 * h);
+      auto const of_pixel = [&](oracle::pixel const& at) { return loss(at, p); };
+      (k < 3 ? out.by_shift : out.by_turn)[3 * p + k % 3] = pictures.slope(k, p, of_pixel);
     }
   return out;
 }

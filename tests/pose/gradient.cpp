@@ -1,6 +1,6 @@
 // Gradients of poses against central differences of the oracle's images, which is turned and shifted in double.
 #include <gart/pose/differentiate_pose.hpp>
-#include <oracle/oracle.hpp>
+#include <oracle/moved_pictures.hpp>
 #include <oracle/scenes.hpp>
 #include <support/policies.hpp>
 #include <support/scene_by_kind.hpp>
@@ -26,43 +26,26 @@ struct expectation {
 expectation expect(oracle::scene s, std::mt19937_64& random) {
   s.options.near = 1e-3f;  // what it cuts off is a step, and left out as steps are
   expectation out{s, {}, {}, {}};
-  oracle::parameters const m(s.model);
-  double smallest = 1;
-  for (double l : m.log_scale) smallest = std::min(smallest, std::exp(l));
-  double const h = 2e-4 * smallest;
-  auto const render = [&](oracle::motion const& by) {
-    return oracle::render(m, s.view, s.options, s.active_degree, by);
-  };
-  auto const base = render({});
-  std::size_t const pixels = base.pixels.size();
-  std::vector<bool> usable(pixels, true);
-  std::vector<oracle::picture> moved;  // shifts, then turns; plus and minus, by h and 2 h
-  for (int k = 0; k < 6; ++k)
-    for (double const step : {h, -h, 2 * h, -2 * h}) {
-      oracle::motion by;
-      (k < 3 ? by.shift[k] : by.turn[k - 3]) = step;
-      moved.push_back(render(by));
-      for (std::size_t p = 0; p < pixels; ++p)
-        usable[p] = usable[p] && !base.pixels[p].edge && !base.pixels[p].kink &&
-                    oracle::same_branches(base.pixels[p], moved.back().pixels[p]);
-    }
+  oracle::moved_pictures const pictures = oracle::move_camera(s);
+  std::vector<bool> const& usable = pictures.smooth;
+  std::size_t const pixels = usable.size();
   REQUIRE(std::count(usable.begin(), usable.end(), true) > static_cast<long>(pixels / 2));
   // Half the squared distance from the image of another pose has the difference for its gradient.
   std::normal_distribution<double> normal(0, 0.05);
   oracle::motion away;
   for (int k = 0; k < 3; ++k) away.shift[k] = normal(random), away.turn[k] = normal(random);
-  auto const there = render(away);
+  auto const there = oracle::render(oracle::parameters(s.model), s.view, s.options, s.active_degree, away);
   for (std::size_t p = 0; p < pixels; ++p)
     for (int c = 0; c < 3; ++c) {
-      double const difference = base.pixels[p].color[c] - there.pixels[p].color[c];
+      double const difference = pictures.base.pixels[p].color[c] - there.pixels[p].color[c];
       out.weights.push_back(usable[p] ? static_cast<float>(difference) : 0.0f);
     }
   for (int k = 0; k < 6; ++k) {
     double sum = 0;
     for (std::size_t p = 0; p < pixels; ++p)
       for (int c = 0; c < 3; ++c) {
-        auto const at = [&](int step) { return moved[static_cast<std::size_t>(4 * k + step)].pixels[p].color[c]; };
-        sum += double{out.weights[3 * p + c]} * (8 * (at(0) - at(1)) - (at(2) - at(3))) / (12 * h);
+        auto const of_pixel = [&](oracle::pixel const& at) { return at.color[c]; };
+        sum += double{out.weights[3 * p + c]} * pictures.slope(static_cast<std::size_t>(k), p, of_pixel);
       }
     (k < 3 ? out.translation[k] : out.rotation[k - 3]) = sum;
   }
