@@ -228,12 +228,12 @@ TEST_CASE_TEMPLATE("the statistic adds up steps, and the penalty is that of the 
   CHECK(got.mean == g.mean);
 }
 
-TEST_CASE("a split that leaves no halves is refused by field") {
-  gart::serial_exec exec;
+TEST_CASE_TEMPLATE("a split that leaves no halves is refused by field", E, GART_TEST_POLICIES) {
+  E exec;
   auto const made = [&](float share, float opacity) {
     gart::error_growth_options options;
     options.split = {share, opacity};
-    gart::error_growth<gart::serial_exec>(exec, options, 10, 10, 1);
+    gart::error_growth<E>(exec, options, 10, 10, 1);
   };
   made(0.5f, 1.0f);
   for (float const bad : {0.0f, 1.0f, -0.5f, NAN}) {
