@@ -237,10 +237,9 @@ TEST_CASE_TEMPLATE("a split that leaves no halves is refused by field", E, GART_
   };
   made(0.5f, 1.0f);
   for (float const bad : {0.0f, 1.0f, -0.5f, NAN}) {
-    CHECK_THROWS_WITH_AS(made(bad, 0.5f), doctest::Contains("train_options.error.split.share"), gart::invalid_argument);
+    CHECK_THROWS_WITH_AS(made(bad, 0.5f), doctest::Contains("split_shape.share"), gart::invalid_argument);
     if (bad != 1.0f)
-      CHECK_THROWS_WITH_AS(made(0.5f, bad), doctest::Contains("train_options.error.split.opacity"),
-                           gart::invalid_argument);
+      CHECK_THROWS_WITH_AS(made(0.5f, bad), doctest::Contains("split_shape.opacity"), gart::invalid_argument);
   }
 }
 

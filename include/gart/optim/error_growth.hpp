@@ -149,11 +149,9 @@ class error_growth {
         totals_(exec, 2) {
     split_shape const& split = options.split;
     if (!(split.share > 0 && split.share < 1))
-      throw invalid_argument("train_options.error.split.share is " + std::to_string(split.share) +
-                             ": more than 0, less than 1");
+      throw invalid_argument("split_shape.share is " + std::to_string(split.share) + ": more than 0, less than 1");
     if (!(split.opacity > 0 && split.opacity <= 1))
-      throw invalid_argument("train_options.error.split.opacity is " + std::to_string(split.opacity) +
-                             ": more than 0, at most 1");
+      throw invalid_argument("split_shape.opacity is " + std::to_string(split.opacity) + ": more than 0, at most 1");
   }
 
   /// Every step, with the moments that the step's backward pass left ([N][moment_stride]), before the optimizer's step:

@@ -2,11 +2,11 @@
 /// \file
 /// One Gaussian becomes two along its longest axis (Deng et al., Efficient Density Control for 3D Gaussian Splatting,
 /// 2024): the halves end where it ended and are as thick in their middles as it was there, so the silhouette stays.
-/// With q = split_shape::share and s the longest standard deviation, their centres lie at +-q 3 s, where the cross-section
-/// at three standard deviations is sqrt(1 - q^2) of the middle one; they are 1 - q times as long, q 3 s + (1 - q) 3 s =
-/// 3 s, and sqrt(1 - q^2) times as thick. Between middle and end they reach up to 6% further out where q = 0.45. Opacity
-/// falls to split_shape::opacity of what it was: where a half is needed it rises again, and where not it fades, which
-/// keeps a growing model from learning its training views by heart.
+/// With q = split_shape::share and s the longest standard deviation, their centres lie at +-q 3 s, where the
+/// cross-section at three standard deviations is sqrt(1 - q^2) of the middle one; they are 1 - q times as long, q 3 s +
+/// (1 - q) 3 s = 3 s, and sqrt(1 - q^2) times as thick. Between middle and end they reach up to 6% further out where q
+/// = 0.45. Opacity falls to split_shape::opacity of what it was: where a half is needed it rises again, and where not
+/// it fades, which keeps a growing model from learning its training views by heart.
 
 #include <gart/math/quaternion.hpp>
 #include <gart/optim/options.hpp>
