@@ -89,6 +89,11 @@ try:
         ip("-n", name, "link", "set", "lo", "up")
         ip("-n", name, "link", "set", name, "up")
 
+    for name in hosts:
+        probe = run(*on_host(name, "true"))
+        if probe.returncode != 0:
+            skip(f"no command runs in a network namespace: {probe.stderr.strip()}")
+
     alone = run(*launcher, 1, gart, *options_of(capture, folder / "alone", 60), *ordered)
     expect(alone.returncode == 0, f"1 rank: {alone.stderr}")
     both = run(*training("both", 60))
