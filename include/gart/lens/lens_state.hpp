@@ -39,6 +39,7 @@ inline camera through(camera view, lens_numbers const& by) {
 
 /// Whether two views are through one camera of the capture, for all that it says: the same model, size and lens.
 inline bool same_lens(camera const& a, camera const& b) {
+  static_assert(sizeof(distortion) == 18 * sizeof(float), "a new number of a lens is to be compared too");
   auto const all = [](camera const& c) {
     distortion const& l = c.lens;
     return std::array<float, 22>{c.fx, c.fy, c.cx, c.cy, l.k1, l.k2, l.p1, l.p2, l.k3,    l.k4,    l.k5,

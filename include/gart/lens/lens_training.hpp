@@ -3,7 +3,8 @@
 /// Lenses of a capture, learned with the Gaussians: Adam on three numbers for each camera of it (lens/lens_state.hpp),
 /// on the host. Views of the same model, size and lens are of one camera, and each step of one moves it.
 ///
-/// A gradient that is not finite moves nothing. Cost: none that shows beside the gradient's.
+/// A gradient that is not finite moves nothing. Each number stays within half of the focal length, either way, so that
+/// it stays positive: what is farther off is no calibration to refine. Cost: none that shows beside the gradient's.
 
 #include <gart/lens/differentiate_lens.hpp>
 #include <gart/lens/lens_state.hpp>
