@@ -89,9 +89,10 @@ bool training_view::attend(double step_seconds, gart::view_status status, interr
     if (paused_) {
       seconds_ += server_.render_next(render_, 0.1);
     } else {
-      if (share_.may_view()) seconds_ += server_.render_next(render_, 0);
+      double const rendered = share_.may_view() ? server_.render_next(render_, 0) : 0;
+      seconds_ += rendered;
       // All that a step does for its viewers is of their share, not the images alone.
-      share_.viewed(duration<double>(clock::now() - now).count());
+      share_.viewed(duration<double>(clock::now() - now).count(), rendered > 0);
     }
   }
   return true;

@@ -74,6 +74,22 @@ TEST_CASE("views keep to their share of the time, whatever one takes") {
   }
 }
 
+TEST_CASE("what the step after a view takes beyond the usual is of the views' share") {
+  gart::time_share time(0.1);
+  double usual = 0, views = 0;
+  bool after = false;
+  for (int step = 0; step < 20000; ++step) {
+    double const slower = after ? 0.002 : 0;
+    time.worked(0.004 + slower);
+    usual += 0.004, views += slower;
+    after = time.may_view();
+    time.viewed(after ? 0.003 : 1e-6, after);
+    views += after ? 0.003 : 1e-6;
+  }
+  CHECK(views <= 0.1 * usual + 0.01);
+  CHECK(views >= 0.095 * usual);
+}
+
 TEST_CASE("of a share that nobody used only a moment is kept, and all of the time is all") {
   gart::time_share time(0.1);
   CHECK_FALSE(time.may_view());

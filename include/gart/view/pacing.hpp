@@ -44,6 +44,7 @@ class frame_pacing {
 
 /// Keeps views to a share of the time that a training takes, so that it is slower by no more than that: work earns them
 /// time, each view spends it. What is saved up is bounded, so that a viewer who comes late does not stop the training.
+/// A step after a view finds caches cold and a device without work; what it takes beyond the usual is the view's.
 class time_share {
  public:
   /// Between 0 and 1 of the training's own time; 1: as much as is wanted.
@@ -52,16 +53,27 @@ class time_share {
   void set(double share) { share_ = std::clamp(share, 0.0, 1.0); }
   /// Of the training's own time.
   double share() const { return share_; }
-  /// So many seconds went into training.
-  void worked(double seconds) { saved_ = std::min(saved_ + seconds * share_, saved_most); }
-  /// So many seconds went into a view.
-  void viewed(double seconds) { saved_ -= seconds; }
+  /// So many seconds went into a step of the training.
+  void worked(double seconds) {
+    double own = seconds;
+    if (after_view_ && usual_ > 0)
+      own = std::min(seconds, usual_);
+    else
+      usual_ += (seconds - usual_) * (usual_ > 0 ? usual_weight : 1);
+    after_view_ = false;
+    saved_ = std::min(saved_ + own * share_, saved_most) - (seconds - own);
+  }
+  /// So many seconds went into a view, or into asking whether one is wanted.
+  void viewed(double seconds, bool rendered = true) { saved_ -= seconds, after_view_ = rendered; }
   /// Whether a view may be rendered now. What it takes beyond what was saved is earned before the next one.
   bool may_view() const { return saved_ > 0 || share_ >= 1; }
 
  private:
-  static constexpr double saved_most = 0.1;  // seconds
+  static constexpr double saved_most = 0.1;     // seconds
+  static constexpr double usual_weight = 0.05;  // of a step in the mean
   double share_ = 0, saved_ = 0;
+  double usual_ = 0;  // seconds of a step that no view came before
+  bool after_view_ = false;
 };
 
 }  // namespace gart::inline GART_ISA
