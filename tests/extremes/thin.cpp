@@ -83,6 +83,9 @@ TEST_CASE_TEMPLATE("error budget: thin Gaussians", E, GART_TEST_POLICIES) {
       for (float& g : gradient) g = static_cast<float>(random.uniform(-1, 1));
       oracle::parameters const parameters(m);
       auto const picture = oracle::render(parameters, view, options, 1);
+      // Where a colour is within rounding of its clamp at zero, its gradient may be there or not.
+      for (std::size_t i = 0; i < picture.pixels.size(); ++i)
+        if (picture.pixels[i].kink) std::fill_n(&gradient[3 * i], 3, 0.0f);
       auto const expected = oracle::gradients(parameters, view, options, 1, {gradient.begin(), gradient.end()});
       auto const all = run_all(exec, m, view, options, gradient);
 
