@@ -86,6 +86,11 @@ camera downscaled(camera c, int factor, std::string const& where) {
   if (width < 1 || height < 1) {
     throw invalid_argument("dataset_options.downscale = " + std::to_string(factor) + " leaves nothing of " + where);
   }
+  if (c.kind == camera_kind::equirectangular && (c.width % factor || c.height % factor)) {
+    throw invalid_argument("dataset_options.downscale = " + std::to_string(factor) + " does not divide " +
+                           std::to_string(c.width) + " x " + std::to_string(c.height) + " of " + where +
+                           ": a view of the whole sphere cannot be cropped; take a factor of both");
+  }
   return resized(cropped(c, width * factor, height * factor), width, height);
 }
 

@@ -326,6 +326,11 @@ TEST_CASE("transforms.json names its lenses") {
   c = read("\"camera_model\": \"EQUIRECTANGULAR\"");
   CHECK(c.kind == gart::camera_kind::equirectangular);
   CHECK(c.width == 16);
+  gart::dataset_options smaller = all_train();
+  smaller.downscale = 4;
+  CHECK(gart::load_dataset(folder.path, smaller).train.at(0).view.height == 3);
+  smaller.downscale = 5;  // a part of the sphere would be left out
+  CHECK(holds(error_of([&] { gart::load_dataset(folder.path, smaller); }), "does not divide 16 x 12"));
   c = read(focal + ", \"camera_model\": \"FULL_OPENCV\", \"k3\": 0.01, \"k4\": 0.02, \"k6\": 0.03");
   CHECK(c.kind == gart::camera_kind::perspective);
   CHECK(c.lens.k3 == 0.01f);

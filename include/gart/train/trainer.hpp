@@ -41,6 +41,7 @@
 #include <gart/train/depth_supervision.hpp>
 #include <gart/train/memory_need.hpp>
 #include <gart/train/options.hpp>
+#include <gart/train/shown_share.hpp>
 #include <gart/train/shards.hpp>
 #include <gart/train/state.hpp>
 #include <gart/train/step_report.hpp>
@@ -188,8 +189,9 @@ class basic_trainer {
     m.dead_opacity = least_opacity(m.dead_opacity, options.render.alpha_min);
     return m;
   }
-  static error_growth_options error_options_of(train_options const& options) {
+  static error_growth_options error_options_of(train_options const& options, dataset const& data) {
     error_growth_options e = options.error;
+    e.opacity_penalty *= penalty_scale(shown_share(data, options.background));
     e.dead_opacity = least_opacity(e.dead_opacity, options.render.alpha_min);
     return e;
   }

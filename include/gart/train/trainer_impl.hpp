@@ -28,7 +28,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       loss_(exec),
       images_(data),
       order_(data.train.size(), options.held_out, options.seed),
-      error_(exec, error_options_of(options),
+      error_(exec, error_options_of(options, data),
              growth_budget(options.error, options.max_gaussians, data.training_pixels()), options.iterations,
              options.seed),
       error_map_(exec),

@@ -1,0 +1,45 @@
+#pragma once
+/// \file
+/// How much of its images a capture fills. The loss is a mean over all pixels, so that an object before an empty
+/// background gives its Gaussians a gradient in proportion to the share of the pixels that it covers, a fiftieth on
+/// views of the whole sphere; a penalty beside the loss has to be as much smaller, or it fades what is seen. Captures
+/// that the penalties' sizes were measured on fill a quarter of their images and more (penalty_scale).
+/// Cost: a pass over the pixels of at most `most_views` images, once a run.
+
+#include <gart/io/dataset.hpp>
+#include <gart/train/options.hpp>
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace gart {
+
+/// The share of the training views' pixels that count in the loss and are not as the background, at least 0.001. Views
+/// are evenly spread over the capture. Before a random background only transparent pixels are empty.
+inline double shown_share(dataset const& data, background_kind background) {
+  constexpr std::size_t most_views = 32;
+  constexpr int alike = 12;  // of 255, a channel
+  int const empty = background == background_kind::white ? 255 : 0;
+  bool const opaque_may_be_empty = background != background_kind::random;
+  std::size_t shown = 0, pixels = 0;
+  for (std::size_t v = 0; v < data.train.size(); v += (data.train.size() + most_views - 1) / most_views) {
+    dataset_view const& view = data.train[v];
+    std::size_t const channels = static_cast<std::size_t>(view.image.channels);
+    std::size_t const count = channels ? view.image.data.size() / channels : 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      u8 const* const p = &view.image.data[channels * i];
+      int const alpha = channels == 4 ? p[3] : 255;
+      bool differs = !opaque_may_be_empty && alpha > alike;
+      for (int c = 0; c < 3 && opaque_may_be_empty; ++c)
+        differs = differs || std::abs(p[c] - empty) * alpha > alike * 255;
+      shown += differs && (view.mask.empty() || view.mask.data[i] != 0);
+    }
+    pixels += count;
+  }
+  return pixels ? std::max(static_cast<double>(shown) / static_cast<double>(pixels), 1e-3) : 1.0;
+}
+
+/// What a penalty is multiplied by in a capture that fills such a share of its images.
+inline float penalty_scale(double share) { return static_cast<float>(std::min(1.0, 4 * share)); }
+
+}  // namespace gart
