@@ -3,6 +3,8 @@
 /// The values of an image: an array of its own, as std::vector, or memory that others hold too, as the ranks of a host
 /// hold a capture's images once (comm/host_group.hpp).
 
+#include <gart/core/span.hpp>
+
 #include <algorithm>
 #include <cstddef>
 #include <initializer_list>
@@ -52,6 +54,11 @@ class pixels {
   ///@}
   /// n values that are held as long as `values` is, and are nobody's to change.
   pixels(std::shared_ptr<T> values, std::size_t n) : shared_(std::move(values)), begin_(shared_.get()), size_(n) {}
+  ///@{
+  /// All of them.
+  operator span<T>() { return {begin_, size_}; }
+  operator span<T const>() const { return {begin_, size_}; }
+  ///@}
   /// A copy.
   operator std::vector<T>() const { return {begin(), end()}; }
 
