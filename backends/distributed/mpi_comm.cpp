@@ -11,6 +11,7 @@
 
 #include <fcntl.h>
 #include <mpi.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 namespace gart {
@@ -100,6 +101,11 @@ class mpi_comm::host_ranks final : public host_group {
     std::atomic_thread_fence(std::memory_order_seq_cst);
   }
   std::shared_ptr<void> allocate(u64 bytes) override {
+    // Found out before: a window that its file system has no room for ends a process where it is touched.
+    u64 room = ~u64{0};
+    if (struct statvfs there = {}; ::statvfs("/dev/shm", &there) == 0) room = u64{there.f_bavail} * there.f_frsize;
+    MPI_Bcast(&room, 1, MPI_UINT64_T, 0, state_->host);
+    if (room < bytes + bytes / 16) return nullptr;
     MPI_Comm quiet = MPI_COMM_NULL;  // says what is wrong, in place of ending all ranks
     MPI_Comm_dup(state_->host, &quiet);
     MPI_Comm_set_errhandler(quiet, MPI_ERRORS_RETURN);

@@ -293,13 +293,20 @@ dataset load(fs::path const& path, dataset_options const& options) {
   data.resize_filter = options.downscale == 1 ? "none" : "box (1/" + std::to_string(options.downscale) + ")";
   std::size_t scaled = 0;
   std::vector<dataset_view> views;
-  if (options.host && options.load_images) {
+  bool shared = options.host && options.load_images;
+  if (shared) {
     agreed_on_host(*options.host, [&] { views = load_views(c, options, scaled, data.decoded); });
-    share_on_host(*options.host, views);
-  } else {
-    views = load_views(c, options, scaled, data.decoded);
+    shared = share_on_host(*options.host, views);
+  }
+  if (!shared) {
+    dataset_options by_itself = options;
+    by_itself.host = nullptr;
+    data.decoded = 0;
+    views = load_views(c, by_itself, scaled, data.decoded);
   }
   data.notes = std::move(c.notes);
+  if (options.host && options.load_images && !shared)
+    data.notes.push_back("each rank of a host holds all images: /dev/shm has no room for them (give it more)");
   if (scaled) {
     data.notes.push_back(counted(scaled, "photo") + " differ in size from their cameras: the intrinsics were scaled");
   }

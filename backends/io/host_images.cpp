@@ -64,7 +64,7 @@ void agreed_on_host(host_group& host, std::function<void()> const& f) {
     if (all[at] != '\0') throw error("another rank of this host: " + std::string(all.c_str() + at));
 }
 
-void share_on_host(host_group& host, std::vector<dataset_view>& views) {
+bool share_on_host(host_group& host, std::vector<dataset_view>& views) {
   auto const ranks = static_cast<std::size_t>(host.size()), rank = static_cast<std::size_t>(host.rank());
   std::vector<view_shapes> shapes(views.size()), all(views.size() * ranks);
   for (std::size_t i = 0; i < views.size(); ++i)
@@ -76,8 +76,9 @@ void share_on_host(host_group& host, std::vector<dataset_view>& views) {
     bytes +=
         up_to_line(values_in(s.image)) + up_to_line(values_in(s.mask)) + up_to_line(values_in(s.depth) * sizeof(float));
   }
-  if (bytes == 0) return;
+  if (bytes == 0) return true;
   std::shared_ptr<void> const memory = host.allocate(bytes);
+  if (!memory) return false;
   std::size_t at = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     bool const mine = i % ranks == rank;
@@ -86,6 +87,7 @@ void share_on_host(host_group& host, std::vector<dataset_view>& views) {
     place(views[i].depth, shapes[i].depth, mine, memory, at);
   }
   host.barrier();
+  return true;
 }
 
 }  // namespace gart::io

@@ -13,6 +13,7 @@ namespace gart::io {
 void agreed_on_host(host_group& host, std::function<void()> const& f);
 
 // Of each view the images are there on the rank i % ranks: after it they are on all, in memory that is theirs together.
-void share_on_host(host_group& host, std::vector<dataset_view>& views);
+// False, on all, where there is none.
+bool share_on_host(host_group& host, std::vector<dataset_view>& views);
 
 }  // namespace gart::io

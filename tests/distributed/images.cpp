@@ -109,6 +109,31 @@ TEST_CASE("the ranks of a host decode each photograph once, and have the images 
   for_each_array([](parameter_array const&, auto const& x, auto const& y) { CHECK(x == y); }, a, b);
 }
 
+TEST_CASE("where a host has no memory that its ranks share, each reads all and says so") {
+  // The ranks of a host of which none has any.
+  struct crowded final : host_group {
+    std::shared_ptr<host_group> of;
+    int rank() const override { return of->rank(); }
+    int size() const override { return of->size(); }
+    void all_gather(void const* mine, void* all, std::size_t bytes) override { of->all_gather(mine, all, bytes); }
+    void barrier() override { of->barrier(); }
+    std::shared_ptr<void> allocate(u64) override { return nullptr; }
+  };
+  capture_folder const here;
+  CHECK(here.ranks.on_host()->allocate(u64{1} << 60) == nullptr);
+  crowded host;
+  host.of = here.ranks.on_host();
+  dataset_options options;
+  dataset const alone = load_dataset(here.path, options);
+  options.host = &host;
+  dataset const all = load_dataset(here.path, options);
+  CHECK(all.decoded == 7);
+  REQUIRE(all.train.size() == alone.train.size());
+  for (std::size_t i = 0; i < all.train.size(); ++i) CHECK(all.train[i].image.data == alone.train[i].image.data);
+  REQUIRE(all.notes.size() == alone.notes.size() + 1);
+  CHECK(all.notes.front().find("/dev/shm") != std::string::npos);
+}
+
 TEST_CASE("a photograph that one rank cannot decode ends the loading on all, by its name") {
   capture_folder const here;
   mpi_comm ranks = here.ranks;

@@ -21,8 +21,8 @@ class host_group {
   virtual void all_gather(void const* mine, void* all, std::size_t bytes) = 0;
   /// Waits for all; what they have written in memory that all have is seen after it.
   virtual void barrier() = 0;
-  /// The same memory on all of them, of so many bytes. No rank waits for another to give it back: it stays while one
-  /// of them runs. Errors: out_of_memory, on all.
+  /// The same memory on all of them, of so many bytes; null on all where the host has not so much of that kind. No rank
+  /// waits for another to give it back: it stays while one of them runs. Errors: out_of_memory.
   virtual std::shared_ptr<void> allocate(u64 bytes) = 0;
 };
 

@@ -81,7 +81,7 @@ struct dataset_options {
   /// Called from the loading threads, one at a time.
   std::function<void(std::size_t done, std::size_t total)> progress = {};
   /// Where ranks of one host load the same capture, those: images are decoded by one of them each, in turn, and held
-  /// once. They make this call together; an error of one is an error of all.
+  /// once, or by each where the host cannot. They make this call together; an error of one is an error of all.
   host_group* host = nullptr;
 };
 
