@@ -83,6 +83,7 @@ int run_eval(eval_arguments const& a) {
   gart::dataset_options load;
   load.downscale = a.downscale;
   load.test_every = a.test_every;
+  load.host = ranks::on_host();
   gart::dataset const data = gart::load_dataset(a.dataset, load);
   if (data.test.empty()) {
     throw gart::io_error(a.dataset.string(), "has no test views (" + data.split + ")",

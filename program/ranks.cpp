@@ -47,6 +47,10 @@ void ranks::start(bool wanted) {
 gart::mpi_comm* ranks::comm() { return started().get(); }
 int ranks::size() { return comm() ? comm()->size() : 1; }
 int ranks::rank() { return comm() ? comm()->rank() : 0; }
+gart::host_group* ranks::on_host() {
+  static std::shared_ptr<gart::host_group> const all = comm() ? comm()->on_host() : nullptr;
+  return all && all->size() > 1 ? all.get() : nullptr;
+}
 std::string ranks::name() {
   if (size() == 1) return {};
   return "rank " + std::to_string(comm()->rank()) + " of " + std::to_string(size()) + " (" + comm()->host() + "): ";
@@ -91,6 +95,7 @@ void ranks::start(bool wanted) {
 gart::mpi_comm* ranks::comm() { return nullptr; }
 int ranks::size() { return 1; }
 int ranks::rank() { return 0; }
+gart::host_group* ranks::on_host() { return nullptr; }
 std::string ranks::name() { return {}; }
 void ranks::broadcast(void*, std::size_t) {}
 std::vector<std::string> ranks::gathered(std::string const& mine) { return {mine}; }

@@ -10,6 +10,7 @@
 #include <vector>
 
 namespace gart {
+class host_group;
 class mpi_comm;
 }
 
@@ -29,6 +30,8 @@ class ranks {
   static gart::mpi_comm* comm();
   static int size();
   static int rank();
+  // Those of this host, where there are several; else null.
+  static gart::host_group* on_host();
   // Whether this one takes part i of what is dealt out in turn.
   static bool takes(std::size_t i) { return i % static_cast<std::size_t>(size()) == static_cast<std::size_t>(rank()); }
   // "rank 2 of 4 (node1): " where there are several, else nothing.

@@ -79,10 +79,9 @@ void training_run::save_checkpoint() {
 
 // The model first: where the disk is full, the smaller and more precious one is there.
 void training_run::save() {
-  gart::model_file const file{session_->model(), gart::render_options_of(train_options_of(a_), data_.extent),
-                              configuration_.kernel_degree};
-  gaussians_ = file.model.size();
-  if (writes_) gart::save_model(a_.model_file(), file);
+  gaussians_ = session_->size();
+  session_->save_model(a_.model_file(), gart::traits_of(gart::render_options_of(train_options_of(a_), data_.extent),
+                                                        configuration_.kernel_degree));
   if (auto const exposures = session_->exposures(); writes_ && !exposures.empty())
     gart::write_exposures(a_.out / "exposures.json", exposures);
   if (auto const poses = session_->poses(); writes_ && !poses.empty())

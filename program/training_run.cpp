@@ -5,6 +5,7 @@
 #include "output.hpp"
 #include "ranks.hpp"
 
+#include <gart/runtime/degree_selection.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/train/memory_need.hpp>
 
@@ -60,15 +61,19 @@ void training_run::prepare() {
       throw usage_error("--start " + a_.start +
                         ": is the model in --out, which the run replaces (choose another --out)");
     }
-    gart::model_file const file = gart::load_model(a_.start);
+    // A run that measures bands looks at all of it.
+    bool const measures = !gart::plan_trials(request(), train_options_of(a_), data_.train.size()).held_out.empty();
+    gart::model_file file = measures ? gart::load_model(a_.start) : gart::load_model(a_.start, owners());
+    start_is_part_ = !measures;
     if (file.kernel_degree != a_.kernel_degree) {
       throw usage_error("--start " + a_.start + ": is of kernel degree " + std::to_string(file.kernel_degree) +
                         ", the run of " + std::to_string(a_.kernel_degree) + " (give --kernel-degree " +
                         std::to_string(file.kernel_degree) + ")");
     }
-    start_ = gart::with_sh_degree(file.model, configuration_.sh_degree);
-    if (start_.size() > a_.max_gaussians) {
-      throw usage_error("--start " + a_.start + ": has " + with_commas(start_.size()) +
+    start_ = gart::with_sh_degree(std::move(file.model), configuration_.sh_degree);
+    start_total_ = file.total;
+    if (file.total > a_.max_gaussians) {
+      throw usage_error("--start " + a_.start + ": has " + with_commas(file.total) +
                         " Gaussians, more than --max-gaussians " + std::to_string(a_.max_gaussians));
     }
   }
@@ -78,7 +83,10 @@ void training_run::prepare() {
     prepare_folder(a_.out / "renders");
   }
   if (ranks::size() > 1) say_memory();
-  session_ = gart::make_session(request(), train_options_of(a_), data_, a_.start.empty() ? nullptr : &start_);
+  session_ = a_.start.empty() ? gart::make_session(request(), train_options_of(a_), data_)
+                              : gart::make_session(request(), train_options_of(a_), data_,
+                                                   gart::start_model(start_, start_is_part_));
+  start_ = {};
   a_.resume ? go_on() : begin_anew();
   trials_ = session_->trials().size();
   say_choices();
@@ -102,10 +110,15 @@ gart::configuration_request training_run::request() const {
   return wanted;
 }
 
+// Which Gaussians are this rank's.
+gart::row_owners training_run::owners() const {
+  return {ranks::size(), ranks::rank(), train_options_of(a_).shard_block};
+}
+
 // What the ranks will need, before they do.
 void training_run::say_memory() {
   gart::train_options const options = train_options_of(a_);
-  gart::u64 const begin = a_.start.empty() ? gart::choose_start(data_, options).value.count : start_.size();
+  gart::u64 const begin = a_.start.empty() ? gart::choose_start(data_, options).value.count : start_total_;
   gart::u64 const most = gart::gaussians_at_end(options, data_, begin);
   say_.note("each rank needs " +
             as_bytes(static_cast<double>(
@@ -139,6 +152,7 @@ void training_run::load() {
     say_.state("loading " + std::to_string(done) + "/" + std::to_string(total) + " images",
                static_cast<double>(done) / static_cast<double>(std::max<std::size_t>(total, 1)));
   };
+  options.host = ranks::on_host();
   data_ = gart::load_dataset(a_.dataset, options);
   if (data_.train.empty()) {
     throw gart::io_error(a_.dataset.string(), "has no training views",

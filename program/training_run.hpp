@@ -10,6 +10,7 @@
 #include "train_arguments.hpp"
 #include "training_view.hpp"
 
+#include <gart/comm/row_owners.hpp>
 #include <gart/runtime/session.hpp>
 
 #include <chrono>
@@ -55,6 +56,7 @@ class training_run {
   void prepare();
   void share_out();
   gart::configuration_request request() const;
+  gart::row_owners owners() const;
   void say_memory();
   void say_choices();
   void enter();
@@ -95,8 +97,10 @@ class training_run {
   bool fell_back_ = false;
   gart::dataset data_;
   nlohmann::json chosen_, raised_ = nlohmann::json::array();
-  std::size_t trials_ = 0;  // that have been told of
-  gart::gaussian_model start_;
+  std::size_t trials_ = 0;      // that have been told of
+  gart::gaussian_model start_;  // of several ranks this one's rows
+  gart::u64 start_total_ = 0;
+  bool start_is_part_ = false;
   gart::vec3 eval_background_{0.0f};
   std::unique_ptr<gart::session> session_;
   std::unique_ptr<training_view> view_;

@@ -1,5 +1,6 @@
 #include "capture.hpp"
 #include "codec.hpp"
+#include "host_images.hpp"
 #include "view_maps.hpp"
 
 #include <gart/core/error.hpp>
@@ -239,8 +240,15 @@ void drop_points_in_cameras(dataset& data) {
   }
 }
 
+// Who of a host's ranks reads what is of view i.
+bool is_mine(dataset_options const& options, std::size_t i) {
+  return !options.host ||
+         i % static_cast<std::size_t>(options.host->size()) == static_cast<std::size_t>(options.host->rank());
+}
+
 // The views of the frames, in the frames' order.
-std::vector<dataset_view> load_views(capture& c, dataset_options const& options, std::size_t& scaled) {
+std::vector<dataset_view> load_views(capture& c, dataset_options const& options, std::size_t& scaled,
+                                     std::size_t& decoded) {
   std::vector<dataset_view> views(c.frames.size());
   std::vector<std::string*> names;
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -256,7 +264,7 @@ std::vector<dataset_view> load_views(capture& c, dataset_options const& options,
     image_size size{f.view.width, f.view.height};
     image8 image;
     if (!f.photo.empty()) {
-      if (options.load_images) {
+      if (options.load_images && is_mine(options, i)) {
         image = read_image(f.photo);
         size = {image.width, image.height};
       } else {
@@ -265,13 +273,13 @@ std::vector<dataset_view> load_views(capture& c, dataset_options const& options,
     }
     bool const resized_camera = fit_to_photo(f, size);
     view.view = downscaled(f.view, options.downscale, f.photo.empty() ? f.name : f.photo.string());
-    if (options.load_images) {
+    if (options.load_images && is_mine(options, i)) {
       view.image = three_channels(box_downscale(image, options.downscale));
       if (!f.mask.empty()) view.mask = read_mask(f.mask, size, options.downscale);
       if (options.depth.load && f.role != part::test) view.depth = read_distances(f, view.view, size, options);
     }
     std::lock_guard const lock(guard);
-    scaled += resized_camera;
+    scaled += resized_camera, decoded += !image.empty();
     ++done;
     if (options.progress) options.progress(done, views.size());
   });
@@ -289,8 +297,21 @@ dataset load(fs::path const& path, dataset_options const& options) {
   data.split = split(c, options.test_every);
   data.resize_filter = options.downscale == 1 ? "none" : "box (1/" + std::to_string(options.downscale) + ")";
   std::size_t scaled = 0;
-  std::vector<dataset_view> views = load_views(c, options, scaled);
+  std::vector<dataset_view> views;
+  bool shared = options.host && options.load_images;
+  if (shared) {
+    agreed_on_host(*options.host, [&] { views = load_views(c, options, scaled, data.decoded); });
+    shared = share_on_host(*options.host, views);
+  }
+  if (!shared) {
+    dataset_options by_itself = options;
+    by_itself.host = nullptr;
+    data.decoded = 0;
+    views = load_views(c, by_itself, scaled, data.decoded);
+  }
   data.notes = std::move(c.notes);
+  if (options.host && options.load_images && !shared)
+    data.notes.push_back("each rank of a host holds all images: /dev/shm has no room for them (give it more)");
   if (scaled) {
     data.notes.push_back(counted(scaled, "photo") + " differ in size from their cameras: the intrinsics were scaled");
   }

@@ -51,7 +51,7 @@ class body_reader {
   }
 
   std::string place(element const& e, u64 record, property const& p) const {
-    return e.name + " " + std::to_string(record) + ", property " + p.name;
+    return e.name + " " + std::to_string(file_.owners.global(static_cast<index_t>(record))) + ", property " + p.name;
   }
 
  private:
@@ -248,8 +248,9 @@ constexpr std::size_t chunk = std::size_t{1} << 20;
 
 }  // namespace
 
-gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* traits) {
-  ply_file const file = open(path);
+namespace {
+
+gaussian_model splats_of(ply_file const& file) {
   element const& e = vertices(file);
   if (!find(e, "f_dc_0") && (find(e, "red") || !find(e, "opacity"))) {
     file.refuse("property 'f_dc_0' is missing: these are points, not Gaussians", "name the model.ply of a training");
@@ -272,38 +273,86 @@ gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* t
   for (std::size_t i = 0; i < model.size(); ++i) {
     float const* q = model.quaternion.data() + 4 * i;
     if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) {
-      file.refuse("vertex " + std::to_string(i) + ", properties rot_0 to rot_3 are all zero, which is no rotation",
+      file.refuse("vertex " + std::to_string(file.owners.global(static_cast<index_t>(i))) +
+                      ", properties rot_0 to rot_3 are all zero, which is no rotation",
                   "remove that vertex");
     }
   }
+  return model;
+}
+
+std::string header_of(std::filesystem::path const& path, int sh_degree, u64 count, splat_traits const& traits) {
+  std::string text = header_start(path, traits);
+  text += "element vertex " + std::to_string(count) + "\n";
+  for (std::string const& name : splat_columns(sh_degree, true)) text += "property float " + name + "\n";
+  return text + "end_header\n";
+}
+
+// Gaussian i, as a vertex.
+void put_vertex(std::string& text, gaussian_model const& model, std::size_t i) {
+  std::size_t const k = static_cast<std::size_t>(sh_coefficients(model.sh_degree));
+  for (std::size_t c = 0; c < 3; ++c) put(text, model.mean[3 * i + c]);
+  for (int c = 0; c < 3; ++c) put(text, 0.0f);
+  float const* sh = model.sh.data() + 3 * k * i;
+  for (std::size_t c = 0; c < 3; ++c) put(text, sh[c]);
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t j = 1; j < k; ++j) put(text, sh[3 * j + c]);
+  }
+  put(text, model.opacity[i]);
+  for (std::size_t c = 0; c < 3; ++c) put(text, model.log_scale[3 * i + c]);
+  for (std::size_t c = 0; c < 4; ++c) put(text, model.quaternion[4 * i + c]);
+}
+
+void require_agreement(std::filesystem::path const& path, gaussian_model const& model) {
+  if (model.sh_degree < 0 || model.sh_degree > 3 || !model.arrays_agree())
+    throw invalid_argument("the arrays of the model to write to " + path.string() + " do not agree in size");
+}
+
+}  // namespace
+
+gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* traits) {
+  ply_file const file = open(path);
+  gaussian_model model = splats_of(file);
   if (traits) *traits = file.head.traits;
   return model;
 }
 
+gaussian_model read_splat_ply_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
+                                   splat_traits* traits) {
+  ply_file const file = open_rows(path, owners, total);
+  gaussian_model model = splats_of(file);
+  if (traits) *traits = file.head.traits;
+  return file.owners.ranks == owners.ranks ? model : rows_of(model, owners);
+}
+
 void write_splat_ply(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits) {
-  std::size_t const n = model.size(), k = static_cast<std::size_t>(sh_coefficients(model.sh_degree));
-  if (model.sh_degree < 0 || model.sh_degree > 3 || !model.arrays_agree()) {
-    throw invalid_argument("the arrays of the model to write to " + path.string() + " do not agree in size");
-  }
-  std::string text = header_start(path, traits);
-  text += "element vertex " + std::to_string(n) + "\n";
-  for (std::string const& name : splat_columns(model.sh_degree, true)) text += "property float " + name + "\n";
-  text += "end_header\n";
+  require_agreement(path, model);
+  std::string text = header_of(path, model.sh_degree, model.size(), traits);
   write_file(path, [&](std::ostream& out) {
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t c = 0; c < 3; ++c) put(text, model.mean[3 * i + c]);
-      for (int c = 0; c < 3; ++c) put(text, 0.0f);
-      float const* sh = model.sh.data() + 3 * k * i;
-      for (std::size_t c = 0; c < 3; ++c) put(text, sh[c]);
-      for (std::size_t c = 0; c < 3; ++c) {
-        for (std::size_t j = 1; j < k; ++j) put(text, sh[3 * j + c]);
-      }
-      put(text, model.opacity[i]);
-      for (std::size_t c = 0; c < 3; ++c) put(text, model.log_scale[3 * i + c]);
-      for (std::size_t c = 0; c < 4; ++c) put(text, model.quaternion[4 * i + c]);
+    for (std::size_t i = 0; i < model.size(); ++i) {
+      put_vertex(text, model, i);
       drain(out, text, chunk);
     }
     drain(out, text, 0);
+  });
+}
+
+void write_splat_ply_rows(shared_file& file, std::filesystem::path const& path, gaussian_model const& mine,
+                          row_owners const& owners, u64 total, splat_traits const& traits) {
+  require_agreement(path, mine);
+  std::string const head = header_of(path, mine.sh_degree, total, traits);
+  u64 const record = sizeof(float) * splat_columns(mine.sh_degree, true).size();
+  if (owners.rank == 0) file.write(0, head.data(), head.size());
+  std::string text;
+  owners.for_each_run(total, [&](u64 first, u64 count, u64 row) {
+    u64 at = head.size() + first * record;
+    for (u64 i = 0; i < count; ++i) {
+      put_vertex(text, mine, row + i);
+      if (text.size() < chunk && i + 1 < count) continue;
+      file.write(at, text.data(), text.size());
+      at += text.size();
+      text.clear();
+    }
   });
 }
 

@@ -5,7 +5,9 @@
 #include <gart/io/file.hpp>
 
 #include <algorithm>
+#include <fstream>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 namespace gart::io::ply {
@@ -94,6 +96,53 @@ void parse_header(ply_file& file) {
 ply_file open(std::filesystem::path const& path) {
   ply_file file{path.string(), read_file(path), {}};
   parse_header(file);
+  return file;
+}
+
+ply_file open_rows(std::filesystem::path const& path, row_owners const& owners, u64& total) {
+  // The header is in the first bytes, or in more of them.
+  std::ifstream in(path, std::ios::binary);
+  std::error_code code;
+  u64 const size = std::filesystem::file_size(path, code);
+  if (!in || code || std::filesystem::is_directory(path, code)) return open(path);  // which says what is wrong
+  ply_file file{path.string(), {}, {}};
+  for (u64 most = u64{1} << 16;; most *= 2) {
+    file.bytes.resize(std::min(most, size));
+    in.seekg(0);
+    in.read(reinterpret_cast<char*>(file.bytes.data()), static_cast<std::streamsize>(file.bytes.size()));
+    std::string_view const start(reinterpret_cast<char const*>(file.bytes.data()), file.bytes.size());
+    if (most >= size || start.find("\nend_header\n") != start.npos || start.find("\nend_header\r") != start.npos) break;
+  }
+  parse_header(file);
+  u64 before = file.head.size, record = 0;
+  bool whole = file.head.format == encoding::ascii;
+  auto vertices = file.head.elements.begin();
+  for (; vertices != file.head.elements.end(); ++vertices) {
+    for (property const& p : vertices->properties) whole = whole || p.list;
+    record = vertices->smallest(file.head.format);
+    if (vertices->name == "vertex") break;
+    whole = whole || (record != 0 && vertices->count > size / record);
+    before += vertices->count * record;
+  }
+  if (whole || vertices == file.head.elements.end() || before > size || record == 0 ||
+      vertices->count > (size - before) / record) {
+    ply_file all = open(path);  // what is wrong is said where it is read
+    for (element const& e : all.head.elements)
+      if (e.name == "vertex") total = e.count;
+    return all;
+  }
+  total = vertices->count;
+  file.owners = owners;
+  element mine = *vertices;
+  mine.count = owners.owned(total);
+  file.head.elements = {mine};
+  file.bytes.resize(file.head.size + mine.count * record);
+  owners.for_each_run(total, [&](u64 first, u64 count, u64 row) {
+    in.seekg(static_cast<std::streamoff>(before + first * record));
+    in.read(reinterpret_cast<char*>(file.bytes.data() + file.head.size + row * record),
+            static_cast<std::streamsize>(count * record));
+  });
+  if (!in) file.refuse("cannot be read", "check the disk, and that nothing is writing the file");
   return file;
 }
 

@@ -2,6 +2,7 @@
 // A PLY file in memory, its header read: which elements it has, of which properties, in which encoding. What follows
 // the header is not looked at.
 
+#include <gart/comm/row_owners.hpp>
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>
 #include <gart/io/ply.hpp>
@@ -51,6 +52,7 @@ struct ply_file {
   std::string name;
   std::vector<u8> bytes;
   header head;
+  row_owners owners = {};  // whose vertices the bytes are
 
   [[noreturn]] void refuse(std::string const& what, std::string const& remedy) const {
     throw io_error(name, what, remedy);
@@ -58,6 +60,9 @@ struct ply_file {
 };
 
 ply_file open(std::filesystem::path const& path);
+// The header, and of the vertices those of these owners alone, `total` in the file; all where they cannot be told apart
+// without reading them.
+ply_file open_rows(std::filesystem::path const& path, row_owners const& owners, u64& total);
 
 // The first lines of a binary splat file of these traits, as comments. invalid_argument for one that is no line.
 std::string header_start(std::filesystem::path const& path, splat_traits const& traits);

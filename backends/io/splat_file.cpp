@@ -1,4 +1,5 @@
 #include <gart/core/error.hpp>
+#include <gart/io/ply.hpp>
 #include <gart/io/splat_file.hpp>
 
 #include <algorithm>
@@ -73,6 +74,30 @@ gaussian_model read_splats(std::filesystem::path const& path, splat_traits* trai
     throw io_error(path.string(), "is in no format of Gaussians that gart knows", "it reads " + listed(false));
   return format->read(path, traits);
 }
+
+gaussian_model rows_of(gaussian_model const& all, row_owners const& owners) {
+  gaussian_model mine;
+  mine.sh_degree = all.sh_degree;
+  for_each_array(
+      [&](parameter_array const& a, auto& to, auto const& from) {
+        std::size_t const width = a.width(all.sh_degree);
+        owners.for_each_run(all.size(), [&](u64 first, u64 count, u64) {
+          to.insert(to.end(), from.data() + first * width, from.data() + (first + count) * width);
+        });
+      },
+      mine, all);
+  return mine;
+}
+
+gaussian_model read_splat_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
+                               splat_traits* traits) {
+  if (owners.ranks > 1 && format_of(path) == &ply_format) return read_splat_ply_rows(path, owners, total, traits);
+  gaussian_model all = read_splats(path, traits);
+  total = all.size();
+  return owners.ranks == 1 ? all : rows_of(all, owners);
+}
+
+bool is_splat_ply(std::filesystem::path const& path) { return by_name(path) == &ply_format; }
 
 void write_splats(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits,
                   splat_packing const& packing) {

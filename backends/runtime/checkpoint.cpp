@@ -1,21 +1,19 @@
+#include "checkpoint_arrays.hpp"
+
 #include <gart/core/error.hpp>
 #include <gart/io/crc32c.hpp>
 #include <gart/io/file.hpp>
 #include <gart/runtime/checkpoint.hpp>
 #include <gart/train/state.hpp>
 
-#include <cmath>
 #include <cstring>
-#include <limits>
 #include <ostream>
 
 namespace gart {
 
-namespace {
+using namespace io::checkpoint;
 
-constexpr char magic[] = "gart checkpoint 2\n", plain_magic[] = "gart checkpoint 1\n";
-constexpr std::size_t magic_size = sizeof magic - 1;
-constexpr u64 longest_name = 256;
+namespace {
 
 class array_writer {
  public:
@@ -115,105 +113,34 @@ training_state with_sh_degree(training_state state, int degree) {
   return state;
 }
 
+training_state without_rows(training_state const& state) {
+  training_state out;
+  out.step = state.step, out.growth = state.growth, out.seed = state.seed, out.trials = state.trials;
+  out.exposures = state.exposures, out.poses = state.poses, out.lenses = state.lenses;
+  return out;
+}
+
 void write_checkpoint(std::filesystem::path const& path, training_state const& state) {
   checkpoint_writer out;
-  auto const add = [&](std::string const& prefix, gaussian_model const& m) {
-    for_each_array([&](parameter_array const& a, auto const& values) { out.add(prefix + a.name, values); }, m);
-  };
-  add("", state.scene), add("first/", state.first), add("second/", state.second);
-  out.add("step", std::vector<int>{state.step});
-  out.add("sh_degree", std::vector<int>{state.scene.sh_degree});
-  out.add("growth", std::vector<float>{state.growth});
-  out.add("seed", std::vector<u64>{state.seed});
-  out.add("error_growth/error_sum", state.error_sum);
-  out.add("adc/gradient_sum", state.gradient_sum), out.add("adc/touched", state.touched);
-  out.add("sh_trials", state.trials);
-  if (exposure_state const& e = state.exposures; !e.value.empty()) {
-    out.add("exposure", e.value), out.add("exposure/first", e.first), out.add("exposure/second", e.second);
-    out.add("exposure/visits", e.visits);
-  }
-  if (pose_state const& p = state.poses; !p.value.empty()) {
-    out.add("pose", p.value), out.add("pose/first", p.first), out.add("pose/second", p.second);
-    out.add("pose/metric", p.metric), out.add("pose/visits", p.visits);
-  }
-  if (lens_state const& l = state.lenses; !l.value.empty()) {
-    out.add("lens", l.value), out.add("lens/first", l.first), out.add("lens/second", l.second);
-    out.add("lens/visits", l.visits);
-  }
+  for_each_state_array(state, [&](std::string const& name, auto const& values, std::size_t) { out.add(name, values); });
   out.write(path);
 }
-
-namespace {
-
-training_state state_of(checkpoint_reader const& in) {
-  training_state s;
-  std::vector<int> const degree = in.get<int>("sh_degree"), step = in.get<int>("step");
-  std::vector<u64> const seed = in.get<u64>("seed");
-  std::vector<float> const growth = in.get<float>("growth");
-  if (degree.size() != 1 || step.size() != 1 || seed.size() != 1 || growth.size() != 1)
-    in.fail("a counter is not one number");
-  if (degree[0] < 0 || degree[0] > 3) in.fail("is damaged: it is of SH degree " + std::to_string(degree[0]));
-  if (step[0] < 0 || step[0] == std::numeric_limits<int>::max())
-    in.fail("is damaged: it was saved after step " + std::to_string(step[0]));
-  if (!(growth[0] > 0 && std::isfinite(growth[0]))) in.fail("is damaged: its growth is no factor");
-  auto const get = [&](std::string const& prefix) {
-    gaussian_model m;
-    m.sh_degree = degree[0];
-    for_each_array([&](parameter_array const& a, auto& values) { values = in.get<float>(prefix + a.name); }, m);
-    if (!m.arrays_agree()) in.fail("its arrays " + prefix + "* differ in length");
-    return m;
-  };
-  s.scene = get(""), s.first = get("first/"), s.second = get("second/");
-  if (s.first.size() != s.scene.size() || s.second.size() != s.scene.size())
-    in.fail("its moments differ in number from its Gaussians");
-  s.step = step[0], s.growth = growth[0], s.seed = seed[0];
-  if (in.has("error_growth/error_sum")) s.error_sum = in.get<float>("error_growth/error_sum");
-  s.gradient_sum = in.get<float>("adc/gradient_sum"), s.touched = in.get<u32>("adc/touched");
-  if (s.gradient_sum.size() != s.touched.size()) in.fail("its arrays adc/* differ in length");
-  if (in.has("exposure")) {
-    exposure_state& e = s.exposures;
-    e.value = in.get<float>("exposure"), e.visits = in.get<u32>("exposure/visits");
-    e.first = in.get<float>("exposure/first"), e.second = in.get<float>("exposure/second");
-    std::size_t const floats = exposure::floats * e.visits.size();
-    if (e.value.size() != floats || e.first.size() != floats || e.second.size() != floats)
-      in.fail("its arrays exposure* differ in length");
-  }
-  if (in.has("pose")) {
-    pose_state& p = s.poses;
-    p.value = in.get<double>("pose"), p.visits = in.get<u32>("pose/visits");
-    p.metric = in.get<double>("pose/metric");
-    p.first = in.get<double>("pose/first"), p.second = in.get<double>("pose/second");
-    std::size_t const numbers = std::tuple_size_v<pose_numbers> * p.visits.size();
-    if (p.value.size() != numbers || p.first.size() != numbers || p.second.size() != numbers ||
-        p.metric.size() != std::tuple_size_v<pose_numbers> * numbers)
-      in.fail("its arrays pose* differ in length");
-  }
-  if (in.has("lens")) {
-    lens_state& l = s.lenses;
-    l.value = in.get<double>("lens"), l.visits = in.get<u32>("lens/visits");
-    l.first = in.get<double>("lens/first"), l.second = in.get<double>("lens/second");
-    std::size_t const numbers = std::tuple_size_v<lens_numbers> * l.visits.size();
-    if (l.value.size() != numbers || l.first.size() != numbers || l.second.size() != numbers)
-      in.fail("its arrays lens* differ in length");
-  }
-  if (in.has("sh_trials")) s.trials = in.get<band_trial>("sh_trials");
-  for (band_trial const& t : s.trials)
-    if (t.band < 1 || t.band > 3) in.fail("is damaged: a trial of SH band " + std::to_string(t.band));
-  return s;
-}
-
-}  // namespace
 
 training_state read_checkpoint(std::filesystem::path const& path) { return state_of(checkpoint_reader(path)); }
 
 training_state read_checkpoint(std::filesystem::path const& path, int sh_degree) {
-  checkpoint_reader const in(path);
-  training_state s = state_of(in);
-  if (s.scene.sh_degree != sh_degree) {
-    in.fail("is of SH degree " + std::to_string(s.scene.sh_degree) + ", this run of " + std::to_string(sh_degree) +
-            ": take configuration_request.sh_degree = " + std::to_string(s.scene.sh_degree));
-  }
+  training_state s = read_checkpoint(path);
+  require_degree(path, s, sh_degree);
   return s;
+}
+
+void require_degree(std::filesystem::path const& path, training_state const& state, int sh_degree) {
+  int const found = state.scene.sh_degree;
+  if (found == sh_degree) return;
+  throw io_error(path.string(),
+                 "is of SH degree " + std::to_string(found) + ", this run of " + std::to_string(sh_degree) +
+                     ": take configuration_request.sh_degree = " + std::to_string(found),
+                 "take a checkpoint that was saved whole, or start anew");
 }
 
 }  // namespace gart

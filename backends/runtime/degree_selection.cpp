@@ -92,29 +92,32 @@ class degree_selection final : public session {
     inner_->set_iterations(iterations);
   }
   int steps_done() const override { return trial_ ? trial_->start.step : inner_->steps_done(); }
-  gaussian_model model() const override { return trial_ ? trial_->start.scene : inner_->model(); }
+  gaussian_model model() const override { return trial_ ? inner_->whole_of(trial_->start).scene : inner_->model(); }
+  u64 size() const override { return trial_ ? begun_with_ : inner_->size(); }
+  void save_model(std::filesystem::path const& path, splat_traits const& traits) const override {
+    trial_ ? inner_->write_part(path, trial_->start.scene, traits) : inner_->save_model(path, traits);
+  }
   rendered render(camera const& view, vec3 background) override { return inner_->render(view, background); }
   image8 render_8bit(camera const& view, vec3 background) override { return inner_->render_8bit(view, background); }
-  void save(std::filesystem::path const& path) const override { write_checkpoint(path, state()); }
-  void load(std::filesystem::path const& path) override { set_state(read_checkpoint(path)); }
-  training_state state() const override {
-    training_state s = trial_ ? trial_->start : inner_->state();
+  void save(std::filesystem::path const& path) const override { inner_->write_part(path, part()); }
+  void load(std::filesystem::path const& path) override { set_part(inner_->read_part(path)); }
+  training_state state() const override { return inner_->whole_of(part()); }
+  void set_state(training_state const& s) override { take_up(s, false); }
+  training_state part() const override {
+    training_state s = trial_ ? trial_->start : inner_->part();
     s.trials = trials_;
     return s;
   }
-  void set_state(training_state const& s) override {
-    if (s.scene.sh_degree > plan_.degree)
-      throw invalid_argument("the state is of SH degree " + std::to_string(s.scene.sh_degree) +
-                             ", this run of at most " + std::to_string(plan_.degree));
-    trial_.reset();
-    trials_ = s.trials;
-    settled_ = (!trials_.empty() && (trials_.back().kept() || trials_.back().band == 1)) ||
-               (s.step >= plan_.begin && s.scene.sh_degree == 0);
-    // The schedule of a run that was lengthened may ask for less than is stored: a band that was trained stays.
-    start_degree_ = std::max(start_degree_, s.scene.sh_degree);
-    hold_out(!settled_);
-    open(s);
+  void set_part(training_state const& mine) override { take_up(mine, true); }
+  training_state whole_of(training_state const& mine) const override { return inner_->whole_of(mine); }
+  void write_part(std::filesystem::path const& path, training_state const& mine) const override {
+    inner_->write_part(path, mine);
   }
+  void write_part(std::filesystem::path const& path, gaussian_model const& mine,
+                  splat_traits const& traits) const override {
+    inner_->write_part(path, mine, traits);
+  }
+  training_state read_part(std::filesystem::path const& path) const override { return inner_->read_part(path); }
   exposure_field exposures() const override { return inner_->exposures(); }
   std::vector<named_camera> poses() const override { return inner_->poses(); }
   camera as_learned(camera const& view) const override { return inner_->as_learned(view); }
@@ -130,19 +133,33 @@ class degree_selection final : public session {
     return std::max(start_degree_, sh_degree_at(step, plan_.degree, interval_, options_.iterations));
   }
 
+  // `part`: of ranks each has its rows of it.
+  void take_up(training_state const& s, bool part) {
+    if (s.scene.sh_degree > plan_.degree)
+      throw invalid_argument("the state is of SH degree " + std::to_string(s.scene.sh_degree) +
+                             ", this run of at most " + std::to_string(plan_.degree));
+    trial_.reset();
+    trials_ = s.trials;
+    settled_ = (!trials_.empty() && (trials_.back().kept() || trials_.back().band == 1)) ||
+               (s.step >= plan_.begin && s.scene.sh_degree == 0);
+    // The schedule of a run that was lengthened may ask for less than is stored: a band that was trained stays.
+    start_degree_ = std::max(start_degree_, s.scene.sh_degree);
+    hold_out(!settled_);
+    open(s, part);
+  }
   // Gives the next step the configuration it needs, or starts a trial.
   void arrange() {
     int const step = inner_->steps_done();
     int const degree = stored_degree(step);
     if (trials_.empty() && degree > inner_->configuration().sh_degree) {
-      open(with_sh_degree(inner_->state(), degree));
+      open(with_sh_degree(inner_->part(), degree));
     } else if (step >= plan_.begin && !long_enough(plan_, options_.iterations)) {
       settled_ = true;  // every band stays
       hold_out(false);
-      open(inner_->state());
+      open(inner_->part());
     } else if (step >= plan_.begin) {
       trial_.emplace();
-      trial_->start = inner_->state();
+      trial_->start = inner_->part(), begun_with_ = inner_->size();
     }
   }
 
@@ -152,7 +169,7 @@ class degree_selection final : public session {
     int const band = start.scene.sh_degree;
     if (!trial_->with) {
       trial_->psnr_with = psnr;
-      trial_->with = inner_->state();
+      trial_->with = inner_->part();
       open(with_sh_degree(start, band - 1));
       return;
     }
@@ -163,7 +180,7 @@ class degree_selection final : public session {
     settled_ = result.kept() || band == 1;
     if (settled_) {
       hold_out(false);
-      open(result.kept() ? *trial_->with : inner_->state());
+      open(result.kept() ? *trial_->with : inner_->part());
     }
     trial_.reset();
   }
@@ -189,14 +206,14 @@ class degree_selection final : public session {
   }
 
   // One session at a time: the old one's memory goes before the new one's comes.
-  void open(gaussian_model const& start) {
+  void open(start_model const& start) {
     close();
-    request_.sh_degree = start.sh_degree;
-    inner_ = make_session(request_, options_, data_, &start);
+    request_.sh_degree = start.rows.sh_degree;
+    inner_ = make_session(request_, options_, data_, start);
   }
-  void open(training_state const& state) {
-    open(state.scene);
-    inner_->set_state(state);
+  void open(training_state const& state, bool part = true) {
+    open(start_model(state.scene, part));
+    part ? inner_->set_part(state) : inner_->set_state(state);
   }
   void close() {
     if (!inner_) return;
@@ -218,6 +235,7 @@ class degree_selection final : public session {
   std::vector<band_trial> trials_;
   profiler profile_;
   std::size_t peak_bytes_ = 0;
+  u64 begun_with_ = 0;  // Gaussians of the trial that runs
 };
 
 }  // namespace

@@ -5,20 +5,36 @@
 
 namespace gart {
 
+namespace {
+
+configuration_request with_depth_of(configuration_request request, train_options const& options) {
+  request.depth = request.depth || options.depth_weight > 0;
+  return request;
+}
+
+}  // namespace
+
 std::unique_ptr<renderer> make_renderer(configuration_request const& request) {
   return find_configuration(request).make_renderer(request);
 }
 
-std::unique_ptr<session> make_session(configuration_request const& wanted, train_options const& options,
+std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,
                                       dataset const& data, gaussian_model const* start) {
-  configuration_request request = wanted;
-  request.depth = wanted.depth || options.depth_weight > 0;
+  if (start) return make_session(request, options, data, start_model(*start));
+  resolve(with_depth_of(request, options));  // what is not there is known before anything is made
+  return make_session(request, options, data, start_model(initial_model(data, options, request.sh_degree)));
+}
+
+std::unique_ptr<session> make_session(configuration_request const& wanted, train_options const& options,
+                                      dataset const& data, start_model const& start) {
+  configuration_request const request = with_depth_of(wanted, options);
   compiled_configuration const& found = find_configuration(request);
   require_tree(options.render.rebuild_every, found.info.tracer);
   trial_plan const plan = plan_trials(request, options, data.train.size());
-  gaussian_model const from = start ? *start : initial_model(data, options, request.sh_degree);
-  if (!plan.held_out.empty()) return make_degree_selection(request, options, data, from, plan);
-  return found.make_session(request, options, data, from);
+  if (plan.held_out.empty()) return found.make_session(request, options, data, start);
+  if (start.is_part)
+    throw invalid_argument("train_options.sh_gain: bands are measured of a start that every rank has whole");
+  return make_degree_selection(request, options, data, start.rows, plan);
 }
 
 }  // namespace gart

@@ -63,6 +63,42 @@ for name, count in (("one_posed", 1), ("three_posed", 3)):
 for file in ("model.ply", "exposures.json", "poses.json", "poses_test.json", "renders/0.png"):
     expect((folder / "one_posed" / file).read_bytes() == (folder / "three_posed" / file).read_bytes(), f"{file} differs")
 
+# Three blocks of rows: each rank writes its own and reads its own, from a checkpoint and from a model to start from.
+def blocks(out, count, *more):
+    done = run(*launcher, count, gart, *more, "--out", folder / out, "--threads", 1)
+    expect(done.returncode in (0, 130), f"{out}: {done.stderr}")
+    return done
+
+
+many = ["train", capture, "--iterations", 12, "--stop-at", 6, "--points", 9000, "--max-gaussians", 9500, "--test-every", 0,
+        "--sh-degree", 1, "--no-auto", "--background", "black", "--exposure", "off", "--backward", "deterministic", "--batch", 2]
+for count in (1, 2, 3, 4):
+    blocks(f"blocks_{count}", count, *many)
+for file in ("model.ply", "checkpoint.gart"):
+    files = [(folder / f"blocks_{count}" / file).read_bytes() for count in (1, 2, 3, 4)]
+    expect(files.count(files[0]) == 4 and len(files[0]) > 9000 * 4, f"{file} differs by the number of ranks")
+for count in (1, 2, 3):
+    shutil.copytree(folder / "blocks_4", folder / f"resumed_{count}")
+    blocks(f"resumed_{count}", count, "train", "--resume", "--stop-at", 0)
+files = [(folder / f"resumed_{count}/checkpoint.gart").read_bytes() for count in (1, 2, 3)]
+expect(files.count(files[0]) == 3, "a run goes on otherwise with another number of ranks")
+started = [word for word in many if word not in ("--points", 9000)] + ["--start", folder / "blocks_1/model.ply"]
+for count in (1, 3):
+    blocks(f"started_{count}", count, *started)
+expect((folder / "started_1/checkpoint.gart").read_bytes() == (folder / "started_3/checkpoint.gart").read_bytes(),
+       "a start differs by the number of ranks")
+
+# Where the model cannot be put in its place all end, and the checkpoint is the last one.
+(folder / "started_3/model.ply").unlink()
+(folder / "started_3/model.ply/in the way").mkdir(parents=True)
+before = (folder / "started_3/checkpoint.gart").read_bytes()
+failed = run(*launcher, 3, gart, "train", "--resume", "--stop-at", 8, "--out", folder / "started_3", "--threads", 1)
+expect(failed.returncode == 1, "a rank that cannot write is no success")
+expect("rank 0 of 3" in failed.stderr and "model.ply" in failed.stderr and "cannot be replaced" in failed.stderr,
+       f"its message:\n{failed.stderr}")
+expect((folder / "started_3/checkpoint.gart").read_bytes() == before, "the last checkpoint is not whole")
+expect(not list((folder / "started_3").glob(".*.tmp")), "a temporary file stays")
+
 # Views that are dealt out.
 for name, count in (("one", 1), ("three", 3)):
     done = run(*launcher, count, gart, "render", folder / "three/model.ply", capture, "--out", folder / f"images_{name}",

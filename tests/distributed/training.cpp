@@ -26,6 +26,9 @@ using shared = trainer_of<deterministic_strategy, mpi_comm>;
 // One rank that does all that several do.
 struct lone_comm : self_comm {
   static constexpr bool alone = false;
+  std::unique_ptr<shared_file> open_file(std::filesystem::path const& path, bool create) {
+    return mpi_comm().open_file(path, create);
+  }
 };
 
 train_options short_run(densify_kind densify) {

@@ -45,5 +45,16 @@ TEST_CASE("CRC-32C of any length, in one part or in two, is the long division's"
     CHECK(gart::crc32c(bytes.data(), size) == expected);
     std::size_t const part = random() % (size + 1);
     CHECK(gart::crc32c(bytes.data() + part, size - part, gart::crc32c(bytes.data(), part)) == expected);
+    auto const first = gart::crc32c(bytes.data(), part), second = gart::crc32c(bytes.data() + part, size - part);
+    CHECK((gart::crc32c_before(first, size - part) ^ second) == expected);
   }
+}
+
+TEST_CASE("a checksum with zeros behind its bytes goes far") {
+  std::vector<gart::u8> bytes(3000001, 0);
+  bytes[0] = 77;
+  auto const zeros = gart::crc32c(bytes.data() + 1, bytes.size() - 1);
+  CHECK((gart::crc32c_before(gart::crc32c(bytes.data(), 1), bytes.size() - 1) ^ zeros) ==
+        gart::crc32c(bytes.data(), bytes.size()));
+  CHECK(gart::crc32c_before(0x12345678u, 0) == 0x12345678u);
 }

@@ -120,7 +120,7 @@ TEST_CASE_TEMPLATE("Gaussians that somebody else owns are rendered and different
 
   own->differentiate(view, {}, image.color);
   gart::buffer<float, E> color_gradient(exec), color(exec, 3 * pixels);
-  color_gradient.assign(image.color.data);
+  color_gradient.assign(gart::span<float const>(image.color.data));
   std::vector<float> const wrong(gradients.sh.size(), std::numeric_limits<float>::quiet_NaN());
   gradients.sh.assign(wrong);  // is overwritten
   gart::render_targets targets;

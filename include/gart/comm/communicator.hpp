@@ -13,13 +13,19 @@
 ///   exclusive_scan(value)             the sum of the values of the ranks before this one
 ///   broadcast(data, bytes, root)      what the root has, to all
 ///   barrier()                         waits for all ranks
+///   open_file(path, create)           where there are several: a file that this rank writes at any place, while others
+///                                     write at theirs (comm/shared_file.hpp); `create` makes it, empty
 /// All but the first exchange are for what is small, and of host memory. Every rank makes the same calls in the same
-/// order. Errors: invalid_argument for a rank that there is not; what the transport finds ends all ranks.
+/// order, but for open_file, which waits for nobody. Errors: invalid_argument for a rank that there is not; io_error
+/// for a file; what else the transport finds ends all ranks.
 
+#include <gart/comm/shared_file.hpp>
 #include <gart/core/span.hpp>
 #include <gart/exec/concepts.hpp>
 
 #include <concepts>
+#include <filesystem>
+#include <memory>
 
 namespace gart {
 
@@ -46,6 +52,9 @@ concept communicator = execution<E> && std::copyable<C> &&
   { c.exclusive_scan(u64{}) } -> std::same_as<u64>;
   c.broadcast(all, bytes, 0);
   c.barrier();
+  requires C::alone || requires(std::filesystem::path const& path) {
+    { c.open_file(path, true) } -> std::same_as<std::unique_ptr<shared_file>>;
+  };
 };
 
 }  // namespace gart

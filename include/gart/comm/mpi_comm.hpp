@@ -13,6 +13,7 @@
 /// says and ends all ranks.
 
 #include <gart/comm/communicator.hpp>
+#include <gart/comm/host_group.hpp>
 #include <gart/core/error.hpp>
 
 #include <memory>
@@ -31,6 +32,8 @@ class mpi_comm {
   int size() const;           ///< ranks in all
   std::string host() const;   ///< the name of the machine that this rank is on
   int ranks_on_host() const;  ///< with this one
+  /// Those, and the memory that they share.
+  std::shared_ptr<host_group> on_host() const;
 
   /// By a policy of host memory.
   template <execution E>
@@ -53,11 +56,15 @@ class mpi_comm {
   void broadcast(void* data, std::size_t bytes, int root);
   /// Waits for all.
   void barrier();
+  /// By MPI-IO, which takes care of hosts that share a folder: NFS alone would write whole pages, over what others
+  /// have written there.
+  std::unique_ptr<shared_file> open_file(std::filesystem::path const& path, bool create);
   /// Ends all ranks at once with that exit code: what a rank does that cannot go on. Says nothing itself.
   [[noreturn]] void abort(int code);
 
  private:
   struct state;
+  class host_ranks;
   std::shared_ptr<state> state_;
 };
 

@@ -38,6 +38,17 @@ struct row_owners {
   }
   /// How many of them this rank has.
   GART_HD constexpr index_t owned(u64 total) const { return owned(total, rank); }
+  /// f(number of the first, how many, first row) for each run of numbers that this rank has, of `total`.
+  template <class F>
+  constexpr void for_each_run(u64 total, F const& f) const {
+    if (ranks == 1) {
+      if (total != 0) f(u64{0}, total, u64{0});
+      return;
+    }
+    u64 const step = u64{block} * static_cast<u64>(ranks);
+    for (u64 first = u64{block} * static_cast<u64>(rank), row = 0; first < total; first += step, row += block)
+      f(first, total - first < block ? total - first : u64{block}, row);
+  }
 };
 
 }  // namespace gart

@@ -47,4 +47,27 @@ inline u32 crc32c(void const* data, std::size_t size, u32 before = 0) {
   return ~crc;
 }
 
+namespace detail {
+
+// The product of two polynomials modulo that of the checksum; the highest bit is the coefficient of x^0.
+constexpr u32 crc_product(u32 a, u32 b) {
+  u32 product = 0;
+  for (; a != 0; a <<= 1) {
+    if ((a & 0x80000000u) != 0) product ^= b;
+    b = (b >> 1) ^ ((b & 1) != 0 ? 0x82f63b78u : 0u);
+  }
+  return product;
+}
+
+}  // namespace detail
+
+/// What the checksum of some bytes comes to with `after` more behind them: that of A and B together is
+/// crc32c_before(crc of A, bytes of B) ^ crc of B, so that parts are summed apart and in any order. Cost: the logarithm
+/// of `after`.
+constexpr u32 crc32c_before(u32 crc, u64 after) {
+  for (u32 step = 0x00800000u; after != 0; after >>= 1, step = detail::crc_product(step, step))  // x^8
+    if ((after & 1) != 0) crc = detail::crc_product(step, crc);
+  return crc;
+}
+
 }  // namespace gart

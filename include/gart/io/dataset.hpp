@@ -10,6 +10,7 @@
 /// the file, the field and the remedy; unsupported for a camera model that gart does not trace, by its name;
 /// invalid_argument for an option out of its range.
 
+#include <gart/comm/host_group.hpp>
 #include <gart/io/depth_file.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/scene/image.hpp>
@@ -48,6 +49,7 @@ struct dataset {
   std::vector<std::string> notes;         ///< one line each: what was skipped, scaled or assumed
   float extent = 1;                       ///< 1.1 x the largest distance of a training camera from their mean
   bool alpha = false;                     ///< images carry alpha: composited over the background chosen
+  std::size_t decoded = 0;  ///< photographs that this process has decoded: where ranks share them, its part
   /// Random starting points lie in this box; Blender's [-1.3, 1.3]^3, else around the cameras.
   vec3d bounds_min{-1.3}, bounds_max{1.3};  ///< corners
 
@@ -78,6 +80,9 @@ struct dataset_options {
   depth_map_options depth = {};  ///< maps of depth
   /// Called from the loading threads, one at a time.
   std::function<void(std::size_t done, std::size_t total)> progress = {};
+  /// Where ranks of one host load the same capture, those: images are decoded by one of them each, in turn, and held
+  /// once, or by each where the host cannot. They make this call together; an error of one is an error of all.
+  host_group* host = nullptr;
 };
 
 /// Reads a capture from a folder, or by the file named.

@@ -12,6 +12,8 @@
 /// f_rest that is no degree from 0 to 3, a 2D Gaussian file (no scale_2), a NaN or infinite value (with its vertex and
 /// property), or a rotation that is all zero; invalid_argument for a model whose arrays disagree in size.
 
+#include <gart/comm/row_owners.hpp>
+#include <gart/comm/shared_file.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/splat_file.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -24,6 +26,17 @@ namespace gart {
 gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* traits = nullptr);
 /// Writes a splat file, with these traits.
 void write_splat_ply(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits = {});
+
+/// Whether the name's ending asks for a splat PLY.
+bool is_splat_ply(std::filesystem::path const& path);
+/// This rank's rows of the file, byte for byte what write_splat_ply writes of `total` Gaussians; rank 0 writes the
+/// header too. `path` is for messages. Memory: a few MB.
+void write_splat_ply_rows(shared_file& file, std::filesystem::path const& path, gaussian_model const& mine,
+                          row_owners const& owners, u64 total, splat_traits const& traits = {});
+/// This rank's rows of a splat PLY, and how many Gaussians there are. Of a binary file no more is read than these; one
+/// in ascii, or with lists before its vertices, is read whole.
+gaussian_model read_splat_ply_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
+                                   splat_traits* traits = nullptr);
 
 /// A plain point cloud: x y z, and red green blue where present (else grey).
 point_cloud read_point_ply(std::filesystem::path const& path);

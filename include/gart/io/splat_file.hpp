@@ -12,6 +12,7 @@
 /// without it; else as the format's own reader and writer (io/ply.hpp). invalid_argument for a model whose arrays
 /// disagree in size, and for a packing out of its range.
 
+#include <gart/comm/row_owners.hpp>
 #include <gart/core/span.hpp>
 #include <gart/scene/gaussians.hpp>
 
@@ -58,6 +59,11 @@ span<splat_format const* const> splat_formats();
 
 /// Reads a file of Gaussians; its traits into `traits`, where that is not null.
 gaussian_model read_splats(std::filesystem::path const& path, splat_traits* traits = nullptr);
+/// Of a whole model the rows of a rank.
+gaussian_model rows_of(gaussian_model const& all, row_owners const& owners);
+/// Of the Gaussians of a file, `total` of them, those of this rank: of a binary splat PLY no other is read.
+gaussian_model read_splat_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
+                               splat_traits* traits = nullptr);
 /// Writes a file of Gaussians, to a temporary name, then renamed.
 void write_splats(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits = {},
                   splat_packing const& packing = {});

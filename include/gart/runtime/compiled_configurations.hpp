@@ -21,7 +21,7 @@ class compiled_session final : public session {
  public:
   /// As make_session has it; `start` is of the configuration's degree.
   compiled_session(configuration_request const& request, train_options const& options, dataset const& data,
-                   gaussian_model const& start)
+                   start_model const& start)
       : exec_(policy_of<E>(request)), trainer_(exec_, options, data, start, comm_of<Comm>(request)) {}
   step_report step() override { return trainer_.step(); }
   int steps_done() const override { return trainer_.steps_done(); }
@@ -33,6 +33,21 @@ class compiled_session final : public session {
   void load(std::filesystem::path const& path) override { trainer_.load(path); }
   training_state state() const override { return trainer_.state(); }
   void set_state(training_state const& state) override { trainer_.set_state(state); }
+  u64 size() const override { return trainer_.size(); }
+  void save_model(std::filesystem::path const& path, splat_traits const& traits) const override {
+    trainer_.save_model(path, traits);
+  }
+  training_state part() const override { return trainer_.part(); }
+  void set_part(training_state const& mine) override { trainer_.set_part(mine); }
+  training_state whole_of(training_state const& mine) const override { return trainer_.whole_of(mine); }
+  void write_part(std::filesystem::path const& path, training_state const& mine) const override {
+    trainer_.write_part(path, mine);
+  }
+  void write_part(std::filesystem::path const& path, gaussian_model const& mine,
+                  splat_traits const& traits) const override {
+    trainer_.write_part(path, mine, traits);
+  }
+  training_state read_part(std::filesystem::path const& path) const override { return trainer_.read_part(path); }
   exposure_field exposures() const override { return trainer_.exposures(); }
   std::vector<named_camera> poses() const override { return trainer_.poses(); }
   camera as_learned(camera const& view) const override { return trainer_.as_learned(view); }
@@ -63,7 +78,7 @@ void register_configuration_of(int rank, bool (*available)(std::string*) = alway
                             return std::make_unique<compiled_renderer<E, Traits, Tracer, Strategy>>(request);
                           },
                           [](configuration_request const& request, train_options const& options, dataset const& data,
-                             gaussian_model const& start) -> std::unique_ptr<session> {
+                             start_model const& start) -> std::unique_ptr<session> {
                             return std::make_unique<compiled_session<E, Traits, Tracer, Strategy, Comm>>(
                                 request, options, data, start);
                           }});

@@ -58,7 +58,7 @@ class compiled_renderer final : public renderer {
   void differentiate(camera const& view, render_options const& options, image_float const& color_gradient) override {
     if (color_gradient.data.size() != std::size_t{3} * pixels_of(view))
       throw invalid_argument("renderer: the colour's gradient must have three values for each pixel of the view");
-    color_gradient_.assign(color_gradient.data);
+    color_gradient_.assign(span<float const>(color_gradient.data.data(), color_gradient.data.size()));
     gradients_.resize_keep(scene_.count);
     differentiate_into(view, options, color_gradient_.data(), gradients_.view(), {});
   }

@@ -18,13 +18,16 @@ namespace gart {
 
 /// A model, and what it was trained to be rendered with.
 struct model_file {
-  gaussian_model model;   ///< the Gaussians
+  gaussian_model model;   ///< the Gaussians, or a rank's rows of them
   render_options render;  ///< the background is in no file
   int kernel_degree = 2;  ///< of the response (math/response.hpp)
+  u64 total = 0;          ///< Gaussians in the file that was read
 };
 
 /// Errors: io_error naming the file and what is wrong in it.
 model_file load_model(std::filesystem::path const& path);
+/// The same with this rank's rows alone, of which a binary splat PLY is not read beyond.
+model_file load_model(std::filesystem::path const& path, row_owners const& owners);
 /// Written to a temporary name, then renamed. Errors: io_error.
 void save_model(std::filesystem::path const& path, model_file const& file);
 

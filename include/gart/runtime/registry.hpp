@@ -22,7 +22,7 @@ struct compiled_configuration {
   std::unique_ptr<renderer> (*make_renderer)(configuration_request const&);  ///< a renderer of it
   /// A session of it.
   std::unique_ptr<session> (*make_session)(configuration_request const&, train_options const&, dataset const&,
-                                           gaussian_model const& start);
+                                           start_model const& start);
 };
 
 /// Adds an entry to the table; before main, from static initialisers.

@@ -9,10 +9,12 @@
 #include <gart/exec/profile.hpp>
 #include <gart/exposure/exposure_field.hpp>
 #include <gart/io/dataset.hpp>
+#include <gart/io/splat_file.hpp>
 #include <gart/render/rendered.hpp>
 #include <gart/runtime/request.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/train/options.hpp>
+#include <gart/train/start_model.hpp>
 #include <gart/train/state.hpp>
 #include <gart/train/step_report.hpp>
 
@@ -38,6 +40,11 @@ class session {
   virtual void set_iterations(int iterations) = 0;
   /// The Gaussians, in host memory.
   virtual gaussian_model model() const = 0;
+  /// How many there are.
+  virtual u64 size() const = 0;
+  /// Writes them to a temporary name, then renames it, in the format that the ending says (io/splat_file.hpp). Ranks
+  /// write their rows each of a splat PLY; of another format rank 0 has to hold all. Errors: io_error, on all ranks.
+  virtual void save_model(std::filesystem::path const& path, splat_traits const& traits = {}) const = 0;
   /// A view of the Gaussians to host memory.
   virtual rendered render(camera const& view, vec3 background) = 0;
   /// Its colours alone, in 8 bits a channel, as renderer has it.
@@ -52,6 +59,20 @@ class session {
   virtual training_state state() const = 0;
   /// Takes up the run that the state is of.
   virtual void set_state(training_state const& state) = 0;
+
+  /// What this rank has of the run: its rows of all that is of each Gaussian (comm/row_owners.hpp), and the rest
+  /// whole; of a session by itself the state. All ranks call this and the next five together, and none comes to hold
+  /// what others have, but by whole_of.
+  virtual training_state part() const = 0;
+  virtual void set_part(training_state const& mine) = 0;                  ///< as set_state, of such a part
+  virtual training_state whole_of(training_state const& mine) const = 0;  ///< of all parts, on all ranks
+  /// The parts of all ranks as one checkpoint, of any degree.
+  virtual void write_part(std::filesystem::path const& checkpoint, training_state const& mine) const = 0;
+  /// This rank's part of one.
+  virtual training_state read_part(std::filesystem::path const& checkpoint) const = 0;
+  /// The rows of all ranks as one model file, as save_model has it.
+  virtual void write_part(std::filesystem::path const& model, gaussian_model const& mine,
+                          splat_traits const& traits) const = 0;
   /// Of the training views so far; empty where none are learned. render() shows the scene's own colours.
   virtual exposure_field exposures() const { return {}; }
   /// The cameras of the training views as they are learned, in order; empty where neither poses nor lenses are.
@@ -78,5 +99,8 @@ std::unique_ptr<session> make_session(configuration_request const& request, trai
                                       dataset const& data, gaussian_model const* start = nullptr);
 std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,
                                       dataset const&& temporary, gaussian_model const* start = nullptr) = delete;
+/// Of several ranks `start` may have each rank's rows alone; invalid_argument where bands are to be measured.
+std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,
+                                      dataset const& data, start_model const& start);
 
 }  // namespace gart

@@ -3,8 +3,7 @@
 /// Images in host memory, row-major, channels interleaved: pixel (x, y), channel c at (y * width + x) * channels + c.
 
 #include <gart/core/types.hpp>
-
-#include <vector>
+#include <gart/scene/pixels.hpp>
 
 namespace gart {
 
@@ -12,7 +11,7 @@ namespace gart {
 template <class T>
 struct basic_image {
   int width = 0, height = 0, channels = 3;  ///< pixels; channels of each
-  std::vector<T> data;                      ///< [height][width][channels]
+  pixels<T> data;                           ///< [height][width][channels]
 
   ///@{
   /// Of this size, with this value everywhere.

@@ -140,7 +140,7 @@ class sharded_rows {
   template <class T>
   std::vector<T> part_of(std::vector<T> const& all, std::size_t width) const {
     std::vector<T> mine;
-    for_each_block(all.size() / width, owners_.rank, [&](std::size_t first, std::size_t count, std::size_t) {
+    owners_.for_each_run(all.size() / width, [&](u64 first, u64 count, u64) {
       mine.insert(mine.end(), all.begin() + offset(first * width), all.begin() + offset((first + count) * width));
     });
     return mine;
@@ -175,7 +175,7 @@ class sharded_rows {
     comm_.exchange(as_span(to), as_span(from));
     at = 0;
     for (int r = 0; takes && r < owners_.ranks; at += counts[static_cast<std::size_t>(r++)])
-      for_each_block(total, r, [&](std::size_t first, std::size_t count, std::size_t row) {
+      row_owners{owners_.ranks, r, owners_.block}.for_each_run(total, [&](u64 first, u64 count, u64 row) {
         std::copy_n(by_rank.begin() + offset((at + row) * width), count * width, all.begin() + offset(first * width));
       });
     return all;
@@ -214,17 +214,6 @@ class sharded_rows {
     std::vector<u32> all;
     for (auto const& one : lists) all.insert(all.end(), one.begin(), one.end()), counts.push_back(one.size());
     return all;
-  }
-  // f(first Gaussian, how many, first row) for each block of a rank's.
-  template <class F>
-  void for_each_block(std::size_t total, int rank, F const& f) const {
-    std::size_t row = 0;
-    for (std::size_t first = static_cast<std::size_t>(rank) * owners_.block; first < total;
-         first += std::size_t{owners_.block} * static_cast<std::size_t>(owners_.ranks)) {
-      std::size_t const count = std::min<std::size_t>(owners_.block, total - first);
-      f(first, count, row);
-      row += count;
-    }
   }
 
   Comm comm_;

@@ -55,6 +55,8 @@ struct training_state {
 
 /// The state with bands above `degree` dropped, or zero bands added, moments too.
 training_state with_sh_degree(training_state state, int degree);
+/// What of a state is not of each Gaussian.
+training_state without_rows(training_state const& state);
 
 /// Written to a temporary name, then renamed. Errors: io_error.
 void write_checkpoint(std::filesystem::path const& path, training_state const& state);
@@ -62,5 +64,7 @@ void write_checkpoint(std::filesystem::path const& path, training_state const& s
 training_state read_checkpoint(std::filesystem::path const& path);
 /// io_error where the checkpoint is of another degree.
 training_state read_checkpoint(std::filesystem::path const& path, int sh_degree);
+/// The same of a state that was read of this checkpoint.
+void require_degree(std::filesystem::path const& path, training_state const& state, int sh_degree);
 
 }  // namespace gart

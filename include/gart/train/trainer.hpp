@@ -24,6 +24,8 @@
 #include <gart/exposure/exposure_field.hpp>
 #include <gart/exposure/exposure_training.hpp>
 #include <gart/io/dataset.hpp>
+#include <gart/io/ply.hpp>
+#include <gart/io/splat_file.hpp>
 #include <gart/lens/lens_training.hpp>
 #include <gart/loss/error_map.hpp>
 #include <gart/loss/image_loss.hpp>
@@ -38,11 +40,13 @@
 #include <gart/render/frame.hpp>
 #include <gart/render/render_image.hpp>
 #include <gart/scene/traits.hpp>
+#include <gart/train/checkpoint_part.hpp>
 #include <gart/train/depth_supervision.hpp>
 #include <gart/train/memory_need.hpp>
 #include <gart/train/options.hpp>
 #include <gart/train/shown_share.hpp>
 #include <gart/train/shards.hpp>
+#include <gart/train/start_model.hpp>
 #include <gart/train/state.hpp>
 #include <gart/train/step_report.hpp>
 #include <gart/train/training_images.hpp>
@@ -80,10 +84,10 @@ class basic_trainer {
 
   /// Starts from `start`, of that degree. Errors: invalid_argument for another degree, or where no view is left to
   /// train on, and for options that several ranks do not have; out_of_memory.
-  basic_trainer(E& exec, train_options const& options, dataset const& data, gaussian_model const& start,
+  basic_trainer(E& exec, train_options const& options, dataset const& data, start_model const& start,
                 Comm comm = Comm());
   /// The dataset must outlive the trainer.
-  basic_trainer(E& exec, train_options const& options, dataset const&& temporary, gaussian_model const& start,
+  basic_trainer(E& exec, train_options const& options, dataset const&& temporary, start_model const& start,
                 Comm comm = Comm()) = delete;
 
   /// One step, with the loss of the options.
@@ -103,14 +107,32 @@ class basic_trainer {
   rendered render(camera const& view, vec3 background);
   /// Its colours alone, in 8 bits a channel: [H][W][3].
   image8 render_8bit(camera const& view, vec3 background);
+  /// Gaussians, of all ranks.
+  index_t size() const { return total_; }
   /// Everything the next step depends on.
-  training_state state() const;
+  training_state state() const { return whole_of(part()); }
   /// Takes up the run that the state is of. Errors: invalid_argument for another degree.
-  void set_state(training_state const& state);
-  /// Writes the state to a checkpoint: one file, whatever the number of ranks.
-  void save(std::filesystem::path const& path) const;
-  /// Takes up the run of a checkpoint.
-  void load(std::filesystem::path const& path) { set_state(read_checkpoint(path, sh_degree)); }
+  void set_state(training_state const& state) { set_part(part_of(state)); }
+  /// Writes the state to a checkpoint: one file, whatever the number of ranks, each of which writes its rows.
+  void save(std::filesystem::path const& path) const { write_part(path, part()); }
+  /// Takes up the run of a checkpoint, of which each rank reads its rows.
+  void load(std::filesystem::path const& path);
+  /// Writes the Gaussians in the format that the name's ending says; ranks write a splat PLY each its rows, of another
+  /// format rank 0 all.
+  void save_model(std::filesystem::path const& path, splat_traits const& traits = {}) const {
+    write_part(path, model_part(), traits);
+  }
+
+  ///@{
+  /// Of a rank's part, as session has them.
+  training_state part() const;
+  gaussian_model model_part() const { return scene_.to_host(); }
+  void set_part(training_state const& mine);
+  void write_part(std::filesystem::path const& path, training_state const& mine) const;
+  void write_part(std::filesystem::path const& path, gaussian_model const& mine, splat_traits const& traits) const;
+  training_state read_part(std::filesystem::path const& path) const;
+  training_state whole_of(training_state const& mine) const;
+  ///@}
   exposure_field exposures() const;  ///< of the views that were trained on; empty where none are learned
   /// The cameras of the training views, where poses or lenses are learned; else empty.
   std::vector<named_camera> poses() const;
@@ -133,14 +155,18 @@ class basic_trainer {
   template <class Rows>
   void optimize(learning_rates const& rates, int degree, Rows&& rows);
   learning_rates rates_of_step() const;
-  training_state state_on(int root) const;
 
   // With ranks (trainer_ranks_impl.hpp).
   void require_ranks() const;
   static train_options const& with_room(E& exec, Comm& comm, train_options const& options, dataset const& data,
-                                        gaussian_model const& start) {
-    require_room(exec, comm, options, data, sh_degree, start.size());
+                                        start_model const& start) {
+    require_room(exec, comm, options, data, sh_degree, total_of(comm, start));
     return options;
+  }
+  static u64 total_of(Comm& comm, start_model const& start) {
+    u64 total = start.rows.size();
+    if (start.is_part) comm.all_reduce(span<u64>(&total, 1));
+    return total;
   }
   step_report step_in_ranks(loss_function<E> const& loss) requires(!Comm::alone);
   void trace_unit(loss_function<E> const& loss, camera const& seen, int image, int degree, image_result& result,
@@ -150,31 +176,30 @@ class basic_trainer {
   rendered render_in_ranks(camera const& view, vec3 background) requires(!Comm::alone);
   bool in_ranks() const { return !Comm::alone && (comm_.size() > 1 || options_.batch > 1); }
   // What of values of all Gaussians is this rank's, and the way back.
-  decltype(auto) part_of(gaussian_model const& all) const {
+  decltype(auto) part_of(start_model const& start) const {
     if constexpr (Comm::alone)
-      return (all);
+      return (start.rows);
     else
-      return shards_.rows.part_of(all);
+      return start.is_part ? start.rows : shards_.rows.part_of(start.rows);
   }
-  template <class T>
-  std::vector<T> part_of(std::vector<T> const& all) const {
-    if constexpr (Comm::alone)
-      return all;
-    else
-      return shards_.rows.part_of(all, 1);
+  decltype(auto) part_of(training_state const& all) const {
+    if constexpr (Comm::alone) {
+      return (all);
+    } else {
+      training_state mine = without_rows(all);
+      mine.scene = shards_.rows.part_of(all.scene);
+      mine.first = shards_.rows.part_of(all.first), mine.second = shards_.rows.part_of(all.second);
+      mine.error_sum = shards_.rows.part_of(all.error_sum, 1);
+      mine.gradient_sum = shards_.rows.part_of(all.gradient_sum, 1);
+      mine.touched = shards_.rows.part_of(all.touched, 1);
+      return mine;
+    }
   }
   gaussian_model whole_of(gaussian_model mine, int root = -1) const {
     if constexpr (Comm::alone)
       return mine;
     else
       return shards_.rows.whole_of(mine, root);
-  }
-  template <class T>
-  std::vector<T> whole_of(std::vector<T> mine, int root) const {
-    if constexpr (Comm::alone)
-      return mine;
-    else
-      return shards_.rows.whole_of(mine, 1, root);
   }
 
   // The camera of a training view, with what is learned of it.

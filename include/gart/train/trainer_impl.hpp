@@ -13,7 +13,7 @@ namespace gart::inline GART_ISA {
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_options const& options,
-                                                                dataset const& data, gaussian_model const& start,
+                                                                dataset const& data, start_model const& start,
                                                                 Comm comm)
     : exec_(exec),
       options_(with_room(exec, comm, options, data, start)),
@@ -43,10 +43,11 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       transmittance_(exec),
       by_pose_(exec),
       by_lens_(exec),
-      started_with_(static_cast<index_t>(start.size())),
+      started_with_(static_cast<index_t>(total_of(comm_, start))),
       total_(started_with_) {
   require_ranks();
-  if (start.sh_degree != sh_degree) throw invalid_argument("trainer: the model to start from has another SH degree");
+  if (start.rows.sh_degree != sh_degree)
+    throw invalid_argument("trainer: the model to start from has another SH degree");
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
   if (options.depth_weight > 0) {
     bool mapped = false;
@@ -77,7 +78,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
     for (dataset_view const& view : data.train) captured.push_back({view.name, view.view});
     lenses_.emplace(options.lens, captured);
   }
-  growth_ = growth_for(options.mcmc, static_cast<index_t>(start.size()), options.max_gaussians, options.iterations);
+  growth_ = growth_for(options.mcmc, started_with_, options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
   error_.set_batch(options.batch), mcmc_.set_batch(options.batch), adc_.set_batch(options.batch);
 }
@@ -258,40 +259,88 @@ std::vector<named_camera> basic_trainer<E, Traits, Tracer, Strategy, Comm>::pose
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::state() const {
-  return state_on(-1);
-}
-
-// On that rank alone, or on all of them (-1).
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::state_on(int root) const {
+training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::part() const {
   training_state s;
-  s.scene = whole_of(scene_.to_host(), root);
-  s.first = whole_of(state_.first.to_host(), root), s.second = whole_of(state_.second.to_host(), root);
+  s.scene = scene_.to_host(), s.first = state_.first.to_host(), s.second = state_.second.to_host();
   s.step = step_, s.growth = growth_, s.seed = options_.seed;
   if (exposures_) s.exposures = exposures_->state();
   if (poses_) s.poses = poses_->state();
   if (lenses_) s.lenses = lenses_->state();
-  s.error_sum = whole_of(error_.error_sum.to_host(), root);
-  s.gradient_sum = whole_of(adc_.gradient_sum.to_host(), root), s.touched = whole_of(adc_.touched.to_host(), root);
+  s.error_sum = error_.error_sum.to_host();
+  s.gradient_sum = adc_.gradient_sum.to_host(), s.touched = adc_.touched.to_host();
   return s;
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::save(std::filesystem::path const& path) const {
-  training_state const s = state_on(0);
-  if (comm_.rank() == 0) write_checkpoint(path, s);
-  comm_.barrier();  // there is one when any rank goes on
+training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::whole_of(training_state const& mine) const {
+  if constexpr (Comm::alone) {
+    return mine;
+  } else {
+    training_state all = without_rows(mine);
+    all.scene = whole_of(mine.scene), all.first = whole_of(mine.first), all.second = whole_of(mine.second);
+    all.error_sum = shards_.rows.whole_of(mine.error_sum, 1);
+    all.gradient_sum = shards_.rows.whole_of(mine.gradient_sum, 1);
+    all.touched = shards_.rows.whole_of(mine.touched, 1);
+    return all;
+  }
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_state(training_state const& s) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesystem::path const& path,
+                                                                  training_state const& mine) const {
+  if constexpr (Comm::alone)
+    write_checkpoint(path, mine);
+  else
+    write_checkpoint_together(comm_, shards_.rows.owners(), path, mine);
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_part(std::filesystem::path const& path) const {
+  if constexpr (Comm::alone)
+    return read_checkpoint(path);
+  else
+    return read_checkpoint_together(comm_, shards_.rows.owners(), path);
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesystem::path const& path,
+                                                                  gaussian_model const& mine,
+                                                                  splat_traits const& traits) const {
+  if constexpr (!Comm::alone) {
+    if (comm_.size() > 1 && is_splat_ply(path)) {
+      u64 total = mine.size();
+      comm_.all_reduce(span<u64>(&total, 1));
+      write_together(comm_, path, [&](shared_file& file) {
+        write_splat_ply_rows(file, path, mine, shards_.rows.owners(), total, traits);
+      });
+      return;
+    }
+    if (comm_.size() > 1) {
+      gaussian_model const all = whole_of(mine, 0);
+      together(comm_, path, [&] {
+        if (comm_.rank() == 0) write_splats(path, all, traits);
+      });
+      return;
+    }
+  }
+  write_splats(path, mine, traits);
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::load(std::filesystem::path const& path) {
+  training_state const mine = read_part(path);
+  require_degree(path, mine, sh_degree);
+  set_part(mine);
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_part(training_state const& s) {
   if (s.scene.sh_degree != sh_degree) throw invalid_argument("trainer: the state has another SH degree");
-  scene_.assign(part_of(s.scene)), state_.first.assign(part_of(s.first)), state_.second.assign(part_of(s.second));
-  total_ = static_cast<index_t>(s.scene.size());
+  scene_.assign(s.scene), state_.first.assign(s.first), state_.second.assign(s.second);
+  total_ = static_cast<index_t>(total_of(comm_, {s.scene, true}));
   gradients_ = gaussians<E>(exec_, scene_.size(), sh_degree);
-  error_.error_sum.assign(part_of(s.error_sum));
-  adc_.gradient_sum.assign(part_of(s.gradient_sum)), adc_.touched.assign(part_of(s.touched));
+  error_.error_sum.assign(s.error_sum);
+  adc_.gradient_sum.assign(s.gradient_sum), adc_.touched.assign(s.touched);
   if (exposures_) {
     if (s.exposures.visits.size() != data_.train.size())
       throw invalid_argument("trainer: the state has exposures of another number of training views");

@@ -1,0 +1,19 @@
+#pragma once
+// The images of a capture that the ranks of a host hold once.
+
+#include <gart/comm/host_group.hpp>
+#include <gart/io/dataset.hpp>
+
+#include <functional>
+#include <vector>
+
+namespace gart::io {
+
+// f() on all ranks of the host; an error of one ends it on all.
+void agreed_on_host(host_group& host, std::function<void()> const& f);
+
+// Of each view the images are there on the rank i % ranks: after it they are on all, in memory that is theirs together.
+// False, on all, where there is none.
+bool share_on_host(host_group& host, std::vector<dataset_view>& views);
+
+}  // namespace gart::io

@@ -1,0 +1,211 @@
+// One rank's rows of a checkpoint.
+#include "checkpoint_arrays.hpp"
+
+#include <gart/core/error.hpp>
+#include <gart/io/crc32c.hpp>
+#include <gart/train/checkpoint_rows.hpp>
+
+#include <algorithm>
+#include <cstring>
+
+namespace gart {
+
+using namespace io::checkpoint;
+
+namespace {
+
+template <class T>
+void append(std::string& out, T value) {
+  out.append(reinterpret_cast<char const*>(&value), sizeof value);
+}
+
+std::string head_of(std::string const& name, u32 version, u64 bytes) {
+  std::string out;
+  append<u64>(out, name.size());
+  out += name;
+  append<u32>(out, version), append<u64>(out, bytes);
+  return out;
+}
+
+constexpr u64 checksum_bytes = sizeof(u32);
+
+}  // namespace
+
+checkpoint_rows::checkpoint_rows(training_state const& mine, row_owners const& owners) : owners_(owners) {
+  for_each_state_array(mine, [&]<class T>(std::string const& name, std::vector<T> const& values, std::size_t width) {
+    array a;
+    a.name = name, a.row = width * sizeof(T), a.bytes = values.size() * sizeof(T);
+    auto const* const bytes = reinterpret_cast<char const*>(values.data());
+    if (width != 0)
+      a.data = bytes;
+    else if (owners.rank == 0)
+      a.small.assign(bytes, bytes + a.bytes);
+    else
+      a.bytes = 0;
+    arrays_.push_back(std::move(a));
+  });
+  std::sort(arrays_.begin(), arrays_.end(), [](array const& a, array const& b) { return a.name < b.name; });
+}
+
+std::vector<u64> checkpoint_rows::bytes() const {
+  std::vector<u64> out;
+  for (array const& a : arrays_) out.push_back(a.bytes);
+  return out;
+}
+
+std::string checkpoint_rows::head(array const& a) const { return head_of(a.name, 1, a.total); }
+
+void checkpoint_rows::place(std::vector<u64> const& bytes_of_all) {
+  u64 at = magic_size;
+  for (std::size_t i = 0; i < arrays_.size(); ++i) {
+    array& a = arrays_[i];
+    a.total = bytes_of_all[i], a.begin = at;
+    at += head(a).size() + a.total + checksum_bytes;
+  }
+}
+
+template <class F>
+void checkpoint_rows::for_each_piece(array const& a, F const& f) const {
+  if (a.row == 0) {
+    if (a.bytes != 0) f(u64{0}, a.small.data(), a.bytes);
+    return;
+  }
+  owners_.for_each_run(a.total / a.row,
+                       [&](u64 first, u64 count, u64 row) { f(first * a.row, a.data + row * a.row, count * a.row); });
+}
+
+std::vector<u32> checkpoint_rows::checksum_shares() const {
+  std::vector<u32> out;
+  for (array const& a : arrays_) {
+    u32 share = 0;
+    if (std::string const start = head(a); owners_.rank == 0)
+      share = crc32c_before(crc32c(start.data(), start.size()), a.total);
+    for_each_piece(a, [&](u64 at, char const* data, u64 bytes) {
+      share ^= crc32c_before(crc32c(data, bytes), a.total - at - bytes);
+    });
+    out.push_back(share);
+  }
+  return out;
+}
+
+void checkpoint_rows::write(shared_file& file, std::vector<u32> const& checksums) const {
+  bool const first = owners_.rank == 0;
+  if (first) file.write(0, magic, magic_size);
+  u64 end = magic_size;
+  for (std::size_t i = 0; i < arrays_.size(); ++i) {
+    array const& a = arrays_[i];
+    std::string const start = head(a);
+    if (first) file.write(a.begin, start.data(), start.size());
+    for_each_piece(a,
+                   [&](u64 at, char const* data, u64 bytes) { file.write(a.begin + start.size() + at, data, bytes); });
+    end = a.begin + start.size() + a.total + checksum_bytes;
+    if (first) file.write(end - checksum_bytes, &checksums[i], checksum_bytes);
+  }
+  if (!first) return;
+  std::string last = head_of("end", 1, 0);
+  append<u32>(last, crc32c(last.data(), last.size()));
+  file.write(end, last.data(), last.size());
+}
+
+checkpoint_rows_reader::checkpoint_rows_reader(std::filesystem::path const& path, row_owners const& owners)
+    : path_(path), owners_(owners), file_(path, std::ios::binary) {
+  std::error_code code;
+  size_ = std::filesystem::file_size(path, code);
+  if (!file_ || code) throw io_error(path.string(), "cannot be opened", "check the path, and that every host has it");
+  char start[magic_size] = {};
+  if (size_ >= magic_size) read(0, start, magic_size);
+  checked_ = std::memcmp(start, magic, magic_size) == 0;
+  if (!checked_ && std::memcmp(start, plain_magic, magic_size) != 0) fail("is not a gart checkpoint");
+  for (u64 at = magic_size;;) {
+    array a;
+    a.begin = at;
+    auto const take = [&](void* to, u64 bytes) { read(at, to, bytes), at += bytes; };
+    u64 length = 0;
+    take(&length, sizeof length);
+    if (length > longest_name) fail("is damaged: an array's name is too long");
+    std::string name(length, '\0');
+    take(name.data(), length);
+    if (checked_) take(&a.version, sizeof a.version);
+    take(&a.bytes, sizeof a.bytes);
+    a.at = at;
+    if (a.bytes > size_ - at) fail("is truncated or damaged: array " + name + " is longer than the file");
+    at += a.bytes;
+    if (checked_) take(&a.checksum, sizeof a.checksum);
+    if (name == "end") {
+      if (checked_ && at != size_) fail("is damaged: there is more after its end");
+      break;
+    }
+    arrays_[name] = a;
+  }
+  std::vector<int> const degree = get<int>("sh_degree");
+  if (degree.size() != 1 || degree[0] < 0 || degree[0] > 3) fail("is damaged: it is of no SH degree from 0 to 3");
+  // All of a state, of which the names and the rows are wanted.
+  training_state like;
+  like.scene.sh_degree = like.first.sh_degree = like.second.sh_degree = degree[0];
+  gaussians_ = find("opacity").bytes / sizeof(float);
+  for_each_state_array(like, [&]<class T>(std::string const& name, std::vector<T> const&, std::size_t width) {
+    auto const found = arrays_.find(name);
+    if (width == 0 || found == arrays_.end()) return;
+    found->second.row = width * sizeof(T);
+    u64 const bytes = found->second.bytes;
+    bool const may_be_empty = width == 1 && name != "opacity" && name.find("/opacity") == std::string::npos;
+    if (bytes != gaussians_ * found->second.row && !(bytes == 0 && may_be_empty))
+      fail("is damaged: its array " + name + " is not of its " + std::to_string(gaussians_) + " Gaussians");
+  });
+}
+
+void checkpoint_rows_reader::fail(std::string const& what) const {
+  throw io_error(path_.string(), what, "take a checkpoint that was saved whole, or start anew");
+}
+
+checkpoint_rows_reader::array const& checkpoint_rows_reader::find(std::string const& name) const {
+  auto const it = arrays_.find(name);
+  if (it == arrays_.end()) fail("has no array " + name);
+  return it->second;
+}
+
+void checkpoint_rows_reader::read(u64 at, void* to, u64 bytes) const {
+  if (at > size_ || bytes > size_ - at) fail("is truncated: the last complete array is its last readable part");
+  file_.seekg(static_cast<std::streamoff>(at));
+  file_.read(static_cast<char*>(to), static_cast<std::streamsize>(bytes));
+  if (!file_) throw io_error(path_.string(), "cannot be read", "check the disk, and that nothing is writing the file");
+}
+
+template <class T>
+std::vector<T> checkpoint_rows_reader::get(std::string const& name, u32 newest_version) const {
+  array const& a = find(name);
+  if (a.version > newest_version) {
+    fail("array " + name + " is of version " + std::to_string(a.version) + ", and this program reads up to " +
+         std::to_string(newest_version) + ": a newer gart wrote it");
+  }
+  if (a.bytes % sizeof(T) != 0) fail("array " + name + " is not a whole number of elements");
+  u64 const total = a.row ? a.bytes / a.row : 0;
+  std::vector<T> values((a.row ? owners_.owned(total) * a.row : a.bytes) / sizeof(T));
+  char* const to = reinterpret_cast<char*>(values.data());
+  if (a.row == 0) read(a.at, to, a.bytes);
+  owners_.for_each_run(
+      total, [&](u64 first, u64 count, u64 row) { read(a.at + first * a.row, to + row * a.row, count * a.row); });
+  if (!checked_) return values;
+  std::string const start = head_of(name, a.version, a.bytes);
+  u32 share = a.row == 0 || owners_.rank == 0 ? crc32c_before(crc32c(start.data(), start.size()), a.bytes) : 0;
+  if (a.row == 0) {
+    if ((share ^ crc32c(to, a.bytes)) != a.checksum)
+      fail("is damaged: the checksum of array " + name + " is not that of its bytes");
+    return values;
+  }
+  owners_.for_each_run(total, [&](u64 first, u64 count, u64 row) {
+    share ^= crc32c_before(crc32c(to + row * a.row, count * a.row), a.bytes - (first + count) * a.row);
+  });
+  shares_.push_back(share), shared_.push_back(name);
+  return values;
+}
+
+training_state checkpoint_rows_reader::state() const { return state_of(*this); }
+
+void checkpoint_rows_reader::require(std::vector<u32> const& checksums) const {
+  for (std::size_t i = 0; i < checksums.size(); ++i)
+    if (checksums[i] != find(shared_[i]).checksum)
+      fail("is damaged: the checksum of array " + shared_[i] + " is not that of its bytes");
+}
+
+}  // namespace gart

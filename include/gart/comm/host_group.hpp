@@ -1,0 +1,29 @@
+#pragma once
+/// \file
+/// The ranks that are on one host, and memory that all of them have: what each would read for itself is read once, and
+/// held once (io/dataset.hpp). All of them make the same calls in the same order.
+
+#include <gart/core/types.hpp>
+
+#include <cstddef>
+#include <memory>
+
+namespace gart {
+
+/// Ranks of one host.
+class host_group {
+ public:
+  /// What was allocated stays.
+  virtual ~host_group() = default;
+  virtual int rank() const = 0;  ///< which one this is, 0 to size() - 1
+  virtual int size() const = 0;  ///< ranks on this host
+  /// `bytes` of each, in the order of ranks, to all.
+  virtual void all_gather(void const* mine, void* all, std::size_t bytes) = 0;
+  /// Waits for all; what they have written in memory that all have is seen after it.
+  virtual void barrier() = 0;
+  /// The same memory on all of them, of so many bytes; null on all where the host has not so much of that kind. No rank
+  /// waits for another to give it back: it stays while one of them runs. Errors: out_of_memory.
+  virtual std::shared_ptr<void> allocate(u64 bytes) = 0;
+};
+
+}  // namespace gart

@@ -1,0 +1,40 @@
+#pragma once
+/// \file
+/// A checkpoint (train/state.hpp) that several ranks write and read, each its own rows and nothing else of what is of
+/// each Gaussian: the file is byte for byte that of one rank. A rank's rows lie in blocks of the file
+/// (comm/row_owners.hpp), and an array's checksum is the sum of what each block adds to it (io/crc32c.hpp). Memory:
+/// what a rank has, and a few bytes an array.
+///
+/// Errors: io_error on all ranks, naming the file, the rank and the cause; the checkpoint that was there is whole.
+
+#include <gart/comm/together.hpp>
+#include <gart/train/checkpoint_rows.hpp>
+
+namespace gart::inline GART_ISA {
+
+/// `mine`: this rank's rows of the Gaussians, and what all ranks have of the rest. All ranks call it.
+template <class Comm>
+void write_checkpoint_together(Comm& comm, row_owners const& owners, std::filesystem::path const& path,
+                               training_state const& mine) {
+  if (comm.size() == 1) return write_checkpoint(path, mine);
+  checkpoint_rows rows(mine, owners);
+  std::vector<u64> bytes = rows.bytes();
+  comm.all_reduce(span<u64>(bytes));
+  rows.place(bytes);
+  std::vector<u32> const checksums = checksums_of(comm, rows.checksum_shares());
+  write_together(comm, path, [&](shared_file& file) { rows.write(file, checksums); });
+}
+
+/// This rank's rows of a checkpoint that any number of ranks wrote. All ranks call it.
+template <class Comm>
+training_state read_checkpoint_together(Comm& comm, row_owners const& owners, std::filesystem::path const& path) {
+  if (comm.size() == 1) return read_checkpoint(path);
+  training_state mine;
+  std::optional<checkpoint_rows_reader> reader;
+  together(comm, path, [&] { mine = reader.emplace(path, owners).state(); });
+  std::vector<u32> const checksums = checksums_of(comm, reader->checksum_shares());
+  together(comm, path, [&] { reader->require(checksums); });
+  return mine;
+}
+
+}  // namespace gart::inline GART_ISA

@@ -1,0 +1,92 @@
+#pragma once
+/// \file
+/// One rank's rows of a checkpoint: where they lie in the file, and what they add to its checksums. The ranks agree by
+/// train/checkpoint_part.hpp.
+///
+/// Errors: as read_checkpoint (train/state.hpp).
+
+#include <gart/comm/row_owners.hpp>
+#include <gart/comm/shared_file.hpp>
+#include <gart/train/state.hpp>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace gart {
+
+/// What a rank writes. Rank 0 also writes what is not of Gaussians.
+class checkpoint_rows {
+ public:
+  /// The state must outlive it; of each Gaussian it has the rows of `owners`.
+  checkpoint_rows(training_state const& mine, row_owners const& owners);
+  /// Of this rank, in each array.
+  std::vector<u64> bytes() const;
+  /// Where arrays lie that have so many bytes: the sums over the ranks.
+  void place(std::vector<u64> const& bytes_of_all);
+  /// What the checksum of each array has of this rank, where it is placed: all ranks' together, by exclusive or, are
+  /// the checksums.
+  std::vector<u32> checksum_shares() const;
+  /// This rank's bytes of the file.
+  void write(shared_file& file, std::vector<u32> const& checksums) const;
+
+ private:
+  struct array {
+    std::string name;
+    std::vector<char> small;     // the values of an array of the run
+    char const* data = nullptr;  // or this rank's rows
+    u64 row = 0;                 // bytes of one; 0: of the run
+    u64 bytes = 0, total = 0;    // of this rank, of all
+    u64 begin = 0;               // in the file
+  };
+  std::string head(array const& a) const;
+  // f(byte in the array, first of them, how many) for what this rank has of an array's values.
+  template <class F>
+  void for_each_piece(array const& a, F const& f) const;
+  row_owners owners_;
+  std::vector<array> arrays_;  // in the order of the file
+};
+
+/// What a rank reads.
+class checkpoint_rows_reader {
+ public:
+  /// Reads where the arrays lie.
+  checkpoint_rows_reader(std::filesystem::path const& path, row_owners const& owners);
+  /// This rank's rows of what is of each Gaussian, and all of the rest.
+  training_state state() const;
+  /// What the checksums of the arrays of rows have of this rank, once the state was read.
+  std::vector<u32> const& checksum_shares() const { return shares_; }
+  /// io_error where these are not the checksums of the file.
+  void require(std::vector<u32> const& checksums) const;
+
+  /// What state() asks of it, as of a checkpoint_reader (runtime/checkpoint.hpp).
+  template <class T>
+  std::vector<T> get(std::string const& name, u32 newest_version = 1) const;
+  /// Whether there is an array of that name.
+  bool has(std::string const& name) const { return arrays_.count(name) != 0; }
+  /// Throws io_error with the path before `what`.
+  [[noreturn]] void fail(std::string const& what) const;
+
+ private:
+  struct array {
+    u32 version = 1;
+    u64 begin = 0, at = 0, bytes = 0;  // of its head and of its values, in the file
+    u64 row = 0;                       // bytes of a Gaussian; 0: of the run
+    u32 checksum = 0;
+  };
+  array const& find(std::string const& name) const;
+  void read(u64 at, void* to, u64 bytes) const;
+
+  std::filesystem::path path_;
+  row_owners owners_;
+  mutable std::ifstream file_;
+  u64 size_ = 0, gaussians_ = 0;
+  bool checked_ = true;
+  std::map<std::string, array> arrays_;
+  mutable std::vector<u32> shares_;
+  mutable std::vector<std::string> shared_;  // their names
+};
+
+}  // namespace gart
