@@ -6,13 +6,14 @@
 /// that the penalties' sizes were measured on fill a quarter of their images and more (penalty_scale).
 /// Cost: a pass over the pixels of at most `most_views` images, once a run.
 
+#include <gart/core/isa.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/train/options.hpp>
 
 #include <algorithm>
 #include <cstdlib>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 /// The share of the training views' pixels that count in the loss and are not as the background, at least 0.001. Views
 /// are evenly spread over the capture. Before a random background only transparent pixels are empty.
@@ -42,4 +43,4 @@ inline double shown_share(dataset const& data, background_kind background) {
 /// What a penalty is multiplied by in a capture that fills such a share of its images.
 inline float penalty_scale(double share) { return static_cast<float>(std::min(1.0, 4 * share)); }
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA

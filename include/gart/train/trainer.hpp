@@ -44,8 +44,8 @@
 #include <gart/train/depth_supervision.hpp>
 #include <gart/train/memory_need.hpp>
 #include <gart/train/options.hpp>
-#include <gart/train/shown_share.hpp>
 #include <gart/train/shards.hpp>
+#include <gart/train/shown_share.hpp>
 #include <gart/train/start_model.hpp>
 #include <gart/train/state.hpp>
 #include <gart/train/step_report.hpp>
