@@ -49,6 +49,8 @@ std::vector<field> const& fields() {
       named("poses.until", [](options& o) -> float& { return o.poses.until; }),
       named("poses.rate", [](options& o) -> float& { return o.poses.rate; }),
       named("poses.rate_final", [](options& o) -> float& { return o.poses.rate_final; }),
+      named("poses.coarse", [](options& o) -> int& { return o.poses.coarse; }),
+      named("poses.coarse_until", [](options& o) -> float& { return o.poses.coarse_until; }),
       named("poses.held", [](options& o) -> float& { return o.poses.held; }),
       named("poses.held_final", [](options& o) -> float& { return o.poses.held_final; }),
       named("poses.prior", [](options& o) -> float& { return o.poses.prior; }),

@@ -81,7 +81,7 @@ image8 three_channels(image8 image) {
   return result;
 }
 
-// The camera of a box-downscaled image: a partial last block is cropped, so the scale is exactly 1 / factor.
+// The camera of a box-downscaled image.
 camera downscaled(camera c, int factor, std::string const& where) {
   int const width = c.width / factor, height = c.height / factor;
   if (width < 1 || height < 1) {
@@ -92,7 +92,7 @@ camera downscaled(camera c, int factor, std::string const& where) {
                            std::to_string(c.width) + " x " + std::to_string(c.height) + " of " + where +
                            ": a view of the whole sphere cannot be cropped; take a factor of both");
   }
-  return resized(cropped(c, width * factor, height * factor), width, height);
+  return shrunk(c, factor);
 }
 
 void drop_frames_without_photo(capture& c, bool load_images) {

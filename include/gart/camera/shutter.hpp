@@ -96,4 +96,11 @@ inline camera cropped(camera c, int width, int height) {
   return c;
 }
 
+/// That of an image made smaller by a whole factor, a box of pixels each: a partial last block is cropped, so that the
+/// scale is exactly 1 / factor.
+inline camera shrunk(camera const& c, int factor) {
+  int const width = c.width / factor, height = c.height / factor;
+  return factor == 1 ? c : resized(cropped(c, width * factor, height * factor), width, height);
+}
+
 }  // namespace gart::inline GART_ISA

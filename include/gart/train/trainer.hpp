@@ -44,8 +44,8 @@
 #include <gart/train/depth_supervision.hpp>
 #include <gart/train/memory_need.hpp>
 #include <gart/train/options.hpp>
-#include <gart/train/shown_share.hpp>
 #include <gart/train/shards.hpp>
+#include <gart/train/shown_share.hpp>
 #include <gart/train/start_model.hpp>
 #include <gart/train/state.hpp>
 #include <gart/train/step_report.hpp>
@@ -151,7 +151,8 @@ class basic_trainer {
 
   step_report step_by(loss_function<E> const& loss);
   template <class Pass>
-  void differentiate_by(Pass& pass, loss_function<E> const& loss, std::size_t view, learning_rates const& rates);
+  void differentiate_by(Pass& pass, loss_function<E> const& loss, std::size_t view, camera const& seen,
+                        learning_rates const& rates);
   template <class Rows>
   void optimize(learning_rates const& rates, int degree, Rows&& rows);
   learning_rates rates_of_step() const;
@@ -204,6 +205,19 @@ class basic_trainer {
 
   // The camera of a training view, with what is learned of it.
   camera seen_by(std::size_t index) const { return as_learned(poses_ ? poses_->view(index) : data_.train[index].view); }
+  // By what the images of a step are made smaller: where poses are learned, at first (pose_options::coarse). A side
+  // keeps 64 pixels. Not with depth maps, nor where a focal length is learned, whose gradient is by its pixels.
+  int shrink_at(int step, std::size_t index) const {
+    if (!poses_ || lenses_ || has_depth<Strategy>) return 1;
+    camera const& c = data_.train[index].view;
+    int factor = coarse_factor(options_.poses, step, options_.iterations);
+    auto const fits = [&](int f) {
+      bool const whole = c.kind != camera_kind::equirectangular || (c.width % f == 0 && c.height % f == 0);
+      return whole && std::min(c.width, c.height) / f >= 64;
+    };
+    while (factor > 1 && !fits(factor)) factor /= 2;
+    return factor;
+  }
   bool learns_poses() const { return poses_ && poses_->learns(step_, options_.iterations); }
   bool learns_lenses() const { return lenses_ && lenses_->learns(step_, options_.iterations); }
 

@@ -105,11 +105,11 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
     if (in_ranks()) return step_in_ranks(loss);
   std::size_t const index = order_.at(step_);
   dataset_view const& view = data_.train[index];
-  camera const seen = seen_by(index);
+  camera const seen = shrunk(seen_by(index), shrink_at(step_, index));
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates const rates = rates_of_step();
   render_options const render = render_options_of(options_, data_.extent, background_of(step_));
-  std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
+  std::size_t const floats = std::size_t{3} * seen.width * seen.height;
   color_.resize(floats), color_gradient_.resize(floats);
 
   frame_.prepare(std::as_const(scene_).view(), seen, render, degree);
@@ -117,7 +117,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
   char const* used = nullptr;
   // With less memory where the LT buffer would pass its budget or the numbers of its slots, and then with none.
   passes_.with_room(frame_, options_.lt_budget, [&]<class Pass>(Pass& pass) {
-    differentiate_by(pass, loss, index, rates);
+    differentiate_by(pass, loss, index, seen, rates);
     moments = pass.moments(), lt_bytes_ = pass.lt_bytes(), used = Pass::strategy_type::name;
   });
   bool const moves = learns_poses(), bends = learns_lenses();
@@ -135,6 +135,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
   report.backward = used;
   std::vector<float> const value = value_.to_host();
   if (moves) poses_->step(index, pose_gradient(value.data() + 2), step_ - 1, options_.iterations);
+  if (poses_ && coarse_factor(options_.poses, step_, options_.iterations) == 1) images_.forget_smaller();
   if (bends)
     lenses_->step(index, lens_gradient(value.data() + 2 + pose_gradient::floats), step_ - 1, options_.iterations);
   report.loss = value[0];
@@ -146,7 +147,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 template <class Pass>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pass, loss_function<E> const& loss,
-                                                                        std::size_t index,
+                                                                        std::size_t index, camera const& seen,
                                                                         learning_rates const& rates) {
   dataset_view const& view = data_.train[index];
   image_targets targets;
@@ -162,11 +163,11 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
   {
     stage_scope stage(exec_, "loss");
     span<float const> const image = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
-    truth_view const truth = images_.get(exec_, index, frame_.options().background);
+    truth_view const truth = images_.get(exec_, index, frame_.options().background, shrink_at(step_, index));
     depth_pixels depth;
     if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth), depth = supervision_.pixels();
-    loss(loss_input<E>{exec_, view, truth, view.view.width, view.view.height, image, color_gradient_,
-                       value_.view().subspan(0, 2), depth});
+    loss(loss_input<E>{exec_, view, truth, seen.width, seen.height, image, color_gradient_, value_.view().subspan(0, 2),
+                       depth});
     if (grows_by_error()) error_map(exec_, image, truth, error_map_);
     if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }

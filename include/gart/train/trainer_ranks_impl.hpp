@@ -67,7 +67,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
     std::vector<camera> cameras;
     for (int v = 0; v < views; ++v) {
       std::size_t const index = round.data()[v].view = order_.at(before + done + v);
-      cameras.push_back(seen_by(index));
+      cameras.push_back(shrunk(seen_by(index), shrink_at(before + done + v, index)));
     }
     // Near distance and the like are those of any view; the background is the view's own.
     shards_.round.fetch(std::as_const(scene_).view(), cameras, render_options_of(options_, data_.extent));
@@ -85,6 +85,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
     if (exposures_) exposures_->move(image.view, {image.by_exposure, exposure::floats}, rates.exposure);
     if (moves) poses_->step(image.view, image.by_pose, before + k, options_.iterations);
   }
+  if (poses_ && coarse_factor(options_.poses, step_, options_.iterations) == 1) images_.forget_smaller();
   float const haste = std::sqrt(static_cast<float>(batch));
   if (batch > 1)
     for (float* rate : {&rates.mean, &rates.log_scale, &rates.quaternion, &rates.opacity, &rates.sh_dc, &rates.sh_rest})
@@ -130,7 +131,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
       for (buffer<float, E>* each : {&depth_, &transmittance_})
         shards_.round.share_image(each->data(), seen, sizeof(float));
     span<float const> const shown = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
-    truth_view const truth = images_.get(exec_, index, background);
+    truth_view const truth = images_.get(exec_, index, background, shrink_at(step_ + image, index));
     loss(loss_input<E>{exec_, view, truth, seen.width, seen.height, shown, color_gradient_, value_.view().subspan(0, 2),
                        depth_pixels{}});
     if (grows_by_error()) error_map(exec_, shown, truth, error_map_);

@@ -4,10 +4,15 @@
 /// at its first use and stays. Masks have the weights of the cameras' pixels (camera/pixel_weights.hpp) in them.
 
 #include <gart/camera/pixel_weights.hpp>
+#include <gart/camera/shutter.hpp>
 #include <gart/exec/buffer.hpp>
 #include <gart/io/dataset.hpp>
+#include <gart/io/image_file.hpp>
 #include <gart/loss/image_loss.hpp>
 
+#include <algorithm>
+#include <map>
+#include <memory>
 #include <vector>
 
 namespace gart::inline GART_ISA {
@@ -20,8 +25,9 @@ class training_images {
   explicit training_images(dataset const& data)
       : data_(data), pixels_(data.train.size()), masks_(data.train.size()), weights_(data.train.size()) {}
 
-  /// The photograph of a training view, by its index, over that background.
-  truth_view get(E& exec, std::size_t view, vec3 background) {
+  /// The photograph of a training view, by its index, over that background; `shrink`: made smaller by this factor.
+  truth_view get(E& exec, std::size_t view, vec3 background, int shrink = 1) {
+    if (shrink > 1) return smaller_.try_emplace(shrink, data_, shrink).first->second.get(exec, view, background);
     dataset_view const& v = data_.train[view];
     truth_view out;
     out.channels = v.image.channels;
@@ -38,7 +44,41 @@ class training_images {
     return out;
   }
 
+  /// Gives back the memory of those that were made smaller.
+  void forget_smaller() { smaller_.clear(); }
+
  private:
+  // Copies of the views, each made at its first use.
+  struct smaller {
+    smaller(dataset const& whole, int f) : of(whole), factor(f) {
+      data.train.resize(of.train.size());
+      images = std::make_unique<training_images>(data);
+    }
+    truth_view get(E& exec, std::size_t view, vec3 background) {
+      dataset_view& v = data.train[view];
+      dataset_view const& from = of.train[view];
+      if (v.image.empty()) {
+        v.view = shrunk(from.view, factor), v.image = box_downscale(from.image, factor);
+        if (!from.mask.empty()) v.mask = counted(from.mask, v.view);
+      }
+      return images->get(exec, view, background);
+    }
+    // A pixel of which a part is excluded is.
+    image8 counted(image8 const& mask, camera const& c) const {
+      image8 out(c.width, c.height, 1, 255);
+      for (int y = 0; y < c.height * factor; ++y)
+        for (int x = 0; x < c.width * factor; ++x) {
+          u8& least = out.at(x / factor, y / factor, 0);
+          least = std::min(least, mask.at(x, y, 0));
+        }
+      return out;
+    }
+    dataset const& of;
+    int factor;
+    dataset data;
+    std::unique_ptr<training_images> images;
+  };
+
   static u8 const* resident(E& exec, image8 const& image, buffer<u8, E>& copy) {
     if constexpr (!E::device) return image.data.data();
     if (copy.size() == 0) copy = buffer<u8, E>(exec, image.data);
@@ -53,6 +93,7 @@ class training_images {
   dataset const& data_;
   std::vector<buffer<u8, E>> pixels_, masks_;
   std::vector<image8> weights_;
+  std::map<int, smaller> smaller_;  // by factor
 };
 
 }  // namespace gart::inline GART_ISA
