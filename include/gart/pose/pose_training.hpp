@@ -13,6 +13,7 @@
 ///
 /// A gradient that is not finite moves nothing. Cost: none that shows; memory: 440 bytes a view.
 
+#include <gart/camera/shutter.hpp>
 #include <gart/optim/options.hpp>
 #include <gart/optim/schedule.hpp>
 #include <gart/pose/options.hpp>
@@ -46,9 +47,10 @@ class pose_training {
 
   /// Whether view i has yet to be told how its image moves.
   bool wants_metric(std::size_t i) const { return state_.metric[36 * i] == 0; }
-  /// It, from the image's depth and transmittance.
-  std::array<double, 36> metric_of(std::size_t i, span<float const> depth, span<float const> transmittance) const {
-    return pose_metric(view(i), depth, transmittance, extent_);
+  /// It, from the depth and transmittance of its image, or of one made smaller by a factor.
+  std::array<double, 36> metric_of(std::size_t i, span<float const> depth, span<float const> transmittance,
+                                   int shrink = 1) const {
+    return pose_metric(shrunk(view(i), shrink), depth, transmittance, extent_);
   }
   /// Told, before the view's first step.
   void set_metric(std::size_t i, std::array<double, 36> const& metric) {

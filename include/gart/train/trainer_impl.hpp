@@ -186,7 +186,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
       depth = supervision_.depth(), transmittance = supervision_.transmittance();
     else
       depth = depth_.to_host(), transmittance = transmittance_.to_host();
-    poses_->set_metric(index, poses_->metric_of(index, depth, transmittance));
+    poses_->set_metric(index, poses_->metric_of(index, depth, transmittance, shrink_at(step_, index)));
   }
 }
 

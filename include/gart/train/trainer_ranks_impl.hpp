@@ -140,7 +140,9 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
                      sizeof result.by_exposure);
     exec_.copy_out(&result.loss, value_.data(), sizeof(float));
     exec_.copy_out(&result.mean_square, value_.data() + 1, sizeof(float));
-    if (measures) result.metric = poses_->metric_of(index, depth_.to_host(), transmittance_.to_host());
+    if (measures)
+      result.metric =
+          poses_->metric_of(index, depth_.to_host(), transmittance_.to_host(), shrink_at(step_ + image, index));
   };
   if (unit.empty()) {
     by_image();
