@@ -23,12 +23,13 @@ set(_package_of_WebP::WebP "WebP")
 set(_package_of_Libwebsockets::Libwebsockets "Libwebsockets")
 set(_package_of_embree "embree")
 set(_package_of_MPI::MPI_CXX "MPI COMPONENTS CXX")
+set(_package_of_NCCL::NCCL "NCCL")
 set(_package_of_CUDA::cudart "CUDAToolkit")
 set(_package_of_CUDA::cudart_static "CUDAToolkit")
 
 set(_components)
 set(_config_components)
-foreach(component IN ITEMS headers io runtime reference cpu embree distributed cuda view all)
+foreach(component IN ITEMS headers io runtime reference cpu embree distributed cuda nccl view all)
   set(target gart_${component})
   set(exported_name ${component})
   if(component STREQUAL "headers")
@@ -58,7 +59,7 @@ foreach(component IN ITEMS headers io runtime reference cpu embree distributed c
     endif()
     if(name STREQUAL "gart")
       list(APPEND needs headers)
-    elseif(name MATCHES "^gart_(io|runtime|view|reference|cpu|embree|distributed|cuda)$")
+    elseif(name MATCHES "^gart_(io|runtime|view|reference|cpu|embree|distributed|cuda|nccl)$")
       list(APPEND needs ${CMAKE_MATCH_1})
     elseif(DEFINED _package_of_${name})
       list(APPEND packages "${_package_of_${name}}")
@@ -94,4 +95,5 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/gartConfigVersion.cmake C
 install(FILES ${PROJECT_BINARY_DIR}/gartConfig.cmake ${PROJECT_BINARY_DIR}/gartConfigVersion.cmake
               ${PROJECT_SOURCE_DIR}/backends/io/FindTurboJPEG.cmake ${PROJECT_SOURCE_DIR}/backends/io/FindZSTD.cmake
               ${PROJECT_SOURCE_DIR}/backends/io/FindWebP.cmake ${PROJECT_SOURCE_DIR}/backends/view/FindLibwebsockets.cmake
+              ${PROJECT_SOURCE_DIR}/backends/distributed/FindNCCL.cmake
         DESTINATION ${_package_dir})

@@ -9,6 +9,9 @@
 #if defined(GART_WITH_CUDA)
 #include <gart/exec/cuda.hpp>
 #endif
+#if defined(GART_WITH_NCCL)
+#include <gart/comm/nccl_comm.hpp>
+#endif
 
 #include <cstdio>
 #include <map>
@@ -46,6 +49,9 @@ void print_devices() {
 #endif
 #if defined(GART_WITH_MPI)
   std::printf("ranks      MPI: mpirun -n N gart train; launched as %d\n", ranks::launched());
+#if defined(GART_WITH_NCCL)
+  std::printf("           a GPU each: NCCL %s; gart train --gpus N\n", gart::nccl_comm::version().c_str());
+#endif
 #else
   std::puts("ranks      not in this build (MPI)");
 #endif

@@ -86,6 +86,8 @@ int main(int argc, char** argv) {
   bool const views = ranks::built && (app.got_subcommand("render") || app.got_subcommand("eval"));
   if (ranks::launched_rank() > 0 && !views && !app.got_subcommand("train")) return 0;
   try {
+    if (app.got_subcommand("train"))
+      ranks::launch_on(app.get_subcommand("train")->get_option("--gpus")->as<int>(), argv);
     return flushed(selected());
   } catch (usage_error const& e) {
     return fail(e.what(), exit_usage);

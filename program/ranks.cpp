@@ -5,14 +5,23 @@
 #if defined(GART_WITH_MPI)
 #include <gart/comm/mpi_comm.hpp>
 #endif
+#if defined(GART_WITH_NCCL)
+#include <gart/exec/cuda.hpp>
+#endif
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
+#include <cstring>
+#include <filesystem>
 #include <initializer_list>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
+
+#include <unistd.h>
 
 namespace gart_cli {
 
@@ -37,6 +46,32 @@ std::unique_ptr<gart::mpi_comm>& started() {
 int ranks::launched() { return first_of({"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"}, 1); }
 int ranks::launched_rank() {
   return launched() > 1 ? first_of({"OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID"}, 0) : 0;
+}
+
+void ranks::launch_on(int gpus, char** argv) {
+  std::string const asked = "--gpus " + std::to_string(gpus) + ": ";
+  if (launched() > 1 && gpus > 1 && launched() != gpus)
+    throw usage_error(asked + std::to_string(launched()) + " ranks were started (leave --gpus out under mpirun)");
+  if (launched() > 1 || gpus == 1) return;
+#if defined(GART_WITH_NCCL)
+  std::string reason;
+  auto const found = gart::cuda_devices(&reason).size();
+  if (found < static_cast<std::size_t>(gpus))
+    throw usage_error(asked + "this host has " + std::to_string(found) + (found ? "" : " (" + reason + ")"));
+  // A rank's threads go where there is room, not all to one core; and root may.
+  ::setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 0);
+  if (::geteuid() == 0) ::setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 0), ::setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 0);
+  std::string count = std::to_string(gpus), self = "/proc/self/exe", option = "-n", launcher = "mpirun";
+  self = std::filesystem::read_symlink(self).string();
+  std::vector<char*> line = {launcher.data(), option.data(), count.data(), self.data()};
+  for (char** word = argv + 1; *word; ++word) line.push_back(*word);
+  line.push_back(nullptr);
+  ::execvp(launcher.c_str(), line.data());
+  throw usage_error(asked + "mpirun cannot be started: " + std::strerror(errno) + " (install openmpi-bin)");
+#else
+  (void)argv;
+  throw usage_error(asked + "this gart was built without NCCL (build it where CUDA, MPI and NCCL are)");
+#endif
 }
 
 #if defined(GART_WITH_MPI)

@@ -180,6 +180,12 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->type_name("NAME")
       ->capture_default_str()
       ->check(one_of({"strips", "views"}));
+  in_group(train.add_option("--gpus", a.gpus,
+                            "GPUs of this host that train together: starts a rank for\neach, as mpirun -n N gart "
+                            "train ... does"))
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 1024));
   add_threads(train, a.threads);
   in_group(train.get_option("--threads"));
 

@@ -21,6 +21,7 @@ struct train_arguments {
   bool resume = false, quiet = false, check_finite = false;
   int threads = 0, stop_at = 0;
   std::string parallel = "strips";
+  int gpus = 1;
   nlohmann::json raised = nlohmann::json::object();  // options raised by a resuming command line: what they were
   float checkpoint_minutes = 10;
   bool viewed = false;

@@ -130,6 +130,7 @@ mpi_comm::mpi_comm() : state_(std::make_shared<state>()) {}
 int mpi_comm::rank() const { return state_->rank; }
 int mpi_comm::size() const { return state_->size; }
 int mpi_comm::ranks_on_host() const { return state_->on_host; }
+int mpi_comm::rank_on_host() const { return state_->rank_on_host; }
 std::shared_ptr<host_group> mpi_comm::on_host() const { return std::make_shared<host_ranks>(state_); }
 
 std::string mpi_comm::host() const {

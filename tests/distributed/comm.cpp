@@ -1,37 +1,39 @@
 // A communicator's messages and sums, by MPI and by one rank alone.
+#include "policy.hpp"
+
 #include <doctest/doctest.h>
 
-#include <gart/comm/mpi_comm.hpp>
 #include <gart/comm/self_comm.hpp>
-#include <gart/exec/serial.hpp>
+#include <gart/exec/buffer.hpp>
 
 #include <vector>
 
 using namespace gart;
-static_assert(communicator<self_comm, serial_exec> && communicator<mpi_comm, serial_exec>);
+using gart_test::every_rank, gart_test::exec_type, gart_test::rank_comm;
+static_assert(communicator<self_comm, exec_type> && communicator<rank_comm, exec_type>);
 
 namespace {
 
 template <class Comm>
 void check(Comm comm) {
-  serial_exec exec;
+  exec_type exec = gart_test::make_exec();
   int const size = comm.size(), rank = comm.rank();
   auto const n = static_cast<std::size_t>(size);
   REQUIRE((rank >= 0 && rank < size));
 
   // Each rank sends (rank + 1) words of 100 rank + to, to each; one message to itself among them, and none to the next.
-  std::vector<std::vector<u32>> out(n), in(n);
+  std::vector<buffer<u32, exec_type>> out, in;
   std::vector<message> sends, receives;
   for (int r = 0; r < size; ++r) {
     auto const k = static_cast<std::size_t>(r);
-    out[k].assign(static_cast<std::size_t>(rank) + 1, static_cast<u32>(100 * rank + r));
-    in[k].assign(k + 1, 0u);
+    out.emplace_back(exec, std::vector<u32>(static_cast<std::size_t>(rank) + 1, static_cast<u32>(100 * rank + r)));
+    in.emplace_back(exec, std::vector<u32>(k + 1));
     sends.push_back({r, out[k].data(), out[k].size() * sizeof(u32)});
     receives.push_back({r, in[k].data(), in[k].size() * sizeof(u32)});
   }
   comm.exchange(exec, {sends.data(), n}, {receives.data(), n});
   for (int r = 0; r < size; ++r)
-    for (u32 const word : in[static_cast<std::size_t>(r)]) CHECK(word == static_cast<u32>(100 * r + rank));
+    for (u32 const word : in[static_cast<std::size_t>(r)].to_host()) CHECK(word == static_cast<u32>(100 * r + rank));
 
   // Two messages between the same ranks arrive in their order.
   u32 const first = static_cast<u32>(rank), second = first + 1000;
@@ -72,15 +74,21 @@ void check(Comm comm) {
 }  // namespace
 
 TEST_CASE("messages, sums and broadcasts between ranks") {
-  check(mpi_comm());
+  check(every_rank());
   check(self_comm());
+#if defined(GART_TEST_CUDA)
+  mpi_comm const ranks;
+  check(nccl_comm(ranks, nccl_comm::device_of(ranks), device_transport::host));
+#endif
 }
 
 TEST_CASE("a rank that there is not is refused") {
-  mpi_comm comm;
+  rank_comm comm = every_rank();
   int value = 0;
   message const wrong{comm.size(), &value, sizeof value};
   CHECK_THROWS_AS(comm.exchange({&wrong, 1}, {}), invalid_argument);
+  exec_type exec = gart_test::make_exec();
+  CHECK_THROWS_AS(comm.exchange(exec, {&wrong, 1}, {}), invalid_argument);
   CHECK_THROWS_AS(comm.broadcast(&value, sizeof value, -1), invalid_argument);
   CHECK_THROWS_AS(self_comm().exchange({&wrong, 1}, {}), invalid_argument);
 }

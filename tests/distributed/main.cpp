@@ -5,11 +5,23 @@
 
 #include <gart/comm/mpi_comm.hpp>
 
+#if defined(GART_TEST_CUDA)
+#include <gart/exec/cuda.hpp>
+#endif
+
 #include <cstdio>
 #include <sstream>
+#include <string>
 
 int main(int argc, char** argv) {
   gart::mpi_comm ranks;
+#if defined(GART_TEST_CUDA)
+  std::string reason;
+  if (gart::cuda_devices(&reason).empty()) {
+    if (ranks.rank() == 0) std::printf("skipped: no CUDA device (%s)\n", reason.c_str());
+    return 0;
+  }
+#endif
   doctest::Context context(argc, argv);
   std::ostringstream words;
   if (ranks.rank() > 0) context.setCout(&words);

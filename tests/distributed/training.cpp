@@ -1,8 +1,8 @@
 // Training on the ranks that there are, held against the trainer of one: bit by bit where sums have a fixed order.
 #include <train/capture.hpp>
 
-#include <gart/comm/mpi_comm.hpp>
-#include <gart/exec/parallel.hpp>
+#include "policy.hpp"
+
 #include <gart/io/file.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
@@ -16,12 +16,12 @@ using namespace gart;
 
 namespace {
 
-using exec_type = serial_exec;
+using gart_test::every_rank, gart_test::exec_type, gart_test::rank_comm;
 using tiles = tile_tracer<exec_type>;
 template <class Strategy, class Comm = self_comm, class Tracer = tiles>
 using trainer_of = trainer<exec_type, scene_traits<1>, Tracer, Strategy, Comm>;
 using plain = trainer_of<deterministic_strategy>;
-using shared = trainer_of<deterministic_strategy, mpi_comm>;
+using shared = trainer_of<deterministic_strategy, rank_comm>;
 
 // One rank that does all that several do.
 struct lone_comm : self_comm {
@@ -63,20 +63,20 @@ double largest_difference(std::vector<float> const& a, std::vector<float> const&
 // The gradients of all ranks' rows, in the order of numbers.
 template <class Trainer>
 gaussian_model all_gradients(Trainer& run, exec_type& exec, index_t block) {
-  return sharded_rows<exec_type, mpi_comm>(exec, mpi_comm(), block).whole_of(run.gradients().to_host());
+  return sharded_rows<exec_type, rank_comm>(exec, every_rank(), block).whole_of(run.gradients().to_host());
 }
 
 }  // namespace
 
 TEST_CASE("by strips the bits are those of one rank, whatever the number of ranks") {
-  exec_type exec;
+  exec_type exec = gart_test::make_exec();
   dataset const data = gart_test::capture(exec, 3);
   for (densify_kind const densify : {densify_kind::error, densify_kind::mcmc, densify_kind::adc}) {
     CAPTURE(to_string(densify));
     train_options const options = short_run(densify);
     gaussian_model const start = gart_test::cloud(11, 0.5f);
     plain one(exec, options, data, start);
-    shared all(exec, options, data, start, mpi_comm());
+    shared all(exec, options, data, start, every_rank());
     bool rose = false, fell = false;
     index_t count = start.size();
     while (one.steps_done() < options.iterations) {
@@ -106,13 +106,13 @@ TEST_CASE("by strips the bits are those of one rank, whatever the number of rank
 }
 
 TEST_CASE("with sums in any order, gradients are as near as rounding") {
-  exec_type exec;
+  exec_type exec = gart_test::make_exec();
   dataset const data = gart_test::capture(exec, 4);
   train_options const options = short_run(densify_kind::none);
   gaussian_model const start = gart_test::cloud(12, 0.5f);
   auto const check = [&]<class Strategy, class Tracer>(Strategy, std::type_identity<Tracer>) {
     trainer_of<Strategy, self_comm, Tracer> one(exec, options, data, start);
-    trainer_of<Strategy, mpi_comm, Tracer> all(exec, options, data, start, mpi_comm());
+    trainer_of<Strategy, rank_comm, Tracer> all(exec, options, data, start, every_rank());
     one.step(), all.step();
     gaussian_model const a = all_gradients(all, exec, options.shard_block), b = one.gradients().to_host();
     REQUIRE(a.size() == b.size());
@@ -124,16 +124,17 @@ TEST_CASE("with sums in any order, gradients are as near as rounding") {
         a, b);
   };
   check(primitive_strategy(), std::type_identity<tiles>());
-  check(pixel_strategy(), std::type_identity<bvh_tracer<exec_type>>());  // rows by their tracers' rays
+  if constexpr (!exec_type::device)  // the same rows by their tracer's rays
+    check(pixel_strategy(), std::type_identity<bvh_tracer<exec_type>>());
 }
 
 TEST_CASE("a batch is the mean of its views, the same for any number of ranks") {
-  exec_type exec;
+  exec_type exec = gart_test::make_exec();
   dataset const data = gart_test::capture(exec, 5);
   train_options options = short_run(densify_kind::none);
   gaussian_model const start = gart_test::cloud(13, 0.5f);
   options.batch = 3;
-  shared all(exec, options, data, start, mpi_comm());
+  shared all(exec, options, data, start, every_rank());
   float const loss = all.step().loss;
   CHECK(all.steps_done() == 3);
   gaussian_model const mean = all_gradients(all, exec, options.shard_block);
@@ -160,7 +161,7 @@ TEST_CASE("a batch is the mean of its views, the same for any number of ranks") 
     train_options grown = short_run(densify);
     grown.batch = 3, grown.iterations = 150, grown.exposure = true;
     trainer_of<deterministic_strategy, lone_comm> one(exec, grown, data, start);
-    shared many(exec, grown, data, start, mpi_comm());
+    shared many(exec, grown, data, start, every_rank());
     while (many.steps_done() < grown.iterations) REQUIRE(one.step().loss == many.step().loss);
     if (densify != densify_kind::adc) CHECK(many.model().size() == 230);
     CHECK(same(one.model(), many.model()));
@@ -170,7 +171,7 @@ TEST_CASE("a batch is the mean of its views, the same for any number of ranks") 
 }
 
 TEST_CASE("exposures and poses are learned as by one rank, bit by bit") {
-  exec_type exec;
+  exec_type exec = gart_test::make_exec();
   dataset data = gart_test::capture(exec, 9);
   data.train[2].view.position.x += 0.05;
   train_options options = short_run(densify_kind::error);
@@ -181,7 +182,7 @@ TEST_CASE("exposures and poses are learned as by one rank, bit by bit") {
     CAPTURE(batch);
     options.batch = batch;
     trainer_of<deterministic_strategy, lone_comm> one(exec, options, data, start);
-    shared all(exec, options, data, start, mpi_comm());
+    shared all(exec, options, data, start, every_rank());
     while (all.steps_done() < options.iterations) REQUIRE(one.step().loss == all.step().loss);
     training_state const a = one.state(), b = all.state();
     CHECK(a.poses.value == b.poses.value);
@@ -202,20 +203,20 @@ TEST_CASE("exposures and poses are learned as by one rank, bit by bit") {
 }
 
 TEST_CASE("a checkpoint is one file of today's format, and goes on with any number of ranks") {
-  exec_type exec;
+  exec_type exec = gart_test::make_exec();
   mpi_comm ranks;
   dataset const data = gart_test::capture(exec, 6);
   train_options const options = short_run(densify_kind::error);
   gaussian_model const start = gart_test::cloud(14, 0.5f);
   std::string const name = "distributed_" + std::to_string(ranks.size()) + "_";
   std::string const by_all = name + "all.gart", by_one = name + std::to_string(ranks.rank()) + ".gart";
-  shared all(exec, options, data, start, ranks);
+  shared all(exec, options, data, start, every_rank());
   plain one(exec, options, data, start);
   while (one.steps_done() < 90) one.step(), all.step();
   all.save(by_all), one.save(by_one);
   auto const bytes = [](std::string const& path) { return read_file(path); };
   CHECK(bytes(by_all) == bytes(by_one));
-  shared resumed(exec, options, data, start, ranks);
+  shared resumed(exec, options, data, start, every_rank());
   resumed.load(by_one);
   plain alone(exec, options, data, start);
   alone.load(by_all);
@@ -228,13 +229,13 @@ TEST_CASE("a checkpoint is one file of today's format, and goes on with any numb
 }
 
 TEST_CASE("more ranks than Gaussians, than rows of tiles, than anything to see") {
-  exec_type exec;
+  exec_type exec = gart_test::make_exec();
   dataset data = gart_test::capture(exec, 7);
   train_options options = short_run(densify_kind::none);
   options.shard_block = 1;
   auto const check = [&](gaussian_model const& start, int steps) {
     plain one(exec, options, data, start);
-    shared all(exec, options, data, start, mpi_comm());
+    shared all(exec, options, data, start, every_rank());
     for (int i = 0; i < steps; ++i) REQUIRE(one.step().loss == all.step().loss);
     CHECK(same(one.model(), all.model()));
   };
@@ -255,13 +256,13 @@ TEST_CASE("more ranks than Gaussians, than rows of tiles, than anything to see")
 }
 
 TEST_CASE("what several ranks do not train is refused by field") {
-  exec_type exec;
+  exec_type exec = gart_test::make_exec();
   dataset const data = gart_test::capture(exec, 8);
   train_options const good = short_run(densify_kind::none);
   auto const refused = [&](train_options options, char const* field) {
     options.batch = std::max(options.batch, 2);
     try {
-      shared run(exec, options, data, gart_test::cloud(1, 0.5f), mpi_comm());
+      shared run(exec, options, data, gart_test::cloud(1, 0.5f), every_rank());
       FAIL("not refused");
     } catch (invalid_argument const& e) {
       CHECK(std::string(e.what()).find(field) != std::string::npos);
@@ -277,7 +278,7 @@ TEST_CASE("what several ranks do not train is refused by field") {
   o = good, o.shard_block = 0;
   refused(o, "train_options.shard_block");
   o = good, o.batch = -1;
-  CHECK_THROWS_AS(shared(exec, o, data, gart_test::cloud(1, 0.5f), mpi_comm()), invalid_argument);
+  CHECK_THROWS_AS(shared(exec, o, data, gart_test::cloud(1, 0.5f), every_rank()), invalid_argument);
   o.batch = 2;
   CHECK_THROWS_AS(plain(exec, o, data, gart_test::cloud(1, 0.5f)), invalid_argument);
 }

@@ -4,6 +4,7 @@
 /// communicator is a handle, cheap to copy, with the members
 ///   static constexpr bool alone;      there is one rank, known when compiled: nothing is exchanged
 ///   int rank(); int size();           which one this is, 0 to size() - 1
+///   int sharers();                    ranks that have their memory from where this one has it, with it
 ///   exchange(exec, sends, receives)   point-to-point messages as one group, in the memory of the policy, on its queue;
 ///                                     messages between two ranks arrive in the order of the lists; one to itself too
 ///   exchange(sends, receives)         the same in host memory, waited for
@@ -44,6 +45,7 @@ concept communicator = execution<E> && std::copyable<C> &&
   { C::alone } -> std::convertible_to<bool>;
   { k.rank() } -> std::same_as<int>;
   { k.size() } -> std::same_as<int>;
+  { k.sharers() } -> std::same_as<int>;
   c.exchange(exec, messages, messages);
   c.exchange(messages, messages);
   c.all_gather(mine, all, bytes);

@@ -32,6 +32,8 @@ class mpi_comm {
   int size() const;           ///< ranks in all
   std::string host() const;   ///< the name of the machine that this rank is on
   int ranks_on_host() const;  ///< with this one
+  int rank_on_host() const;   ///< which of these this is
+  int sharers() const { return ranks_on_host(); }  ///< of the host's memory
   /// Those, and the memory that they share.
   std::shared_ptr<host_group> on_host() const;
 

@@ -15,8 +15,9 @@ class self_comm {
  public:
   static constexpr bool alone = true;  ///< known when compiled
 
-  constexpr int rank() const { return 0; }  ///< the only one
-  constexpr int size() const { return 1; }  ///< one
+  constexpr int rank() const { return 0; }     ///< the only one
+  constexpr int size() const { return 1; }     ///< one
+  constexpr int sharers() const { return 1; }  ///< it has all memory
   /// Messages to itself, by the policy.
   template <execution E>
   void exchange(E& exec, span<message const> sends, span<message const> receives) {

@@ -63,14 +63,19 @@ struct row_kernel {
 
 }  // namespace detail
 
-/// body(row, column) for every element of `rows` rows; a tile of rows at a time, so that the count of elements may pass
-/// 2^32.
+/// body(row, column) for every element of `rows` rows of `width`; a tile of rows at a time, so that the count of elements
+/// may pass 2^32.
 template <execution E, class Body>
-void for_each_element(E& exec, char const* label, index_t rows, int sh_degree, Body const& body) {
+void for_each_column(E& exec, char const* label, index_t rows, index_t width, Body const& body) {
   if (rows == 0) return;
   using kernel = detail::row_kernel<Body>;
   index_t const tiles = rows / kernel::rows_per_tile + (rows % kernel::rows_per_tile != 0);
-  parallel_for(exec, label, tile_range{tiles, 256}, kernel{body, rows, row_width(sh_degree)});
+  parallel_for(exec, label, tile_range{tiles, 256}, kernel{body, rows, width});
+}
+/// The same of Gaussians of that degree.
+template <execution E, class Body>
+void for_each_element(E& exec, char const* label, index_t rows, int sh_degree, Body const& body) {
+  for_each_column(exec, label, rows, row_width(sh_degree), body);
 }
 
 namespace detail {

@@ -22,7 +22,7 @@ class compiled_session final : public session {
   /// As make_session has it; `start` is of the configuration's degree.
   compiled_session(configuration_request const& request, train_options const& options, dataset const& data,
                    start_model const& start)
-      : exec_(policy_of<E>(request)), trainer_(exec_, options, data, start, comm_of<Comm>(request)) {}
+      : exec_(policy_of<E, Comm>(request)), trainer_(exec_, options, data, start, comm_of<Comm>(request)) {}
   step_report step() override { return trainer_.step(); }
   int steps_done() const override { return trainer_.steps_done(); }
   void set_iterations(int iterations) override { trainer_.set_iterations(iterations); }

@@ -32,10 +32,12 @@ configuration_info configuration_of() {
   return configuration;
 }
 
-/// The policy that a request asks for.
-template <execution E>
+/// The policy that a request asks for; of ranks with a device each, on that of this rank.
+template <execution E, class Comm = self_comm>
 E policy_of(configuration_request const& request) {
-  if constexpr (E::device)
+  if constexpr (requires(decltype(*request.ranks) ranks) { Comm::device_of(ranks); })
+    return E(Comm::device_of(*request.ranks));
+  else if constexpr (E::device)
     return E(request.device, request.stream);
   else if constexpr (std::is_constructible_v<E, int>)
     return E(request.threads);
@@ -48,6 +50,8 @@ template <class Comm>
 Comm comm_of(configuration_request const& request) {
   if constexpr (Comm::alone)
     return Comm();
+  else if constexpr (requires(decltype(*request.ranks) ranks) { Comm::device_of(ranks); })
+    return Comm(*request.ranks, Comm::device_of(*request.ranks));
   else
     return *request.ranks;
 }

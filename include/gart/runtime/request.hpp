@@ -26,7 +26,7 @@ struct configuration_request {
   bool depth = false;  ///< gradients of depth and transmittance too; training by depth_weight asks for it itself
   int window = 0;      ///< hits that a ray keeps in order before it goes over the scene again
   int threads = 0;     ///< of the openmp policy; 0: as many as OpenMP gives
-  int device = 0;      ///< of the cuda policy
+  int device = 0;      ///< of the cuda policy; ranks take a host's GPUs in turn
   /// Of the cuda policy: a cudaStream_t of the caller's that all work goes to (cudaStreamLegacy for the default one);
   /// null: one of its own.
   void* stream = nullptr;

@@ -66,8 +66,8 @@ class row_exchange {
     std::size_t const leave = sent_.total(), arrive = std::accumulate(received.begin(), received.end(), std::size_t{0});
     received_ = received;
     out_.resize(leave * width), in_.resize(arrive * width);
-    parallel_for(*exec_, "exchange/pack", static_cast<index_t>(leave),
-                 detail::pack_kernel{scene, owners_, list_.data(), out_.data(), width});
+    for_each_column(*exec_, "exchange/pack", static_cast<index_t>(leave), width,
+                    detail::pack_body{scene, owners_, list_.data(), out_.data(), width});
     traffic_ += width * sizeof(float) * (leave - sent_.counts[static_cast<std::size_t>(owners_.rank)]);
     comm_.exchange(*exec_, as_span(messages_of(sent_.counts, out_.data(), width * sizeof(float))),
                    as_span(messages_of(received, in_.data(), width * sizeof(float))));
@@ -75,7 +75,8 @@ class row_exchange {
     index_t const n = static_cast<index_t>(arrive);
     parallel_for(*exec_, "exchange/ids", n, detail::ids_kernel{in_.data(), width, ids_.data(), order_.data()});
     if (owners_.ranks > 1) sort_pairs(*exec_, ids_.view(), order_.view(), 32);
-    parallel_for(*exec_, "exchange/unpack", n, detail::unpack_kernel{scene_.view(), in_.data(), width, order_.data()});
+    for_each_element(*exec_, "exchange/unpack", n, ShDegree,
+                     detail::unpack_body{scene_.view(), in_.data(), width, order_.data()});
   }
 
   /// What this rank traces.
@@ -111,9 +112,9 @@ class row_exchange {
     stage_scope stage(*exec_, "exchange/gradients");
     index_t const n = scene_.size();
     out_.resize(std::size_t{n} * sums);
-    parallel_for(
-        *exec_, "exchange/pack", n,
-        detail::pack_sums_kernel<coefficients>{sh_gradient, pass.moments().data(), order_.data(), out_.data()});
+    for_each_column(
+        *exec_, "exchange/pack", n, sums,
+        detail::pack_sums_body<coefficients>{{sh_gradient, pass.moments().data()}, order_.data(), out_.data()});
     if constexpr (Pass::ordered) pack_pairs(pass);
     return_sums(Pass::ordered);
   }
@@ -131,10 +132,10 @@ class row_exchange {
     for (std::size_t r = 0; r < units_.size(); ++r) {
       if (units_[r].view != v) continue;
       u64 const first = sent_.begin(r);
-      parallel_for(*exec_, "exchange/add", static_cast<index_t>(sent_.counts[r]),
-                   detail::add_sums_kernel<coefficients>{
-                       list_.data() + first, in_.data() + first * sums, ordered_ ? places_.data() + first : nullptr,
-                       sent_pairs_.data() + first, pairs_in_.data(), sh_gradient, moments});
+      for_each_column(*exec_, "exchange/add", static_cast<index_t>(sent_.counts[r]), sums,
+                      detail::add_sums_body<coefficients>{
+                          list_.data() + first, in_.data() + first * sums, ordered_ ? places_.data() + first : nullptr,
+                          sent_pairs_.data() + first, pairs_in_.data(), {sh_gradient, moments}});
     }
   }
 
@@ -220,9 +221,10 @@ class row_exchange {
     pairs_leaving_ = in_parts(span<u32 const>(counts_), received_);
     u64 const pairs = std::accumulate(pairs_leaving_.begin(), pairs_leaving_.end(), u64{0});
     pairs_out_.resize(pairs * sums);
-    parallel_for(*exec_, "exchange/pairs", n,
-                 detail::pack_pairs_kernel<ShDegree>{pass.pair_offsets().data(), pass.pair_rows().data(), order_.data(),
-                                                     counts_.data(), places_.data(), pairs_out_.data()});
+    for_each_column(*exec_, "exchange/pairs", n, sums,
+                    detail::pack_pairs_body<ShDegree>{pass.pair_offsets().data(), pass.pair_rows().data(),
+                                                      order_.data(), counts_.data(), places_.data(),
+                                                      pairs_out_.data()});
   }
 
   // Prefix sums of `counts` into places_, and the sums over parts of them.

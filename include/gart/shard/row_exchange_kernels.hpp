@@ -65,23 +65,17 @@ struct list_kernel {
 };
 
 // Rows, and the Gaussian's number behind each.
-struct pack_kernel {
+struct pack_body {
   gaussians_view<float const> scene;
   row_owners owners;
   u32 const* list;
   float* out;
   index_t width;
-  GART_KERNEL void operator()(index_t k) const {
-    float* const to = out + std::size_t{k} * width;
+  GART_KERNEL void operator()(index_t k, index_t column) const {
     index_t const row = list[k];
-    index_t column = 0;
-    for_each_array(
-        [&](parameter_array const& a, float const* values) {
-          index_t const n = a.width(scene.sh_degree);
-          for (index_t c = 0; c < n; ++c) to[column++] = values[std::size_t{row} * n + c];
-        },
-        scene);
-    to[column] = bits_to_float(static_cast<u32>(owners.global(row)));
+    out[std::size_t{k} * width + column] = column + 1 < width
+                                               ? row_element(scene, row, column)
+                                               : bits_to_float(static_cast<u32>(owners.global(row)));
   }
 };
 
@@ -94,32 +88,34 @@ struct ids_kernel {
   }
 };
 
-struct unpack_kernel {
+struct unpack_body {
   gaussians_view<float> scene;
   float const* in;
-  index_t width;
+  index_t width;  // with the number
   u32 const* order;
-  GART_KERNEL void operator()(index_t k) const {
-    float const* const from = in + std::size_t{order[k]} * width;
-    index_t column = 0;
-    for_each_array(
-        [&](parameter_array const& a, float* values) {
-          index_t const n = a.width(scene.sh_degree);
-          for (index_t c = 0; c < n; ++c) values[std::size_t{k} * n + c] = from[column++];
-        },
-        scene);
+  GART_KERNEL void operator()(index_t k, index_t column) const {
+    row_element(scene, k, column) = in[std::size_t{order[k]} * width + column];
+  }
+};
+
+// A column of a Gaussian's sums: colour's gradient first, then the moments.
+template <index_t Coefficients, class T>
+struct sums_view {
+  static constexpr index_t width = Coefficients + moment_stride;
+  T *sh_gradient, *moments;
+  GART_HD T& operator()(index_t row, index_t column) const {
+    return column < Coefficients ? sh_gradient[std::size_t{row} * Coefficients + column]
+                                 : moments[std::size_t{row} * moment_stride + (column - Coefficients)];
   }
 };
 
 template <index_t Coefficients>
-struct pack_sums_kernel {
-  float const *sh_gradient, *moments;
+struct pack_sums_body {
+  sums_view<Coefficients, float const> sums;
   u32 const* order;
   float* out;
-  GART_KERNEL void operator()(index_t k) const {
-    float* const to = out + std::size_t{order[k]} * (Coefficients + moment_stride);
-    for (index_t c = 0; c < Coefficients; ++c) to[c] = sh_gradient[std::size_t{k} * Coefficients + c];
-    for (index_t c = 0; c < moment_stride; ++c) to[Coefficients + c] = moments[std::size_t{k} * moment_stride + c];
+  GART_KERNEL void operator()(index_t k, index_t column) const {
+    out[std::size_t{order[k]} * sums.width + column] = sums(k, column);
   }
 };
 
@@ -134,47 +130,40 @@ struct count_pairs_kernel {
 };
 
 template <int ShDegree>
-struct pack_pairs_kernel {
-  static constexpr index_t coefficients = 3 * sh_basis<ShDegree>::size;
+struct pack_pairs_body {
+  static constexpr index_t coefficients = 3 * sh_basis<ShDegree>::size, width = coefficients + moment_stride;
   u64 const* pair_offsets;
   quad const* rows;
   u32 const* order;
   u32 const* counts;
   u64 const* places;
   float* out;
-  GART_KERNEL void operator()(index_t k) const {
+  GART_KERNEL void operator()(index_t k, index_t column) const {
     using row = pair_gradient<ShDegree>;
+    index_t const from = column < coefficients ? column : 4 * row::sh_quads + (column - coefficients);
     u32 const at = order[k];
-    for (u32 p = 0; p < counts[at]; ++p) {
-      float* const to = out + (places[at] + p) * (coefficients + moment_stride);
-      float const* const from = reinterpret_cast<float const*>(rows + (pair_offsets[k] + p) * row::quads);
-      for (index_t c = 0; c < coefficients; ++c) to[c] = from[c];
-      for (index_t c = 0; c < moment_stride; ++c) to[coefficients + c] = from[4 * row::sh_quads + c];
-    }
+    for (u32 p = 0; p < counts[at]; ++p)
+      out[(places[at] + p) * width + column] =
+          reinterpret_cast<float const*>(rows + (pair_offsets[k] + p) * row::quads)[from];
   }
 };
 
 // One rank's sums to those of this rank's rows, or its pairs one after another.
 template <index_t Coefficients>
-struct add_sums_kernel {
+struct add_sums_body {
   u32 const* list;
   float const* in;
   u64 const* places;  // of the pairs of each; null where sums have no fixed order
   u32 const* pairs;
   float const* pairs_in;
-  float *sh_gradient, *moments;
-  GART_KERNEL void operator()(index_t k) const {
+  sums_view<Coefficients, float> sums;
+  GART_KERNEL void operator()(index_t k, index_t column) const {
     constexpr index_t width = Coefficients + moment_stride;
-    if (!places || pairs[k] == 0) return add(list[k], in + std::size_t{k} * width);
-    for (u32 p = 0; p < pairs[k]; ++p) add(list[k], pairs_in + (places[k] + p) * width);
-  }
-
- private:
-  GART_HD void add(index_t row, float const* from) const {
-    float* const sh = sh_gradient + std::size_t{row} * Coefficients;
-    float* const m = moments + std::size_t{row} * moment_stride;
-    for (index_t c = 0; c < Coefficients; ++c) sh[c] += from[c];
-    for (index_t c = 0; c < moment_stride; ++c) m[c] += from[Coefficients + c];
+    float& sum = sums(list[k], column);
+    if (!places || pairs[k] == 0)
+      sum += in[std::size_t{k} * width + column];
+    else
+      for (u32 p = 0; p < pairs[k]; ++p) sum += pairs_in[(places[k] + p) * width + column];
   }
 };
 

@@ -37,12 +37,11 @@ inline u64 least_bytes(u64 gaussians, int sh_degree, int ranks, index_t block) {
   return 16 * floats * row_owners{ranks, 0, block}.owned(gaussians);
 }
 
-/// Throws where the policy has not even that. Ranks of one host share a host policy's memory.
+/// Throws where the policy has not even that, of what it shares with other ranks.
 template <execution E, class Comm>
 void require_room(E& exec, Comm& comm, train_options const& options, dataset const& data, int sh_degree, u64 start) {
-  u64 sharers = 1;
-  if constexpr (!E::device && requires { comm.ranks_on_host(); }) sharers = static_cast<u64>(comm.ranks_on_host());
-  u64 const free = exec.free_bytes() / sharers, gaussians = gaussians_at_end(options, data, start);
+  u64 const free = exec.free_bytes() / static_cast<u64>(comm.sharers()),
+            gaussians = gaussians_at_end(options, data, start);
   u64 const need = least_bytes(gaussians, sh_degree, comm.size(), std::max<index_t>(options.shard_block, 1));
   if (free == 0 || need <= free) return;
   u64 const fit = free / (need / std::max<u64>(gaussians, 1) + 1);

@@ -62,7 +62,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
   }
   // Sums in a fixed order were asked for: no budget of our own takes them away.
   if (options.lt_budget == 0 && !Strategy::ordered)
-    options_.lt_budget = exec.free_bytes() / 2 / static_cast<u64>(comm_.size());
+    options_.lt_budget = exec.free_bytes() / 2 / static_cast<u64>(comm_.sharers());
   if (options.exposure) exposures_.emplace(exec, data.train.size());
   if (options.refine_poses) {
     std::vector<camera> captured;

@@ -1,0 +1,22 @@
+// The CUDA policy with tile lists, on several ranks.
+#include <gart/comm/nccl_comm.hpp>
+#include <gart/exec/cuda_launch.cuh>
+#include <gart/runtime/compiled_configurations.hpp>
+#include <gart/trace/tile_tracer.hpp>
+
+namespace {
+
+using namespace gart;
+
+bool device_available(std::string* reason) { return !cuda_devices(reason).empty(); }
+
+template <strategy Strategy>
+void register_on_devices(int rank) {
+  register_configuration_of<cuda_exec, scene_traits<3>, tile_tracer<cuda_exec>, Strategy, nccl_comm>(rank,
+                                                                                                     device_available);
+}
+
+}  // namespace
+
+GART_REGISTER_CONFIGURATIONS(gart_device_rank_configurations, register_on_devices<deterministic_strategy>(36),
+                             register_on_devices<primitive_strategy>(37))
