@@ -8,7 +8,8 @@
 ///   frame.prepare(rows.scene(), views[rows.unit().view], options of rows.unit().rows);
 ///   ...                                      // the image, its gradient, sum_gradients
 ///   rows.give_back(pass, sh_gradient);       // what this rank has summed
-///   rows.sum(v, sh_gradient, moments);       // for each view: of the rows of this rank, over all ranks that traced it
+///   rows.sum_colors(0, views, share, sh_gradient, false);  // of the rows of this rank, over all that traced them
+///   rows.sum_moments(v, moments);                          // for each view
 ///
 /// An owner finds the boxes of its rows in each view, and sends a row to those whose tiles a box meets. What arrives is
 /// put in the order of the Gaussians' numbers, so that lists, ties and images have the bits of one rank that has all.
@@ -17,8 +18,8 @@
 /// goes on adding where the earlier strip's sum ends.
 ///
 /// Traffic a row and unit: 4 (row width + 1) bytes out, and 4 (3 K + 12) back: 240 both ways at degree 3; ordered, as
-/// much again for each pair of a row that began above. Memory: 16 bytes a row of this rank's and view, these buffers,
-/// and the rows that arrived. Errors: out_of_memory.
+/// much again for each pair of a row that began above. Memory: 16 bytes a row of this rank's and view, 4 a row and
+/// unit, these buffers, and the rows that arrived. Errors: out_of_memory.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>
@@ -27,6 +28,8 @@
 #include <gart/shard/row_exchange_kernels.hpp>
 #include <gart/shard/sharded_rows.hpp>
 #include <gart/shard/work_units.hpp>
+
+#include <bit>
 
 namespace gart::inline GART_ISA {
 
@@ -46,6 +49,8 @@ class row_exchange {
         flags_(exec),
         list_(exec),
         sent_pairs_(exec),
+        place_of_(exec),
+        returned_(exec),
         ids_(exec),
         order_(exec),
         counts_(exec),
@@ -74,7 +79,7 @@ class row_exchange {
     ids_.resize(arrive), order_.resize(arrive), scene_.resize_keep(arrive);
     index_t const n = static_cast<index_t>(arrive);
     parallel_for(*exec_, "exchange/ids", n, detail::ids_kernel{in_.data(), width, ids_.data(), order_.data()});
-    if (owners_.ranks > 1) sort_pairs(*exec_, ids_.view(), order_.view(), 32);
+    if (owners_.ranks > 1) sort_pairs(*exec_, ids_.view(), order_.view(), bits_of_ids(scene.count));
     for_each_element(*exec_, "exchange/unpack", n, ShDegree,
                      detail::unpack_body{scene_.view(), in_.data(), width, order_.data()});
   }
@@ -124,20 +129,13 @@ class row_exchange {
     return_sums(ordered);
   }
 
-  /// Of this rank's rows, over all pixels of the round's view v: [rows][K][3] and [rows][moment_stride], overwritten.
-  void sum(int v, float* sh_gradient, float* moments, index_t rows) {
-    stage_scope stage(*exec_, "exchange/gradients");
-    exec_->zero(sh_gradient, sizeof(float) * coefficients * rows);
-    exec_->zero(moments, sizeof(float) * moment_stride * rows);
-    for (std::size_t r = 0; r < units_.size(); ++r) {
-      if (units_[r].view != v) continue;
-      u64 const first = sent_.begin(r);
-      for_each_column(*exec_, "exchange/add", static_cast<index_t>(sent_.counts[r]), sums,
-                      detail::add_sums_body<coefficients>{
-                          list_.data() + first, in_.data() + first * sums, ordered_ ? places_.data() + first : nullptr,
-                          sent_pairs_.data() + first, pairs_in_.data(), {sh_gradient, moments}});
-    }
+  /// Of this rank's rows the colours' gradients, [rows][K][3]: the sum over the views [first, end) of the round, and
+  /// of what is there if it `adds`, times `share`.
+  void sum_colors(int first, int end, float share, span<float> sh_gradient, bool adds) {
+    add_sums(first, end, 0, coefficients, share, sh_gradient, adds);
   }
+  /// Their moments, [rows][moment_stride], over all pixels of the round's view v.
+  void sum_moments(int v, span<float> moments) { add_sums(v, v + 1, coefficients, moment_stride, 1, moments, false); }
 
  private:
   static constexpr index_t coefficients = 3 * sh_basis<ShDegree>::size, sums = coefficients + moment_stride;
@@ -146,50 +144,60 @@ class row_exchange {
   struct parts {
     std::vector<u64> counts;
     u64 total() const { return std::accumulate(counts.begin(), counts.end(), u64{0}); }
-    u64 begin(std::size_t r) const {
-      return std::accumulate(counts.begin(), counts.begin() + static_cast<std::ptrdiff_t>(r), u64{0});
-    }
   };
 
-  // The boxes of this rank's rows in each view, and from all ranks' who traces what.
+  // The boxes of this rank's rows in each view, and from all ranks' who traces what. A view that one rank traces alone
+  // needs no cost.
   void measure(gaussians_view<float const> scene, std::vector<camera> const& views, render_options const& options) {
+    bool const shared = views.size() < static_cast<std::size_t>(owners_.ranks);
+    constexpr index_t counted = 1 << 16;  // rows of a rank, about, that tell the cost of a view's strips
+    index_t const every = shared ? 1 + scene.count / counted : 0;
     std::vector<std::vector<u64>> costs;
-    std::vector<u64> all;
     while (boxes_.size() < views.size()) boxes_.emplace_back(*exec_);
     for (std::size_t v = 0; v < views.size(); ++v) {
       tile_grid<Size> const grid{views[v].width, views[v].height};
       boxes_[v].resize(scene.count), cost_.resize(grid.rows() + 1);
-      cost_.zero();
+      if (shared) cost_.zero();
       auto const seen = filter_.of(*exec_, scene, views[v], options.antialias);
       visit_camera(views[v], [&](auto const& model) {
         auto const bounds = model.bounds(options.near);
         parallel_for(*exec_, "exchange/boxes", scene.count,
                      detail::box_kernel<Response, E, Size, std::remove_const_t<decltype(bounds)>>{
-                         seen, bounds, model.position, options.alpha_min, boxes_[v].data(), cost_.data()});
+                         seen, bounds, model.position, options.alpha_min, boxes_[v].data(), cost_.data(), every});
       });
-      std::vector<u64> const steps = cost_.to_host();
-      all.insert(all.end(), steps.begin(), steps.end());
+      costs.push_back(shared ? cost_.to_host() : std::vector<u64>(grid.rows() + 1));
     }
-    comm_.all_reduce(span<u64>(all.data(), all.size()));
-    for (std::size_t v = 0, at = 0; v < views.size(); ++v) {
-      std::size_t const rows = tile_grid<Size>{views[v].width, views[v].height}.rows();
-      std::vector<u64> cost(rows);
-      std::inclusive_scan(all.begin() + static_cast<std::ptrdiff_t>(at),
-                          all.begin() + static_cast<std::ptrdiff_t>(at + rows), cost.begin());
-      costs.push_back(std::move(cost)), at += rows + 1;
+    if (shared) add_costs(costs);
+    for (std::vector<u64>& cost : costs) {
+      std::inclusive_scan(cost.begin(), cost.end(), cost.begin());
+      cost.pop_back();
     }
     units_ = divide_work(costs, owners_.ranks, Size);
+  }
+
+  // Over all ranks.
+  void add_costs(std::vector<std::vector<u64>>& costs) {
+    std::vector<u64> all;
+    for (auto const& cost : costs) all.insert(all.end(), cost.begin(), cost.end());
+    comm_.all_reduce(span<u64>(all.data(), all.size()));
+    auto at = all.begin();
+    for (auto& cost : costs) {
+      auto const end = at + static_cast<std::ptrdiff_t>(cost.size());
+      cost.assign(at, end), at = end;
+    }
   }
 
   // Which rows go to whom.
   void select(index_t rows) {
     sent_.counts.assign(units_.size(), 0);
-    flags_.resize(rows), places_.resize(rows);
+    flags_.resize(rows), places_.resize(rows), place_of_.resize(rows * units_.size());
     list_.resize(0), sent_pairs_.resize(0);
+    std::vector<detail::returned_unit> returned;
     u64 at = 0;
     for (std::size_t r = 0; r < units_.size(); ++r) {
       work_unit const& u = units_[r];
       if (u.empty() || rows == 0) continue;
+      u32* const place_of = place_of_.data() + r * rows;
       auto const& boxes = boxes_[static_cast<std::size_t>(u.view)];
       parallel_for(*exec_, "exchange/select", rows, detail::select_kernel{boxes.data(), u.rows, flags_.data()});
       exclusive_scan(*exec_, span<u32 const>(flags_), places_.view(), total_.view());
@@ -197,9 +205,31 @@ class row_exchange {
       list_.resize_keep(at + count), sent_pairs_.resize_keep(at + count);
       parallel_for(*exec_, "exchange/list", rows,
                    detail::list_kernel<Size>{boxes.data(), u.rows, flags_.data(), places_.data(), list_.data() + at,
-                                             sent_pairs_.data() + at});
+                                             sent_pairs_.data() + at, place_of});
+      returned.push_back({u.view, at, place_of});
       sent_.counts[r] = count, at += count;
     }
+    returned_views_.clear();
+    for (detail::returned_unit const& u : returned) returned_views_.push_back(u.view);
+    returned_.assign(returned);
+  }
+
+  // Bits of a Gaussian's number, where this rank has so many rows: others have at most a block more.
+  int bits_of_ids(index_t rows) const {
+    u64 const blocks = (u64{rows} + owners_.block - 1) / owners_.block + 1;
+    return std::min(32, static_cast<int>(std::bit_width(blocks * owners_.block * static_cast<u64>(owners_.ranks) - 1)));
+  }
+
+  // Columns [from, from + width) of what has come back.
+  void add_sums(int first, int end, index_t from, index_t width, float share, span<float> out, bool adds) {
+    stage_scope stage(*exec_, "exchange/gradients");
+    auto const begin = std::lower_bound(returned_views_.begin(), returned_views_.end(), first),
+               past = std::lower_bound(begin, returned_views_.end(), end);
+    for_each_column(
+        *exec_, "exchange/add", static_cast<index_t>(out.size() / width), width,
+        detail::add_sums_body{returned_.data() + (begin - returned_views_.begin()), static_cast<index_t>(past - begin),
+                              sums, from, width, in_.data(), ordered_ ? places_.data() : nullptr, sent_pairs_.data(),
+                              pairs_in_.data(), out.data(), adds, share});
   }
 
   // What each rank has for this one.
@@ -221,10 +251,10 @@ class row_exchange {
     pairs_leaving_ = in_parts(span<u32 const>(counts_), received_);
     u64 const pairs = std::accumulate(pairs_leaving_.begin(), pairs_leaving_.end(), u64{0});
     pairs_out_.resize(pairs * sums);
-    for_each_column(*exec_, "exchange/pairs", n, sums,
-                    detail::pack_pairs_body<ShDegree>{pass.pair_offsets().data(), pass.pair_rows().data(),
-                                                      order_.data(), counts_.data(), places_.data(),
-                                                      pairs_out_.data()});
+    for_each_column(
+        *exec_, "exchange/pairs", n, sums,
+        detail::pack_pairs_body<ShDegree>{pass.pair_offsets().data(), pass.pair_rows().data(), order_.data(),
+                                          counts_.data(), places_.data(), pairs_out_.data()});
   }
 
   // Prefix sums of `counts` into places_, and the sums over parts of them.
@@ -271,7 +301,10 @@ class row_exchange {
   std::vector<u64> received_, pairs_leaving_;
   buffer<u64, E> cost_;
   buffer<u32, E> flags_, list_, sent_pairs_;  // list_: rows of this rank's, by who they went to
-  buffer<u32, E> ids_, order_, counts_;       // order_: where each row of scene_ lay in what came
+  buffer<u32, E> place_of_;                   // of each row in each unit
+  buffer<detail::returned_unit, E> returned_;
+  std::vector<int> returned_views_;      // their views
+  buffer<u32, E> ids_, order_, counts_;  // order_: where each row of scene_ lay in what came
   buffer<u64, E> places_, total_;
   buffer<float, E> out_, in_, pairs_out_, pairs_in_;
   bool ordered_ = false;

@@ -11,6 +11,7 @@
 namespace gart::inline GART_ISA::detail {
 
 // The box of a row in a view; cost is, by rows of tiles, by how much their pairs are more than those of the row above.
+// One row in `every` is counted, for all of them, and with 0 none: many atomic additions to few addresses are slow.
 template <class Response, class E, int Size, class Bounds>
 struct box_kernel {
   gaussians_view<float const> scene;
@@ -19,14 +20,16 @@ struct box_kernel {
   float alpha_min;
   footprint_slots* boxes;
   u64* cost;
+  index_t every;
   GART_KERNEL void operator()(index_t i) const {
     footprint const f = footprint_of<Response>(bounds, load_parameters(scene, i), frame, alpha_min);
     footprint_slots const range(0, f.box, f.seam);
     boxes[i] = range;
-    if (f.box.empty()) return;
+    if (every == 0 || i % every != 0 || f.box.empty()) return;
     pixel_box const tiles = tiles_of<Size>(range);
-    E::atomic_add(cost + tiles.y0, u64{tiles.width()});
-    E::atomic_add(cost + tiles.y1, ~u64{tiles.width()} + 1);
+    u64 const pairs = u64{tiles.width()} * every;
+    E::atomic_add(cost + tiles.y0, pairs);
+    E::atomic_add(cost + tiles.y1, ~pairs + 1);
   }
 };
 
@@ -51,14 +54,18 @@ GART_HD inline u32 continued_pairs(footprint_slots range, image_rows const& rows
   return rows.first > 0 && range.box.y0 == rows.first ? tiles_of<Size>(range).area() : 0;
 }
 
+// What a row that does not go to a unit has for its place among those that do.
+inline constexpr u32 not_sent = ~u32{0};
+
 template <int Size>
 struct list_kernel {
   footprint_slots const* boxes;
   image_rows rows;
   u32 const* flags;
   u64 const* places;
-  u32 *list, *pairs;
+  u32 *list, *pairs, *place_of;
   GART_KERNEL void operator()(index_t i) const {
+    place_of[i] = flags[i] ? static_cast<u32>(places[i]) : not_sent;
     if (!flags[i]) return;
     list[places[i]] = i, pairs[places[i]] = continued_pairs<Size>(boxes[i], rows);
   }
@@ -73,9 +80,8 @@ struct pack_body {
   index_t width;
   GART_KERNEL void operator()(index_t k, index_t column) const {
     index_t const row = list[k];
-    out[std::size_t{k} * width + column] = column + 1 < width
-                                               ? row_element(scene, row, column)
-                                               : bits_to_float(static_cast<u32>(owners.global(row)));
+    out[std::size_t{k} * width + column] =
+        column + 1 < width ? row_element(scene, row, column) : bits_to_float(static_cast<u32>(owners.global(row)));
   }
 };
 
@@ -148,22 +154,39 @@ struct pack_pairs_body {
   }
 };
 
-// One rank's sums to those of this rank's rows, or its pairs one after another.
-template <index_t Coefficients>
+// What has come back from a rank: the sums of its unit, from `first` on among all that came.
+struct returned_unit {
+  int view;
+  u64 first;
+  u32 const* place_of;  // of each row of this rank's, in the unit
+};
+
+// Columns [from, from + width) of a row's sums: over the ranks that traced a view, in their order, or their pairs one
+// after another; and over views. Rows that no unit has had are zero.
 struct add_sums_body {
-  u32 const* list;
+  returned_unit const* units;
+  index_t count, stride, from, width;
   float const* in;
   u64 const* places;  // of the pairs of each; null where sums have no fixed order
   u32 const* pairs;
   float const* pairs_in;
-  sums_view<Coefficients, float> sums;
-  GART_KERNEL void operator()(index_t k, index_t column) const {
-    constexpr index_t width = Coefficients + moment_stride;
-    float& sum = sums(list[k], column);
-    if (!places || pairs[k] == 0)
-      sum += in[std::size_t{k} * width + column];
-    else
-      for (u32 p = 0; p < pairs[k]; ++p) sum += pairs_in[(places[k] + p) * width + column];
+  float* out;
+  bool adds;    // to what is there
+  float share;  // what the sum is multiplied by
+  GART_KERNEL void operator()(index_t row, index_t column) const {
+    float& to = out[std::size_t{row} * width + column];
+    float total = adds ? to : 0, view = 0;
+    for (index_t u = 0; u < count; ++u) {
+      if (u > 0 && units[u].view != units[u - 1].view) total += view, view = 0;
+      u32 const place = units[u].place_of[row];
+      if (place == not_sent) continue;
+      u64 const k = units[u].first + place;
+      if (!places || pairs[k] == 0)
+        view += in[k * stride + from + column];
+      else
+        for (u32 p = 0; p < pairs[k]; ++p) view += pairs_in[(places[k] + p) * stride + from + column];
+    }
+    to = (total + view) * share;
   }
 };
 

@@ -172,7 +172,8 @@ class basic_trainer {
   void trace_unit(loss_function<E> const& loss, camera const& seen, int image, int degree, image_result& result,
                   step_report& report) requires(!Comm::alone);
   void gather_results(span<image_result> round, bool metrics) requires(!Comm::alone);
-  void take_gradients(camera const& view, int v, int image, image_result& result) requires(!Comm::alone);
+  void take_gradients(std::vector<camera> const& views, int image, span<image_result> round,
+                      bool moves) requires(!Comm::alone);
   rendered render_in_ranks(camera const& view, vec3 background) requires(!Comm::alone);
   bool in_ranks() const { return !Comm::alone && (comm_.size() > 1 || options_.batch > 1); }
   // What of values of all Gaussians is this rank's, and the way back.

@@ -74,7 +74,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
     int const mine = shards_.round.unit().view;
     trace_unit(loss, cameras[static_cast<std::size_t>(mine)], done + mine, degree, round.data()[mine], report);
     gather_results(round, moves);
-    for (int v = 0; v < views; ++v) take_gradients(cameras[static_cast<std::size_t>(v)], v, done + v, round.data()[v]);
+    take_gradients(cameras, done, round, moves);
     done += views;
   }
   shards_.sent += shards_.round.take_traffic();
@@ -177,35 +177,44 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::gather_results(span<image
   }
 }
 
-// From the sums over the pixels of the round's view v, which is the image'th of the step, to gradients of this rank's
-// rows.
+// From the sums over the pixels of the round's views, of which the first is the image'th of the step, to gradients of
+// this rank's rows. Colours are added over all views at once, but where each view's are asked for: by its pose.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(camera const& view, int v, int image,
-                                                                      image_result& result) requires(!Comm::alone) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(std::vector<camera> const& views, int image,
+                                                                      span<image_result> round,
+                                                                      bool moves) requires(!Comm::alone) {
   index_t const n = scene_.size();
-  gaussians<E>& to = image == 0 ? gradients_ : shards_.view_gradients;
-  to.resize_keep(n), shards_.moments.resize(std::size_t{moment_stride} * n), shards_.prepared.resize(n);
-  shards_.round.sum(v, to.sh.data(), shards_.moments.data(), n);
+  int const count = static_cast<int>(views.size());
+  auto const share_after = [&](int images) {
+    return images == options_.batch ? 1.0f / static_cast<float>(options_.batch) : 1.0f;
+  };
+  gradients_.resize_keep(n), shards_.moments.resize(std::size_t{moment_stride} * n), shards_.prepared.resize(n);
+  if (options_.batch > 1) shards_.view_gradients.resize_keep(n);
+  if (!moves) shards_.round.sum_colors(0, count, share_after(image + count), gradients_.sh.view(), image > 0);
   auto const scene = std::as_const(scene_).view();
-  auto const seen = shards_.filter.of(exec_, scene, view, options_.render.antialias);
-  parallel_for(exec_, "preprocess", n,
-               render_kernels::prepare_gaussians<typename Traits::response>{
-                   seen, view.position, options_.render.alpha_min, shards_.prepared.view()});
-  finish_gradients(exec_, scene, shards_.prepared, view, options_.render.antialias, shards_.moments, to.view());
-  if (grows_by_error()) error_.add_errors(scene_, shards_.moments);
-  if (options_.densify == densify_kind::adc) adc_.accumulate(scene_, to, view);
-  if (learns_poses()) {
-    span<double const> const runs =
-        by_pose_.template sum_runs<sh_degree>(scene, std::as_const(to).view(), view.position);
-    std::vector<double> mine(runs.size());
-    exec_.copy_out(mine.data(), runs.data(), runs.size() * sizeof(double));
-    result.by_pose = by_pose_.total(shards_.pose_runs.whole_of(mine, pose_gradient::floats));
+  for (int v = 0; v < count; ++v, ++image) {
+    camera const& view = views[static_cast<std::size_t>(v)];
+    gaussians<E>& to = image == 0 ? gradients_ : shards_.view_gradients;
+    if (moves) shards_.round.sum_colors(v, v + 1, 1, to.sh.view(), false);
+    shards_.round.sum_moments(v, shards_.moments.view());
+    auto const seen = shards_.filter.of(exec_, scene, view, options_.render.antialias);
+    parallel_for(exec_, "preprocess", n,
+                 render_kernels::prepare_gaussians<typename Traits::response>{
+                     seen, view.position, options_.render.alpha_min, shards_.prepared.view()});
+    finish_gradients(exec_, scene, shards_.prepared, view, options_.render.antialias, shards_.moments, to.view());
+    if (grows_by_error()) error_.add_errors(scene_, shards_.moments);
+    if (options_.densify == densify_kind::adc) adc_.accumulate(scene_, to, view);
+    if (moves) {
+      span<double const> const runs =
+          by_pose_.template sum_runs<sh_degree>(scene, std::as_const(to).view(), view.position);
+      std::vector<double> mine(runs.size());
+      exec_.copy_out(mine.data(), runs.data(), runs.size() * sizeof(double));
+      round.data()[v].by_pose = by_pose_.total(shards_.pose_runs.whole_of(mine, pose_gradient::floats));
+    }
+    if (image > 0)
+      for_each_column(exec_, "batch/add", n, moves ? row_width(sh_degree) : geometry_columns + 1,
+                      train_kernels::add_gradients_body{gradients_.view(), to.view(), share_after(image + 1)});
   }
-  if (image > 0)
-    for_each_element(exec_, "batch/add", n, sh_degree,
-                     train_kernels::add_gradients_body{
-                         gradients_.view(), to.view(),
-                         image + 1 == options_.batch ? 1.0f / static_cast<float>(options_.batch) : 1.0f});
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
