@@ -13,7 +13,7 @@ import os
 import re
 
 from charts import SOFT, Svg, bars, lines, scatter, stacked
-from tables import clock_of, formats, source, table, viewed_training, viewer
+from tables import clock_of, formats, ranks, source, table, viewed_training, viewer
 from training_pages import TrainingPages
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -208,6 +208,18 @@ class Pages(TrainingPages):
         if found:
             self.tables["formats"] = formats([self.load(os.path.basename(path)[:-5]) for path in found])
 
+    def ranks(self):
+        found = sorted(glob.glob(os.path.join(self.results, "ranks_*.json")))
+        results = [r for r in (self.load(os.path.basename(path)[:-5]) for path in found) if "scene" in r]
+        if not results:
+            return
+        self.tables["ranks"] = ranks(results)
+        groups = [(result["scene"].removesuffix(".ply"),
+                   [(f"{r['ranks']} GPU{'s' * (r['ranks'] > 1)}, {r['what'].removeprefix('steps ')}", r["images_a_second"])
+                    for r in result["runs"] if r["what"] == "steps alone" or
+                    r["what"].startswith("steps") and r["ranks"] > 1]) for result in results]
+        bars(self.figure("ranks"), "Images a second of training", "images a second", groups, source(results[0]))
+
     def viewer(self):
         found = sorted(glob.glob(os.path.join(self.results, "view_*.json")))
         results = [self.load(os.path.basename(path)[:-5]) for path in found]
@@ -248,6 +260,7 @@ def main():
     pages.memory()
     pages.stages()
     pages.cpu()
+    pages.ranks()
     pages.tradeoff()
     pages.formats()
     pages.viewer()

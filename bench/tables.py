@@ -40,6 +40,22 @@ def viewer(results):
                   "motion to whole, s", "of it the whole view, ms", ""], rows)
 
 
+def ranks(results):
+    """Steps on several GPUs against one, by every ranks_SCENE.json."""
+    rows = []
+    for result in results:
+        alone = next(r for r in result["runs"] if r["what"] == "steps alone")
+        for r in result["runs"]:
+            if r["what"].startswith("steps"):
+                rows.append([result["scene"].removesuffix(".ply"), r["what"].removeprefix("steps "), r["ranks"],
+                             f"{r['step_ms']:.3f}", f"{r['images_a_second']:.1f}",
+                             f"{r['images_a_second'] / alone['images_a_second']:.2f}", f"{r['sent_bytes'] / 1e6:.1f}",
+                             f"{r['peak_bytes'] / 1e9:.2f}"])
+        rows.append([f"{source(result)}"] + [""] * 7)
+    return table(["scene", "a step", "GPUs", "ms", "images a second", "against one", "sent by a rank, MB",
+                  "peak of a rank, GB"], rows)
+
+
 def viewed_training(results):
     """What a viewer takes from a training, by every view_training_NAME.json."""
     words = {"without": "no viewer", "nobody": "a viewer that nobody opens", "client": "a page that moves all the time"}

@@ -2,6 +2,7 @@
 #include <support/policies.hpp>
 
 #include <gart/train/shown_share.hpp>
+#include <gart/train/view_order.hpp>
 
 using namespace gart;
 
@@ -21,21 +22,25 @@ dataset capture_of(int views, int filled, u8 empty, int channels = 3) {
   return out;
 }
 
+double share_of(dataset const& data, background_kind background, std::vector<std::size_t> const& held_out = {}) {
+  return shown_share(data, views_trained_on(data.train.size(), held_out), background);
+}
+
 }  // namespace
 
 TEST_CASE("the share of the images that a capture fills") {
-  CHECK(shown_share(capture_of(3, 25, 255), background_kind::white) == doctest::Approx(0.25));
-  CHECK(shown_share(capture_of(3, 25, 0), background_kind::black) == doctest::Approx(0.25));
-  CHECK(shown_share(capture_of(3, 25, 0), background_kind::white) == doctest::Approx(1));
-  CHECK(shown_share(capture_of(100, 25, 0), background_kind::black) == doctest::Approx(0.25));
+  CHECK(share_of(capture_of(3, 25, 255), background_kind::white) == doctest::Approx(0.25));
+  CHECK(share_of(capture_of(3, 25, 0), background_kind::black) == doctest::Approx(0.25));
+  CHECK(share_of(capture_of(3, 25, 0), background_kind::white) == doctest::Approx(1));
+  CHECK(share_of(capture_of(100, 25, 0), background_kind::black) == doctest::Approx(0.25));
   // What is nearly the background is.
-  CHECK(shown_share(capture_of(3, 25, 250), background_kind::white) == doctest::Approx(0.25));
+  CHECK(share_of(capture_of(3, 25, 250), background_kind::white) == doctest::Approx(0.25));
   // Transparent pixels are empty over any background, opaque ones of any colour over a random one are not.
-  CHECK(shown_share(capture_of(3, 25, 99, 4), background_kind::black) == doctest::Approx(0.25));
-  CHECK(shown_share(capture_of(3, 25, 99, 4), background_kind::random) == doctest::Approx(0.25));
-  CHECK(shown_share(capture_of(3, 25, 0), background_kind::random) == doctest::Approx(1));
-  CHECK(shown_share(capture_of(3, 0, 0), background_kind::black) == doctest::Approx(0.001));
-  CHECK(shown_share({}, background_kind::black) == 1);
+  CHECK(share_of(capture_of(3, 25, 99, 4), background_kind::black) == doctest::Approx(0.25));
+  CHECK(share_of(capture_of(3, 25, 99, 4), background_kind::random) == doctest::Approx(0.25));
+  CHECK(share_of(capture_of(3, 25, 0), background_kind::random) == doctest::Approx(1));
+  CHECK(share_of(capture_of(3, 0, 0), background_kind::black) == doctest::Approx(0.001));
+  CHECK(share_of({}, background_kind::black) == 1);
 
   // What a mask excludes does not count, as it does not in the loss.
   dataset masked = capture_of(2, 50, 0);
@@ -43,7 +48,13 @@ TEST_CASE("the share of the images that a capture fills") {
     view.mask = image8(10, 10, 1, 255);
     for (int i = 0; i < 20; ++i) view.mask.data[i] = 0;
   }
-  CHECK(shown_share(masked, background_kind::black) == doctest::Approx(0.3));
+  CHECK(share_of(masked, background_kind::black) == doctest::Approx(0.3));
+
+  // Nor does a view that is held out.
+  dataset held = capture_of(4, 20, 0);
+  held.train[1] = capture_of(1, 100, 0).train[0];
+  CHECK(share_of(held, background_kind::black) == doctest::Approx(0.4));
+  CHECK(share_of(held, background_kind::black, {1}) == doctest::Approx(0.2));
 }
 
 TEST_CASE("penalties are as they are down to a quarter of the images, and follow the share below") {

@@ -4,7 +4,7 @@
 /// background gives its Gaussians a gradient in proportion to the share of the pixels that it covers, a fiftieth on
 /// views of the whole sphere; a penalty beside the loss has to be as much smaller, or it fades what is seen. Captures
 /// that the penalties' sizes were measured on fill a quarter of their images and more (penalty_scale).
-/// Cost: a pass over the pixels of at most `most_views` images, once a run.
+/// Cost: a pass over the pixels of at most 32 images, once a run.
 
 #include <gart/core/isa.hpp>
 #include <gart/io/dataset.hpp>
@@ -12,19 +12,21 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <vector>
 
 namespace gart::inline GART_ISA {
 
-/// The share of the training views' pixels that count in the loss and are not as the background, at least 0.001. Views
-/// are evenly spread over the capture. Before a random background only transparent pixels are empty.
-inline double shown_share(dataset const& data, background_kind background) {
+/// The share of the pixels of data.train's `views`, by index, that count in the loss and are not as the background, at
+/// least a thousandth. Those looked at are evenly spread over the views. Before a random background only transparent
+/// pixels are empty.
+inline double shown_share(dataset const& data, std::vector<std::size_t> const& views, background_kind background) {
   constexpr std::size_t most_views = 32;
   constexpr int alike = 12;  // of 255, a channel
   int const empty = background == background_kind::white ? 255 : 0;
   bool const opaque_may_be_empty = background != background_kind::random;
   std::size_t shown = 0, pixels = 0;
-  for (std::size_t v = 0; v < data.train.size(); v += (data.train.size() + most_views - 1) / most_views) {
-    dataset_view const& view = data.train[v];
+  for (std::size_t k = 0; k < views.size(); k += (views.size() + most_views - 1) / most_views) {
+    dataset_view const& view = data.train[views[k]];
     std::size_t const channels = static_cast<std::size_t>(view.image.channels);
     std::size_t const count = channels ? view.image.data.size() / channels : 0;
     for (std::size_t i = 0; i < count; ++i) {

@@ -217,7 +217,9 @@ class basic_trainer {
   }
   static error_growth_options error_options_of(train_options const& options, dataset const& data) {
     error_growth_options e = options.error;
-    e.opacity_penalty *= penalty_scale(shown_share(data, options.background));
+    if (options.densify == densify_kind::error && e.opacity_penalty > 0)
+      e.opacity_penalty *=
+          penalty_scale(shown_share(data, views_trained_on(data.train.size(), options.held_out), options.background));
     e.dead_opacity = least_opacity(e.dead_opacity, options.render.alpha_min);
     return e;
   }

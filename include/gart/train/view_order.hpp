@@ -11,15 +11,20 @@
 
 namespace gart::inline GART_ISA {
 
+/// The views that are trained on, by index: of `views`, those not held out.
+inline std::vector<std::size_t> views_trained_on(std::size_t views, std::vector<std::size_t> const& held_out) {
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < views; ++i)
+    if (std::find(held_out.begin(), held_out.end(), i) == held_out.end()) out.push_back(i);
+  return out;
+}
+
 /// Which view a step trains on: all in turn, in another order each time round.
 class view_order {
  public:
-  /// Of `views` views, by index, without those held out.
-  view_order(std::size_t views, std::vector<std::size_t> const& held_out, u64 seed) : seed_(seed) {
-    for (std::size_t i = 0; i < views; ++i)
-      if (std::find(held_out.begin(), held_out.end(), i) == held_out.end()) views_.push_back(i);
-    order_ = views_;
-  }
+  /// Of `views` views, without those held out.
+  view_order(std::size_t views, std::vector<std::size_t> const& held_out, u64 seed)
+      : views_(views_trained_on(views, held_out)), order_(views_), seed_(seed) {}
   /// Whether no view is left.
   bool empty() const { return views_.empty(); }
 
