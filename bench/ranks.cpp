@@ -31,7 +31,8 @@ constexpr char const* usage =
     "  --batch N            views a step (1); as many as ranks: each rank takes a view\n"
     "  --backend NAME --backward NAME --threads N\n"
     "  --alone 1            the plain trainer, of one rank\n"
-    "  --learn 1            usual rates in place of none, from the first step; its loss and the model's checksum count\n"
+    "  --learn 1            usual rates in place of none, from the first step; its loss and the model's checksum "
+    "count\n"
     "  --stages 1           time by stage instead of a step's\n"
     "  --exchange MB        no steps: each rank sends so much to every other, of device memory and of the host's\n";
 
@@ -80,9 +81,7 @@ bool parse(int argc, char** argv, arguments& a) {
   return true;
 }
 
-double seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 // The largest of all ranks.
 double largest(mpi_comm& ranks, double value) {
@@ -116,8 +115,8 @@ double exchange_rate(E& exec, Comm comm, mpi_comm& ranks, double megabytes) {
 }
 
 void exchange(mpi_comm& ranks, arguments const& a) {
-  std::string text = "{\"ranks\": " + std::to_string(ranks.size()) + ", \"bytes_to_each\": " +
-                     std::to_string(static_cast<long long>(a.exchange_mb * 1e6));
+  std::string text = "{\"ranks\": " + std::to_string(ranks.size()) +
+                     ", \"bytes_to_each\": " + std::to_string(static_cast<long long>(a.exchange_mb * 1e6));
   auto const add = [&](char const* name, double rate) {
     text += std::string(", \"") + name + "_gb_a_second\": " + std::to_string(rate);
   };
@@ -183,12 +182,13 @@ void steps(mpi_comm& ranks, arguments const& a) {
   }
   if (ranks.rank() != 0) return;
   configuration_info const c = run->configuration();
-  std::printf("{\"ranks\": %d, \"backend\": \"%s\", \"tracer\": \"%s\", \"backward\": \"%s\", \"gaussians\": %zu, "
-              "\"width\": %d, \"height\": %d, \"batch\": %d, \"step_ms\": %.4f, \"images_a_second\": %.3f, "
-              "\"sent_bytes\": %.0f, \"peak_bytes\": %.0f, \"lt_bytes\": %.0f, \"loss\": %.9g",
-              ranks.size(), to_string(c.backend), to_string(c.tracer), c.backward.c_str(), scene.model.size(),
-              scene.view().width, scene.view().height, a.batch, 1e3 * took, a.batch / took, most_sent, peak, lt,
-              static_cast<double>(loss));
+  std::printf(
+      "{\"ranks\": %d, \"backend\": \"%s\", \"tracer\": \"%s\", \"backward\": \"%s\", \"gaussians\": %zu, "
+      "\"width\": %d, \"height\": %d, \"batch\": %d, \"step_ms\": %.4f, \"images_a_second\": %.3f, "
+      "\"sent_bytes\": %.0f, \"peak_bytes\": %.0f, \"lt_bytes\": %.0f, \"loss\": %.9g",
+      ranks.size(), to_string(c.backend), to_string(c.tracer), c.backward.c_str(), scene.model.size(),
+      scene.view().width, scene.view().height, a.batch, 1e3 * took, a.batch / took, most_sent, peak, lt,
+      static_cast<double>(loss));
   if (a.learn) std::printf(", \"checksum\": \"%08x\"", checksum);
   if (a.stages) {
     std::printf(", \"stages_ms\": {");

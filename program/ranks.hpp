@@ -24,8 +24,8 @@ class ranks {
 
   static bool const built;  // with MPI
 
-  // Becomes MPI's launcher, which starts this command line as one rank a GPU of this host; returns where `gpus` is 1, or
-  // where a launcher has started them already. usage_error where there are not so many, or no launcher.
+  // Becomes MPI's launcher, which starts this command line as one rank a GPU of this host; returns where `gpus` is 1,
+  // or where a launcher has started them already. usage_error where there are not so many, or no launcher.
   static void launch_on(int gpus, char** argv);
   // Starts MPI where several were launched, or `wanted` says that one needs it. usage_error where this build has none.
   static void start(bool wanted);

@@ -92,8 +92,8 @@ nccl_comm::nccl_comm(mpi_comm ranks, int device, device_transport transport)
     throw invalid_argument(
         "nccl_comm: transport nccl needs a GPU for each rank, and ranks share one; start as many ranks as there are "
         "GPUs, or take device_transport::automatic");
-  s.transport = transport == device_transport::automatic ? apart ? device_transport::nccl : device_transport::host
-                                                         : transport;
+  s.transport =
+      transport == device_transport::automatic ? apart ? device_transport::nccl : device_transport::host : transport;
   if (s.transport != device_transport::nccl || size() == 1) return;
   ::setenv("NCCL_NVLS_ENABLE", "0", 0);
   detail::check_cuda(cudaSetDevice(device), "choosing the device");

@@ -63,8 +63,8 @@ struct row_kernel {
 
 }  // namespace detail
 
-/// body(row, column) for every element of `rows` rows of `width`; a tile of rows at a time, so that the count of elements
-/// may pass 2^32.
+/// body(row, column) for every element of `rows` rows of `width`; a tile of rows at a time, so that the count of
+/// elements may pass 2^32.
 template <execution E, class Body>
 void for_each_column(E& exec, char const* label, index_t rows, index_t width, Body const& body) {
   if (rows == 0) return;
