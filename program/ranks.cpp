@@ -61,8 +61,8 @@ void ranks::launch_on(int gpus, char** argv) {
   // A rank's threads go where there is room, not all to one core; and root may.
   ::setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 0);
   if (::geteuid() == 0) ::setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 0), ::setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 0);
-  std::string count = std::to_string(gpus), self = "/proc/self/exe", option = "-n", launcher = "mpirun";
-  self = std::filesystem::read_symlink(self).string();
+  std::string launcher = "mpirun", option = "-n", count = std::to_string(gpus),
+              self = std::filesystem::read_symlink("/proc/self/exe").string();
   std::vector<char*> line = {launcher.data(), option.data(), count.data(), self.data()};
   for (char** word = argv + 1; *word; ++word) line.push_back(*word);
   line.push_back(nullptr);

@@ -5,13 +5,11 @@
 ///
 ///   mpi_comm ranks;
 ///   cuda_exec exec(nccl_comm::device_of(ranks));
-///   trainer<cuda_exec, traits, tracer, primitive_strategy, nccl_comm> run(exec, options, data, start,
-///                                                                        nccl_comm(ranks,
-///                                                                        nccl_comm::device_of(ranks)));
+///   nccl_comm all(ranks, nccl_comm::device_of(ranks));
+///   trainer<cuda_exec, traits, tracer, primitive_strategy, nccl_comm> run(exec, options, data, start, all);
 ///
 /// NCCL wants a GPU for each rank. Where two ranks have the same one, all messages go through pinned host memory and
-/// MPI
-/// (`transport` says so): right, and slow. A rank's messages to itself are copies. What is sent and received has no
+/// MPI (`transport` says so): right, and slow. A rank's messages to itself are copies. What is sent and received has no
 /// sums in it, so that both transports give the same bits.
 ///
 /// Memory: NCCL's buffers, some hundred MB of each device; by the host, pinned memory for one group of messages.
