@@ -9,6 +9,7 @@
 #include <gart/runtime/presets.hpp>
 
 #include <cstdio>
+#include <limits>
 
 namespace gart_cli {
 
@@ -51,7 +52,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--max-gaussians", a.max_gaussians, "N",
                  "Gaussians at most; memory and time grow with them. Growth by\nerror ends at one for each 100 "
                  "training pixels where that is\nless (and over 100,000)"))
-      ->check(between(1, static_cast<double>(gart::most_gaussians)));
+      ->check(between(1, static_cast<double>(std::numeric_limits<gart::index_t>::max())));
   in_group(r.add(train, "--time-budget", a.time_budget, "S",
                  "Seconds of training after which the run ends, where\n--iterations do not end it before, 0: no limit. "
                  "Rates, degrees\nand densification go by the larger of both shares. Such a run\ndepends on the "

@@ -16,4 +16,5 @@ void register_on_ranks(int rank) {
 }  // namespace
 
 GART_REGISTER_CONFIGURATIONS(gart_rank_configurations, register_on_ranks<deterministic_strategy>(16),
-                             register_on_ranks<primitive_strategy>(17))
+                             register_on_ranks<primitive_strategy>(17),
+                             register_on_ranks<with_depth<primitive_strategy>>(17))

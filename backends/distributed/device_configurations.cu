@@ -19,4 +19,5 @@ void register_on_devices(int rank) {
 }  // namespace
 
 GART_REGISTER_CONFIGURATIONS(gart_device_rank_configurations, register_on_devices<deterministic_strategy>(36),
-                             register_on_devices<primitive_strategy>(37))
+                             register_on_devices<primitive_strategy>(37),
+                             register_on_devices<with_depth<primitive_strategy>>(37))

@@ -75,7 +75,7 @@ TEST_CASE("wrong command lines exit with 2, say what is wrong, and make nothing"
            line{"train x --out made --alpha-min nan", "--alpha-min"},
            line{"train x --out made --speed 9", "--speed"},
            line{"train x --out made --seed -3", "--seed: '-3' is not a whole number from 0 to 18446744073709551615"},
-           line{"train x --out made --max-gaussians 268435457", "is not a number from 1 to 268435456"},
+           line{"train x --out made --max-gaussians 4294967296", "is not a number from 1 to 4294967295"},
            line{"train x --out made --gpus 0", "--gpus: '0' is not a number from 1 to 1024"},
            line{"train x --speed 9", "not understood: --speed; --out is required"},
            line{"eval --renders made model.ply x --otu made", "not understood: --otu; --out is required"},

@@ -210,6 +210,48 @@ TEST_CASE("exposures and poses are learned as by one rank, bit by bit") {
   }
 }
 
+TEST_CASE("depth and lenses are learned as by one rank, bit by bit") {
+  exec_type exec = gart_test::make_exec();
+  dataset data = gart_test::mapped_capture(exec, 10);
+  for (auto& v : data.train) v.view.fx *= 1.02f, v.view.fy *= 1.02f;
+  train_options options = short_run(densify_kind::error);
+  options.shard_block = 64, options.iterations = 120;  // three blocks
+  options.depth_weight = 1, options.refine_lens = options.refine_poses = true;
+  options.lens.warm_up = 0;
+  gaussian_model const start = gart_test::cloud(18, 0.5f);
+  using deep = with_depth<deterministic_strategy>;
+  for (int const batch : {1, 3}) {
+    CAPTURE(batch);
+    options.batch = batch;
+    trainer_of<deep, lone_comm> one(exec, options, data, start);
+    trainer_of<deep, rank_comm> all(exec, options, data, start, every_rank());
+    while (all.steps_done() < options.iterations) REQUIRE(one.step().loss == all.step().loss);
+    training_state const a = one.state(), b = all.state();
+    CHECK(a.lenses.value == b.lenses.value);
+    CHECK(a.lenses.visits == b.lenses.visits);
+    CHECK(a.poses.value == b.poses.value);
+    CHECK(a.poses.metric == b.poses.metric);
+    double changed = 0;
+    for (double const x : b.lenses.value) changed = std::max(changed, std::fabs(x));
+    CHECK(changed > 1e-4);
+    CHECK(same(one.model(), all.model()));
+    if (batch > 1) continue;
+    trainer_of<deep> usual(exec, options, data, start);
+    trainer_of<deep> colours(
+        exec,
+        [&] {
+          auto o = options;
+          return o.depth_weight = 0, o;
+        }(),
+        data, start);
+    while (usual.steps_done() < options.iterations) usual.step(), colours.step();
+    CHECK(usual.state().lenses.value == b.lenses.value);
+    CHECK(usual.state().poses.value == b.poses.value);
+    CHECK(same(usual.model(), all.model()));
+    CHECK(!same(usual.model(), colours.model()));
+  }
+}
+
 TEST_CASE("a checkpoint is one file of today's format, and goes on with any number of ranks") {
   exec_type exec = gart_test::make_exec();
   mpi_comm ranks;
@@ -279,10 +321,8 @@ TEST_CASE("what several ranks do not train is refused by field") {
   train_options o = good;
   o.refine_poses = true;  // with blocks of 8
   refused(o, "train_options.shard_block");
-  o = good, o.depth_weight = 1;
+  o = good, o.depth_weight = 1;  // without its gradients
   refused(o, "train_options.depth_weight");
-  o = good, o.refine_lens = true;
-  refused(o, "train_options.refine_lens");
   o = good, o.shard_block = 0;
   refused(o, "train_options.shard_block");
   o = good, o.batch = -1;

@@ -52,4 +52,20 @@ gart::dataset capture(E& exec, std::uint64_t seed) {
   return data;
 }
 
+// With maps of the distances that its views see.
+template <class E>
+gart::dataset mapped_capture(E& exec, std::uint64_t seed) {
+  gart::dataset data = capture(exec, seed);
+  gart::gaussian_model const truth = cloud(seed, 0.6f);
+  for (gart::dataset_view& v : data.train) {
+    auto const seen = pictured(exec, truth, v.view);
+    v.depth = gart::image_float(v.view.width, v.view.height, 1);
+    for (std::size_t i = 0; i < seen.depth.size(); ++i) {
+      float const alpha = 1 - seen.transmittance[i];
+      v.depth.data[i] = alpha > 0.5f ? seen.depth[i] / alpha : 0;
+    }
+  }
+  return data;
+}
+
 }  // namespace gart_test

@@ -7,23 +7,6 @@ using namespace gart_test;
 
 namespace {
 
-// Distances of what the views see, in place of colours: photographs that are grey all over, of which colour learns
-// nothing of the shape.
-template <class E>
-gart::dataset mapped_capture(E& exec) {
-  gart::dataset data = capture(exec, seed());
-  gart::gaussian_model const truth = cloud(seed(), 0.6f);
-  for (gart::dataset_view& v : data.train) {
-    auto const seen = pictured(exec, truth, v.view);
-    v.depth = gart::image_float(v.view.width, v.view.height, 1);
-    for (std::size_t i = 0; i < seen.depth.size(); ++i) {
-      float const alpha = 1 - seen.transmittance[i];
-      v.depth.data[i] = alpha > 0.5f ? seen.depth[i] / alpha : 0;
-    }
-  }
-  return data;
-}
-
 // The mean difference of depth where the maps have one.
 template <class Run>
 double off(Run& run, gart::dataset const& data) {
@@ -51,7 +34,7 @@ TEST_CASE_TEMPLATE("depth comes nearer to the maps", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
-  gart::dataset const data = mapped_capture(exec);
+  gart::dataset const data = mapped_capture(exec, seed);
   gart::gaussian_model const start = cloud(seed + 1, 0.8f);
   auto const after = [&](float weight) {
     run_of<E, gart::with_depth<gart::primitive_strategy>> run(exec, options_of(weight), data, start);
@@ -72,7 +55,7 @@ TEST_CASE_TEMPLATE("a loss of one's own may add to the gradient of depth", E, GA
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
-  gart::dataset const data = mapped_capture(exec);
+  gart::dataset const data = mapped_capture(exec, seed);
   run_of<E, gart::with_depth<gart::pixel_strategy>> run(exec, options_of(0), data, cloud(seed + 1, 0.8f));
   run.step([&](gart::loss_input<E> const& in) {
     in.exec.zero(in.gradient.data(), in.gradient.size() * sizeof(float));

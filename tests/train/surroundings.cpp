@@ -65,6 +65,9 @@ TEST_CASE("a run that cannot have its Gaussians is refused in bytes before it st
   CHECK_THROWS_WITH_AS(
       made(), doctest::Contains("asked for 60352 bytes, 60000 bytes free (164 Gaussians of degree 1 on 1 rank"),
       gart::out_of_memory);
+  options.max_gaussians = (1u << 28) + 1;
+  CHECK_THROWS_WITH_AS(made(), doctest::Contains("train_options.max_gaussians: 268435457 Gaussians on 1 rank are more"),
+                       gart::invalid_argument);
   options.densify = gart::densify_kind::none, options.max_gaussians = 1'000'000;
   made();  // it stays at 150
   CHECK(gart::least_bytes(200'000'000, 3, 1, 4096) == 188'800'000'000);

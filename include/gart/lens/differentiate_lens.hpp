@@ -62,16 +62,22 @@ struct weigh_pixels {
 /// Gradients of lenses, one view at a time, and the memory that they need.
 template <execution E>
 class lens_differentiation {
+  // Of a frame that has all rows.
+  struct alone {
+    void operator()(float*) const {}
+  };
+
  public:
   /// Allocates nothing; `exec` must outlive it.
   explicit lens_differentiation(E& exec)
       : exec_(&exec), by_direction_(exec), by_origin_(exec), parts_(exec), out_(exec) {}
 
   /// Into out, [4] in the policy's memory: a lens_gradient's numbers in order. The rest is as differentiate_rays has
-  /// it.
-  template <class Frame>
+  /// it. Where the frame has rows of the image alone, share(float* plane) is called to fill in what others have of an
+  /// image of one float a pixel, [H][W], for each of the four numbers.
+  template <class Frame, class Share = alone>
   void operator()(Frame& frame, span<float const> color, image_gradients const& image, span<float> out,
-                  depth_and_transmittance const& more = {}) {
+                  depth_and_transmittance const& more = {}, Share&& share = {}) {
     if (frame.options().antialias > 0)
       throw invalid_argument(
           "differentiate_lens: the filter of the pixels has no gradient by the focal length: set "
@@ -89,14 +95,20 @@ class lens_differentiation {
         parallel_for(*exec_, "lens/weigh", static_cast<index_t>(pixels),
                      lens_kernels::weigh_pixels<decltype(model.slopes())>{
                          model.slopes(), model.focal(), rays, by_direction_.data(), by_origin_.data(), parts_.data()});
-        for (std::size_t k = 0; k < lens_gradient::floats; ++k)
-          reduce(*exec_, span<float const>(parts_).subspan(k * pixels, pixels), out.subspan(k, 1));
+        add_up(pixels, out, share);
       } else {
         throw invalid_argument(
             "differentiate_lens: the camera has no focal length and no principal point (equirectangular ones have "
             "none): leave its lens as it is");
       }
     });
+  }
+
+  /// The same where others have traced all of the view's rows, of an image of so many pixels.
+  template <class Share>
+  void of_others(std::size_t pixels, span<float> out, Share&& share) {
+    parts_.resize(lens_gradient::floats * pixels);
+    add_up(pixels, out, share);
   }
 
   /// To the host; waits for it.
@@ -109,6 +121,14 @@ class lens_differentiation {
   }
 
  private:
+  template <class Share>
+  void add_up(std::size_t pixels, span<float> out, Share&& share) {
+    for (std::size_t k = 0; k < lens_gradient::floats; ++k) {
+      share(parts_.data() + k * pixels);
+      reduce(*exec_, span<float const>(parts_).subspan(k * pixels, pixels), out.subspan(k, 1));
+    }
+  }
+
   E* exec_;
   buffer<vec3, E> by_direction_, by_origin_;
   buffer<float, E> parts_, out_;

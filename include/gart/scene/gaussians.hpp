@@ -21,7 +21,7 @@
 
 namespace gart {
 
-/// Indices have 32 bits, and a launch may take up to 15 of them a Gaussian.
+/// Of one rank: indices have 32 bits, and a launch may take up to 15 of them a Gaussian.
 inline constexpr std::size_t most_gaussians = std::size_t{1} << 28;
 
 /// Throws invalid_argument for more Gaussians than that.

@@ -17,9 +17,9 @@
 /// bits of one rank: where a Gaussian's pairs begin in an earlier strip, the pairs travel one by one, and its owner
 /// goes on adding where the earlier strip's sum ends.
 ///
-/// Traffic a row and unit: 4 (row width + 1) bytes out, and 4 (3 K + 12) back: 240 both ways at degree 3; ordered, as
-/// much again for each pair of a row that began above. Memory: 16 bytes a row of this rank's and view, 4 a row and
-/// unit, these buffers, and the rows that arrived. Errors: out_of_memory.
+/// Traffic a row and unit: 4 (row width + 1) bytes out, up to a multiple of 16, and 4 (3 K + 12) back: 240 both ways at
+/// degree 3; ordered, as much again for each pair of a row that began above. Memory: 16 bytes a row of this rank's and
+/// view, 4 a row and unit, these buffers, and the rows that arrived. Errors: out_of_memory.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>
@@ -67,12 +67,12 @@ class row_exchange {
     measure(scene, views, options);
     select(scene.count);
     std::vector<u64> const received = send_counts();
-    index_t const width = row_width(ShDegree) + 1;
+    index_t const own = row_width(ShDegree), width = detail::travelling_width(own);
     std::size_t const leave = sent_.total(), arrive = std::accumulate(received.begin(), received.end(), std::size_t{0});
     received_ = received;
     out_.resize(leave * width), in_.resize(arrive * width);
-    for_each_column(*exec_, "exchange/pack", static_cast<index_t>(leave), width,
-                    detail::pack_body{scene, owners_, list_.data(), out_.data(), width});
+    for_each_column(*exec_, "exchange/pack", static_cast<index_t>(leave), width / 4,
+                    detail::pack_body{scene, owners_, list_.data(), out_.data(), own, width});
     traffic_ += width * sizeof(float) * (leave - sent_.counts[static_cast<std::size_t>(owners_.rank)]);
     comm_.exchange(*exec_, as_span(messages_of(sent_.counts, out_.data(), width * sizeof(float))),
                    as_span(messages_of(received, in_.data(), width * sizeof(float))));
@@ -80,8 +80,8 @@ class row_exchange {
     index_t const n = static_cast<index_t>(arrive);
     parallel_for(*exec_, "exchange/ids", n, detail::ids_kernel{in_.data(), width, ids_.data(), order_.data()});
     if (owners_.ranks > 1) sort_pairs(*exec_, ids_.view(), order_.view(), bits_of_ids(scene.count));
-    for_each_element(*exec_, "exchange/unpack", n, ShDegree,
-                     detail::unpack_body{scene_.view(), in_.data(), width, order_.data()});
+    for_each_column(*exec_, "exchange/unpack", n, width / 4,
+                    detail::unpack_body{scene_.view(), in_.data(), own, width, order_.data()});
   }
 
   /// What this rank traces.
@@ -118,8 +118,9 @@ class row_exchange {
     index_t const n = scene_.size();
     out_.resize(std::size_t{n} * sums);
     for_each_column(
-        *exec_, "exchange/pack", n, sums,
-        detail::pack_sums_body<coefficients>{{sh_gradient, pass.moments().data()}, order_.data(), out_.data()});
+        *exec_, "exchange/pack", n, layout::width,
+        detail::pack_sums_body<coefficients>{layout::pieces(sh_gradient), layout::pieces(pass.moments().data()),
+                                             order_.data(), layout::pieces(out_.data())});
     if constexpr (Pass::ordered) pack_pairs(pass);
     return_sums(Pass::ordered);
   }
@@ -132,13 +133,16 @@ class row_exchange {
   /// Of this rank's rows the colours' gradients, [rows][K][3]: the sum over the views [first, end) of the round, and
   /// of what is there if it `adds`, times `share`.
   void sum_colors(int first, int end, float share, span<float> sh_gradient, bool adds) {
-    add_sums(first, end, 0, coefficients, share, sh_gradient, adds);
+    add_sums(first, end, 0, layout::coefficients, share, sh_gradient, adds);
   }
   /// Their moments, [rows][moment_stride], over all pixels of the round's view v.
-  void sum_moments(int v, span<float> moments) { add_sums(v, v + 1, coefficients, moment_stride, 1, moments, false); }
+  void sum_moments(int v, span<float> moments) {
+    add_sums(v, v + 1, layout::coefficients, layout::moments, 1, moments, false);
+  }
 
  private:
   static constexpr index_t coefficients = 3 * sh_basis<ShDegree>::size, sums = coefficients + moment_stride;
+  using layout = detail::sums_layout<coefficients>;
 
   // What goes to each rank: its part of list_.
   struct parts {
@@ -220,16 +224,16 @@ class row_exchange {
     return std::min(32, static_cast<int>(std::bit_width(blocks * owners_.block * static_cast<u64>(owners_.ranks) - 1)));
   }
 
-  // Columns [from, from + width) of what has come back.
+  // Pieces [from, from + width) of what has come back.
   void add_sums(int first, int end, index_t from, index_t width, float share, span<float> out, bool adds) {
     stage_scope stage(*exec_, "exchange/gradients");
     auto const begin = std::lower_bound(returned_views_.begin(), returned_views_.end(), first),
                past = std::lower_bound(begin, returned_views_.end(), end);
-    for_each_column(
-        *exec_, "exchange/add", static_cast<index_t>(out.size() / width), width,
-        detail::add_sums_body{returned_.data() + (begin - returned_views_.begin()), static_cast<index_t>(past - begin),
-                              sums, from, width, in_.data(), ordered_ ? places_.data() : nullptr, sent_pairs_.data(),
-                              pairs_in_.data(), out.data(), adds, share});
+    for_each_column(*exec_, "exchange/add", static_cast<index_t>(out.size() / (width * layout::lane)), width,
+                    detail::add_sums_body<coefficients>{
+                        returned_.data() + (begin - returned_views_.begin()), static_cast<index_t>(past - begin), from,
+                        width, layout::pieces(in_.data()), ordered_ ? places_.data() : nullptr, sent_pairs_.data(),
+                        layout::pieces(pairs_in_.data()), layout::pieces(out.data()), adds, share});
   }
 
   // What each rank has for this one.

@@ -8,6 +8,8 @@
 #include <gart/scene/image_rows.hpp>
 #include <gart/tiles/footprint_slots.hpp>
 
+#include <type_traits>
+
 namespace gart::inline GART_ISA::detail {
 
 // The box of a row in a view; cost is, by rows of tiles, by how much their pairs are more than those of the row above.
@@ -71,17 +73,27 @@ struct list_kernel {
   }
 };
 
-// Rows, and the Gaussian's number behind each.
+// Floats of a row as it travels, a multiple of four: the Gaussian's own, in the order of their table, and its number
+// last.
+constexpr index_t travelling_width(index_t own) { return (own + 1 + 3) / 4 * 4; }
+
+// Rows, four columns a lane: by single ones the loads in flight bound it, not the bandwidth.
 struct pack_body {
   gaussians_view<float const> scene;
   row_owners owners;
   u32 const* list;
   float* out;
-  index_t width;
-  GART_KERNEL void operator()(index_t k, index_t column) const {
+  index_t own, width;  // floats of a row, and of one that travels
+  GART_KERNEL void operator()(index_t k, index_t four) const {
     index_t const row = list[k];
-    out[std::size_t{k} * width + column] =
-        column + 1 < width ? row_element(scene, row, column) : bits_to_float(static_cast<u32>(owners.global(row)));
+    quad to;
+    for (index_t c = 0; c < 4; ++c) {
+      index_t const column = 4 * four + c;
+      to.v[c] = column < own          ? row_element(scene, row, column)
+                : column + 1 == width ? bits_to_float(static_cast<u32>(owners.global(row)))
+                                      : 0.0f;
+    }
+    *reinterpret_cast<quad*>(out + std::size_t{k} * width + 4 * four) = to;
   }
 };
 
@@ -97,31 +109,39 @@ struct ids_kernel {
 struct unpack_body {
   gaussians_view<float> scene;
   float const* in;
-  index_t width;  // with the number
+  index_t own, width;  // as above
   u32 const* order;
-  GART_KERNEL void operator()(index_t k, index_t column) const {
-    row_element(scene, k, column) = in[std::size_t{order[k]} * width + column];
+  GART_KERNEL void operator()(index_t k, index_t four) const {
+    auto const from = *reinterpret_cast<quad const*>(in + std::size_t{order[k]} * width + 4 * four);
+    for (index_t c = 0; c < 4 && 4 * four + c < own; ++c) row_element(scene, k, 4 * four + c) = from.v[c];
   }
 };
 
-// A column of a Gaussian's sums: colour's gradient first, then the moments.
-template <index_t Coefficients, class T>
-struct sums_view {
-  static constexpr index_t width = Coefficients + moment_stride;
-  T *sh_gradient, *moments;
-  GART_HD T& operator()(index_t row, index_t column) const {
-    return column < Coefficients ? sh_gradient[std::size_t{row} * Coefficients + column]
-                                 : moments[std::size_t{row} * moment_stride + (column - Coefficients)];
-  }
+struct single {
+  float v[1];
+};
+
+// A Gaussian's sums: colour's gradient first, then the moments; in pieces of four floats where both are of fours.
+template <index_t Coefficients>
+struct sums_layout {
+  static constexpr index_t lane = Coefficients % 4 == 0 && moment_stride % 4 == 0 ? 4 : 1;  // floats of a piece
+  using piece = std::conditional_t<lane == 4, quad, single>;
+  static constexpr index_t coefficients = Coefficients / lane, moments = moment_stride / lane,
+                           width = coefficients + moments;  // in pieces
+  static piece const* pieces(float const* p) { return reinterpret_cast<piece const*>(p); }
+  static piece* pieces(float* p) { return reinterpret_cast<piece*>(p); }
 };
 
 template <index_t Coefficients>
 struct pack_sums_body {
-  sums_view<Coefficients, float const> sums;
+  using layout = sums_layout<Coefficients>;
+  typename layout::piece const *sh_gradient, *moments;
   u32 const* order;
-  float* out;
+  typename layout::piece* out;
   GART_KERNEL void operator()(index_t k, index_t column) const {
-    out[std::size_t{order[k]} * sums.width + column] = sums(k, column);
+    out[std::size_t{order[k]} * layout::width + column] =
+        column < layout::coefficients ? sh_gradient[std::size_t{k} * layout::coefficients + column]
+                                      : moments[std::size_t{k} * layout::moments + (column - layout::coefficients)];
   }
 };
 
@@ -161,32 +181,40 @@ struct returned_unit {
   u32 const* place_of;  // of each row of this rank's, in the unit
 };
 
-// Columns [from, from + width) of a row's sums: over the ranks that traced a view, in their order, or their pairs one
+// Pieces [from, from + width) of a row's sums: over the ranks that traced a view, in their order, or their pairs one
 // after another; and over views. Rows that no unit has had are zero.
+template <index_t Coefficients>
 struct add_sums_body {
+  using layout = sums_layout<Coefficients>;
+  using piece = typename layout::piece;
   returned_unit const* units;
-  index_t count, stride, from, width;
-  float const* in;
+  index_t count, from, width;
+  piece const* in;
   u64 const* places;  // of the pairs of each; null where sums have no fixed order
   u32 const* pairs;
-  float const* pairs_in;
-  float* out;
+  piece const* pairs_in;
+  piece* out;
   bool adds;    // to what is there
   float share;  // what the sum is multiplied by
   GART_KERNEL void operator()(index_t row, index_t column) const {
-    float& to = out[std::size_t{row} * width + column];
-    float total = adds ? to : 0, view = 0;
+    piece& to = out[std::size_t{row} * width + column];
+    piece total = adds ? to : piece{}, view{};
+    auto const add = [](piece& sum, piece const& x) {
+      for (index_t c = 0; c < layout::lane; ++c) sum.v[c] += x.v[c];
+    };
     for (index_t u = 0; u < count; ++u) {
-      if (u > 0 && units[u].view != units[u - 1].view) total += view, view = 0;
+      if (u > 0 && units[u].view != units[u - 1].view) add(total, view), view = {};
       u32 const place = units[u].place_of[row];
       if (place == not_sent) continue;
       u64 const k = units[u].first + place;
       if (!places || pairs[k] == 0)
-        view += in[k * stride + from + column];
+        add(view, in[k * layout::width + from + column]);
       else
-        for (u32 p = 0; p < pairs[k]; ++p) view += pairs_in[(places[k] + p) * stride + from + column];
+        for (u32 p = 0; p < pairs[k]; ++p) add(view, pairs_in[(places[k] + p) * layout::width + from + column]);
     }
-    to = (total + view) * share;
+    add(total, view);
+    for (index_t c = 0; c < layout::lane; ++c) total.v[c] *= share;
+    to = total;
   }
 };
 

@@ -5,13 +5,15 @@
 /// spread in whole blocks (comm/row_owners.hpp). Records, lists, images and the LT buffer come on top: they depend on
 /// the views, and a step that finds no room for the LT buffer is done with less.
 ///
-/// Errors: out_of_memory, in bytes, before anything is allocated.
+/// Errors: out_of_memory, in bytes, before anything is allocated; invalid_argument for more Gaussians than a rank has
+/// numbers for.
 
 #include <gart/comm/communicator.hpp>
 #include <gart/comm/row_owners.hpp>
 #include <gart/core/error.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/optim/error_growth.hpp>
+#include <gart/scene/gaussians.hpp>
 #include <gart/train/options.hpp>
 
 #include <algorithm>
@@ -42,7 +44,13 @@ template <execution E, class Comm>
 void require_room(E& exec, Comm& comm, train_options const& options, dataset const& data, int sh_degree, u64 start) {
   u64 const free = exec.free_bytes() / static_cast<u64>(comm.sharers()),
             gaussians = gaussians_at_end(options, data, start);
-  u64 const need = least_bytes(gaussians, sh_degree, comm.size(), std::max<index_t>(options.shard_block, 1));
+  index_t const block = std::max<index_t>(options.shard_block, 1);
+  if (row_owners{comm.size(), 0, block}.owned(gaussians) > most_gaussians)
+    throw invalid_argument("train_options.max_gaussians: " + std::to_string(gaussians) + " Gaussians on " +
+                           std::to_string(comm.size()) + (comm.size() == 1 ? " rank" : " ranks") +
+                           " are more than the " + std::to_string(most_gaussians) +
+                           " that a rank can hold; lower it, or take more ranks");
+  u64 const need = least_bytes(gaussians, sh_degree, comm.size(), block);
   if (free == 0 || need <= free) return;
   u64 const fit = free / (need / std::max<u64>(gaussians, 1) + 1);
   throw out_of_memory(E::device ? "CUDA device" : "host", need, free,

@@ -4,6 +4,7 @@
 /// trainer_ranks_impl.hpp has the step. With self_comm there is nothing of it.
 
 #include <gart/exposure/exposure.hpp>
+#include <gart/lens/differentiate_lens.hpp>
 #include <gart/pose/differentiate_pose.hpp>
 #include <gart/shard/row_exchange.hpp>
 #include <gart/shard/sharded_rows.hpp>
@@ -22,11 +23,12 @@ struct no_shards {
 
 /// What was found of one of a step's images, by the ranks that traced it.
 struct image_result {
-  std::size_t view = 0;                   ///< of the training views
-  float loss = 0, mean_square = 0;        ///< of the whole image
-  float by_exposure[exposure::floats]{};  ///< the loss by the view's exposure, where that is learned
-  std::array<double, 36> metric{};        ///< of its pose (pose/pose_metric.hpp), where that was asked for
-  pose_gradient by_pose;                  ///< the loss by it, where that is learned
+  std::size_t view = 0;                    ///< of the training views
+  float loss = 0, mean_square = 0;         ///< of the whole image
+  float by_exposure[exposure::floats]{};   ///< the loss by the view's exposure, where that is learned
+  std::array<double, 36> metric{};         ///< of its pose (pose/pose_metric.hpp), where that was asked for
+  pose_gradient by_pose;                   ///< the loss by it, where that is learned
+  float by_lens[lens_gradient::floats]{};  ///< the loss by the lens, where that is learned
 };
 
 /// Comm: a communicator for E.

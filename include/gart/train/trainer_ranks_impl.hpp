@@ -26,20 +26,14 @@ struct add_gradients_body {
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::require_ranks() const {
-  auto const refuse = [](std::string const& what) {
-    throw invalid_argument(what + " with several ranks, or a batch of views");
-  };
   if (options_.batch < 1)
     throw invalid_argument("train_options.batch is " + std::to_string(options_.batch) + ": at least 1");
   if (options_.shard_block < 1) throw invalid_argument("train_options.shard_block is 0: at least 1");
   if (comm_.size() == 1 && options_.batch == 1) return;
-  if constexpr (Comm::alone)
-    refuse("train_options.batch needs a trainer that has a communicator; self_comm has no step");
+  if constexpr (Comm::alone) throw invalid_argument("train_options.batch needs a trainer that has a communicator");
   if (options_.refine_poses && options_.shard_block % pose_differentiation<E>::run != 0)
     throw invalid_argument("train_options.shard_block is " + std::to_string(options_.shard_block) +
                            ": with refine_poses a multiple of " + std::to_string(pose_differentiation<E>::run));
-  if (options_.refine_lens) refuse("train_options.refine_lens is not there");
-  if (has_depth<Strategy> || options_.depth_weight > 0) refuse("train_options.depth_weight is not there");
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -56,7 +50,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates rates = rates_of_step();
   int const ranks = comm_.size(), batch = options_.batch, before = step_;
-  bool const moves = learns_poses();
+  bool const moves = learns_poses(), bends = learns_lenses();
   std::vector<image_result> images(static_cast<std::size_t>(batch));  // of the step, in their order
   lt_bytes_ = 0;
   step_report report;
@@ -79,11 +73,12 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
   }
   shards_.sent += shards_.round.take_traffic();
   step_ += batch;
-  // From what each image said of the exposures and poses that the step began with, whoever traced it.
+  // From what each image said of the exposures, poses and lenses that the step began with, whoever traced it.
   for (int k = 0; k < batch; ++k) {
     image_result const& image = images[static_cast<std::size_t>(k)];
     if (exposures_) exposures_->move(image.view, {image.by_exposure, exposure::floats}, rates.exposure);
     if (moves) poses_->step(image.view, image.by_pose, before + k, options_.iterations);
+    if (bends) lenses_->step(image.view, lens_gradient(image.by_lens), before + k, options_.iterations);
   }
   float const haste = std::sqrt(static_cast<float>(batch));
   if (batch > 1)
@@ -118,31 +113,45 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   work_unit const unit = shards_.round.unit();
   image_targets targets;
   targets.color = color_.data();
-  bool const measures = learns_poses() && poses_->wants_metric(index);
-  if (measures) {
+  bool const measures = learns_poses() && poses_->wants_metric(index), bends = learns_lenses();
+  depth_and_transmittance more;  // of the image
+  image_gradients gradient{color_gradient_};
+  if constexpr (has_depth<Strategy>) {
+    supervision_.begin(targets, pixels), gradient = supervision_.gradients(color_gradient_);
+    more = {targets.depth, targets.transmittance};
+  } else if (measures) {
     depth_.resize(pixels), transmittance_.resize(pixels);
     targets.depth = depth_.data(), targets.transmittance = transmittance_.data();
   }
+  auto const share = [&](float* plane) { shards_.round.share_image(plane, seen, sizeof(float)); };
+  span<float> const by_lens = value_.view().subspan(2 + pose_gradient::floats, lens_gradient::floats);
   auto const by_image = [&] {
     stage_scope stage(exec_, "loss");
     shards_.round.share_image(color_.data(), seen, 3 * sizeof(float));
-    if (measures)
-      for (buffer<float, E>* each : {&depth_, &transmittance_})
-        shards_.round.share_image(each->data(), seen, sizeof(float));
+    if (targets.depth) share(targets.depth), share(targets.transmittance);
     span<float const> const shown = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
     truth_view const truth = images_.get(exec_, index, background);
+    depth_pixels depth;
+    if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth), depth = supervision_.pixels();
     loss(loss_input<E>{exec_, view, truth, seen.width, seen.height, shown, color_gradient_, value_.view().subspan(0, 2),
-                       depth_pixels{}});
+                       depth});
     if (grows_by_error()) error_map(exec_, shown, truth, error_map_);
     if (exposures_)
       exec_.copy_out(result.by_exposure, exposures_->differentiate(index, color_, color_gradient_).data(),
                      sizeof result.by_exposure);
     exec_.copy_out(&result.loss, value_.data(), sizeof(float));
     exec_.copy_out(&result.mean_square, value_.data() + 1, sizeof(float));
-    if (measures) result.metric = poses_->metric_of(index, depth_.to_host(), transmittance_.to_host());
+    if constexpr (has_depth<Strategy>) {
+      result.loss += supervision_.value();
+      if (measures) result.metric = poses_->metric_of(index, supervision_.depth(), supervision_.transmittance());
+    } else if (measures) {
+      result.metric = poses_->metric_of(index, depth_.to_host(), transmittance_.to_host());
+    }
   };
   if (unit.empty()) {
     by_image();
+    if (bends)
+      by_lens_.of_others(pixels, by_lens, share), exec_.copy_out(result.by_lens, by_lens.data(), sizeof result.by_lens);
     shards_.round.give_nothing_back(Strategy::ordered);
     return;
   }
@@ -157,11 +166,13 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
     } else {
       pass.render(frame_, targets);
       by_image();
-      sum_gradients(frame_, pass, {color_gradient_}, sums.view(), error_map_);
+      sum_gradients(frame_, pass, gradient, sums.view(), error_map_);
+      if (bends) by_lens_(frame_, color_, gradient, by_lens, more, share);
       shards_.round.give_back(pass, sums.sh.data());
       lt_bytes_ = std::max(lt_bytes_, pass.lt_bytes()), report.backward = Pass::strategy_type::name;
     }
   });
+  if (bends) exec_.copy_out(result.by_lens, by_lens.data(), sizeof result.by_lens);
 }
 
 // What the first rank of each of the round's views has found, to all.
