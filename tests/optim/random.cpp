@@ -85,24 +85,22 @@ TEST_CASE("the rate of the means decays exponentially") {
   CHECK(rates_at(usual, 3.0f, 0, 10).opacity == doctest::Approx(4 * usual.opacity));
 }
 
-TEST_CASE("the bands' rate is that of the first where a long run starts from points, and a twentieth at least") {
+TEST_CASE("the bands' rate is that of the first where a run starts from points, else a twentieth") {
   learning_rates rates;
-  CHECK(sh_rest_of(rates, true, 2 * rates.long_run) == rates.sh_dc);
-  CHECK(sh_rest_of(rates, true, rates.long_run / 4) == doctest::Approx(rates.sh_dc / 4).epsilon(1e-3));
-  CHECK(sh_rest_of(rates, true, 10) == doctest::Approx(rates.sh_dc / 20));
-  CHECK(sh_rest_of(rates, false, 2 * rates.long_run) == doctest::Approx(rates.sh_dc / 20));
+  CHECK(sh_rest_of(rates, true) == rates.sh_dc);
+  CHECK(sh_rest_of(rates, false) == doctest::Approx(rates.sh_dc / 20));
   rates.sh_rest = 1e-3f;
-  CHECK(sh_rest_of(rates, false, 10) == 1e-3f);
-  CHECK(sh_rest_of(rates, true, 2 * rates.long_run) == 1e-3f);
+  CHECK(sh_rest_of(rates, false) == 1e-3f);
+  CHECK(sh_rest_of(rates, true) == 1e-3f);
 }
 
 TEST_CASE("the SH degree rises every so many steps, sooner in short runs") {
   CHECK(sh_degree_at(999, 3, 1000, 30000) == 0);
   CHECK(sh_degree_at(1000, 3, 1000, 30000) == 1);
   CHECK(sh_degree_at(29999, 3, 1000, 30000) == 3);
-  CHECK(sh_degree_at(99, 3, 1000, 900) == 0);
-  CHECK(sh_degree_at(100, 3, 1000, 900) == 1);
-  CHECK(sh_degree_at(300, 3, 1000, 900) == 3);
+  CHECK(sh_degree_at(29, 3, 1000, 900) == 0);
+  CHECK(sh_degree_at(30, 3, 1000, 900) == 1);
+  CHECK(sh_degree_at(90, 3, 1000, 900) == 3);
   CHECK(sh_degree_at(0, 3, 1000, 1) == 0);
   CHECK(sh_degree_at(500, 0, 1000, 900) == 0);
 }

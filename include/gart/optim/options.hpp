@@ -16,8 +16,8 @@ struct learning_rates {
   float opacity = 2.5e-2f;     ///< of the logit
   float sh_dc = 2.5e-3f;       ///< of the first band
   /// Of the bands above the first; 0: what suits the run (sh_rest_of). A run that starts from a capture's points moves
-  /// them as fast as the first, a short one slower; one that starts at random has its geometry to find, and colours
-  /// that follow the view would stand in for it.
+  /// them as fast as the first; one that starts at random has its geometry to find, and colours that follow the view
+  /// would stand in for it.
   float sh_rest = 0;
   /// All rates but those of the means and exposures stay as they are for a share of the run, then decay exponentially
   /// to `settled` of it.

@@ -18,12 +18,11 @@ inline float exponential_decay(float from, float to, int step, int steps) {
   return static_cast<float>(from * std::pow(static_cast<double>(to) / from, share));
 }
 
-/// The rate of the bands above the first: what `rates` says, or that of the first times steps / long_run, within
-/// [1/20, 1], where the run starts from points; where it does not, a twentieth, as in 3DGS.
-inline float sh_rest_of(learning_rates const& rates, bool has_points, int steps) {
+/// The rate of the bands above the first: what `rates` says, or that of the first where the run starts from points;
+/// where it does not, a twentieth, as in 3DGS.
+inline float sh_rest_of(learning_rates const& rates, bool has_points) {
   if (rates.sh_rest > 0) return rates.sh_rest;
-  double const length = static_cast<double>(steps) / std::max(rates.long_run, 1);
-  return rates.sh_dc * static_cast<float>(has_points ? std::clamp(length, 0.05, 1.0) : 0.05);
+  return has_points ? rates.sh_dc : rates.sh_dc / 20;
 }
 
 /// The rates of one step; `extent` is the scene's. sh_rest is what sh_rest_of gave.
@@ -45,8 +44,8 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
 inline bool passes(int step, int every, int batch) { return every > 0 && step / every != (step - batch) / every; }
 
 /// One degree more every `every` steps, sooner where the run is too short for that: the full degree is reached within
-/// the first third of any run.
-inline int sh_interval(int degree, int every, int steps) { return std::max(1, std::min(every, steps / (3 * degree))); }
+/// the first tenth of any run.
+inline int sh_interval(int degree, int every, int steps) { return std::max(1, std::min(every, steps / (10 * degree))); }
 /// The degree in use at a step.
 inline int sh_degree_at(int step, int degree, int every, int steps) {
   return degree <= 0 ? 0 : std::min(degree, step / sh_interval(degree, every, steps));

@@ -39,7 +39,7 @@ struct train_options {
   index_t max_gaussians = 1'000'000;           ///< never more than these
   index_t random_points = 100'000;             ///< where the capture has no points
   densify_kind densify = densify_kind::error;  ///< how their number grows
-  int sh_every = 1000;  ///< a degree more after so many steps (or iterations / (3 * degrees) in shorter runs)
+  int sh_every = 1000;  ///< a degree more after so many steps (or iterations / (10 * degrees) in shorter runs)
   /// Held-out gain in PSNR, dB, that a band of spherical harmonics must buy to be stored
   /// (runtime/degree_selection.hpp); 0: every band is, without a measurement.
   float sh_gain = 0;
