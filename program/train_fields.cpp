@@ -35,6 +35,8 @@ std::vector<field> const& fields() {
       named("near", [](options& o) -> float& { return o.near; }),
       named("ssim_weight", [](options& o) -> float& { return o.ssim_weight; }),
       named("sh_every", [](options& o) -> int& { return o.sh_every; }),
+      named("fade.from", [](options& o) -> float& { return o.fade.from; }),
+      named("fade.to", [](options& o) -> float& { return o.fade.to; }),
       named("rates.mean", [](options& o) -> float& { return o.rates.mean; }),
       named("rates.mean_final", [](options& o) -> float& { return o.rates.mean_final; }),
       named("rates.log_scale", [](options& o) -> float& { return o.rates.log_scale; }),

@@ -24,6 +24,14 @@ struct exposure {
   }
 };
 
+/// The share `strength` of the way from the identity to e: itself, bit for bit, at 1.
+GART_HD inline exposure faded(exposure const& e, float strength) {
+  exposure const identity;
+  exposure out;
+  for (int k = 0; k < exposure::floats; ++k) out.m[k] = fma(strength, e.m[k], (1 - strength) * identity.m[k]);
+  return out;
+}
+
 /// The exposures of all training views and their moments, as a checkpoint holds them.
 struct exposure_state {
   std::vector<float> value, first, second;  ///< [views][12]; empty: no exposures are learned

@@ -23,11 +23,12 @@ namespace detail {
 
 struct expose_kernel {
   exposure const* view;
+  float strength;
   float const* image;
   float* exposed;
   GART_KERNEL void operator()(index_t pixel) const {
     float const* const x = image + std::size_t{3} * pixel;
-    exposure const e = *view;
+    exposure const e = faded(*view, strength);
     for (int c = 0; c < 3; ++c) exposed[std::size_t{3} * pixel + c] = e.channel(c, x[0], x[1], x[2]);
   }
 };
@@ -35,13 +36,14 @@ struct expose_kernel {
 // A lane takes every lanes-th pixel, turns its gradient and sums what it says of the exposure.
 struct exposure_gradient_kernel {
   exposure const* view;
+  float strength;
   float const* image;
   float* gradient;  // in: dL/dx', out: dL/dx
   index_t pixels, lanes;
   float* sums;  // [lanes][12]
 
   GART_KERNEL void operator()(index_t lane) const {
-    exposure const e = *view;
+    exposure const e = faded(*view, strength);
     float sum[exposure::floats] = {};
     for (index_t pixel = lane; pixel < pixels; pixel += lanes) {
       float const* const x = image + std::size_t{3} * pixel;
@@ -53,7 +55,7 @@ struct exposure_gradient_kernel {
         g[c] = fma(e.m[c], d[0], fma(e.m[4 + c], d[1], e.m[8 + c] * d[2]));
       }
     }
-    for (int k = 0; k < exposure::floats; ++k) sums[std::size_t{exposure::floats} * lane + k] = sum[k];
+    for (int k = 0; k < exposure::floats; ++k) sums[std::size_t{exposure::floats} * lane + k] = strength * sum[k];
   }
 };
 
@@ -94,11 +96,14 @@ class exposure_training {
     ends_.assign(ends);
   }
 
+  /// The share of the exposures that is applied from now on (faded); 1 at first.
+  void set_strength(float strength) { strength_ = strength; }
+
   /// The image [H][W][3] as the view's photograph would show it; until the next call.
   span<float const> expose(std::size_t view, span<float const> image) {
     exposed_.resize(image.size());
     parallel_for(*exec_, "expose", static_cast<index_t>(image.size() / 3),
-                 detail::expose_kernel{at(view), image.data(), exposed_.data()});
+                 detail::expose_kernel{at(view), strength_, image.data(), exposed_.data()});
     return exposed_;
   }
 
@@ -116,7 +121,7 @@ class exposure_training {
     auto const by_lane = sums_.view().subspan(0, std::size_t{lanes} * exposure::floats);
     auto const by_run = sums_.view().subspan(by_lane.size(), std::size_t{runs} * exposure::floats);
     parallel_for(*exec_, "exposure_gradient", lanes,
-                 detail::exposure_gradient_kernel{at(view), image.data(), gradient.data(),
+                 detail::exposure_gradient_kernel{at(view), strength_, image.data(), gradient.data(),
                                                   static_cast<index_t>(image.size() / 3), lanes, by_lane.data()});
     span<u32 const> const ends = ends_;
     segmented_reduce(*exec_, by_lane, exposure::floats, ends, by_run);
@@ -163,6 +168,7 @@ class exposure_training {
   std::vector<u32> visits_;
   buffer<float, E> exposed_, sums_, gradient_;
   buffer<u32, E> ends_;
+  float strength_ = 1;
 };
 
 }  // namespace gart::inline GART_ISA

@@ -33,6 +33,18 @@ constexpr auto names_of(background_kind) {
   return std::array<name_of<background_kind>, 3>{{{white, "white"}, {black, "black"}, {random, "random"}}};
 }
 
+/// Exposures that no model keeps: learned while the scene forms, so that veils need not say them, then faded to none, so
+/// that colours that follow the view take over what they can. Shares of the run; `to` 0: none are learned.
+struct exposure_fade {
+  float from = 0, to = 0;  ///< applied whole until `from`, gone at `to`
+
+  /// The share of them that is applied in a step.
+  float strength(int step, int steps) const {
+    float const at = steps > 0 ? static_cast<float>(step) / static_cast<float>(steps) : 1.0f;
+    return at < from ? 1.0f : at < to ? (to - at) / (to - from) : 0.0f;
+  }
+};
+
 /// The options of a run.
 struct train_options {
   int iterations = 30000;                      ///< steps of the run
@@ -53,6 +65,7 @@ struct train_options {
   /// Of the depth's loss beside the colours', in units of the scene's extent (loss/depth_loss.hpp); 0: depth is not
   /// looked at. The dataset must have maps (dataset_options.depth).
   float depth_weight = 0;
+  exposure_fade fade = {};    ///< of exposures that are learned for a time
   bool exposure = false;      ///< learn an exposure of each training view (exposure/exposure.hpp)
   bool refine_poses = false;  ///< learn the pose of each training view (pose/pose_training.hpp)
   bool refine_lens = false;   ///< learn the focal length and centre of each camera (lens/lens_training.hpp)

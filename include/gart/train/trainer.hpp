@@ -209,6 +209,7 @@ class basic_trainer {
   bool learns_lenses() const { return lenses_ && lenses_->learns(step_, options_.iterations); }
 
   bool grows_by_error() const { return options_.densify == densify_kind::error; }
+  bool begin_exposures();  // of the step: whether any are applied
   vec3 background_of(int step) const;
   static mcmc_options mcmc_options_of(train_options const& options) {
     mcmc_options m = options.mcmc;

@@ -63,7 +63,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
   // Sums in a fixed order were asked for: no budget of our own takes them away.
   if (options.lt_budget == 0 && !Strategy::ordered)
     options_.lt_budget = exec.free_bytes() / 2 / static_cast<u64>(comm_.sharers());
-  if (options.exposure) exposures_.emplace(exec, data.train.size());
+  if (options.exposure || options.fade.to > 0) exposures_.emplace(exec, data.train.size());
   if (options.refine_poses) {
     std::vector<camera> captured;
     for (dataset_view const& view : data.train) captured.push_back(view.view);
@@ -149,6 +149,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
                                                                         std::size_t index,
                                                                         learning_rates const& rates) {
   dataset_view const& view = data_.train[index];
+  bool const exposes = begin_exposures();
   image_targets targets;
   targets.color = color_.data();
   bool const measures = learns_poses() && poses_->wants_metric(index);
@@ -161,14 +162,14 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
   pass.render(frame_, targets);
   {
     stage_scope stage(exec_, "loss");
-    span<float const> const image = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
+    span<float const> const image = exposes ? exposures_->expose(index, color_) : span<float const>(color_);
     truth_view const truth = images_.get(exec_, index, frame_.options().background);
     depth_pixels depth;
     if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth), depth = supervision_.pixels();
     loss(loss_input<E>{exec_, view, truth, view.view.width, view.view.height, image, color_gradient_,
                        value_.view().subspan(0, 2), depth});
     if (grows_by_error()) error_map(exec_, image, truth, error_map_);
-    if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
+    if (exposes) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }
   image_gradients image{color_gradient_};
   depth_and_transmittance more;
@@ -207,6 +208,14 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates c
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+bool basic_trainer<E, Traits, Tracer, Strategy, Comm>::begin_exposures() {
+  if (!exposures_) return false;
+  float const strength = options_.exposure ? 1.0f : options_.fade.strength(step_, options_.iterations);
+  exposures_->set_strength(strength);
+  return strength > 0;
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 vec3 basic_trainer<E, Traits, Tracer, Strategy, Comm>::background_of(int step) const {
   switch (options_.background) {
     case background_kind::black:
@@ -239,7 +248,7 @@ image8 basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_8bit(camera cons
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 exposure_field basic_trainer<E, Traits, Tracer, Strategy, Comm>::exposures() const {
   std::vector<view_exposure> views;
-  exposure_state const learned = exposures_ ? exposures_->state() : exposure_state{};
+  exposure_state const learned = options_.exposure ? exposures_->state() : exposure_state{};
   for (std::size_t i = 0; i < learned.visits.size(); ++i) {
     if (learned.visits[i] == 0) continue;
     dataset_view const& v = data_.train[i];

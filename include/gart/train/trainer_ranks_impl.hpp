@@ -49,6 +49,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
     !Comm::alone) {
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates rates = rates_of_step();
+  bool const exposes = begin_exposures();
   int const ranks = comm_.size(), batch = options_.batch, before = step_;
   bool const moves = learns_poses(), bends = learns_lenses();
   std::vector<image_result> images(static_cast<std::size_t>(batch));  // of the step, in their order
@@ -76,7 +77,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
   // From what each image said of the exposures, poses and lenses that the step began with, whoever traced it.
   for (int k = 0; k < batch; ++k) {
     image_result const& image = images[static_cast<std::size_t>(k)];
-    if (exposures_) exposures_->move(image.view, {image.by_exposure, exposure::floats}, rates.exposure);
+    if (exposes) exposures_->move(image.view, {image.by_exposure, exposure::floats}, rates.exposure);
     if (moves) poses_->step(image.view, image.by_pose, before + k, options_.iterations);
     if (bends) lenses_->step(image.view, lens_gradient(image.by_lens), before + k, options_.iterations);
   }
@@ -110,6 +111,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   std::size_t const pixels = static_cast<std::size_t>(seen.width) * seen.height;
   color_.resize(3 * pixels), color_gradient_.resize(3 * pixels);
   vec3 const background = background_of(step_ + image);
+  bool const exposes = begin_exposures();
   work_unit const unit = shards_.round.unit();
   image_targets targets;
   targets.color = color_.data();
@@ -129,14 +131,14 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
     stage_scope stage(exec_, "loss");
     shards_.round.share_image(color_.data(), seen, 3 * sizeof(float));
     if (targets.depth) share(targets.depth), share(targets.transmittance);
-    span<float const> const shown = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
+    span<float const> const shown = exposes ? exposures_->expose(index, color_) : span<float const>(color_);
     truth_view const truth = images_.get(exec_, index, background);
     depth_pixels depth;
     if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth), depth = supervision_.pixels();
     loss(loss_input<E>{exec_, view, truth, seen.width, seen.height, shown, color_gradient_, value_.view().subspan(0, 2),
                        depth});
     if (grows_by_error()) error_map(exec_, shown, truth, error_map_);
-    if (exposures_)
+    if (exposes)
       exec_.copy_out(result.by_exposure, exposures_->differentiate(index, color_, color_gradient_).data(),
                      sizeof result.by_exposure);
     exec_.copy_out(&result.loss, value_.data(), sizeof(float));
