@@ -7,11 +7,17 @@
 /// K the largest second derivative of u up to that angle from the axis. With the Hessian H of u = r(theta) cos(phi),
 ///   r'' cos(phi),   -(r' - r cot(theta)) / sin(theta) sin(phi),   (r' cot(theta) - r / sin^2(theta)) cos(phi),
 /// it is within the extremes of g s + s H s / 2 over that ellipse +- K3 d^3 / 6, K3 of third derivatives: a quadratic
-/// over an ellipse, bounded by its dual. K and K3 are tabulated as running maxima. Both are cut by the image of the
-/// ring and the sector about the axis that the ellipsoid is seen in (camera/seen_angles.hpp), which alone remains where
-/// it surrounds the camera or reaches to where the lens says nothing. In double.
+/// over an ellipse, bounded by its dual.
+///
+/// Where an ellipsoid is seen large d^3 is too much. There a polygon is put about that ellipse. Where the lens folds
+/// nowhere u has a gradient everywhere, so that it is most on the polygon's border, whose edges are arcs: on one of the
+/// angle l u is no more than at its ends and K l^2 / 8.
+///
+/// Derivatives are tabulated (camera/lens_image.hpp). All is cut by the image of the ring and the sector about the axis
+/// that the ellipsoid is seen in (camera/seen_angles.hpp), which alone remains where it surrounds the camera or reaches
+/// to where the lens says nothing. In double.
 
-#include <gart/camera/lens_curve.hpp>
+#include <gart/camera/lens_image.hpp>
 #include <gart/camera/seen_angles.hpp>
 
 #include <array>
@@ -22,16 +28,11 @@
 namespace gart::inline GART_ISA {
 
 /// A lens with what its boxes need. Host side made, trivially copyable.
-class lens_bounds {
+class lens_bounds : public lens_image {
  public:
-  lens_bounds() = default;
   /// The lens of a camera's size, focal lengths and principal point; without a pose or a near distance, for what does
   /// not depend on these.
-  lens_bounds(lens_curve const& curve, double fx, double fy, double cx, double cy, int width, int height)
-      : curve_(curve), fx_(fx), fy_(fy), cx_(cx), cy_(cy), width_(width), height_(height) {
-    find_last();
-    tabulate();
-  }
+  using lens_image::lens_image;
   /// With a pose and a near distance.
   lens_bounds seen_from(mat3 const& rotation, float near) const {
     lens_bounds out = *this;
@@ -39,19 +40,6 @@ class lens_bounds {
       for (int j = 0; j < 3; ++j) out.to_camera_[i][j] = rotation[j][i];
     out.near_ = near;
     return out;
-  }
-
-  double last() const { return last_; }               ///< the largest angle with the axis that a ray may have
-  double farthest_q() const { return last_q_; }       ///< its q
-  double farthest_r() const { return last_r_; }       ///< what the radial terms make of that
-  lens_curve const& curve() const { return curve_; }  ///< of the lens
-
-  /// The distance from the axis that the curve and the radial terms give, and its derivative by the angle.
-  GART_HD void distance_at(double theta, double& r, double& slope) const {
-    double q, by_theta, value, by_square;
-    curve_.curve(theta, q, by_theta);
-    curve_.radial(q * q, value, by_square);
-    r = q * value, slope = by_theta * (value + 2 * q * q * by_square);
   }
 
   /// The pixels that can hit it, and its near depth; empty where none can.
@@ -98,29 +86,9 @@ class lens_bounds {
     return out;
   }
 
-  /// The image point of a direction in the camera's axes, of any length. Host side: of no use to boxes.
-  void image_of(vec3d const& d, double& u, double& v) const {
-    double const across = std::sqrt(d.x * d.x + d.y * d.y);
-    double q, ignored, value;
-    curve_.curve(std::atan2(across, d.z), q, ignored);
-    curve_.radial(q * q, value, ignored);
-    double const x = across > 0 ? q * d.x / across : 0, y = across > 0 ? q * d.y / across : 0;
-    double a = x * value, b = y * value;
-    if (curve_.beside()) {
-      auto const t = curve_.after() ? curve_.beside_at(a, b) : curve_.beside_at(x, y);
-      a += t.x, b += t.y;
-    }
-    u = fx_ * a + cx_, v = fy_ * b + cy_;
-  }
-
  private:
-  static constexpr int cells = 96;
-
-  GART_HD double q_at(double theta) const {
-    double q, ignored;
-    curve_.curve(theta, q, ignored);
-    return q;
-  }
+  static constexpr int edges = 16;      // of the polygon round a silhouette
+  static constexpr double wide = 0.15;  // silhouettes that reach less far are bounded by derivatives alone
 
   // u and v, in units of the focal lengths, cut by what they are at most by their gradients at the centre.
   GART_HD void cut_by_gradient(seen_ellipsoid const& s, double least, detail::interval& u, detail::interval& v) const {
@@ -139,7 +107,10 @@ class lens_bounds {
     flat_silhouette const f(s, {cosine * cp, cosine * sp, -sine}, {-sp, cp, 0}, w);
     if (!f.whole) return;
     double const error = s.error / least, d = atan(sqrt(f.z1 * f.z1 + f.z2 * f.z2) + sqrt(f.major2())) + error;
-    if (!(theta + d < end_)) return;
+    // Not about what lies behind, where the image has all of its outermost ring.
+    if (d > wide && theta + 1.02 * d < 3.1)
+      cut_by_polygon(f, {cosine * cp, cosine * sp, -sine}, {-sp, cp, 0}, w, error, u, v);
+    if (!(theta + d < end())) return;
     double q, q_slope, value, by_square;
     curve_.curve(theta, q, q_slope);
     curve_.radial(q * q, value, by_square);
@@ -157,13 +128,13 @@ class lens_bounds {
       gy1 += t.yx * bx1 + t.yy * by1, gy2 += t.yx * bx2 + t.yy * by2;
       x += t.x, y += t.y;
     }
-    int const cell = cell_of(theta + d);
+    changes_up_to const by = changes(theta + d);
     // What is left out by gradients alone; and by second derivatives too, where these are as below.
-    double const bend = 0.5 * d * d * bend_[cell];
+    double const bend = 0.5 * d * d * by.second;
     bool const bent = sine > 1e-3 && d < 1.2;
     double const slope_s = tan(d), shrunk = d > 1e-4 ? 1 - d / slope_s : 1e-8;
     double const rest =
-        d * d * (d * twist_[cell] / 6 + 0.5 * beside_[cell] + 1e-6) + 0.5 * shrunk * slope_s * slope_s * bend_[cell];
+        d * d * (d * by.third / 6 + 0.5 * by.second_beside + 1e-6) + 0.5 * shrunk * slope_s * slope_s * by.second;
     double second = 0, mixed = 0, round = 0;
     if (bent) {
       constexpr double h = 1e-4;
@@ -197,113 +168,41 @@ class lens_bounds {
     cut(u, x, gx1, gx2, cp, sp), cut(v, y, gy1, gy2, sp, -cp);
   }
 
-  GART_HD int cell_of(double theta) const {
-    int const cell = static_cast<int>(theta / end_ * cells);
-    return cell < cells ? cell : cells - 1;
-  }
-
-  // The last angle: where the distance still grows, and no farther than the image needs.
-  void find_last() {
-    double need = 0;
-    for (double const u : {-cx_ / fx_, (width_ - cx_) / fx_})
-      for (double const v : {-cy_ / fy_, (height_ - cy_) / fy_}) need = std::fmax(need, std::hypot(u, v));
-    need *= 1.05;
-    if (curve_.beside()) need += 2 * curve_.steepest_beside(need) * need;
-    constexpr int steps = 2048;
-    constexpr double most = 3.1415926;
-    auto const grows = [&](double theta) {
-      double r, slope;
-      distance_at(theta, r, slope);
-      return slope > 1e-6 && std::isfinite(r) && r < need;
-    };
-    double lo = 0, hi = most;
-    for (int i = 1; i <= steps; ++i) {
-      double const theta = most * i / steps;
-      if (!grows(theta)) {
-        hi = theta;
-        break;
+  // u and v cut by what they are on a polygon about the silhouette f, which is in the plane across w.
+  GART_HD void cut_by_polygon(flat_silhouette const& f, vec3d const& e1, vec3d const& e2, vec3d const& w, double error,
+                              detail::interval& u, detail::interval& v) const {
+    double const l11 = sqrt(f.h11), l21 = l11 > 0 ? f.h12 / l11 : 0.0, left = f.h22 - l21 * l21,
+                 l22 = sqrt(left > 0 ? left : 0.0);
+    constexpr double turn = 2 * 3.141592653589793 / edges;
+    double const out = 1 / cos(0.5 * turn) + 1e-9;
+    detail::interval x, y;
+    vec3d before(0.0);
+    place at{};
+    GART_NO_UNROLL
+    for (int k = 0; k <= edges; ++k) {
+      double const c = out * cos(k * turn), n = out * sin(k * turn);
+      vec3d d = w + e1 * (f.z1 + l11 * c) + e2 * (f.z2 + l21 * c + l22 * n);
+      d = d / sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
+      place const p = place_of(d);
+      if (k > 0) {
+        vec3d const step = d - before;
+        double const chord2 = step.x * step.x + step.y * step.y + step.z * step.z;
+        double const arc2 = chord2 * (1 + chord2 / 8),
+                     most = (p.theta > at.theta ? p.theta : at.theta) + 0.5 * sqrt(arc2) + error;
+        if (!(most < unfolded() && chord2 < 1.44)) return;
+        changes_up_to const by = changes(most);
+        double const rest = arc2 / 8 * by.second + error * by.first;
+        x.add(at.x - rest), x.add(at.x + rest), y.add(at.y - rest), y.add(at.y + rest);
+        x.add(p.x - rest), x.add(p.x + rest), y.add(p.y - rest), y.add(p.y + rest);
       }
-      lo = theta;
+      before = d, at = p;
     }
-    for (int i = 0; i < 50 && hi < most; ++i) {
-      double const middle = 0.5 * (lo + hi);
-      (grows(middle) ? lo : hi) = middle;
-    }
-    last_ = hi < most ? lo : most;
-    double ignored;
-    distance_at(last_, last_r_, ignored);
-    last_q_ = q_at(last_);
-  }
-
-  void tabulate() {
-    // Beyond the last angle what is seen of an ellipsoid may still be bounded by where the curve goes.
-    end_ = last_;
-    for (double const step = 1.0 / 64; end_ + step < last_ + 1 && end_ + step < 3.12; end_ += step) {
-      double r, slope;
-      distance_at(end_ + step, r, slope);
-      if (!(std::isfinite(r) && std::fabs(r) < 2 * last_r_ + 10 && std::fabs(slope) < 100 * (1 + last_r_))) break;
-    }
-    end_ = end_ > 3.12 ? 3.12 : end_ > 1e-3 ? end_ : 1e-3;
-    double bend = 0, twist = 0, beside = 0;
-    constexpr int samples = 4;
-    for (int cell = 0; cell < cells; ++cell) {
-      for (int i = 0; i <= samples; ++i) {
-        double const theta = end_ * (cell + i / double{samples}) / cells;
-        changes const own = changes_at(theta, [&](double at) {
-          double r, ignored;
-          distance_at(at, r, ignored);
-          return r;
-        });
-        bend = std::fmax(bend, own.second), twist = std::fmax(twist, own.third);
-        if (!curve_.beside()) continue;
-        changes const of_q = curve_.after() ? own : changes_at(theta, [&](double at) { return q_at(at); });
-        double const reach = of_q.value;
-        beside = std::fmax(beside, curve_.steepest_beside(reach) * of_q.second +
-                                       curve_.most_bent_beside(reach) * of_q.first * of_q.first);
-      }
-      // A tenth for what lies between samples.
-      beside_[cell] = static_cast<float>(1.1 * beside);
-      bend_[cell] = static_cast<float>(1.1 * (bend + beside) + 1e-6), twist_[cell] = static_cast<float>(1.1 * twist);
-    }
-  }
-
-  // Of an image coordinate distance(theta) cos(phi), whatever phi: how large its derivatives along a line of sight that
-  // turns from that angle are at most, in any direction.
-  struct changes {
-    double value = 0, first = 0, second = 0, third = 0;
-  };
-  template <class F>
-  static changes changes_at(double theta, F const& distance) {
-    constexpr int directions = 12;
-    double const h = 0.004 * std::fmin(1.0, 10 * (3.1415926 - theta));
-    changes out;
-    out.value = distance(theta);
-    for (int k = 0; k <= directions; ++k) {
-      double const psi = 3.141592653589793 * k / directions, c = std::cos(psi), s = std::sin(psi);
-      double x[5], y[5];
-      for (int i = -2; i <= 2; ++i) {
-        double const ct = std::cos(i * h), st = std::sin(i * h), sine = std::sin(theta), cosine = std::cos(theta);
-        double const dx = ct * sine + st * c * cosine, dy = st * s, dz = ct * cosine - st * c * sine;
-        double const across = std::hypot(dx, dy), r = distance(std::atan2(across, dz));
-        x[i + 2] = across > 0 ? r * dx / across : 0, y[i + 2] = across > 0 ? r * dy / across : 0;
-      }
-      auto const length = [](double a, double b) { return std::hypot(a, b); };
-      out.first = std::fmax(out.first, length(x[3] - x[1], y[3] - y[1]) / (2 * h));
-      out.second = std::fmax(out.second, length(x[3] - 2 * x[2] + x[1], y[3] - 2 * y[2] + y[1]) / (h * h));
-      out.third = std::fmax(
-          out.third, length(x[4] - 2 * x[3] + 2 * x[1] - x[0], y[4] - 2 * y[3] + 2 * y[1] - y[0]) / (2 * h * h * h));
-    }
-    return out;
+    u.lo = x.lo > u.lo ? x.lo : u.lo, u.hi = x.hi < u.hi ? x.hi : u.hi;
+    v.lo = y.lo > v.lo ? y.lo : v.lo, v.hi = y.hi < v.hi ? y.hi : v.hi;
   }
 
   mat3d to_camera_{1.0};
-  lens_curve curve_;
-  double fx_ = 1, fy_ = 1, cx_ = 0, cy_ = 0;
-  double last_ = 0, last_q_ = 0, last_r_ = 0, end_ = 1;
-  int width_ = 0, height_ = 0;
   float near_ = 0;
-  // Running maxima by the angle: second and third derivatives, and the second of the tangential terms.
-  float bend_[cells] = {}, twist_[cells] = {}, beside_[cells] = {};
 };
 
 /// Of a camera's lens: its tables take milliseconds, and views share lenses, so they are made once a lens and program,
