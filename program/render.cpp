@@ -114,8 +114,7 @@ int run_render(render_arguments const& a) {
     if (!ranks::takes(i)) continue;
     auto& [name, view] = cameras[i];
     if (!a.camera.empty()) view = gart::seen_through(view, a.camera);
-    if (a.downscale > 1)
-      view = gart::resized(view, std::max(1, view.width / a.downscale), std::max(1, view.height / a.downscale));
+    if (a.downscale > 1) view = gart::downscaled(view, a.downscale, "the camera " + name);
     auto const start = std::chrono::steady_clock::now();
     gart::rendered image = render_samples(*renderer, view, options, a.samples);
     if (!exposures.empty()) apply(exposures.at(view), image.color);

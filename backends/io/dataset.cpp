@@ -81,20 +81,6 @@ image8 three_channels(image8 image) {
   return result;
 }
 
-// The camera of a box-downscaled image: a partial last block is cropped, so the scale is exactly 1 / factor.
-camera downscaled(camera c, int factor, std::string const& where) {
-  int const width = c.width / factor, height = c.height / factor;
-  if (width < 1 || height < 1) {
-    throw invalid_argument("dataset_options.downscale = " + std::to_string(factor) + " leaves nothing of " + where);
-  }
-  if (c.kind == camera_kind::equirectangular && (c.width % factor || c.height % factor)) {
-    throw invalid_argument("dataset_options.downscale = " + std::to_string(factor) + " does not divide " +
-                           std::to_string(c.width) + " x " + std::to_string(c.height) + " of " + where +
-                           ": a view of the whole sphere cannot be cropped; take a factor of both");
-  }
-  return resized(cropped(c, width * factor, height * factor), width, height);
-}
-
 void drop_frames_without_photo(capture& c, bool load_images) {
   std::size_t const before = c.frames.size();
   auto const missing = [](frame const& f) { return f.photo.empty(); };
@@ -335,6 +321,19 @@ dataset load(fs::path const& path, dataset_options const& options) {
 
 }  // namespace
 }  // namespace io
+
+camera downscaled(camera const& c, int factor, std::string const& where) {
+  int const width = c.width / factor, height = c.height / factor;
+  if (width < 1 || height < 1) {
+    throw invalid_argument("dataset_options.downscale = " + std::to_string(factor) + " leaves nothing of " + where);
+  }
+  if (c.kind == camera_kind::equirectangular && (c.width % factor || c.height % factor)) {
+    throw invalid_argument("dataset_options.downscale = " + std::to_string(factor) + " does not divide " +
+                           std::to_string(c.width) + " x " + std::to_string(c.height) + " of " + where +
+                           ": a view of the whole sphere cannot be cropped; take a factor of both");
+  }
+  return resized(cropped(c, width * factor, height * factor), width, height);
+}
 
 dataset load_dataset(std::filesystem::path const& path, dataset_options const& options) {
   return io::load(path, options);

@@ -200,12 +200,14 @@ TEST_CASE("no silhouette leaves its box while the camera moves, and boxes are ti
         if (!by_lines) continue;
         if (exact && exact->area() >= 400) {
           ++compared;
-          // Each rounds by itself, and a pixel on two sides is a tenth of a small box.
+          // One goes from line to line, the other round the silhouette by steps: on a side they may differ by a pixel
+          // of rounding and one of the steps, which is more than a tenth of a small box.
           int const apart =
               std::max({std::abs(by_lines->lo - exact->lo), std::abs(by_lines->hi - exact->hi),
                         std::abs(by_lines->first - exact->first), std::abs(by_lines->last - exact->last)});
           double const share = static_cast<double>(by_lines->area()) / static_cast<double>(exact->area());
-          CHECK((apart <= 1 || std::abs(share - 1) < 0.1));
+          CAPTURE(apart);
+          CHECK((apart <= 2 || std::abs(share - 1) < 0.1));
         }
         int const b0 = c.columns ? f.box.y0 : f.box.x0, b1 = c.columns ? f.box.y1 : f.box.x1;
         int const l0 = c.columns ? f.box.x0 : f.box.y0, l1 = c.columns ? f.box.x1 : f.box.y1;

@@ -231,6 +231,14 @@ TEST_CASE("eval scores a trained model as train did, and render draws the same i
   CHECK(half.out.empty());
   CHECK(half.err.empty());
   for (auto const& file : fs::directory_iterator(here / "half")) CHECK(gart::read_image(file.path()).width == 8);
+  // A factor that divides no side: the cameras are those of the capture's photographs, shrunk by it.
+  REQUIRE(here.gart("eval run/model.ply capture --out third.json --renders third_scored --downscale 3").code == 0);
+  REQUIRE(here.gart("render run/model.ply capture --out third --downscale 3").code == 0);
+  for (auto const& view : scores["views"]) {
+    auto const name = view["name"].get<std::string>() + ".png";
+    CHECK(text_of(here / ("third/" + name)) == text_of(here / ("third_scored/" + name)));
+  }
+  CHECK(has(here.gart("render run/model.ply capture --out none --downscale 32").err, "leaves nothing of the camera"));
 }
 
 TEST_CASE("an ordinary model's header says how near it was traced, and --start takes it at another degree") {

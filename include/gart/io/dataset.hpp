@@ -88,6 +88,11 @@ struct dataset_options {
 /// Reads a capture from a folder, or by the file named.
 dataset load_dataset(std::filesystem::path const& path, dataset_options const& options = {});
 
+/// The camera of an image that dataset_options.downscale shrank: a partial last block of pixels is cropped, so that the
+/// scale is 1 / factor itself. Errors: invalid_argument, naming `where`, where nothing is left, or for a view of the
+/// whole sphere that the factor does not divide.
+camera downscaled(camera const& c, int factor, std::string const& where);
+
 /// The cameras alone: a dataset (all its views, test views first) or a camera JSON, a list of
 /// {"name","width","height","fx","fy","cx","cy","c2w"} with c2w camera-to-world in OpenCV axes, and "camera_model" by
 /// COLMAP's name, with the parameters of its lens, where it is no pinhole; EQUIRECTANGULAR has no fx to cy.
