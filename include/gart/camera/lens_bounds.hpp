@@ -87,8 +87,11 @@ class lens_bounds : public lens_image {
   }
 
  private:
-  static constexpr int edges = 16;      // of the polygon round a silhouette
-  static constexpr double wide = 0.15;  // silhouettes that reach less far are bounded by derivatives alone
+  static constexpr double wide = 0.18;  // silhouettes that reach less far are bounded by derivatives alone
+  // Of the polygon round a silhouette, and of the angle of an edge and of half of it.
+  static constexpr int edges = 16;
+  static constexpr double edge_cosine = 0.92387953251128674, edge_sine = 0.38268343236508977,
+                          half_edge_cosine = 0.98078528040323043;
 
   // u and v, in units of the focal lengths, cut by what they are at most by their gradients at the centre.
   GART_HD void cut_by_gradient(seen_ellipsoid const& s, double least, detail::interval& u, detail::interval& v) const {
@@ -173,14 +176,12 @@ class lens_bounds : public lens_image {
                               detail::interval& u, detail::interval& v) const {
     double const l11 = sqrt(f.h11), l21 = l11 > 0 ? f.h12 / l11 : 0.0, left = f.h22 - l21 * l21,
                  l22 = sqrt(left > 0 ? left : 0.0);
-    constexpr double turn = 2 * 3.141592653589793 / edges;
-    double const out = 1 / cos(0.5 * turn) + 1e-9;
+    double c = 1 / half_edge_cosine + 1e-9, n = 0;
     detail::interval x, y;
     vec3d before(0.0);
     place at{};
     GART_NO_UNROLL
     for (int k = 0; k <= edges; ++k) {
-      double const c = out * cos(k * turn), n = out * sin(k * turn);
       vec3d d = w + e1 * (f.z1 + l11 * c) + e2 * (f.z2 + l21 * c + l22 * n);
       d = d / sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
       place const p = place_of(d);
@@ -196,6 +197,8 @@ class lens_bounds : public lens_image {
         x.add(p.x - rest), x.add(p.x + rest), y.add(p.y - rest), y.add(p.y + rest);
       }
       before = d, at = p;
+      double const turned = c * edge_cosine - n * edge_sine;
+      n = c * edge_sine + n * edge_cosine, c = turned;
     }
     u.lo = x.lo > u.lo ? x.lo : u.lo, u.hi = x.hi < u.hi ? x.hi : u.hi;
     v.lo = y.lo > v.lo ? y.lo : v.lo, v.hi = y.hi < v.hi ? y.hi : v.hi;
