@@ -55,7 +55,7 @@ std::vector<setting> settings_of(configuration const& exact) {
   using c = configuration;
   table t(exact);
   for (gart::preset const& p : gart::presets()) {
-    if (p.name == "exact") continue;
+    if (!p.approximates()) continue;
     t.add("preset", p.name,
           [&](c& x) { x.render.alpha_min = p.alpha_min, x.render.transmittance_min = p.transmittance_min; });
   }

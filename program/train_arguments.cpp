@@ -24,7 +24,7 @@ std::string presets_help() {
   for (gart::preset const& p : gart::presets()) {
     char knobs[80];
     std::snprintf(knobs, sizeof knobs, ": --alpha-min %.4g --t-min %.4g", p.alpha_min, p.transmittance_min);
-    text += "\n" + p.name + knobs;
+    text += "\n" + p.name + (p.iterations ? ": --iterations " + std::to_string(p.iterations) : knobs);
   }
   return text;
 }
@@ -250,6 +250,7 @@ void fill_in(CLI::App const& train, train_arguments& a) {
   };
   set("--alpha-min", a.alpha_min, chosen.alpha_min);
   set("--t-min", a.t_min, chosen.transmittance_min);
+  if (chosen.iterations) set("--iterations", a.iterations, chosen.iterations);
   set("--auto", a.automatic, a.iterations >= gart::measured_from);
 }
 

@@ -4,6 +4,8 @@
 
 #include <support/policies.hpp>
 
+#include <gart/runtime/presets.hpp>
+
 #include <random>
 
 using namespace cli_test;
@@ -193,4 +195,10 @@ TEST_CASE("a preset sets what the command line does not, and the run says so") {
   CHECK(fast["alpha_min"].get<double>() > plain["alpha_min"].get<double>());
   CHECK(has(text_of(here / "run/report.html"), "preset fast"));
   CHECK(has(text_of(here / "run/model.ply"), "comment gart alpha_min"));
+
+  std::string const tiny = " --backend serial --max-gaussians 60 --sh-degree 1 --quiet --no-auto --stop-at 1";
+  REQUIRE(here.gart("train capture --out half --preset quick" + tiny).code == 130);
+  CHECK(here.json("half/config.json")["options"]["iterations"] == gart::preset_named("quick").iterations);
+  REQUIRE(here.gart("train capture --out own --preset quick --iterations 40" + tiny).code == 130);
+  CHECK(here.json("own/config.json")["options"]["iterations"] == 40);
 }
