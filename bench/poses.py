@@ -9,8 +9,9 @@ copy, without and with --refine-poses (--runs takes fewer). What is after -- goe
 
 The result, OUT/poses_NAME.json, has of each its scores, at the capture's poses and aligned, and of the poses that were
 learned how far they are from the undisturbed: rotation in degrees and position in percent of the extent, after the
-similarity that brings all of them nearest (the scene may move with its cameras). Captures are Blender's layout or
-COLMAP's binary files.
+similarity that brings all of them nearest (the scene may move with its cameras). A capture's poses are themselves an
+estimate: `from_clean_refined` is how far those of the copy are from what the capture's own became. Captures are
+Blender's layout or COLMAP's binary files.
 """
 import argparse
 import json
@@ -230,14 +231,19 @@ def main():
             shutil.rmtree(copy)
         reader = blender if os.path.exists(os.path.join(source, "transforms_train.json")) else colmap
         before, after, extent = reader(a, source, copy)
-        runs = []
+        runs, clean = [], None
         for run_name in a.runs.split(","):
             disturbed, refined = RUNS[run_name]
             out = os.path.join(folder, name + "_" + run_name)
             row = {"run": run_name, **train(a, copy if disturbed else source, out, refined)}
             row["poses"] = errors(after if disturbed else before, before, extent)
             if refined and "error" not in row:
-                row["start"], row["poses"] = row["poses"], errors(poses_of(os.path.join(out, "poses.json")), before, extent)
+                found = poses_of(os.path.join(out, "poses.json"))
+                row["start"], row["poses"] = row["poses"], errors(found, before, extent)
+                if not disturbed:
+                    clean = found
+                elif clean:
+                    row["from_clean_refined"] = errors(found, clean, extent)
             failed = failed or "error" in row
             runs.append(row)
             print(json.dumps(row), file=sys.stderr, flush=True)
