@@ -18,7 +18,7 @@ namespace tile_kernels {
 // Bounds: of a camera model.
 template <class Response, int Size, class Bounds>
 struct measure {
-  // Through a lens some boxes take ten times as long as most (camera/lens_bounds.hpp), and a block as long as its last.
+  // Through a lens few boxes take far longer than most (camera/lens_bounds.hpp), and a block as long as its last.
   static constexpr int block_size = 64, min_blocks = 1;
   gaussians_view<float const> scene;
   Bounds bounds;
