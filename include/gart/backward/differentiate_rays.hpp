@@ -104,9 +104,8 @@ struct ray_gradients : ray_program_base {
     s.by_turn += sh_turn<most, 1>(by_band, s.basis.y);
     ray_gaussian const gaussian = records[h.id];
     ray_peak const r = evaluate<Response>(gaussian, s.own);
-    moments_of<float> m = hit_moments<Response>(gaussian, r, alpha_gradient);
     float const by_depth = weight * s.by_depth;
-    add_depth_moments(m, r, by_depth, true);
+    moments_of<float> const m = hit_moments_with_depth<Response>(gaussian, r, alpha_gradient, by_depth, true);
     ray_part const part = ray_part_of(gaussian, r, m, by_depth);
     s.by_origin += part.origin, s.by_direction += part.direction;
     return s.gradient.transmittance >= transmittance_min && --s.left != 0;

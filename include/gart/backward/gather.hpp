@@ -277,9 +277,12 @@ struct gather_kernel {
     float opaque_g = opaque.x * g.v[0] + opaque.y * g.v[1] + opaque.z * g.v[2];
     if constexpr (C::terms::depth) opaque_g += entry.depth * at.last.v[2];
     float const alpha = hit_alpha<response_type>(data.gaussian, r.d2);
-    moments_of<float> m =
-        hit_moments<response_type>(data.gaussian, r, alpha_gradient(opaque_g, at.direction_total.v[3], alpha), hit);
-    if constexpr (C::terms::depth) add_depth_moments(m, r, entry.weight() * at.last.v[2], hit);
+    float const by_alpha = alpha_gradient(opaque_g, at.direction_total.v[3], alpha);
+    moments_of<float> m;
+    if constexpr (C::terms::depth)
+      m = hit_moments_with_depth<response_type>(data.gaussian, r, by_alpha, entry.weight() * at.last.v[2], hit);
+    else
+      m = hit_moments<response_type>(data.gaussian, r, by_alpha, hit);
     GART_UNROLL
     for (int i = 0; i < error_place; ++i) moment_sum[i] += m.v[i];
     moment_sum[error_place] += hit ? entry.weight() * g.v[3] : 0.0f;

@@ -162,8 +162,12 @@ struct packet_gather {
         lanes opaque_g = dot(e.opaque, at.gradient);
         if constexpr (C::terms::depth)
           opaque_g += found[i].slots.read_depths(gather.depth.slots, hit) * at.depth_gradient[0];
-        moments_of<lanes> m = hit_moments<response_type>(g, r, alpha_gradient(opaque_g, at.total, alpha), hit);
-        if constexpr (C::terms::depth) add_depth_moments(m, r, e.weight * at.depth_gradient[0], hit);
+        lanes const by_alpha = alpha_gradient(opaque_g, at.total, alpha);
+        moments_of<lanes> m;
+        if constexpr (C::terms::depth)
+          m = hit_moments_with_depth<response_type>(g, r, by_alpha, e.weight * at.depth_gradient[0], hit);
+        else
+          m = hit_moments<response_type>(g, r, by_alpha, hit);
 #pragma GCC unroll 16
         for (int k = 0; k < error_place; ++k) moment_sum[k] += m.v[k];
         moment_sum[error_place] += select(hit, e.weight * at.error, 0.0f);

@@ -106,8 +106,11 @@ struct scatter_program : ray_program_base {
     if constexpr (Terms::geometry) {
       ray_gaussian const g = records[h.id];
       ray_peak const r = evaluate<Response>(g, ray_of(s));
-      moments_of<float> m = hit_moments<Response>(g, r, alpha_gradient);
-      if constexpr (Terms::depth) add_depth_moments(m, r, weight * s.depth_gradient[0], true);
+      moments_of<float> m;
+      if constexpr (Terms::depth)
+        m = hit_moments_with_depth<Response>(g, r, alpha_gradient, weight * s.depth_gradient[0], true);
+      else
+        m = hit_moments<Response>(g, r, alpha_gradient);
       m.v[error_place] = weight * s.error;
       E::atomic_add_row(moments_out + static_cast<std::size_t>(moment_stride) * h.id, m.v, moment_count);
     }

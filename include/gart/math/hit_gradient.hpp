@@ -69,15 +69,31 @@ struct ray_gradient {
   }
 };
 
-/// What a hit adds to the moments; zeros where `hit` is false, whatever the rest is then.
-template <class Response = generalized_gaussian<>, class F, class Mask>
-GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, ray_peak_of<F> const& r, F alpha_gradient,
+namespace detail {
+
+// a and b of a hit, and p; zeros where it is none, whatever the rest is then.
+template <class F>
+struct hit_terms {
+  F a, b;
+  vec3_of<F> p;
+};
+template <class Response, class F, class Mask>
+GART_HD GART_INLINE hit_terms<F> terms_of_hit(ray_gaussian const& gaussian, ray_peak_of<F> const& r, F alpha_gradient,
                                               Mask hit) {
   F const raw = unclamped_alpha<Response>(gaussian, r.d2), zero = 0.0f;
   F const a = select(both(hit, raw < F(alpha_max)), raw * alpha_gradient, zero);
   F const b = select(hit, a * Response::slope(r.d2), zero);
   vec3_of<F> const offset = offset_of(r);
-  vec3_of<F> const p = {select(hit, offset.x, zero), select(hit, offset.y, zero), select(hit, offset.z, zero)};
+  return {a, b, {select(hit, offset.x, zero), select(hit, offset.y, zero), select(hit, offset.z, zero)}};
+}
+
+}  // namespace detail
+
+/// What a hit adds to the moments; zeros where `hit` is false, whatever the rest is then.
+template <class Response = generalized_gaussian<>, class F, class Mask>
+GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, ray_peak_of<F> const& r, F alpha_gradient,
+                                              Mask hit) {
+  auto const [a, b, p] = detail::terms_of_hit<Response>(gaussian, r, alpha_gradient, hit);
   vec3_of<F> const bp = {b * p.x, b * p.y, b * p.z};
   return {{a, bp.x, bp.y, bp.z, bp.x * p.x, bp.y * p.y, bp.z * p.z, bp.y * p.z, bp.x * p.z, bp.x * p.y, 0.0f, 0.0f}};
 }
@@ -88,17 +104,18 @@ GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, ray_
   return hit_moments<Response>(gaussian, r, alpha_gradient, F(0.0f) <= F(0.0f));
 }
 
-/// What its t adds to a hit's moments; `gradient` is w dL/d depth. Nothing where `hit` is false, whatever the rest is.
-template <class F, class Mask>
-GART_HD GART_INLINE void add_depth_moments(moments_of<F>& m, ray_peak_of<F> const& r, F gradient, Mask hit) {
-  F const zero = 0.0f;
-  F const e = gradient * fast_reciprocal(r.d.x * r.d.x + r.d.y * r.d.y + r.d.z * r.d.z);
-  vec3_of<F> const offset = offset_of(r);
-  vec3_of<F> const p = {select(hit, offset.x, zero), select(hit, offset.y, zero), select(hit, offset.z, zero)};
-  vec3_of<F> const ed = {select(hit, e * r.d.x, zero), select(hit, e * r.d.y, zero), select(hit, e * r.d.z, zero)};
-  m.v[1] += ed.x, m.v[2] += ed.y, m.v[3] += ed.z;
-  m.v[4] += F(2.0f) * p.x * ed.x, m.v[5] += F(2.0f) * p.y * ed.y, m.v[6] += F(2.0f) * p.z * ed.z;
-  m.v[7] += p.y * ed.z + p.z * ed.y, m.v[8] += p.x * ed.z + p.z * ed.x, m.v[9] += p.x * ed.y + p.y * ed.x;
+/// The same where t has a gradient too; `depth_gradient` is w dL/d depth. With h = b p / 2 + e d_g the second moments
+/// are p h^T + h p^T.
+template <class Response = generalized_gaussian<>, class F, class Mask>
+GART_HD GART_INLINE moments_of<F> hit_moments_with_depth(ray_gaussian const& gaussian, ray_peak_of<F> const& r,
+                                                         F alpha_gradient, F depth_gradient, Mask hit) {
+  auto const [a, b, p] = detail::terms_of_hit<Response>(gaussian, r, alpha_gradient, hit);
+  F const e = depth_gradient * fast_reciprocal(r.d.x * r.d.x + r.d.y * r.d.y + r.d.z * r.d.z), half = F(0.5f) * b;
+  vec3_of<F> const bp = {half * p.x, half * p.y, half * p.z};
+  vec3_of<F> const h = {bp.x + select(hit, e * r.d.x, F(0.0f)), bp.y + select(hit, e * r.d.y, F(0.0f)),
+                        bp.z + select(hit, e * r.d.z, F(0.0f))};
+  return {{a, bp.x + h.x, bp.y + h.y, bp.z + h.z, (p.x + p.x) * h.x, (p.y + p.y) * h.y, (p.z + p.z) * h.z,
+           p.y * h.z + p.z * h.y, p.x * h.z + p.z * h.x, p.x * h.y + p.y * h.x, 0.0f, 0.0f}};
 }
 
 /// M^T v: from the Gaussian's own space to the world, for what is pulled back through M.
