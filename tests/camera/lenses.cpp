@@ -26,6 +26,53 @@ TEST_CASE_TEMPLATE("lenses and the sphere are traced through the seam", E, GART_
   }
 }
 
+TEST_CASE_TEMPLATE("what a lens shows large is measured later, to the same boxes", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  std::normal_distribution<float> normal;
+  E exec;
+  gart::serial_exec host;
+  constexpr float alpha_min = 1.0f / 255, near = 0.01f;
+  for (auto const& lens : gart_test::lenses()) {
+    CAPTURE(std::string(lens.name));
+    gart::camera c = gart_test::camera_of(lens, 1000);
+    c.rotation = gart::to_matrix({normal(random), normal(random), normal(random), normal(random)});
+    auto const model = gart_test::gaussians_around(c.position, 3, 2000, random);
+    gart::gaussians<E> const scene(exec, model);
+    gart::gaussians<gart::serial_exec> const same(host, model);
+    gart::visit_camera(c, [&](auto const& view) {
+      auto const bounds = view.bounds(near);
+      if constexpr (gart::detail::staged_bounds<std::remove_const_t<decltype(bounds)>>) {
+        gart::footprints<E, 8> prints(exec);
+        prints.measure(exec, scene.view(), view, alpha_min, near);
+        std::vector<gart::footprint_slots> ranges(model.size());
+        exec.copy_out(ranges.data(), prints.ranges().data(), ranges.size() * sizeof ranges[0]);
+        int late = 0, worst = 0;
+        for (gart::index_t i = 0; i < model.size(); ++i) {
+          gart::gaussian_parameters const g = gart::load_parameters(same.view(), i);
+          gart::ellipsoid e;
+          if (!gart::ellipsoid_of<>(g, view.position, alpha_min, e)) continue;
+          bool wide = false;
+          gart::pixel_box const whole = bounds(e).box, first = bounds.narrow(e, wide).box, got = ranges[i].box;
+          late += wide;
+          auto const apart = [](gart::pixel_box const& a, gart::pixel_box const& b) {
+            auto const least = [](gart::pixel_box const& x) {
+              return static_cast<int>(std::min(x.width(), x.height()));
+            };
+            if (a.empty() || b.empty()) return least(a) + least(b);
+            return std::max(
+                {std::abs(a.x0 - b.x0), std::abs(a.x1 - b.x1), std::abs(a.y0 - b.y0), std::abs(a.y1 - b.y1)});
+          };
+          if (!wide) CHECK(apart(first, whole) == 0);
+          worst = std::max(worst, apart(got, whole));
+        }
+        CHECK(worst <= (E::device ? 1 : 0));  // a device contracts other products
+        CHECK(late > 20);
+      }
+    });
+  }
+}
+
 TEST_CASE("rays are their models', in double, and where there is none it is zero") {
   for (auto const& lens : gart_test::lenses()) {
     CAPTURE(std::string(lens.name));

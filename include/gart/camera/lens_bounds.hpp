@@ -44,6 +44,22 @@ class lens_bounds : public lens_image {
 
   /// The pixels that can hit it, and its near depth; empty where none can.
   GART_HD footprint operator()(ellipsoid const& e) const {
+    bool ignored = false;
+    return box_of<true>(e, ignored);
+  }
+  /// The same where that takes no polygon; else nothing, and `wide` is set. Few take one, and it takes long, and
+  /// registers that a kernel would have for all.
+  GART_HD footprint narrow(ellipsoid const& e, bool& wide) const { return box_of<false>(e, wide); }
+
+ private:
+  static constexpr double wide_from = 0.18;  // silhouettes that reach less far are bounded by derivatives alone
+  // Of the polygon round a silhouette, and of the angle of an edge and of half of it.
+  static constexpr int edges = 16;
+  static constexpr double edge_cosine = 0.92387953251128674, edge_sine = 0.38268343236508977,
+                          half_edge_cosine = 0.98078528040323043;
+
+  template <bool Polygon>
+  GART_HD footprint box_of(ellipsoid const& e, bool& wide) const {
     constexpr double pi = 3.141592653589793;
     seen_ellipsoid const s(to_camera_, e);
     footprint out;
@@ -77,24 +93,25 @@ class lens_bounds : public lens_image {
       curve_.most_beside(curve_.after() ? r_hi : q_at(hi), most_u, most_v);
       u = {u.lo - most_u, u.hi + most_u}, v = {v.lo - most_v, v.hi + most_v};
     }
-    cut_by_gradient(s, out.depth, u, v);
-    constexpr double pad = 0.01;
-    out.box = {
-        detail::first_pixel(fx_ * u.lo + cx_ - pad, width_), detail::first_pixel(fy_ * v.lo + cy_ - pad, height_),
-        detail::first_pixel(fx_ * u.hi + cx_ + pad, width_), detail::first_pixel(fy_ * v.hi + cy_ + pad, height_)};
+    if (pixels_of(u, v).empty()) return {};
+    cut_by_gradient<Polygon>(s, out.depth, u, v, wide);
+    if (wide && !Polygon) return {};
+    out.box = pixels_of(u, v);
     if (out.box.empty()) return {};
     return out;
   }
 
- private:
-  static constexpr double wide = 0.18;  // silhouettes that reach less far are bounded by derivatives alone
-  // Of the polygon round a silhouette, and of the angle of an edge and of half of it.
-  static constexpr int edges = 16;
-  static constexpr double edge_cosine = 0.92387953251128674, edge_sine = 0.38268343236508977,
-                          half_edge_cosine = 0.98078528040323043;
+  // Between these, in units of the focal lengths.
+  GART_HD pixel_box pixels_of(detail::interval const& u, detail::interval const& v) const {
+    constexpr double pad = 0.01;
+    return {detail::first_pixel(fx_ * u.lo + cx_ - pad, width_), detail::first_pixel(fy_ * v.lo + cy_ - pad, height_),
+            detail::first_pixel(fx_ * u.hi + cx_ + pad, width_), detail::first_pixel(fy_ * v.hi + cy_ + pad, height_)};
+  }
 
   // u and v, in units of the focal lengths, cut by what they are at most by their gradients at the centre.
-  GART_HD void cut_by_gradient(seen_ellipsoid const& s, double least, detail::interval& u, detail::interval& v) const {
+  template <bool Polygon>
+  GART_HD void cut_by_gradient(seen_ellipsoid const& s, double least, detail::interval& u, detail::interval& v,
+                               bool& wide) const {
     vec3d const& m = s.center;
     if (!(s.distance > 0)) return;
     // About the middle of the silhouette as it is across the centre's direction.
@@ -111,8 +128,13 @@ class lens_bounds : public lens_image {
     if (!f.whole) return;
     double const error = s.error / least, d = atan(sqrt(f.z1 * f.z1 + f.z2 * f.z2) + sqrt(f.major2())) + error;
     // Not about what lies behind, where the image has all of its outermost ring.
-    if (d > wide && theta + 1.02 * d < 3.1)
-      cut_by_polygon(f, {cosine * cp, cosine * sp, -sine}, {-sp, cp, 0}, w, error, u, v);
+    if (d > wide_from && theta + 1.02 * d < 3.1) {
+      wide = true;
+      if constexpr (Polygon)
+        cut_by_polygon(f, {cosine * cp, cosine * sp, -sine}, {-sp, cp, 0}, w, error, u, v);
+      else
+        return;
+    }
     if (!(theta + d < end())) return;
     double q, q_slope, value, by_square;
     curve_.curve(theta, q, q_slope);
@@ -171,6 +193,10 @@ class lens_bounds : public lens_image {
     cut(u, x, gx1, gx2, cp, sp), cut(v, y, gy1, gy2, sp, -cp);
   }
 
+  struct corner {
+    vec3d direction{0.0};
+    place at{};
+  };
   // u and v cut by what they are on a polygon about the silhouette f, which is in the plane across w.
   GART_HD void cut_by_polygon(flat_silhouette const& f, vec3d const& e1, vec3d const& e2, vec3d const& w, double error,
                               detail::interval& u, detail::interval& v) const {
@@ -178,25 +204,34 @@ class lens_bounds : public lens_image {
                  l22 = sqrt(left > 0 ? left : 0.0);
     double c = 1 / half_edge_cosine + 1e-9, n = 0;
     detail::interval x, y;
-    vec3d before(0.0);
-    place at{};
-    GART_NO_UNROLL
-    for (int k = 0; k <= edges; ++k) {
-      vec3d d = w + e1 * (f.z1 + l11 * c) + e2 * (f.z2 + l21 * c + l22 * n);
+    auto const corner_at = [&](double along, double beside) -> corner {
+      vec3d d = w + e1 * (f.z1 + l11 * along) + e2 * (f.z2 + l21 * along + l22 * beside);
       d = d / sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
-      place const p = place_of(d);
-      if (k > 0) {
-        vec3d const step = d - before;
-        double const chord2 = step.x * step.x + step.y * step.y + step.z * step.z;
-        double const arc2 = chord2 * (1 + chord2 / 8),
-                     most = (p.theta > at.theta ? p.theta : at.theta) + 0.5 * sqrt(arc2) + error;
-        if (!(most < unfolded() && chord2 < 1.44)) return;
-        changes_up_to const by = changes(most);
-        double const rest = arc2 / 8 * by.second + error * by.first;
-        x.add(at.x - rest), x.add(at.x + rest), y.add(at.y - rest), y.add(at.y + rest);
-        x.add(p.x - rest), x.add(p.x + rest), y.add(p.y - rest), y.add(p.y + rest);
+      return {d, place_of(d)};
+    };
+    // False where it reaches too far to be bounded.
+    auto const add_edge = [&](corner const& a, corner const& b) {
+      vec3d const step = b.direction - a.direction;
+      double const chord2 = step.x * step.x + step.y * step.y + step.z * step.z;
+      double const arc2 = chord2 * (1 + chord2 / 8),
+                   most = (a.at.theta > b.at.theta ? a.at.theta : b.at.theta) + 0.5 * sqrt(arc2) + error;
+      if (!(most < unfolded() && chord2 < 1.44)) return false;
+      changes_up_to const by = changes(most);
+      double const rest = arc2 / 8 * by.second + error * by.first;
+      for (place const* p : {&a.at, &b.at})
+        x.add(p->x - rest), x.add(p->x + rest), y.add(p->y - rest), y.add(p->y + rest);
+      return true;
+    };
+    // By quarters, four corners at a time: one waits for another's square roots and arcs no more.
+    corner before[4];
+    GART_NO_UNROLL
+    for (int k = 0; k <= edges / 4; ++k) {
+      corner const now[4] = {corner_at(c, n), corner_at(-n, c), corner_at(-c, -n), corner_at(n, -c)};
+      GART_UNROLL
+      for (int q = 0; q < 4; ++q) {
+        if (k > 0 && !add_edge(before[q], now[q])) return;
+        before[q] = now[q];
       }
-      before = d, at = p;
       double const turned = c * edge_cosine - n * edge_sine;
       n = c * edge_sine + n * edge_cosine, c = turned;
     }

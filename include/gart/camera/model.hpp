@@ -14,7 +14,9 @@
 ///   bounds(float near) const
 ///     Host side: a trivially copyable footprint operator()(ellipsoid const&) const for kernels, the box of all pixels
 ///     whose rays can hit the ellipsoid at t > near, and a lower bound of the depths of these hits. Conservative for
-///     rays in float: math/footprint.hpp says by how much to widen.
+///     rays in float: math/footprint.hpp says by how much to widen. Where few ellipsoids take far longer than the
+///     rest it may also have footprint narrow(ellipsoid const&, bool& wide) const, which sets `wide` for these instead:
+///     kernels take them in a launch of their own (tiles/footprints.hpp).
 ///   ray_depth depth() const
 ///     What those depths are measured along (camera/ray_depth.hpp). camera_base has the distance along the ray.
 ///   filter(float pixels) const
@@ -73,6 +75,11 @@ concept camera_ray = std::same_as<R, primary_ray_of<F>> ||(std::same_as<F, float
 template <class B>
 concept camera_bounds = std::is_trivially_copyable_v<B> && requires(B const& bounds, ellipsoid const& e) {
   { bounds(e) } -> std::same_as<footprint>;
+};
+
+template <class B>
+concept staged_bounds = camera_bounds<B> && requires(B const& bounds, ellipsoid const& e, bool& wide) {
+  { bounds.narrow(e, wide) } -> std::same_as<footprint>;
 };
 
 template <class T>

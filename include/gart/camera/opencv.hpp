@@ -5,11 +5,10 @@
 ///   x_d = x (1 + k1 r2 + k2 r2^2) + 2 p1 x y + p2 (r2 + 2 x x),  y_d likewise with p1 and p2 exchanged;
 /// a ray inverts it by Newton's method (camera/undistort.hpp).
 ///
-/// A box is what two bounds have in common. One is that of any curve of the angle with the axis
-/// (camera/lens_bounds.hpp), the tighter one for most. For what is seen large, or crosses the near plane, the rectangle
-/// of slopes is mapped to the image edge by edge: the map is one to one where the image is, so the image of the
-/// rectangle lies within the image of its border, which is sampled and widened by what a curved edge can bulge between
-/// samples.
+/// A box is that of any curve of the angle with the axis (camera/lens_bounds.hpp). For what is seen large, or crosses
+/// the near plane, it is what that has in common with another: the rectangle of slopes is mapped to the image edge by
+/// edge: the map is one to one where the image is, so the image of the rectangle lies within the image of its border,
+/// which is sampled and widened by what a curved edge can bulge between samples.
 
 #include <gart/camera/lens_bounds.hpp>
 #include <gart/camera/pinhole.hpp>
@@ -35,20 +34,37 @@ class opencv_bounds {
   }
 
   /// The pixels that can hit it, and its near depth; empty where none can.
-  GART_HD footprint operator()(ellipsoid const& e) const {
+  GART_HD footprint operator()(ellipsoid const& e) const { return box_of(e, curved_); }
+  /// As lens_bounds::narrow.
+  GART_HD footprint narrow(ellipsoid const& e, bool& wide) const {
+    return box_of(e, [&](ellipsoid const& same) { return curved_.narrow(same, wide); });
+  }
+
+ private:
+  static constexpr u32 small = 32;  // sides of an image are so many times those of such a box
+
+  template <class Curved>
+  GART_HD footprint box_of(ellipsoid const& e, Curved const& curved_box) const {
     slope_box s;
     footprint out = project(view_, e, s);
-    if (!s.visible) return {};
-    footprint const curved = curved_(e);  // its depth is a distance, which z is at most
+    if (!s.visible || s.u.hi + s.error < u_.lo || s.u.lo - s.error > u_.hi || s.w.hi + s.error < w_.lo ||
+        s.w.lo - s.error > w_.hi)
+      return {};
+    footprint const curved = curved_box(e);
+    if (curved.box.empty()) return {};
+    out.depth = curved.depth > out.depth ? curved.depth : out.depth;  // a distance, which z is at most
+    // From what is seen small the slopes take nothing off.
+    if (small * curved.box.width() < u32(view_.width) && small * curved.box.height() < u32(view_.height)) {
+      out.box = curved.box;
+      return out;
+    }
     pixel_box const a = pixels_of(view_, distorted(s)), &b = curved.box;
     out.box = {a.x0 > b.x0 ? a.x0 : b.x0, a.y0 > b.y0 ? a.y0 : b.y0, a.x1 < b.x1 ? a.x1 : b.x1,
                a.y1 < b.y1 ? a.y1 : b.y1};
     if (out.box.empty()) return {};
-    out.depth = curved.depth > out.depth ? curved.depth : out.depth;
     return out;
   }
 
- private:
   GART_HD slope_box distorted(slope_box const& s) const {
     auto const clamp = [](double v, detail::interval const& to) { return v < to.lo ? to.lo : v > to.hi ? to.hi : v; };
     // What lies outside the view is seen by no pixel; keeping the rectangle to it keeps it where the lens is one to

@@ -1,8 +1,9 @@
 #pragma once
 /// \file
 /// The footprints of all Gaussians in one view: boxes with their place in the LT buffer, near depths, and how many
-/// (primitive, tile) pairs they make. Cost: one launch of double arithmetic over the Gaussians, two prefix sums, and
-/// one read of two totals by the host, from which buffers are sized.
+/// (primitive, tile) pairs they make. Cost: one launch of double arithmetic over the Gaussians, and through a lens
+/// another over what it shows large, two prefix sums, and one read of two totals by the host, from which buffers are
+/// sized.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/camera/models.hpp>
@@ -15,11 +16,10 @@ namespace gart::inline GART_ISA {
 
 namespace tile_kernels {
 
-// Bounds: of a camera model.
-template <class Response, int Size, class Bounds>
+// Bounds: of a camera model. What takes long is left to measure_left.
+template <execution E, class Response, int Size, class Bounds>
 struct measure {
-  // Through a lens few boxes take far longer than most (camera/lens_bounds.hpp), and a block as long as its last.
-  static constexpr int block_size = 64, min_blocks = 1;
+  static constexpr int block_size = 64, min_blocks = 1;  // by larger blocks a pinhole's take twice as long
   gaussians_view<float const> scene;
   Bounds bounds;
   vec3d frame;
@@ -28,15 +28,45 @@ struct measure {
   span<footprint_slots> ranges;
   span<float> depths;
   span<u32> areas, tiles;
+  span<u64> left;   // Gaussians, in no order
+  u64* left_count;  // of these
   GART_KERNEL void operator()(index_t i) const {
-    footprint f = footprint_of<Response>(bounds, load_parameters(scene, i), frame, alpha_min);
+    ellipsoid e;
+    footprint f;
+    bool wide = false;
+    if (ellipsoid_of<Response>(load_parameters(scene, i), frame, alpha_min, e)) {
+      if constexpr (detail::staged_bounds<Bounds>)
+        f = bounds.narrow(e, wide);
+      else
+        f = bounds(e);
+    }
+    if (wide)
+      left[E::atomic_add(left_count, u64{1})] = i;
+    else
+      put(i, f);
+  }
+
+ protected:
+  GART_KERNEL void put(index_t i, footprint f) const {
     if (f.box.y0 < rows.first) f.box.y0 = static_cast<u16>(rows.first);
     if (f.box.y1 > rows.end) f.box.y1 = static_cast<u16>(rows.end);
     if (f.box.empty()) f.box = {}, f.seam = 0;
-    ranges[i].box = f.box, ranges[i].seam = f.seam;
+    ranges[i] = footprint_slots(0, f.box, f.seam);
     depths[i] = f.depth;
     areas[i] = f.box.area();
     tiles[i] = tiles_of<Size>(ranges[i]).area();
+  }
+};
+
+template <execution E, class Response, int Size, class Bounds>
+struct measure_left : measure<E, Response, Size, Bounds> {
+  static constexpr int block_size = 32, min_blocks = 1;
+  static constexpr index_t lanes = 8192;
+  GART_KERNEL void operator()(index_t lane) const {
+    for (u64 k = lane; k < *this->left_count; k += lanes) {
+      index_t const i = static_cast<index_t>(this->left[k]);
+      this->put(i, footprint_of<Response>(this->bounds, load_parameters(this->scene, i), this->frame, this->alpha_min));
+    }
   }
 };
 
@@ -79,9 +109,18 @@ class footprints {
       stage_scope stage(exec, "footprint");
       visit_camera(view, [&](auto const& model) {
         auto const bounds = model.bounds(near);
-        parallel_for(exec, "footprint/measure", n,
-                     tile_kernels::measure<Response, Size, std::remove_const_t<decltype(bounds)>>{
-                         scene, bounds, model.position, alpha_min, rows, ranges_, depths_, areas_, tiles_});
+        using bounds_type = std::remove_const_t<decltype(bounds)>;
+        // What is left lies where the offsets will, and its count where the total will.
+        tile_kernels::measure<E, Response, Size, bounds_type> const kernel{
+            scene,   bounds, model.position, alpha_min,     rows,          ranges_,
+            depths_, areas_, tiles_,         area_offsets_, totals_.data()};
+        constexpr bool staged = detail::staged_bounds<bounds_type>;
+        if constexpr (staged) exec.zero(totals_.data(), sizeof(u64));
+        parallel_for(exec, "footprint/measure", n, kernel);
+        if constexpr (staged) {
+          using rest = tile_kernels::measure_left<E, Response, Size, bounds_type>;
+          parallel_for(exec, "footprint/left", rest::lanes, rest{kernel});
+        }
       });
     }
     stage_scope stage(exec, "scan");
