@@ -72,16 +72,21 @@ struct difference_kernel {
   }
 };
 
-// Tiles of one channel, with a halo of the window's radius. A lane of a device takes one pixel at a time; a host's
-// takes 16, which its compiler puts in vector registers, and its tiles are large: long runs of memory, little halo.
+// Tiles of one channel, with a halo of the window's radius. A lane of a host takes 16 pixels beside each other, which
+// its compiler puts in vector registers, and its tiles are large: long runs of memory, little halo. One of a device
+// takes four: beside each other along rows, below each other down columns, so that neighbouring windows share what they
+// read of shared memory, whose bandwidth these kernels are bound by. It loads one at a time, as memory is read.
 template <execution E>
 struct loss_tiles {
-  static constexpr int block = E::device ? 1 : 16;
+  static constexpr int block = E::device ? 4 : 16, load_block = E::device ? 1 : 16;
+  static constexpr index_t team_size = 128;
   static constexpr int width = E::device ? 32 : 96, height = E::device ? 16 : 32;
   static constexpr int halo_width = width + 2 * ssim_window::radius, halo_height = height + 2 * ssim_window::radius;
-  static constexpr int halo_pitch = (halo_width + block - 1) / block * block;
-  static constexpr int halo_size = halo_pitch * halo_height;
-  static constexpr int rows_size = width * halo_height;
+  static constexpr int load_width = (halo_width + load_block - 1) / load_block * load_block;
+  // A warp of a device takes four rows along rows: pitches of one more than a multiple of four share no bank.
+  static constexpr int halo_pitch = E::device ? load_width / 4 * 4 + 5 : load_width, rows_pitch = width + E::device;
+  static constexpr int halo_size = halo_pitch * halo_height, rows_size = rows_pitch * halo_height;
+  static_assert(halo_pitch >= load_width);
 
   loss_image image;
   GART_HD int across() const { return (image.width + width - 1) / width; }
@@ -100,9 +105,9 @@ struct loss_tiles {
   // f(cell, i, inside) for every cell of the haloed tile; i is its pixel's place in [3][H][W] where it is inside.
   template <class Team, class F>
   GART_HD void each_halo_cell(Team const& team, place const& at, F const& f) const {
-    constexpr int blocks = halo_pitch / block;
+    constexpr int blocks = load_width / load_block;
     team.for_each(blocks * halo_height, [&](index_t item) {
-      int const row = item / blocks, first = item % blocks * block, y = at.y + row - ssim_window::radius;
+      int const row = item / blocks, first = item % blocks * load_block, y = at.y + row - ssim_window::radius;
       int const x = at.x + first - ssim_window::radius;
       bool const row_inside = y >= 0 && y < image.height;
       // In pointer-sized integers, which is what lets a compiler see that neighbours are contiguous.
@@ -110,10 +115,10 @@ struct loss_tiles {
       std::ptrdiff_t const start = at.channel * image.pixels() + static_cast<std::ptrdiff_t>(y) * image.width + x;
       std::ptrdiff_t const cell = row * halo_pitch + first;
       // Most blocks lie inside, and without a question for each cell they are moved as vectors.
-      if (block > 1 && begin == 0 && end >= block)
-        for (std::ptrdiff_t v = 0; v < block; ++v) f(cell + v, start + v, true);
+      if (load_block > 1 && begin == 0 && end >= load_block)
+        for (std::ptrdiff_t v = 0; v < load_block; ++v) f(cell + v, start + v, true);
       else
-        for (std::ptrdiff_t v = 0; v < block; ++v) f(cell + v, start + v, v >= begin && v < end);
+        for (std::ptrdiff_t v = 0; v < load_block; ++v) f(cell + v, start + v, v >= begin && v < end);
     });
   }
 
@@ -130,22 +135,62 @@ struct loss_tiles {
   template <int Tap>
   static constexpr float weight = static_cast<float>(ssim_window::weight(Tap));
 
+  // Windows `step` apart from value to value, of `block` neighbours that lie `next` apart.
   template <int Planes>
-  static GART_HD GART_INLINE void convolve(float const* in, int plane, int step, float (&sums)[Planes][block]) {
-    for (int p = 0; p < Planes; ++p)
-      for (int v = 0; v < block; ++v) sums[p][v] = windowed(in + p * plane + v, step);
+  static GART_HD GART_INLINE void convolve(float const* in, int plane, int step, int next,
+                                           float (&sums)[Planes][block]) {
+    GART_UNROLL
+    for (int p = 0; p < Planes; ++p) {
+      GART_UNROLL
+      for (int v = 0; v < block; ++v) sums[p][v] = windowed(in + p * plane + v * next, step);
+    }
   }
 
-  // Along rows: from haloed planes to planes of `width` by halo_height.
+  // Along rows: from haloed planes to planes of rows_pitch by halo_height.
   template <int Planes, class Team>
   static GART_HD void convolve_rows(Team const& team, float const* halo, float* rows) {
-    team.for_each(rows_size / block, [&](index_t item) {
+    team.for_each(width * halo_height / block, [&](index_t item) {
       int const row = item * block / width, x = item * block % width;
       float sums[Planes][block];
-      convolve<Planes>(halo + row * halo_pitch + x, halo_size, 1, sums);
+      convolve<Planes>(halo + row * halo_pitch + x, halo_size, 1, 1, sums);
       for (int p = 0; p < Planes; ++p)
-        for (int v = 0; v < block; ++v) rows[p * rows_size + row * width + x + v] = sums[p][v];
+        for (int v = 0; v < block; ++v) rows[p * rows_size + row * rows_pitch + x + v] = sums[p][v];
     });
+  }
+
+  // What a lane takes down columns: value v lies at (column, row) + v (dx, dy).
+  static constexpr int dx = !E::device, dy = E::device, items = width * height / block;
+  struct item_place {
+    int column, row;
+  };
+  static GART_HD item_place item_at(index_t item) {
+    if constexpr (E::device) return {static_cast<int>(item % width), static_cast<int>(item / width) * block};
+    return {static_cast<int>(item * block % width), static_cast<int>(item * block / width)};
+  }
+  // From a value to the next where rows are so far apart.
+  static GART_HD constexpr int next(int pitch) { return dx + dy * pitch; }
+  template <int Planes>
+  static GART_HD GART_INLINE void convolve_columns(float const* rows, item_place const& at,
+                                                   float (&sums)[Planes][block]) {
+    convolve<Planes>(rows + at.row * rows_pitch + at.column, rows_size, rows_pitch, next(rows_pitch), sums);
+  }
+  // How many of an item's values lie in the image.
+  GART_HD int inside(int x, int y) const {
+    if (x >= image.width || y >= image.height) return 0;
+    int const left = E::device ? image.height - y : image.width - x;
+    return left < block ? left : block;
+  }
+  // f of each of these; all of them, as mostly, without a question each, and always by numbers known to the compiler.
+  template <class F>
+  static GART_HD GART_INLINE void each_inside(int inside, F const& f) {
+    if (inside == block) {
+      GART_UNROLL
+      for (int v = 0; v < block; ++v) f(v);
+    } else {
+      GART_UNROLL
+      for (int v = 0; v < block; ++v)
+        if (v < inside) f(v);
+    }
   }
 };
 
@@ -170,7 +215,7 @@ struct ssim_kernel {
     scratch& s = team.scratch();
     auto const at = grid(team.tile());
     std::size_t const pixels = grid.image.pixels(), plane = at.channel * pixels;
-    int const image_width = grid.image.width, image_height = grid.image.height;
+    int const image_width = grid.image.width;
 
     grid.each_halo_cell(team, at, [&](std::ptrdiff_t cell, std::ptrdiff_t i, bool inside) {
       float const truth = inside ? centred_truth[i] : -0.5f, d = inside ? difference[i] : 0.0f;
@@ -182,12 +227,14 @@ struct ssim_kernel {
     tiles::template convolve_rows<4>(team, &s.halo[0][0], &s.rows[0][0]);
     team.barrier();
 
-    team.for_each(tiles::height * tiles::width / tiles::block, [&](index_t item) {
-      int const row = item * tiles::block / tiles::width, column = item * tiles::block % tiles::width;
+    team.for_each(tiles::items, [&](index_t item) {
+      auto const [column, row] = tiles::item_at(item);
       float sums[4][tiles::block];
-      tiles::template convolve<4>(&s.rows[0][row * tiles::width + column], tiles::rows_size, tiles::width, sums);
+      tiles::template convolve_columns<4>(&s.rows[0][0], {column, row}, sums);
       float out[3][tiles::block];
-      float const* const d = &s.halo[1][(row + ssim_window::radius) * tiles::halo_pitch + column + ssim_window::radius];
+      float const* const differences =
+          &s.halo[1][(row + ssim_window::radius) * tiles::halo_pitch + column + ssim_window::radius];
+      int const cell = row * tiles::width + column;
       for (int v = 0; v < tiles::block; ++v) {
         float const difference_mean = sums[1][v], centred = sums[0][v] + difference_mean;
         float const mean = centred + 0.5f, truth_mean = sums[0][v] + 0.5f;
@@ -203,22 +250,16 @@ struct ssim_kernel {
         out[1][v] = l * missing_c * inverse_b2;
         out[2][v] = -l * inverse_b2;
         float const error = missing_l + missing_c - missing_l * missing_c;  // 1 - SSIM
-        s.loss[row * tiles::width + column + v] = weight * error + (1.0f - weight) * fabsf(d[v]);
-        s.square[row * tiles::width + column + v] = d[v] * d[v];
+        float const d = differences[v * tiles::next(tiles::halo_pitch)];
+        s.loss[cell + v * tiles::next(tiles::width)] = weight * error + (1.0f - weight) * fabsf(d);
+        s.square[cell + v * tiles::next(tiles::width)] = d * d;
       }
-      int const y = at.y + row, x = at.x + column, left = y < image_height ? image_width - x : 0;
+      int const x = at.x + column, y = at.y + row, inside = grid.inside(x, y);
       float* const to = partials + plane + static_cast<std::size_t>(y) * image_width + x;
-      if (tiles::block > 1 && left >= tiles::block) {
-        for (int p = 0; p < 3; ++p)
-          for (int v = 0; v < tiles::block; ++v) to[p * 3 * pixels + v] = out[p][v];
-        return;
-      }
-      for (int v = 0; v < tiles::block; ++v) {
-        if (v < left)
-          for (int p = 0; p < 3; ++p) to[p * 3 * pixels + v] = out[p][v];
-        else
-          s.loss[row * tiles::width + column + v] = s.square[row * tiles::width + column + v] = 0;
-      }
+      int const next = tiles::next(image_width);
+      for (int p = 0; p < 3; ++p) tiles::each_inside(inside, [&](int v) { to[p * 3 * pixels + v * next] = out[p][v]; });
+      for (int v = inside; v < tiles::block; ++v)
+        s.loss[cell + v * tiles::next(tiles::width)] = s.square[cell + v * tiles::next(tiles::width)] = 0;
     });
     team.barrier();
 
@@ -260,41 +301,41 @@ struct loss_gradient_kernel {
     scratch& s = team.scratch();
     auto const at = grid(team.tile());
     std::size_t const pixels = grid.image.pixels(), plane = at.channel * pixels;
-    int const image_width = grid.image.width, image_height = grid.image.height;
+    int const image_width = grid.image.width;
 
-    for (int p = 0; p < 3; ++p) {
-      float const* const from = partials + p * 3 * pixels;
-      float* const to = s.halo[p];
-      grid.each_halo_cell(
-          team, at, [=](std::ptrdiff_t cell, std::ptrdiff_t i, bool inside) { to[cell] = inside ? from[i] : 0.0f; });
-    }
+    // All three planes at once: as many reads wait for memory together.
+    float const* const from[3] = {partials, partials + 3 * pixels, partials + 6 * pixels};
+    float* const to[3] = {s.halo[0], s.halo[1], s.halo[2]};
+    grid.each_halo_cell(team, at, [=](std::ptrdiff_t cell, std::ptrdiff_t i, bool inside) {
+      for (int p = 0; p < 3; ++p) to[p][cell] = inside ? from[p][i] : 0.0f;
+    });
     team.barrier();
     tiles::template convolve_rows<3>(team, &s.halo[0][0], &s.rows[0][0]);
     team.barrier();
 
     float const share = 1.0f / (3.0f * static_cast<float>(pixels));
-    team.for_each(tiles::height * tiles::width / tiles::block, [&](index_t item) {
-      int const row = item * tiles::block / tiles::width, column = item * tiles::block % tiles::width;
+    team.for_each(tiles::items, [&](index_t item) {
+      auto const [column, row] = tiles::item_at(item);
+      int const x = at.x + column, y = at.y + row, inside = grid.inside(x, y);
+      if (inside == 0) return;
       float sums[3][tiles::block];
-      tiles::template convolve<3>(&s.rows[0][row * tiles::width + column], tiles::rows_size, tiles::width, sums);
-      int const y = at.y + row, x = at.x + column;
-      if (y >= image_height) return;
-      int const inside = image_width - x < tiles::block ? image_width - x : tiles::block;
+      tiles::template convolve_columns<3>(&s.rows[0][0], {column, row}, sums);
       std::size_t const pixel = static_cast<std::size_t>(y) * image_width + x;
+      int const next = tiles::next(image_width);
       float const* const d_row = difference + plane + pixel;
       float const* const truth_row = centred_truth + plane + pixel;
       float out[tiles::block];
-      for (int v = 0; v < inside; ++v) {
-        float const d = d_row[v], value = truth_row[v] + d;
+      tiles::each_inside(inside, [&](int v) {
+        float const d = d_row[v * next], value = truth_row[v * next] + d;
         float const sign = d > 0 ? 1.0f : d < 0 ? -1.0f : d;  // a NaN stays one
         float const structure = sums[0][v] + 2.0f * (value * sums[1][v] + d * sums[2][v]);
         out[v] = ((1.0f - weight) * sign - weight * structure) * share;
-      }
+      });
       // No division: its slow path would cost every training registers. 255 is 1 to the bit.
-      for (int v = 0; v < inside; ++v) {
-        float const kept = mask ? static_cast<float>(mask[pixel + v]) * (1.0f / 255.0f) : 1.0f;
-        gradient[(pixel + v) * 3 + at.channel] = kept > 0 ? kept * out[v] : 0.0f;
-      }
+      tiles::each_inside(inside, [&](int v) {
+        float const kept = mask ? static_cast<float>(mask[pixel + v * next]) * (1.0f / 255.0f) : 1.0f;
+        gradient[(pixel + v * next) * 3 + at.channel] = kept > 0 ? kept * out[v] : 0.0f;
+      });
     });
   }
 };
@@ -322,10 +363,10 @@ class image_loss {
 
     parallel_for(exec, "loss_difference", static_cast<index_t>(grid.image.pixels()),
                  detail::difference_kernel{image.data(), truth, grid.image, truth_plane, difference});
-    parallel_for(exec, "loss_ssim", tile_range{grid.count(), 256},
+    parallel_for(exec, "loss_ssim", tile_range{grid.count(), grid.team_size},
                  detail::ssim_kernel<E>{grid, truth_plane, difference, partials_.data(), tile_loss.data(),
                                         tile_square.data(), ssim_weight});
-    parallel_for(exec, "loss_gradient", tile_range{grid.count(), 256},
+    parallel_for(exec, "loss_gradient", tile_range{grid.count(), grid.team_size},
                  detail::loss_gradient_kernel<E>{grid, truth_plane, difference, partials_.data(), truth.mask,
                                                  gradient.data(), ssim_weight});
     reduce(exec, span<float const>(tile_loss), loss.subspan(0, 1));
