@@ -45,6 +45,7 @@ struct sum_gaussians {
   struct scratch {
     float color[run * pitch], by_color[run * pitch];
     float sum[run * pose_gradient::floats];  // a row a lane
+    u32 seen[run];
   };
 
   gaussians_view<float const> scene, gradients;
@@ -58,6 +59,8 @@ struct sum_gaussians {
     team.barrier();
     for (index_t first = team.tile() * run; first < scene.count; first += teams * run) {
       index_t const count = scene.count - first < run ? scene.count - first : run;
+      team.for_each(count, [&](index_t k) { s.seen[k] = is_seen(first + k); });
+      team.barrier();
       if constexpr (Degree > 0) {
         team.for_each(count * (row / word), [&](index_t k) { load(s, first, k); });
         team.barrier();
@@ -73,7 +76,7 @@ struct sum_gaussians {
   }
 
  private:
-  GART_HD bool seen(index_t i) const {
+  GART_HD bool is_seen(index_t i) const {
     float const* const mean = gradients.mean + std::size_t{3} * i;
     float const* const band = gradients.sh + std::size_t{row} * i;
     return (mean[0] != 0) | (mean[1] != 0) | (mean[2] != 0) | (band[0] != 0) | (band[1] != 0) | (band[2] != 0);
@@ -81,7 +84,7 @@ struct sum_gaussians {
 
   GART_HD void load(scratch& s, index_t first, index_t k) const {
     index_t const lane = k / (row / word), column = k % (row / word) * word;
-    if (!seen(first + lane)) return;
+    if (!s.seen[lane]) return;
     std::size_t const from = std::size_t{row} * (first + lane) + column, to = std::size_t{pitch} * lane + column;
     if constexpr (word == 4) {
       quad const c = *reinterpret_cast<quad const*>(scene.sh + from);
@@ -93,7 +96,7 @@ struct sum_gaussians {
   }
 
   GART_HD void add(scratch& s, index_t i, index_t lane) const {
-    if (!seen(i)) return;
+    if (!s.seen[lane]) return;
     float const* const m = gradients.mean + std::size_t{3} * i;
     float const* const g = gradients.quaternion + std::size_t{4} * i;
     gaussian_parameters const p = load_parameters(scene, i);
