@@ -8,8 +8,8 @@ namespace gart {
 struct pose_options {
   float warm_up = 0.02f;     ///< share of the run in which poses stay as they are, at most 500 steps
   float until = 0.9f;        ///< share of the run at which the rates have come to their last
-  float rate = 2e-3f;        ///< by which the image moves a visit, in radians on the sphere of directions
-  float rate_final = 1e-5f;  ///< where it ends; exponential between
+  float rate = 3e-3f;        ///< by which the image moves a visit, in radians on the sphere of directions
+  float rate_final = 1e-4f;  ///< where it ends; exponential between
   /// What is added to how the image moves (pose/pose_metric.hpp), from and to: at first a view hardly goes where its
   /// image says little, later it does.
   float held = 1.0f, held_final = 1e-3f;
