@@ -193,10 +193,6 @@ class lens_bounds : public lens_image {
     cut(u, x, gx1, gx2, cp, sp), cut(v, y, gy1, gy2, sp, -cp);
   }
 
-  struct corner {
-    vec3d direction{0.0};
-    place at{};
-  };
   // u and v cut by what they are on a polygon about the silhouette f, which is in the plane across w.
   GART_HD void cut_by_polygon(flat_silhouette const& f, vec3d const& e1, vec3d const& e2, vec3d const& w, double error,
                               detail::interval& u, detail::interval& v) const {
@@ -204,34 +200,25 @@ class lens_bounds : public lens_image {
                  l22 = sqrt(left > 0 ? left : 0.0);
     double c = 1 / half_edge_cosine + 1e-9, n = 0;
     detail::interval x, y;
-    auto const corner_at = [&](double along, double beside) -> corner {
-      vec3d d = w + e1 * (f.z1 + l11 * along) + e2 * (f.z2 + l21 * along + l22 * beside);
-      d = d / sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
-      return {d, place_of(d)};
-    };
-    // False where it reaches too far to be bounded.
-    auto const add_edge = [&](corner const& a, corner const& b) {
-      vec3d const step = b.direction - a.direction;
-      double const chord2 = step.x * step.x + step.y * step.y + step.z * step.z;
-      double const arc2 = chord2 * (1 + chord2 / 8),
-                   most = (a.at.theta > b.at.theta ? a.at.theta : b.at.theta) + 0.5 * sqrt(arc2) + error;
-      if (!(most < unfolded() && chord2 < 1.44)) return false;
-      changes_up_to const by = changes(most);
-      double const rest = arc2 / 8 * by.second + error * by.first;
-      for (place const* p : {&a.at, &b.at})
-        x.add(p->x - rest), x.add(p->x + rest), y.add(p->y - rest), y.add(p->y + rest);
-      return true;
-    };
-    // By quarters, four corners at a time: one waits for another's square roots and arcs no more.
-    corner before[4];
+    vec3d before(0.0);
+    place at{};
     GART_NO_UNROLL
-    for (int k = 0; k <= edges / 4; ++k) {
-      corner const now[4] = {corner_at(c, n), corner_at(-n, c), corner_at(-c, -n), corner_at(n, -c)};
-      GART_UNROLL
-      for (int q = 0; q < 4; ++q) {
-        if (k > 0 && !add_edge(before[q], now[q])) return;
-        before[q] = now[q];
+    for (int k = 0; k <= edges; ++k) {
+      vec3d d = w + e1 * (f.z1 + l11 * c) + e2 * (f.z2 + l21 * c + l22 * n);
+      d = d / sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
+      place const p = place_of(d);
+      if (k > 0) {
+        vec3d const step = d - before;
+        double const chord2 = step.x * step.x + step.y * step.y + step.z * step.z;
+        double const arc2 = chord2 * (1 + chord2 / 8),
+                     most = (p.theta > at.theta ? p.theta : at.theta) + 0.5 * sqrt(arc2) + error;
+        if (!(most < unfolded() && chord2 < 1.44)) return;
+        changes_up_to const by = changes(most);
+        double const rest = arc2 / 8 * by.second + error * by.first;
+        x.add(at.x - rest), x.add(at.x + rest), y.add(at.y - rest), y.add(at.y + rest);
+        x.add(p.x - rest), x.add(p.x + rest), y.add(p.y - rest), y.add(p.y + rest);
       }
+      before = d, at = p;
       double const turned = c * edge_cosine - n * edge_sine;
       n = c * edge_sine + n * edge_cosine, c = turned;
     }
