@@ -1,5 +1,5 @@
-// What the templates compute where they are instantiated, as the README shows it: every strategy, SH degrees 0 and 3, and
-// with EVERY_DEGREE 1 and 2 too.
+// What the templates compute where they are instantiated, as the README shows it: every strategy, SH degrees 0 and 3,
+// and with EVERY_DEGREE 1 and 2 too.
 #include "scene.hpp"
 
 #include <gart/gart.hpp>
