@@ -19,7 +19,7 @@ namespace tile_kernels {
 // Bounds: of a camera model. What takes long is left to measure_left.
 template <execution E, class Response, int Size, class Bounds>
 struct measure {
-  static constexpr int block_size = 64, min_blocks = 1;  // by larger blocks a pinhole's take twice as long
+  static constexpr int block_size = 64, min_blocks = 1;  // a block takes as long as the slowest of its boxes
   gaussians_view<float const> scene;
   Bounds bounds;
   vec3d frame;
