@@ -93,19 +93,14 @@ class lens_bounds : public lens_image {
       curve_.most_beside(curve_.after() ? r_hi : q_at(hi), most_u, most_v);
       u = {u.lo - most_u, u.hi + most_u}, v = {v.lo - most_v, v.hi + most_v};
     }
-    if (pixels_of(u, v).empty()) return {};
     cut_by_gradient<Polygon>(s, out.depth, u, v, wide);
     if (wide && !Polygon) return {};
-    out.box = pixels_of(u, v);
+    constexpr double pad = 0.01;
+    out.box = {
+        detail::first_pixel(fx_ * u.lo + cx_ - pad, width_), detail::first_pixel(fy_ * v.lo + cy_ - pad, height_),
+        detail::first_pixel(fx_ * u.hi + cx_ + pad, width_), detail::first_pixel(fy_ * v.hi + cy_ + pad, height_)};
     if (out.box.empty()) return {};
     return out;
-  }
-
-  // Between these, in units of the focal lengths.
-  GART_HD pixel_box pixels_of(detail::interval const& u, detail::interval const& v) const {
-    constexpr double pad = 0.01;
-    return {detail::first_pixel(fx_ * u.lo + cx_ - pad, width_), detail::first_pixel(fy_ * v.lo + cy_ - pad, height_),
-            detail::first_pixel(fx_ * u.hi + cx_ + pad, width_), detail::first_pixel(fy_ * v.hi + cy_ + pad, height_)};
   }
 
   // u and v, in units of the focal lengths, cut by what they are at most by their gradients at the centre.
