@@ -5,12 +5,12 @@ How many lanes the host policies have, and whether a fused multiply-add is one r
 and the library share each inline function and template of one name: where the name does not tell the two apart, one
 runs the other's, and its images are black, or it crashes.
 
-A program trains with the templates of the README (every strategy, SH 0 and 3) beside every configuration of make_renderer and
-make_session. By default: the library that was built here, and one for another instruction set; consumers for none,
+A program trains with the templates of the README (every strategy, SH 0 and 3) beside every configuration of
+make_renderer and make_session. By default: the library that was built here, and one for another instruction set; consumers for none,
 x86-64-v3 and native at -O0, and at -O2 those that are no library's, and nvcc's host code, where there is an nvcc; the
 linker finding the library first, and last.
-GART_TEST_ALL_INSTRUCTION_SETS=1 takes every pair of {none, x86-64-v3, native} at both levels, and SH 0 to 3. One thread, because then
-the sums have one order.
+GART_TEST_ALL_INSTRUCTION_SETS=1 takes every pair of {none, x86-64-v3, native} at both levels, and SH 0 to 3. One thread,
+because then the sums have one order.
 
 Values are compared where a program happens to have them. So the objects for none and for native at -O0, which inlines
 nothing, are also searched for symbols that both have: none may have come out with a fused multiply-add, or with lanes.

@@ -75,7 +75,7 @@ struct difference_kernel {
 // Tiles of one channel, with a halo of the window's radius. A lane of a host takes 16 pixels beside each other, which
 // its compiler puts in vector registers, and its tiles are large: long runs of memory, little halo. One of a device
 // takes four: beside each other along rows, below each other down columns, so that neighbouring windows share what they
-// read of shared memory, whose bandwidth these kernels are bound by. It loads one at a time, as memory is read.
+// read of shared memory. It loads one at a time, as memory is read.
 template <execution E>
 struct loss_tiles {
   static constexpr int block = E::device ? 4 : 16, load_block = E::device ? 1 : 16;
