@@ -104,18 +104,17 @@ GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, ray_
   return hit_moments<Response>(gaussian, r, alpha_gradient, F(0.0f) <= F(0.0f));
 }
 
-/// The same where t has a gradient too; `depth_gradient` is w dL/d depth. With h = b p / 2 + e d_g the second moments
-/// are p h^T + h p^T.
+/// The same where t has a gradient too; `depth_gradient` is w dL/d depth. With v = e d_g and h = b p + v the first
+/// moments are h, the second p h^T + v p^T. d_g is finite, hit or not.
 template <class Response = generalized_gaussian<>, class F, class Mask>
 GART_HD GART_INLINE moments_of<F> hit_moments_with_depth(ray_gaussian const& gaussian, ray_peak_of<F> const& r,
                                                          F alpha_gradient, F depth_gradient, Mask hit) {
   auto const [a, b, p] = detail::terms_of_hit<Response>(gaussian, r, alpha_gradient, hit);
-  F const e = depth_gradient * fast_reciprocal(r.d.x * r.d.x + r.d.y * r.d.y + r.d.z * r.d.z), half = F(0.5f) * b;
-  vec3_of<F> const bp = {half * p.x, half * p.y, half * p.z};
-  vec3_of<F> const h = {bp.x + select(hit, e * r.d.x, F(0.0f)), bp.y + select(hit, e * r.d.y, F(0.0f)),
-                        bp.z + select(hit, e * r.d.z, F(0.0f))};
-  return {{a, bp.x + h.x, bp.y + h.y, bp.z + h.z, (p.x + p.x) * h.x, (p.y + p.y) * h.y, (p.z + p.z) * h.z,
-           p.y * h.z + p.z * h.y, p.x * h.z + p.z * h.x, p.x * h.y + p.y * h.x, 0.0f, 0.0f}};
+  F const e = select(hit, depth_gradient * r.inverse, F(0.0f));
+  vec3_of<F> const v = {e * r.d.x, e * r.d.y, e * r.d.z};
+  vec3_of<F> const h = {b * p.x + v.x, b * p.y + v.y, b * p.z + v.z};
+  return {{a, h.x, h.y, h.z, p.x * (h.x + v.x), p.y * (h.y + v.y), p.z * (h.z + v.z), p.y * h.z + p.z * v.y,
+           p.x * h.z + p.z * v.x, p.x * h.y + p.y * v.x, 0.0f, 0.0f}};
 }
 
 /// M^T v: from the Gaussian's own space to the world, for what is pulled back through M.
@@ -132,7 +131,7 @@ struct ray_part {
 GART_HD GART_INLINE ray_part ray_part_of(ray_gaussian const& g, ray_peak const& r, moments_of<float> const& m,
                                          float by_depth) {
   vec3 const along = to_world(g, m.v[1], m.v[2], m.v[3]), p = offset_of(r);
-  float const e = by_depth * fast_reciprocal(r.d.x * r.d.x + r.d.y * r.d.y + r.d.z * r.d.z);
+  float const e = by_depth * r.inverse;
   return {-along, -r.t * along - to_world(g, e * p.x, e * p.y, e * p.z)};
 }
 

@@ -129,6 +129,7 @@ struct ray_peak_of {
   F d2;          ///< |p|^2 there
   vec3_of<F> c;  ///< o_g x d_g / |d_g|^2
   vec3_of<F> d;  ///< d_g
+  F inverse;     ///< 1 / |d_g|^2
 };
 /// Of one ray.
 using ray_peak = ray_peak_of<float>;
@@ -185,6 +186,7 @@ GART_HD GART_INLINE ray_peak_of<F> ray_peak_of_approach(approach_of<F> const& a,
   ray_peak_of<F> out;
   out.c = {mul(a.c.x, inverse), mul(a.c.y, inverse), mul(a.c.z, inverse)};
   out.d = a.d;
+  out.inverse = inverse;
   out.t = mul(-a.od, inverse);
   out.d2 = mul(a.cc, inverse);
   return out;
