@@ -42,7 +42,7 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
   static constexpr int lanes = 32,                       ///< of a warp
       warps = 4,                                         ///< of a team
       block_size = warps * lanes,                        ///< lanes of a team
-      min_blocks = 5;                                    ///< teams a multiprocessor holds
+      min_blocks = C::terms::depth ? 4 : 5;              ///< teams a multiprocessor holds: with depth five would spill
   static constexpr int bands = base::bands,              ///< SH functions
       sh_stride = base::sh_stride;                       ///< floats of a Gaussian's coefficients
   static constexpr int Size = C::tile_size;              ///< side of a tile, in pixels
