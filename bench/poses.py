@@ -4,8 +4,9 @@
     python3 bench/poses.py --gart build/program/gart --capture lego DIR --iterations 7000 -- --downscale 2
 
 Every camera of a copy of the capture, test views too, is turned by --degrees about an axis drawn at random and shifted
-by --share of the scene's extent in a direction drawn at random. Four trainings: of the capture as it is and of the
-copy, without and with --refine-poses (--runs takes fewer). What is after -- goes to all of them.
+by --share of the scene's extent in a direction drawn at random. Trainings: of the capture as it is and of the
+copy, without and with --refine-poses (--runs takes fewer); disturbed_again trains the copy once more, from the poses
+that disturbed_refined found (--poses). What is after -- goes to all of them.
 
 The result, OUT/poses_NAME.json, has of each its scores, at the capture's poses and aligned, and of the poses that were
 learned how far they are from the undisturbed: rotation in degrees and position in percent of the extent, after the
@@ -27,7 +28,7 @@ import tempfile
 from common import command_line, commit_of, last_line, machine, now, run, write_json
 
 RUNS = {"clean": (False, False), "clean_refined": (False, True), "disturbed": (True, False),
-        "disturbed_refined": (True, True)}
+        "disturbed_refined": (True, True), "disturbed_again": (True, True)}
 
 
 def matmul(a, b):
@@ -195,9 +196,10 @@ def poses_of(path):
         return [([row[:3] for row in c["c2w"][:3]], [row[3] for row in c["c2w"][:3]]) for c in json.load(file)]
 
 
-def train(a, capture, out, refined):
+def train(a, capture, out, refined, poses=None):
     command = [a.gart, "train", capture, "--out", out, "--quiet", "--eval-every", "0", "--iterations", a.iterations,
-               "--test-every", a.test_every] + a.rest + (["--refine-poses"] if refined else [])
+               "--test-every", a.test_every, *a.rest]
+    command += (["--refine-poses"] if refined else []) + (["--poses", poses] if poses else [])
     done = run(command)
     if done.returncode != 0:
         return {"error": last_line(done.stderr)}
@@ -235,7 +237,9 @@ def main():
         for run_name in a.runs.split(","):
             disturbed, refined = RUNS[run_name]
             out = os.path.join(folder, name + "_" + run_name)
-            row = {"run": run_name, **train(a, copy if disturbed else source, out, refined)}
+            before_it = os.path.join(folder, name + "_disturbed_refined", "poses.json")
+            poses = before_it if run_name == "disturbed_again" else None
+            row = {"run": run_name, **train(a, copy if disturbed else source, out, refined, poses)}
             row["poses"] = errors(after if disturbed else before, before, extent)
             if refined and "error" not in row:
                 found = poses_of(os.path.join(out, "poses.json"))

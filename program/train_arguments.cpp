@@ -5,6 +5,8 @@
 #include "train_fields.hpp"
 
 #include <gart/core/version.hpp>
+#include <gart/io/crc32c.hpp>
+#include <gart/io/file.hpp>
 #include <gart/runtime/choose.hpp>
 #include <gart/runtime/presets.hpp>
 
@@ -126,6 +128,9 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       r.add_flag(train, "--refine-poses", a.refine_poses,
                  "Learn the pose of each training view with the Gaussians, for\ncaptures whose poses are a little off; "
                  "test views are then\naligned to their photographs before they are scored"));
+  in_group(r.add(train, "--poses", a.poses, "FILE",
+                 "With --refine-poses: begin at the poses of this camera JSON,\nby the views' names, in place of the "
+                 "capture's. The poses.json of\na run that found them makes a better scene, and better poses"));
   in_group(r.add_flag(train, "--refine-lens", a.refine_lens,
                       "Learn the focal length and the centre of each camera of the\ncapture with the Gaussians, for "
                       "calibrations that are a little\noff; test views are scored through what was learned"));
@@ -320,11 +325,17 @@ gart::train_options train_options_of(train_arguments const& a) {
 }
 
 nlohmann::json config_of(train_arguments const& a, gart::dataset const& data) {
-  return {{"gart", gart::version},
-          {"dataset", fs::absolute(a.dataset).lexically_normal().string()},
-          {"train_views", data.train.size()},
-          {"test_views", data.test.size()},
-          {"options", a.recorded.values()}};
+  nlohmann::json config{{"gart", gart::version},
+                        {"dataset", fs::absolute(a.dataset).lexically_normal().string()},
+                        {"train_views", data.train.size()},
+                        {"test_views", data.test.size()},
+                        {"options", a.recorded.values()}};
+  // A run that goes on must begin at the same: what it has learned is from there.
+  if (!a.poses.empty()) {
+    std::vector<gart::u8> const file = gart::read_file(a.poses);
+    config["poses_checksum"] = gart::crc32c(file.data(), file.size());
+  }
+  return config;
 }
 
 void check_same_dataset(train_arguments const& a, gart::dataset const& data) {
@@ -336,6 +347,9 @@ void check_same_dataset(train_arguments const& a, gart::dataset const& data) {
                       config.value(key, nlohmann::json()).dump() + " (" + a.config_file().string() +
                       "; name the dataset it was started with)");
   }
+  if (now.value("poses_checksum", nlohmann::json()) != config.value("poses_checksum", nlohmann::json()))
+    throw usage_error("--poses " + a.poses + ": is not what the run to be resumed began at (" +
+                      a.config_file().string() + "; put that file back, or start anew without --resume)");
 }
 
 }  // namespace gart_cli

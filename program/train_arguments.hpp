@@ -29,7 +29,8 @@ struct train_arguments {
   double view_share = 0.1;
 
   // What follows decides the result and is recorded.
-  std::string backend = "auto", tracer = "auto", backward = "auto", densify = "error", background = "auto", start;
+  std::string backend = "auto", tracer = "auto", backward = "auto", densify = "error", background = "auto", start,
+              poses;
   std::string arithmetic = "exact", lt_format = "auto";
   std::string preset = "exact";
   gart::train_options defaults;

@@ -5,6 +5,7 @@
 #include "output.hpp"
 #include "ranks.hpp"
 
+#include <gart/io/placed_views.hpp>
 #include <gart/runtime/degree_selection.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/train/memory_need.hpp>
@@ -41,6 +42,7 @@ void training_run::prepare() {
   if (a_.resume) continue_run(a_);
   share_out();
   if (a_.dataset.empty()) throw usage_error("DATASET is missing (see gart train --help)");
+  check_poses();
   configuration_ = gart::resolve(request());  // what is not there is known before images are read
   course_ = course_of(a_);
   load();
@@ -92,6 +94,18 @@ void training_run::prepare() {
   say_choices();
   say_.note(a_.backend + " backend, " + a_.tracer + " tracer, " + configuration_.backward + " backward pass");
   load_seconds_ = loading.seconds();
+}
+
+// What is said of --poses; recorded as a whole path, since a run may be resumed from anywhere.
+void training_run::check_poses() {
+  if (a_.poses.empty()) return;
+  if (!a_.refine_poses)
+    throw usage_error("--poses " + a_.poses +
+                      ": needs --refine-poses, which also aligns the test views before they are scored");
+  a_.poses = fs::absolute(a_.poses).lexically_normal().string();
+  if (!a_.resume && a_.poses == fs::absolute(a_.out / "poses.json").lexically_normal())
+    throw usage_error("--poses " + a_.poses +
+                      ": is of the run in --out, which the run replaces (choose another --out)");
 }
 
 // A step among the ranks there are.
@@ -158,6 +172,7 @@ void training_run::load() {
     throw gart::io_error(a_.dataset.string(), "has no training views",
                          "raise --test-every, which keeps views for testing");
   }
+  if (!a_.poses.empty()) gart::place_training_views(data_, a_.poses);
   say_.note(data_.format + " capture: " + std::to_string(data_.train.size()) + " training views, " +
             std::to_string(data_.test.size()) + " test views (" + data_.split + "), " + image_size() + ", " +
             with_commas(data_.points.size()) + " points");

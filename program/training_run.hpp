@@ -54,6 +54,7 @@ class training_run {
  private:
   // Before the first step (training_run.cpp).
   void prepare();
+  void check_poses();
   void share_out();
   gart::configuration_request request() const;
   gart::row_owners owners() const;

@@ -49,6 +49,7 @@ TEST_CASE("train has every option that is promised, with its default") {
                              "--quiet",
                              "--points",
                              "--start",
+                             "--poses",
                              "--adam",
                              "--threads",
                              "(default: 30000)",
