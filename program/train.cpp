@@ -16,7 +16,7 @@ void add_train(CLI::App& app, command& selected) {
       "  model.ply         the Gaussians, as other viewers read them\n"
       "  exposures.json    with --exposure: of each training view, for gart render and gart eval\n"
       "  poses.json        with --refine-poses or --refine-lens: the training views' cameras as learned, for\n"
-      "                    gart render;\n"
+      "                    gart render and --poses;\n"
       "  poses_test.json   and the test views', aligned to their photographs where poses are learned\n"
       "  report.html       one page: scores, curves, test views with their errors, where time and memory went\n"
       "  metrics.json      the same in figures\n"
