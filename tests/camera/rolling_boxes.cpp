@@ -147,20 +147,21 @@ std::optional<seen_box> seen_by_lines(moving_case const& c) {
 }
 
 // Around the silhouette: a point of it is seen in the line that is read as it crosses that, which a few rounds find. To
-// a fraction of a pixel, and much faster: for means over many.
+// a fraction of a pixel, and much faster: for means over many. None where they do not: it then moves with the lines.
 std::optional<seen_box> seen_around(moving_case const& c) {
   constexpr int around = 96;
   double lo = 1e300, hi = -1e300, first = 1e300, last = -1e300, level = 0.5 * c.lines(), before[2] = {}, now[2];
   std::vector<std::optional<silhouette>> of_line(static_cast<std::size_t>(c.lines()));
   for (int k = 0; k <= around; ++k) {
-    for (int round = 0; round < 10; ++round) {
+    bool settled = false;
+    for (int round = 0; round < 10 && !settled; ++round) {
       int const line = std::clamp(static_cast<int>(level), 0, c.lines() - 1);
       auto& s = of_line[static_cast<std::size_t>(line)];
       if (!s) s = silhouette::of(c, line + 0.5);
       if (!s || !s->image_of(c, 2 * pi * k / around, now)) return {};
-      level = now[1];
-      if (std::abs(level - line - 0.5) < 1) break;
+      level = now[1], settled = std::abs(level - line - 0.5) < 1;
     }
+    if (!settled) return {};
     if (k > 0 && silhouette::over_seam(c, before, now)) return {};
     before[0] = now[0], before[1] = now[1];
     lo = std::min(lo, now[0]), hi = std::max(hi, now[0]), first = std::min(first, now[1]),
