@@ -103,7 +103,8 @@ void training_run::check_poses() {
     throw usage_error("--poses " + a_.poses +
                       ": needs --refine-poses, which also aligns the test views before they are scored");
   a_.poses = fs::absolute(a_.poses).lexically_normal().string();
-  if (!a_.resume && a_.poses == fs::absolute(a_.out / "poses.json").lexically_normal())
+  std::error_code not_there;
+  if (!a_.resume && fs::equivalent(a_.poses, a_.out / "poses.json", not_there))
     throw usage_error("--poses " + a_.poses +
                       ": is of the run in --out, which the run replaces (choose another --out)");
 }

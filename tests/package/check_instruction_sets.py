@@ -6,9 +6,9 @@ and the library share each inline function and template of one name: where the n
 runs the other's, and its images are black, or it crashes.
 
 A program trains with the templates of the README (every strategy, SH 0 and 3) beside every configuration of
-make_renderer and make_session. By default: the library that was built here, and one for another instruction set; consumers for none,
-x86-64-v3 and native at -O0, and at -O2 those that are no library's, and nvcc's host code, where there is an nvcc; the
-linker finding the library first, and last.
+make_renderer and make_session. By default: the library that was built here, and one for another instruction set;
+consumers for none, x86-64-v3 and native at -O0, and at -O2 those that are no library's, and nvcc's host code, where
+there is an nvcc; the linker finding the library first, and last.
 GART_TEST_ALL_INSTRUCTION_SETS=1 takes every pair of {none, x86-64-v3, native} at both levels, and SH 0 to 3. One thread,
 because then the sums have one order.
 
