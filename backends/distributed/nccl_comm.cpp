@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nccl.h>
@@ -51,6 +52,9 @@ struct nccl_comm::state {
   device_transport transport = device_transport::host;
   int device = 0, sharers = 1;
   pinned out, in;
+  cudaStream_t stream = nullptr;                    // NCCL's
+  cudaEvent_t queued = nullptr, arrived = nullptr;  // before a group, on the policy's stream; after it, on NCCL's
+  bool under_way = false;
 
   state() = default;
   state(state const&) = delete;
@@ -59,6 +63,7 @@ struct nccl_comm::state {
     if (!comm) return;
     cudaSetDevice(device);
     ncclCommDestroy(comm);
+    cudaEventDestroy(queued), cudaEventDestroy(arrived), cudaStreamDestroy(stream);
   }
 };
 
@@ -100,13 +105,25 @@ nccl_comm::nccl_comm(mpi_comm ranks, int device, device_transport transport)
   ncclUniqueId id{};
   if (rank() == 0) check_nccl(ncclGetUniqueId(&id), "making an id for the ranks");
   ranks_.broadcast(&id, sizeof id, 0);
+  int least = 0, most = 0;  // messages go before what could wait
+  detail::check_cuda(cudaDeviceGetStreamPriorityRange(&least, &most), "reading a device's properties");
+  detail::check_cuda(cudaStreamCreateWithPriority(&s.stream, cudaStreamNonBlocking, most), "making a stream");
+  for (cudaEvent_t* event : {&s.queued, &s.arrived})
+    detail::check_cuda(cudaEventCreateWithFlags(event, cudaEventDisableTiming), "making an event");
   check_nccl(ncclCommInitRank(&s.comm, size(), id, rank()), "connecting the ranks' GPUs");
 }
 
 int nccl_comm::sharers() const { return state_->sharers; }
 device_transport nccl_comm::transport() const { return state_->transport; }
 
-void nccl_comm::exchange(cuda_exec& exec, span<message const> sends, span<message const> receives) {
+void nccl_comm::finish(cuda_exec& exec) {
+  state& s = *state_;
+  if (!std::exchange(s.under_way, false)) return;
+  detail::check_cuda(cudaStreamWaitEvent(static_cast<cudaStream_t>(exec.stream()), s.arrived), "waiting for messages");
+}
+
+void nccl_comm::begin(cuda_exec& exec, span<message const> sends, span<message const> receives) {
+  finish(exec);
   state& s = *state_;
   exec.make_current();
   cudaStream_t const stream = static_cast<cudaStream_t>(exec.stream());
@@ -128,12 +145,16 @@ void nccl_comm::exchange(cuda_exec& exec, span<message const> sends, span<messag
   }
   if (s.comm) {
     if (to_others[0].empty() && to_others[1].empty()) return;
+    detail::check_cuda(cudaEventRecord(s.queued, stream), "exchanging messages");
+    detail::check_cuda(cudaStreamWaitEvent(s.stream, s.queued), "exchanging messages");
     check_nccl(ncclGroupStart(), "grouping messages", s.comm);
     for (message const& m : to_others[0])
-      check_nccl(ncclSend(m.data, m.bytes, ncclUint8, m.rank, s.comm, stream), "sending", s.comm);
+      check_nccl(ncclSend(m.data, m.bytes, ncclUint8, m.rank, s.comm, s.stream), "sending", s.comm);
     for (message const& m : to_others[1])
-      check_nccl(ncclRecv(m.data, m.bytes, ncclUint8, m.rank, s.comm, stream), "receiving", s.comm);
+      check_nccl(ncclRecv(m.data, m.bytes, ncclUint8, m.rank, s.comm, s.stream), "receiving", s.comm);
     check_nccl(ncclGroupEnd(), "exchanging messages", s.comm);
+    detail::check_cuda(cudaEventRecord(s.arrived, s.stream), "exchanging messages");
+    s.under_way = true;
     return;
   }
   char* const places[2] = {s.out.room(total(to_others[0])), s.in.room(total(to_others[1]))};

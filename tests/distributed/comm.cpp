@@ -35,6 +35,21 @@ void check(Comm comm) {
   for (int r = 0; r < size; ++r)
     for (u32 const word : in[static_cast<std::size_t>(r)].to_host()) CHECK(word == static_cast<u32>(100 * r + rank));
 
+  // Beside the queue: what is queued after finish has what was sent, and a second group ends the first.
+  for (std::size_t k = 0; k < n; ++k) in[k].zero();
+  comm.begin(exec, {sends.data(), n}, {receives.data(), n});
+  comm.finish(exec);
+  buffer<u32, exec_type> copied(exec, n);
+  for (std::size_t k = 0; k < n; ++k) exec.copy(copied.data() + k, in[k].data() + k, sizeof(u32));
+  auto const firsts = copied.to_host();
+  for (std::size_t k = 0; k < n; ++k) CHECK(firsts[k] == static_cast<u32>(100 * k) + static_cast<u32>(rank));
+  for (std::size_t k = 0; k < n; ++k) in[k].zero();
+  for (int time = 0; time < 2; ++time) comm.begin(exec, {sends.data(), n}, {receives.data(), n});
+  comm.finish(exec);
+  comm.finish(exec);  // nothing is under way
+  for (int r = 0; r < size; ++r)
+    for (u32 const word : in[static_cast<std::size_t>(r)].to_host()) CHECK(word == static_cast<u32>(100 * r + rank));
+
   // Two messages between the same ranks arrive in their order.
   u32 const first = static_cast<u32>(rank), second = first + 1000;
   u32 got[2] = {};

@@ -7,6 +7,10 @@
 ///   int sharers();                    ranks that have their memory from where this one has it, with it
 ///   exchange(exec, sends, receives)   point-to-point messages as one group, in the memory of the policy, on its queue;
 ///                                     messages between two ranks arrive in the order of the lists; one to itself too
+///   begin(exec, sends, receives)      the same beside the queue: after what was queued before it, along with what is
+///                                     queued after it, which must leave its memory alone until
+///   finish(exec)                      what is queued after this comes after the group that began last. One at a time:
+///                                     begin and exchange finish what has begun
 ///   exchange(sends, receives)         the same in host memory, waited for
 ///   all_gather(mine, all, bytes)      `bytes` of each rank, in the order of ranks, to all
 ///   all_reduce(values)                element by element the sum over ranks, added in the order of ranks: the same
@@ -47,6 +51,8 @@ concept communicator = execution<E> && std::copyable<C> &&
   { k.size() } -> std::same_as<int>;
   { k.sharers() } -> std::same_as<int>;
   c.exchange(exec, messages, messages);
+  c.begin(exec, messages, messages);
+  c.finish(exec);
   c.exchange(messages, messages);
   c.all_gather(mine, all, bytes);
   c.all_reduce(numbers);

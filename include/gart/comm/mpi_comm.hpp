@@ -43,6 +43,15 @@ class mpi_comm {
     static_assert(!E::device, "mpi_comm's messages are of host memory");
     exchange(sends, receives);
   }
+  ///@{
+  /// At once: there is nothing beside the queue.
+  template <execution E>
+  void begin(E& exec, span<message const> sends, span<message const> receives) {
+    exchange(exec, sends, receives);
+  }
+  template <execution E>
+  void finish(E&) {}
+  ///@}
   /// Grouped; returns when all have arrived.
   void exchange(span<message const> sends, span<message const> receives);
   /// `bytes` of each.

@@ -1,7 +1,8 @@
 #pragma once
 /// \file
-/// Ranks that each compute on a GPU: messages of device memory by NCCL, on the policy's stream, and everything small by
-/// MPI, which also started the ranks. Compiled into gart::nccl; a program needs no header of NCCL or MPI.
+/// Ranks that each compute on a GPU: messages of device memory by NCCL, on a stream of its own that waits for the
+/// policy's and is waited for, and everything small by MPI, which also started the ranks. Compiled into gart::nccl; a
+/// program needs no header of NCCL or MPI.
 ///
 ///   mpi_comm ranks;
 ///   cuda_exec exec(nccl_comm::device_of(ranks));
@@ -45,8 +46,13 @@ class nccl_comm {
   /// The version of NCCL, as "2.28.9".
   static std::string version();
 
-  /// On the policy's stream; by the host, returns when all have arrived.
-  void exchange(cuda_exec& exec, span<message const> sends, span<message const> receives);
+  /// In the policy's order; by the host, returns when all have arrived.
+  void exchange(cuda_exec& exec, span<message const> sends, span<message const> receives) {
+    begin(exec, sends, receives), finish(exec);
+  }
+  /// Beside the policy's stream; by the host, as exchange.
+  void begin(cuda_exec& exec, span<message const> sends, span<message const> receives);
+  void finish(cuda_exec& exec);  ///< the policy's stream waits for it
   /// Of host memory.
   void exchange(span<message const> sends, span<message const> receives) { ranks_.exchange(sends, receives); }
   /// `bytes` of each, of host memory.

@@ -25,6 +25,15 @@ class self_comm {
       if (to.bytes) exec.copy(to.data, from.data, to.bytes);
     });
   }
+  ///@{
+  /// At once.
+  template <execution E>
+  void begin(E& exec, span<message const> sends, span<message const> receives) {
+    exchange(exec, sends, receives);
+  }
+  template <execution E>
+  void finish(E&) {}
+  ///@}
   /// In host memory.
   void exchange(span<message const> sends, span<message const> receives) {
     each_pair(sends, receives, [](message const& from, message const& to) {

@@ -47,31 +47,45 @@ GART_HD inline bool is_alive(gaussians_view<float const> const& g, index_t row, 
 
 namespace detail {
 
-template <class Body>
+// Width: 0 where it is not known when compiled, which costs a division an element.
+template <class Body, index_t Width>
 struct row_kernel {
   static constexpr index_t rows_per_tile = 64;
   struct scratch {};
   Body body;
-  index_t rows, width;
+  index_t rows, given_width;
 
   GART_KERNEL void operator()(auto const& team) const {
+    index_t const width = Width ? Width : given_width;
     index_t const first = team.tile() * rows_per_tile;
     index_t const count = rows - first < rows_per_tile ? rows - first : rows_per_tile;
     team.for_each(count * width, [&](index_t e) { body(first + e / width, e % width); });
   }
 };
 
-}  // namespace detail
-
-/// body(row, column) for every element of `rows` rows of `width`; a tile of rows at a time, so that the count of
-/// elements may pass 2^32.
-template <execution E, class Body>
-void for_each_column(E& exec, char const* label, index_t rows, index_t width, Body const& body) {
+template <index_t Width, execution E, class Body>
+void launch_rows(E& exec, char const* label, index_t rows, index_t width, Body const& body) {
   if (rows == 0) return;
-  using kernel = detail::row_kernel<Body>;
+  using kernel = row_kernel<Body, Width>;
   index_t const tiles = rows / kernel::rows_per_tile + (rows % kernel::rows_per_tile != 0);
   parallel_for(exec, label, tile_range{tiles, 256}, kernel{body, rows, width});
 }
+
+}  // namespace detail
+
+///@{
+/// body(row, column) for every element of `rows` rows of `width`, known when compiled or not; a tile of rows at a time,
+/// so that the count of elements may pass 2^32.
+template <execution E, class Body>
+void for_each_column(E& exec, char const* label, index_t rows, index_t width, Body const& body) {
+  detail::launch_rows<0>(exec, label, rows, width, body);
+}
+template <index_t Width, execution E, class Body>
+void for_each_column(E& exec, char const* label, index_t rows, Body const& body) {
+  static_assert(Width > 0);
+  detail::launch_rows<Width>(exec, label, rows, Width, body);
+}
+///@}
 /// The same of Gaussians of that degree.
 template <execution E, class Body>
 void for_each_element(E& exec, char const* label, index_t rows, int sh_degree, Body const& body) {

@@ -6,30 +6,31 @@
 ///   row_exchange<E, Comm, 8, 3, response> rows(exec, comm, block);
 ///   rows.fetch(scene, views, options);       // `scene`: the rows of this rank
 ///   frame.prepare(rows.scene(), views[rows.unit().view], options of rows.unit().rows);
+///   rows.finish_fetch();                     // what was queued may go on without colours, what is next has them
 ///   ...                                      // the image, its gradient, sum_gradients
 ///   rows.give_back(pass, sh_gradient);       // what this rank has summed
-///   rows.sum_colors(0, views, share, sh_gradient, false);  // of the rows of this rank, over all that traced them
-///   rows.sum_moments(v, moments);                          // for each view
+///   rows.sum_moments(v, moments);            // for each view, of the rows of this rank, over all that traced them
+///   rows.sum_colors(0, views, share, sh_gradient, false);  // last, since they arrive last
 ///
 /// An owner finds the boxes of its rows in each view, and sends a row to those whose tiles a box meets. What arrives is
 /// put in the order of the Gaussians' numbers, so that lists, ties and images have the bits of one rank that has all.
+/// Four fifths of what travels are colours and their gradients: they travel while lists are made, and while the owner
+/// finishes the gradients of geometry.
 /// Sums are added in the order of ranks. With sums in a fixed order (a strategy that is `ordered`) they also have the
 /// bits of one rank: where a Gaussian's pairs begin in an earlier strip, the pairs travel one by one, and its owner
 /// goes on adding where the earlier strip's sum ends.
 ///
 /// Traffic a row and unit: 4 (row width + 1) bytes out, up to a multiple of 16, and 4 (3 K + 12) back: 240 both ways at
 /// degree 3; ordered, as much again for each pair of a row that began above. Memory: 16 bytes a row of this rank's and
-/// view, 4 a row and unit, these buffers, and the rows that arrived. Errors: out_of_memory.
+/// view, 12 a row and unit, these buffers, and the rows that arrived. The host waits once, for how many rows go to
+/// whom. Errors: out_of_memory.
 
 #include <gart/algorithm/exclusive_scan.hpp>
-#include <gart/algorithm/sort_pairs.hpp>
 #include <gart/backward/backward.hpp>
 #include <gart/render/antialiased.hpp>
 #include <gart/shard/row_exchange_kernels.hpp>
 #include <gart/shard/sharded_rows.hpp>
 #include <gart/shard/work_units.hpp>
-
-#include <bit>
 
 namespace gart::inline GART_ISA {
 
@@ -46,42 +47,57 @@ class row_exchange {
         filter_(exec),
         scene_(exec, 0, ShDegree),
         cost_(exec),
-        flags_(exec),
+        place_of_(exec),
         list_(exec),
         sent_pairs_(exec),
-        place_of_(exec),
         returned_(exec),
-        ids_(exec),
+        runs_(exec),
         order_(exec),
         counts_(exec),
         places_(exec),
         total_(exec, 1),
+        ends_(exec),
         out_(exec),
         in_(exec),
+        colors_out_(exec),
+        colors_in_(exec),
         pairs_out_(exec),
         pairs_in_(exec) {}
 
-  /// The rows of the round's views, at most one a rank; the same on all ranks.
+  /// The rows of the round's views, at most one a rank; the same on all ranks. Without their colours (finish_fetch).
   void fetch(gaussians_view<float const> scene, std::vector<camera> const& views, render_options const& options) {
     stage_scope stage(*exec_, "exchange/rows");
+    comm_.finish(*exec_);
     measure(scene, views, options);
     select(scene.count);
-    std::vector<u64> const received = send_counts();
-    index_t const own = row_width(ShDegree), width = detail::travelling_width(own);
-    std::size_t const leave = sent_.total(), arrive = std::accumulate(received.begin(), received.end(), std::size_t{0});
-    received_ = received;
-    out_.resize(leave * width), in_.resize(arrive * width);
-    for_each_column(*exec_, "exchange/pack", static_cast<index_t>(leave), width / 4,
-                    detail::pack_body{scene, owners_, list_.data(), out_.data(), own, width});
-    traffic_ += width * sizeof(float) * (leave - sent_.counts[static_cast<std::size_t>(owners_.rank)]);
-    comm_.exchange(*exec_, as_span(messages_of(sent_.counts, out_.data(), width * sizeof(float))),
-                   as_span(messages_of(received, in_.data(), width * sizeof(float))));
-    ids_.resize(arrive), order_.resize(arrive), scene_.resize_keep(arrive);
-    index_t const n = static_cast<index_t>(arrive);
-    parallel_for(*exec_, "exchange/ids", n, detail::ids_kernel{in_.data(), width, ids_.data(), order_.data()});
-    if (owners_.ranks > 1) sort_pairs(*exec_, ids_.view(), order_.view(), bits_of_ids(scene.count));
-    for_each_column(*exec_, "exchange/unpack", n, width / 4,
-                    detail::unpack_body{scene_.view(), in_.data(), own, width, order_.data()});
+    received_ = send_counts();
+    std::size_t const leave = total(sent_), arrive = total(received_);
+    index_t const leaving = static_cast<index_t>(leave), arriving = static_cast<index_t>(arrive);
+    out_.resize(leave * detail::placing_width), in_.resize(arrive * detail::placing_width);
+    colors_out_.resize(leave * colors_width), colors_in_.resize(arrive * colors_width);
+    scene_.resize_keep(arrive);
+    for_each_column<detail::placing_width / 4>(
+        *exec_, "exchange/pack", leaving,
+        detail::pack_placing_body{scene, owners_, list_.data(),
+                                  way<detail::placing_width>(sent_, out_.data(), received_, in_.data())});
+    begin(messages(sent_, out_.data(), detail::placing_width), messages(received_, in_.data(), detail::placing_width));
+    for_each_column<colors_width / 4>(
+        *exec_, "exchange/pack", leaving,
+        detail::pack_colors_body<coefficients>{
+            scene.sh, list_.data(), way<colors_width>(sent_, colors_out_.data(), received_, colors_in_.data())});
+    comm_.finish(*exec_);
+    begin(messages(sent_, colors_out_.data(), colors_width), messages(received_, colors_in_.data(), colors_width));
+    put_in_order(arriving, scene.count);
+    for_each_column<detail::placing_width / 4>(*exec_, "exchange/unpack", arriving,
+                                               detail::unpack_placing_body{scene_.view(), in_.data(), order_.data()});
+  }
+  /// Their colours. Every rank calls it, with a unit to trace or without.
+  void finish_fetch() {
+    stage_scope stage(*exec_, "exchange/rows");
+    comm_.finish(*exec_);
+    for_each_column<colors_width / 4>(
+        *exec_, "exchange/unpack", scene_.size(),
+        detail::unpack_colors_body<coefficients>{scene_.sh.data(), colors_in_.data(), order_.data()});
   }
 
   /// What this rank traces.
@@ -115,40 +131,54 @@ class row_exchange {
   void give_back(Pass const& pass, float const* sh_gradient) {
     static_assert(!Pass::records || Pass::tile_size == Size);
     stage_scope stage(*exec_, "exchange/gradients");
-    index_t const n = scene_.size();
-    out_.resize(std::size_t{n} * sums);
-    for_each_column(
-        *exec_, "exchange/pack", n, layout::width,
-        detail::pack_sums_body<coefficients>{layout::pieces(sh_gradient), layout::pieces(pass.moments().data()),
-                                             order_.data(), layout::pieces(out_.data())});
     if constexpr (Pass::ordered) pack_pairs(pass);
-    return_sums(Pass::ordered);
+    return_sums(Pass::ordered, pass.moments().data(), sh_gradient);
   }
   /// The same of a rank that has traced nothing.
   void give_nothing_back(bool ordered) {
-    out_.resize(0), pairs_out_.resize(0), pairs_leaving_.assign(static_cast<std::size_t>(owners_.ranks), 0);
-    return_sums(ordered);
+    stage_scope stage(*exec_, "exchange/gradients");
+    pairs_out_.resize(0), pairs_leaving_.assign(units_.size(), 0);
+    return_sums(ordered, nullptr, nullptr);
   }
 
   /// Of this rank's rows the colours' gradients, [rows][K][3]: the sum over the views [first, end) of the round, and
   /// of what is there if it `adds`, times `share`.
   void sum_colors(int first, int end, float share, span<float> sh_gradient, bool adds) {
-    add_sums(first, end, 0, layout::coefficients, share, sh_gradient, adds);
+    comm_.finish(*exec_);
+    add_sums<0, layout::coefficients>(first, end, colors_in_, share, sh_gradient, adds);
   }
   /// Their moments, [rows][moment_stride], over all pixels of the round's view v.
   void sum_moments(int v, span<float> moments) {
-    add_sums(v, v + 1, layout::coefficients, layout::moments, 1, moments, false);
+    add_sums<layout::coefficients, layout::moments>(v, v + 1, in_, 1, moments, false);
   }
 
  private:
-  static constexpr index_t coefficients = 3 * sh_basis<ShDegree>::size, sums = coefficients + moment_stride;
+  static constexpr index_t coefficients = 3 * sh_basis<ShDegree>::size, sums = coefficients + moment_stride,
+                           colors_width = detail::colors_width(coefficients);
   using layout = detail::sums_layout<coefficients>;
+  using piece = typename layout::piece;
 
-  // What goes to each rank: its part of list_.
-  struct parts {
-    std::vector<u64> counts;
-    u64 total() const { return std::accumulate(counts.begin(), counts.end(), u64{0}); }
-  };
+  static u64 total(std::vector<u64> const& counts) { return std::accumulate(counts.begin(), counts.end(), u64{0}); }
+
+  // Rows of `width` floats, so many to each rank, or from it. What stays here is none: it is where it arrives.
+  std::vector<message> messages(std::vector<u64> const& counts, void* data, std::size_t width) const {
+    std::vector<message> all = messages_of(counts, data, width * sizeof(float));
+    std::erase_if(all, [&](message const& m) { return m.rank == owners_.rank; });
+    return all;
+  }
+  // Where they are written before they leave.
+  template <index_t Width, class T>
+  detail::way_out<T, Width> way(std::vector<u64> const& leave, T* out, std::vector<u64> const& arrive, T* in) const {
+    auto const me = static_cast<std::ptrdiff_t>(owners_.rank);
+    auto const before = [&](std::vector<u64> const& counts) {
+      return std::accumulate(counts.begin(), counts.begin() + me, u64{0});
+    };
+    return {out, in, before(leave), leave[static_cast<std::size_t>(me)], before(arrive)};
+  }
+  void begin(std::vector<message> const& sends, std::vector<message> const& receives) {
+    for (message const& m : sends) traffic_ += m.rank == owners_.rank ? 0 : m.bytes;
+    comm_.begin(*exec_, as_span(sends), as_span(receives));
+  }
 
   // The boxes of this rank's rows in each view, and from all ranks' who traces what. A view that one rank traces alone
   // needs no cost.
@@ -191,56 +221,75 @@ class row_exchange {
     }
   }
 
-  // Which rows go to whom.
+  // Which rows go to whom: one scan over the units, for one wait.
   void select(index_t rows) {
-    sent_.counts.assign(units_.size(), 0);
-    flags_.resize(rows), places_.resize(rows), place_of_.resize(rows * units_.size());
-    list_.resize(0), sent_pairs_.resize(0);
+    std::size_t const units = units_.size(), all = rows * units;
+    sent_.assign(units, 0), returned_views_.clear();
+    place_of_.resize(all), places_.resize(all + 1), ends_.resize(units + 1);
+    std::vector<u64> ends(units + 1, 0);
+    if (rows) {
+      for (std::size_t r = 0; r < units; ++r)
+        parallel_for(*exec_, "exchange/select", rows,
+                     detail::select_kernel{boxes_of(r), units_[r].rows, place_of_.data() + r * rows});
+      exclusive_scan(*exec_, span<u32 const>(place_of_), places_.view().subspan(0, all),
+                     places_.view().subspan(all, 1));
+      parallel_for(*exec_, "exchange/select", static_cast<index_t>(units + 1),
+                   detail::unit_ends_kernel{places_.data(), rows, ends_.data()});
+      exec_->copy_out(ends.data(), ends_.data(), ends.size() * sizeof(u64));
+    }
+    list_.resize(ends.back()), sent_pairs_.resize(ends.back());
     std::vector<detail::returned_unit> returned;
-    u64 at = 0;
-    for (std::size_t r = 0; r < units_.size(); ++r) {
+    for (std::size_t r = 0; r < units; ++r) {
       work_unit const& u = units_[r];
       if (u.empty() || rows == 0) continue;
       u32* const place_of = place_of_.data() + r * rows;
-      auto const& boxes = boxes_[static_cast<std::size_t>(u.view)];
-      parallel_for(*exec_, "exchange/select", rows, detail::select_kernel{boxes.data(), u.rows, flags_.data()});
-      exclusive_scan(*exec_, span<u32 const>(flags_), places_.view(), total_.view());
-      u64 const count = total_.front();
-      list_.resize_keep(at + count), sent_pairs_.resize_keep(at + count);
       parallel_for(*exec_, "exchange/list", rows,
-                   detail::list_kernel<Size>{boxes.data(), u.rows, flags_.data(), places_.data(), list_.data() + at,
-                                             sent_pairs_.data() + at, place_of});
-      returned.push_back({u.view, at, place_of});
-      sent_.counts[r] = count, at += count;
+                   detail::list_kernel<Size>{boxes_of(r), u.rows, places_.data() + r * rows, ends[r], list_.data(),
+                                             sent_pairs_.data(), place_of});
+      returned.push_back({u.view, ends[r], place_of}), returned_views_.push_back(u.view);
+      sent_[r] = ends[r + 1] - ends[r];
     }
-    returned_views_.clear();
-    for (detail::returned_unit const& u : returned) returned_views_.push_back(u.view);
     returned_.assign(returned);
   }
-
-  // Bits of a Gaussian's number, where this rank has so many rows: others have at most a block more.
-  int bits_of_ids(index_t rows) const {
-    u64 const blocks = (u64{rows} + owners_.block - 1) / owners_.block + 1;
-    return std::min(32, static_cast<int>(std::bit_width(blocks * owners_.block * static_cast<u64>(owners_.ranks) - 1)));
+  footprint_slots const* boxes_of(std::size_t unit) const {
+    return boxes_[static_cast<std::size_t>(units_[unit].view)].data();
   }
 
-  // Pieces [from, from + width) of what has come back.
-  void add_sums(int first, int end, index_t from, index_t width, float share, span<float> out, bool adds) {
+  // What came, by the Gaussians' numbers: order_ of `n` rows. Where this rank has so many rows others have at most a
+  // block more.
+  void put_in_order(index_t n, index_t rows) {
+    order_.resize(n);
+    std::size_t const mine = (u64{rows} + owners_.block - 1) / owners_.block + 1,
+                      blocks = mine * static_cast<std::size_t>(owners_.ranks);
+    runs_.resize(3 * blocks), places_.resize(blocks);
+    runs_.zero();
+    u32 *const first = runs_.data(), *const past = first + blocks, *const lengths = past + blocks;
+    detail::runs_kernel const runs{in_.data(), n, owners_.block, first, past};
+    parallel_for(*exec_, "exchange/order", n, runs);
+    parallel_for(*exec_, "exchange/order", static_cast<index_t>(blocks),
+                 detail::run_lengths_kernel{first, past, lengths});
+    exclusive_scan(*exec_, span<u32 const>(lengths, blocks), places_.view());
+    parallel_for(*exec_, "exchange/order", n, detail::run_order_kernel{runs, places_.data(), order_.data()});
+  }
+
+  // Of one kind, Width pieces a row, which are those from From on in pairs.
+  template <index_t From, index_t Width>
+  void add_sums(int first, int end, buffer<float, E> const& in, float share, span<float> out, bool adds) {
     stage_scope stage(*exec_, "exchange/gradients");
     auto const begin = std::lower_bound(returned_views_.begin(), returned_views_.end(), first),
                past = std::lower_bound(begin, returned_views_.end(), end);
-    for_each_column(*exec_, "exchange/add", static_cast<index_t>(out.size() / (width * layout::lane)), width,
-                    detail::add_sums_body<coefficients>{
-                        returned_.data() + (begin - returned_views_.begin()), static_cast<index_t>(past - begin), from,
-                        width, layout::pieces(in_.data()), ordered_ ? places_.data() : nullptr, sent_pairs_.data(),
-                        layout::pieces(pairs_in_.data()), layout::pieces(out.data()), adds, share});
+    for_each_column<Width>(*exec_, "exchange/add", static_cast<index_t>(out.size() / (Width * layout::lane)),
+                           detail::add_sums_body<coefficients, From, Width>{
+                               returned_.data() + (begin - returned_views_.begin()), static_cast<index_t>(past - begin),
+                               layout::pieces(in.data()), ordered_ ? places_.data() : nullptr, sent_pairs_.data(),
+                               layout::pieces(pairs_in_.data()), layout::pieces(out.data()), adds, share});
   }
 
   // What each rank has for this one.
   std::vector<u64> send_counts() {
     std::size_t const ranks = units_.size(), me = static_cast<std::size_t>(owners_.rank);
     std::vector<u64> all(ranks * ranks), mine(ranks);
-    comm_.all_gather(sent_.counts.data(), all.data(), ranks * sizeof(u64));
+    comm_.all_gather(sent_.data(), all.data(), ranks * sizeof(u64));
     for (std::size_t r = 0; r < ranks; ++r) mine[r] = all[r * ranks + me];
     return mine;
   }
@@ -278,20 +327,33 @@ class row_exchange {
     return out;
   }
 
-  // The way back of what came.
-  void return_sums(bool ordered) {
+  // The way back of what came: the sums of this rank's unit, if it has traced one.
+  void return_sums(bool ordered, float const* moments, float const* sh_gradient) {
     ordered_ = ordered;
-    in_.resize(sent_.total() * sums);
-    std::vector<message> sends = messages_of(received_, out_.data(), sums * sizeof(float)),
-                         receives = messages_of(sent_.counts, in_.data(), sums * sizeof(float));
+    index_t const n = moments ? scene_.size() : 0;
+    std::size_t const leave = total(received_), arrive = total(sent_);
+    out_.resize(leave * moment_stride), in_.resize(arrive * moment_stride);
+    colors_out_.resize(leave * coefficients), colors_in_.resize(arrive * coefficients);
+    auto const pack = [&]<index_t Width>(std::integral_constant<index_t, Width>, float const* from,
+                                         buffer<float, E>& out, buffer<float, E>& in) {
+      for_each_column<Width>(*exec_, "exchange/pack", n,
+                             detail::pack_sums_body<piece, Width>{
+                                 layout::pieces(from), order_.data(),
+                                 way<Width>(received_, layout::pieces(out.data()), sent_, layout::pieces(in.data()))});
+    };
+    pack(std::integral_constant<index_t, layout::moments>{}, moments, out_, in_);
+    std::vector<message> sends = messages(received_, out_.data(), moment_stride),
+                         receives = messages(sent_, in_.data(), moment_stride);
     if (ordered) {
-      std::vector<u64> const arriving = in_parts(span<u32 const>(sent_pairs_).subspan(0, sent_.total()), sent_.counts);
-      pairs_in_.resize(std::accumulate(arriving.begin(), arriving.end(), u64{0}) * sums);
+      std::vector<u64> const arriving = in_parts(span<u32 const>(sent_pairs_), sent_);
+      pairs_in_.resize(total(arriving) * sums);
       for (message const& m : messages_of(pairs_leaving_, pairs_out_.data(), sums * sizeof(float))) sends.push_back(m);
       for (message const& m : messages_of(arriving, pairs_in_.data(), sums * sizeof(float))) receives.push_back(m);
     }
-    for (message const& m : sends) traffic_ += m.rank == owners_.rank ? 0 : m.bytes;
-    comm_.exchange(*exec_, as_span(sends), as_span(receives));
+    begin(sends, receives);
+    pack(std::integral_constant<index_t, layout::coefficients>{}, sh_gradient, colors_out_, colors_in_);
+    comm_.finish(*exec_);
+    begin(messages(received_, colors_out_.data(), coefficients), messages(sent_, colors_in_.data(), coefficients));
   }
 
   E* exec_;
@@ -301,16 +363,15 @@ class row_exchange {
   gaussians<E> scene_;
   std::vector<buffer<footprint_slots, E>> boxes_;  // of this rank's rows, by view
   std::vector<work_unit> units_;
-  parts sent_;
-  std::vector<u64> received_, pairs_leaving_;
+  std::vector<u64> sent_, received_, pairs_leaving_;  // by rank
   buffer<u64, E> cost_;
-  buffer<u32, E> flags_, list_, sent_pairs_;  // list_: rows of this rank's, by who they went to
-  buffer<u32, E> place_of_;                   // of each row in each unit
+  buffer<u32, E> place_of_;           // of each row in each unit
+  buffer<u32, E> list_, sent_pairs_;  // list_: rows of this rank's, by who they went to
   buffer<detail::returned_unit, E> returned_;
-  std::vector<int> returned_views_;      // their views
-  buffer<u32, E> ids_, order_, counts_;  // order_: where each row of scene_ lay in what came
-  buffer<u64, E> places_, total_;
-  buffer<float, E> out_, in_, pairs_out_, pairs_in_;
+  std::vector<int> returned_views_;       // their views
+  buffer<u32, E> runs_, order_, counts_;  // order_: where each row of scene_ lay in what came
+  buffer<u64, E> places_, total_, ends_;
+  buffer<float, E> out_, in_, colors_out_, colors_in_, pairs_out_, pairs_in_;
   bool ordered_ = false;
   u64 traffic_ = 0;
 };

@@ -59,61 +59,128 @@ GART_HD inline u32 continued_pairs(footprint_slots range, image_rows const& rows
 // What a row that does not go to a unit has for its place among those that do.
 inline constexpr u32 not_sent = ~u32{0};
 
+// The k-th count of what lies before each unit, and of all.
+struct unit_ends_kernel {
+  u64 const* places;
+  index_t rows;
+  u64* ends;
+  GART_KERNEL void operator()(index_t k) const { ends[k] = places[std::size_t{k} * rows]; }
+};
+
+// Of one unit, whose rows begin at `first` of all that leave. place_of is its flags, and becomes their places.
 template <int Size>
 struct list_kernel {
   footprint_slots const* boxes;
   image_rows rows;
-  u32 const* flags;
   u64 const* places;
+  u64 first;
   u32 *list, *pairs, *place_of;
   GART_KERNEL void operator()(index_t i) const {
-    place_of[i] = flags[i] ? static_cast<u32>(places[i]) : not_sent;
-    if (!flags[i]) return;
-    list[places[i]] = i, pairs[places[i]] = continued_pairs<Size>(boxes[i], rows);
+    bool const goes = place_of[i];
+    place_of[i] = goes ? static_cast<u32>(places[i] - first) : not_sent;
+    if (goes) list[places[i]] = i, pairs[places[i]] = continued_pairs<Size>(boxes[i], rows);
   }
 };
 
-// Floats of a row as it travels, a multiple of four: the Gaussian's own, in the order of their table, and its number
-// last.
-constexpr index_t travelling_width(index_t own) { return (own + 1 + 3) / 4 * 4; }
+// A row travels in two parts: what a Gaussian's place and tiles come from, with its number last, and its colours. A
+// rank that has the first can make its lists while the second is under way.
+inline constexpr index_t placing_columns = geometry_columns + 1, placing_width = placing_columns + 1;
+static_assert(placing_width % 4 == 0);
+// Floats of the colours as they travel.
+constexpr index_t colors_width(index_t coefficients) { return (coefficients + 3) / 4 * 4; }
+
+// Where the k-th row of those that leave is written, of `Width` T: those that stay here, to where they arrive.
+template <class T, index_t Width>
+struct way_out {
+  T *out, *in;
+  u64 first, count, arrive;  // of those that stay: the first that leaves, how many, where the first arrives
+  GART_HD T* row(u64 k) const { return k - first < count ? in + (arrive + (k - first)) * Width : out + k * Width; }
+};
 
 // Rows, four columns a lane: by single ones the loads in flight bound it, not the bandwidth.
-struct pack_body {
+struct pack_placing_body {
   gaussians_view<float const> scene;
   row_owners owners;
   u32 const* list;
-  float* out;
-  index_t own, width;  // floats of a row, and of one that travels
+  way_out<float, placing_width> to;
   GART_KERNEL void operator()(index_t k, index_t four) const {
     index_t const row = list[k];
-    quad to;
+    quad values;
     for (index_t c = 0; c < 4; ++c) {
       index_t const column = 4 * four + c;
-      to.v[c] = column < own          ? row_element(scene, row, column)
-                : column + 1 == width ? bits_to_float(static_cast<u32>(owners.global(row)))
-                                      : 0.0f;
+      values.v[c] = column < placing_columns ? row_element(scene, row, column)
+                                             : bits_to_float(static_cast<u32>(owners.global(row)));
     }
-    *reinterpret_cast<quad*>(out + std::size_t{k} * width + 4 * four) = to;
+    *reinterpret_cast<quad*>(to.row(k) + 4 * four) = values;
   }
 };
 
-struct ids_kernel {
+template <index_t Coefficients>
+struct pack_colors_body {
+  float const* sh;
+  u32 const* list;
+  way_out<float, colors_width(Coefficients)> to;
+  GART_KERNEL void operator()(index_t k, index_t four) const {
+    float const* const from = sh + std::size_t{list[k]} * Coefficients;
+    quad values;
+    for (index_t c = 0; c < 4; ++c) values.v[c] = 4 * four + c < Coefficients ? from[4 * four + c] : 0.0f;
+    *reinterpret_cast<quad*>(to.row(k) + 4 * four) = values;
+  }
+};
+
+// What arrives is in the order of ranks, and of each rank in that of the Gaussians' numbers: a run for each block of
+// them, whose first and past-the-last places these are. Both are zero where nothing of a block has come.
+struct runs_kernel {
   float const* in;
-  index_t width;
-  u32 *ids, *order;
+  index_t count, block;
+  u32 *first, *past;
   GART_KERNEL void operator()(index_t k) const {
-    ids[k] = float_to_bits(in[std::size_t{k} * width + width - 1]), order[k] = k;
+    u32 const mine = block_of(k);
+    if (k == 0 || block_of(k - 1) != mine) first[mine] = k;
+    if (k + 1 == count || block_of(k + 1) != mine) past[mine] = k + 1;
+  }
+  GART_HD u32 block_of(index_t k) const {
+    return float_to_bits(in[std::size_t{k} * placing_width + placing_columns]) / block;
   }
 };
 
-struct unpack_body {
+struct run_lengths_kernel {
+  u32 const *first, *past;
+  u32* lengths;
+  GART_KERNEL void operator()(index_t b) const { lengths[b] = past[b] - first[b]; }
+};
+
+// The order of the numbers: runs in that of their blocks.
+struct run_order_kernel {
+  runs_kernel runs;
+  u64 const* begin;  // of each block's run, in that order
+  u32* order;
+  GART_KERNEL void operator()(index_t k) const {
+    u32 const mine = runs.block_of(k);
+    order[begin[mine] + (k - runs.first[mine])] = k;
+  }
+};
+
+struct unpack_placing_body {
   gaussians_view<float> scene;
   float const* in;
-  index_t own, width;  // as above
   u32 const* order;
   GART_KERNEL void operator()(index_t k, index_t four) const {
-    auto const from = *reinterpret_cast<quad const*>(in + std::size_t{order[k]} * width + 4 * four);
-    for (index_t c = 0; c < 4 && 4 * four + c < own; ++c) row_element(scene, k, 4 * four + c) = from.v[c];
+    auto const from = *reinterpret_cast<quad const*>(in + std::size_t{order[k]} * placing_width + 4 * four);
+    for (index_t c = 0; c < 4 && 4 * four + c < placing_columns; ++c) row_element(scene, k, 4 * four + c) = from.v[c];
+  }
+};
+
+template <index_t Coefficients>
+struct unpack_colors_body {
+  float* sh;
+  float const* in;
+  u32 const* order;
+  GART_KERNEL void operator()(index_t k, index_t four) const {
+    auto const from =
+        *reinterpret_cast<quad const*>(in + std::size_t{order[k]} * colors_width(Coefficients) + 4 * four);
+    for (index_t c = 0; c < 4 && 4 * four + c < Coefficients; ++c)
+      sh[std::size_t{k} * Coefficients + 4 * four + c] = from.v[c];
   }
 };
 
@@ -132,16 +199,14 @@ struct sums_layout {
   static piece* pieces(float* p) { return reinterpret_cast<piece*>(p); }
 };
 
-template <index_t Coefficients>
+// Of either kind, `Width` pieces a row.
+template <class Piece, index_t Width>
 struct pack_sums_body {
-  using layout = sums_layout<Coefficients>;
-  typename layout::piece const *sh_gradient, *moments;
+  Piece const* sums;
   u32 const* order;
-  typename layout::piece* out;
+  way_out<Piece, Width> to;
   GART_KERNEL void operator()(index_t k, index_t column) const {
-    out[std::size_t{order[k]} * layout::width + column] =
-        column < layout::coefficients ? sh_gradient[std::size_t{k} * layout::coefficients + column]
-                                      : moments[std::size_t{k} * layout::moments + (column - layout::coefficients)];
+    to.row(order[k])[column] = sums[std::size_t{k} * Width + column];
   }
 };
 
@@ -181,14 +246,14 @@ struct returned_unit {
   u32 const* place_of;  // of each row of this rank's, in the unit
 };
 
-// Pieces [from, from + width) of a row's sums: over the ranks that traced a view, in their order, or their pairs one
-// after another; and over views. Rows that no unit has had are zero.
-template <index_t Coefficients>
+// One kind of a row's sums, `Width` pieces, which in pairs are those from `From` on: over the ranks that traced a view,
+// in their order, or their pairs one after another; and over views. Rows that no unit has had are zero.
+template <index_t Coefficients, index_t From, index_t Width>
 struct add_sums_body {
   using layout = sums_layout<Coefficients>;
   using piece = typename layout::piece;
   returned_unit const* units;
-  index_t count, from, width;
+  index_t count;
   piece const* in;
   u64 const* places;  // of the pairs of each; null where sums have no fixed order
   u32 const* pairs;
@@ -197,7 +262,7 @@ struct add_sums_body {
   bool adds;    // to what is there
   float share;  // what the sum is multiplied by
   GART_KERNEL void operator()(index_t row, index_t column) const {
-    piece& to = out[std::size_t{row} * width + column];
+    piece& to = out[std::size_t{row} * Width + column];
     piece total = adds ? to : piece{}, view{};
     auto const add = [](piece& sum, piece const& x) {
       for (index_t c = 0; c < layout::lane; ++c) sum.v[c] += x.v[c];
@@ -208,9 +273,9 @@ struct add_sums_body {
       if (place == not_sent) continue;
       u64 const k = units[u].first + place;
       if (!places || pairs[k] == 0)
-        add(view, in[k * layout::width + from + column]);
+        add(view, in[k * Width + column]);
       else
-        for (u32 p = 0; p < pairs[k]; ++p) add(view, pairs_in[(places[k] + p) * layout::width + from + column]);
+        for (u32 p = 0; p < pairs[k]; ++p) add(view, pairs_in[(places[k] + p) * layout::width + From + column]);
     }
     add(total, view);
     for (index_t c = 0; c < layout::lane; ++c) total.v[c] *= share;

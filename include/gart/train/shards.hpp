@@ -46,6 +46,7 @@ struct shards {
   gaussians<E> view_gradients,       ///< of this rank's rows, by one view of a batch
       unit_gradients;                ///< what this rank has summed of its unit: .sh alone is used
   buffer<float, E> moments;          ///< of this rank's rows, by one view
+  span<float const> by_exposure;     ///< what its exposure makes of the loss of the image that was traced last
   u64 sent = 0;                      ///< bytes to other ranks since the run began
 
   /// `block`: Gaussians that stay together.

@@ -171,7 +171,8 @@ class basic_trainer {
   step_report step_in_ranks(loss_function<E> const& loss) requires(!Comm::alone);
   void trace_unit(loss_function<E> const& loss, camera const& seen, int image, int degree, image_result& result,
                   step_report& report) requires(!Comm::alone);
-  void gather_results(span<image_result> round, bool metrics) requires(!Comm::alone);
+  void read_result(image_result& result, bool metric, bool lens) requires(!Comm::alone);
+  void collect_results(span<image_result> round, bool metrics, bool lens) requires(!Comm::alone);
   void take_gradients(std::vector<camera> const& views, int image, span<image_result> round,
                       bool moves) requires(!Comm::alone);
   rendered render_in_ranks(camera const& view, vec3 background) requires(!Comm::alone);

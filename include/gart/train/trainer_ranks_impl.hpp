@@ -48,7 +48,7 @@ template <execution E, class Traits, class Tracer, strategy Strategy, class Comm
 step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss_function<E> const& loss) requires(
     !Comm::alone) {
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
-  learning_rates rates = rates_of_step();
+  learning_rates const rates = rates_of_step();
   int const ranks = comm_.size(), batch = options_.batch, before = step_;
   bool const moves = learns_poses(), bends = learns_lenses();
   std::vector<image_result> images(static_cast<std::size_t>(batch));  // of the step, in their order
@@ -67,12 +67,21 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
     shards_.round.fetch(std::as_const(scene_).view(), cameras, render_options_of(options_, data_.extent));
     int const mine = shards_.round.unit().view;
     trace_unit(loss, cameras[static_cast<std::size_t>(mine)], done + mine, degree, round.data()[mine], report);
-    gather_results(round, moves);
     take_gradients(cameras, done, round, moves);
     done += views;
+    if (done < batch) collect_results(round, moves, bends);
   }
   shards_.sent += shards_.round.take_traffic();
   step_ += batch;
+  float const haste = std::sqrt(static_cast<float>(batch));
+  learning_rates hasty = rates;
+  if (batch > 1)
+    for (float* rate : {&hasty.mean, &hasty.log_scale, &hasty.quaternion, &hasty.opacity, &hasty.sh_dc, &hasty.sh_rest})
+      *rate *= haste;
+  optimize(hasty, degree, shards_.rows);
+  // Read when all is queued: a device that waits for its host to read has nothing to do.
+  std::size_t const last = static_cast<std::size_t>((batch - 1) / ranks * ranks);
+  collect_results(span<image_result>(images).subspan(last, images.size() - last), moves, bends);
   // From what each image said of the exposures, poses and lenses that the step began with, whoever traced it.
   for (int k = 0; k < batch; ++k) {
     image_result const& image = images[static_cast<std::size_t>(k)];
@@ -80,11 +89,6 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
     if (moves) poses_->step(image.view, image.by_pose, before + k, options_.iterations);
     if (bends) lenses_->step(image.view, lens_gradient(image.by_lens), before + k, options_.iterations);
   }
-  float const haste = std::sqrt(static_cast<float>(batch));
-  if (batch > 1)
-    for (float* rate : {&rates.mean, &rates.log_scale, &rates.quaternion, &rates.opacity, &rates.sh_dc, &rates.sh_rest})
-      *rate *= haste;
-  optimize(rates, degree, shards_.rows);
 
   report.step = step_, report.gaussians = total_, report.view = data_.train[images.back().view].name;
   if (finite_) {
@@ -136,28 +140,19 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
     loss(loss_input<E>{exec_, view, truth, seen.width, seen.height, shown, color_gradient_, value_.view().subspan(0, 2),
                        depth});
     if (grows_by_error()) error_map(exec_, shown, truth, error_map_);
-    if (exposures_)
-      exec_.copy_out(result.by_exposure, exposures_->differentiate(index, color_, color_gradient_).data(),
-                     sizeof result.by_exposure);
-    exec_.copy_out(&result.loss, value_.data(), sizeof(float));
-    exec_.copy_out(&result.mean_square, value_.data() + 1, sizeof(float));
-    if constexpr (has_depth<Strategy>) {
-      result.loss += supervision_.value();
-      if (measures) result.metric = poses_->metric_of(index, supervision_.depth(), supervision_.transmittance());
-    } else if (measures) {
-      result.metric = poses_->metric_of(index, depth_.to_host(), transmittance_.to_host());
-    }
+    if (exposures_) shards_.by_exposure = exposures_->differentiate(index, color_, color_gradient_);
   };
   if (unit.empty()) {
+    shards_.round.finish_fetch();
     by_image();
-    if (bends)
-      by_lens_.of_others(pixels, by_lens, share), exec_.copy_out(result.by_lens, by_lens.data(), sizeof result.by_lens);
+    if (bends) by_lens_.of_others(pixels, by_lens, share);
     shards_.round.give_nothing_back(Strategy::ordered);
     return;
   }
   render_options render = render_options_of(options_, data_.extent, background);
   render.rows = unit.rows;
   frame_.prepare(shards_.round.scene(), seen, render, degree);
+  shards_.round.finish_fetch();
   gaussians<E>& sums = shards_.unit_gradients;
   sums.resize_keep(shards_.round.scene().count);
   passes_.with_room(frame_, options_.lt_budget, [&]<class Pass>(Pass& pass) {
@@ -172,16 +167,39 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
       lt_bytes_ = std::max(lt_bytes_, pass.lt_bytes()), report.backward = Pass::strategy_type::name;
     }
   });
-  if (bends) exec_.copy_out(result.by_lens, by_lens.data(), sizeof result.by_lens);
 }
 
-// What the first rank of each of the round's views has found, to all.
+// What this rank has found of the image that it traced last.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::gather_results(span<image_result> round,
-                                                                      bool metrics) requires(!Comm::alone) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_result(image_result& result, bool metric,
+                                                                   bool lens) requires(!Comm::alone) {
+  float values[2];
+  exec_.copy_out(values, value_.data(), sizeof values);
+  result.loss = values[0], result.mean_square = values[1];
+  if (exposures_) exec_.copy_out(result.by_exposure, shards_.by_exposure.data(), sizeof result.by_exposure);
+  if (lens) exec_.copy_out(result.by_lens, value_.data() + 2 + pose_gradient::floats, sizeof result.by_lens);
+  bool const measures = metric && poses_->wants_metric(result.view);
+  if constexpr (has_depth<Strategy>) {
+    result.loss += supervision_.value();
+    if (measures) result.metric = poses_->metric_of(result.view, supervision_.depth(), supervision_.transmittance());
+  } else if (measures) {
+    result.metric = poses_->metric_of(result.view, depth_.to_host(), transmittance_.to_host());
+  }
+}
+
+// What the first rank of each of the round's views has found, to all; by_pose all have.
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::collect_results(span<image_result> round, bool metrics,
+                                                                       bool lens) requires(!Comm::alone) {
+  image_result& mine = round.data()[shards_.round.unit().view];
+  read_result(mine, metrics, lens);
   std::vector<image_result> all(static_cast<std::size_t>(comm_.size()));
-  comm_.all_gather(&round.data()[shards_.round.unit().view], all.data(), sizeof(image_result));
-  for (std::size_t rank = all.size(); rank-- > 0;) round.data()[shards_.round.units()[rank].view] = all[rank];
+  comm_.all_gather(&mine, all.data(), sizeof(image_result));
+  for (std::size_t rank = all.size(); rank-- > 0;) {
+    image_result& to = round.data()[shards_.round.units()[rank].view];
+    pose_gradient const by_pose = to.by_pose;
+    to = all[rank], to.by_pose = by_pose;
+  }
   for (std::size_t v = 0; metrics && v < round.size(); ++v) {
     image_result const& found = round.data()[v];
     if (poses_->wants_metric(found.view)) poses_->set_metric(found.view, found.metric);
@@ -201,7 +219,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(std::vecto
   };
   gradients_.resize_keep(n), shards_.moments.resize(std::size_t{moment_stride} * n), shards_.prepared.resize(n);
   if (options_.batch > 1) shards_.view_gradients.resize_keep(n);
-  if (!moves) shards_.round.sum_colors(0, count, share_after(image + count), gradients_.sh.view(), image > 0);
+  bool const adds = image > 0;
   auto const scene = std::as_const(scene_).view();
   for (int v = 0; v < count; ++v, ++image) {
     camera const& view = views[static_cast<std::size_t>(v)];
@@ -226,6 +244,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(std::vecto
       for_each_column(exec_, "batch/add", n, moves ? row_width(sh_degree) : geometry_columns + 1,
                       train_kernels::add_gradients_body{gradients_.view(), to.view(), share_after(image + 1)});
   }
+  // Last: they arrive last.
+  if (!moves) shards_.round.sum_colors(0, count, share_after(image), gradients_.sh.view(), adds);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -235,11 +255,13 @@ rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_in_ranks(camer
   auto& round = shards_.round;
   round.fetch(std::as_const(scene_).view(), {view}, render);
   render.rows = round.unit().rows;
+  bool const traces = !round.unit().empty();
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
   buffer<float, E> color(exec_, 3 * pixels), transmittance(exec_, pixels), depth(exec_, pixels);
   buffer<u32, E> hits(exec_, pixels);
-  if (!round.unit().empty()) {
-    frame_.prepare(round.scene(), view, render);
+  if (traces) frame_.prepare(round.scene(), view, render);
+  round.finish_fetch();
+  if (traces) {
     frame_.render({color.data(), transmittance.data(), depth.data(), hits.data()});
   }
   round.share_image(color.data(), view, 3 * sizeof(float)),
