@@ -8,14 +8,15 @@
 ///   frame.prepare(rows.scene(), views[rows.unit().view], options of rows.unit().rows);
 ///   rows.finish_fetch();                     // what was queued may go on without colours, what is next has them
 ///   ...                                      // the image, its gradient, sum_gradients
-///   rows.give_back(pass, sh_gradient);       // what this rank has summed
+///   rows.give_back(pass, gradients);         // what this rank has summed
 ///   rows.sum_moments(v, moments);            // for each view, of the rows of this rank, over all that traced them
 ///   rows.sum_colors(0, views, share, sh_gradient, false);  // last, since they arrive last
 ///
 /// An owner finds the boxes of its rows in each view, and sends a row to those whose tiles a box meets. What arrives is
 /// put in the order of the Gaussians' numbers, so that lists, ties and images have the bits of one rank that has all.
 /// Four fifths of what travels are colours and their gradients: they travel while lists are made, and while the owner
-/// finishes the gradients of geometry.
+/// finishes the gradients of geometry. Where one rank traces each view, it finishes them itself, for the rows that its
+/// view shows, and they travel in the moments' place (finishes).
 /// Sums are added in the order of ranks. With sums in a fixed order (a strategy that is `ordered`) they also have the
 /// bits of one rank: where a Gaussian's pairs begin in an earlier strip, the pairs travel one by one, and its owner
 /// goes on adding where the earlier strip's sum ends.
@@ -126,19 +127,21 @@ class row_exchange {
     comm_.exchange(*exec_, as_span(sends), as_span(receives));
   }
 
-  /// What the pass has summed over this rank's strip; sh_gradient is [rows][K][3].
+  /// Whether each rank traces a whole view, and finishes its gradients: sum_moments then has these (detail::finished).
+  bool finishes() const { return finishes_; }
+  /// What the pass has summed over this rank's strip: gradients.sh, and of a whole view all of the gradients.
   template <class Pass>
-  void give_back(Pass const& pass, float const* sh_gradient) {
+  void give_back(Pass const& pass, gaussians_view<float const> gradients) {
     static_assert(!Pass::records || Pass::tile_size == Size);
     stage_scope stage(*exec_, "exchange/gradients");
     if constexpr (Pass::ordered) pack_pairs(pass);
-    return_sums(Pass::ordered, pass.moments().data(), sh_gradient);
+    return_sums(Pass::ordered, pass.moments().data(), gradients);
   }
   /// The same of a rank that has traced nothing.
   void give_nothing_back(bool ordered) {
     stage_scope stage(*exec_, "exchange/gradients");
     pairs_out_.resize(0), pairs_leaving_.assign(units_.size(), 0);
-    return_sums(ordered, nullptr, nullptr);
+    return_sums(ordered, nullptr, {});
   }
 
   /// Of this rank's rows the colours' gradients, [rows][K][3]: the sum over the views [first, end) of the round, and
@@ -147,7 +150,7 @@ class row_exchange {
     comm_.finish(*exec_);
     add_sums<0, layout::coefficients>(first, end, colors_in_, share, sh_gradient, adds);
   }
-  /// Their moments, [rows][moment_stride], over all pixels of the round's view v.
+  /// Their moments, [rows][moment_stride], over all pixels of the round's view v; or what finishes() says.
   void sum_moments(int v, span<float> moments) {
     add_sums<layout::coefficients, layout::moments>(v, v + 1, in_, 1, moments, false);
   }
@@ -184,6 +187,7 @@ class row_exchange {
   // needs no cost.
   void measure(gaussians_view<float const> scene, std::vector<camera> const& views, render_options const& options) {
     bool const shared = views.size() < static_cast<std::size_t>(owners_.ranks);
+    finishes_ = !shared;
     constexpr index_t counted = 1 << 16;  // rows of a rank, about, that tell the cost of a view's strips
     index_t const every = shared ? 1 + scene.count / counted : 0;
     std::vector<std::vector<u64>> costs;
@@ -328,20 +332,19 @@ class row_exchange {
   }
 
   // The way back of what came: the sums of this rank's unit, if it has traced one.
-  void return_sums(bool ordered, float const* moments, float const* sh_gradient) {
+  void return_sums(bool ordered, float const* moments, gaussians_view<float const> gradients) {
     ordered_ = ordered;
     index_t const n = moments ? scene_.size() : 0;
     std::size_t const leave = total(received_), arrive = total(sent_);
     out_.resize(leave * moment_stride), in_.resize(arrive * moment_stride);
     colors_out_.resize(leave * coefficients), colors_in_.resize(arrive * coefficients);
-    auto const pack = [&]<index_t Width>(std::integral_constant<index_t, Width>, float const* from,
-                                         buffer<float, E>& out, buffer<float, E>& in) {
-      for_each_column<Width>(*exec_, "exchange/pack", n,
-                             detail::pack_sums_body<piece, Width>{
-                                 layout::pieces(from), order_.data(),
-                                 way<Width>(received_, layout::pieces(out.data()), sent_, layout::pieces(in.data()))});
-    };
-    pack(std::integral_constant<index_t, layout::moments>{}, moments, out_, in_);
+    if (finishes_)
+      for_each_column<moment_stride / 4>(
+          *exec_, "exchange/pack", n,
+          detail::pack_finished_body{gradients, moments, order_.data(),
+                                     way<moment_stride>(received_, out_.data(), sent_, in_.data())});
+    else
+      pack_sums<layout::moments>(n, moments, out_, in_);
     std::vector<message> sends = messages(received_, out_.data(), moment_stride),
                          receives = messages(sent_, in_.data(), moment_stride);
     if (ordered) {
@@ -351,9 +354,17 @@ class row_exchange {
       for (message const& m : messages_of(arriving, pairs_in_.data(), sums * sizeof(float))) receives.push_back(m);
     }
     begin(sends, receives);
-    pack(std::integral_constant<index_t, layout::coefficients>{}, sh_gradient, colors_out_, colors_in_);
+    pack_sums<layout::coefficients>(n, gradients.sh, colors_out_, colors_in_);
     comm_.finish(*exec_);
     begin(messages(received_, colors_out_.data(), coefficients), messages(sent_, colors_in_.data(), coefficients));
+  }
+
+  template <index_t Width>
+  void pack_sums(index_t n, float const* from, buffer<float, E>& out, buffer<float, E>& in) {
+    for_each_column<Width>(*exec_, "exchange/pack", n,
+                           detail::pack_sums_body<piece, Width>{
+                               layout::pieces(from), order_.data(),
+                               way<Width>(received_, layout::pieces(out.data()), sent_, layout::pieces(in.data()))});
   }
 
   E* exec_;
@@ -372,7 +383,7 @@ class row_exchange {
   buffer<u32, E> runs_, order_, counts_;  // order_: where each row of scene_ lay in what came
   buffer<u64, E> places_, total_, ends_;
   buffer<float, E> out_, in_, colors_out_, colors_in_, pairs_out_, pairs_in_;
-  bool ordered_ = false;
+  bool ordered_ = false, finishes_ = false;
   u64 traffic_ = 0;
 };
 

@@ -210,6 +210,45 @@ struct pack_sums_body {
   }
 };
 
+// Gradients of geometry in the place of moments: those of a row's columns, the error where moments have it, and last
+// the opacity's.
+static_assert(error_place == geometry_columns && moment_stride == geometry_columns + 2);
+struct finished {
+  static constexpr index_t opacity_place = geometry_columns + 1;
+  // The place of a column of a row.
+  static GART_HD constexpr index_t place(index_t column) { return column < geometry_columns ? column : opacity_place; }
+};
+
+struct pack_finished_body {
+  gaussians_view<float const> gradients;
+  float const* moments;
+  u32 const* order;
+  way_out<float, moment_stride> to;
+  GART_KERNEL void operator()(index_t k, index_t four) const {
+    quad values;
+    for (index_t c = 0; c < 4; ++c) {
+      index_t const place = 4 * four + c;
+      values.v[c] = place < geometry_columns           ? row_element(gradients, k, place)
+                    : place == finished::opacity_place ? gradients.opacity[k]
+                                                       : moments[std::size_t{k} * moment_stride + error_place];
+    }
+    *reinterpret_cast<quad*>(to.row(order[k]) + 4 * four) = values;
+  }
+};
+
+// Adds what was finished, or begins with it, and multiplies the sum by the share.
+struct take_finished_body {
+  float const* sums;
+  gaussians_view<float> gradients;
+  bool adds;
+  float share;
+  GART_KERNEL void operator()(index_t row, index_t column) const {
+    float& to = row_element(gradients, row, column);
+    float const value = sums[std::size_t{row} * moment_stride + finished::place(column)];
+    to = (adds ? to + value : value) * share;
+  }
+};
+
 // By where the row lay when it came.
 template <int Size>
 struct count_pairs_kernel {
