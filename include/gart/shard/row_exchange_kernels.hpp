@@ -237,15 +237,21 @@ struct pack_finished_body {
 };
 
 // Adds what was finished, or begins with it, and multiplies the sum by the share.
-struct take_finished_body {
-  float const* sums;
+struct take_finished_kernel {
+  quad const* sums;
   gaussians_view<float> gradients;
   bool adds;
   float share;
-  GART_KERNEL void operator()(index_t row, index_t column) const {
-    float& to = row_element(gradients, row, column);
-    float const value = sums[std::size_t{row} * moment_stride + finished::place(column)];
-    to = (adds ? to + value : value) * share;
+  GART_KERNEL void operator()(index_t row) const {
+    static_assert(moment_stride == 12);
+    quad const part[3] = {sums[std::size_t{3} * row], sums[std::size_t{3} * row + 1], sums[std::size_t{3} * row + 2]};
+    GART_UNROLL
+    for (index_t column = 0; column <= geometry_columns; ++column) {
+      index_t const place = finished::place(column);
+      float const value = part[place / 4].v[place % 4];
+      float& to = row_element(gradients, row, column);
+      to = (adds ? to + value : value) * share;
+    }
   }
 };
 
