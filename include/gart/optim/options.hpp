@@ -67,6 +67,9 @@ struct error_growth_options {
   /// max_gaussians, whatever the capture.
   float pixels_each = 100;
   int least_budget = 100'000;  ///< that pixels_each leaves to the smallest capture
+  /// The most that split.share is in a capture whose pixels end growth: longer halves hold more in common, which costs
+  /// time, and few pixels are soon learnt by heart.
+  float few_pixels_share = 0.4f;
 };
 
 /// Of adaptive density control (optim/adc.hpp).
