@@ -60,10 +60,12 @@ struct nccl_comm::state {
   state(state const&) = delete;
   state& operator=(state const&) = delete;
   ~state() {
-    if (!comm) return;
+    if (!stream) return;
     cudaSetDevice(device);
-    ncclCommDestroy(comm);
-    cudaEventDestroy(queued), cudaEventDestroy(arrived), cudaStreamDestroy(stream);
+    if (comm) ncclCommDestroy(comm);
+    for (cudaEvent_t const event : {queued, arrived})
+      if (event) cudaEventDestroy(event);
+    cudaStreamDestroy(stream);
   }
 };
 
