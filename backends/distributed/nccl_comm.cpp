@@ -60,12 +60,10 @@ struct nccl_comm::state {
   state(state const&) = delete;
   state& operator=(state const&) = delete;
   ~state() {
-    if (!stream) return;
+    if (!comm) return;
     cudaSetDevice(device);
-    if (comm) ncclCommDestroy(comm);
-    for (cudaEvent_t const event : {queued, arrived})
-      if (event) cudaEventDestroy(event);
-    cudaStreamDestroy(stream);
+    ncclCommDestroy(comm);
+    cudaEventDestroy(queued), cudaEventDestroy(arrived), cudaStreamDestroy(stream);
   }
 };
 

@@ -269,4 +269,8 @@ TEST_CASE("halves are longer where the capture's pixels end growth, and as they 
   CHECK(share(1'000'000, 22'809'600) == 0.2f);
   options.split.opacity = 0.7f;
   CHECK(gart::split_for(options, 1'000'000, 22'809'600).opacity == 0.7f);
+  for (float const bad : {0.0f, -0.5f, NAN}) {
+    options.few_pixels_share = bad;
+    CHECK_THROWS_WITH_AS(share(1'000'000, 22'809'600), doctest::Contains("few_pixels_share"), gart::invalid_argument);
+  }
 }

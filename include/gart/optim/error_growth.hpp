@@ -125,8 +125,11 @@ inline index_t growth_budget(error_growth_options const& options, index_t most, 
   return static_cast<index_t>(std::clamp(fit, least, limit));
 }
 
-/// How Gaussians split in such a capture.
+/// How Gaussians split in such a capture. Errors: invalid_argument for a few_pixels_share of 0 or less.
 inline split_shape split_for(error_growth_options const& options, index_t most, u64 pixels) {
+  if (!(options.few_pixels_share > 0))
+    throw invalid_argument("error_growth_options.few_pixels_share is " + std::to_string(options.few_pixels_share) +
+                           ": more than 0");
   split_shape shape = options.split;
   if (growth_budget(options, most, pixels) < most) shape.share = std::min(shape.share, options.few_pixels_share);
   return shape;

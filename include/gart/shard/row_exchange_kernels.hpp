@@ -188,7 +188,8 @@ struct single {
   float v[1];
 };
 
-// A Gaussian's sums: colour's gradient first, then the moments; in pieces of four floats where both are of fours.
+// A Gaussian's sums, in pieces of four floats where both kinds are of fours; in pairs colour's gradient comes first,
+// then the moments.
 template <index_t Coefficients>
 struct sums_layout {
   static constexpr index_t lane = Coefficients % 4 == 0 && moment_stride % 4 == 0 ? 4 : 1;  // floats of a piece
@@ -237,21 +238,15 @@ struct pack_finished_body {
 };
 
 // Adds what was finished, or begins with it, and multiplies the sum by the share.
-struct take_finished_kernel {
-  quad const* sums;
+struct take_finished_body {
+  float const* sums;
   gaussians_view<float> gradients;
   bool adds;
   float share;
-  GART_KERNEL void operator()(index_t row) const {
-    static_assert(moment_stride == 12);
-    quad const part[3] = {sums[std::size_t{3} * row], sums[std::size_t{3} * row + 1], sums[std::size_t{3} * row + 2]};
-    GART_UNROLL
-    for (index_t column = 0; column <= geometry_columns; ++column) {
-      index_t const place = finished::place(column);
-      float const value = part[place / 4].v[place % 4];
-      float& to = row_element(gradients, row, column);
-      to = (adds ? to + value : value) * share;
-    }
+  GART_KERNEL void operator()(index_t row, index_t column) const {
+    float& to = row_element(gradients, row, column);
+    float const value = sums[std::size_t{row} * moment_stride + finished::place(column)];
+    to = (adds ? to + value : value) * share;
   }
 };
 

@@ -44,7 +44,7 @@ struct shards {
   antialiased<E> filter;             ///< of this rank's rows
   buffer<ray_gaussian, E> prepared;  ///< this rank's rows in a view's frame
   gaussians<E> view_gradients,       ///< of this rank's rows, by one view of a batch
-      unit_gradients;                ///< what this rank has summed of its unit: .sh alone is used
+      unit_gradients;                ///< what this rank has summed of its unit: .sh, and of a whole view all
   buffer<float, E> moments;          ///< of this rank's rows, by one view
   span<float const> by_exposure;     ///< what its exposure makes of the loss of the image that was traced last
   u64 sent = 0;                      ///< bytes to other ranks since the run began

@@ -233,9 +233,10 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(std::vecto
     if (moves) shards_.round.sum_colors(v, v + 1, 1, to.sh.view(), false);
     shards_.round.sum_moments(v, shards_.moments.view());
     if (finishes) {
-      parallel_for(exec_, "batch/add", n,
-                   detail::take_finished_kernel{reinterpret_cast<quad const*>(shards_.moments.data()), to.view(),
-                                                at_once && image > 0, at_once ? share_after(image + 1) : 1.0f});
+      for_each_column<geometry_columns + 1>(
+          exec_, "batch/add", n,
+          detail::take_finished_body{shards_.moments.data(), to.view(), at_once && image > 0,
+                                     at_once ? share_after(image + 1) : 1.0f});
     } else {
       auto const seen = shards_.filter.of(exec_, scene, view, options_.render.antialias);
       parallel_for(exec_, "preprocess", n,
