@@ -173,10 +173,8 @@ class error_growth {
   }
   /// The first part of it: the errors of one of a step's views.
   void add_errors(gaussians<E> const& model, span<float const> moments) {
-    index_t const n = model.size();
-    if (n == 0) return;
-    if (error_sum.size() != n) clear_statistic(n);
-    parallel_for(*exec_, "error_sum", n, detail::error_sum_kernel{moments.data(), error_sum.data()});
+    if (index_t const n = model.size())
+      parallel_for(*exec_, "error_sum", n, detail::error_sum_kernel{moments.data(), statistic_of(n).data()});
   }
   /// And the second; `total`: Gaussians of the scene, where `model` are not all.
   void add_penalty(gaussians<E> const& model, gaussians<E>& gradient, index_t total) {
@@ -184,6 +182,12 @@ class error_growth {
       parallel_for(*exec_, "error_penalty", model.size(),
                    detail::error_penalty_kernel{model.opacity.data(), gradient.opacity.data(),
                                                 options_.opacity_penalty / static_cast<float>(total)});
+  }
+
+  /// The statistic of so many, for who adds to it; of another count than before it is zero.
+  span<float> statistic_of(index_t n) {
+    if (error_sum.size() != n) error_sum.resize(n), error_sum.zero();
+    return error_sum.view();
   }
 
   /// From the next step on the schedules are those of a run of so many steps.
@@ -218,12 +222,12 @@ class error_growth {
     index_t const here = model.size(), n = rows.total(here);
     row_owners const owners = rows.owners();
     if (n == 0) return change;
-    if (error_sum.size() != here) clear_statistic(here);
+    float const* const errors = statistic_of(here).data();
     dead_.resize(here), drawable_.resize(here), key_.resize(here), id_.resize(here), place_.resize(n);
     parallel_for(*exec_, "error_keys", here,
                  detail::error_key_kernel{std::as_const(model).view(),
                                           owners,
-                                          error_sum.data(),
+                                          errors,
                                           options_.dead_opacity,
                                           {seed_, static_cast<u32>(step), random_use::growth},
                                           dead_.data(),
@@ -259,16 +263,11 @@ class error_growth {
                      detail::error_split_kernel{model.view(), (second ? to : from).data(), owners, options_.split,
                                                 second, 1.01f * options_.dead_opacity});
     }
-    clear_statistic(model.size());
+    error_sum.resize(model.size()), error_sum.zero();
     return change;
   }
 
  private:
-  void clear_statistic(index_t n) {
-    error_sum.resize(n);
-    error_sum.zero();
-  }
-
   E* exec_;
   error_growth_options options_;
   index_t max_gaussians_;

@@ -9,14 +9,15 @@
 ///   rows.finish_fetch();                     // what was queued may go on without colours, what is next has them
 ///   ...                                      // the image, its gradient, sum_gradients
 ///   rows.give_back(pass, gradients);         // what this rank has summed
-///   rows.sum_moments(v, moments);            // for each view, of the rows of this rank, over all that traced them
+///   rows.sum_moments(v, moments);            // for each view, of the rows of this rank, over all that traced them;
+///   rows.sum_finished(0, views, share, gradients, errors, false);  // or so, where rows.finishes()
 ///   rows.sum_colors(0, views, share, sh_gradient, false);  // last, since they arrive last
 ///
 /// An owner finds the boxes of its rows in each view, and sends a row to those whose tiles a box meets. What arrives is
 /// put in the order of the Gaussians' numbers, so that lists, ties and images have the bits of one rank that has all.
 /// Four fifths of what travels are colours and their gradients: they travel while lists are made, and while the owner
 /// finishes the gradients of geometry. Where one rank traces each view, it finishes them itself, for the rows that its
-/// view shows, and they travel in the moments' place (finishes).
+/// view shows, and they travel in the moments' place (finishes); owners add what came, row by row, in one launch.
 /// Sums are added in the order of ranks. With sums in a fixed order (a strategy that is `ordered`) they also have the
 /// bits of one rank: where a Gaussian's pairs begin in an earlier strip, the pairs travel one by one, and its owner
 /// goes on adding where the earlier strip's sum ends.
@@ -127,7 +128,8 @@ class row_exchange {
     comm_.exchange(*exec_, as_span(sends), as_span(receives));
   }
 
-  /// Whether each rank traces a whole view, and finishes its gradients: sum_moments then has these (detail::finished).
+  /// Whether each rank traces a whole view, and finishes its gradients: sum_finished then has these, sum_moments
+  /// nothing.
   bool finishes() const { return finishes_; }
   /// What the pass has summed over this rank's strip: gradients.sh, and of a whole view all of the gradients.
   template <class Pass>
@@ -150,9 +152,18 @@ class row_exchange {
     comm_.finish(*exec_);
     add_sums<0, layout::coefficients>(first, end, colors_in_, share, sh_gradient, adds);
   }
-  /// Their moments, [rows][moment_stride], over all pixels of the round's view v; or what finishes() says.
+  /// Their moments, [rows][moment_stride], over all pixels of the round's view v.
   void sum_moments(int v, span<float> moments) {
     add_sums<layout::coefficients, layout::moments>(v, v + 1, in_, 1, moments, false);
+  }
+  /// Their gradients but for colours, as sum_colors has those; `errors`, [rows] or null: to which the errors seen
+  /// through them are added.
+  void sum_finished(int first, int end, float share, gaussians_view<float> gradients, float* errors, bool adds) {
+    stage_scope stage(*exec_, "exchange/gradients");
+    auto const [units, count] = returned_of(first, end);
+    for_each_column<moment_stride / 4>(
+        *exec_, "exchange/add", gradients.count,
+        detail::add_finished_body{units, count, in_.data(), gradients, errors, adds, share});
   }
 
  private:
@@ -276,17 +287,22 @@ class row_exchange {
     parallel_for(*exec_, "exchange/order", n, detail::run_order_kernel{runs, places_.data(), order_.data()});
   }
 
+  // What came of the views [first, end): the first, and how many.
+  std::pair<detail::returned_unit const*, index_t> returned_of(int first, int end) const {
+    auto const begin = std::lower_bound(returned_views_.begin(), returned_views_.end(), first),
+               past = std::lower_bound(begin, returned_views_.end(), end);
+    return {returned_.data() + (begin - returned_views_.begin()), static_cast<index_t>(past - begin)};
+  }
   // Of one kind, Width pieces a row, which are those from From on in pairs.
   template <index_t From, index_t Width>
   void add_sums(int first, int end, buffer<float, E> const& in, float share, span<float> out, bool adds) {
     stage_scope stage(*exec_, "exchange/gradients");
-    auto const begin = std::lower_bound(returned_views_.begin(), returned_views_.end(), first),
-               past = std::lower_bound(begin, returned_views_.end(), end);
-    for_each_column<Width>(*exec_, "exchange/add", static_cast<index_t>(out.size() / (Width * layout::lane)),
-                           detail::add_sums_body<coefficients, From, Width>{
-                               returned_.data() + (begin - returned_views_.begin()), static_cast<index_t>(past - begin),
-                               layout::pieces(in.data()), ordered_ ? places_.data() : nullptr, sent_pairs_.data(),
-                               layout::pieces(pairs_in_.data()), layout::pieces(out.data()), adds, share});
+    auto const [units, count] = returned_of(first, end);
+    for_each_column<Width>(
+        *exec_, "exchange/add", static_cast<index_t>(out.size() / (Width * layout::lane)),
+        detail::add_sums_body<coefficients, From, Width>{
+            units, count, layout::pieces(in.data()), ordered_ ? places_.data() : nullptr, sent_pairs_.data(),
+            layout::pieces(pairs_in_.data()), layout::pieces(out.data()), adds, share});
   }
 
   // What each rank has for this one.

@@ -214,11 +214,14 @@ struct pack_sums_body {
 // Gradients of geometry in the place of moments: those of a row's columns, the error where moments have it, and last
 // the opacity's.
 static_assert(error_place == geometry_columns && moment_stride == geometry_columns + 2);
-struct finished {
-  static constexpr index_t opacity_place = geometry_columns + 1;
-  // The place of a column of a row.
-  static GART_HD constexpr index_t place(index_t column) { return column < geometry_columns ? column : opacity_place; }
-};
+
+// The k-th of them, of a row: an element of `gradients`, or of `errors`.
+template <class T>
+GART_HD T& finished_element(gaussians_view<T> gradients, T* errors, index_t row, index_t k) {
+  return k < geometry_columns ? row_element(gradients, row, k)
+         : k == error_place   ? errors[row]
+                              : gradients.opacity[row];
+}
 
 struct pack_finished_body {
   gaussians_view<float const> gradients;
@@ -229,24 +232,10 @@ struct pack_finished_body {
     quad values;
     for (index_t c = 0; c < 4; ++c) {
       index_t const place = 4 * four + c;
-      values.v[c] = place < geometry_columns           ? row_element(gradients, k, place)
-                    : place == finished::opacity_place ? gradients.opacity[k]
-                                                       : moments[std::size_t{k} * moment_stride + error_place];
+      values.v[c] = place == error_place ? moments[std::size_t{k} * moment_stride + error_place]
+                                         : finished_element<float const>(gradients, nullptr, k, place);
     }
     *reinterpret_cast<quad*>(to.row(order[k]) + 4 * four) = values;
-  }
-};
-
-// Adds what was finished, or begins with it, and multiplies the sum by the share.
-struct take_finished_body {
-  float const* sums;
-  gaussians_view<float> gradients;
-  bool adds;
-  float share;
-  GART_KERNEL void operator()(index_t row, index_t column) const {
-    float& to = row_element(gradients, row, column);
-    float const value = sums[std::size_t{row} * moment_stride + finished::place(column)];
-    to = (adds ? to + value : value) * share;
   }
 };
 
@@ -320,6 +309,37 @@ struct add_sums_body {
     add(total, view);
     for (index_t c = 0; c < layout::lane; ++c) total.v[c] *= share;
     to = total;
+  }
+};
+
+// What ranks have finished of a row, straight from what came, four places a lane: the sum of the units', of which each
+// is a whole view, times the share. Errors have none, and are added to what is there one by one, as rounds would.
+struct add_finished_body {
+  returned_unit const* units;
+  index_t count;
+  float const* in;
+  gaussians_view<float> gradients;
+  float* errors;  // null where nobody asks for them
+  bool adds;      // to the gradients that are there
+  float share;
+  GART_KERNEL void operator()(index_t row, index_t four) const {
+    quad total{};
+    for (index_t c = 0; c < 4; ++c)
+      if (index_t const place = 4 * four + c; place == error_place ? errors != nullptr : adds)
+        total.v[c] = finished_element(gradients, errors, row, place);
+    for (index_t u = 0; u < count; ++u) {
+      u32 const place = units[u].place_of[row];
+      if (place == not_sent) continue;
+      auto const one = *reinterpret_cast<quad const*>(in + (units[u].first + place) * moment_stride + 4 * four);
+      for (index_t c = 0; c < 4; ++c) total.v[c] += one.v[c];
+    }
+    for (index_t c = 0; c < 4; ++c) {
+      index_t const place = 4 * four + c;
+      if (place != error_place)
+        finished_element(gradients, errors, row, place) = total.v[c] * share;
+      else if (errors)
+        errors[row] = total.v[c];
+    }
   }
 };
 

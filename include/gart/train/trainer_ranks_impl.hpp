@@ -222,29 +222,29 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(std::vecto
   };
   // Whether a view's own gradients are asked for by nobody, and those of all are added as they come.
   bool const finishes = shards_.round.finishes(), at_once = finishes && !moves && options_.densify != densify_kind::adc;
-  gradients_.resize_keep(n), shards_.moments.resize(std::size_t{moment_stride} * n);
-  if (!finishes) shards_.prepared.resize(n);
+  gradients_.resize_keep(n);
+  if (!finishes) shards_.moments.resize(std::size_t{moment_stride} * n), shards_.prepared.resize(n);
   if (options_.batch > 1 && !at_once) shards_.view_gradients.resize_keep(n);
   bool const adds = image > 0;
   auto const scene = std::as_const(scene_).view();
-  for (int v = 0; v < count; ++v, ++image) {
+  float* const errors = finishes && grows_by_error() ? error_.statistic_of(n).data() : nullptr;
+  if (at_once)
+    shards_.round.sum_finished(0, count, share_after(image + count), gradients_.view(), errors, adds), image += count;
+  for (int v = 0; v < count && !at_once; ++v, ++image) {
     camera const& view = views[static_cast<std::size_t>(v)];
-    gaussians<E>& to = image == 0 || at_once ? gradients_ : shards_.view_gradients;
+    gaussians<E>& to = image == 0 ? gradients_ : shards_.view_gradients;
     if (moves) shards_.round.sum_colors(v, v + 1, 1, to.sh.view(), false);
-    shards_.round.sum_moments(v, shards_.moments.view());
     if (finishes) {
-      for_each_column<geometry_columns + 1>(
-          exec_, "batch/add", n,
-          detail::take_finished_body{shards_.moments.data(), to.view(), at_once && image > 0,
-                                     at_once ? share_after(image + 1) : 1.0f});
+      shards_.round.sum_finished(v, v + 1, 1, to.view(), errors, false);
     } else {
+      shards_.round.sum_moments(v, shards_.moments.view());
       auto const seen = shards_.filter.of(exec_, scene, view, options_.render.antialias);
       parallel_for(exec_, "preprocess", n,
                    render_kernels::prepare_gaussians<typename Traits::response>{
                        seen, view.position, options_.render.alpha_min, shards_.prepared.view()});
       finish_gradients(exec_, scene, shards_.prepared, view, options_.render.antialias, shards_.moments, to.view());
+      if (grows_by_error()) error_.add_errors(scene_, shards_.moments);
     }
-    if (grows_by_error()) error_.add_errors(scene_, shards_.moments);
     if (options_.densify == densify_kind::adc) adc_.accumulate(scene_, to, view);
     if (moves) {
       span<double const> const runs =
@@ -253,7 +253,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(std::vecto
       exec_.copy_out(mine.data(), runs.data(), runs.size() * sizeof(double));
       round.data()[v].by_pose = by_pose_.total(shards_.pose_runs.whole_of(mine, pose_gradient::floats));
     }
-    if (image > 0 && !at_once)
+    if (image > 0)
       for_each_column(exec_, "batch/add", n, moves ? row_width(sh_degree) : geometry_columns + 1,
                       train_kernels::add_gradients_body{gradients_.view(), to.view(), share_after(image + 1)});
   }
