@@ -16,12 +16,12 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t most_views = 12;
+constexpr std::size_t parts = 12;
 
-// The first of each of `most_views` equal parts.
+// The first of each of `parts` equal parts.
 bool evenly_spread(std::size_t index, std::size_t total) {
-  if (total <= most_views || index == 0) return true;
-  return index * most_views / total != (index - 1) * most_views / total;
+  if (total <= parts || index == 0) return true;
+  return index * parts / total != (index - 1) * parts / total;
 }
 
 std::string error_gradient() {
