@@ -218,7 +218,8 @@ class Pages(TrainingPages):
                    [(f"{r['ranks']} GPU{'s' * (r['ranks'] > 1)}, {r['what'].removeprefix('steps ')}", r["images_a_second"])
                     for r in result["runs"] if r["what"] == "steps alone" or
                     r["what"].startswith("steps") and r["ranks"] > 1]) for result in results]
-        bars(self.figure("ranks"), "Images a second of training", "images a second", groups, source(results[0]))
+        bars(self.figure("ranks"), "Images a second of training", "images a second", groups,
+             "; ".join(dict.fromkeys(source(result) for result in results)))
 
     def viewer(self):
         found = sorted(glob.glob(os.path.join(self.results, "view_*.json")))
