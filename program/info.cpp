@@ -12,6 +12,9 @@
 #if defined(GART_WITH_NCCL)
 #include <gart/comm/nccl_comm.hpp>
 #endif
+#if defined(GART_WITH_MPI)
+#include <gart/comm/mpi_comm.hpp>
+#endif
 
 #include <cstdio>
 #include <map>
@@ -19,10 +22,57 @@
 #include <string>
 #include <thread>
 #include <tuple>
+#include <vector>
 
 namespace gart_cli {
 
 namespace {
+
+#if defined(GART_WITH_CUDA)
+// How the GPUs of this host reach each other: the pairs of each kind.
+void print_links(int devices) {
+  std::map<gart::device_link, std::string> pairs;
+  for (int one = 0; one < devices; ++one)
+    for (int other = one + 1; other < devices; ++other)
+      pairs[gart::link_between(one, other)] += " " + std::to_string(one) + "-" + std::to_string(other);
+  for (auto const& [link, which] : pairs)
+    std::printf("links     %s %s\n", which.c_str(),
+                link == gart::device_link::host     ? "through the host's memory"
+                : link == gart::device_link::direct ? "to each other's memory, as by PCIe"
+                                                    : "to each other's memory, with atomic operations, as by NVLink");
+}
+#endif
+
+#if defined(GART_WITH_MPI)
+// Where a rank is and what it would train on: alike for two that share a GPU.
+std::string place_of(gart::mpi_comm const& rank) {
+#if defined(GART_WITH_NCCL)
+  if (auto const devices = gart::cuda_devices(); !devices.empty()) {
+    int const device = gart::nccl_comm::device_of(rank);
+    return rank.host() + ", GPU " + std::to_string(device) + " (" + devices[static_cast<std::size_t>(device)].name +
+           ")";
+  }
+#endif
+  return rank.host() + ", host processors";
+}
+#endif
+
+void print_ranks() {
+#if defined(GART_WITH_MPI)
+  std::vector<std::string> const places =
+      ranks::comm() ? ranks::gathered(place_of(*ranks::comm())) : std::vector<std::string>();
+  std::printf("ranks      by MPI: mpirun -n N gart train; started here: %d\n", ranks::size());
+  for (std::size_t r = 0; r < places.size(); ++r) std::printf("           rank %zu on %s\n", r, places[r].c_str());
+#if defined(GART_WITH_NCCL)
+  std::printf("           a GPU each: NCCL %s; gart train --gpus N\n", gart::nccl_comm::version().c_str());
+  bool const on_gpus = !places.empty() && places.front().find(", GPU ") != std::string::npos;
+  if (on_gpus && std::set<std::string>(places.begin(), places.end()).size() < places.size())
+    std::puts("           two of these share a GPU: what they exchange goes through the host, slowly");
+#endif
+#else
+  std::puts("ranks      not in this build (MPI)");
+#endif
+}
 
 void print_devices() {
   std::set<std::string> compiled_for;
@@ -39,6 +89,7 @@ void print_devices() {
     std::printf("cuda       %s, sm_%d%d, %d multiprocessors, %s\n", d.name.c_str(), d.compute_major, d.compute_minor,
                 d.multiprocessors, as_bytes(static_cast<double>(d.total_bytes)).c_str());
   }
+  print_links(static_cast<int>(devices.size()));
 #else
   std::puts("cuda       not in this build");
 #endif
@@ -47,20 +98,17 @@ void print_devices() {
 #else
   std::puts("embree     not in this build");
 #endif
-#if defined(GART_WITH_MPI)
-  std::printf("ranks      MPI: mpirun -n N gart train; launched as %d\n", ranks::launched());
-#if defined(GART_WITH_NCCL)
-  std::printf("           a GPU each: NCCL %s; gart train --gpus N\n", gart::nccl_comm::version().c_str());
-#endif
-#else
-  std::puts("ranks      not in this build (MPI)");
-#endif
+  print_ranks();
   std::string formats;
   for (auto const* format : gart::splat_formats()) formats += std::string(formats.empty() ? "" : ", ") + format->name;
   std::printf("models     %s\n", formats.c_str());
 }
 
 int run_info() {
+  if (ranks::built) ranks::start(false);
+#if defined(GART_WITH_MPI)
+  if (ranks::rank() > 0) return ranks::gathered(place_of(*ranks::comm())), 0;
+#endif
   std::printf("gart       %s\n", gart::version);
   print_devices();
   // Configurations that differ only in the degree of the spherical harmonics share a line.
@@ -92,10 +140,13 @@ void add_info(CLI::App& app, command& selected) {
   CLI::App* info = app.add_subcommand("info", "Say what this build and this machine can do.");
   info->footer(
       "\nPrints the version, the devices found, and the configurations that were compiled: which backend, tracer and\n"
-      "backward pass go together, for which degrees of spherical harmonics. Writes nothing.\n"
+      "backward pass go together, for which degrees of spherical harmonics. Writes nothing. Of several GPUs it says "
+      "how\n"
+      "they reach each other's memory, and of several ranks where each is and what it would train on.\n"
       "\nExamples:\n"
       "  gart info\n"
-      "  gart info | grep cuda");
+      "  gart info | grep cuda\n"
+      "  mpirun -n 4 gart info");
   info->callback([&selected] { selected = run_info; });
 }
 

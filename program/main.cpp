@@ -83,8 +83,9 @@ int main(int argc, char** argv) {
     return exit_usage;
   }
   // Commands that have nothing to share out are rank 0's.
-  bool const views = ranks::built && (app.got_subcommand("render") || app.got_subcommand("eval"));
-  if (ranks::launched_rank() > 0 && !views && !app.got_subcommand("train")) return 0;
+  bool const shares =
+      ranks::built && (app.got_subcommand("render") || app.got_subcommand("eval") || app.got_subcommand("info"));
+  if (ranks::launched_rank() > 0 && !shares && !app.got_subcommand("train")) return 0;
   try {
     if (app.got_subcommand("train"))
       ranks::launch_on(app.get_subcommand("train")->get_option("--gpus")->as<int>(), argv);

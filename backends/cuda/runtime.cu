@@ -42,6 +42,16 @@ std::vector<cuda_device_info> cuda_devices(std::string* reason) {
   return devices;
 }
 
+device_link link_between(int one, int other) {
+  auto const has = [&](cudaDeviceP2PAttr what) {
+    int value = 0;
+    check_cuda(cudaDeviceGetP2PAttribute(&value, what, one, other), "asking how two devices are linked");
+    return value != 0;
+  };
+  if (!has(cudaDevP2PAttrAccessSupported)) return device_link::host;
+  return has(cudaDevP2PAttrNativeAtomicSupported) ? device_link::direct_atomic : device_link::direct;
+}
+
 struct cuda_exec::resources {
   struct stage {
     std::string label;

@@ -44,6 +44,11 @@ def ranks_of(launch):
     return found
 
 
+# Where each is; rank 0 alone talks.
+info = run(*launcher, 3, gart, "info")
+expect(info.returncode == 0 and info.stdout.count("gart       ") == 1 and "started here: 3" in info.stdout and
+       all(info.stdout.count(f"rank {r} on {os.uname().nodename}, ") == 1 for r in range(3)), f"info:\n{info.stdout}{info.stderr}")
+
 write_capture(capture)
 
 # The same run by 1 and by 3 ranks, where sums have a fixed order, and what is said.

@@ -33,6 +33,12 @@ struct cuda_device_info {
 /// The devices there are; empty without a driver. `reason` then says why.
 std::vector<cuda_device_info> cuda_devices(std::string* reason = nullptr);
 
+/// How two devices of a host reach each other's memory: through the host's; directly; and so that atomic operations
+/// work there too, as by NVLink.
+enum class device_link { host, direct, direct_atomic };
+/// Of two devices, by index. Errors: gart::error, with the driver's words, for a device that there is not.
+device_link link_between(int one, int other);
+
 /// A policy: a stream and its pool of memory.
 class cuda_exec {
  public:
