@@ -49,38 +49,40 @@ void print_links(int devices) {
 }
 #endif
 
+// Where each rank is and what it would train on, alike for two that share a GPU; none where no launcher started any.
+std::vector<std::string> places_of_ranks() {
 #if defined(GART_WITH_MPI)
-// Where a rank is and what it would train on: alike for two that share a GPU.
-std::string place_of(gart::mpi_comm const& rank) {
+  if (gart::mpi_comm const* const all = ranks::comm()) {
+    std::string mine = all->host() + ", host processors";
 #if defined(GART_WITH_NCCL)
-  if (auto const devices = gart::cuda_devices(); !devices.empty()) {
-    int const device = gart::nccl_comm::device_of(rank);
-    return rank.host() + ", GPU " + std::to_string(device) + " (" + devices[static_cast<std::size_t>(device)].name +
-           ")";
+    if (auto const devices = gart::cuda_devices(); !devices.empty()) {
+      auto const device = static_cast<std::size_t>(gart::nccl_comm::device_of(*all));
+      mine = all->host() + ", GPU " + std::to_string(device) + " (" + devices[device].name + ")";
+    }
+#endif
+    return ranks::gathered(mine);
   }
 #endif
-  return rank.host() + ", host processors";
+  return {};
 }
-#endif
 
-void print_ranks() {
+void print_ranks(std::vector<std::string> const& places) {
 #if defined(GART_WITH_MPI)
-  std::vector<std::string> const places =
-      ranks::comm() ? ranks::gathered(place_of(*ranks::comm())) : std::vector<std::string>();
   std::printf("ranks      by MPI: mpirun -n N gart train; started here: %d\n", ranks::size());
   for (std::size_t r = 0; r < places.size(); ++r) std::printf("           rank %zu on %s\n", r, places[r].c_str());
 #if defined(GART_WITH_NCCL)
   std::printf("           a GPU each: NCCL %s; gart train --gpus N\n", gart::nccl_comm::version().c_str());
-  bool const on_gpus = !places.empty() && places.front().find(", GPU ") != std::string::npos;
-  if (on_gpus && std::set<std::string>(places.begin(), places.end()).size() < places.size())
+  bool const shared = std::set<std::string>(places.begin(), places.end()).size() < places.size();
+  if (shared && !gart::cuda_devices().empty())
     std::puts("           two of these share a GPU: what they exchange goes through the host, slowly");
 #endif
 #else
+  static_cast<void>(places);
   std::puts("ranks      not in this build (MPI)");
 #endif
 }
 
-void print_devices() {
+void print_devices(std::vector<std::string> const& places) {
   std::set<std::string> compiled_for;
   for (auto const& r : gart::compiled_configurations())
     if (!r.instruction_set.empty()) compiled_for.insert(r.instruction_set);
@@ -104,7 +106,7 @@ void print_devices() {
 #else
   std::puts("embree     not in this build");
 #endif
-  print_ranks();
+  print_ranks(places);
   std::string formats;
   for (auto const* format : gart::splat_formats()) formats += std::string(formats.empty() ? "" : ", ") + format->name;
   std::printf("models     %s\n", formats.c_str());
@@ -112,11 +114,10 @@ void print_devices() {
 
 int run_info() {
   if (ranks::built) ranks::start(false);
-#if defined(GART_WITH_MPI)
-  if (ranks::rank() > 0) return ranks::gathered(place_of(*ranks::comm())), 0;
-#endif
+  std::vector<std::string> const places = places_of_ranks();
+  if (ranks::rank() > 0) return 0;
   std::printf("gart       %s\n", gart::version);
-  print_devices();
+  print_devices(places);
   // Configurations that differ only in the degree of the spherical harmonics share a line.
   std::map<std::tuple<std::string, std::string, std::string, int, std::string, std::string, int, int>, std::set<int>>
       configurations;

@@ -9,23 +9,20 @@
 ///   rows.finish_fetch();                     // what was queued may go on without colours, what is next has them
 ///   ...                                      // the image, its gradient, sum_gradients
 ///   rows.give_back(pass, gradients);         // what this rank has summed
-///   rows.sum_moments(v, moments);            // for each view, of the rows of this rank, over all that traced them;
-///   rows.sum_finished(0, views, share, gradients, errors, false);  // or so, where rows.finishes()
+///   rows.sum_moments(v, moments);            // of a view, for the rows of this rank; sum_finished where it finishes()
 ///   rows.sum_colors(0, views, share, sh_gradient, false);  // last, since they arrive last
 ///
 /// An owner finds the boxes of its rows in each view, and sends a row to those whose tiles a box meets. What arrives is
 /// put in the order of the Gaussians' numbers, so that lists, ties and images have the bits of one rank that has all.
 /// Four fifths of what travels are colours and their gradients: they travel while lists are made, and while the owner
 /// finishes the gradients of geometry. Where one rank traces each view, it finishes them itself, for the rows that its
-/// view shows, and they travel in the moments' place (finishes); owners add what came, row by row, in one launch.
-/// Sums are added in the order of ranks. With sums in a fixed order (a strategy that is `ordered`) they also have the
-/// bits of one rank: where a Gaussian's pairs begin in an earlier strip, the pairs travel one by one, and its owner
-/// goes on adding where the earlier strip's sum ends.
+/// view shows, and they travel in the moments' place; owners add what came, row by row. Sums are added in the order of
+/// ranks. With sums in a fixed order (a strategy that is `ordered`) they also have the bits of one rank: where a
+/// Gaussian's pairs begin in an earlier strip, they travel one by one, and its owner adds them to that strip's sum.
 ///
-/// Traffic a row and unit: 4 (row width + 1) bytes out, up to a multiple of 16, and 4 (3 K + 12) back: 240 both ways at
+/// Traffic a row and unit: 4 (row width + 1) bytes out, up to a multiple of 16, and 4 (3 K + 12) back: 240 each at
 /// degree 3; ordered, as much again for each pair of a row that began above. Memory: 16 bytes a row of this rank's and
-/// view, 12 a row and unit, these buffers, and the rows that arrived. The host waits once, for how many rows go to
-/// whom. Errors: out_of_memory.
+/// view, 12 a row and unit, and the rows that travel. The host waits once, for the counts. Errors: out_of_memory.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/backward/backward.hpp>
@@ -128,8 +125,7 @@ class row_exchange {
     comm_.exchange(*exec_, as_span(sends), as_span(receives));
   }
 
-  /// Whether each rank traces a whole view, and finishes its gradients: sum_finished then has these, sum_moments
-  /// nothing.
+  /// Whether each rank traces a whole view, and finishes its gradients: sum_finished has these, and not sum_moments.
   bool finishes() const { return finishes_; }
   /// What the pass has summed over this rank's strip: gradients.sh, and of a whole view all of the gradients.
   template <class Pass>
@@ -156,8 +152,7 @@ class row_exchange {
   void sum_moments(int v, span<float> moments) {
     add_sums<layout::coefficients, layout::moments>(v, v + 1, in_, 1, moments, false);
   }
-  /// Their gradients but for colours, as sum_colors has those; `errors`, [rows] or null: to which the errors seen
-  /// through them are added.
+  /// Their other gradients, in the same way; to `errors`, [rows] or null, the errors seen through them are added.
   void sum_finished(int first, int end, float share, gaussians_view<float> gradients, float* errors, bool adds) {
     stage_scope stage(*exec_, "exchange/gradients");
     auto const [units, count] = returned_of(first, end);
@@ -224,7 +219,6 @@ class row_exchange {
     units_ = divide_work(costs, owners_.ranks, Size);
   }
 
-  // Over all ranks.
   void add_costs(std::vector<std::vector<u64>>& costs) {
     std::vector<u64> all;
     for (auto const& cost : costs) all.insert(all.end(), cost.begin(), cost.end());
