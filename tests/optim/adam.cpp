@@ -5,6 +5,7 @@
 #include "models.hpp"
 
 #include <algorithm>
+#include <type_traits>
 
 using namespace gart;
 
@@ -18,6 +19,22 @@ struct textbook {
     m = b1 * m + (1 - b1) * g;
     v = b2 * v + (1 - b2) * g * g;
     return p - rate * (m / (1 - std::pow(b1, t))) / (std::sqrt(v / (1 - std::pow(b2, t))) + 1e-15);
+  }
+};
+
+// What a kernel that sums gradients does: gives them piece by piece, of one float or of four.
+struct single {
+  float v[1];
+};
+template <index_t Width, class Take>
+struct give_colors {
+  float const* gradient;
+  index_t floats;
+  Take take;
+  GART_KERNEL void operator()(index_t row, index_t column) const {
+    std::conditional_t<Width == 4, quad, single> piece;
+    for (index_t c = 0; c < Width; ++c) piece.v[c] = gradient[row * floats + Width * column + c];
+    take(row, Width * column, piece);
   }
 };
 
@@ -129,6 +146,55 @@ TEST_CASE_TEMPLATE("what a step did not show stays, if so asked, and all else mo
       CHECK(gart_test::row(got, i) == gart_test::row(seen[i] ? moved : start, i));
       CHECK(gart_test::row(got_first, i) == (seen[i] ? gart_test::row(first, i) : zeros));
       CHECK(gart_test::row(got_second, i) == (seen[i] ? gart_test::row(second, i) : zeros));
+    }
+  }
+}
+
+TEST_CASE_TEMPLATE("a step in two launches, the colours by gradients in no memory, has the bits of one", E,
+                   GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  E exec;
+  index_t const n = 391;
+  for (int const degree : {0, 2, 3}) {
+    for (bool const seen_only : {false, true}) {
+      CAPTURE(degree);
+      CAPTURE(seen_only);
+      gaussian_model const start = gart_test::random_model(n, degree, random);
+      gaussian_model g = gart_test::random_model(n, degree, random);
+      for (index_t i = 0; i < n; ++i)
+        if (random() % 3 == 0) std::fill_n(&g.mean[3 * i], 3, 0.0f);
+      index_t const floats = 3 * sh_coefficients(degree);
+      g.sh[floats * 7] = NAN;
+      buffer<float, E> const given(exec, g.sh);
+      gaussians<E> const whole(exec, g);
+      std::fill(g.sh.begin(), g.sh.end(), 1.0f);  // not to be read
+      gaussians<E> const without(exec, g);
+      gaussians<E> one(exec, start), two(exec, start);
+      optimizer_state<E> state_of_one(exec, n, degree), state_of_two(exec, n, degree);
+      buffer<u64, E> skipped(exec, std::vector<u64>{0, 0});
+      adam_options options;
+      options.seen_only = seen_only;
+      for (int step = 1; step <= 3; ++step) {
+        int const active = std::min(degree, step - 1);
+        adam_step(exec, one, whole, state_of_one, {}, step, active, skipped.view().subspan(0, 1), options);
+        adam_pass<E> const pass(two, without, state_of_two, {}, step, active, skipped.view().subspan(1, 1), options);
+        pass.geometry(exec);
+        pass.colors([&]<class Take>(Take const& take) {
+          if (floats % 4 == 0)
+            for_each_column(exec, "give", n, floats / 4, give_colors<4, Take>{given.data(), floats, take});
+          else
+            for_each_column(exec, "give", n, floats, give_colors<1, Take>{given.data(), floats, take});
+        });
+      }
+      for (auto const& [a, b] : {std::pair(&one, &two), std::pair(&state_of_one.first, &state_of_two.first),
+                                 std::pair(&state_of_one.second, &state_of_two.second)}) {
+        gaussian_model x = a->to_host(), y = b->to_host();
+        for (index_t i = 0; i < n; ++i) CHECK(gart_test::row(x, i) == gart_test::row(y, i));
+      }
+      std::vector<u64> const counts = skipped.to_host();
+      CHECK(counts[0] == counts[1]);
+      if (!seen_only || g.mean[3 * 7] != 0) CHECK(counts[0] == 3);
     }
   }
 }

@@ -31,6 +31,7 @@
 #include <concepts>
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 namespace gart {
 
@@ -40,6 +41,9 @@ struct message {
   void* data = nullptr;   ///< where they are, or go
   std::size_t bytes = 0;  ///< how many; the receiver knows
 };
+
+/// A group of messages, as a communicator takes them.
+inline span<message const> as_span(std::vector<message> const& m) { return {m.data(), m.size()}; }
 
 /// A communicator for the policy E.
 template <class C, class E>

@@ -19,6 +19,7 @@
 #include <cmath>
 #include <cstring>
 #include <iterator>
+#include <type_traits>
 
 namespace gart::inline GART_ISA {
 
@@ -95,30 +96,38 @@ struct adam_group {
   float rate_head, rate_rest;
 };
 
-// Group g has tiles [g * group_tiles, (g + 1) * group_tiles), each of `rows_per_tile` Gaussians.
-template <execution E, bool SeenOnly>
-struct adam_kernel {
+struct adam_arguments {
   static constexpr index_t rows_per_tile = 128;
-  struct scratch {};
   adam_group groups[parameter_arrays];  // the table's, from the last: the widest begins first
+  index_t first_group = 0;              // of those that move
   index_t group_tiles, rows;
   adam_rule rule;  // the rates carry 1 / (1 - b1^t)
   u64* skipped;
 
   GART_HD static constexpr int group_of(int array) { return parameter_arrays - 1 - array; }
+};
+
+// Each group from first_group on has group_tiles tiles, each of `rows_per_tile` Gaussians.
+template <execution E, bool SeenOnly>
+struct adam_kernel : adam_arguments {
+  static constexpr bool seen_only = SeenOnly;
+  struct scratch {};
 
   GART_KERNEL void operator()(auto const& team) const {
     index_t const group_index = team.tile() / group_tiles;
     index_t const row = (team.tile() - group_index * group_tiles) * rows_per_tile;
     index_t const count = rows - row < rows_per_tile ? rows - row : rows_per_tile;
-    adam_group const& group = groups[group_index];
+    adam_group const& group = groups[first_group + group_index];
 #if !defined(__CUDACC__)
     if constexpr (!E::device) return update_rows(group, row, count);
 #endif
     // Four elements a lane: by single ones a step is bound by the loads in flight, not by the memory's bandwidth.
     std::size_t const base = std::size_t{row} * group.stride;
     index_t const elements = count * group.stride, quads = elements / 4;
-    team.for_each(quads, [&](index_t q) { update_quad(group, base, row, 4 * q); });
+    team.for_each(quads, [&](index_t q) {
+      update_quad(group, base, row, 4 * q,
+                  [&] { return *reinterpret_cast<quad const*>(group.gradient + base + 4 * q); });
+    });
     team.for_each(elements - 4 * quads, [&](index_t k) {
       index_t const e = 4 * quads + k;
       if (!SeenOnly || seen(row + e / group.stride)) update(group, base + e, e % group.stride);
@@ -143,14 +152,19 @@ struct adam_kernel {
   }
 
   GART_KERNEL void update(adam_group const& group, std::size_t i, index_t column) const {
+    if (column < group.active) update(group, i, column, group.gradient[i]);
+  }
+  GART_KERNEL void update(adam_group const& group, std::size_t i, index_t column, float g) const {
     if (column >= group.active) return;
     adam_element<float> e{group.parameter[i], group.first[i], group.second[i]};
-    if (move(group, column, group.gradient[i], e))
+    if (move(group, column, g, e))
       group.parameter[i] = e.parameter, group.first[i] = e.first, group.second[i] = e.second;
   }
 
-  // Elements e to e + 3 of a tile, which begins at `base` with a row; what is not to move is written as it was.
-  GART_KERNEL void update_quad(adam_group const& group, std::size_t base, index_t row, index_t e) const {
+  // Elements e to e + 3 of a tile, which begins at `base` with a row, by gradient(), which is asked for where any
+  // moves; what is not to move is written as it was.
+  GART_KERNEL void update_quad(adam_group const& group, std::size_t base, index_t row, index_t e,
+                               auto const& gradient) const {
     index_t columns[4];
     bool wanted[4];
     index_t next = e % group.stride;
@@ -160,7 +174,7 @@ struct adam_kernel {
     }
     if (!(wanted[0] | wanted[1] | wanted[2] | wanted[3])) return;
     std::size_t const i = base + e;
-    quad const g = *reinterpret_cast<quad const*>(group.gradient + i);
+    quad const g = gradient();
     quad p = *reinterpret_cast<quad const*>(group.parameter + i);
     quad m = *reinterpret_cast<quad const*>(group.first + i);
     quad v = *reinterpret_cast<quad const*>(group.second + i);
@@ -225,7 +239,85 @@ struct adam_kernel {
 #endif
 };
 
+// The colours' step by gradients that are given: of a Gaussian's floats those from `first` on, one or four.
+template <class Kernel>
+struct adam_colors {
+  Kernel kernel;
+  template <class Piece>
+  GART_KERNEL void operator()(index_t row, index_t first, Piece const& gradient) const {
+    adam_group const& group = kernel.groups[kernel.group_of(sh_array)];
+    std::size_t const base = std::size_t{row} * group.stride;
+    if constexpr (std::is_same_v<Piece, quad>)
+      kernel.update_quad(group, base, row, first, [&] { return gradient; });
+    else if (!Kernel::seen_only || kernel.seen(row))
+      kernel.update(group, base + first, first, gradient.v[0]);
+  }
+};
+
 }  // namespace detail
+
+/// A step of Adam, in one launch or in two. What it is made of must outlive it.
+template <execution E>
+class adam_pass {
+ public:
+  /// As adam_step.
+  adam_pass(gaussians<E>& model, gaussians<E> const& gradient, optimizer_state<E>& state, learning_rates const& rates,
+            int step, int active_sh_degree, span<u64> skipped = {}, adam_options const& options = {}, int batch = 1)
+      : seen_only_(options.seen_only) {
+    double const correction = adam_rule::first_correction(options, step);
+    auto const rate = [&](float r) { return static_cast<float>(r * correction); };
+    auto const p = model.view();
+    int const degree = active_sh_degree < p.sh_degree ? active_sh_degree : p.sh_degree;
+    for_each_array(
+        [&](parameter_array const& a, float* parameter, float const* slope, float* first, float* second) {
+          auto const [head, rest] = detail::parameter_rates[a.number];
+          with_.groups[with_.group_of(a.number)] = {parameter,
+                                                    slope,
+                                                    first,
+                                                    second,
+                                                    a.width(p.sh_degree),
+                                                    a.width(degree),
+                                                    detail::head_columns,
+                                                    rate(rates.*head),
+                                                    rate(rates.*rest)};
+        },
+        p, gradient.view(), state.first.view(), state.second.view());
+    with_.rows = p.count;
+    with_.group_tiles = p.count / with_.rows_per_tile + (p.count % with_.rows_per_tile != 0);
+    with_.rule = adam_rule(options, step, batch);
+    with_.skipped = skipped.data();
+  }
+
+  /// All arrays.
+  void all(E& exec) const { launch(exec, 0); }
+  /// All but the colours, whose gradient need not be there yet.
+  void geometry(E& exec) const { launch(exec, with_.group_of(sh_array) + 1); }
+  /// The colours, by gradients that are in no memory: calls launch(take), whose kernel is to call take(row, first,
+  /// piece) for all floats of each Gaussian's colours: a quad of them, or one in piece.v, from number `first` on.
+  template <class Launch>
+  void colors(Launch&& launch) const {
+    with_kernel([&]<class Kernel>(Kernel const& k) { launch(detail::adam_colors<Kernel>{k}); });
+  }
+
+ private:
+  template <class F>
+  void with_kernel(F&& f) const {
+    if (seen_only_)
+      f(detail::adam_kernel<E, true>{with_});
+    else
+      f(detail::adam_kernel<E, false>{with_});
+  }
+  void launch(E& exec, index_t first_group) const {
+    if (with_.rows == 0) return;
+    with_kernel([&](auto k) {
+      k.first_group = first_group;
+      parallel_for(exec, "adam", tile_range{(parameter_arrays - first_group) * k.group_tiles, 256}, k);
+    });
+  }
+
+  detail::adam_arguments with_;
+  bool seen_only_;
+};
 
 /// Step `step` (from 1), or with a batch the step after which there have been `step` images. Coefficients above
 /// `active_sh_degree` are left alone. `skipped`, one element or empty, counts up by the elements that were not finite.
@@ -233,37 +325,7 @@ template <execution E>
 void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optimizer_state<E>& state,
                learning_rates const& rates, int step, int active_sh_degree, span<u64> skipped = {},
                adam_options const& options = {}, int batch = 1) {
-  if (model.size() == 0) return;
-  double const correction = adam_rule::first_correction(options, step);
-  auto const rate = [&](float r) { return static_cast<float>(r * correction); };
-  auto const p = model.view();
-  int const degree = active_sh_degree < p.sh_degree ? active_sh_degree : p.sh_degree;
-
-  auto const launch = [&](auto k) {
-    for_each_array(
-        [&](parameter_array const& a, float* parameter, float const* slope, float* first, float* second) {
-          auto const [head, rest] = detail::parameter_rates[a.number];
-          k.groups[k.group_of(a.number)] = {parameter,
-                                            slope,
-                                            first,
-                                            second,
-                                            a.width(p.sh_degree),
-                                            a.width(degree),
-                                            detail::head_columns,
-                                            rate(rates.*head),
-                                            rate(rates.*rest)};
-        },
-        p, gradient.view(), state.first.view(), state.second.view());
-    k.rows = p.count;
-    k.group_tiles = p.count / k.rows_per_tile + (p.count % k.rows_per_tile != 0);
-    k.rule = adam_rule(options, step, batch);
-    k.skipped = skipped.data();
-    parallel_for(exec, "adam", tile_range{parameter_arrays * k.group_tiles, 256}, k);
-  };
-  if (options.seen_only)
-    launch(detail::adam_kernel<E, true>{});
-  else
-    launch(detail::adam_kernel<E, false>{});
+  adam_pass<E>(model, gradient, state, rates, step, active_sh_degree, skipped, options, batch).all(exec);
 }
 
 }  // namespace gart::inline GART_ISA

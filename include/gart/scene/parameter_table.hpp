@@ -27,8 +27,10 @@ struct parameter_array {
 
 /// Lines of the table.
 inline constexpr int parameter_arrays = 5;
-/// The line of the means.
-inline constexpr int mean_array = 0;
+///@{
+/// The lines of the means and of the colours.
+inline constexpr int mean_array = 0, sh_array = parameter_arrays - 1;
+///@}
 
 /// Calls f(parameter_array, set.member...) for each array, in order, with that member of every set: of anything that
 /// has the members mean, log_scale, quaternion, opacity and sh.
@@ -37,7 +39,7 @@ GART_KERNEL constexpr void for_each_array(auto&& f, auto&&... sets) {
   f(parameter_array{"log_scale", "log-scale", 1, 3}, sets.log_scale...);
   f(parameter_array{"quaternion", "quaternion", 2, 4}, sets.quaternion...);
   f(parameter_array{"opacity", "opacity", 3, 1}, sets.opacity...);
-  f(parameter_array{"sh", "SH", 4, 0}, sets.sh...);
+  f(parameter_array{"sh", "SH", sh_array, 0}, sets.sh...);
 }
 
 }  // namespace gart

@@ -10,7 +10,7 @@
 ///   ...                                      // the image, its gradient, sum_gradients
 ///   rows.give_back(pass, gradients);         // what this rank has summed
 ///   rows.sum_moments(v, moments);            // of a view, for the rows of this rank; sum_finished where it finishes()
-///   rows.sum_colors(0, views, share, sh_gradient, false);  // last, since they arrive last
+///   rows.sum_colors(0, views, share, sh_gradient, false);  // last, since they arrive last; or take_colors
 ///
 /// An owner finds the boxes of its rows in each view, and sends a row to those whose tiles a box meets. What arrives is
 /// put in the order of the Gaussians' numbers, so that lists, ties and images have the bits of one rank that has all.
@@ -27,6 +27,7 @@
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/backward/backward.hpp>
 #include <gart/render/antialiased.hpp>
+#include <gart/shard/image_strips.hpp>
 #include <gart/shard/row_exchange_kernels.hpp>
 #include <gart/shard/sharded_rows.hpp>
 #include <gart/shard/work_units.hpp>
@@ -110,19 +111,7 @@ class row_exchange {
 
   /// Strips of [H][W] of `bytes` a pixel become whole images, on all ranks that trace the same view.
   void share_image(void* image, camera const& view, std::size_t bytes) {
-    std::vector<message> sends, receives;
-    auto const part = [&](work_unit const& u, int rank) {
-      std::size_t const end = static_cast<std::size_t>(std::min(u.rows.end, view.height)),
-                        first = static_cast<std::size_t>(u.rows.first);
-      std::size_t const row = static_cast<std::size_t>(view.width) * bytes;
-      return message{rank, static_cast<char*>(image) + first * row, u.empty() ? 0 : (end - first) * row};
-    };
-    for (int r = 0; r < owners_.ranks; ++r) {
-      if (r == owners_.rank || units_[static_cast<std::size_t>(r)].view != unit().view) continue;
-      if (message const m = part(unit(), r); m.bytes) sends.push_back(m), traffic_ += m.bytes;
-      if (message const m = part(units_[static_cast<std::size_t>(r)], r); m.bytes) receives.push_back(m);
-    }
-    comm_.exchange(*exec_, as_span(sends), as_span(receives));
+    traffic_ += share_strips(*exec_, comm_, units_, image, view, bytes);
   }
 
   /// Whether each rank traces a whole view, and finishes its gradients: sum_finished has these, and not sum_moments.
@@ -145,12 +134,20 @@ class row_exchange {
   /// Of this rank's rows the colours' gradients, [rows][K][3]: the sum over the views [first, end) of the round, and
   /// of what is there if it `adds`, times `share`.
   void sum_colors(int first, int end, float share, span<float> sh_gradient, bool adds) {
+    take_colors(first, end, share, sh_gradient, adds, "exchange/add",
+                detail::keep_sums{sh_gradient.data(), coefficients});
+  }
+  /// The same not to memory, but to take(row, first, piece), as adam_pass::colors has it. Until the next fetch.
+  template <class Take>
+  void take_colors(int first, int end, float share, span<float const> sh_gradient, bool adds, char const* label,
+                   Take const& take) {
     comm_.finish(*exec_);
-    add_sums<0, layout::coefficients>(first, end, colors_in_, share, sh_gradient, adds);
+    add_sums<0, layout::coefficients>(label, first, end, colors_in_, share, sh_gradient, adds, take);
   }
   /// Their moments, [rows][moment_stride], over all pixels of the round's view v.
   void sum_moments(int v, span<float> moments) {
-    add_sums<layout::coefficients, layout::moments>(v, v + 1, in_, 1, moments, false);
+    add_sums<layout::coefficients, layout::moments>("exchange/add", v, v + 1, in_, 1, moments, false,
+                                                    detail::keep_sums{moments.data(), moment_stride});
   }
   /// Their other gradients, in the same way; to `errors`, [rows] or null, the errors seen through them are added.
   void sum_finished(int first, int end, float share, gaussians_view<float> gradients, float* errors, bool adds) {
@@ -287,16 +284,17 @@ class row_exchange {
                past = std::lower_bound(begin, returned_views_.end(), end);
     return {returned_.data() + (begin - returned_views_.begin()), static_cast<index_t>(past - begin)};
   }
-  // Of one kind, Width pieces a row, which are those from From on in pairs.
-  template <index_t From, index_t Width>
-  void add_sums(int first, int end, buffer<float, E> const& in, float share, span<float> out, bool adds) {
+  // Of one kind, Width pieces a row, which are those from From on in pairs. `before`: of all rows.
+  template <index_t From, index_t Width, class Take>
+  void add_sums(char const* label, int first, int end, buffer<float, E> const& in, float share,
+                span<float const> before, bool adds, Take const& take) {
     stage_scope stage(*exec_, "exchange/gradients");
     auto const [units, count] = returned_of(first, end);
     for_each_column<Width>(
-        *exec_, "exchange/add", static_cast<index_t>(out.size() / (Width * layout::lane)),
-        detail::add_sums_body<coefficients, From, Width>{
+        *exec_, label, static_cast<index_t>(before.size() / (Width * layout::lane)),
+        detail::add_sums_body<coefficients, From, Width, Take>{
             units, count, layout::pieces(in.data()), ordered_ ? places_.data() : nullptr, sent_pairs_.data(),
-            layout::pieces(pairs_in_.data()), layout::pieces(out.data()), adds, share});
+            layout::pieces(pairs_in_.data()), adds ? layout::pieces(before.data()) : nullptr, share, take});
   }
 
   // What each rank has for this one.

@@ -276,8 +276,9 @@ struct returned_unit {
 };
 
 // One kind of a row's sums, `Width` pieces, which in pairs are those from `From` on: over the ranks that traced a view,
-// in their order, or their pairs one after another; and over views. Rows that no unit has had are zero.
-template <index_t Coefficients, index_t From, index_t Width>
+// in their order, or their pairs one after another; and over views. Rows that no unit has had are zero. Take: what is
+// done with them, take(row, first float of the piece, piece).
+template <index_t Coefficients, index_t From, index_t Width, class Take>
 struct add_sums_body {
   using layout = sums_layout<Coefficients>;
   using piece = typename layout::piece;
@@ -287,12 +288,11 @@ struct add_sums_body {
   u64 const* places;  // of the pairs of each; null where sums have no fixed order
   u32 const* pairs;
   piece const* pairs_in;
-  piece* out;
-  bool adds;    // to what is there
-  float share;  // what the sum is multiplied by
+  piece const* before;  // what it is added to, or null
+  float share;          // what the sum is multiplied by
+  Take take;
   GART_KERNEL void operator()(index_t row, index_t column) const {
-    piece& to = out[std::size_t{row} * Width + column];
-    piece total = adds ? to : piece{}, view{};
+    piece total = before ? before[std::size_t{row} * Width + column] : piece{}, view{};
     auto const add = [](piece& sum, piece const& x) {
       for (index_t c = 0; c < layout::lane; ++c) sum.v[c] += x.v[c];
     };
@@ -308,7 +308,17 @@ struct add_sums_body {
     }
     add(total, view);
     for (index_t c = 0; c < layout::lane; ++c) total.v[c] *= share;
-    to = total;
+    take(row, column * layout::lane, total);
+  }
+};
+
+// They are kept: [rows][floats].
+struct keep_sums {
+  float* out;
+  index_t floats;  // a row
+  template <class Piece>
+  GART_KERNEL void operator()(index_t row, index_t first, Piece const& sum) const {
+    *reinterpret_cast<Piece*>(out + std::size_t{row} * floats + first) = sum;
   }
 };
 

@@ -59,9 +59,6 @@ inline std::vector<message> messages_of(std::vector<u64> const& counts, void* da
   return out;
 }
 
-/// A group of messages, as a communicator takes them.
-inline span<message const> as_span(std::vector<message> const& m) { return {m.data(), m.size()}; }
-
 /// Comm: a communicator for E.
 template <execution E, class Comm>
 requires communicator<Comm, E>

@@ -10,6 +10,7 @@
 #include <gart/shard/sharded_rows.hpp>
 
 #include <array>
+#include <optional>
 #include <utility>
 
 namespace gart::inline GART_ISA {
@@ -31,6 +32,13 @@ struct image_result {
   float by_lens[lens_gradient::floats]{};  ///< the loss by the lens, where that is learned
 };
 
+/// Gradients of colours that are in no memory but as ranks have sent them (shard/row_exchange.hpp).
+struct arrived_colors {
+  int views = 0;      ///< of the step's last round
+  float share = 1;    ///< as row_exchange::sum_colors has it
+  bool adds = false;  ///< to those of the rounds before
+};
+
 /// Comm: a communicator for E.
 template <execution E, class Comm, class Traits, class Tracer>
 struct shards {
@@ -38,16 +46,17 @@ struct shards {
   static constexpr int sh_degree = Traits::sh_degree;  ///< of the coefficients that are stored
   using exchange = row_exchange<E, Comm, Tracer::tile_size, sh_degree, response>;  ///< of this tracer's tiles
 
-  sharded_rows<E, Comm> rows;        ///< who has which
-  exchange round;                    ///< of the views under way
-  sharded_rows<E, Comm> pose_runs;   ///< who has which sums of a pose's gradient
-  antialiased<E> filter;             ///< of this rank's rows
-  buffer<ray_gaussian, E> prepared;  ///< this rank's rows in a view's frame
-  gaussians<E> view_gradients,       ///< of this rank's rows, by one view of a batch
-      unit_gradients;                ///< what this rank has summed of its unit: .sh, and of a whole view all
-  buffer<float, E> moments;          ///< of this rank's rows, by one view
-  span<float const> by_exposure;     ///< what its exposure makes of the loss of the image that was traced last
-  u64 sent = 0;                      ///< bytes to other ranks since the run began
+  sharded_rows<E, Comm> rows;             ///< who has which
+  exchange round;                         ///< of the views under way
+  sharded_rows<E, Comm> pose_runs;        ///< who has which sums of a pose's gradient
+  antialiased<E> filter;                  ///< of this rank's rows
+  buffer<ray_gaussian, E> prepared;       ///< this rank's rows in a view's frame
+  gaussians<E> view_gradients,            ///< of this rank's rows, by one view of a batch
+      unit_gradients;                     ///< what this rank has summed of its unit: .sh, and of a whole view all
+  buffer<float, E> moments;               ///< of this rank's rows, by one view
+  span<float const> by_exposure;          ///< what its exposure makes of the loss of the image that was traced last
+  u64 sent = 0;                           ///< bytes to other ranks since the run began
+  std::optional<arrived_colors> arrived;  ///< of the last step, where Adam took them as they came
 
   /// `block`: Gaussians that stay together.
   shards(E& exec, Comm const& comm, index_t block)

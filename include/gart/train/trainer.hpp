@@ -143,8 +143,11 @@ class basic_trainer {
   u64 sent_bytes() const requires(!Comm::alone) { return shards_.sent; }
   /// The Gaussians, in the policy's memory.
   gaussians<E>& scene() { return scene_; }
-  /// Of the last step, in their shape.
-  gaussians<E> const& gradients() const { return gradients_; }
+  /// Of the last step, in their shape; where it changed the count of the Gaussians, undefined.
+  gaussians<E> const& gradients() const {
+    if constexpr (!Comm::alone) sum_arrived();
+    return gradients_;
+  }
 
  private:
   using frame_type = frame<E, Traits, Tracer>;
@@ -175,6 +178,8 @@ class basic_trainer {
   void collect_results(span<image_result> round, bool metrics, bool lens) requires(!Comm::alone);
   void take_gradients(std::vector<camera> const& views, int image, span<image_result> round,
                       bool moves) requires(!Comm::alone);
+  void move_parameters(adam_pass<E> const& adam) requires(!Comm::alone);
+  void sum_arrived() const requires(!Comm::alone);
   rendered render_in_ranks(camera const& view, vec3 background) requires(!Comm::alone);
   bool in_ranks() const { return !Comm::alone && (comm_.size() > 1 || options_.batch > 1); }
   // What of values of all Gaussians is this rank's, and the way back.
@@ -236,7 +241,8 @@ class basic_trainer {
   dataset const& data_;
   mutable Comm comm_;
   mutable std::conditional_t<Comm::alone, no_shards, shards<E, Comm, Traits, Tracer>> shards_;
-  gaussians<E> scene_, gradients_;
+  gaussians<E> scene_;
+  mutable gaussians<E> gradients_;
   optimizer_state<E> state_;
   frame_type frame_;
   backward_passes<frame_type, Strategy> passes_;

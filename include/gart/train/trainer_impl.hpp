@@ -196,14 +196,20 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates c
   bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
   if (grows_by_error()) error_.add_penalty(scene_, gradients_, total_);
   if (use_mcmc) mcmc_.add_penalties(scene_, gradients_, total_);
-  adam_step(exec_, scene_, gradients_, state_, rates, step_, degree, finite_ ? finite_->skipped() : span<u64>{},
-            options_.adam, options_.batch);
+  adam_pass<E> const adam(scene_, gradients_, state_, rates, step_, degree, finite_ ? finite_->skipped() : span<u64>{},
+                          options_.adam, options_.batch);
+  if constexpr (Comm::alone)
+    adam.all(exec_);
+  else
+    move_parameters(adam);
   density_change change;
   if (grows_by_error()) change = error_.after_step(scene_, state_, step_, rows);
   if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean, rows);
   if (use_adc) change = adc_.after_step(scene_, state_, step_, rows);
   total_ += change.added - change.removed;
-  if (change.added || change.removed) gradients_.resize_keep(scene_.size());
+  if (!change.added && !change.removed) return;
+  gradients_.resize_keep(scene_.size());
+  if constexpr (!Comm::alone) shards_.arrived.reset();
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>

@@ -52,7 +52,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
   int const ranks = comm_.size(), batch = options_.batch, before = step_;
   bool const moves = learns_poses(), bends = learns_lenses();
   std::vector<image_result> images(static_cast<std::size_t>(batch));  // of the step, in their order
-  lt_bytes_ = 0;
+  lt_bytes_ = 0, shards_.arrived.reset();
   step_report report;
   for (int done = 0; done < batch;) {
     int const views = std::min(batch - done, ranks);
@@ -257,8 +257,31 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(std::vecto
       for_each_column(exec_, "batch/add", n, moves ? row_width(sh_degree) : geometry_columns + 1,
                       train_kernels::add_gradients_body{gradients_.view(), to.view(), share_after(image + 1)});
   }
-  // Last: they arrive last.
-  if (!moves) shards_.round.sum_colors(0, count, share_after(image), gradients_.sh.view(), adds);
+  // Last: they arrive last. A device's Adam takes the step's last ones as they come: 8 bytes less to move an element.
+  if (moves) return;
+  if (E::device && image == options_.batch)
+    shards_.arrived = {count, share_after(image), adds};
+  else
+    shards_.round.sum_colors(0, count, share_after(image), gradients_.sh.view(), adds);
+}
+
+// Adam's step, while the last colours arrive.
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::move_parameters(adam_pass<E> const& adam) requires(
+    !Comm::alone) {
+  if (!shards_.arrived) return adam.all(exec_);
+  adam.geometry(exec_);
+  auto const [views, share, adds] = *shards_.arrived;
+  adam.colors([&](auto const& take) {
+    shards_.round.take_colors(0, views, share, gradients_.sh.view(), adds, "adam/colors", take);
+  });
+}
+
+// Into gradients_.sh, for who asks for it.
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::sum_arrived() const requires(!Comm::alone) {
+  if (auto const arrived = std::exchange(shards_.arrived, {}))
+    shards_.round.sum_colors(0, arrived->views, arrived->share, gradients_.sh.view(), arrived->adds);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -266,6 +289,7 @@ rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_in_ranks(camer
                                                                            vec3 background) requires(!Comm::alone) {
   render_options render = render_options_of(options_, data_.extent, background);
   auto& round = shards_.round;
+  sum_arrived();  // before what they are made of goes
   round.fetch(std::as_const(scene_).view(), {view}, render);
   render.rows = round.unit().rows;
   bool const traces = !round.unit().empty();
