@@ -243,11 +243,10 @@ struct adam_kernel : adam_arguments {
 template <class Kernel>
 struct adam_colors {
   Kernel kernel;
-  template <class Piece>
-  GART_KERNEL void operator()(index_t row, index_t first, Piece const& gradient) const {
+  GART_KERNEL void operator()(index_t row, index_t first, auto const& gradient) const {
     adam_group const& group = kernel.groups[kernel.group_of(sh_array)];
     std::size_t const base = std::size_t{row} * group.stride;
-    if constexpr (std::is_same_v<Piece, quad>)
+    if constexpr (std::is_same_v<decltype(gradient), quad const&>)
       kernel.update_quad(group, base, row, first, [&] { return gradient; });
     else if (!Kernel::seen_only || kernel.seen(row))
       kernel.update(group, base + first, first, gradient.v[0]);

@@ -316,9 +316,8 @@ struct add_sums_body {
 struct keep_sums {
   float* out;
   index_t floats;  // a row
-  template <class Piece>
-  GART_KERNEL void operator()(index_t row, index_t first, Piece const& sum) const {
-    *reinterpret_cast<Piece*>(out + std::size_t{row} * floats + first) = sum;
+  GART_KERNEL void operator()(index_t row, index_t first, auto const& sum) const {
+    *reinterpret_cast<std::remove_cvref_t<decltype(sum)>*>(out + std::size_t{row} * floats + first) = sum;
   }
 };
 
