@@ -44,6 +44,7 @@ std::vector<field> const& fields() {
       named("rates.sh_rest", [](options& o) -> float& { return o.rates.sh_rest; }),
       named("rates.settled", [](options& o) -> float& { return o.rates.settled; }),
       named("rates.settle_from", [](options& o) -> float& { return o.rates.settle_from; }),
+      named("rates.settle_late", [](options& o) -> float& { return o.rates.settle_late; }),
       named("rates.long_run", [](options& o) -> int& { return o.rates.long_run; }),
       named("poses.warm_up", [](options& o) -> float& { return o.poses.warm_up; }),
       named("poses.until", [](options& o) -> float& { return o.poses.until; }),

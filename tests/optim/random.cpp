@@ -75,12 +75,16 @@ TEST_CASE("the rate of the means decays exponentially") {
   CHECK(rates_at(usual, 3.0f, 10000, 20000).opacity == usual.opacity);
   CHECK(rates_at(usual, 3.0f, 15000, 20000).opacity == doctest::Approx(usual.opacity * std::sqrt(0.1)));
   CHECK(rates_at(usual, 3.0f, 20000, 20000).sh_rest == doctest::Approx(0.1 * usual.sh_rest));
-  // A quarter of a long run: twice as fast, and settled by the fourth root.
+  // A quarter of a long run: twice as fast, and settling from 0.5 + 3/4 (0.9 - 0.5) = 0.8 of it on.
   int const quarter = usual.long_run / 4;
   CHECK(rates_at(usual, 3.0f, 0, quarter).mean == doctest::Approx(6 * usual.mean));
   CHECK(rates_at(usual, 3.0f, 0, quarter).sh_dc == usual.sh_dc);
-  CHECK(rates_at(usual, 3.0f, quarter, quarter).log_scale ==
-        doctest::Approx(2 * usual.log_scale * std::pow(0.1, 0.25)).epsilon(1e-3));
+  CHECK(rates_at(usual, 3.0f, quarter * 79 / 100, quarter).log_scale == 2 * usual.log_scale);
+  CHECK(rates_at(usual, 3.0f, quarter * 9 / 10, quarter).log_scale ==
+        doctest::Approx(2 * usual.log_scale * std::sqrt(0.1)).epsilon(1e-2));
+  CHECK(rates_at(usual, 3.0f, quarter, quarter).log_scale == doctest::Approx(0.2 * usual.log_scale));
+  usual.settle_late = 0;  // never before settle_from
+  CHECK(rates_at(usual, 3.0f, quarter / 2, quarter).sh_dc == usual.sh_dc);
   CHECK(rates_at(usual, 3.0f, 0, quarter).sh_rest == usual.sh_rest);
   CHECK(rates_at(usual, 3.0f, 0, 10).opacity == doctest::Approx(4 * usual.opacity));
 }

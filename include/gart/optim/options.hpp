@@ -23,9 +23,10 @@ struct learning_rates {
   /// to `settled` of it.
   float settled = 0.1f, settle_from = 0.5f;  ///< the share
   /// The rates are those of a run of at least so many steps. A shorter one has less time to go as far: its rates of
-  /// mean, scale and opacity are sqrt(long_run / steps) times as large, at most four times, and it settles by less,
-  /// settled^(steps / long_run).
+  /// mean, scale and opacity are sqrt(long_run / steps) times as large, at most four times, and it settles the later
+  /// the shorter it is, up to settle_late of the run.
   int long_run = 15000;
+  float settle_late = 0.9f;                         ///< the share
   float exposure = 0.05f, exposure_final = 0.005f;  ///< a visit of the view; decays like the means'
 };
 

@@ -32,9 +32,9 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
   for (float* rate : {&rates.mean, &rates.mean_final, &rates.log_scale, &rates.opacity}) *rate *= haste;
   rates.mean = exponential_decay(rates.mean, rates.mean_final, step, steps) * extent;
   rates.exposure = exponential_decay(rates.exposure, rates.exposure_final, step, steps);
-  int const from = static_cast<int>(rates.settle_from * static_cast<float>(steps));
-  float const settled = static_cast<float>(std::pow(static_cast<double>(rates.settled), std::min(1.0, length)));
-  float const share = exponential_decay(1.0f, settled, step - from, steps - from);
+  double const late = std::max(0.0f, rates.settle_late - rates.settle_from) * std::max(0.0, 1 - length);
+  int const from = static_cast<int>((static_cast<double>(rates.settle_from) + late) * steps);
+  float const share = exponential_decay(1.0f, rates.settled, step - from, steps - from);
   for (float* rate : {&rates.log_scale, &rates.quaternion, &rates.opacity, &rates.sh_dc, &rates.sh_rest})
     *rate *= share;
   return rates;
