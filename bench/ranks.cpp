@@ -27,6 +27,9 @@ using namespace gart;
 constexpr char const* usage =
     "usage: mpirun -n N gart_bench_ranks [options]          one line of JSON, of the slowest rank\n"
     "  --model FILE.ply --cameras FILE.json | --gaussians N --size WxH\n"
+    "  --copies N           of the discs, each with its share of the Gaussians, in place of one; a view sees one "
+    "copy,\n"
+    "                       and a rank makes its own rows alone\n"
     "  --steps N            steps that are timed (20), after 10 that are not\n"
     "  --batch N            views a step (1); as many as ranks: each rank takes a view\n"
     "  --backend NAME --backward NAME --threads N\n"
@@ -57,6 +60,8 @@ bool parse(int argc, char** argv, arguments& a) {
       a.scene.gaussians = static_cast<std::size_t>(number);
     else if (name == "--size" && std::sscanf(value.c_str(), "%dx%d", &a.scene.width, &a.scene.height) == 2)
       continue;
+    else if (name == "--copies" && number > 0)
+      a.scene.copies = number;
     else if (name == "--steps" && number > 0)
       a.steps = number;
     else if (name == "--batch" && number > 0)
@@ -150,7 +155,9 @@ dataset captured(gart_bench::scene const& scene) {
 }
 
 void steps(mpi_comm& ranks, arguments const& a) {
-  gart_bench::scene const scene = gart_bench::make_scene(a.scene);
+  bool const parts = a.scene.copies > 1;
+  gart_bench::scene const scene =
+      parts ? gart_bench::make_part(a.scene, {ranks.size(), ranks.rank()}) : gart_bench::make_scene(a.scene);
   dataset const data = captured(scene);
   configuration_request request;
   request.backend = from_string(a.backend, backend_kind::automatic), request.backward = a.backward;
@@ -161,7 +168,7 @@ void steps(mpi_comm& ranks, arguments const& a) {
   options.iterations = (a.steps + warm) * a.batch, options.sh_every = 1, options.batch = a.batch;
   options.densify = densify_kind::none, options.background = background_kind::black;
   if (!a.learn) options.rates = {0, 0, 0, 0, 0, 0, 0};
-  auto const run = make_session(request, options, data, &scene.model);
+  auto const run = make_session(request, options, data, start_model(scene.model, parts && !a.alone));
   float loss = 0;
   for (int i = 0; i < warm; ++i) run->step();
   if (a.stages) run->profile().clear(), run->profile().enable(true);
@@ -186,9 +193,9 @@ void steps(mpi_comm& ranks, arguments const& a) {
       "{\"ranks\": %d, \"backend\": \"%s\", \"tracer\": \"%s\", \"backward\": \"%s\", \"gaussians\": %zu, "
       "\"width\": %d, \"height\": %d, \"batch\": %d, \"step_ms\": %.4f, \"images_a_second\": %.3f, "
       "\"sent_bytes\": %.0f, \"peak_bytes\": %.0f, \"lt_bytes\": %.0f, \"loss\": %.9g",
-      ranks.size(), to_string(c.backend), to_string(c.tracer), c.backward.c_str(), scene.model.size(),
-      scene.view().width, scene.view().height, a.batch, 1e3 * took, a.batch / took, most_sent, peak, lt,
-      static_cast<double>(loss));
+      ranks.size(), to_string(c.backend), to_string(c.tracer), c.backward.c_str(),
+      parts ? a.scene.gaussians : scene.model.size(), scene.view().width, scene.view().height, a.batch, 1e3 * took,
+      a.batch / took, most_sent, peak, lt, static_cast<double>(loss));
   if (a.learn) std::printf(", \"checksum\": \"%08x\"", checksum);
   if (a.stages) {
     std::printf(", \"stages_ms\": {");

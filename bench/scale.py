@@ -34,7 +34,7 @@ class Scale:
         self.program = os.path.abspath(found[0])
         scene = os.path.splitext(a.scene)[0] if a.scene else None
         self.scene = (["--model", scene + ".ply", "--cameras", scene + ".json"] if scene else
-                      ["--gaussians", a.gaussians, "--size", a.size])
+                      ["--gaussians", a.gaussians, "--size", a.size, "--copies", a.copies])
         self.common = [*self.scene, "--backend", a.backend] + (["--threads", a.threads] if a.threads else [])
 
     def measure(self, what, ranks, *options):
@@ -51,18 +51,25 @@ class Scale:
         self.runs.append(result)
         return result
 
+    def options_of(self, backward):
+        return [*self.common, "--backward", backward, "--steps", self.a.steps]
+
     def steps(self):
         for backward in self.a.backwards.split(","):
-            common = [*self.common, "--backward", backward, "--steps", self.a.steps]
+            common = self.options_of(backward)
             if self.a.alone:
                 self.measure("steps alone", 1, *common, "--alone", 1)
             for ranks in self.a.ranks:
                 self.measure("steps by strips", ranks, *common)
                 if ranks > 1:
                     self.measure("steps by views", ranks, *common, "--batch", ranks)
-            if self.a.ranks[-1] > 1:
-                self.measure("stages by strips", self.a.ranks[-1], *common, "--stages", 1)
-                self.measure("stages by views", self.a.ranks[-1], *common, "--stages", 1, "--batch", self.a.ranks[-1])
+
+    def stages(self):
+        most = self.a.ranks[-1]
+        for backward in self.a.backwards.split(",") if most > 1 else []:
+            common = [*self.options_of(backward), "--stages", 1]
+            self.measure("stages by strips", most, *common)
+            self.measure("stages by views", most, *common, "--batch", most)
 
     def bits(self):
         for batch in (1, 2):
@@ -94,7 +101,11 @@ class Scale:
             self.bits()
         if "steps" in parts:
             self.steps()
-        out["scene"] = os.path.basename(self.a.scene) if self.a.scene else f"discs, {self.a.gaussians} at {self.a.size}"
+        if "stages" in parts:
+            self.stages()
+        copies = f" in {self.a.copies} copies" if self.a.copies != "1" else ""
+        out["scene"] = (os.path.basename(self.a.scene) if self.a.scene else
+                        f"discs, {self.a.gaussians}{copies} at {self.a.size}")
         out["runs"], out["failures"] = self.runs, self.failures
         with open(self.a.out + ".part", "w") as file:
             json.dump(out, file, indent=1, sort_keys=True)
@@ -106,11 +117,12 @@ def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--build", required=True, metavar="DIR", help="build folder")
     p.add_argument("--out", required=True, metavar="FILE", help="where the JSON goes")
-    p.add_argument("--what", default="exchange,bits,steps", metavar="LIST")
+    p.add_argument("--what", default="exchange,bits,steps,stages", metavar="LIST")
     p.add_argument("--ranks", default="1,2", metavar="LIST", help="numbers of ranks, ascending")
     p.add_argument("--launch", default="mpirun", metavar="COMMAND", help="the launcher with its options, up to -n")
     p.add_argument("--scene", metavar="FILE.ply", help="with FILE.json, its cameras; else discs of gart's own")
     p.add_argument("--gaussians", default="1000000", metavar="N")
+    p.add_argument("--copies", default="1", metavar="N", help="of the discs, of which a view sees one")
     p.add_argument("--size", default="1237x822", metavar="WxH")
     p.add_argument("--backend", default="auto", metavar="NAME")
     p.add_argument("--backwards", default="primitive", metavar="LIST")

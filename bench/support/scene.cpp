@@ -4,6 +4,7 @@
 #include <gart/io/file.hpp>
 #include <gart/io/ply.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -62,6 +63,31 @@ std::vector<gart::named_camera> orbit(int count, int width, int height) {
 }
 
 }  // namespace
+
+scene make_part(scene_options const& options, gart::row_owners const& owners) {
+  // A sphere has radius 1, and a camera 2.2 from its centre sees no further up or down than 1.4.
+  constexpr float apart = 4;
+  auto const copies = static_cast<std::size_t>(options.copies);
+  gart::gaussian_model const one = discs((options.gaussians + copies - 1) / copies);
+  scene s;
+  s.model.resize(owners.owned(options.gaussians), sh_degree);
+  owners.for_each_run(options.gaussians, [&](gart::u64 first, gart::u64 count, gart::u64 row) {
+    for (gart::u64 k = 0; k < count; ++k) {
+      std::size_t const from = (first + k) / copies, to = row + k;
+      gart::for_each_array(
+          [&](gart::parameter_array const& array, auto const& source, auto& target) {
+            std::size_t const width = array.width(sh_degree);
+            std::copy_n(source.data() + width * from, width, target.data() + width * to);
+          },
+          one, s.model);
+      s.model.mean[3 * to + 2] += apart * static_cast<float>((first + k) % copies);
+    }
+  });
+  s.cameras = orbit(8, options.width, options.height);
+  for (std::size_t i = 0; i < s.cameras.size(); ++i)
+    s.cameras[i].view.position.z += static_cast<double>(apart) * static_cast<double>(i * copies / s.cameras.size());
+  return s;
+}
 
 scene make_scene(scene_options const& options) {
   scene s;

@@ -2,6 +2,7 @@
 // The Gaussians and the camera that every benchmark runs on: a splat PLY with a camera JSON, or Gaussians of our own
 // making: thin discs on three nested spheres, a few tens of hits a ray whatever their number.
 
+#include <gart/comm/row_owners.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/scene/gaussians.hpp>
 
@@ -22,9 +23,13 @@ struct scene_options {
   std::filesystem::path model, cameras;  // empty: discs
   std::size_t gaussians = 20000;
   int width = 320, height = 240;
+  int copies = 1;  // of the discs, above each other: a camera sees one of them
 };
 
 scene make_scene(scene_options const& options);
+// Of discs, with all cameras, the rows that one rank has of so many Gaussians as no host may hold: Gaussian g is of
+// copy g % copies, so that each view finds the same share of its rows on every rank.
+scene make_part(scene_options const& options, gart::row_owners const& owners);
 // STEM.ply and STEM.json.
 void write_scene(std::filesystem::path const& stem, scene const& s);
 
