@@ -1,6 +1,7 @@
 """Charts as SVG files, for bench/plot.py: bars, stacked bars, lines, courses of a training and scatters."""
 import math
 import os
+import textwrap
 
 COLORS = ["#4269d0", "#efb118", "#ff725c", "#6cc5b0", "#3ca951", "#a463f2", "#97bbf5", "#9c6b4e", "#9498a0"]
 INK, SOFT, GRID = "#1f2328", "#57606a", "#d8dee4"
@@ -79,7 +80,8 @@ def bars(path, title, unit, groups, note):
     """groups: [(label, [(series, value)])]; a bar each, side by side."""
     series = list(dict.fromkeys(name for _, row in groups for name, _ in row))
     color = {name: COLORS[i % len(COLORS)] for i, name in enumerate(series)}
-    svg = Svg(760, 400, title)
+    notes = textwrap.wrap(note, 118)
+    svg = Svg(760, 386 + 14 * len(notes), title)
     svg.legend(20, 56, color.items())
     y_of = axis(svg, 70, 740, 104, 330, ticks(max(v for _, row in groups for _, v in row)), unit)
     share = 670 / len(groups)
@@ -92,7 +94,8 @@ def bars(path, title, unit, groups, note):
             svg.text(x + width / 2, y_of(value) - 5, f"{value:.3g}", size=11, anchor="middle")
             x += width
         svg.text(70 + share * (g + 0.5), 352, label, anchor="middle")
-    svg.text(20, 384, note, size=11, color=SOFT)
+    for i, text in enumerate(notes):
+        svg.text(20, 384 + 14 * i, text, size=11, color=SOFT)
     svg.write(path)
 
 

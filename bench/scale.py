@@ -103,9 +103,8 @@ class Scale:
             self.steps()
         if "stages" in parts:
             self.stages()
-        copies = f" in {self.a.copies} copies" if self.a.copies != "1" else ""
-        out["scene"] = (os.path.basename(self.a.scene) if self.a.scene else
-                        f"discs, {self.a.gaussians}{copies} at {self.a.size}")
+        discs = f"{int(self.a.gaussians):,} discs" + (f", {self.a.copies} copies" if self.a.copies != "1" else "")
+        out["scene"] = os.path.basename(self.a.scene) if self.a.scene else discs
         out["runs"], out["failures"] = self.runs, self.failures
         with open(self.a.out + ".part", "w") as file:
             json.dump(out, file, indent=1, sort_keys=True)
