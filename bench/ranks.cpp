@@ -27,9 +27,7 @@ using namespace gart;
 constexpr char const* usage =
     "usage: mpirun -n N gart_bench_ranks [options]          one line of JSON, of the slowest rank\n"
     "  --model FILE.ply --cameras FILE.json | --gaussians N --size WxH\n"
-    "  --copies N           of the discs, each with its share of the Gaussians, in place of one; a view sees one "
-    "copy,\n"
-    "                       and a rank makes its own rows alone\n"
+    "  --copies N           of the discs, each a share of the Gaussians: a view sees one, a rank makes its own rows\n"
     "  --steps N            steps that are timed (20), after 10 that are not\n"
     "  --batch N            views a step (1); as many as ranks: each rank takes a view\n"
     "  --backend NAME --backward NAME --threads N\n"
@@ -83,7 +81,7 @@ bool parse(int argc, char** argv, arguments& a) {
     else
       return false;
   }
-  return true;
+  return a.scene.copies == 1 || a.scene.model.empty();
 }
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }

@@ -131,6 +131,8 @@ def main():
     p.add_argument("--alone", action="store_true", help="time the plain trainer too")
     p.add_argument("--commit", default="", metavar="ID", help="where the folder is no checkout")
     a = p.parse_args()
+    if a.scene and a.copies != "1":
+        p.error("--copies are of the discs, and --scene names another scene: give one of the two")
     a.ranks = sorted(int(r) for r in a.ranks.split(","))
     return Scale(a).go()
 
