@@ -27,6 +27,7 @@ using namespace gart;
 constexpr char const* usage =
     "usage: mpirun -n N gart_bench_ranks [options]          one line of JSON, of the slowest rank\n"
     "  --model FILE.ply --cameras FILE.json | --gaussians N --size WxH\n"
+    "  --degree N           of the colours' spherical harmonics, 0 to 3 (3)\n"
     "  --copies N           of the discs, each a share of the Gaussians: a view sees one, a rank makes its own rows\n"
     "  --steps N            steps that are timed (20), after 10 that are not\n"
     "  --batch N            views a step (1); as many as ranks: each rank takes a view\n"
@@ -60,6 +61,8 @@ bool parse(int argc, char** argv, arguments& a) {
       continue;
     else if (name == "--copies" && number > 0)
       a.scene.copies = number;
+    else if (name == "--degree" && number >= 0 && number <= 3)
+      a.scene.degree = number;
     else if (name == "--steps" && number > 0)
       a.steps = number;
     else if (name == "--batch" && number > 0)
@@ -189,11 +192,12 @@ void steps(mpi_comm& ranks, arguments const& a) {
   configuration_info const c = run->configuration();
   std::printf(
       "{\"ranks\": %d, \"backend\": \"%s\", \"tracer\": \"%s\", \"backward\": \"%s\", \"gaussians\": %zu, "
+      "\"sh_degree\": %d, "
       "\"width\": %d, \"height\": %d, \"batch\": %d, \"step_ms\": %.4f, \"images_a_second\": %.3f, "
       "\"sent_bytes\": %.0f, \"peak_bytes\": %.0f, \"lt_bytes\": %.0f, \"loss\": %.9g",
       ranks.size(), to_string(c.backend), to_string(c.tracer), c.backward.c_str(),
-      parts ? a.scene.gaussians : scene.model.size(), scene.view().width, scene.view().height, a.batch, 1e3 * took,
-      a.batch / took, most_sent, peak, lt, static_cast<double>(loss));
+      parts ? a.scene.gaussians : scene.model.size(), scene.model.sh_degree, scene.view().width, scene.view().height,
+      a.batch, 1e3 * took, a.batch / took, most_sent, peak, lt, static_cast<double>(loss));
   if (a.learn) std::printf(", \"checksum\": \"%08x\"", checksum);
   if (a.stages) {
     std::printf(", \"stages_ms\": {");

@@ -34,7 +34,7 @@ class Scale:
         self.program = os.path.abspath(found[0])
         scene = os.path.splitext(a.scene)[0] if a.scene else None
         self.scene = (["--model", scene + ".ply", "--cameras", scene + ".json"] if scene else
-                      ["--gaussians", a.gaussians, "--size", a.size, "--copies", a.copies])
+                      ["--gaussians", a.gaussians, "--size", a.size, "--copies", a.copies]) + ["--degree", a.degree]
         self.common = [*self.scene, "--backend", a.backend] + (["--threads", a.threads] if a.threads else [])
 
     def measure(self, what, ranks, *options):
@@ -122,6 +122,7 @@ def main():
     p.add_argument("--scene", metavar="FILE.ply", help="with FILE.json, its cameras; else discs of gart's own")
     p.add_argument("--gaussians", default="1000000", metavar="N")
     p.add_argument("--copies", default="1", metavar="N", help="of the discs, of which a view sees one")
+    p.add_argument("--degree", default="3", metavar="N", help="of the colours' spherical harmonics")
     p.add_argument("--size", default="1237x822", metavar="WxH")
     p.add_argument("--backend", default="auto", metavar="NAME")
     p.add_argument("--backwards", default="primitive", metavar="LIST")

@@ -137,7 +137,7 @@ void training_run::say_memory() {
   gart::u64 const most = gart::gaussians_at_end(options, data_, begin);
   say_.note("each rank needs " +
             as_bytes(static_cast<double>(
-                gart::least_bytes(most, configuration_.sh_degree, ranks::size(), options.shard_block))) +
+                gart::least_bytes(most, configuration_.sh_degree, ranks::size(), options.shard_block, options.batch))) +
             " at the least, for its part of " + with_commas(most) + " Gaussians, and what the views take");
 }
 

@@ -12,7 +12,7 @@ namespace gart_bench {
 
 namespace {
 
-gart::gaussian_model discs(std::size_t n) {
+gart::gaussian_model discs(std::size_t n, int degree) {
   std::mt19937 random(7);
   std::normal_distribution<float> normal;
   std::uniform_real_distribution<float> uniform;
@@ -22,7 +22,7 @@ gart::gaussian_model discs(std::size_t n) {
   float const spacing = std::sqrt(area / static_cast<float>(n));
 
   gart::gaussian_model model;
-  model.resize(n, sh_degree);
+  model.resize(n, degree);
   for (std::size_t i = 0; i < n; ++i) {
     float const r = radii[sphere(random)];
     float d[3] = {normal(random), normal(random), normal(random)};
@@ -38,8 +38,8 @@ gart::gaussian_model discs(std::size_t n) {
     bool const opposite = q[0] < 1e-4f;
     for (int k = 0; k < 4; ++k) model.quaternion[4 * i + k] = opposite ? (k == 1) : q[k];
     model.opacity[i] = -3 + 6 * uniform(random);
-    float* sh = model.sh.data() + 3 * gart::sh_coefficients(sh_degree) * i;
-    for (int k = 0; k < 3 * gart::sh_coefficients(sh_degree); ++k) sh[k] = (k < 3 ? 0.8f : 0.05f) * normal(random);
+    float* sh = model.sh.data() + 3 * gart::sh_coefficients(degree) * i;
+    for (int k = 0; k < 3 * gart::sh_coefficients(degree); ++k) sh[k] = (k < 3 ? 0.8f : 0.05f) * normal(random);
   }
   return model;
 }
@@ -68,15 +68,15 @@ scene make_part(scene_options const& options, gart::row_owners const& owners) {
   // A sphere has radius 1, and a camera 2.2 from its centre sees no further up or down than 1.4.
   constexpr float apart = 4;
   auto const copies = static_cast<std::size_t>(options.copies);
-  gart::gaussian_model const one = discs((options.gaussians + copies - 1) / copies);
+  gart::gaussian_model const one = discs((options.gaussians + copies - 1) / copies, options.degree);
   scene s;
-  s.model.resize(owners.owned(options.gaussians), sh_degree);
+  s.model.resize(owners.owned(options.gaussians), options.degree);
   owners.for_each_run(options.gaussians, [&](gart::u64 first, gart::u64 count, gart::u64 row) {
     for (gart::u64 k = 0; k < count; ++k) {
       std::size_t const from = (first + k) / copies, to = row + k;
       gart::for_each_array(
           [&](gart::parameter_array const& array, auto const& source, auto& target) {
-            std::size_t const width = array.width(sh_degree);
+            std::size_t const width = array.width(options.degree);
             std::copy_n(source.data() + width * from, width, target.data() + width * to);
           },
           one, s.model);
@@ -92,15 +92,15 @@ scene make_part(scene_options const& options, gart::row_owners const& owners) {
 scene make_scene(scene_options const& options) {
   scene s;
   if (options.model.empty()) {
-    s.model = discs(options.gaussians);
+    s.model = discs(options.gaussians, options.degree);
     s.cameras = orbit(8, options.width, options.height);
     return s;
   }
   s.model = gart::read_splat_ply(options.model);
   s.cameras = gart::load_cameras(options.cameras);
-  if (s.model.sh_degree != sh_degree)
+  if (s.model.sh_degree != options.degree)
     throw gart::io_error(options.model.string(), "has SH degree " + std::to_string(s.model.sh_degree),
-                         "the benchmarks are compiled for degree 3: name such a model");
+                         "name a model of degree " + std::to_string(options.degree));
   if (s.cameras.empty())
     throw gart::io_error(options.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   return s;

@@ -11,10 +11,10 @@
 
 namespace gart_bench {
 
-inline constexpr int sh_degree = 3;
+inline constexpr int sh_degree = 3;  // of what is timed stage by stage
 
 struct scene {
-  gart::gaussian_model model;  // of sh_degree
+  gart::gaussian_model model;
   std::vector<gart::named_camera> cameras;
   gart::camera const& view() const { return cameras.front().view; }
 };
@@ -23,7 +23,8 @@ struct scene_options {
   std::filesystem::path model, cameras;  // empty: discs
   std::size_t gaussians = 20000;
   int width = 320, height = 240;
-  int copies = 1;  // of the discs, above each other: a camera sees one of them
+  int copies = 1;          // of the discs, above each other: a camera sees one of them
+  int degree = sh_degree;  // of the discs' colours, and what a model must have
 };
 
 scene make_scene(scene_options const& options);

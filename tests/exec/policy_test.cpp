@@ -185,6 +185,7 @@ TEST_CASE_TEMPLATE("resize_keep keeps what there was", E, GART_TEST_POLICIES) {
   buffer<u32, E> empty(exec);
   empty.resize_keep(3);
   CHECK(empty.size() == 3);
+  CHECK(empty.capacity() == 3);  // a first size is exact
 }
 
 TEST_CASE_TEMPLATE("moving a buffer moves its memory", E, GART_TEST_POLICIES) {

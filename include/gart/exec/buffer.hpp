@@ -69,6 +69,7 @@ class buffer {
   }
   /// Keeps what there is; the rest is undefined.
   void resize_keep(std::size_t n) {
+    if (size_ == 0) return resize(n);
     if (n > capacity_) {
       buffer grown(*exec_);
       grown.resize(static_cast<std::size_t>(static_cast<double>(n) * slack));

@@ -59,6 +59,11 @@ GART_HD inline u32 continued_pairs(footprint_slots range, image_rows const& rows
 // What a row that does not go to a unit has for its place among those that do.
 inline constexpr u32 not_sent = ~u32{0};
 
+// What the exchange has of each row of a rank, sent or not: a box a view, a place and its sum a unit.
+constexpr u64 exchange_bytes_of_row(int views, int units) {
+  return static_cast<u64>(views) * sizeof(footprint_slots) + static_cast<u64>(units) * (sizeof(u32) + sizeof(u64));
+}
+
 // The k-th count of what lies before each unit, and of all.
 struct unit_ends_kernel {
   u64 const* places;

@@ -1,9 +1,10 @@
 #pragma once
 /// \file
 /// What a training needs of memory at the least, known before it starts: of each Gaussian that it may grow to, its
-/// parameters, their gradients and Adam's two moments, 16 bytes a float, 944 at degree 3. Over ranks Gaussians are
-/// spread in whole blocks (comm/row_owners.hpp). Records, lists, images and the LT buffer come on top: they depend on
-/// the views, and a step that finds no room for the LT buffer is done with less.
+/// parameters, their gradients and Adam's two moments, 16 bytes a float, and what a step has of it whether it is seen
+/// or not. Over ranks Gaussians are spread in whole blocks (comm/row_owners.hpp). Lists, images, the LT buffer and,
+/// over ranks, the rows of others come on top: they depend on the views, and a step that finds no room for the LT
+/// buffer is done with less.
 ///
 /// Errors: out_of_memory, in bytes, before anything is allocated; invalid_argument for more Gaussians than a rank has
 /// numbers for.
@@ -12,8 +13,10 @@
 #include <gart/comm/row_owners.hpp>
 #include <gart/core/error.hpp>
 #include <gart/io/dataset.hpp>
+#include <gart/math/hit_gradient.hpp>
 #include <gart/optim/error_growth.hpp>
 #include <gart/scene/gaussians.hpp>
+#include <gart/shard/row_exchange_kernels.hpp>
 #include <gart/train/options.hpp>
 
 #include <algorithm>
@@ -33,10 +36,20 @@ inline u64 gaussians_at_end(train_options const& options, dataset const& data, u
   }
 }
 
-/// Bytes of the rank that has most, for so many Gaussians on `ranks` ranks.
-inline u64 least_bytes(u64 gaussians, int sh_degree, int ranks, index_t block) {
+/// Bytes of a Gaussian on the rank that has it, for ranks that share steps of `batch` images.
+inline u64 bytes_of_gaussian(int sh_degree, int ranks, int batch) {
   u64 const floats = 11 + 3 * static_cast<u64>(sh_degree + 1) * static_cast<u64>(sh_degree + 1);
-  return 16 * floats * row_owners{ranks, 0, block}.owned(gaussians);
+  int const views = std::min(batch, ranks);  // of a round
+  u64 bytes = 16 * floats;
+  // Its record in a view and its moments there; where ranks trace whole views they have these of what a view shows.
+  if (ranks == 1 || views < ranks) bytes += sizeof(ray_gaussian) + moment_stride * sizeof(float);
+  if (ranks > 1) bytes += detail::exchange_bytes_of_row(views, ranks);
+  return bytes;
+}
+
+/// Bytes of the rank that has most, for so many Gaussians on `ranks` ranks.
+inline u64 least_bytes(u64 gaussians, int sh_degree, int ranks, index_t block, int batch) {
+  return bytes_of_gaussian(sh_degree, ranks, batch) * row_owners{ranks, 0, block}.owned(gaussians);
 }
 
 /// Throws where the policy has not even that, of what it shares with other ranks.
@@ -50,7 +63,7 @@ void require_room(E& exec, Comm& comm, train_options const& options, dataset con
                            std::to_string(comm.size()) + (comm.size() == 1 ? " rank" : " ranks") +
                            " are more than the " + std::to_string(most_gaussians) +
                            " that a rank can hold; lower it, or take more ranks");
-  u64 const need = least_bytes(gaussians, sh_degree, comm.size(), block);
+  u64 const need = least_bytes(gaussians, sh_degree, comm.size(), block, options.batch);
   if (free == 0 || need <= free) return;
   u64 const fit = free / (need / std::max<u64>(gaussians, 1) + 1);
   throw out_of_memory(E::device ? "CUDA device" : "host", need, free,
