@@ -43,7 +43,7 @@ train_options short_run(densify_kind densify) {
 }
 
 bool same(std::vector<float> const& a, std::vector<float> const& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0);
 }
 bool same(gaussian_model const& a, gaussian_model const& b) {
   bool equal = a.size() == b.size();
