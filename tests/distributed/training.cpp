@@ -4,6 +4,7 @@
 #include "policy.hpp"
 
 #include <gart/io/file.hpp>
+#include <gart/runtime/request.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
 #include <gart/train/trainer.hpp>
@@ -11,6 +12,10 @@
 #include <doctest/doctest.h>
 
 #include <unistd.h>
+
+#include <map>
+#include <set>
+#include <string>
 
 using namespace gart;
 
@@ -327,6 +332,44 @@ TEST_CASE("a Gaussian that no view shows takes the bytes that were told before, 
     CAPTURE(batch);
     CHECK(taken / told > 0.98);                       // a block more here, and less there
     CHECK(taken / told < (ranks == 1 ? 1.1 : 1.02));  // one rank has its own lists of all
+  }
+}
+
+TEST_CASE("a run that grows has the memory of its end from the start, and no more of it") {
+  row_owners const owners{mpi_comm().size(), mpi_comm().rank(), 8};
+  for (densify_kind const kind : {densify_kind::error, densify_kind::mcmc}) {
+    CAPTURE(static_cast<int>(kind));
+    exec_type exec = gart_test::make_exec();
+    dataset const data = gart_test::capture(exec, 4);
+    train_options const options = short_run(kind);
+    shared run(exec, options, data, gart_test::cloud(11, 0.5f), every_rank());
+    index_t const end = owners.owned(options.max_gaussians);
+    auto const holds = [&](gaussians<exec_type> const& rows) {
+      bool exact = true;
+      for_each_array(
+          [&](parameter_array const& a, auto const& v) { exact = exact && v.capacity() == end * a.width(1); }, rows);
+      return exact;
+    };
+    REQUIRE(run.size() < options.max_gaussians);
+    CHECK(holds(run.scene()));
+    CHECK(holds(run.gradients()));
+    float const* const place = run.scene().sh.data();
+    while (run.size() < options.max_gaussians && run.steps_done() < options.iterations) run.step();
+    CHECK(run.size() == options.max_gaussians);
+    CHECK(run.scene().sh.data() == place);
+    CHECK(holds(run.scene()));
+    CHECK(holds(run.gradients()));
+  }
+}
+
+TEST_CASE("where ranks train, they do so at every degree, so that a choice of bands leaves no GPU idle") {
+  std::map<std::string, std::set<int>> degrees;
+  for (configuration_info const& c : compiled_configurations())
+    if (c.ranks) degrees[std::string(to_string(c.backend)) + " " + c.backward].insert(c.sh_degree);
+  CHECK(degrees.size() >= 2);  // with sums in a fixed order and without
+  for (auto const& [name, there] : degrees) {
+    CAPTURE(name);
+    CHECK(there == std::set<int>{0, 1, 2, 3});
   }
 }
 

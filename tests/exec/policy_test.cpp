@@ -188,6 +188,28 @@ TEST_CASE_TEMPLATE("resize_keep keeps what there was", E, GART_TEST_POLICIES) {
   CHECK(empty.capacity() == 3);  // a first size is exact
 }
 
+TEST_CASE_TEMPLATE("what is reserved is exact, keeps what there was, and is grown into where it lies", E,
+                   GART_TEST_POLICIES) {
+  E exec;
+  auto const host = numbers(1000);
+  buffer<u32, E> a(exec, host);
+  a.reserve(5000);
+  CHECK(a.capacity() == 5000);
+  CHECK(a.to_host() == host);
+  u32* const place = a.data();
+  a.resize_keep(4000), a.resize_keep(5000), a.reserve(10);
+  CHECK(a.data() == place);
+  CHECK(a.capacity() == 5000);
+  CHECK(a.size() == 5000);
+  auto kept = a.to_host();
+  kept.resize(1000);
+  CHECK(kept == host);
+  buffer<u32, E> empty(exec);
+  empty.reserve(3);
+  CHECK(empty.size() == 0);
+  CHECK(empty.capacity() == 3);
+}
+
 TEST_CASE_TEMPLATE("moving a buffer moves its memory", E, GART_TEST_POLICIES) {
   E exec;
   auto const host = numbers(100);

@@ -70,13 +70,17 @@ class buffer {
   /// Keeps what there is; the rest is undefined.
   void resize_keep(std::size_t n) {
     if (size_ == 0) return resize(n);
-    if (n > capacity_) {
-      buffer grown(*exec_);
-      grown.resize(static_cast<std::size_t>(static_cast<double>(n) * slack));
-      exec_->copy(grown.data_, data_, size_ * sizeof(T));
-      swap(grown);
-    }
+    if (n > capacity_) reserve(static_cast<std::size_t>(static_cast<double>(n) * slack));
     size_ = n;
+  }
+  /// Memory for n elements, where there is less, and for no more: of who knows how far it will grow, that gets there
+  /// without slack and without a copy. Keeps what there is.
+  void reserve(std::size_t n) {
+    if (n <= capacity_) return;
+    buffer grown(*exec_, n);
+    if (size_) exec_->copy(grown.data_, data_, size_ * sizeof(T));
+    grown.size_ = size_;
+    swap(grown);
   }
   /// Sets every byte to 0.
   void zero() { exec_->zero(data_, size_ * sizeof(T)); }

@@ -117,6 +117,11 @@ class gaussians {
     require_count(n);
     for_each_array([&](parameter_array const& a, auto& values) { values.resize_keep(n * a.width(degree_)); }, *this);
   }
+  /// Memory for n Gaussians in all, where there is less; size() stays.
+  void reserve(std::size_t n) {
+    require_count(n);
+    for_each_array([&](parameter_array const& a, auto& values) { values.reserve(n * a.width(degree_)); }, *this);
+  }
   /// Sets all numbers to 0.
   void zero() {
     for_each_array([](parameter_array const&, auto& values) { values.zero(); }, *this);

@@ -4,7 +4,7 @@
 /// parameters, their gradients and Adam's two moments, 16 bytes a float, and what a step has of it whether it is seen
 /// or not. Over ranks Gaussians are spread in whole blocks (comm/row_owners.hpp). Lists, images, the LT buffer and,
 /// over ranks, the rows of others come on top: they depend on the views, and a step that finds no room for the LT
-/// buffer is done with less.
+/// buffer is done with less. Parameters, gradients and moments of all that it may grow to are made at the start.
 ///
 /// Errors: out_of_memory, in bytes, before anything is allocated; invalid_argument for more Gaussians than a rank has
 /// numbers for.

@@ -158,6 +158,7 @@ class basic_trainer {
   template <class Rows>
   void optimize(learning_rates const& rates, int degree, Rows&& rows);
   learning_rates rates_of_step() const;
+  void make_room();
 
   // With ranks (trainer_ranks_impl.hpp).
   void require_ranks() const;

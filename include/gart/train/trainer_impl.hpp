@@ -48,6 +48,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
   require_ranks();
   if (start.rows.sh_degree != sh_degree)
     throw invalid_argument("trainer: the model to start from has another SH degree");
+  make_room();
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
   if (options.depth_weight > 0) {
     bool mapped = false;
@@ -81,6 +82,15 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
   growth_ = growth_for(options.mcmc, started_with_, options.max_gaussians, options.iterations);
   mcmc_.set_growth(growth_);
   error_.set_batch(options.batch), mcmc_.set_batch(options.batch), adc_.set_batch(options.batch);
+}
+
+// For all that the run is to grow to, at once: growth neither takes slack nor has an array twice while it copies it.
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::make_room() {
+  u64 const all = gaussians_at_end(options_, data_, started_with_);
+  u64 here = all;
+  if constexpr (!Comm::alone) here = shards_.rows.owners().owned(all);
+  for (gaussians<E>* each : {&scene_, &gradients_, &state_.first, &state_.second}) each->reserve(here);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -344,7 +354,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_part(training_state c
   if (s.scene.sh_degree != sh_degree) throw invalid_argument("trainer: the state has another SH degree");
   scene_.assign(s.scene), state_.first.assign(s.first), state_.second.assign(s.second);
   total_ = static_cast<index_t>(total_of(comm_, {s.scene, true}));
-  gradients_ = gaussians<E>(exec_, scene_.size(), sh_degree);
+  gradients_.resize_keep(scene_.size());
   error_.error_sum.assign(s.error_sum);
   adc_.gradient_sum.assign(s.gradient_sum), adc_.touched.assign(s.touched);
   if (exposures_) {
