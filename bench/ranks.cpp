@@ -162,7 +162,7 @@ void steps(mpi_comm& ranks, arguments const& a) {
   dataset const data = captured(scene);
   configuration_request request;
   request.backend = from_string(a.backend, backend_kind::automatic), request.backward = a.backward;
-  request.threads = a.threads;
+  request.threads = a.threads, request.sh_degree = a.scene.degree;
   if (!a.alone) request.ranks = &ranks;
   train_options options;
   int const warm = a.learn ? 0 : 10;

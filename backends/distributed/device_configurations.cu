@@ -12,8 +12,7 @@ bool device_available(std::string* reason) { return !cuda_devices(reason).empty(
 
 template <strategy Strategy>
 void register_on_devices(int rank) {
-  register_configuration_of<cuda_exec, scene_traits<3>, tile_tracer<cuda_exec>, Strategy, nccl_comm>(rank,
-                                                                                                     device_available);
+  register_configurations<cuda_exec, tile_tracer<cuda_exec>, Strategy, nccl_comm>(rank, device_available);
 }
 
 }  // namespace
