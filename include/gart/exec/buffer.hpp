@@ -73,8 +73,8 @@ class buffer {
     if (n > capacity_) reserve(static_cast<std::size_t>(static_cast<double>(n) * slack));
     size_ = n;
   }
-  /// Memory for n elements, where there is less, and for no more: of who knows how far it will grow, that gets there
-  /// without slack and without a copy. Keeps what there is.
+  /// Makes room for n elements in all, exactly, where there is less: what is known to grow so far does it without slack
+  /// and without a copy. Keeps what there is.
   void reserve(std::size_t n) {
     if (n <= capacity_) return;
     buffer grown(*exec_, n);
