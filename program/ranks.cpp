@@ -21,6 +21,10 @@
 #include <thread>
 #include <vector>
 
+#if defined(_OPENMP)
+#include <omp.h>
+#endif
+#include <sched.h>
 #include <unistd.h>
 
 namespace gart_cli {
@@ -39,6 +43,31 @@ std::unique_ptr<gart::mpi_comm>& started() {
   static std::unique_ptr<gart::mpi_comm> all;
   return all;
 }
+
+// Where nobody has said how many threads a rank takes: its share of the cores that the launcher lets it run on. Each of
+// several would start a thread a core otherwise, and wait for the others' at every loop.
+#if defined(_OPENMP)
+void share_cores(gart::mpi_comm& all) {
+  if (std::getenv("OMP_NUM_THREADS")) return;
+  struct seat {
+    char host[64] = {};
+    cpu_set_t cores;
+  } mine;
+  std::strncpy(mine.host, all.host().c_str(), sizeof mine.host - 1);
+  CPU_ZERO(&mine.cores);
+  ::sched_getaffinity(0, sizeof mine.cores, &mine.cores);
+  std::vector<seat> seats(static_cast<std::size_t>(all.size()));
+  all.all_gather(&mine, seats.data(), sizeof mine);
+  auto const sharers = std::count_if(seats.begin(), seats.end(), [&](seat const& s) {
+    cpu_set_t both;
+    CPU_AND(&both, &s.cores, &mine.cores);
+    return std::strcmp(s.host, mine.host) == 0 && CPU_COUNT(&both) > 0;
+  });
+  omp_set_num_threads(std::max(1, CPU_COUNT(&mine.cores) / std::max(1, static_cast<int>(sharers))));
+}
+#else
+void share_cores(gart::mpi_comm&) {}
+#endif
 #endif
 
 }  // namespace
@@ -77,7 +106,9 @@ void ranks::launch_on(int gpus, char** argv) {
 #if defined(GART_WITH_MPI)
 bool const ranks::built = true;
 void ranks::start(bool wanted) {
-  if (!started() && (launched() > 1 || wanted)) started() = std::make_unique<gart::mpi_comm>();
+  if (started() || (launched() <= 1 && !wanted)) return;
+  started() = std::make_unique<gart::mpi_comm>();
+  share_cores(*started());
 }
 gart::mpi_comm* ranks::comm() { return started().get(); }
 int ranks::size() { return comm() ? comm()->size() : 1; }
