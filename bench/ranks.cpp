@@ -35,7 +35,7 @@ constexpr char const* usage =
     "  --alone 1            the plain trainer, of one rank\n"
     "  --learn 1            usual rates in place of none, from the first step; its loss and the model's checksum "
     "count\n"
-    "  --stages 1           time by stage instead of a step's\n"
+    "  --stages 1           time by stage instead of a step's, of each rank\n"
     "  --exchange MB        no steps: each rank sends so much to every other, of device memory and of the host's\n";
 
 struct arguments {
@@ -141,6 +141,29 @@ void exchange(mpi_comm& ranks, arguments const& a) {
   if (ranks.rank() == 0) std::printf("%s}\n", text.c_str());
 }
 
+// Where this rank's time goes, milliseconds a step, as JSON.
+std::string in_stages(profiler const& times, int steps) {
+  std::string text = "{";
+  for (auto const& [label, time] : times.stages()) {
+    char number[32];
+    std::snprintf(number, sizeof number, "%.4f", time.milliseconds / steps);
+    text += (text.size() > 1 ? ", \"" : "\"") + label + "\": " + number;
+  }
+  return text + "}";
+}
+
+// What each rank has to say, in the order of ranks.
+std::vector<std::string> gathered(mpi_comm& ranks, std::string const& mine) {
+  std::size_t const all = static_cast<std::size_t>(ranks.size());
+  auto const most = static_cast<std::size_t>(largest(ranks, static_cast<double>(mine.size())));
+  std::string padded = mine, every(most * all, '\0');
+  padded.resize(most);
+  ranks.all_gather(padded.data(), every.data(), most);
+  std::vector<std::string> out;
+  for (std::size_t r = 0; r < all; ++r) out.push_back(every.substr(r * most, most).c_str());
+  return out;
+}
+
 // Photographs of noise for the scene's cameras.
 dataset captured(gart_bench::scene const& scene) {
   dataset data;
@@ -188,6 +211,7 @@ void steps(mpi_comm& ranks, arguments const& a) {
     for_each_array([&](parameter_array const&, auto const& v) { checksum = crc32c(v.data(), 4 * v.size(), checksum); },
                    model);
   }
+  std::vector<std::string> const stages = gathered(ranks, a.stages ? in_stages(times, a.steps) : std::string());
   if (ranks.rank() != 0) return;
   configuration_info const c = run->configuration();
   std::printf(
@@ -200,11 +224,10 @@ void steps(mpi_comm& ranks, arguments const& a) {
       a.batch, 1e3 * took, a.batch / took, most_sent, peak, lt, static_cast<double>(loss));
   if (a.learn) std::printf(", \"checksum\": \"%08x\"", checksum);
   if (a.stages) {
-    std::printf(", \"stages_ms\": {");
-    char const* comma = "";
-    for (auto const& [label, time] : times.stages())
-      std::printf("%s\"%s\": %.4f", std::exchange(comma, ", "), label.c_str(), time.milliseconds / a.steps);
-    std::printf("}");
+    std::printf(", \"stages_ms\": %s", stages[0].c_str());
+    for (std::size_t r = 1; r < stages.size(); ++r)
+      std::printf("%s%s", r == 1 ? ", \"stages_ms_of_others\": [" : ", ", stages[r].c_str());
+    if (stages.size() > 1) std::printf("]");
   }
   std::printf("}\n");
 }

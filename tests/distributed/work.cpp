@@ -2,8 +2,11 @@
 #include <doctest/doctest.h>
 
 #include <gart/comm/row_owners.hpp>
+#include <gart/shard/image_strips.hpp>
+#include <gart/shard/view_costs.hpp>
 #include <gart/shard/work_units.hpp>
 
+#include <cstring>
 #include <random>
 #include <vector>
 
@@ -75,4 +78,74 @@ TEST_CASE("ranks share the views of a round, and strips their costs") {
   }
   CHECK_THROWS_AS(divide_work({}, 2, 8), invalid_argument);
   CHECK_THROWS_AS(divide_work({{1}, {1}, {1}}, 2, 8), invalid_argument);
+}
+
+TEST_CASE("what views cost comes as steps from row to row, and is known by their names the next time") {
+  std::mt19937_64 engine(6);
+  std::vector<camera> views(3);
+  for (camera& view : views) view.width = 8, view.height = 1 + static_cast<int>(engine() % 40);
+  std::vector<std::vector<u64>> expected;
+  std::vector<u64> steps;
+  for (camera const& view : views) {
+    auto& cost = expected.emplace_back(static_cast<std::size_t>((view.height + 7) / 8));
+    u64 above = 0;
+    for (u64& c : cost) c = engine() % 100, steps.push_back(c - above), above = c;
+    steps.push_back(u64{0} - above);
+  }
+  CHECK(view_costs::count(views, 8) == steps.size());
+  CHECK(view_costs::by_view(views, 8, steps) == expected);
+
+  view_costs known;
+  CHECK(!known.knows({}));
+  CHECK(!known.knows({4, 9, 2}));
+  known.remember({4, 9, 2}, expected);
+  CHECK(known.knows({2, 4}));
+  CHECK(!known.knows({2, 5}));
+  CHECK(known.of({2, 4}) == std::vector{expected[2], expected[0]});
+  CHECK(!known.knows({}));
+}
+
+TEST_CASE("each rank gets of an array the rows that it reads, from the rank that has them") {
+  std::mt19937_64 engine(7);
+  for (int trial = 0; trial < 200; ++trial) {
+    int const ranks = 1 + static_cast<int>(engine() % 6),
+              views = 1 + static_cast<int>(engine() % static_cast<u64>(ranks)),
+              height = 1 + static_cast<int>(engine() % 60), halo = static_cast<int>(engine() % 30);
+    std::vector<std::vector<u64>> costs(static_cast<std::size_t>(views));
+    for (auto& cost : costs) {
+      cost.resize(static_cast<std::size_t>((height + 7) / 8));
+      for (u64& c : cost) c = engine() % 5;
+    }
+    auto const units = divide_work(costs, ranks, 8);
+    auto const has = [&](work_unit const& u) { return rows_in(u, height); };
+    auto const reads = [&](work_unit const& u) {
+      image_rows const mine = has(u);
+      return mine.empty() ? mine : image_rows{std::max(mine.first - halo, 0), std::min(mine.end + halo, height)};
+    };
+    // What each has: of its own rows the view's numbers, else none.
+    std::vector<std::vector<int>> arrays(units.size());
+    std::vector<strip_messages> messages;
+    for (std::size_t r = 0; r < units.size(); ++r) {
+      for (int y = 0; y < height; ++y) arrays[r].push_back(has(units[r]).contains(y) ? 100 * units[r].view + y : -1);
+      messages.push_back({units, static_cast<int>(r), {}, {}, 0}),
+          messages[r].add(arrays[r].data(), sizeof(int), has, reads);
+    }
+    for (std::size_t r = 0; r < units.size(); ++r) {
+      u64 bytes = 0;
+      for (message const& sent : messages[r].sends) {
+        auto& there = messages[static_cast<std::size_t>(sent.rank)].receives;
+        auto const taken = std::find_if(there.begin(), there.end(),
+                                        [&](message const& m) { return m.rank == static_cast<int>(r) && m.bytes; });
+        REQUIRE(taken != there.end());
+        REQUIRE(taken->bytes == sent.bytes);
+        std::memcpy(taken->data, sent.data, sent.bytes), bytes += sent.bytes, taken->bytes = 0;
+      }
+      CHECK(messages[r].bytes == bytes);
+    }
+    for (std::size_t r = 0; r < units.size(); ++r) {
+      for (message const& m : messages[r].receives) REQUIRE(m.bytes == 0);  // nobody waits for what nobody sends
+      for (int y = 0; y < height; ++y)
+        if (reads(units[r]).contains(y)) REQUIRE(arrays[r][static_cast<std::size_t>(y)] == 100 * units[r].view + y);
+    }
+  }
 }

@@ -169,3 +169,57 @@ TEST_CASE_TEMPLATE("the same image gives the same bits, and the object serves im
     CHECK(loss.to_host() == fresh.loss);
   }
 }
+
+TEST_CASE_TEMPLATE("a strip has the bits of the whole image, and reads no row but those that it says", E,
+                   GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  E exec;
+  using loss_type = image_loss<E>;
+  for (auto const [width, height] : {std::pair{100, 203}, {37, 21}, {5, 97}}) {
+    CAPTURE(width);
+    case_data const d = make_case(width, height, 4, true, 0.4, random);
+    result const whole = evaluate(exec, d, 0.2f);
+    std::size_t const row = static_cast<std::size_t>(width) * 3;
+    std::vector<int> cuts = {0, height / 5, height / 2, height / 2, height / 2 + 8, image_rows::most};
+    std::vector<float> sums[2];
+    for (std::size_t k = 0; k + 1 < cuts.size(); ++k) {
+      CAPTURE(k);
+      image_rows const rows{cuts[k], cuts[k + 1]}, read = loss_type::reads(rows, height);
+      std::vector<float> seen(d.image.size(), std::numeric_limits<float>::quiet_NaN());
+      std::copy(d.image.begin() + static_cast<std::ptrdiff_t>(row) * read.first,
+                d.image.begin() + static_cast<std::ptrdiff_t>(row) * read.end,
+                seen.begin() + static_cast<std::ptrdiff_t>(row) * read.first);
+      buffer<float, E> image(exec, seen), gradient(exec, d.image.size());
+      buffer<u8, E> truth(exec, d.truth), mask(exec, d.mask);
+      loss_type l(exec);
+      l.differentiate(image, {truth.data(), d.channels, mask.data(), d.background}, width, height, 0.2f, gradient,
+                      rows);
+      auto const got = gradient.to_host();
+      for (std::size_t i = row * static_cast<std::size_t>(rows.first);
+           i < row * static_cast<std::size_t>(std::min(rows.end, height)); ++i)
+        REQUIRE(got[i] == whole.gradient[i]);
+      image_rows const begun = loss_type::sums_of(rows, height);
+      int const all = loss_type::sums_of({}, height).end;
+      for (int which = 0; which < 2; ++which) {
+        std::vector<float> mine(l.sums(which).size());
+        exec.copy_out(mine.data(), l.sums(which).data(), mine.size() * sizeof(float));
+        auto const wide = static_cast<std::ptrdiff_t>(mine.size()) / all;
+        CHECK(begun.first * wide == static_cast<std::ptrdiff_t>(sums[which].size()));
+        sums[which].insert(sums[which].end(), mine.begin() + wide * begun.first,
+                           mine.begin() + wide * std::max(begun.end, begun.first));
+      }
+    }
+    // All strips' sums are those of the image.
+    loss_type l(exec);
+    buffer<float, E> image(exec, d.image), gradient(exec, d.image.size()), loss(exec, 2);
+    buffer<u8, E> truth(exec, d.truth), mask(exec, d.mask);
+    l.differentiate(image, {truth.data(), d.channels, mask.data(), d.background}, width, height, 0.2f, gradient);
+    for (int which = 0; which < 2; ++which) {
+      REQUIRE(sums[which].size() == l.sums(which).size());
+      exec.copy_in(l.sums(which).data(), sums[which].data(), sums[which].size() * sizeof(float));
+    }
+    l.total(loss);
+    CHECK(loss.to_host() == whole.loss);
+  }
+}

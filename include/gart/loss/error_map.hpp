@@ -14,7 +14,9 @@ struct error_map_kernel {
   float const* image;
   truth_view truth;
   float* error;
-  GART_KERNEL void operator()(index_t pixel) const {
+  index_t first;  // pixel
+  GART_KERNEL void operator()(index_t k) const {
+    index_t const pixel = first + k;
     vec3 const y = truth.color(pixel);
     float sum = 0;
     for (int c = 0; c < 3; ++c) sum += fabsf(image[std::size_t{3} * pixel + c] - y[c]);
@@ -24,12 +26,18 @@ struct error_map_kernel {
 
 }  // namespace detail
 
-/// Queues the launch that fills `error`.
+/// Queues the launch that fills `error`: of an image so wide, in some rows.
+template <execution E>
+void error_map(E& exec, span<float const> image, truth_view const& truth, buffer<float, E>& error,
+               image_rows const& rows, int width) {
+  error.resize(image.size() / 3);
+  parallel_for(exec, "error_map", static_cast<index_t>(rows.count()) * width,
+               detail::error_map_kernel{image.data(), truth, error.data(), static_cast<index_t>(rows.first) * width});
+}
+/// Of the whole image.
 template <execution E>
 void error_map(E& exec, span<float const> image, truth_view const& truth, buffer<float, E>& error) {
-  error.resize(image.size() / 3);
-  parallel_for(exec, "error_map", static_cast<index_t>(error.size()),
-               detail::error_map_kernel{image.data(), truth, error.data()});
+  error_map(exec, image, truth, error, {0, static_cast<int>(image.size() / 3)}, 1);
 }
 
 }  // namespace gart::inline GART_ISA

@@ -14,12 +14,12 @@
 ///   dS/de = l (1 - c) / B2,  dS/df = -l / B2  for e, f the windowed means of x^2 + y^2 and d^2,
 /// and the gradient at a pixel is the windowed sum of dS/dm_x + 2 (x - 1/2) dS/de + 2 d dS/df.
 ///
-/// Three launches: differences; SSIM with its three partials; their convolution. Memory: 60 bytes a pixel.
+/// Three launches: differences; SSIM with its three partials; their convolution. Memory: 60 bytes a pixel. The gradient
+/// of a strip of the image (differentiate) takes these of the strip and of two windows' reach around it.
 
 #include <gart/algorithm/reduce.hpp>
 #include <gart/exec/buffer.hpp>
-#include <gart/loss/ssim_window.hpp>
-#include <gart/math/arith.hpp>
+#include <gart/loss/loss_tiles.hpp>
 #include <gart/math/glm.hpp>
 
 namespace gart::inline GART_ISA {
@@ -48,148 +48,22 @@ struct truth_view {
 
 namespace detail {
 
-// Planes are [3][H][W]: one a channel.
-struct loss_image {
-  int width = 0, height = 0;
-  GART_HD std::size_t pixels() const { return static_cast<std::size_t>(width) * height; }
-};
-
 struct difference_kernel {
   float const* image;
   truth_view truth;
   loss_image size;
+  index_t first;         // pixel
   float* centred_truth;  // y - 1/2
   float* difference;     // x - y
 
-  GART_KERNEL void operator()(index_t pixel) const {
+  GART_KERNEL void operator()(index_t k) const {
+    index_t const pixel = first + k;
     bool const counts = truth.counts(pixel);
     vec3 const y = truth.color(pixel);
     for (int c = 0; c < 3; ++c) {
       std::size_t const at = c * size.pixels() + pixel;
       centred_truth[at] = y[c] - 0.5f;
       difference[at] = counts ? image[std::size_t{pixel} * 3 + c] - y[c] : 0.0f;
-    }
-  }
-};
-
-// Tiles of one channel, with a halo of the window's radius. A lane of a host takes 16 pixels beside each other, which
-// its compiler puts in vector registers, and its tiles are large: long runs of memory, little halo. One of a device
-// takes four: beside each other along rows, below each other down columns, so that neighbouring windows share what they
-// read of shared memory. It loads one at a time, as memory is read.
-template <execution E>
-struct loss_tiles {
-  static constexpr int block = E::device ? 4 : 16, load_block = E::device ? 1 : 16;
-  static constexpr index_t team_size = 128;
-  static constexpr int width = E::device ? 32 : 96, height = E::device ? 16 : 32;
-  static constexpr int halo_width = width + 2 * ssim_window::radius, halo_height = height + 2 * ssim_window::radius;
-  static constexpr int load_width = (halo_width + load_block - 1) / load_block * load_block;
-  // A warp of a device takes four rows along rows: pitches of one more than a multiple of four share no bank.
-  static constexpr int halo_pitch = E::device ? load_width / 4 * 4 + 5 : load_width, rows_pitch = width + E::device;
-  static constexpr int halo_size = halo_pitch * halo_height, rows_size = rows_pitch * halo_height;
-  static_assert(halo_pitch >= load_width);
-
-  loss_image image;
-  GART_HD int across() const { return (image.width + width - 1) / width; }
-  GART_HD int down() const { return (image.height + height - 1) / height; }
-  GART_HD index_t count() const { return static_cast<index_t>(3) * across() * down(); }
-
-  struct place {
-    int channel, x, y;
-  };
-  GART_HD place operator()(index_t tile) const {
-    index_t const plane = static_cast<index_t>(across()) * down(), in_plane = tile % plane;
-    return {static_cast<int>(tile / plane), static_cast<int>(in_plane % across()) * width,
-            static_cast<int>(in_plane / across()) * height};
-  }
-
-  // f(cell, i, inside) for every cell of the haloed tile; i is its pixel's place in [3][H][W] where it is inside.
-  template <class Team, class F>
-  GART_HD void each_halo_cell(Team const& team, place const& at, F const& f) const {
-    constexpr int blocks = load_width / load_block;
-    team.for_each(blocks * halo_height, [&](index_t item) {
-      int const row = item / blocks, first = item % blocks * load_block, y = at.y + row - ssim_window::radius;
-      int const x = at.x + first - ssim_window::radius;
-      bool const row_inside = y >= 0 && y < image.height;
-      // In pointer-sized integers, which is what lets a compiler see that neighbours are contiguous.
-      std::ptrdiff_t const begin = x < 0 ? -x : 0, end = row_inside ? image.width - x : 0;
-      std::ptrdiff_t const start = at.channel * image.pixels() + static_cast<std::ptrdiff_t>(y) * image.width + x;
-      std::ptrdiff_t const cell = row * halo_pitch + first;
-      // Most blocks lie inside, and without a question for each cell they are moved as vectors.
-      if (load_block > 1 && begin == 0 && end >= load_block)
-        for (std::ptrdiff_t v = 0; v < load_block; ++v) f(cell + v, start + v, true);
-      else
-        for (std::ptrdiff_t v = 0; v < load_block; ++v) f(cell + v, start + v, v >= begin && v < end);
-    });
-  }
-
-  // The window's sum of 11 values `step` apart, the middle one at p[5 * step].
-  static GART_HD GART_INLINE float windowed(float const* p, int step) {
-    constexpr float w[6] = {weight<0>, weight<1>, weight<2>, weight<3>, weight<4>, weight<5>};
-    float sum = w[5] * p[5 * step];
-    sum = fma(w[4], p[4 * step] + p[6 * step], sum);
-    sum = fma(w[3], p[3 * step] + p[7 * step], sum);
-    sum = fma(w[2], p[2 * step] + p[8 * step], sum);
-    sum = fma(w[1], p[step] + p[9 * step], sum);
-    return fma(w[0], p[0] + p[10 * step], sum);
-  }
-  template <int Tap>
-  static constexpr float weight = static_cast<float>(ssim_window::weight(Tap));
-
-  // Windows `step` apart from value to value, of `block` neighbours that lie `next` apart.
-  template <int Planes>
-  static GART_HD GART_INLINE void convolve(float const* in, int plane, int step, int next,
-                                           float (&sums)[Planes][block]) {
-    GART_UNROLL
-    for (int p = 0; p < Planes; ++p) {
-      GART_UNROLL
-      for (int v = 0; v < block; ++v) sums[p][v] = windowed(in + p * plane + v * next, step);
-    }
-  }
-
-  // Along rows: from haloed planes to planes of rows_pitch by halo_height.
-  template <int Planes, class Team>
-  static GART_HD void convolve_rows(Team const& team, float const* halo, float* rows) {
-    team.for_each(width * halo_height / block, [&](index_t item) {
-      int const row = item * block / width, x = item * block % width;
-      float sums[Planes][block];
-      convolve<Planes>(halo + row * halo_pitch + x, halo_size, 1, 1, sums);
-      for (int p = 0; p < Planes; ++p)
-        for (int v = 0; v < block; ++v) rows[p * rows_size + row * rows_pitch + x + v] = sums[p][v];
-    });
-  }
-
-  // What a lane takes down columns: value v lies at (column, row) + v (dx, dy).
-  static constexpr int dx = !E::device, dy = E::device, items = width * height / block;
-  struct item_place {
-    int column, row;
-  };
-  static GART_HD item_place item_at(index_t item) {
-    if constexpr (E::device) return {static_cast<int>(item % width), static_cast<int>(item / width) * block};
-    return {static_cast<int>(item * block % width), static_cast<int>(item * block / width)};
-  }
-  // From a value to the next where rows are so far apart.
-  static GART_HD constexpr int next(int pitch) { return dx + dy * pitch; }
-  template <int Planes>
-  static GART_HD GART_INLINE void convolve_columns(float const* rows, item_place const& at,
-                                                   float (&sums)[Planes][block]) {
-    convolve<Planes>(rows + at.row * rows_pitch + at.column, rows_size, rows_pitch, next(rows_pitch), sums);
-  }
-  // How many of an item's values lie in the image.
-  GART_HD int inside(int x, int y) const {
-    if (x >= image.width || y >= image.height) return 0;
-    int const left = E::device ? image.height - y : image.width - x;
-    return left < block ? left : block;
-  }
-  // f of each of these; all of them, as mostly, without a question each, and always by numbers known to the compiler.
-  template <class F>
-  static GART_HD GART_INLINE void each_inside(int inside, F const& f) {
-    if (inside == block) {
-      GART_UNROLL
-      for (int v = 0; v < block; ++v) f(v);
-    } else {
-      GART_UNROLL
-      for (int v = 0; v < block; ++v)
-        if (v < inside) f(v);
     }
   }
 };
@@ -204,6 +78,7 @@ struct ssim_kernel {
     float column_loss[tiles::width], column_square[tiles::width];
   };
   tiles grid;
+  index_t first;  // tile
   float const* centred_truth;
   float const* difference;
   float* partials;   // [3 partials][3][H][W]
@@ -213,7 +88,8 @@ struct ssim_kernel {
 
   GART_KERNEL void operator()(auto const& team) const {
     scratch& s = team.scratch();
-    auto const at = grid(team.tile());
+    index_t const tile = first + team.tile();
+    auto const at = grid(tile);
     std::size_t const pixels = grid.image.pixels(), plane = at.channel * pixels;
     int const image_width = grid.image.width;
 
@@ -275,7 +151,7 @@ struct ssim_kernel {
       for (int column = 0; column < tiles::width; ++column)
         loss += s.column_loss[column], square += s.column_square[column];
       float const share = 1.0f / (3.0f * static_cast<float>(pixels));
-      tile_loss[team.tile()] = loss * share, tile_square[team.tile()] = square * share;
+      tile_loss[tile] = loss * share, tile_square[tile] = square * share;
     });
   }
 
@@ -290,6 +166,7 @@ struct loss_gradient_kernel {
     float rows[3][tiles::rows_size];
   };
   tiles grid;
+  index_t first;  // tile
   float const* centred_truth;
   float const* difference;
   float const* partials;
@@ -299,7 +176,7 @@ struct loss_gradient_kernel {
 
   GART_KERNEL void operator()(auto const& team) const {
     scratch& s = team.scratch();
-    auto const at = grid(team.tile());
+    auto const at = grid(first + team.tile());
     std::size_t const pixels = grid.image.pixels(), plane = at.channel * pixels;
     int const image_width = grid.image.width;
 
@@ -352,28 +229,56 @@ class image_loss {
   /// `image` and `gradient` are [H][W][3]; `loss` is two floats of the policy's memory: L, and the mean squared error.
   void evaluate(span<float const> image, truth_view truth, int width, int height, float ssim_weight,
                 span<float> gradient, span<float> loss) {
+    differentiate(image, truth, width, height, ssim_weight, gradient);
+    total(loss);
+  }
+
+  /// The gradient in some rows of the image, the same bits as of all; and what the loss sums there, in rows of tiles.
+  void differentiate(span<float const> image, truth_view truth, int width, int height, float ssim_weight,
+                     span<float> gradient, image_rows rows = {}) {
     E& exec = *exec_;
-    detail::loss_tiles<E> const grid{{width, height}};
+    tiles const grid{{width, height}};
     std::size_t const values = 3 * grid.image.pixels();
     planes_.resize(2 * values), partials_.resize(3 * values), sums_.resize(std::size_t{2} * grid.count());
     float* const truth_plane = planes_.data();
     float* const difference = planes_.data() + values;
-    span<float> const tile_loss = sums_.view().subspan(0, grid.count());
-    span<float> const tile_square = sums_.view().subspan(grid.count(), grid.count());
+    image_rows const inner = tiles::rows_of(rows, height), outer = tiles::around(inner, height),
+                     read = reads(rows, height);
+    auto const launched = [&](image_rows const& some) {
+      return tile_range{grid.row_tiles() * static_cast<index_t>(some.count()), grid.team_size};
+    };
+    auto const first = [&](image_rows const& some) { return grid.row_tiles() * static_cast<index_t>(some.first); };
 
-    parallel_for(exec, "loss_difference", static_cast<index_t>(grid.image.pixels()),
-                 detail::difference_kernel{image.data(), truth, grid.image, truth_plane, difference});
-    parallel_for(exec, "loss_ssim", tile_range{grid.count(), grid.team_size},
-                 detail::ssim_kernel<E>{grid, truth_plane, difference, partials_.data(), tile_loss.data(),
-                                        tile_square.data(), ssim_weight});
-    parallel_for(exec, "loss_gradient", tile_range{grid.count(), grid.team_size},
-                 detail::loss_gradient_kernel<E>{grid, truth_plane, difference, partials_.data(), truth.mask,
-                                                 gradient.data(), ssim_weight});
-    reduce(exec, span<float const>(tile_loss), loss.subspan(0, 1));
-    reduce(exec, span<float const>(tile_square), loss.subspan(1, 1));
+    parallel_for(exec, "loss_difference", static_cast<index_t>(width) * static_cast<index_t>(read.count()),
+                 detail::difference_kernel{image.data(), truth, grid.image, static_cast<index_t>(width) * read.first,
+                                           truth_plane, difference});
+    parallel_for(exec, "loss_ssim", launched(outer),
+                 detail::ssim_kernel<E>{grid, first(outer), truth_plane, difference, partials_.data(), sums_.data(),
+                                        sums_.data() + grid.count(), ssim_weight});
+    parallel_for(exec, "loss_gradient", launched(inner),
+                 detail::loss_gradient_kernel<E>{grid, first(inner), truth_plane, difference, partials_.data(),
+                                                 truth.mask, gradient.data(), ssim_weight});
+  }
+  /// The rows of an image that differentiate() reads for some.
+  static image_rows reads(image_rows rows, int height) {
+    return tiles::reached(tiles::around(tiles::rows_of(rows, height), height), height);
+  }
+  /// What the last differentiate() has summed, [rows of tiles][tiles of a row], of L and of the squared error.
+  span<float> sums(int which) { return sums_.view().subspan(which * sums_.size() / 2, sums_.size() / 2); }
+  /// The rows of tiles that begin in some rows of an image: whose sums those have who have the image in parts.
+  static image_rows sums_of(image_rows rows, int height) {
+    return {(rows.first + tiles::height - 1) / tiles::height,
+            (std::min(rows.end, height) + tiles::height - 1) / tiles::height};
+  }
+  /// The loss, of all rows' sums.
+  void total(span<float> loss) {
+    for (int which = 0; which < 2; ++which)
+      reduce(*exec_, span<float const>(sums(which)), loss.subspan(static_cast<std::size_t>(which), 1));
   }
 
  private:
+  using tiles = detail::loss_tiles<E>;
+
   E* exec_;
   buffer<float, E> planes_, partials_, sums_;
 };

@@ -4,7 +4,7 @@
 /// gradients back.
 ///
 ///   row_exchange<E, Comm, 8, 3, response> rows(exec, comm, block);
-///   rows.fetch(scene, views, options);       // `scene`: the rows of this rank
+///   rows.fetch(scene, views, names, options);  // `scene`: the rows of this rank
 ///   frame.prepare(rows.scene(), views[rows.unit().view], options of rows.unit().rows);
 ///   rows.finish_fetch();                     // what was queued may go on without colours, what is next has them
 ///   ...                                      // the image, its gradient, sum_gradients
@@ -27,9 +27,11 @@
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/backward/backward.hpp>
 #include <gart/render/antialiased.hpp>
+#include <gart/shard/arrival_order.hpp>
 #include <gart/shard/image_strips.hpp>
 #include <gart/shard/row_exchange_kernels.hpp>
 #include <gart/shard/sharded_rows.hpp>
+#include <gart/shard/view_costs.hpp>
 #include <gart/shard/work_units.hpp>
 
 namespace gart::inline GART_ISA {
@@ -46,17 +48,15 @@ class row_exchange {
         owners_{comm_.size(), comm_.rank(), block},
         filter_(exec),
         scene_(exec, 0, ShDegree),
-        cost_(exec),
         place_of_(exec),
         list_(exec),
         sent_pairs_(exec),
         returned_(exec),
-        runs_(exec),
         order_(exec),
         counts_(exec),
         places_(exec),
         total_(exec, 1),
-        ends_(exec),
+        told_(exec),
         out_(exec),
         in_(exec),
         colors_out_(exec),
@@ -65,12 +65,15 @@ class row_exchange {
         pairs_in_(exec) {}
 
   /// The rows of the round's views, at most one a rank; the same on all ranks. Without their colours (finish_fetch).
-  void fetch(gaussians_view<float const> scene, std::vector<camera> const& views, render_options const& options) {
+  /// `names`: a number of each view, by which what it costs is remembered; or none.
+  void fetch(gaussians_view<float const> scene, std::vector<camera> const& views, std::vector<std::size_t> const& names,
+             render_options const& options) {
     stage_scope stage(*exec_, "exchange/rows");
     comm_.finish(*exec_);
-    measure(scene, views, options);
-    select(scene.count);
-    received_ = send_counts();
+    measure(scene, views, names, options);
+    std::vector<u64> costs = select(scene.count);
+    received_ = send_counts(costs);
+    if (!costs.empty()) costs_.remember(names, view_costs::by_view(views, Size, costs));
     std::size_t const leave = total(sent_), arrive = total(received_);
     index_t const leaving = static_cast<index_t>(leave), arriving = static_cast<index_t>(arrive);
     out_.resize(leave * detail::placing_width), in_.resize(arrive * detail::placing_width);
@@ -87,7 +90,7 @@ class row_exchange {
             scene.sh, list_.data(), way<colors_width>(sent_, colors_out_.data(), received_, colors_in_.data())});
     comm_.finish(*exec_);
     begin(messages(sent_, colors_out_.data(), colors_width), messages(received_, colors_in_.data(), colors_width));
-    put_in_order(arriving, scene.count);
+    order_.find(in_.data(), arriving, scene.count, owners_, places_);
     for_each_column<detail::placing_width / 4>(*exec_, "exchange/unpack", arriving,
                                                detail::unpack_placing_body{scene_.view(), in_.data(), order_.data()});
   }
@@ -111,7 +114,16 @@ class row_exchange {
 
   /// Strips of [H][W] of `bytes` a pixel become whole images, on all ranks that trace the same view.
   void share_image(void* image, camera const& view, std::size_t bytes) {
-    traffic_ += share_strips(*exec_, comm_, units_, image, view, bytes);
+    share_image(image, view, bytes, [&](work_unit const&) { return image_rows{0, view.height}; });
+  }
+  /// Of them only the rows that a unit reads.
+  void share_image(void* image, camera const& view, std::size_t bytes, auto const& reads) {
+    traffic_ += share_strips(*exec_, comm_, units_, image, view, bytes, reads);
+  }
+  /// Beside what is queued, until give_back: as many rows of each of `arrays`, to all ranks that trace the same view,
+  /// from the one that `has` them.
+  void begin_sharing(std::initializer_list<span<float>> arrays, int rows, auto const& has) {
+    traffic_ += begin_sharing_rows(*exec_, comm_, units_, arrays, rows, has);
   }
 
   /// Whether each rank traces a whole view, and finishes its gradients: sum_finished has these, and not sum_moments.
@@ -186,53 +198,48 @@ class row_exchange {
     comm_.begin(*exec_, as_span(sends), as_span(receives));
   }
 
-  // The boxes of this rank's rows in each view, and from all ranks' who traces what. A view that one rank traces alone
-  // needs no cost.
-  void measure(gaussians_view<float const> scene, std::vector<camera> const& views, render_options const& options) {
+  // The boxes of this rank's rows in each view, and who traces what: of what the views cost when they were traced last,
+  // or where one never was, of what they cost now. What they cost now comes with the counts, for the next time. A view
+  // that one rank traces alone needs no cost.
+  void measure(gaussians_view<float const> scene, std::vector<camera> const& views,
+               std::vector<std::size_t> const& names, render_options const& options) {
     bool const shared = views.size() < static_cast<std::size_t>(owners_.ranks);
     finishes_ = !shared;
     constexpr index_t counted = 1 << 16;  // rows of a rank, about, that tell the cost of a view's strips
     index_t const every = shared ? 1 + scene.count / counted : 0;
-    std::vector<std::vector<u64>> costs;
+    std::size_t const ends = static_cast<std::size_t>(owners_.ranks) + 1,
+                      costs = shared ? view_costs::count(views, Size) : 0;
+    told_.resize(ends + costs), told_.zero();
+    u64* cost = told_.data() + ends;
     while (boxes_.size() < views.size()) boxes_.emplace_back(*exec_);
     for (std::size_t v = 0; v < views.size(); ++v) {
-      tile_grid<Size> const grid{views[v].width, views[v].height};
-      boxes_[v].resize(scene.count), cost_.resize(grid.rows() + 1);
-      if (shared) cost_.zero();
+      boxes_[v].resize(scene.count);
       auto const seen = filter_.of(*exec_, scene, views[v], options.antialias);
       visit_camera(views[v], [&](auto const& model) {
         auto const bounds = model.bounds(options.near);
         parallel_for(*exec_, "exchange/boxes", scene.count,
                      detail::box_kernel<Response, E, Size, std::remove_const_t<decltype(bounds)>>{
-                         seen, bounds, model.position, options.alpha_min, boxes_[v].data(), cost_.data(), every});
+                         seen, bounds, model.position, options.alpha_min, boxes_[v].data(), cost, every});
       });
-      costs.push_back(shared ? cost_.to_host() : std::vector<u64>(grid.rows() + 1));
+      if (shared) cost += tile_grid<Size>{views[v].width, views[v].height}.rows() + 1;
     }
-    if (shared) add_costs(costs);
-    for (std::vector<u64>& cost : costs) {
-      std::inclusive_scan(cost.begin(), cost.end(), cost.begin());
-      cost.pop_back();
+    if (shared && costs_.knows(names)) {
+      units_ = divide_work(costs_.of(names), owners_.ranks, Size);
+      return;
     }
-    units_ = divide_work(costs, owners_.ranks, Size);
+    std::vector<u64> now(view_costs::count(views, Size));
+    if (shared) {
+      exec_->copy_out(now.data(), told_.data() + ends, costs * sizeof(u64));
+      comm_.all_reduce(span<u64>(now.data(), costs));
+    }
+    units_ = divide_work(view_costs::by_view(views, Size, now), owners_.ranks, Size);
   }
 
-  void add_costs(std::vector<std::vector<u64>>& costs) {
-    std::vector<u64> all;
-    for (auto const& cost : costs) all.insert(all.end(), cost.begin(), cost.end());
-    comm_.all_reduce(span<u64>(all.data(), all.size()));
-    auto at = all.begin();
-    for (auto& cost : costs) {
-      auto const end = at + static_cast<std::ptrdiff_t>(cost.size());
-      cost.assign(at, end), at = end;
-    }
-  }
-
-  // Which rows go to whom: one scan over the units, for one wait.
-  void select(index_t rows) {
+  // Which rows go to whom: one scan over the units, for one wait. Returns what this rank's rows cost the views.
+  std::vector<u64> select(index_t rows) {
     std::size_t const units = units_.size(), all = rows * units;
     sent_.assign(units, 0), returned_views_.clear();
-    place_of_.resize(all), places_.resize(all + 1), ends_.resize(units + 1);
-    std::vector<u64> ends(units + 1, 0);
+    place_of_.resize(all), places_.resize(all + 1);
     if (rows) {
       for (std::size_t r = 0; r < units; ++r)
         parallel_for(*exec_, "exchange/select", rows,
@@ -240,9 +247,11 @@ class row_exchange {
       exclusive_scan(*exec_, span<u32 const>(place_of_), places_.view().subspan(0, all),
                      places_.view().subspan(all, 1));
       parallel_for(*exec_, "exchange/select", static_cast<index_t>(units + 1),
-                   detail::unit_ends_kernel{places_.data(), rows, ends_.data()});
-      exec_->copy_out(ends.data(), ends_.data(), ends.size() * sizeof(u64));
+                   detail::unit_ends_kernel{places_.data(), rows, told_.data()});
     }
+    std::vector<u64> ends = told_.to_host();
+    std::vector<u64> costs(ends.begin() + static_cast<std::ptrdiff_t>(units + 1), ends.end());
+    ends.resize(units + 1);
     list_.resize(ends.back()), sent_pairs_.resize(ends.back());
     std::vector<detail::returned_unit> returned;
     for (std::size_t r = 0; r < units; ++r) {
@@ -256,26 +265,10 @@ class row_exchange {
       sent_[r] = ends[r + 1] - ends[r];
     }
     returned_.assign(returned);
+    return costs;
   }
   footprint_slots const* boxes_of(std::size_t unit) const {
     return boxes_[static_cast<std::size_t>(units_[unit].view)].data();
-  }
-
-  // What came, by the Gaussians' numbers: order_ of `n` rows. Where this rank has so many rows others have at most a
-  // block more.
-  void put_in_order(index_t n, index_t rows) {
-    order_.resize(n);
-    std::size_t const mine = (u64{rows} + owners_.block - 1) / owners_.block + 1,
-                      blocks = mine * static_cast<std::size_t>(owners_.ranks);
-    runs_.resize(3 * blocks), places_.resize(blocks);
-    runs_.zero();
-    u32 *const first = runs_.data(), *const past = first + blocks, *const lengths = past + blocks;
-    detail::runs_kernel const runs{in_.data(), n, owners_.block, first, past};
-    parallel_for(*exec_, "exchange/order", n, runs);
-    parallel_for(*exec_, "exchange/order", static_cast<index_t>(blocks),
-                 detail::run_lengths_kernel{first, past, lengths});
-    exclusive_scan(*exec_, span<u32 const>(lengths, blocks), places_.view());
-    parallel_for(*exec_, "exchange/order", n, detail::run_order_kernel{runs, places_.data(), order_.data()});
   }
 
   // What came of the views [first, end): the first, and how many.
@@ -297,13 +290,18 @@ class row_exchange {
             layout::pieces(pairs_in_.data()), adds ? layout::pieces(before.data()) : nullptr, share, take});
   }
 
-  // What each rank has for this one.
-  std::vector<u64> send_counts() {
-    std::size_t const ranks = units_.size(), me = static_cast<std::size_t>(owners_.rank);
-    std::vector<u64> all(ranks * ranks), mine(ranks);
-    comm_.all_gather(sent_.data(), all.data(), ranks * sizeof(u64));
-    for (std::size_t r = 0; r < ranks; ++r) mine[r] = all[r * ranks + me];
-    return mine;
+  // What each rank has for this one; `costs` become the sums over ranks.
+  std::vector<u64> send_counts(std::vector<u64>& costs) {
+    std::size_t const ranks = units_.size(), me = static_cast<std::size_t>(owners_.rank), width = ranks + costs.size();
+    std::vector<u64> mine = sent_, all(ranks * width), counts(ranks);
+    mine.insert(mine.end(), costs.begin(), costs.end());
+    comm_.all_gather(mine.data(), all.data(), width * sizeof(u64));
+    costs.assign(costs.size(), 0);
+    for (std::size_t r = 0; r < ranks; ++r) {
+      counts[r] = all[r * width + me];
+      for (std::size_t k = 0; k < costs.size(); ++k) costs[k] += all[r * width + ranks + k];
+    }
+    return counts;
   }
 
   // The pairs of rows that began in a strip above, in the order in which the rows came.
@@ -382,14 +380,16 @@ class row_exchange {
   gaussians<E> scene_;
   std::vector<buffer<footprint_slots, E>> boxes_;  // of this rank's rows, by view
   std::vector<work_unit> units_;
+  view_costs costs_;
   std::vector<u64> sent_, received_, pairs_leaving_;  // by rank
-  buffer<u64, E> cost_;
-  buffer<u32, E> place_of_;           // of each row in each unit
-  buffer<u32, E> list_, sent_pairs_;  // list_: rows of this rank's, by who they went to
+  buffer<u32, E> place_of_;                           // of each row in each unit
+  buffer<u32, E> list_, sent_pairs_;                  // list_: rows of this rank's, by who they went to
   buffer<detail::returned_unit, E> returned_;
-  std::vector<int> returned_views_;       // their views
-  buffer<u32, E> runs_, order_, counts_;  // order_: where each row of scene_ lay in what came
-  buffer<u64, E> places_, total_, ends_;
+  std::vector<int> returned_views_;  // their views
+  arrival_order<E> order_;           // where each row of scene_ lay in what came
+  buffer<u32, E> counts_;
+  buffer<u64, E> places_, total_;
+  buffer<u64, E> told_;  // where each unit's rows end, and what its rows of tiles cost each view
   buffer<float, E> out_, in_, colors_out_, colors_in_, pairs_out_, pairs_in_;
   bool ordered_ = false, finishes_ = false;
   u64 traffic_ = 0;

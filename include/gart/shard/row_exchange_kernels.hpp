@@ -133,39 +133,6 @@ struct pack_colors_body {
   }
 };
 
-// What arrives is in the order of ranks, and of each rank in that of the Gaussians' numbers: a run for each block of
-// them, whose first and past-the-last places these are. Both are zero where nothing of a block has come.
-struct runs_kernel {
-  float const* in;
-  index_t count, block;
-  u32 *first, *past;
-  GART_KERNEL void operator()(index_t k) const {
-    u32 const mine = block_of(k);
-    if (k == 0 || block_of(k - 1) != mine) first[mine] = k;
-    if (k + 1 == count || block_of(k + 1) != mine) past[mine] = k + 1;
-  }
-  GART_HD u32 block_of(index_t k) const {
-    return float_to_bits(in[std::size_t{k} * placing_width + placing_columns]) / block;
-  }
-};
-
-struct run_lengths_kernel {
-  u32 const *first, *past;
-  u32* lengths;
-  GART_KERNEL void operator()(index_t b) const { lengths[b] = past[b] - first[b]; }
-};
-
-// The order of the numbers: runs in that of their blocks.
-struct run_order_kernel {
-  runs_kernel runs;
-  u64 const* begin;  // of each block's run, in that order
-  u32* order;
-  GART_KERNEL void operator()(index_t k) const {
-    u32 const mine = runs.block_of(k);
-    order[begin[mine] + (k - runs.first[mine])] = k;
-  }
-};
-
 struct unpack_placing_body {
   gaussians_view<float> scene;
   float const* in;

@@ -99,15 +99,21 @@ struct emit_pairs {
   }
 };
 
-// Of sorted keys, over 0 to their count: pair i begins the lists from the tile after its predecessor's to its own.
+// Of sorted keys: where a tile's list begins, the first key that is not of a tile before it. Each looks for its own,
+// since most tiles may have no list, as in a strip of an image, and whoever found the next one would fill all of them.
 struct begin_lists {
   span<u32 const> keys;
   int order_bits;
   span<u32> offsets;  // [tiles + 1]
-  GART_KERNEL void operator()(index_t i) const {
-    u32 const tiles = static_cast<u32>(offsets.size()) - 1;
-    u32 const last = i < keys.size() ? keys[i] >> order_bits : tiles;
-    for (u32 tile = i > 0 ? (keys[i - 1] >> order_bits) + 1 : 0; tile <= last; ++tile) offsets[tile] = i;
+  GART_KERNEL void operator()(index_t tile) const {
+    u32 first = 0, count = static_cast<u32>(keys.size());
+    while (count > 0) {
+      u32 const half = count / 2;
+      bool const before = keys[first + half] >> order_bits < tile;
+      first = before ? first + half + 1 : first;
+      count = before ? count - half - 1 : half;
+    }
+    offsets[tile] = first;
   }
 };
 
@@ -153,7 +159,7 @@ class tile_map {
         tile_range{(static_cast<u32>(prints.ranges().size()) + emit::share - 1) / emit::share, emit::block_size},
         emit{grid, prints.ranges(), prints.pair_offsets(), pairs, order, order_bits_, keys_, primitives_});
     sort_pairs(exec, keys_.view(), primitives_.view(), tile_bits + order_bits_);
-    parallel_for(exec, "map/begin", static_cast<index_t>(pairs) + 1,
+    parallel_for(exec, "map/begin", static_cast<index_t>(offsets_.size()),
                  tile_kernels::begin_lists{keys_, order_bits_, offsets_});
   }
 

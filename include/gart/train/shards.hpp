@@ -55,6 +55,7 @@ struct shards {
       unit_gradients;                     ///< what this rank has summed of its unit: .sh, and of a whole view all
   buffer<float, E> moments;               ///< of this rank's rows, by one view
   span<float const> by_exposure;          ///< what its exposure makes of the loss of the image that was traced last
+  bool loss_by_strips = false;            ///< each rank has differentiated that of its own
   u64 sent = 0;                           ///< bytes to other ranks since the run began
   std::optional<arrived_colors> arrived;  ///< of the last step, where Adam took them as they came
 

@@ -95,7 +95,8 @@ class basic_trainer {
   /// One step, with a loss of one's own, called with a loss_input.
   template <class Loss>
   step_report step(Loss&& loss) {
-    return step_by(std::ref(loss));
+    loss_function<E> const own = std::ref(loss);
+    return step_by(&own);
   }
 
   /// Steps done.
@@ -152,9 +153,11 @@ class basic_trainer {
  private:
   using frame_type = frame<E, Traits, Tracer>;
 
-  step_report step_by(loss_function<E> const& loss);
+  // `loss`: one's own, or null.
+  step_report step_by(loss_function<E> const* loss);
   template <class Pass>
-  void differentiate_by(Pass& pass, loss_function<E> const& loss, std::size_t view, learning_rates const& rates);
+  void differentiate_by(Pass& pass, loss_function<E> const* loss, std::size_t view, learning_rates const& rates);
+  void evaluate(loss_function<E> const* loss, loss_input<E> const& in);
   template <class Rows>
   void optimize(learning_rates const& rates, int degree, Rows&& rows);
   learning_rates rates_of_step() const;
@@ -172,9 +175,10 @@ class basic_trainer {
     if (start.is_part) comm.all_reduce(span<u64>(&total, 1));
     return total;
   }
-  step_report step_in_ranks(loss_function<E> const& loss) requires(!Comm::alone);
-  void trace_unit(loss_function<E> const& loss, camera const& seen, int image, int degree, image_result& result,
+  step_report step_in_ranks(loss_function<E> const* loss) requires(!Comm::alone);
+  void trace_unit(loss_function<E> const* loss, camera const& seen, int image, int degree, image_result& result,
                   step_report& report) requires(!Comm::alone);
+  void differentiate_strip(camera const& seen, truth_view const& truth) requires(!Comm::alone);
   void read_result(image_result& result, bool metric, bool lens) requires(!Comm::alone);
   void collect_results(span<image_result> round, bool metrics, bool lens) requires(!Comm::alone);
   void take_gradients(std::vector<camera> const& views, int image, span<image_result> round,

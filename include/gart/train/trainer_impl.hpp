@@ -104,13 +104,17 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_iterations(int iterat
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step() {
-  return step([this](loss_input<E> const& in) {
-    loss_.evaluate(in.image, in.truth, in.width, in.height, options_.ssim_weight, in.gradient, in.value);
-  });
+  return step_by(nullptr);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_function<E> const& loss) {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::evaluate(loss_function<E> const* loss, loss_input<E> const& in) {
+  if (loss) return (*loss)(in);
+  loss_.evaluate(in.image, in.truth, in.width, in.height, options_.ssim_weight, in.gradient, in.value);
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_function<E> const* loss) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return step_in_ranks(loss);
   std::size_t const index = order_.at(step_);
@@ -155,7 +159,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 template <class Pass>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pass, loss_function<E> const& loss,
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pass, loss_function<E> const* loss,
                                                                         std::size_t index,
                                                                         learning_rates const& rates) {
   dataset_view const& view = data_.train[index];
@@ -175,8 +179,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
     truth_view const truth = images_.get(exec_, index, frame_.options().background);
     depth_pixels depth;
     if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth), depth = supervision_.pixels();
-    loss(loss_input<E>{exec_, view, truth, view.view.width, view.view.height, image, color_gradient_,
-                       value_.view().subspan(0, 2), depth});
+    evaluate(loss, {exec_, view, truth, view.view.width, view.view.height, image, color_gradient_,
+                    value_.view().subspan(0, 2), depth});
     if (grows_by_error()) error_map(exec_, image, truth, error_map_);
     if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
   }

@@ -45,7 +45,7 @@ learning_rates basic_trainer<E, Traits, Tracer, Strategy, Comm>::rates_of_step()
 
 // A step over options.batch views, in as many rounds as it takes all ranks to trace them.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss_function<E> const& loss) requires(
+step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss_function<E> const* loss) requires(
     !Comm::alone) {
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates const rates = rates_of_step();
@@ -59,12 +59,13 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
     span<image_result> const round =
         span<image_result>(images).subspan(static_cast<std::size_t>(done), static_cast<std::size_t>(views));
     std::vector<camera> cameras;
+    std::vector<std::size_t> names;
     for (int v = 0; v < views; ++v) {
-      std::size_t const index = round.data()[v].view = order_.at(before + done + v);
-      cameras.push_back(seen_by(index));
+      names.push_back(round.data()[v].view = order_.at(before + done + v));
+      cameras.push_back(seen_by(names.back()));
     }
     // Near distance and the like are those of any view; the background is the view's own.
-    shards_.round.fetch(std::as_const(scene_).view(), cameras, render_options_of(options_, data_.extent));
+    shards_.round.fetch(std::as_const(scene_).view(), cameras, names, render_options_of(options_, data_.extent));
     int const mine = shards_.round.unit().view;
     trace_unit(loss, cameras[static_cast<std::size_t>(mine)], done + mine, degree, round.data()[mine], report);
     take_gradients(cameras, done, round, moves);
@@ -106,7 +107,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
 
 // This rank's unit of a round: its rows of the image, the loss of the whole, its sums of the gradients.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<E> const& loss, camera const& seen,
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<E> const* loss, camera const& seen,
                                                                   int image, int degree, image_result& result,
                                                                   step_report& report) requires(!Comm::alone) {
   std::size_t const index = result.view;
@@ -129,16 +130,18 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   }
   auto const share = [&](float* plane) { shards_.round.share_image(plane, seen, sizeof(float)); };
   span<float> const by_lens = value_.view().subspan(2 + pose_gradient::floats, lens_gradient::floats);
+  shards_.loss_by_strips = !loss && !exposures_ && !targets.depth && !bends;
   auto const by_image = [&] {
     stage_scope stage(exec_, "loss");
+    if (shards_.loss_by_strips) return differentiate_strip(seen, images_.get(exec_, index, background));
     shards_.round.share_image(color_.data(), seen, 3 * sizeof(float));
     if (targets.depth) share(targets.depth), share(targets.transmittance);
     span<float const> const shown = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
     truth_view const truth = images_.get(exec_, index, background);
     depth_pixels depth;
     if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth), depth = supervision_.pixels();
-    loss(loss_input<E>{exec_, view, truth, seen.width, seen.height, shown, color_gradient_, value_.view().subspan(0, 2),
-                       depth});
+    evaluate(loss,
+             {exec_, view, truth, seen.width, seen.height, shown, color_gradient_, value_.view().subspan(0, 2), depth});
     if (grows_by_error()) error_map(exec_, shown, truth, error_map_);
     if (exposures_) shards_.by_exposure = exposures_->differentiate(index, color_, color_gradient_);
   };
@@ -172,10 +175,26 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   });
 }
 
+// The loss of this rank's strip alone, where nobody asks for the whole image: its own rows and those that windows reach
+// come from the others, and the sums of the loss go to them, while gradients are gathered.
+template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_strip(
+    camera const& seen, truth_view const& truth) requires(!Comm::alone) {
+  auto const rows = [&](work_unit const& unit) { return rows_in(unit, seen.height); };
+  shards_.round.share_image(color_.data(), seen, 3 * sizeof(float),
+                            [&](work_unit const& unit) { return image_loss<E>::reads(rows(unit), seen.height); });
+  image_rows const mine = rows(shards_.round.unit());
+  loss_.differentiate(color_, truth, seen.width, seen.height, options_.ssim_weight, color_gradient_, mine);
+  if (grows_by_error()) error_map(exec_, color_, truth, error_map_, mine, seen.width);
+  shards_.round.begin_sharing({loss_.sums(0), loss_.sums(1)}, image_loss<E>::sums_of({}, seen.height).end,
+                              [&](work_unit const& unit) { return image_loss<E>::sums_of(rows(unit), seen.height); });
+}
+
 // What this rank has found of the image that it traced last.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_result(image_result& result, bool metric,
                                                                    bool lens) requires(!Comm::alone) {
+  if (shards_.loss_by_strips) loss_.total(value_.view().subspan(0, 2));
   float values[2];
   exec_.copy_out(values, value_.data(), sizeof values);
   result.loss = values[0], result.mean_square = values[1];
@@ -290,7 +309,7 @@ rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_in_ranks(camer
   render_options render = render_options_of(options_, data_.extent, background);
   auto& round = shards_.round;
   sum_arrived();  // before what they are made of goes
-  round.fetch(std::as_const(scene_).view(), {view}, render);
+  round.fetch(std::as_const(scene_).view(), {view}, {}, render);
   render.rows = round.unit().rows;
   bool const traces = !round.unit().empty();
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;

@@ -1,0 +1,67 @@
+#pragma once
+/// \file
+/// What the rows of tiles of each view cost when ranks traced it last, the same on all of them: what it is cut by the
+/// next time (work_units.hpp), so that no rank waits for the others' counts before it knows what it traces. A view
+/// changes little from one time to the next, and images and gradients do not depend on where it is cut.
+///
+/// Costs come as box_kernel counts them: of a view one number a row of tiles and one behind, by how much the row's cost
+/// is more than that of the row above, in wrapping arithmetic; views one after another. Memory: 8 bytes a row of tiles.
+
+#include <gart/core/types.hpp>
+#include <gart/scene/camera.hpp>
+#include <gart/tiles/grid.hpp>
+
+#include <map>
+#include <numeric>
+#include <vector>
+
+namespace gart {
+
+/// By a number of each view that its user chooses.
+class view_costs {
+ public:
+  /// How many numbers the costs of these views are.
+  static std::size_t count(std::vector<camera> const& views, int tile_size) {
+    std::size_t all = 0;
+    for (camera const& view : views) all += rows_of(view, tile_size) + 1;
+    return all;
+  }
+  /// These numbers as costs, by view and row of tiles.
+  static std::vector<std::vector<u64>> by_view(std::vector<camera> const& views, int tile_size,
+                                               std::vector<u64> const& steps) {
+    std::vector<std::vector<u64>> costs;
+    auto at = steps.begin();
+    for (camera const& view : views) {
+      auto const end = at + static_cast<std::ptrdiff_t>(rows_of(view, tile_size));
+      std::partial_sum(at, end, std::back_inserter(costs.emplace_back()));
+      at = end + 1;
+    }
+    return costs;
+  }
+
+  /// Whether all of them were traced before. Of views without a name: no.
+  bool knows(std::vector<std::size_t> const& names) const {
+    for (std::size_t const name : names)
+      if (!costs_.contains(name)) return false;
+    return !names.empty();
+  }
+  /// Of views that it knows.
+  std::vector<std::vector<u64>> of(std::vector<std::size_t> const& names) const {
+    std::vector<std::vector<u64>> costs;
+    for (std::size_t const name : names) costs.push_back(costs_.at(name));
+    return costs;
+  }
+  /// Does nothing where views have no names.
+  void remember(std::vector<std::size_t> const& names, std::vector<std::vector<u64>> costs) {
+    for (std::size_t v = 0; v < names.size(); ++v) costs_[names[v]] = std::move(costs[v]);
+  }
+
+ private:
+  static std::size_t rows_of(camera const& view, int tile_size) {
+    return static_cast<std::size_t>((view.height + tile_size - 1) / tile_size);
+  }
+
+  std::map<std::size_t, std::vector<u64>> costs_;
+};
+
+}  // namespace gart
