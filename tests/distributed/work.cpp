@@ -127,8 +127,7 @@ TEST_CASE("each rank gets of an array the rows that it reads, from the rank that
     std::vector<strip_messages> messages;
     for (std::size_t r = 0; r < units.size(); ++r) {
       for (int y = 0; y < height; ++y) arrays[r].push_back(has(units[r]).contains(y) ? 100 * units[r].view + y : -1);
-      messages.push_back({units, static_cast<int>(r), {}, {}, 0}),
-          messages[r].add(arrays[r].data(), sizeof(int), has, reads);
+      messages.push_back({units, static_cast<int>(r)}), messages[r].add(arrays[r].data(), sizeof(int), has, reads);
     }
     for (std::size_t r = 0; r < units.size(); ++r) {
       u64 bytes = 0;

@@ -19,7 +19,7 @@ namespace gart::inline GART_ISA {
 struct strip_messages {
   std::vector<work_unit> const& units;
   int rank;  ///< this one
-  std::vector<message> sends, receives;
+  std::vector<message> sends = {}, receives = {};
   u64 bytes = 0;  ///< sent
 
   /// Of the rows at `data`, so many bytes each: those that a unit has go to those that read them. Both are functions

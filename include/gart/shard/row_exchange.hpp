@@ -51,6 +51,7 @@ class row_exchange {
         place_of_(exec),
         list_(exec),
         sent_pairs_(exec),
+        taken_(exec),
         returned_(exec),
         order_(exec),
         counts_(exec),
@@ -240,35 +241,34 @@ class row_exchange {
     std::size_t const units = units_.size(), all = rows * units;
     sent_.assign(units, 0), returned_views_.clear();
     place_of_.resize(all), places_.resize(all + 1);
+    std::vector<detail::taken_unit> taken;
+    for (work_unit const& u : units_) taken.push_back({boxes_[static_cast<std::size_t>(u.view)].data(), u.rows});
+    taken_.assign(taken);
+    index_t const count = static_cast<index_t>(units);
     if (rows) {
-      for (std::size_t r = 0; r < units; ++r)
-        parallel_for(*exec_, "exchange/select", rows,
-                     detail::select_kernel{boxes_of(r), units_[r].rows, place_of_.data() + r * rows});
+      parallel_for(*exec_, "exchange/select", rows,
+                   detail::select_kernel{taken_.data(), count, rows, place_of_.data()});
       exclusive_scan(*exec_, span<u32 const>(place_of_), places_.view().subspan(0, all),
                      places_.view().subspan(all, 1));
-      parallel_for(*exec_, "exchange/select", static_cast<index_t>(units + 1),
-                   detail::unit_ends_kernel{places_.data(), rows, told_.data()});
+      parallel_for(*exec_, "exchange/select", count + 1, detail::unit_ends_kernel{places_.data(), rows, told_.data()});
     }
     std::vector<u64> ends = told_.to_host();
     std::vector<u64> costs(ends.begin() + static_cast<std::ptrdiff_t>(units + 1), ends.end());
     ends.resize(units + 1);
     list_.resize(ends.back()), sent_pairs_.resize(ends.back());
+    if (rows)
+      parallel_for(*exec_, "exchange/list", rows,
+                   detail::list_kernel<Size>{taken_.data(), count, rows, places_.data(), told_.data(), list_.data(),
+                                             sent_pairs_.data(), place_of_.data()});
     std::vector<detail::returned_unit> returned;
     for (std::size_t r = 0; r < units; ++r) {
-      work_unit const& u = units_[r];
-      if (u.empty() || rows == 0) continue;
-      u32* const place_of = place_of_.data() + r * rows;
-      parallel_for(*exec_, "exchange/list", rows,
-                   detail::list_kernel<Size>{boxes_of(r), u.rows, places_.data() + r * rows, ends[r], list_.data(),
-                                             sent_pairs_.data(), place_of});
-      returned.push_back({u.view, ends[r], place_of}), returned_views_.push_back(u.view);
+      if (units_[r].empty() || rows == 0) continue;
+      returned.push_back({units_[r].view, ends[r], place_of_.data() + r * rows});
+      returned_views_.push_back(units_[r].view);
       sent_[r] = ends[r + 1] - ends[r];
     }
     returned_.assign(returned);
     return costs;
-  }
-  footprint_slots const* boxes_of(std::size_t unit) const {
-    return boxes_[static_cast<std::size_t>(units_[unit].view)].data();
   }
 
   // What came of the views [first, end): the first, and how many.
@@ -384,6 +384,7 @@ class row_exchange {
   std::vector<u64> sent_, received_, pairs_leaving_;  // by rank
   buffer<u32, E> place_of_;                           // of each row in each unit
   buffer<u32, E> list_, sent_pairs_;                  // list_: rows of this rank's, by who they went to
+  buffer<detail::taken_unit, E> taken_;
   buffer<detail::returned_unit, E> returned_;
   std::vector<int> returned_views_;  // their views
   arrival_order<E> order_;           // where each row of scene_ lay in what came

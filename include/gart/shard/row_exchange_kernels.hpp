@@ -42,11 +42,21 @@ GART_HD inline pixel_box cut(pixel_box box, image_rows const& rows) {
   return box;
 }
 
-struct select_kernel {
+// What a unit takes rows by: their boxes in its view, and its own rows of the image.
+struct taken_unit {
   footprint_slots const* boxes;
   image_rows rows;
+};
+
+// Of every row, whether it goes to each unit, [units][rows]: one launch for all of them, whose latency it is.
+struct select_kernel {
+  taken_unit const* units;
+  index_t count, rows;
   u32* flags;
-  GART_KERNEL void operator()(index_t i) const { flags[i] = !cut(boxes[i].box, rows).empty(); }
+  GART_KERNEL void operator()(index_t i) const {
+    for (index_t u = 0; u < count; ++u)
+      flags[std::size_t{u} * rows + i] = !cut(units[u].boxes[i].box, units[u].rows).empty();
+  }
 };
 
 // The pairs of a box that began above the rows, or begins with them; 0 of others. Of `range`, cut to the rows or not.
@@ -72,18 +82,21 @@ struct unit_ends_kernel {
   GART_KERNEL void operator()(index_t k) const { ends[k] = places[std::size_t{k} * rows]; }
 };
 
-// Of one unit, whose rows begin at `first` of all that leave. place_of is its flags, and becomes their places.
+// place_of is select_kernel's flags, and becomes places among those that go to a unit: its first is ends[u] of all.
 template <int Size>
 struct list_kernel {
-  footprint_slots const* boxes;
-  image_rows rows;
-  u64 const* places;
-  u64 first;
+  taken_unit const* units;
+  index_t count, rows;
+  u64 const *places, *ends;
   u32 *list, *pairs, *place_of;
   GART_KERNEL void operator()(index_t i) const {
-    bool const goes = place_of[i];
-    place_of[i] = goes ? static_cast<u32>(places[i] - first) : not_sent;
-    if (goes) list[places[i]] = i, pairs[places[i]] = continued_pairs<Size>(boxes[i], rows);
+    for (index_t u = 0; u < count; ++u) {
+      std::size_t const at = std::size_t{u} * rows + i;
+      u64 const place = places[at];
+      bool const goes = place_of[at];
+      place_of[at] = goes ? static_cast<u32>(place - ends[u]) : not_sent;
+      if (goes) list[place] = i, pairs[place] = continued_pairs<Size>(units[u].boxes[i], units[u].rows);
+    }
   }
 };
 
