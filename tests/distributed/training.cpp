@@ -325,8 +325,7 @@ TEST_CASE("a Gaussian that no view shows takes the bytes that were told before, 
       for (std::size_t i = seen; i < start.size(); ++i) start.quaternion[4 * i] = 1, start.opacity[i] = -20;
       exec.memory.peak = exec.memory.current;  // the capture's images took more than a rank of many does
       shared run(exec, options, data, start, every_rank());
-      run.step(), run.step();
-      return static_cast<double>(exec.memory.peak);
+      return run.step(), run.step(), static_cast<double>(exec.memory.peak);
     };
     double const told = static_cast<double>(bytes_of_gaussian(1, ranks, batch)) * unseen / ranks,
                  taken = peak(unseen) - peak(0);

@@ -48,9 +48,11 @@ struct run_order_kernel {
 
 }  // namespace detail
 
+/// The order, and what finds it.
 template <execution E>
 class arrival_order {
  public:
+  /// Nothing has come yet.
   explicit arrival_order(E& exec) : exec_(&exec), order_(exec), runs_(exec) {}
 
   /// Of `n` rows of placing_width floats at `in`. Where this rank has so many rows others have at most a block more.

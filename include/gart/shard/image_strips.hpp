@@ -17,8 +17,8 @@ namespace gart::inline GART_ISA {
 
 /// The messages of one rank: to whom and from whom rows go.
 struct strip_messages {
-  std::vector<work_unit> const& units;
-  int rank;  ///< this one
+  std::vector<work_unit> const& units;  ///< of all ranks
+  int rank;                             ///< this one
   std::vector<message> sends = {}, receives = {};
   u64 bytes = 0;  ///< sent
 
