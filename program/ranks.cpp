@@ -124,11 +124,12 @@ std::string ranks::name() {
 void ranks::broadcast(void* data, std::size_t bytes) {
   if (size() > 1) comm()->broadcast(data, bytes, 0);
 }
+void ranks::gather(void const* mine, void* all, std::size_t bytes) {
+  if (size() > 1) comm()->all_gather(mine, all, bytes);
+}
 std::vector<std::string> ranks::gathered(std::string const& mine) {
   if (size() == 1) return {mine};
-  std::vector<std::size_t> lengths(static_cast<std::size_t>(size()));
-  std::size_t const length = mine.size();
-  comm()->all_gather(&length, lengths.data(), sizeof length);
+  std::vector<std::size_t> const lengths = of_all(mine.size());
   std::size_t const most = *std::max_element(lengths.begin(), lengths.end());
   std::string padded = mine, all(most * lengths.size(), '\0');
   padded.resize(most);
@@ -138,9 +139,7 @@ std::vector<std::string> ranks::gathered(std::string const& mine) {
   return out;
 }
 gart::u64 ranks::largest(gart::u64 value) {
-  if (size() == 1) return value;
-  std::vector<gart::u64> all(static_cast<std::size_t>(size()));
-  comm()->all_gather(&value, all.data(), sizeof value);
+  std::vector<gart::u64> const all = of_all(value);
   return *std::max_element(all.begin(), all.end());
 }
 void ranks::barrier() {
@@ -164,6 +163,7 @@ int ranks::rank() { return 0; }
 gart::host_group* ranks::on_host() { return nullptr; }
 std::string ranks::name() { return {}; }
 void ranks::broadcast(void*, std::size_t) {}
+void ranks::gather(void const*, void*, std::size_t) {}
 std::vector<std::string> ranks::gathered(std::string const& mine) { return {mine}; }
 gart::u64 ranks::largest(gart::u64 value) { return value; }
 void ranks::barrier() {}

@@ -47,6 +47,14 @@ class ranks {
     broadcast(&value, sizeof value);
     return value;
   }
+  // What each has, on all of them, in their order.
+  template <class T>
+  static std::vector<T> of_all(T const& mine) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    std::vector<T> all(static_cast<std::size_t>(size()), mine);
+    gather(&mine, all.data(), sizeof mine);
+    return all;
+  }
   // What each has to say, on all of them.
   static std::vector<std::string> gathered(std::string const& mine);
   // The largest of all.
@@ -59,6 +67,7 @@ class ranks {
 
  private:
   static void broadcast(void* data, std::size_t bytes);
+  static void gather(void const* mine, void* all, std::size_t bytes);
 };
 
 }  // namespace gart_cli

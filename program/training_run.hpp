@@ -30,13 +30,14 @@ class stopwatch {
 
 // The running means that the progress line shows.
 struct recent_steps {
-  double loss = 0, psnr = 0, seconds = 0;
-  void add(gart::step_report const& report, double step_seconds) {
+  double loss = 0, psnr = 0, seconds = 0, own = 0;  // own: of this rank's step by itself
+  void add(gart::step_report const& report, double step_seconds, double own_seconds) {
     double const keep = count_ < 50 ? count_ / (count_ + 1.0) : 0.98;
     ++count_;
     loss = keep * loss + (1 - keep) * report.loss;
     psnr = keep * psnr + (1 - keep) * report.psnr;
     seconds = keep * seconds + (1 - keep) * step_seconds;
+    own = keep * own + (1 - keep) * own_seconds;
   }
 
  private:

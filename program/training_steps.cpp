@@ -1,6 +1,7 @@
 #include "choices.hpp"
 #include "training_run.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -10,6 +11,24 @@ namespace {
 
 // Timing each launch slows a step a little: one step in so many is timed.
 constexpr int profile_every = 16;
+
+// Of several ranks how fast the slowest and the fastest step, and what memory they have come to.
+std::string in_ranks(recent_steps const& recent, std::size_t peak_bytes) {
+  if (ranks::size() == 1) return {};
+  struct rank_state {
+    double rate, bytes;
+  };
+  auto const all = ranks::of_all(rank_state{recent.own > 0 ? 1 / recent.own : 0, static_cast<double>(peak_bytes)});
+  auto const from_to = [&](double rank_state::*value, auto const& told) {
+    auto const [least, most] =
+        std::minmax_element(all.begin(), all.end(), [&](auto const& a, auto const& b) { return a.*value < b.*value; });
+    std::string const low = told((*least).*value), high = told((*most).*value);
+    return low == high ? high : low + " to " + high;
+  };
+  return "  " + std::to_string(all.size()) +
+         " ranks: " + from_to(&rank_state::rate, [](double rate) { return fixed(rate, rate < 10 ? 2 : 0); }) +
+         " steps/s, " + from_to(&rank_state::bytes, as_bytes) + " each";
+}
 
 }  // namespace
 
@@ -27,7 +46,7 @@ bool training_run::train(interrupt_guard const& interrupt) {
     session_->profile().enable(before % profile_every == profile_every - 1);
     stopwatch const step;
     gart::step_report const report = checked_step();
-    double const seconds = ranks::agreed(step.seconds());
+    double const own = step.seconds(), seconds = ranks::agreed(own);
     if (session_->profile().enabled()) ++profiled_steps_, profiled_seconds_ += seconds;
     session_->profile().enable(false);
     if (report.backward != configuration_.backward && !fell_back_) {
@@ -45,7 +64,7 @@ bool training_run::train(interrupt_guard const& interrupt) {
     ++steps_, step_seconds_ += seconds, course_.seconds += seconds, gaussians_ = report.gaussians;
     if (!report.trial) course_.add(report);
     say_new_trials();
-    recent.add(report, seconds);
+    recent.add(report, seconds, own);
     show(report, recent);
     double const done = progress_at(report.step);
     auto const passes = [&](int parts) { return std::floor(done * parts) > std::floor(done_before * parts); };
@@ -121,14 +140,14 @@ void training_run::say_new_trials() {
 
 void training_run::show(gart::step_report const& report, recent_steps const& recent) {
   double const share = progress_at(report.step);
-  if (!say_.due(share)) return;
+  if (!ranks::agreed(say_.due(share))) return;
   double const rate = recent.seconds > 0 ? 1 / recent.seconds : 0;
   double const left = (a_.iterations - report.step) * recent.seconds;
   say_.state(with_commas(report.step) + (a_.time_budget > 0 ? "" : "/" + with_commas(a_.iterations)) + "  " +
                  fixed(rate, rate < 10 ? 2 : 0) + " it/s  loss " + fixed(recent.loss, 4) + "  PSNR " +
                  fixed(recent.psnr, 2) + " dB  " + with_commas(report.gaussians) + " Gaussians  " +
                  as_duration(a_.time_budget > 0 ? std::min(left, a_.time_budget - course_.seconds) : left) + " left" +
-                 (report.trial ? ", a band on trial" : ""),
+                 (report.trial ? ", a band on trial" : "") + in_ranks(recent, session_->peak_bytes()),
              share);
 }
 

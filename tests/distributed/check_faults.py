@@ -7,6 +7,7 @@ usage: check_faults.py GART WORK_FOLDER LAUNCHER...     the launcher up to the n
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -59,6 +60,8 @@ expect(three.returncode == 0, f"3 ranks: {three.stderr}")
 expect((folder / "alone/model.ply").read_bytes() == (folder / "three/model.ply").read_bytes(), "the models differ")
 expect((folder / "alone/checkpoint.gart").read_bytes() == (folder / "three/checkpoint.gart").read_bytes(),
        "the checkpoints differ")
+expect(re.search(r"  3 ranks: .* steps/s, .* each$", three.stderr, re.MULTILINE),
+       f"progress says nothing of the ranks:\n{three.stderr}")
 expect(three.stdout.count("trained ") == 1 and three.stderr.count("3 ranks, ") == 1, f"rank 0 alone talks:\n{three.stderr}")
 
 # With exposures and poses that are learned, and test views, which are aligned to their photographs.
