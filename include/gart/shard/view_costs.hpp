@@ -7,15 +7,17 @@
 /// Costs come as box_kernel counts them: of a view one number a row of tiles and one behind, by how much the row's cost
 /// is more than that of the row above, in wrapping arithmetic; views one after another. Memory: 8 bytes a row of tiles.
 
+#include <gart/core/isa.hpp>
 #include <gart/core/types.hpp>
 #include <gart/scene/camera.hpp>
-#include <gart/tiles/grid.hpp>
 
+#include <iterator>
 #include <map>
 #include <numeric>
+#include <utility>
 #include <vector>
 
-namespace gart {
+namespace gart::inline GART_ISA {
 
 /// By a number of each view that its user chooses.
 class view_costs {
@@ -64,4 +66,4 @@ class view_costs {
   std::map<std::size_t, std::vector<u64>> costs_;
 };
 
-}  // namespace gart
+}  // namespace gart::inline GART_ISA
