@@ -1,6 +1,7 @@
 // Steps of training on the ranks that mpirun started, and their messages; rank 0 writes one line of JSON.
 #include "support/scene.hpp"
 
+#include <gart/comm/gathered.hpp>
 #include <gart/comm/mpi_comm.hpp>
 #include <gart/core/error.hpp>
 #include <gart/exec/serial.hpp>
@@ -91,8 +92,7 @@ double seconds() { return std::chrono::duration<double>(std::chrono::steady_cloc
 
 // The largest of all ranks.
 double largest(mpi_comm& ranks, double value) {
-  std::vector<double> all(static_cast<std::size_t>(ranks.size()));
-  ranks.all_gather(&value, all.data(), sizeof value);
+  std::vector<double> const all = gathered(ranks, value);
   return *std::max_element(all.begin(), all.end());
 }
 
@@ -150,18 +150,6 @@ std::string in_stages(profiler const& times, int steps) {
     text += (text.size() > 1 ? ", \"" : "\"") + label + "\": " + number;
   }
   return text + "}";
-}
-
-// What each rank has to say, in the order of ranks.
-std::vector<std::string> gathered(mpi_comm& ranks, std::string const& mine) {
-  std::size_t const all = static_cast<std::size_t>(ranks.size());
-  auto const most = static_cast<std::size_t>(largest(ranks, static_cast<double>(mine.size())));
-  std::string padded = mine, every(most * all, '\0');
-  padded.resize(most);
-  ranks.all_gather(padded.data(), every.data(), most);
-  std::vector<std::string> out;
-  for (std::size_t r = 0; r < all; ++r) out.push_back(every.substr(r * most, most).c_str());
-  return out;
 }
 
 // Photographs of noise for the scene's cameras.

@@ -3,6 +3,7 @@
 #include "commands.hpp"
 
 #if defined(GART_WITH_MPI)
+#include <gart/comm/gathered.hpp>
 #include <gart/comm/mpi_comm.hpp>
 #endif
 #if defined(GART_WITH_NCCL)
@@ -48,7 +49,6 @@ std::unique_ptr<gart::mpi_comm>& started() {
 // several would start a thread a core otherwise, and wait for the others' at every loop.
 #if defined(_OPENMP)
 void share_cores(gart::mpi_comm& all) {
-  if (std::getenv("OMP_NUM_THREADS")) return;
   struct seat {
     char host[64] = {};
     cpu_set_t cores;
@@ -56,8 +56,8 @@ void share_cores(gart::mpi_comm& all) {
   std::strncpy(mine.host, all.host().c_str(), sizeof mine.host - 1);
   CPU_ZERO(&mine.cores);
   ::sched_getaffinity(0, sizeof mine.cores, &mine.cores);
-  std::vector<seat> seats(static_cast<std::size_t>(all.size()));
-  all.all_gather(&mine, seats.data(), sizeof mine);
+  std::vector<seat> const seats = gart::gathered(all, mine);  // by all, since hosts may differ in what is said
+  if (std::getenv("OMP_NUM_THREADS")) return;
   auto const sharers = std::count_if(seats.begin(), seats.end(), [&](seat const& s) {
     cpu_set_t both;
     CPU_AND(&both, &s.cores, &mine.cores);
@@ -129,14 +129,7 @@ void ranks::gather(void const* mine, void* all, std::size_t bytes) {
 }
 std::vector<std::string> ranks::gathered(std::string const& mine) {
   if (size() == 1) return {mine};
-  std::vector<std::size_t> const lengths = of_all(mine.size());
-  std::size_t const most = *std::max_element(lengths.begin(), lengths.end());
-  std::string padded = mine, all(most * lengths.size(), '\0');
-  padded.resize(most);
-  comm()->all_gather(padded.data(), all.data(), most);
-  std::vector<std::string> out;
-  for (std::size_t r = 0; r < lengths.size(); ++r) out.push_back(all.substr(r * most, lengths[r]));
-  return out;
+  return gart::gathered(*comm(), mine);
 }
 gart::u64 ranks::largest(gart::u64 value) {
   std::vector<gart::u64> const all = of_all(value);

@@ -6,6 +6,7 @@
 #include <gart/shard/view_costs.hpp>
 #include <gart/shard/work_units.hpp>
 
+#include <algorithm>
 #include <cstring>
 #include <random>
 #include <vector>
@@ -92,10 +93,10 @@ TEST_CASE("what views cost comes as steps from row to row, and is known by their
     for (u64& c : cost) c = engine() % 100, steps.push_back(c - above), above = c;
     steps.push_back(u64{0} - above);
   }
-  CHECK(view_costs::count(views, 8) == steps.size());
-  CHECK(view_costs::by_view(views, 8, steps) == expected);
+  CHECK(view_costs<8>::count(views) == steps.size());
+  CHECK(view_costs<8>::by_view(views, steps) == expected);
 
-  view_costs known;
+  view_costs<8> known;
   CHECK(!known.knows({}));
   CHECK(!known.knows({4, 9, 2}));
   known.remember({4, 9, 2}, expected);

@@ -74,7 +74,7 @@ class row_exchange {
     measure(scene, views, names, options);
     std::vector<u64> costs = select(scene.count);
     received_ = send_counts(costs);
-    if (!costs.empty()) costs_.remember(names, view_costs::by_view(views, Size, costs));
+    if (!costs.empty()) costs_.remember(names, costs_.by_view(views, costs));
     std::size_t const leave = total(sent_), arrive = total(received_);
     index_t const leaving = static_cast<index_t>(leave), arriving = static_cast<index_t>(arrive);
     out_.resize(leave * detail::placing_width), in_.resize(arrive * detail::placing_width);
@@ -208,8 +208,7 @@ class row_exchange {
     finishes_ = !shared;
     constexpr index_t counted = 1 << 16;  // rows of a rank, about, that tell the cost of a view's strips
     index_t const every = shared ? 1 + scene.count / counted : 0;
-    std::size_t const ends = static_cast<std::size_t>(owners_.ranks) + 1,
-                      costs = shared ? view_costs::count(views, Size) : 0;
+    std::size_t const ends = static_cast<std::size_t>(owners_.ranks) + 1, costs = shared ? costs_.count(views) : 0;
     told_.resize(ends + costs), told_.zero();
     u64* cost = told_.data() + ends;
     while (boxes_.size() < views.size()) boxes_.emplace_back(*exec_);
@@ -222,18 +221,18 @@ class row_exchange {
                      detail::box_kernel<Response, E, Size, std::remove_const_t<decltype(bounds)>>{
                          seen, bounds, model.position, options.alpha_min, boxes_[v].data(), cost, every});
       });
-      if (shared) cost += tile_grid<Size>{views[v].width, views[v].height}.rows() + 1;
+      if (shared) cost += costs_.count({views[v]});
     }
     if (shared && costs_.knows(names)) {
       units_ = divide_work(costs_.of(names), owners_.ranks, Size);
       return;
     }
-    std::vector<u64> now(view_costs::count(views, Size));
+    std::vector<u64> now(costs_.count(views));
     if (shared) {
       exec_->copy_out(now.data(), told_.data() + ends, costs * sizeof(u64));
       comm_.all_reduce(span<u64>(now.data(), costs));
     }
-    units_ = divide_work(view_costs::by_view(views, Size, now), owners_.ranks, Size);
+    units_ = divide_work(costs_.by_view(views, now), owners_.ranks, Size);
   }
 
   // Which rows go to whom: one scan over the units, for one wait. Returns what this rank's rows cost the views.
@@ -380,7 +379,7 @@ class row_exchange {
   gaussians<E> scene_;
   std::vector<buffer<footprint_slots, E>> boxes_;  // of this rank's rows, by view
   std::vector<work_unit> units_;
-  view_costs costs_;
+  view_costs<Size> costs_;
   std::vector<u64> sent_, received_, pairs_leaving_;  // by rank
   buffer<u32, E> place_of_;                           // of each row in each unit
   buffer<u32, E> list_, sent_pairs_;                  // list_: rows of this rank's, by who they went to

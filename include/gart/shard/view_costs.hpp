@@ -10,6 +10,7 @@
 #include <gart/core/isa.hpp>
 #include <gart/core/types.hpp>
 #include <gart/scene/camera.hpp>
+#include <gart/tiles/grid.hpp>
 
 #include <iterator>
 #include <map>
@@ -19,22 +20,22 @@
 
 namespace gart::inline GART_ISA {
 
-/// By a number of each view that its user chooses.
+/// By a number of each view that its user chooses. Size: side of a tile.
+template <int Size>
 class view_costs {
  public:
   /// How many numbers the costs of these views are.
-  static std::size_t count(std::vector<camera> const& views, int tile_size) {
+  static std::size_t count(std::vector<camera> const& views) {
     std::size_t all = 0;
-    for (camera const& view : views) all += rows_of(view, tile_size) + 1;
+    for (camera const& view : views) all += rows_of(view) + 1;
     return all;
   }
   /// These numbers as costs, by view and row of tiles.
-  static std::vector<std::vector<u64>> by_view(std::vector<camera> const& views, int tile_size,
-                                               std::vector<u64> const& steps) {
+  static std::vector<std::vector<u64>> by_view(std::vector<camera> const& views, std::vector<u64> const& steps) {
     std::vector<std::vector<u64>> costs;
     auto at = steps.begin();
     for (camera const& view : views) {
-      auto const end = at + static_cast<std::ptrdiff_t>(rows_of(view, tile_size));
+      auto const end = at + static_cast<std::ptrdiff_t>(rows_of(view));
       std::partial_sum(at, end, std::back_inserter(costs.emplace_back()));
       at = end + 1;
     }
@@ -59,9 +60,7 @@ class view_costs {
   }
 
  private:
-  static std::size_t rows_of(camera const& view, int tile_size) {
-    return static_cast<std::size_t>((view.height + tile_size - 1) / tile_size);
-  }
+  static std::size_t rows_of(camera const& view) { return tile_grid<Size>{view.width, view.height}.rows(); }
 
   std::map<std::size_t, std::vector<u64>> costs_;
 };
