@@ -18,8 +18,10 @@ void tile_map(benchmark::State& state, E& exec) {
     gart::camera_rays<E> rays(exec);
     rays.cast(exec, frame.view);
     gart::visit_camera(frame.view, [&](auto const& model) {
-      auto const by_depth = orders.of(exec, model, rays, prints.depths().data(), frame.traced.gaussians().data());
-      gart_bench::measure(state, exec, [&] { map.build(exec, grid, prints, by_depth); });
+      gart::ray_gaussian const* const gaussians = frame.traced.gaussians().data();
+      auto const by_depth = orders.of(exec, model, rays, prints.depths().data(), gaussians);
+      auto const test = orders.test_of(model, gaussians);
+      gart_bench::measure(state, exec, [&] { map.build(exec, grid, prints, by_depth, test); });
     });
   } else {
     gart_bench::measure(state, exec, [&] { map.build(exec, grid, prints, gart::number_order{}); });

@@ -80,7 +80,9 @@ class backward_pass {
       if constexpr (tracer_type::lends_footprints) {
         lists_ = frame.tracer().map();
       } else {
-        map_.build(exec, grid_, *prints_, number_order{});
+        visit_camera(view, [&](auto const& model) {
+          map_.build(exec, grid_, *prints_, number_order{}, pair_test_of(model, frame.gaussians().data()));
+        });
         lists_ = map_.view();
       }
       slots_.resize(prints_->slots());
@@ -169,7 +171,10 @@ class backward_pass {
     if constexpr (!(ordered && Strategy::gather::color))
       exec.zero(gradients.sh, sizeof(float) * scene.count * static_cast<std::size_t>(gradients.sh_stride()));
     if constexpr (records) {
-      if constexpr (ordered) rows_.resize(prints_->pairs() * pair_gradient<sh_degree>::quads);
+      if constexpr (ordered) {
+        rows_.resize(prints_->pairs() * pair_gradient<sh_degree>::quads);
+        rows_.zero();  // pairs in no list have no sums
+      }
       gather(frame, image.color, error, gradients);
       if constexpr (ordered)
         parallel_for(exec, "backward/sum", scene.count * pair_gradient<sh_degree>::quads,

@@ -1,7 +1,8 @@
 #pragma once
 /// \file
-/// The tile-primitive map: for every tile, the primitives whose boxes overlap it. One pair for each overlap is emitted
-/// in primitive order and radix sorted by tile; a tile's list begins where its number first stands in a key.
+/// The tile-primitive map: for every tile, the primitives that its pixels may hit. A pair is emitted for each tile that
+/// a primitive's box overlaps, in primitive order, and radix sorted by tile; those that fail the test of pairs
+/// (tiles/pair_test.hpp) come last, in no tile. A tile's list begins where its number first stands in a key.
 ///
 /// One 32-bit key sorts both by tile and within it, in the bits that the tile's number leaves free, by an order
 /// (tiles/tile_order.hpp).
@@ -9,6 +10,7 @@
 
 #include <gart/algorithm/sort_pairs.hpp>
 #include <gart/tiles/footprints.hpp>
+#include <gart/tiles/pair_test.hpp>
 #include <gart/tiles/tile_order.hpp>
 
 namespace gart::inline GART_ISA {
@@ -39,12 +41,14 @@ namespace tile_kernels {
 
 // A team takes some primitives; its lanes take the pairs of all of them in turn, since boxes differ in size by orders
 // of magnitude. A host's one lane takes them box by box.
-template <execution E, int Size, tile_order Order>
+template <execution E, int Size, tile_order Order, pair_test Test>
 struct emit_pairs {
   static constexpr int block_size = 128, min_blocks = 1;
   static constexpr u32 share = 128;  // primitives of a team
   struct scratch {
     typename Order::primitive primitive[share];
+    typename Test::primitive tested[share];
+    bool is_tested[share];
     footprint_slots range[share];
     u32 first[share];  // of the team's pairs
   };
@@ -54,6 +58,7 @@ struct emit_pairs {
   span<u64 const> offsets;
   u64 pairs;
   Order order;
+  Test test;
   int order_bits;
   span<u32> keys, primitives;
 
@@ -67,7 +72,11 @@ struct emit_pairs {
     team.for_each(n, [&](index_t k) {
       s.range[k] = ranges[begin + k];
       s.first[k] = static_cast<u32>(offsets[begin + k] - at);
-      if (!s.range[k].box.empty()) s.primitive[k] = order.of(begin + k);
+      if (s.range[k].box.empty()) return;
+      s.primitive[k] = order.of(begin + k);
+      pixel_box const tiles = tiles_of<Size>(s.range[k]);
+      s.is_tested[k] = tiles.width() > 1 && tiles.height() > 1;
+      if (s.is_tested[k]) s.tested[k] = test.of(begin + k);
     });
     team.barrier();
     if constexpr (E::device)
@@ -94,7 +103,9 @@ struct emit_pairs {
 
   GART_HD GART_INLINE void emit(scratch const& s, u32 k, u32 x, u32 y, u64 to, u32 begin) const {
     u32 const column = x < grid.columns() ? x : x - grid.columns(), tile = y * grid.columns() + column;
-    keys[to] = tile << order_bits | order.key(s.primitive[k], cell_in(s.range[k], grid.tile(column, y)), tile);
+    pixel_box const cell = cell_in(s.range[k], grid.tile(column, y));
+    bool const meets = !s.is_tested[k] || test.meets(s.tested[k], cell, tile);
+    keys[to] = meets ? tile << order_bits | order.key(s.primitive[k], cell, tile) : grid.count() << order_bits;
     primitives[to] = begin + k;
   }
 };
@@ -139,8 +150,9 @@ class tile_map {
   explicit tile_map(E& exec) : keys_(exec), primitives_(exec), offsets_(exec), ranks_(exec), longest_first_(exec) {}
 
   /// A new map of a view's footprints; out_of_memory for 2^31 pairs or more.
-  template <tile_order Order>
-  void build(E& exec, tile_grid<Size> const& grid, footprints<E, Size> const& prints, Order order) {
+  template <tile_order Order, pair_test Test = every_pair>
+  void build(E& exec, tile_grid<Size> const& grid, footprints<E, Size> const& prints, Order order,
+             Test const& test = {}) {
     stage_scope stage(exec, "map");
     u64 const pairs = prints.pairs();
     if (pairs >= (u64{1} << 31))
@@ -149,15 +161,15 @@ class tile_map {
                               " (primitive, tile) pairs, and a map holds 2^31: raise dataset_options.downscale, "
                               "lower train_options.max_gaussians, or take configuration_request.tracer = bvh with "
                               "configuration_request.backward = pixel");
-    int const tile_bits = bits_for(grid.count());
+    int const tile_bits = bits_for(grid.count() + 1);  // one more for pairs in no tile
     order_bits_ = order.take(32 - tile_bits);
     depth_shift_ = order.shift();
     keys_.resize(pairs), primitives_.resize(pairs), offsets_.resize(grid.count() + 1);
-    using emit = tile_kernels::emit_pairs<E, Size, Order>;
+    using emit = tile_kernels::emit_pairs<E, Size, Order, Test>;
     parallel_for(
         exec, "map/emit",
         tile_range{(static_cast<u32>(prints.ranges().size()) + emit::share - 1) / emit::share, emit::block_size},
-        emit{grid, prints.ranges(), prints.pair_offsets(), pairs, order, order_bits_, keys_, primitives_});
+        emit{grid, prints.ranges(), prints.pair_offsets(), pairs, order, test, order_bits_, keys_, primitives_});
     sort_pairs(exec, keys_.view(), primitives_.view(), tile_bits + order_bits_);
     parallel_for(exec, "map/begin", static_cast<index_t>(offsets_.size()),
                  tile_kernels::begin_lists{keys_, order_bits_, offsets_});

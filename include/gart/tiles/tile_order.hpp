@@ -9,6 +9,7 @@
 #include <gart/camera/models.hpp>
 #include <gart/math/rectangle_depth.hpp>
 #include <gart/tiles/grid.hpp>
+#include <gart/tiles/pair_test.hpp>
 #include <gart/tiles/tile_planes.hpp>
 
 #include <concepts>
@@ -246,6 +247,15 @@ class depth_orders {
     }
   }
   ///@}
+
+  /// The test of pairs of the same view, after its order, with whose planes it goes.
+  template <camera_model M>
+  auto test_of(M const& model, ray_gaussian const* gaussians) const {
+    if constexpr (central_camera<M> && !std::is_same_v<M, pinhole>)
+      return plane_silhouette_pairs<Size>(gaussians, planes_.data());
+    else
+      return pair_test_of(model, gaussians);
+  }
 
  private:
   void find_planes(E& exec, camera_base const& model, pixel_rays const& directions) {

@@ -158,7 +158,8 @@ class tile_tracer : public tracer_base {
       rays_.cast(exec, model);
       depth_ = model.depth();
       prints_.template measure<Response>(exec, scene, model, options.alpha_min, options.near, options.rows);
-      map_.build(exec, grid_, prints_, orders_.of(exec, model, rays_, prints_.depths().data(), gaussians.data()));
+      auto const order = orders_.of(exec, model, rays_, prints_.depths().data(), gaussians.data());
+      map_.build(exec, grid_, prints_, order, orders_.test_of(model, gaussians.data()));
     });
     if constexpr (E::device) map_.rank_tiles(exec);
     scene_ = {gaussians.data(), scene.count, options.near};
