@@ -1,5 +1,6 @@
 #include "choices.hpp"
 #include "commands.hpp"
+#include "image_writer.hpp"
 #include "options.hpp"
 #include "output.hpp"
 #include "progress.hpp"
@@ -102,16 +103,17 @@ int run_eval(eval_arguments const& a) {
   progress say(a.quiet || !speaks);
   auto const draw = [&](gart::camera const& view) { return renderer->render(view, options); };
   gart::some_views const tests = dealt(gart::all_of(data.test));
+  image_writer files;
   gart::scores result = gart::evaluate(
       tests, options.background, exposures, draw,
       [&](std::size_t i, gart::view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
         if (!a.renders.empty()) {
-          gart::write_png(a.renders / (s.name + ".png"), gart::to_8bit(render));
-          gart::write_png(a.renders / (s.name + "_truth.png"), gart::to_8bit(truth));
+          files.png(a.renders / (s.name + ".png"), gart::to_8bit(render));
+          files.png(a.renders / (s.name + "_truth.png"), gart::to_8bit(truth));
         }
         if (!a.pairs.empty()) {
-          gart::write_png(a.pairs / "render" / (s.name + ".png"), gart::to_8bit(render));
-          gart::write_png(a.pairs / "truth" / (s.name + ".png"), gart::to_8bit(truth));
+          files.png(a.pairs / "render" / (s.name + ".png"), gart::to_8bit(render));
+          files.png(a.pairs / "truth" / (s.name + ".png"), gart::to_8bit(truth));
         }
         say.state("scored " + std::to_string(i + 1) + "/" + std::to_string(tests.size()) + "  " + s.name + " " +
                       fixed(s.psnr, 2) + " dB",
@@ -122,6 +124,7 @@ int run_eval(eval_arguments const& a) {
   gart::some_views const spread = gart::evenly_spread(data.train, data.test.size());
   gart::scores training = gart::evaluate(dealt(spread), options.background, exposures, draw);
   put_together(training, spread.size());
+  files.finish();
   gart::u64 const most_bytes = ranks::largest(renderer->peak_bytes());
   if (!speaks) return 0;
   auto const configuration = renderer->configuration();

@@ -1,4 +1,5 @@
 #include "commands.hpp"
+#include "image_writer.hpp"
 #include "options.hpp"
 #include "output.hpp"
 #include "progress.hpp"
@@ -110,6 +111,7 @@ int run_render(render_arguments const& a) {
                             {"stages_ms", nlohmann::json::object()},
                             {"views", nlohmann::json::array()}};
   renderer->profile().enable(!a.json.empty());
+  image_writer files;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     if (!ranks::takes(i)) continue;
     auto& [name, view] = cameras[i];
@@ -119,7 +121,7 @@ int run_render(render_arguments const& a) {
     gart::rendered image = render_samples(*renderer, view, options, a.samples);
     if (!exposures.empty()) apply(exposures.at(view), image.color);
     double const ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    if (images.has("colour")) gart::write_png(a.out / (name + ".png"), gart::to_8bit(image.color));
+    if (images.has("colour")) files.png(a.out / (name + ".png"), gart::to_8bit(image.color));
     nlohmann::json entry = {{"name", name}, {"width", view.width}, {"height", view.height}, {"milliseconds", ms}};
     write_images(a.out, name, image, view, images, entry);
     timings["views"].push_back(entry);
@@ -127,6 +129,7 @@ int run_render(render_arguments const& a) {
     say.state("rendered " + std::to_string(i + 1) + "/" + std::to_string(cameras.size()) + "  " + fixed(ms, 1) + " ms",
               share);
   }
+  files.finish();
   for (auto const& [label, time] : renderer->profile().stages()) timings["stages_ms"][label] = time.milliseconds;
   timings["peak_bytes"] = ranks::largest(renderer->peak_bytes());
   timings = of_all_ranks(timings, cameras.size());

@@ -1,4 +1,5 @@
 #include "choices.hpp"
+#include "image_writer.hpp"
 #include "output.hpp"
 #include "process_memory.hpp"
 #include "report.hpp"
@@ -96,6 +97,7 @@ void training_run::save() {
 void training_run::conclude() {
   if (writes_) remove_results(a_.out);
   report_views shown;
+  image_writer files;
   stopwatch const writing;
   double const tests_before = test_seconds_;
   std::vector<gart::named_camera> aligned;
@@ -103,8 +105,8 @@ void training_run::conclude() {
       session_->steps_done(),
       [&](std::size_t i, gart::view_score const& s, gart::image_float const& render, gart::image_float const& truth) {
         if (!writes_) return;
-        gart::write_png(a_.out / "renders" / (s.name + ".png"), gart::to_8bit(render));
-        gart::write_png(a_.out / "renders" / (s.name + "_truth.png"), gart::to_8bit(truth));
+        files.png(a_.out / "renders" / (s.name + ".png"), gart::to_8bit(render));
+        files.png(a_.out / "renders" / (s.name + "_truth.png"), gart::to_8bit(truth));
         shown.add(i, data_.test.size(), s.name, s.psnr, s.ssim, render, truth);
         say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
                    static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
@@ -118,6 +120,7 @@ void training_run::conclude() {
   gart::scores const training = score(gart::evenly_spread(data_.train, data_.test.size()), {},
                                       a_.refine_poses ? as_learned() : gart::place_view());
   test_seconds_ += training_views.seconds();
+  files.finish();
   gart::u64 const most_bytes = ranks::largest(session_->peak_bytes()),
                   most_sent = ranks::largest(session_->sent_bytes());
   if (!writes_) return;
