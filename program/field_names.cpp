@@ -32,7 +32,6 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(train_options, seed), "--seed"},
       {GART_CLI_FIELD(split_shape, share), "--set error.split.share"},
       {GART_CLI_FIELD(split_shape, opacity), "--set error.split.opacity"},
-      {GART_CLI_FIELD(error_growth_options, few_pixels_share), "--set error.few_pixels_share"},
       {GART_CLI_FIELD(render_options, alpha_min), "--alpha-min"},
       {GART_CLI_FIELD(render_options, transmittance_min), "--t-min"},
       {GART_CLI_FIELD(render_options, near), "near"},  // no option: a model's file may say it

@@ -68,7 +68,6 @@ std::vector<field> const& fields() {
       named("error.split.share", [](options& o) -> float& { return o.error.split.share; }),
       named("error.split.opacity", [](options& o) -> float& { return o.error.split.opacity; }),
       named("error.pixels_each", [](options& o) -> float& { return o.error.pixels_each; }),
-      named("error.few_pixels_share", [](options& o) -> float& { return o.error.few_pixels_share; }),
       named("error.least_budget", [](options& o) -> int& { return o.error.least_budget; }),
       named("mcmc.growth", [](options& o) -> float& { return o.mcmc.growth; }),
       named("mcmc.noise", [](options& o) -> float& { return o.mcmc.noise; }),

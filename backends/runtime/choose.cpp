@@ -178,11 +178,9 @@ chosen<index_t> choose_budget(dataset const& data, train_options const& options)
   if (options.densify != densify_kind::error) return {most, "as many as there may be"};
   index_t const budget = growth_budget(options.error, most, data.training_pixels());
   if (budget == most) return {most, "as many as there may be; the photographs have pixels for them"};
-  bool const longer = split_for(options.error, most, data.training_pixels()).share < options.error.split.share;
   char text[128];
-  std::snprintf(text, sizeof text, "one for %g training pixels, and at least %d: more would learn them by heart%s",
-                static_cast<double>(options.error.pixels_each), options.error.least_budget,
-                longer ? "; halves are longer" : "");
+  std::snprintf(text, sizeof text, "one for %g training pixels, and at least %d: more would learn them by heart",
+                static_cast<double>(options.error.pixels_each), options.error.least_budget);
   return {budget, text};
 }
 

@@ -256,21 +256,3 @@ TEST_CASE("growth ends where the capture has too few pixels for more") {
   options.pixels_each = 0;
   CHECK(budget(1'000'000, 912'384) == 1'000'000);
 }
-
-TEST_CASE("halves are longer where the capture's pixels end growth, and as they were asked for elsewhere") {
-  gart::error_growth_options options;
-  auto const share = [&](gart::index_t most, gart::u64 pixels) { return gart::split_for(options, most, pixels).share; };
-  CHECK(share(1'000'000, 22'809'600) == options.few_pixels_share);
-  CHECK(share(1'000'000, 108'732'000) == options.split.share);
-  CHECK(share(20'000, 22'809'600) == options.split.share);  // few were asked for: pixels end nothing
-  options.split.share = 0.2f;
-  CHECK(share(1'000'000, 22'809'600) == 0.2f);
-  options.few_pixels_share = 0.5f;
-  CHECK(share(1'000'000, 22'809'600) == 0.2f);
-  options.split.opacity = 0.7f;
-  CHECK(gart::split_for(options, 1'000'000, 22'809'600).opacity == 0.7f);
-  for (float const bad : {0.0f, -0.5f, NAN}) {
-    options.few_pixels_share = bad;
-    CHECK_THROWS_WITH_AS(share(1'000'000, 22'809'600), doctest::Contains("few_pixels_share"), gart::invalid_argument);
-  }
-}

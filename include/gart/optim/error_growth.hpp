@@ -13,9 +13,8 @@
 /// (long_axis_split.hpp). As many are drawn as there are dead Gaussians, whose rows the second halves take, and as the
 /// count is to grow. It grows on a square-root curve, early, to the budget at the share `fill` of the run, and at most
 /// doubles at a time. The budget follows the capture's pixels where they are few (growth_budget): a Gaussian that
-/// covers a pixel or two of each photograph learns its noise, and what is wrong with its pose. There halves are longer
-/// too (split_for). First halves keep Adam's moments, second ones start with none. After `fill` only the dead are
-/// replaced, after `until` nothing moves.
+/// covers a pixel or two of each photograph learns its noise, and what is wrong with its pose. First halves keep Adam's
+/// moments, second ones start with none. After `fill` only the dead are replaced, after `until` nothing moves.
 ///
 /// A small penalty on the mean opacity, paid by all Gaussians, takes those that no view needs; they fade until they are
 /// dead. A Gaussian whose opacity or geometry is not finite counts as dead. Where no error is attributed, or none is
@@ -123,16 +122,6 @@ inline index_t growth_budget(error_growth_options const& options, index_t most, 
   double const fit = static_cast<double>(pixels) / static_cast<double>(options.pixels_each);
   double const limit = most, least = std::min(limit, static_cast<double>(std::max(options.least_budget, 0)));
   return static_cast<index_t>(std::clamp(fit, least, limit));
-}
-
-/// How Gaussians split in such a capture. Errors: invalid_argument for a few_pixels_share of 0 or less.
-inline split_shape split_for(error_growth_options const& options, index_t most, u64 pixels) {
-  if (!(options.few_pixels_share > 0))
-    throw invalid_argument("error_growth_options.few_pixels_share is " + std::to_string(options.few_pixels_share) +
-                           ": more than 0");
-  split_shape shape = options.split;
-  if (growth_budget(options, most, pixels) < most) shape.share = std::min(shape.share, options.few_pixels_share);
-  return shape;
 }
 
 /// Steps count from 1.

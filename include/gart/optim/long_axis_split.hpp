@@ -5,7 +5,7 @@
 /// With q = split_shape::share and s the longest standard deviation, their centres lie at +-q 3 s, where the
 /// cross-section at three standard deviations is sqrt(1 - q^2) of the middle one; they are 1 - q times as long, q 3 s +
 /// (1 - q) 3 s = 3 s, and sqrt(1 - q^2) times as thick. Between middle and end they reach up to 6% further out where q
-/// = 0.45. Opacity falls to split_shape::opacity of what it was: where a half is needed it rises again, and where not
+/// = 0.4. Opacity falls to split_shape::opacity of what it was: where a half is needed it rises again, and where not
 /// it fades, which keeps a growing model from learning its training views by heart.
 
 #include <gart/math/quaternion.hpp>

@@ -52,7 +52,7 @@ struct mcmc_options {
 
 /// How one Gaussian becomes two along its longest axis (optim/long_axis_split.hpp).
 struct split_shape {
-  float share = 0.45f;   ///< q, in (0, 1): the halves' centres lie at +-q 3 s, and they are 1 - q times as long
+  float share = 0.4f;    ///< q, in (0, 1): the halves' centres lie at +-q 3 s, and they are 1 - q times as long
   float opacity = 0.6f;  ///< what opacity is multiplied by
 };
 
@@ -68,9 +68,6 @@ struct error_growth_options {
   /// max_gaussians, whatever the capture.
   float pixels_each = 100;
   int least_budget = 100'000;  ///< that pixels_each leaves to the smallest capture
-  /// The most that split.share is in a capture whose pixels end growth: longer halves hold more in common, which costs
-  /// time, and few pixels are soon learnt by heart.
-  float few_pixels_share = 0.4f;
 };
 
 /// Of adaptive density control (optim/adc.hpp).

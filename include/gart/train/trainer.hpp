@@ -232,7 +232,6 @@ class basic_trainer {
       e.opacity_penalty *=
           penalty_scale(shown_share(data, views_trained_on(data.train.size(), options.held_out), options.background));
     e.dead_opacity = least_opacity(e.dead_opacity, options.render.alpha_min);
-    e.split = split_for(options.error, options.max_gaussians, data.training_pixels());
     return e;
   }
   static adc_options adc_options_of(train_options const& options) {
