@@ -213,6 +213,13 @@ void check_scenes(E& exec) {
     reused.check(exec, model, view, 0.01f);
   }
   CHECK(reused.left_out > 300);
+  // Needles through a lens: pairs are left out on the planes of tiles, too.
+  gart::camera const lens = source.camera(placement::lens);
+  gart::gaussian_model needles;
+  for (int i = 0; i < 400; ++i) gart_test::append(needles, source.gaussian(placement::needle, lens));
+  reused.left_out = 0;
+  reused.check(exec, needles, lens, 0.01f);
+  CHECK(reused.left_out > 50);
 }
 
 gart::gaussian_parameters at(double x, double y, double z, double scale) {
