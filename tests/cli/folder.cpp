@@ -64,6 +64,23 @@ TEST_CASE("files of a run's names that no run left are refused, and left as they
   CHECK(fs::exists(here / "run/model.ply"));
 }
 
+TEST_CASE("an image that cannot be written is named, and the run fails") {
+  folder const here;
+  write_capture(here / "capture");
+  REQUIRE(here.gart("train capture --out run --iterations 2" + small).code == 0);
+  std::string const name = here.json("run/metrics.json")["views"].back()["name"].get<std::string>() + ".png";
+  fs::create_directories(here / ("views/" + name));  // where the last picture belongs
+  for (std::string const command :
+       {"eval run/model.ply capture --out scores.json --renders views", "render run/model.ply capture --out views"}) {
+    CAPTURE(command);
+    auto const run = here.gart(command + " --backend serial");
+    CHECK(run.code == 1);
+    CHECK_MESSAGE(has(run.err, "views/" + name), run.err);
+    CHECK(fs::is_directory(here / ("views/" + name)));
+  }
+  CHECK_FALSE(fs::exists(here / "scores.json"));
+}
+
 TEST_CASE("one program at a time writes to a folder") {
   folder const here;
   write_capture(here / "capture");
