@@ -6,7 +6,8 @@
 ///   w = 0 where the channel is clamped or no hit is,
 /// so it is left to the matrix units (math/matrix_unit.hpp): a lane holds the weights where they want them, and no SH
 /// sum of its own. Moments are summed in registers and added up over the four lanes. Neighbouring lanes read
-/// neighbouring slots and add to neighbouring floats.
+/// neighbouring slots and add to neighbouring floats. Slots are copied to shared memory two rows ahead, which hides the
+/// latency of memory and takes no registers.
 ///
 /// A warp takes the rows of the tile that any of its primitives has, so a tile's list is put in order of rows first,
 /// 256 of it at a time. A pair's sums are of the terms of gather_kernel (backward/gather.hpp) in another order, the
@@ -14,6 +15,10 @@
 
 #include <gart/backward/gather.hpp>
 #include <gart/math/matrix_unit.hpp>
+
+#if defined(__CUDACC__)
+#include <cuda_pipeline.h>
+#endif
 
 namespace gart::inline GART_ISA {
 
@@ -47,6 +52,7 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
       sh_stride = base::sh_stride;                       ///< floats of a Gaussian's coefficients
   static constexpr int Size = C::tile_size;              ///< side of a tile, in pixels
   static constexpr u32 share = 2 * block_size;           ///< primitives that are put in order together
+  static constexpr u32 stages = 3;                       ///< rows of slots in shared memory: one is read, two come
   static_assert(C::terms::color && Size == 8 && bands <= 16);
 
   /// What a team shares.
@@ -54,6 +60,7 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
     typename base::pixel_data pixels[Size * Size];  ///< of the tile
     matrix_part<4>::words high[Size][lanes],        ///< Y of a row of pixels, as the lanes want it
         low[Size][lanes];                           ///< and what the first part leaves
+    slot_type slots[warps][stages][2][lanes];       ///< two a lane and row
     float sums[warps][8][52];  ///< of colour, a row a primitive; 52: what a warp writes at once lies in 32 banks
     tile_slots cells[share];   ///< of the primitives put in order
     u32 ids[share];            ///< their Gaussians
@@ -146,24 +153,22 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
     u32 const x = area.x0 + column, from = cell.y - area.y0, rows = cell.y1 - cell.y;
     bool const has[2] = {exists && x >= cell.x && x < cell.x1, exists && x + 4 >= cell.x && x + 4 < cell.x1};
     auto const slot_of = [&](u32 row, int i) { return cell.first + (row - from) * cell.width + x + 4 * i - cell.x; };
-    struct {
-      bool in[2];
-      slot_type entry[2];
-    } now, next;
-    auto const read = [&](u32 row) {
-      bool const in_rows = row - from < rows;
+    auto const in_row = [&](u32 row, int i) { return has[i] & (row - from < rows); };
+    auto& staged = s.slots[threadIdx.x / lanes];
+    auto const fetch = [&](u32 row, u32 stage) {
       GART_UNROLL
-      for (int i = 0; i < 2; ++i) {
-        next.in[i] = has[i] & in_rows;
-        next.entry[i] = this->slots_from(0)[next.in[i] ? slot_of(row, i) : cell.first];
-      }
+      for (int i = 0; i < 2; ++i)
+        if (in_row(row, i)) copy_slot(staged[stage][i][lane], slot_of(row, i));
+      __pipeline_commit();
     };
     u32 const first = __reduce_min_sync(everyone, from), last = __reduce_max_sync(everyone, from + rows - 1);
-    read(first);
+    GART_UNROLL
+    for (u32 k = 0; k + 1 < stages; ++k) fetch(first + k, k);
+    u32 stage = 0;
     GART_NO_UNROLL
     for (u32 row = first; row <= last; ++row) {
-      now = next;
-      read(row < last ? row + 1 : last);
+      fetch(row + stages - 1, stage == 0 ? stages - 1 : stage - 1);
+      __pipeline_wait_prior(stages - 1);
       matrix_part<2> weights[3];
       ray_peak r[2];
       auto const pixel_of = [&](int i) -> auto const& { return s.pixels[8 * row + column + 4 * i]; };
@@ -171,9 +176,9 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
       GART_UNROLL
       for (int i = 0; i < 2; ++i) {
         typename base::pixel_data const& at = pixel_of(i);
-        slot_type const& entry = now.entry[i];
+        slot_type const entry = staged[stage][i][lane];
         quad const g = at.gradient;
-        bool const hit = now.in[i] & this->holds(at, entry, slot_of(row, i), r[i], data);
+        bool const hit = in_row(row, i) & this->holds(at, entry, slot_of(row, i), r[i], data);
         met |= hit;
         GART_UNROLL
         for (int c = 0; c < 3; ++c) weights[c].set(i, hit & !entry.clamped(c) ? entry.weight() * g.v[c] : 0.0f);
@@ -182,6 +187,7 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
       matrix_part<4> const y{s.high[row][lane], s.low[row][lane]};
       GART_UNROLL
       for (int c = 0; c < 3; ++c) multiply_add(color_sum[c], y, weights[c]);
+      stage = stage + 1 == stages ? 0 : stage + 1;
     }
 
     bool const wanted = exists && (met || ordered);
@@ -193,6 +199,13 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
       if (column == 0 && wants(all_wanted, lane / 4)) this->add_moment_sums(range_of(id), area, id, moment_sum);
     }
     add_colors(s, area, k, color_sum, all_wanted);
+  }
+
+  // Asks for the slot of that number.
+  __device__ GART_INLINE void copy_slot(slot_type& to, u32 number) const {
+    using entry_type = typename base::entry_type;
+    __pipeline_memcpy_async(static_cast<entry_type*>(&to), this->slots + number, sizeof(entry_type));
+    if constexpr (C::terms::depth) __pipeline_memcpy_async(&to.depth, this->depth.slots + number, sizeof(float));
   }
 
   // Bands lie over the lanes and primitives in them; so that lanes add to neighbouring floats they change places.

@@ -1,13 +1,13 @@
 #pragma once
 /// \file
-/// The pending hits of one ray of a warp (trace/warp_walk.hpp), in the order (t, id). The latest 16 lie in a window in
-/// shared memory, each lane in a bank of its own, their order a register of sixteen 4-bit numbers. A full window is
-/// spilled, all but its first hit, as a run, in order, to memory of its own; of each run the next hit's t is in a
-/// register. The next hit of all is the window's first or that of a run. So a hit is spilled once at most, and the
-/// order of others is never made anew for it.
+/// The pending hits of one ray of a warp (trace/warp_walk.hpp), in the order (t, id). The latest 15 lie in a window in
+/// shared memory, each lane in a bank of its own, their order a register of 4-bit numbers. A full window is spilled,
+/// all but its first hit, as a run, in order, to memory of its own; of each run the next hit's t is in a register. The
+/// next hit of all is the window's first or that of a run. So a hit is spilled once at most, and the order of others is
+/// never made anew for it.
 ///
 /// Where all runs are taken a hit is lost: what is passed on from then on lies before the nearest hit that was.
-/// Memory: 24 bytes for each of 210 hits a lane. Device only.
+/// Memory: 24 bytes for each of 196 hits a lane. Device only.
 
 #include <gart/core/types.hpp>
 #include <gart/exec/kept_address.hpp>
@@ -42,10 +42,13 @@ struct entry_order {
 template <class KeyOrder>
 class warp_hit_queue {
   static constexpr int lanes = 32;
-  static constexpr int window = 16;  // as many as `order_` has room for
+  static constexpr int window = 15;  // as many as `order_` has room for
   static constexpr int run = window - 1, runs = 14;
   static_assert(run < 16 && runs < 16);  // `left_` has 4 bits a run; free_run: some of them are always zero
   static constexpr float infinity = __builtin_huge_valf();
+  // Slots are numbered from 1. Of slot 0 there is a t alone, less than that of any hit.
+  static constexpr int no_slot = 0;
+  static constexpr u32 every_slot = ((1u << window) - 1) << 1;
 
   struct alignas(8) pair {
     float a, b;
@@ -54,21 +57,22 @@ class warp_hit_queue {
  public:
   /// What a warp shares.
   struct scratch {
-    float words[6][window][lanes];  ///< of the waiting hits, a bank a lane
+    float words[1 + 6 * window][lanes];  ///< of the waiting hits, a bank a lane
   };
   static constexpr std::size_t spill_floats_a_lane = std::size_t{6} * runs * run;  ///< of a lane
 
   /// spill_memory: of the warp's lanes, on a boundary of 8 bytes.
   __device__ GART_INLINE warp_hit_queue(scratch& s, float* spill_memory, int lane, KeyOrder before)
-      : own_(&detail::kept_address<float>(&s.words[0][0][lane])),
-        spilled_(reinterpret_cast<pair*>(spill_memory) + 3 * runs * run * lane),
+      : own_(&detail::kept_address<float>(&s.words[0][lane])),
+        spilled_(reinterpret_cast<pair*>(spill_memory + spill_floats_a_lane * lane)),
         before_(before) {
+    word(time, no_slot) = -infinity;
     clear();
   }
 
   /// Empties it.
   __device__ GART_INLINE void clear() {
-    order_ = 0, free_ = (1u << window) - 1, count_ = 0;
+    order_ = 0, free_ = every_slot, count_ = 0;
     left_ = 0, next_t_ = infinity, next_run_ = 0;
     lost_t_ = infinity, lost_key_ = 0;
     GART_UNROLL
@@ -104,15 +108,16 @@ class warp_hit_queue {
   template <class F>
   __device__ GART_INLINE void pass_on(float depth, float cosine, F&& f) {
     while (true) {
-      int const slot = slot_of(0);
-      float t = count_ > 0 ? word(time, slot) : infinity;
+      int const slot = slot_from_back((count_ - 1) & 15);
+      waiting_hit const first = at(slot);  // all of it, taken or not: shared memory is waited for once
+      float t = count_ > 0 ? first.t : infinity;
       bool from_run = false;
-      if ((next_t_ < infinity) & (next_t_ <= t))
-        from_run = next_t_ < t || before_(key_of(next_spilled()), key_at(slot));
+      if ((next_t_ < infinity) & (next_t_ <= t)) from_run = next_t_ < t || before_(key_of(next_spilled()), first.key);
       t = from_run ? next_t_ : t;
       if ((t == infinity) | !(t * cosine < depth)) return;
-      if (t >= lost_t_ && !nearer(t, from_run ? key_of(next_spilled()) : key_at(slot), lost_t_, lost_key_)) return;
-      if (!f(from_run ? take_of_run() : take_first())) return;
+      if (t >= lost_t_ && !nearer(t, from_run ? key_of(next_spilled()) : first.key, lost_t_, lost_key_)) return;
+      if (!from_run) order_ &= ~(u64{15} << (4 * (count_ - 1))), give_back(slot);
+      if (!f(from_run ? take_of_run() : first)) return;
     }
   }
 
@@ -127,21 +132,21 @@ class warp_hit_queue {
     return t != other_t ? t < other_t : before_(key, other);
   }
 
-  // The slot of the window's hit that is k-th in order.
-  __device__ GART_INLINE int slot_of(int k) const { return static_cast<int>(order_ >> (4 * k)) & 15; }
+  // The slot of the window's hit that has k behind it; no_slot where there is none.
+  __device__ GART_INLINE int slot_from_back(int k) const { return static_cast<int>(order_ >> (4 * k)) & 15; }
 
   // Where some hit was lost or the window is full: whether there is a place for this one, nearer than what was lost or
   // will be for it.
   __device__ GART_INLINE bool has_place(waiting_hit const& h) {
     if (lost() && !nearer(h.t, h.key, lost_t_, lost_key_)) return false;
     if (!full()) return true;
-    int const farthest = slot_of(window - 1);
+    int const farthest = slot_from_back(0);
     float const t = word(time, farthest);
     u32 const key = key_at(farthest);
     bool const fits = nearer(h.t, h.key, t, key);
     lost_t_ = fits ? t : h.t, lost_key_ = fits ? key : h.key;
     if (!fits) return false;
-    order_ &= (u64{1} << (4 * (window - 1))) - 1;
+    order_ >>= 4;
     give_back(farthest);
     return true;
   }
@@ -153,14 +158,33 @@ class warp_hit_queue {
     word(time, slot) = h.t, word(opacity, slot) = h.alpha;
     word(red, slot) = h.shown.x, word(green, slot) = h.shown.y, word(blue, slot) = h.shown.z;
     word(key_bits, slot) = bits_to_float(h.key);
-    int bits = 4 * count_++;
-    for (; bits > 0; bits -= 4) {  // from the back, where most belong
-      int const other = slot_of(bits / 4 - 1);
-      float const t = word(time, other);
-      if (t < h.t || (t == h.t && !before_(h.key, key_at(other)))) break;
-    }
+    ++count_;
+    int const bits = 4 * hits_behind(h);
     u64 const low = (u64{1} << bits) - 1;
     order_ = (order_ & low) | u64(slot) << bits | (order_ & ~low) << 4;
+  }
+
+  // How many hits of the window come after h. From the back, where most belong, four at a time: shared memory is waited
+  // for once.
+  __device__ GART_INLINE int hits_behind(waiting_hit const& h) const {
+    int behind = 0;
+    for (u64 rest = order_;; rest >>= 16) {
+      int farther = 0;
+      bool tied = false;
+      GART_UNROLL
+      for (int k = 0; k < 4; ++k) {
+        float const t = word(time, static_cast<int>(rest) >> (4 * k) & 15);
+        farther += t > h.t, tied |= t == h.t;
+      }
+      if (tied) break;
+      behind += farther;
+      if (farther < 4) return behind;
+    }
+    for (;; ++behind) {
+      int const other = slot_from_back(behind);
+      float const t = word(time, other);
+      if (t < h.t || (t == h.t && !before_(h.key, key_at(other)))) return behind;
+    }
   }
 
   __device__ GART_INLINE waiting_hit at(int slot) const {
@@ -169,13 +193,6 @@ class warp_hit_queue {
   }
 
   __device__ GART_INLINE void give_back(int slot) { free_ |= 1u << slot, --count_; }
-
-  __device__ GART_INLINE waiting_hit take_first() {
-    int const slot = slot_of(0);
-    order_ >>= 4;
-    give_back(slot);
-    return at(slot);
-  }
 
   // Runs. left_: how many each still has, 4 bits a run.
   __device__ GART_INLINE int free_run() const {
@@ -191,17 +208,17 @@ class warp_hit_queue {
 
   // All but the first of the window, at a run's end.
   __device__ GART_INLINE void spill(int to) {
-    int const count = count_ - 1;
-    u64 rest = order_ >> 4;
-    float const first = word(time, static_cast<int>(rest) & 15);
-    pair* out = spilled_at(to, run - count);
-    for (int k = 0; k < count; ++k, rest >>= 4, out += 3) {
-      int const slot = static_cast<int>(rest) & 15;
-      waiting_hit const h = at(slot);
+    int const count = count_ - 1, kept = slot_from_back(count);
+    pair* out = spilled_at(to, run);
+    float first = infinity;
+    u64 rest = order_;
+    for (int k = 0; k < count; ++k, rest >>= 4) {
+      waiting_hit const h = at(static_cast<int>(rest) & 15);
+      out -= 3;
       out[0] = {h.t, bits_to_float(h.key)}, out[1] = {h.alpha, h.shown.x}, out[2] = {h.shown.y, h.shown.z};
+      first = h.t;
     }
-    int const kept = slot_of(0);
-    order_ = kept, free_ = ((1u << window) - 1) & ~(1u << kept), count_ = 1;
+    order_ = kept, free_ = every_slot & ~(1u << kept), count_ = 1;
     left_ |= u64(count) << (4 * to);
     set_first(to, first);
   }

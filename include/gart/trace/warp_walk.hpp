@@ -3,11 +3,12 @@
 /// The walk of tile lists on a device: a warp takes a block of 8 x 4 pixels of a tile, a lane a ray. The same as
 /// walk_tiles (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that all rays of the warp meet a
 /// candidate together. So candidates that miss the block are left out by one vote, the others come through shared
-/// memory, read ahead while the ones before are evaluated, and what a hit shows is computed as it is found, where its
-/// Gaussian is the same for all lanes. A ray's pending hits are in a queue (trace/warp_hit_queue.hpp). Hits are passed
-/// on when the window of some ray's queue is full: many rays then have some to pass on, and do it together. Where a
-/// queue loses a hit the ray passes on what lies before it, and walks the list again, strictly after its last hit. The
-/// queues take 5 KB of device memory for each ray that the device holds at a time: 298 MB on 132 multiprocessors.
+/// memory, read ahead while the ones before are evaluated. Of each group of four a ray then takes its own hits, one
+/// after the other, and computes what they show: few lanes are idle where a candidate is a hit of some rays alone. A
+/// ray's pending hits are in a queue (trace/warp_hit_queue.hpp). Hits are passed on when the window of some ray's queue
+/// is full: many rays then have some to pass on, and do it together. Where a queue loses a hit the ray passes on what
+/// lies before it, and walks the list again, strictly after its last hit. The queues take 4.7 KB of device memory for
+/// each ray that the device holds at a time: 298 MB on 132 multiprocessors.
 
 #include <gart/camera/ray_depth.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -25,14 +26,14 @@ namespace gart::inline GART_ISA {
 /// The tile kernel of the walk.
 template <class Response, int Size, warp_program P>
 class walk_tile_warps {
-  static constexpr int lanes = 32, warps = 2;
+  static constexpr int lanes = 32, warps = 3;
   static constexpr int block_width = 8, block_height = 4;
   static constexpr int tile_blocks = Size * Size / lanes;
   static_assert(Size % block_width == 0);
 
  public:
-  static constexpr int block_size = warps * lanes,                                 ///< lanes of a team
-      min_blocks = 7;                                                              ///< teams a multiprocessor holds
+  static constexpr int block_size = warps * lanes,  ///< lanes of a team
+      min_blocks = 5;  ///< teams a multiprocessor holds: as many warps as its shared memory has room for
   static constexpr u32 tile_parts = tile_blocks;                                   ///< parts of a tile, a warp each
   using key_order = std::conditional_t<P::places_hits, place_order, entry_order>;  ///< the order of hits at one t
   using queue = warp_hit_queue<key_order>;                                         ///< of a lane's ray
@@ -56,9 +57,10 @@ class walk_tile_warps {
   static constexpr u32 full_warp = 0xffffffffu;
   static constexpr u32 no_key = 0xffffffffu;
 
+  // Of an odd number of words, so that lanes that read different candidates read different banks.
   struct candidate {
     ray_gaussian gaussian;
-    quad row[row_words];
+    quad row[row_words + (gaussian_words + row_words + 1) % 2];
   };
 
   struct warp_scratch {
@@ -245,26 +247,40 @@ class walk_tile_warps {
           if ((tied >> c & 1) && follows_last(from[c].gaussian, t[c], d2[c], first + c)) found |= 1u << c;
       }
       if (!alive_) found = 0;
-      bool const crowded = __any_sync(full_warp, __popc(found) > pending_.room());
+      if (__any_sync(full_warp, __popc(found) > pending_.room())) return add_crowded(from, t, d2, found, first);
+      GART_NO_UNROLL
+      for (; __any_sync(full_warp, found); found &= found - 1)
+        if (found) add(from, t, d2, __ffs(static_cast<int>(found)) - 1, first);
+      return true;
+    }
+
+    // The same where a ray may have no room: what comes before the first of the hits left is passed on, to make some.
+    __device__ GART_INLINE bool add_crowded(candidate const (&from)[group], float const (&t)[group],
+                                            float const (&d2)[group], u32 found, int first) {
       bool tried = false;
       GART_NO_UNROLL
-      for (u32 left = __reduce_or_sync(full_warp, found); left; left &= left - 1) {
-        int const c = __ffs(static_cast<int>(left)) - 1;
-        bool const hit = alive_ && (found >> c & 1);
-        if (crowded && __any_sync(full_warp, hit && pending_.full())) {
+      while (u32 const left = __reduce_or_sync(full_warp, found)) {
+        if (__any_sync(full_warp, found && pending_.full())) {
           if (!tried) {
             tried = true;
-            float const depth = s_.depth[first + c];
+            float const depth = s_.depth[first + __ffs(static_cast<int>(left)) - 1];
             pass_on(depth);
             if (!__any_sync(full_warp, alive_ && !(pending_.lost_t() * depth_of_t_ <= depth))) return false;
+            if (!alive_) found = 0;
           }
-          if (__any_sync(full_warp, hit && alive_ && pending_.full())) pending_.make_room();
+          if (__any_sync(full_warp, found && pending_.full())) pending_.make_room();
         }
-        if (hit && alive_)
-          pending_.add({pick(t, c), hit_alpha<Response>(from[c].gaussian, pick(d2, c)),
-                        k_.program.shade(state_, reinterpret_cast<float const*>(from[c].row)), key_of(first + c)});
+        if (found) add(from, t, d2, __ffs(static_cast<int>(found)) - 1, first);
+        found &= found - 1;
       }
       return true;
+    }
+
+    // Candidate c, a hit of this ray.
+    __device__ GART_INLINE void add(candidate const (&from)[group], float const (&t)[group], float const (&d2)[group],
+                                    int c, int first) {
+      pending_.add({pick(t, c), hit_alpha<Response>(from[c].gaussian, pick(d2, c)),
+                    k_.program.shade(state_, reinterpret_cast<float const*>(from[c].row)), key_of(first + c)});
     }
 
     // v[c] of an array in registers.
