@@ -163,7 +163,7 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
     };
     u32 const first = __reduce_min_sync(everyone, from), last = __reduce_max_sync(everyone, from + rows - 1);
     GART_UNROLL
-    for (u32 k = 0; k + 1 < stages; ++k) fetch(first + k, k);
+    for (u32 ahead = 0; ahead + 1 < stages; ++ahead) fetch(first + ahead, ahead);
     u32 stage = 0;
     GART_NO_UNROLL
     for (u32 row = first; row <= last; ++row) {
