@@ -47,6 +47,8 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   settle("--backward", a.backward, gart::choose_backward(traits));
   auto const exposure = gart::choose_exposure(traits);
   settle("--exposure", a.exposure, {exposure.value ? "on" : "off", exposure.why});
+  auto const vignetting = gart::choose_vignetting(traits);
+  settle("--vignetting", a.vignetting, {vignetting.value ? "on" : "off", vignetting.why});
   say("masks", traits.masked ? std::to_string(traits.masked) + " of " + std::to_string(traits.views) : "none",
       traits.masked ? "what they exclude counts in no loss" : "the capture has none");
 

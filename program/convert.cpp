@@ -120,7 +120,8 @@ int run_convert(convert_arguments const& a) {
 
   std::vector<std::string> lost = gart::left_out(a.out, model, traits);
   if (fs::exists(a.in.parent_path() / "exposures.json"))
-    lost.push_back("the exposures of " + (a.in.parent_path() / "exposures.json").string() + ", which no format holds");
+    lost.push_back("exposures and falloffs of lenses in " + (a.in.parent_path() / "exposures.json").string() +
+                   ", which no format holds");
   gart::write_splats(a.out, model, traits, packing);
   if (a.quiet) return 0;
   for (std::string const& what : lost) std::printf("left out: %s\n", what.c_str());

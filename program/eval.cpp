@@ -100,6 +100,11 @@ int run_eval(eval_arguments const& a) {
   gart::exposure_field const exposures =
       a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures);
 
+  fs::path const beside = a.model.parent_path() / "exposures.json";
+  if (a.exposures.empty() && fs::exists(beside) && speaks && !a.quiet)
+    std::printf("scored in the scene's own colours: for those of photographs --exposures %s\n",
+                beside.string().c_str());
+
   progress say(a.quiet || !speaks);
   auto const draw = [&](gart::camera const& view) { return renderer->render(view, options); };
   gart::some_views const tests = dealt(gart::all_of(data.test));

@@ -22,6 +22,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(train_options, initial_opacity), "--init-opacity"},
       {GART_CLI_FIELD(train_options, initial_scale), "--init-scale"},
       {GART_CLI_FIELD(train_options, exposure), "--exposure"},
+      {GART_CLI_FIELD(train_options, vignetting), "--vignetting"},
       {GART_CLI_FIELD(train_options, depth_weight), "--depth-weight"},
       {GART_CLI_FIELD(train_options, refine_poses), "--refine-poses"},
       {GART_CLI_FIELD(train_options, refine_lens), "--refine-lens"},

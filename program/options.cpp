@@ -116,7 +116,8 @@ void add_max_hits(CLI::App& app, int& max_hits) {
 
 void add_exposures(CLI::App& app, std::filesystem::path& file) {
   app.add_option("--exposures", file,
-                 "exposures.json of the model's training: each view gets the exposure\nof the training views about it")
+                 "exposures.json of the model's training: each view gets the exposure\nof the training views about it, "
+                 "and what its lens darkens")
       ->type_name("FILE");
 }
 

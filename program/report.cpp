@@ -169,10 +169,10 @@ std::string settings(json const& m, json const& config) {
           ", and a ray ends below a transmittance of " + fixed(number_of(m["approximations"], "t_min"), 6) + cap +
           ". PSNR and SSIM (11 x 11 Gaussian window, sigma 1.5) are taken per view on [0, 1] and averaged over views.";
   if (m.contains("psnr_own_colours")) {
-    html +=
-        " Each test view has the exposure of the training views about it, not of its own photograph; without, in the "
-        "scene's own colours, PSNR is " +
-        fixed(number_of(m, "psnr_own_colours"), 2) + " dB.";
+    html += m.value("exposure", false)
+                ? " Each test view has the exposure of the training views about it, not of its own photograph"
+                : " Each test view is darker towards its corners, as the training views say of its lens";
+    html += "; without, in the scene's own colours, PSNR is " + fixed(number_of(m, "psnr_own_colours"), 2) + " dB.";
   }
   html += "</p>";
   if (m.contains("notes") && !m["notes"].empty()) {

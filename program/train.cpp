@@ -14,7 +14,8 @@ void add_train(CLI::App& app, command& selected) {
   train->footer(
       "\nWrites into DIR:\n"
       "  model.ply         the Gaussians, as other viewers read them\n"
-      "  exposures.json    with --exposure: of each training view, for gart render and gart eval\n"
+      "  exposures.json    with --exposure: of each training view, with --vignetting: of each lens,\n"
+      "                    for gart render and gart eval\n"
       "  poses.json        with --refine-poses or --refine-lens: the training views' cameras as learned, for\n"
       "                    gart render and --poses;\n"
       "  poses_test.json   and the test views', aligned to their photographs where poses are learned\n"

@@ -124,6 +124,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "on: learn the exposure and white balance of each photograph;\ntest views get theirs from the "
                  "training views about them.\nauto: where neighbouring photographs differ in brightness"))
       ->check(one_of({"auto", "on", "off"}));
+  in_group(r.add(train, "--vignetting", a.vignetting, "NAME",
+                 "on: learn by how much each lens darkens the corners of its\nphotographs, three numbers for all of "
+                 "them, which test views\nhave too. auto: where photographs fill their images"))
+      ->check(one_of({"auto", "on", "off"}));
   in_group(
       r.add_flag(train, "--refine-poses", a.refine_poses,
                  "Learn the pose of each training view with the Gaussians, for\ncaptures whose poses are a little off; "
@@ -301,7 +305,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.densify = gart::from_string<gart::densify_kind>(a.densify);
   o.initial_opacity = a.initial_opacity;
   o.initial_scale = a.initial_scale;
-  o.exposure = a.exposure == "on";
+  o.exposure = a.exposure == "on", o.vignetting = a.vignetting == "on";
   o.depth_weight = a.depth_weight;
   o.refine_poses = a.refine_poses, o.refine_lens = a.refine_lens;
   o.mcmc.noise *= a.mcmc_noise;

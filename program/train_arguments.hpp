@@ -46,7 +46,7 @@ struct train_arguments {
   std::string depth_kind = "auto";
   double depth_unit = 0;
   float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
-  std::string exposure = "auto", adam = "all", set;
+  std::string exposure = "auto", vignetting = "auto", adam = "all", set;
   float mcmc_noise = 1, mcmc_penalty = 1;
   float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;
   gart::u32 max_hits = defaults.render.max_hits;

@@ -44,7 +44,7 @@ gart::place_view training_run::aligned_to_photographs(std::vector<gart::named_ca
   options.render = gart::render_options_of(train_options_of(a_), data_.extent, eval_background_);
   options.steps = 20, options.blur = 0.01f;
   return [this, renderer, options, exposures = session_->exposures(), &found](gart::dataset_view const& view) mutable {
-    options.exposed = exposures.at(view.view);
+    options.response = exposures.at(view.view);
     gart::camera at = session_->as_learned(view.view);
     if (writes_)
       at = gart::track(*renderer, gart::composited(view.image, eval_background_), at, options, view.mask).view;
@@ -127,6 +127,10 @@ void training_run::conclude() {
   write_json(a_.history_file(), course_.to_json());
   save_seconds_ += writing.seconds() - (test_seconds_ - tests_before);
   nlohmann::json metrics = metrics_of(result, training);
+  // At a corner as far from the middle as half of the diagonal.
+  gart::exposure_field const photographed = session_->exposures();
+  for (auto const& lens : photographed.lenses())
+    metrics["corner_gains"].push_back((lens.value.gain(0, 1) + lens.value.gain(1, 1) + lens.value.gain(2, 1)) / 3);
   metrics["ranks"] = ranks::size(), metrics["batch"] = a_.batch;
   metrics["peak_bytes"] = most_bytes, metrics["sent_bytes"] = most_sent;
   write_json(a_.out / "metrics.json", metrics);
@@ -137,6 +141,10 @@ void training_run::conclude() {
   std::printf("trained %s steps in %s, %s Gaussians\n", with_commas(session_->steps_done()).c_str(),
               as_duration(course_.seconds).c_str(), with_commas(gaussians_).c_str());
   if (!result.views.empty()) std::fputs(in_words(result, training, data_.train.size()).c_str(), stdout);
+  if (metrics.contains("corner_gains"))
+    std::printf("corners of photographs at %s of the light in their middle%s\n",
+                fixed(metrics["corner_gains"][0].get<double>(), 3).c_str(),
+                metrics["corner_gains"].size() > 1 ? ", through the first of several lenses" : "");
   std::printf("model   %s\nreport  %s\n", a_.model_file().string().c_str(), (a_.out / "report.html").string().c_str());
 }
 
@@ -157,7 +165,7 @@ nlohmann::json training_run::metrics_of(gart::scores const& result, gart::scores
   m["psnr_over_seconds"] = course_.psnr_over_seconds();
   m["image_size"] = image_size(), m["notes"] = data_.notes;
   m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
-  m["exposure"] = a_.exposure == "on", m["refine_poses"] = a_.refine_poses;
+  m["exposure"] = a_.exposure == "on", m["vignetting"] = a_.vignetting == "on", m["refine_poses"] = a_.refine_poses;
   m["refine_lens"] = a_.refine_lens;
   m["iterations"] = session_->steps_done(), m["time_budget"] = a_.time_budget, m["raised"] = raised_;
   m["gaussians"] = gaussians_, m["sh_degree"] = session_->configuration().sh_degree;

@@ -116,7 +116,8 @@ training_state with_sh_degree(training_state state, int degree) {
 training_state without_rows(training_state const& state) {
   training_state out;
   out.step = state.step, out.growth = state.growth, out.seed = state.seed, out.trials = state.trials;
-  out.exposures = state.exposures, out.poses = state.poses, out.lenses = state.lenses;
+  out.exposures = state.exposures, out.vignetting = state.vignetting, out.poses = state.poses,
+  out.lenses = state.lenses;
   return out;
 }
 

@@ -33,6 +33,10 @@ void for_each_state_array(training_state const& state, F const& f) {
     f("exposure", e.value, 0), f("exposure/first", e.first, 0), f("exposure/second", e.second, 0);
     f("exposure/visits", e.visits, 0);
   }
+  if (vignetting_state const& v = state.vignetting; !v.value.empty()) {
+    f("vignetting", v.value, 0), f("vignetting/first", v.first, 0), f("vignetting/second", v.second, 0);
+    f("vignetting/visits", v.visits, 0);
+  }
   if (pose_state const& p = state.poses; !p.value.empty()) {
     f("pose", p.value, 0), f("pose/first", p.first, 0), f("pose/second", p.second, 0);
     f("pose/metric", p.metric, 0), f("pose/visits", p.visits, 0);
@@ -78,6 +82,14 @@ training_state state_of(Reader const& in) {
     std::size_t const floats = exposure::floats * e.visits.size();
     if (e.value.size() != floats || e.first.size() != floats || e.second.size() != floats)
       in.fail("its arrays exposure* differ in length");
+  }
+  if (in.has("vignetting")) {
+    vignetting_state& v = s.vignetting;
+    v.value = in.template get<float>("vignetting"), v.visits = in.template get<u32>("vignetting/visits");
+    v.first = in.template get<float>("vignetting/first"), v.second = in.template get<float>("vignetting/second");
+    std::size_t const floats = vignetting::floats * v.visits.size();
+    if (v.value.size() != floats || v.first.size() != floats || v.second.size() != floats)
+      in.fail("its arrays vignetting* differ in length");
   }
   if (in.has("pose")) {
     pose_state& p = s.poses;

@@ -108,6 +108,7 @@ capture_traits inspect(dataset const& data) {
       if (v.view.kind == camera_kind::perspective && !v.view.lens.any()) continue;
       ++traits.distorted;
       traits.folding += !one_to_one(v.view);
+      traits.panoramas += v.view.kind == camera_kind::equirectangular;
     }
   }
   std::size_t pixels = 0, clear = 0;
@@ -157,6 +158,12 @@ chosen<bool> choose_exposure(capture_traits const& t) {
   return {false, "the brightness of neighbouring photographs differs by " + step + " only"};
 }
 
+chosen<bool> choose_vignetting(capture_traits const& t) {
+  if (t.bounded() || t.transparent > 0) return {false, "a bounded object, which says nothing of the corners"};
+  if (t.panoramas) return {false, counted(t.panoramas, "view") + " of the whole sphere, which have no corners"};
+  return {true, "photographs, which lenses darken towards the corners"};
+}
+
 chosen<starting_points> choose_start(dataset const& data, train_options const& options) {
   starting_points start;
   bool const mapped = options.depth_weight > 0 && std::any_of(data.train.begin(), data.train.end(),
@@ -196,6 +203,7 @@ recommendation recommended(train_options const& options, dataset const& data, co
   if (request.backward == "auto") all.request.backward = choose_backward(traits).value;
   all.options.background = choose_background(traits).value;
   all.options.exposure = choose_exposure(traits).value;
+  all.options.vignetting = choose_vignetting(traits).value;
   all.options.sh_gain = choose_sh_gain(options).value;
   return all;
 }

@@ -158,7 +158,7 @@ class tracker {
     vec6 by{};
     for (int step = 0; step < options_.steps; ++step) {
       rendered image = renderer_.render(candidate, options_.render);
-      apply(options_.exposed, image.color);
+      apply(options_.response, image.color);
       double const loss = loss_of(image.color), slope = dot(gradient_, by);
       if (loss < loss_) {
         bool const slow = loss > 0.9 * loss_;
@@ -220,12 +220,16 @@ class tracker {
   vec6 gradient() {
     image_float by_image = blurred(blurred(difference(image_.color), sigma_), sigma_);
     float const scale = 2.0f / static_cast<float>(by_image.data.size());
-    float const* const m = options_.exposed.m;
+    float const* const m = options_.response.exposed.m;
     for (std::size_t p = 0; p + 3 <= by_image.data.size(); p += 3) {
       float* const g = by_image.data.data() + p;
       bool const counts = mask_.empty() || mask_.data[p / 3] != 0;
+      int const pixel = static_cast<int>(p / 3);
       float const d[3] = {g[0] * scale, g[1] * scale, g[2] * scale};
-      for (int c = 0; c < 3; ++c) g[c] = counts ? m[c] * d[0] + m[4 + c] * d[1] + m[8 + c] * d[2] : 0;
+      for (int c = 0; c < 3; ++c) {
+        float const gain = options_.response.gain(c, pixel % by_image.width, pixel / by_image.width);
+        g[c] = counts ? gain * (m[c] * d[0] + m[4 + c] * d[1] + m[8 + c] * d[2]) : 0;
+      }
     }
     renderer_.differentiate(best_, options_.render, by_image);
     return pull_back(best_, {}, 1, renderer_.differentiate_pose());

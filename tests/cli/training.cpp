@@ -309,3 +309,38 @@ TEST_CASE("exposures are learned, said, saved, resumed and used again by eval an
   CHECK_FALSE(fs::exists(here / "run/exposures.json"));
   CHECK(here.json("run/metrics.json")["exposure"] == false);
 }
+
+TEST_CASE("the falloff of a lens is learned without exposures, said, saved, resumed and used again by eval") {
+  folder const here;
+  write_capture(here / "capture");
+  std::string const train = " --iterations 60 --exposure off --vignetting on" + small;
+  REQUIRE(here.gart("train capture --out run" + train + " --stop-at 30").code == 130);
+  REQUIRE(here.gart("train --resume --out run --quiet").code == 0);
+  REQUIRE(here.gart("train capture --out whole" + train).code == 0);
+  CHECK(text_of(here / "run/exposures.json") == text_of(here / "whole/exposures.json"));
+
+  auto const metrics = here.json("run/metrics.json"), file = here.json("run/exposures.json");
+  CHECK(metrics["vignetting"] == true);
+  CHECK(metrics["exposure"] == false);
+  CHECK(file["views"].empty());
+  REQUIRE(file["lenses"].size() == 1);
+  double corner = 1;
+  for (auto const& k : file["lenses"][0]["falloff"]) corner += k.get<double>() / 3;
+  REQUIRE(metrics["corner_gains"].size() == 1);
+  CHECK(metrics["corner_gains"][0].get<double>() == doctest::Approx(corner).epsilon(1e-5));
+  CHECK(has(text_of(here / "run/report.html"), "as the training views say of its lens"));
+
+  std::string const eval = "eval run/model.ply capture --backend serial --out ";
+  REQUIRE(here.gart(eval + "with.json --quiet --exposures run/exposures.json").code == 0);
+  auto const without = here.gart(eval + "without.json");
+  REQUIRE(without.code == 0);
+  CHECK(has(without.out, "for those of photographs --exposures run/exposures.json"));
+  CHECK(here.json("with.json")["psnr"].get<double>() == doctest::Approx(metrics["psnr"].get<double>()).epsilon(1e-4));
+  CHECK(here.json("without.json")["psnr"].get<double>() ==
+        doctest::Approx(metrics["psnr_own_colours"].get<double>()).epsilon(1e-4));
+
+  // An object before a plain background says nothing of the corners.
+  REQUIRE(here.gart("train capture --out run --iterations 5" + small).code == 0);
+  CHECK_FALSE(fs::exists(here / "run/exposures.json"));
+  CHECK(here.json("run/metrics.json")["vignetting"] == false);
+}

@@ -189,7 +189,7 @@ TEST_CASE("exposures and poses are learned as by one rank, bit by bit") {
   data.train[2].view.position.x += 0.05;
   train_options options = short_run(densify_kind::error);
   options.shard_block = 64, options.iterations = 120;  // three blocks
-  options.exposure = options.refine_poses = true;
+  options.exposure = options.vignetting = options.refine_poses = true;
   gaussian_model const start = gart_test::cloud(17, 0.5f);
   for (int const batch : {1, 3}) {
     CAPTURE(batch);
@@ -202,6 +202,8 @@ TEST_CASE("exposures and poses are learned as by one rank, bit by bit") {
     CHECK(a.poses.metric == b.poses.metric);
     CHECK(a.poses.visits == b.poses.visits);
     CHECK(same(a.exposures.value, b.exposures.value));
+    CHECK(same(a.vignetting.value, b.vignetting.value));
+    CHECK(b.vignetting.visits == std::vector<u32>{120});
     double moved = 0;
     for (double const x : b.poses.value) moved = std::max(moved, std::fabs(x));
     CHECK(moved > 1e-4);

@@ -203,11 +203,13 @@ bool exposures(std::string_view input) {
   fs::path const file = folder.put("exposures.json", input), again = folder.path() / "again.json";
   return accepted(folder, [&] {
     gart::exposure_field const field = gart::read_exposures(file);
-    promise(!field.empty(), "no view");
+    promise(!field.empty(), "no view and no lens");
     gart::camera view;
-    for (auto const& position : {gart::vec3d(0.0), field.views()[0].position, gart::vec3d(1e7)}) {
+    view.width = 4, view.height = 3;
+    gart::vec3d const there = field.views().empty() ? gart::vec3d(0.0) : field.views()[0].position;
+    for (auto const& position : {gart::vec3d(0.0), there, gart::vec3d(1e7)}) {
       view.position = position;
-      gart::exposure const e = field.at(view);
+      gart::exposure const e = field.at(view).exposed;
       // The numbers may be of any size; beyond what the sums in double can hold there is nothing to promise.
       bool small = true, sound = true;
       for (auto const& v : field.views())
@@ -217,8 +219,12 @@ bool exposures(std::string_view input) {
     }
     gart::write_exposures(again, field);
     gart::exposure_field const back = gart::read_exposures(again);
-    promise(back.views().size() == field.views().size() && back.views()[0].position == field.views()[0].position,
-            "exposures that are others when written and read again");
+    bool same = back.views().size() == field.views().size() && back.lenses().size() == field.lenses().size();
+    for (std::size_t i = 0; same && i < field.views().size(); ++i)
+      same = back.views()[i].position == field.views()[i].position;
+    for (std::size_t i = 0; same && i < field.lenses().size(); ++i)
+      same = back.lenses()[i].focal == field.lenses()[i].focal && back.lenses()[i].center == field.lenses()[i].center;
+    promise(same, "exposures that are others when written and read again");
   });
 }
 

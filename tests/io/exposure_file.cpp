@@ -13,7 +13,12 @@ gart::exposure_field some_field() {
     for (int k = 0; k < gart::exposure::floats; ++k) v.value.m[k] += 0.1f * static_cast<float>(i + k) / 3;
     views.push_back(v);
   }
-  return gart::exposure_field(views);
+  std::vector<gart::lens_falloff> lenses(2);
+  for (auto& l : lenses)
+    l.focal = {0.9f / 7, 1.2f}, l.center = {0.5f, 1 / 3.0f},
+    l.value = {{-0.1f, 0.7f / 3, 1e-9f, 1, 2, 3, 4, 5, 1 / 7.0f}};
+  lenses[1].focal.x = 3;
+  return gart::exposure_field(views, lenses);
 }
 
 char const* const sound =
@@ -35,6 +40,17 @@ TEST_CASE("exposures come back from their file with every bit") {
     CHECK(a.direction == b.direction);
     for (int k = 0; k < gart::exposure::floats; ++k) CHECK(a.value.m[k] == b.value.m[k]);
   }
+  REQUIRE(read.lenses().size() == 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    auto const &a = written.lenses()[i], &b = read.lenses()[i];
+    CHECK(a.focal == b.focal);
+    CHECK(a.center == b.center);
+    for (int k = 0; k < gart::vignetting::floats; ++k) CHECK(a.value.k[k] == b.value.k[k]);
+  }
+  // Lenses alone are enough: a run may learn no exposures.
+  gart::write_exposures(path, gart::exposure_field({}, written.lenses()));
+  CHECK(gart::read_exposures(path).views().empty());
+  CHECK(gart::read_exposures(path).lenses().size() == 2);
 }
 
 TEST_CASE("a file that holds no exposures is refused by name, view and field") {
@@ -67,6 +83,10 @@ TEST_CASE("a file that holds no exposures is refused by name, view and field") {
   refused("0,0,1,0]", "0,0,1e99,0]", "'matrix' is not a list of 12 finite numbers");
   refused("0,0,1,0]", "0,0,1]", "'matrix'");
   refused("[0, 0, 0]", "[0, 1e200, 0]", "'position'");
+  refused("\"views\"", "\"lenses\": 3, \"views\"", "'lenses' is no list");
+  refused("\"views\"", "\"lenses\": [3], \"views\"", "lens 0: is not an object");
+  std::string const lens = R"("lenses": [{"focal": [1, 1], "center": [0.5, 0.5]}], "views")";
+  refused("\"views\"", lens, "lens 0: 'falloff' is not a list of 9 finite numbers");
   refused("\"matrix\"", "\"matrices\"", "'matrix'");
   CHECK_THROWS_AS(gart::read_exposures(folder.path / "nowhere.json"), gart::io_error);
 }

@@ -155,9 +155,10 @@ TEST_CASE_TEMPLATE("a camera is tracked from 2 degrees and 5 % of the extent to 
   renderer.set_model(cloud(seed, 0.6f));
   CHECK_THROWS_AS(renderer.differentiate_pose(), gart::invalid_argument);
   gart::track_options options;
-  options.exposed.m[0] = 0.8f, options.exposed.m[7] = 0.1f;
+  options.response.exposed.m[0] = 0.8f, options.response.exposed.m[7] = 0.1f;
+  options.response.falloff.k[0] = -0.4f, options.response.circle = gart::image_circle(truth);
   auto photo = renderer.render(truth, options.render).color;
-  gart::apply(options.exposed, photo);
+  gart::apply(options.response, photo);
   for (int trial = 0; trial < 3; ++trial) {
     gart::camera const guess = disturbed(truth, random, 2, 0.05 * 4);
     auto const found = gart::track(renderer, photo, guess, options);

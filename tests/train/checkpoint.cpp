@@ -51,6 +51,8 @@ training_state some_state(std::mt19937_64& random) {
   s.gradient_sum = {1, 2, 3}, s.touched = {4, 5, 6};
   s.exposures.value.assign(12, 0.5f), s.exposures.first.assign(12, 0.1f), s.exposures.second.assign(12, 0.2f);
   s.exposures.visits = {9};
+  s.vignetting.value.assign(18, 0.5f), s.vignetting.first.assign(18, 0.1f), s.vignetting.second.assign(18, 0.2f);
+  s.vignetting.visits = {3, 9};
   s.poses.value.assign(6, 0.125), s.poses.first.assign(6, 0.1), s.poses.second.assign(6, 0.2);
   s.poses.metric.assign(36, 0.3), s.poses.visits = {4};
   s.lenses.value.assign(3, 0.125), s.lenses.first.assign(3, 0.1), s.lenses.second.assign(3, 0.2);
@@ -75,6 +77,9 @@ void check_same(training_state const& a, training_state const& b) {
   CHECK(a.touched == b.touched);
   CHECK(a.exposures.value == b.exposures.value);
   CHECK(a.exposures.visits == b.exposures.visits);
+  CHECK(a.vignetting.value == b.vignetting.value);
+  CHECK(a.vignetting.second == b.vignetting.second);
+  CHECK(a.vignetting.visits == b.vignetting.visits);
   CHECK(a.poses.value == b.poses.value);
   CHECK(a.poses.second == b.poses.second);
   CHECK(a.poses.metric == b.poses.metric);

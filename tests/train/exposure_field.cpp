@@ -28,12 +28,12 @@ gart::view_exposure exposed(gart::camera const& c, float gain, float offset) {
 TEST_CASE("without views every view has the identity, with one that one's") {
   gart::exposure const identity;
   auto const none = gart::exposure_field().at(camera_at(0, 0, 0));
-  for (int k = 0; k < gart::exposure::floats; ++k) CHECK(none.m[k] == identity.m[k]);
+  for (int k = 0; k < gart::exposure::floats; ++k) CHECK(none.exposed.m[k] == identity.m[k]);
   gart::exposure_field const one({exposed(camera_at(1, 2, 0.3f), 0.7f, 0.1f)});
   for (double const far : {0.0, 1e-3, 10.0, 1e6}) {
     auto const e = one.at(camera_at(1 + far, 2, 0.3f));
-    CHECK(e.m[0] == doctest::Approx(0.7f).epsilon(1e-6));
-    CHECK(e.m[3] == doctest::Approx(0.1f).epsilon(1e-6));
+    CHECK(e.exposed.m[0] == doctest::Approx(0.7f).epsilon(1e-6));
+    CHECK(e.exposed.m[3] == doctest::Approx(0.1f).epsilon(1e-6));
   }
 }
 
@@ -51,12 +51,12 @@ TEST_CASE("a training view keeps its own, one between two has what lies between,
   gart::exposure_field const field(views);
   for (int i = 0; i < 20; ++i) {
     auto const e = field.at(camera_at(3.0 * i, 0.2 * i, 0.05f * static_cast<float>(i)));
-    CHECK(e.m[0] == doctest::Approx(views[static_cast<std::size_t>(i)].value.m[0]).epsilon(0.01));
+    CHECK(e.exposed.m[0] == doctest::Approx(views[static_cast<std::size_t>(i)].value.m[0]).epsilon(0.01));
   }
   auto const far = field.at(camera_at(1e9, 1e9, 3));
-  CHECK(far.m[0] == doctest::Approx(mean).epsilon(0.02));
-  CHECK(far.m[3] == doctest::Approx(0.01f).epsilon(1e-3));
-  CHECK(far.m[1] == doctest::Approx(0.0f));
+  CHECK(far.exposed.m[0] == doctest::Approx(mean).epsilon(0.02));
+  CHECK(far.exposed.m[3] == doctest::Approx(0.01f).epsilon(1e-3));
+  CHECK(far.exposed.m[1] == doctest::Approx(0.0f));
 
   // A line is followed between the views it was sampled at, by any scale of the scene.
   for (double const scale : {1e-3, 1.0, 1e4}) {
@@ -65,7 +65,7 @@ TEST_CASE("a training view keeps its own, one between two has what lies between,
     for (int i = 0; i < 20; ++i)
       line.push_back(exposed(camera_at(scale * i, 0, 0), 0.6f + 0.02f * static_cast<float>(i), 0));
     auto const between = gart::exposure_field(line).at(camera_at(scale * 9.4, 0, 0));
-    CHECK(between.m[0] == doctest::Approx(0.6 + 0.02 * 9.4).epsilon(0.005));
+    CHECK(between.exposed.m[0] == doctest::Approx(0.6 + 0.02 * 9.4).epsilon(0.005));
   }
 }
 
@@ -73,7 +73,48 @@ TEST_CASE("views in one place, or one of them twice, are no difficulty") {
   std::vector<gart::view_exposure> views(5, exposed(camera_at(1, 1, 0), 0.8f, 0));
   views.push_back(exposed(camera_at(1, 1, 0), 1.4f, 0));
   auto const e = gart::exposure_field(views).at(camera_at(1, 1, 0));
-  CHECK(e.m[0] == doctest::Approx(0.9f).epsilon(1e-4));
+  CHECK(e.exposed.m[0] == doctest::Approx(0.9f).epsilon(1e-4));
+}
+
+TEST_CASE("a view has the falloff of the lens that is most like its own, whatever its size") {
+  std::vector<gart::lens_falloff> lenses;
+  for (float const focal : {4.0f, 6.0f}) {
+    gart::camera lens = camera_at(0, 0, 0);
+    lens.fx = lens.fy = focal;
+    gart::vignetting falloff;
+    for (int c = 0; c < 3; ++c)
+      falloff.k[3 * c] = -0.1f * focal, falloff.k[3 * c + 1] = 0.02f,
+                    falloff.k[3 * c + 2] = 0.01f * static_cast<float>(c);
+    lenses.emplace_back(lens, falloff);
+  }
+  gart::exposure_field const field({exposed(camera_at(0, 0, 0), 0.5f, 0.1f)}, lenses);
+  for (float const focal : {3.5f, 4.0f, 6.0f, 7.0f}) {
+    CAPTURE(focal);
+    gart::camera view = camera_at(5, 0, 0);
+    view.fx = view.fy = focal;
+    view = gart::resized(view, 12, 9);
+    auto const response = field.at(view);
+    CHECK(response.falloff.k[0] == (focal < 5 ? -0.4f : -0.6f));
+    // Of each pixel what the lens lets through, exposed.
+    gart::image_float image(12, 9, 3, 0.6f);
+    apply(response, image);
+    for (int y = 0; y < 9; ++y) {
+      for (int x = 0; x < 12; ++x) {
+        double const dx = x + 0.5 - 6, dy = y + 0.5 - 4.5, u = (dx * dx + dy * dy) / (6 * 6 + 4.5 * 4.5);
+        for (int c = 0; c < 3; ++c) {
+          double const gain = 1 + static_cast<double>(response.falloff.k[0]) * u + 0.02 * u * u + 0.01 * c * u * u * u;
+          CHECK(image.at(x, y, c) == doctest::Approx(0.5 * gain * 0.6 + 0.1).epsilon(1e-5));
+        }
+      }
+    }
+  }
+  // Without lenses there is none, without views colours stay but for it.
+  gart::image_float plain(4, 3, 3, 0.6f), shaded = plain;
+  apply(gart::exposure_field().at(camera_at(0, 0, 0)), plain);
+  CHECK(plain.data == std::vector<float>(36, 0.6f));
+  apply(gart::exposure_field({}, lenses).at(camera_at(0, 0, 0)), shaded);
+  CHECK(shaded.at(0, 0, 0) < 0.5f);
+  CHECK(shaded.at(1, 1, 0) > shaded.at(0, 0, 0));
 }
 
 TEST_CASE("exposures are learned where neighbouring photographs differ in brightness, and nowhere else") {
@@ -95,7 +136,12 @@ TEST_CASE("exposures are learned where neighbouring photographs differ in bright
       }
       data.train.push_back(std::move(v));
     }
-    return gart::choose_exposure(gart::inspect(data));
+    gart::capture_traits traits = gart::inspect(data);
+    // Lenses darken corners wherever photographs fill their images.
+    CHECK(gart::choose_vignetting(traits).value == (channels == 3 && !plain));
+    traits.panoramas = 1;
+    CHECK_FALSE(gart::choose_vignetting(traits).value);
+    return gart::choose_exposure(traits);
   };
   CHECK(learned(0.08f, 3, false).value);
   CHECK(learned(0.08f, 3, false).why.find("7.") != std::string::npos);

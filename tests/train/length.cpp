@@ -8,7 +8,7 @@ namespace {
 gart::train_options options_of(gart::densify_kind densify, int iterations) {
   gart::train_options options;
   options.iterations = iterations, options.densify = densify;
-  options.max_gaussians = 220, options.exposure = true;
+  options.max_gaussians = 220, options.exposure = options.vignetting = true;
   options.mcmc.from = 20, options.mcmc.every = 10;
   options.adc.from = 20, options.adc.every = 10, options.adc.opacity_reset_every = 60, options.adc.gradient = 1e-6f;
   return options;
@@ -39,6 +39,7 @@ TEST_CASE("a length that is set is as good as one that was known") {
   CHECK(same_bits(known.model(), told.model()));
   CHECK(same_bits(known.state().second, told.state().second));
   CHECK(known.state().exposures.value == told.state().exposures.value);
+  CHECK(known.state().vignetting.value == told.state().vignetting.value);
   CHECK_FALSE(same_bits(known.model(), untold.model()));
 
   // Under way, it goes on from where it stands: the rate of the means ends where that of the run ends.

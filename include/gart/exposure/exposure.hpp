@@ -7,7 +7,6 @@
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
 #include <gart/math/arith.hpp>
-#include <gart/scene/image.hpp>
 
 #include <vector>
 
@@ -31,15 +30,3 @@ struct exposure_state {
 };
 
 }  // namespace gart
-
-namespace gart::inline GART_ISA {
-
-/// Exposes every pixel of an image of three channels.
-inline void apply(exposure const& e, image_float& image) {
-  for (std::size_t p = 0; p + 3 <= image.data.size(); p += 3) {
-    float const r = image.data[p], g = image.data[p + 1], b = image.data[p + 2];
-    for (int c = 0; c < 3; ++c) image.data[p + static_cast<std::size_t>(c)] = e.channel(c, r, g, b);
-  }
-}
-
-}  // namespace gart::inline GART_ISA

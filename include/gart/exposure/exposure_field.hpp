@@ -9,9 +9,11 @@
 /// where d_i leads to training view i and r^2 is the weighted mean of |d_i|^2: a line through the nearest, since a
 /// camera on its way passes between them, and the constant a is what the view gets. (A weighted mean, which b = 0 is,
 /// leaves errors a quarter larger where one view is left out of the others.) Far from all views it comes to their mean.
-/// Cost: O(views) in double for each call. Without views it is the identity.
+/// The falloff is that of the lens whose focal lengths and principal point, over the size of its images, are nearest.
+/// Cost: O(views) in double for each call. Without views the exposure is the identity, without lenses there is no
+/// falloff.
 
-#include <gart/exposure/exposure.hpp>
+#include <gart/exposure/photo_response.hpp>
 #include <gart/math/glm.hpp>
 #include <gart/scene/camera.hpp>
 
@@ -32,12 +34,26 @@ struct view_exposure {
   exposure value;           ///< its exposure
 };
 
-/// The exposures of all training views.
+/// The falloff of one of a capture's lenses, and which lens it is.
+struct lens_falloff {
+  vec2 focal{0}, center{0};  ///< focal lengths and principal point, over the images' width and height
+  vignetting value;          ///< its falloff
+
+  lens_falloff() = default;
+  /// Of the lens of a view.
+  lens_falloff(camera const& view, vignetting const& falloff) : value(falloff) {
+    vec2 const size(static_cast<float>(view.width), static_cast<float>(view.height));
+    focal = vec2(view.fx, view.fy) / size, center = vec2(view.cx, view.cy) / size;
+  }
+};
+
+/// The exposures of all training views, and the falloffs of their lenses.
 class exposure_field {
  public:
   exposure_field() = default;
-  /// Of these views.
-  explicit exposure_field(std::vector<view_exposure> views) : views_(std::move(views)) {
+  /// Of these views and lenses.
+  explicit exposure_field(std::vector<view_exposure> views, std::vector<lens_falloff> lenses = {})
+      : views_(std::move(views)), lenses_(std::move(lenses)) {
     std::vector<double> nearest;
     double farthest = 0;
     for (auto const& a : views_) {
@@ -55,10 +71,12 @@ class exposure_field {
     spacing_ = std::max(*middle, 1e-12 * farthest);
   }
 
-  /// Whether there is no view.
-  bool empty() const { return views_.empty(); }
+  /// Whether there is no view and no lens.
+  bool empty() const { return views_.empty() && lenses_.empty(); }
   /// As they were given.
   std::vector<view_exposure> const& views() const { return views_; }
+  /// As they were given.
+  std::vector<lens_falloff> const& lenses() const { return lenses_; }
 
   /// The training view whose pose is nearest to that of another; of at least two.
   std::size_t nearest(std::size_t view) const {
@@ -73,8 +91,22 @@ class exposure_field {
     return best;
   }
 
-  /// The exposure of a view.
-  exposure at(camera const& view) const {
+  /// What a photograph taken as the view is shows.
+  photo_response at(camera const& view) const {
+    photo_response out{exposure_at(view), {}, {}};
+    if (view.kind == camera_kind::equirectangular) return out;  // no lens sees it
+    lens_falloff const seen(view, {});
+    float least = HUGE_VALF;
+    for (lens_falloff const& l : lenses_) {
+      vec2 const focal = l.focal - seen.focal, center = l.center - seen.center;
+      float const far = glm::dot(focal, focal) + glm::dot(center, center);
+      if (far < least) least = far, out.falloff = l.value, out.circle = image_circle(view);
+    }
+    return out;
+  }
+
+ private:
+  exposure exposure_at(camera const& view) const {
     exposure out;
     if (views_.empty()) return out;
     // The normal equations, the constant first; weights relative to the largest, so that none underflows alone.
@@ -106,7 +138,6 @@ class exposure_field {
     return out;
   }
 
- private:
   static constexpr int size = 7;
   using matrix = std::array<std::array<double, size>, size>;
 
@@ -135,6 +166,7 @@ class exposure_field {
   }
 
   std::vector<view_exposure> views_;
+  std::vector<lens_falloff> lenses_;
   double spacing_ = 1;
 };
 

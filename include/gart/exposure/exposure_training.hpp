@@ -7,15 +7,10 @@
 /// The scene's own colours are those of an exposure that is the identity; nothing holds the views' mean to it but that
 /// they start there.
 ///
-/// Buffers: 37 words a view, a copy of the image, and a few sums. Cost: two passes over the image and three launches
-/// over a few numbers a step; no host read. The order of all sums depends on the image's size only. A number whose
-/// gradient is not finite stays as it is.
+/// Buffers and cost: those of learned_rows.hpp, a copy of the image and another pass over it.
 
-#include <gart/algorithm/segmented_reduce.hpp>
-#include <gart/exec/buffer.hpp>
 #include <gart/exposure/exposure.hpp>
-#include <gart/math/arith.hpp>
-#include <gart/optim/adam.hpp>
+#include <gart/exposure/learned_rows.hpp>
 
 namespace gart::inline GART_ISA {
 
@@ -37,8 +32,8 @@ struct exposure_gradient_kernel {
   exposure const* view;
   float const* image;
   float* gradient;  // in: dL/dx', out: dL/dx
-  index_t pixels, lanes;
-  float* sums;  // [lanes][12]
+  index_t pixels, lanes = 0;
+  float* sums = nullptr;  // [lanes][12]
 
   GART_KERNEL void operator()(index_t lane) const {
     exposure const e = *view;
@@ -57,112 +52,48 @@ struct exposure_gradient_kernel {
   }
 };
 
-struct exposure_adam_kernel {
-  float const* gradient;
-  float* value;
-  float* first;
-  float* second;
-  adam_rule rule;
-  float rate;
-
-  GART_KERNEL void operator()(index_t k) const {
-    auto const to = rule.moved<float>({value[k], first[k], second[k]}, gradient[k], rate);
-    if (!is_finite(to.second) || !is_finite(to.parameter)) return;
-    value[k] = to.parameter, first[k] = to.first, second[k] = to.second;
-  }
-};
-
 }  // namespace detail
 
 /// The exposures of a run, and Adam's moments of them.
 template <execution E>
-class exposure_training {
+class exposure_training : public learned_rows<E, exposure::floats, exposure_state> {
  public:
   /// As many identities as there are views.
-  exposure_training(E& exec, std::size_t views)
-      : exec_(&exec),
-        value_(exec, identities(views)),
-        first_(exec, std::vector<float>(views * exposure::floats)),
-        second_(exec, std::vector<float>(views * exposure::floats)),
-        visits_(views),
-        exposed_(exec),
-        sums_(exec),
-        gradient_(exec, exposure::floats),
-        ends_(exec, std::vector<u32>(runs + 1)) {
-    std::vector<u32> ends(runs + 1);
-    for (u32 r = 0; r <= runs; ++r) ends[r] = r * runs;
-    ends_.assign(ends);
-  }
+  exposure_training(E& exec, std::size_t views) : base(exec, identities(views)), exec_(&exec), exposed_(exec) {}
 
   /// The image [H][W][3] as the view's photograph would show it; until the next call.
   span<float const> expose(std::size_t view, span<float const> image) {
     exposed_.resize(image.size());
     parallel_for(*exec_, "expose", static_cast<index_t>(image.size() / 3),
-                 detail::expose_kernel{at(view), image.data(), exposed_.data()});
+                 detail::expose_kernel{of(view), image.data(), exposed_.data()});
     return exposed_;
   }
 
   /// Turns dL/d exposed into dL/d image, and takes Adam's step for the view.
   void step(std::size_t view, span<float const> image, span<float> gradient, float rate) {
     differentiate(view, image, gradient);
-    move(view, rate);
+    this->move(view, rate);
   }
 
   /// The first half of a step: turns dL/d exposed into dL/d image. What it says of the exposure, [12], stays until the
   /// next call.
   span<float const> differentiate(std::size_t view, span<float const> image, span<float> gradient) {
-    constexpr index_t lanes = runs * runs;
-    sums_.resize(std::size_t{lanes + runs} * exposure::floats);
-    auto const by_lane = sums_.view().subspan(0, std::size_t{lanes} * exposure::floats);
-    auto const by_run = sums_.view().subspan(by_lane.size(), std::size_t{runs} * exposure::floats);
-    parallel_for(*exec_, "exposure_gradient", lanes,
-                 detail::exposure_gradient_kernel{at(view), image.data(), gradient.data(),
-                                                  static_cast<index_t>(image.size() / 3), lanes, by_lane.data()});
-    span<u32 const> const ends = ends_;
-    segmented_reduce(*exec_, by_lane, exposure::floats, ends, by_run);
-    segmented_reduce(*exec_, by_run, exposure::floats, ends.subspan(0, 2), gradient_.view());
-    return gradient_;
-  }
-
-  /// The second, of another rank's view: by its gradient, [12], in host memory.
-  void move(std::size_t view, span<float const> gradient, float rate) {
-    gradient_.assign(std::vector<float>(gradient.begin(), gradient.end()));
-    move(view, rate);
-  }
-
-  /// For a checkpoint.
-  exposure_state state() const { return {value_.to_host(), first_.to_host(), second_.to_host(), visits_}; }
-  /// From a checkpoint.
-  void set_state(exposure_state const& s) {
-    value_.assign(s.value), first_.assign(s.first), second_.assign(s.second), visits_ = s.visits;
+    return this->sum("exposure_gradient", detail::exposure_gradient_kernel{of(view), image.data(), gradient.data(),
+                                                                           static_cast<index_t>(image.size() / 3)});
   }
 
  private:
-  static constexpr index_t runs = E::device ? 128 : 8;  // of as many lanes: two short sums, not a long one
+  using base = learned_rows<E, exposure::floats, exposure_state>;
   static std::vector<float> identities(std::size_t views) {
     exposure const identity;
     std::vector<float> all;
     for (std::size_t v = 0; v < views; ++v) all.insert(all.end(), identity.m, identity.m + exposure::floats);
     return all;
   }
-  exposure* at(std::size_t view) { return reinterpret_cast<exposure*>(value_.data()) + view; }
-
-  // Adam's step for the view, by gradient_.
-  void move(std::size_t view, float rate) {
-    std::size_t const row = view * exposure::floats;
-    int const visit = static_cast<int>(++visits_[view]);
-    adam_options const adam;
-    parallel_for(*exec_, "exposure_adam", exposure::floats,
-                 detail::exposure_adam_kernel{gradient_.data(), value_.data() + row, first_.data() + row,
-                                              second_.data() + row, adam_rule(adam, visit),
-                                              static_cast<float>(rate * adam_rule::first_correction(adam, visit))});
-  }
+  exposure const* of(std::size_t view) { return reinterpret_cast<exposure const*>(this->at(view)); }
 
   E* exec_;
-  buffer<float, E> value_, first_, second_;
-  std::vector<u32> visits_;
-  buffer<float, E> exposed_, sums_, gradient_;
-  buffer<u32, E> ends_;
+  buffer<float, E> exposed_;
 };
 
 }  // namespace gart::inline GART_ISA

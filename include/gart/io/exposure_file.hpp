@@ -1,9 +1,13 @@
 #pragma once
 /// \file
-/// Exposures of training views as JSON, to be read by `gart render` and `gart eval`, and by hand:
-///   {"views": [{"name": "00002", "position": [x, y, z], "direction": [x, y, z], "matrix": [12 numbers]}, ...]}
+/// Exposures of training views and falloffs of lenses as JSON, to be read by `gart render` and `gart eval`, and by
+/// hand:
+///   {"views": [{"name": "00002", "position": [x, y, z], "direction": [x, y, z], "matrix": [12 numbers]}, ...],
+///    "lenses": [{"focal": [x, y], "center": [x, y], "falloff": [9 numbers]}, ...]}
 /// position and direction: of the camera and its axis, in the world; matrix: a row of M, then its offset, three times
-/// (exposure/exposure.hpp). Written whole or not at all. Errors: io_error naming the file, the view and the field.
+/// (exposure/exposure.hpp). focal and center: focal lengths and principal point over the images' width and height,
+/// which tell lenses apart; falloff: k0, k1, k2 of each channel (exposure/vignetting.hpp). Either list may be missing
+/// or empty, not both. Written whole or not at all. Errors: io_error naming the file, the view or lens and the field.
 
 #include <gart/exposure/exposure_field.hpp>
 

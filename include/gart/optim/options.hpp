@@ -19,15 +19,16 @@ struct learning_rates {
   /// them as fast as the first; one that starts at random has its geometry to find, and colours that follow the view
   /// would stand in for it.
   float sh_rest = 0;
-  /// All rates but those of the means and exposures stay as they are for a share of the run, then decay exponentially
-  /// to `settled` of it.
+  /// All rates but those of the means, exposures and lenses stay as they are for a share of the run, then decay
+  /// exponentially to `settled` of it.
   float settled = 0.1f, settle_from = 0.5f;  ///< the share
   /// The rates are those of a run of at least so many steps. A shorter one has less time to go as far: its rates of
   /// mean, scale and opacity are sqrt(long_run / steps) times as large, at most four times, and it settles the later
   /// the shorter it is, up to settle_late of the run.
   int long_run = 15000;
-  float settle_late = 0.9f;                         ///< the share
-  float exposure = 0.05f, exposure_final = 0.005f;  ///< a visit of the view; decays like the means'
+  float settle_late = 0.9f;                            ///< the share
+  float exposure = 0.05f, exposure_final = 0.005f;     ///< a visit of the view; decays like the means'
+  float vignetting = 1e-2f, vignetting_final = 1e-4f;  ///< a visit of the lens; likewise
 };
 
 /// Adam's constants.

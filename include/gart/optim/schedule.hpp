@@ -32,6 +32,7 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
   for (float* rate : {&rates.mean, &rates.mean_final, &rates.log_scale, &rates.opacity}) *rate *= haste;
   rates.mean = exponential_decay(rates.mean, rates.mean_final, step, steps) * extent;
   rates.exposure = exponential_decay(rates.exposure, rates.exposure_final, step, steps);
+  rates.vignetting = exponential_decay(rates.vignetting, rates.vignetting_final, step, steps);
   double const late = std::max(0.0f, rates.settle_late - rates.settle_from) * std::max(0.0, 1 - length);
   int const from = static_cast<int>((static_cast<double>(rates.settle_from) + late) * steps);
   float const share = exponential_decay(1.0f, rates.settled, step - from, steps - from);

@@ -20,6 +20,7 @@ namespace gart {
 struct capture_traits {
   std::size_t distorted = 0;  ///< training and test views whose lens is no pinhole
   std::size_t folding = 0;    ///< of these, lenses that are not one to one over the image
+  std::size_t panoramas = 0;  ///< of these, images of the whole sphere, which no lens makes
   double transparent = 0;     ///< share of the training images' pixels that are not opaque
   std::size_t masked = 0;     ///< training views with a mask
   bool clear_border = false;  ///< the images' borders are transparent
@@ -56,6 +57,10 @@ chosen<std::string> choose_backward(capture_traits const& traits);
 /// (exposure/exposure.hpp), and the scene is unbounded (docs/exposure.md says what captures give).
 chosen<bool> choose_exposure(capture_traits const& traits);
 
+/// The falloff of lenses is learned where photographs fill their images (exposure/vignetting.hpp): an object before a
+/// plain background says nothing of the corners, and images of the whole sphere have none.
+chosen<bool> choose_vignetting(capture_traits const& traits);
+
 /// The gain that a band of spherical harmonics has to buy to be stored, in dB; 0: nothing is measured. Shorter runs
 /// than measured_from would end with a lower score for the views that are held out of their first half (docs/auto.md).
 inline constexpr int measured_from = 5000;
@@ -82,7 +87,7 @@ chosen<starting_points> choose_start(dataset const& data, train_options const& o
 chosen<index_t> choose_budget(dataset const& data, train_options const& options);
 
 /// All of these, as `gart train` takes them: what `request` leaves to gart's choice, and in the options background,
-/// exposure and sh_gain, in place of what they say. A choice that is to be another is set afterwards.
+/// exposure, vignetting and sh_gain, in place of what they say. A choice that is to be another is set afterwards.
 struct recommendation {
   configuration_request request;  ///< the configuration
   train_options options;          ///< with the choices in them

@@ -34,7 +34,7 @@ struct scores {
   double own_psnr = std::numeric_limits<double>::quiet_NaN();       ///< in dB
   double captured_psnr = std::numeric_limits<double>::quiet_NaN();  ///< in dB
   bool placed = false;            ///< whether views were scored at other poses than the capture's
-  bool exposed = false;           ///< whether views were scored with exposures
+  bool exposed = false;           ///< whether views were scored with exposures or through lenses
   std::vector<view_score> views;  ///< each of them, in order
 };
 

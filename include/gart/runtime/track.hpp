@@ -18,7 +18,7 @@
 /// Cost of a step: two forward passes, a backward pass and a few passes over the image on the host. Errors:
 /// invalid_argument for a photograph, mask or camera of another size; what the renderer throws.
 
-#include <gart/exposure/exposure.hpp>
+#include <gart/exposure/photo_response.hpp>
 #include <gart/runtime/renderer.hpp>
 #include <gart/scene/image.hpp>
 
@@ -28,10 +28,10 @@ namespace gart {
 
 /// How a photograph is tracked.
 struct track_options {
-  render_options render = {};  ///< what the model is rendered with, background included
-  int steps = 60;              ///< images at most
-  float blur = 0.05f;          ///< standard deviation of the first blur over the image's width; 0: none
-  exposure exposed = {};       ///< of the photograph
+  render_options render = {};    ///< what the model is rendered with, background included
+  int steps = 60;                ///< images at most
+  float blur = 0.05f;            ///< standard deviation of the first blur over the image's width; 0: none
+  photo_response response = {};  ///< what the photograph shows of the scene's colours
 };
 
 /// What was found.

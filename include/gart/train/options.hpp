@@ -54,6 +54,7 @@ struct train_options {
   /// looked at. The dataset must have maps (dataset_options.depth).
   float depth_weight = 0;
   bool exposure = false;      ///< learn an exposure of each training view (exposure/exposure.hpp)
+  bool vignetting = false;    ///< learn the falloff of each lens (exposure/vignetting.hpp)
   bool refine_poses = false;  ///< learn the pose of each training view (pose/pose_training.hpp)
   bool refine_lens = false;   ///< learn the focal length and centre of each camera (lens/lens_training.hpp)
   /// Bytes of the LT buffer above which a step is done with less; 0: half of what is free when the trainer is made,

@@ -4,6 +4,7 @@
 /// trainer_ranks_impl.hpp has the step. With self_comm there is nothing of it.
 
 #include <gart/exposure/exposure.hpp>
+#include <gart/exposure/vignetting.hpp>
 #include <gart/lens/differentiate_lens.hpp>
 #include <gart/pose/differentiate_pose.hpp>
 #include <gart/shard/row_exchange.hpp>
@@ -27,6 +28,7 @@ struct image_result {
   std::size_t view = 0;                    ///< of the training views
   float loss = 0, mean_square = 0;         ///< of the whole image
   float by_exposure[exposure::floats]{};   ///< the loss by the view's exposure, where that is learned
+  float by_falloff[vignetting::floats]{};  ///< the loss by its lens's falloff, where that is learned
   std::array<double, 36> metric{};         ///< of its pose (pose/pose_metric.hpp), where that was asked for
   pose_gradient by_pose;                   ///< the loss by it, where that is learned
   float by_lens[lens_gradient::floats]{};  ///< the loss by the lens, where that is learned
@@ -54,7 +56,8 @@ struct shards {
   gaussians<E> view_gradients,            ///< of this rank's rows, by one view of a batch
       unit_gradients;                     ///< what this rank has summed of its unit: .sh, and of a whole view all
   buffer<float, E> moments;               ///< of this rank's rows, by one view
-  span<float const> by_exposure;          ///< what its exposure makes of the loss of the image that was traced last
+  span<float const> by_exposure,          ///< what its exposure makes of the loss of the image that was traced last,
+      by_falloff;                         ///< and its lens's falloff
   bool loss_by_strips = false;            ///< each rank has differentiated that of its own
   u64 sent = 0;                           ///< bytes to other ranks since the run began
   std::optional<arrived_colors> arrived;  ///< of the last step, where Adam took them as they came

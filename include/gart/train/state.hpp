@@ -6,6 +6,7 @@
 /// Errors: read_checkpoint throws io_error naming the file and the array that is missing, truncated or of another size.
 
 #include <gart/exposure/exposure.hpp>
+#include <gart/exposure/vignetting.hpp>
 #include <gart/lens/lens_state.hpp>
 #include <gart/pose/pose.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -48,6 +49,7 @@ struct training_state {
   std::vector<float> gradient_sum;  ///< adaptive density's statistic since it last densified: [N], or empty
   std::vector<u32> touched;         ///< how many gradients each Gaussian had since it last densified: [N], or empty
   exposure_state exposures;         ///< learned, or empty
+  vignetting_state vignetting;      ///< learned, or empty
   pose_state poses;                 ///< learned, or empty
   lens_state lenses;                ///< learned, or empty
   std::vector<band_trial> trials;   ///< that are over

@@ -23,6 +23,7 @@
 #include <gart/comm/self_comm.hpp>
 #include <gart/exposure/exposure_field.hpp>
 #include <gart/exposure/exposure_training.hpp>
+#include <gart/exposure/vignetting_training.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/ply.hpp>
 #include <gart/io/splat_file.hpp>
@@ -134,7 +135,8 @@ class basic_trainer {
   training_state read_part(std::filesystem::path const& path) const;
   training_state whole_of(training_state const& mine) const;
   ///@}
-  exposure_field exposures() const;  ///< of the views that were trained on; empty where none are learned
+  /// Of the views that were trained on and their lenses; empty where none are learned.
+  exposure_field exposures() const;
   /// The cameras of the training views, where poses or lenses are learned; else empty.
   std::vector<named_camera> poses() const;
   /// A camera of the capture, at whatever pose, with its lens as it is learned.
@@ -160,6 +162,12 @@ class basic_trainer {
   void evaluate(loss_function<E> const* loss, loss_input<E> const& in);
   template <class Rows>
   void optimize(learning_rates const& rates, int degree, Rows&& rows);
+  // The step's image as the view's photograph would show it, and before its exposure.
+  span<float const> photographed(std::size_t view) {
+    if (vignetting_) vignetting_->shade(view, color_);
+    return exposures_ ? exposures_->expose(view, through_lens()) : through_lens();
+  }
+  span<float const> through_lens() const { return vignetting_ ? vignetting_->shaded() : span<float const>(color_); }
   learning_rates rates_of_step() const;
   void make_room();
 
@@ -259,9 +267,10 @@ class basic_trainer {
   adaptive_density<E> adc_;
   buffer<float, E> color_, color_gradient_, value_;
   std::conditional_t<has_depth<Strategy>, depth_supervision<E>, no_depth_supervision> supervision_;
-  std::optional<exposure_training<E>> exposures_;  // where options.exposure asks for them
-  buffer<float, E> depth_, transmittance_;         // of the step's image, where a pose asks for them
-  std::optional<pose_training> poses_;             // where options.refine_poses asks for them
+  std::optional<exposure_training<E>> exposures_;     // where options.exposure asks for them
+  std::optional<vignetting_training<E>> vignetting_;  // and options.vignetting
+  buffer<float, E> depth_, transmittance_;            // of the step's image, where a pose asks for them
+  std::optional<pose_training> poses_;                // where options.refine_poses asks for them
   pose_differentiation<E> by_pose_;
   std::optional<lens_training> lenses_;  // where options.refine_lens asks for them
   lens_differentiation<E> by_lens_;

@@ -65,6 +65,11 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
   if (options.lt_budget == 0 && !Strategy::ordered)
     options_.lt_budget = exec.free_bytes() / 2 / static_cast<u64>(comm_.sharers());
   if (options.exposure) exposures_.emplace(exec, data.train.size());
+  if (options.vignetting) {
+    std::vector<named_camera> captured;
+    for (dataset_view const& view : data.train) captured.push_back({view.name, view.view});
+    vignetting_.emplace(exec, captured);
+  }
   if (options.refine_poses) {
     std::vector<camera> captured;
     for (dataset_view const& view : data.train) captured.push_back(view.view);
@@ -175,14 +180,15 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
   pass.render(frame_, targets);
   {
     stage_scope stage(exec_, "loss");
-    span<float const> const image = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
+    span<float const> const image = photographed(index);
     truth_view const truth = images_.get(exec_, index, frame_.options().background);
     depth_pixels depth;
     if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth), depth = supervision_.pixels();
     evaluate(loss, {exec_, view, truth, view.view.width, view.view.height, image, color_gradient_,
                     value_.view().subspan(0, 2), depth});
     if (grows_by_error()) error_map(exec_, image, truth, error_map_);
-    if (exposures_) exposures_->step(index, color_, color_gradient_, rates.exposure);
+    if (exposures_) exposures_->step(index, through_lens(), color_gradient_, rates.exposure);
+    if (vignetting_) vignetting_->step(index, color_, color_gradient_, rates.vignetting);
   }
   image_gradients image{color_gradient_};
   depth_and_transmittance more;
@@ -267,7 +273,15 @@ exposure_field basic_trainer<E, Traits, Tracer, Strategy, Comm>::exposures() con
     std::copy_n(learned.value.data() + i * exposure::floats, exposure::floats, e.value.m);
     views.push_back(std::move(e));
   }
-  return exposure_field(std::move(views));
+  std::vector<lens_falloff> lenses;
+  vignetting_state const falloffs = vignetting_ ? vignetting_->state() : vignetting_state{};
+  for (std::size_t i = 0; i < falloffs.visits.size(); ++i) {
+    if (falloffs.visits[i] == 0) continue;
+    vignetting v;
+    std::copy_n(falloffs.value.data() + i * vignetting::floats, vignetting::floats, v.k);
+    lenses.emplace_back(vignetting_->lenses()[i], v);
+  }
+  return exposure_field(std::move(views), std::move(lenses));
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -284,6 +298,7 @@ training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::part() const {
   s.scene = scene_.to_host(), s.first = state_.first.to_host(), s.second = state_.second.to_host();
   s.step = step_, s.growth = growth_, s.seed = options_.seed;
   if (exposures_) s.exposures = exposures_->state();
+  if (vignetting_) s.vignetting = vignetting_->state();
   if (poses_) s.poses = poses_->state();
   if (lenses_) s.lenses = lenses_->state();
   s.error_sum = error_.error_sum.to_host();
@@ -365,6 +380,11 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_part(training_state c
     if (s.exposures.visits.size() != data_.train.size())
       throw invalid_argument("trainer: the state has exposures of another number of training views");
     exposures_->set_state(s.exposures);
+  }
+  if (vignetting_) {
+    if (s.vignetting.visits.size() != vignetting_->lenses().size())
+      throw invalid_argument("trainer: the state has falloffs of another number of lenses");
+    vignetting_->set_state(s.vignetting);
   }
   if (poses_) {
     if (s.poses.visits.size() != data_.train.size())

@@ -87,6 +87,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
   for (int k = 0; k < batch; ++k) {
     image_result const& image = images[static_cast<std::size_t>(k)];
     if (exposures_) exposures_->move(image.view, {image.by_exposure, exposure::floats}, rates.exposure);
+    if (vignetting_) vignetting_->move_lens_of(image.view, {image.by_falloff, vignetting::floats}, rates.vignetting);
     if (moves) poses_->step(image.view, image.by_pose, before + k, options_.iterations);
     if (bends) lenses_->step(image.view, lens_gradient(image.by_lens), before + k, options_.iterations);
   }
@@ -130,20 +131,21 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   }
   auto const share = [&](float* plane) { shards_.round.share_image(plane, seen, sizeof(float)); };
   span<float> const by_lens = value_.view().subspan(2 + pose_gradient::floats, lens_gradient::floats);
-  shards_.loss_by_strips = !loss && !exposures_ && !targets.depth && !bends;
+  shards_.loss_by_strips = !loss && !exposures_ && !vignetting_ && !targets.depth && !bends;
   auto const by_image = [&] {
     stage_scope stage(exec_, "loss");
     if (shards_.loss_by_strips) return differentiate_strip(seen, images_.get(exec_, index, background));
     shards_.round.share_image(color_.data(), seen, 3 * sizeof(float));
     if (targets.depth) share(targets.depth), share(targets.transmittance);
-    span<float const> const shown = exposures_ ? exposures_->expose(index, color_) : span<float const>(color_);
+    span<float const> const shown = photographed(index);
     truth_view const truth = images_.get(exec_, index, background);
     depth_pixels depth;
     if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth), depth = supervision_.pixels();
     evaluate(loss,
              {exec_, view, truth, seen.width, seen.height, shown, color_gradient_, value_.view().subspan(0, 2), depth});
     if (grows_by_error()) error_map(exec_, shown, truth, error_map_);
-    if (exposures_) shards_.by_exposure = exposures_->differentiate(index, color_, color_gradient_);
+    if (exposures_) shards_.by_exposure = exposures_->differentiate(index, through_lens(), color_gradient_);
+    if (vignetting_) shards_.by_falloff = vignetting_->differentiate(index, color_, color_gradient_);
   };
   if (unit.empty()) {
     shards_.round.finish_fetch();
@@ -199,6 +201,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_result(image_result&
   exec_.copy_out(values, value_.data(), sizeof values);
   result.loss = values[0], result.mean_square = values[1];
   if (exposures_) exec_.copy_out(result.by_exposure, shards_.by_exposure.data(), sizeof result.by_exposure);
+  if (vignetting_) exec_.copy_out(result.by_falloff, shards_.by_falloff.data(), sizeof result.by_falloff);
   if (lens) exec_.copy_out(result.by_lens, value_.data() + 2 + pose_gradient::floats, sizeof result.by_lens);
   bool const measures = metric && poses_->wants_metric(result.view);
   if constexpr (has_depth<Strategy>) {

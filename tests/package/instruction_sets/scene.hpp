@@ -56,7 +56,7 @@ gart::train_options some_options(int degree) {
   o.iterations = 4;
   o.max_gaussians = 160;
   o.sh_every = 1;
-  o.exposure = o.check_finite = true;
+  o.exposure = o.vignetting = o.check_finite = true;
   o.mcmc.from = 1, o.mcmc.every = 1;
   return o;
 }

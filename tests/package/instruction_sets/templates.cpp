@@ -56,10 +56,12 @@ void use_templates() {
     directions.insert(directions.end(), {d.x, d.y, d.z});
   }
   tell("template/ray_direction", directions);
-  gart::exposure exposure;
-  for (int k = 0; k < gart::exposure::floats; ++k) exposure.m[k] += 0.013f * static_cast<float>(k);
+  gart::photo_response response;
+  for (int k = 0; k < gart::exposure::floats; ++k) response.exposed.m[k] += 0.013f * static_cast<float>(k);
+  for (int k = 0; k < gart::vignetting::floats; ++k) response.falloff.k[k] = -0.02f * static_cast<float>(k + 1);
+  response.circle = gart::image_circle(view);
   gart::image_float image(8, 8, 3);
   for (std::size_t k = 0; k < image.data.size(); ++k) image.data[k] = 0.0051f * static_cast<float>(k);
-  apply(exposure, image);
-  tell("template/exposure", image.data);
+  apply(response, image);
+  tell("template/photo_response", image.data);
 }

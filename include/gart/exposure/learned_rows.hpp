@@ -1,0 +1,109 @@
+#pragma once
+/// \file
+/// Rows of a few numbers that say how colours become those of a photograph, one row of which a step moves by Adam: the
+/// exposures of views, the falloffs of lenses. What an image says of a row is a sum over its pixels.
+///
+/// Buffers: 3 Floats + 1 words a row, and a few sums. Cost: a pass over the image and three launches over a few numbers
+/// a step; no host read. The order of all sums depends on the image's size only. A number whose gradient is not finite
+/// stays as it is.
+
+#include <gart/algorithm/segmented_reduce.hpp>
+#include <gart/exec/buffer.hpp>
+#include <gart/math/arith.hpp>
+#include <gart/optim/adam.hpp>
+
+#include <vector>
+
+namespace gart::inline GART_ISA {
+
+namespace detail {
+
+struct row_adam_kernel {
+  float const* gradient;
+  float* value;
+  float* first;
+  float* second;
+  adam_rule rule;
+  float rate;
+
+  GART_KERNEL void operator()(index_t k) const {
+    auto const to = rule.moved<float>({value[k], first[k], second[k]}, gradient[k], rate);
+    if (!is_finite(to.second) || !is_finite(to.parameter)) return;
+    value[k] = to.parameter, first[k] = to.first, second[k] = to.second;
+  }
+};
+
+}  // namespace detail
+
+/// Rows of so many floats, and Adam's moments of them. State: a struct of value, first, second and visits.
+template <execution E, int Floats, class State>
+class learned_rows {
+ public:
+  /// [rows][Floats] to begin with.
+  learned_rows(E& exec, std::vector<float> start)
+      : exec_(&exec),
+        value_(exec, start),
+        first_(exec, std::vector<float>(start.size())),
+        second_(exec, std::vector<float>(start.size())),
+        visits_(start.size() / Floats),
+        sums_(exec),
+        gradient_(exec, Floats),
+        ends_(exec, std::vector<u32>(runs + 1)) {
+    std::vector<u32> ends(runs + 1);
+    for (u32 r = 0; r <= runs; ++r) ends[r] = r * runs;
+    ends_.assign(ends);
+  }
+
+  /// A row.
+  float* at(std::size_t row) { return value_.data() + row * Floats; }
+
+  /// Sums up what an image says of a row: lane i of kernel.lanes writes its part to kernel.sums[Floats * i]. The sum
+  /// stays until the next call.
+  template <class Kernel>
+  span<float const> sum(char const* label, Kernel kernel) {
+    constexpr index_t lanes = runs * runs;
+    sums_.resize(std::size_t{lanes + runs} * Floats);
+    auto const by_lane = sums_.view().subspan(0, std::size_t{lanes} * Floats);
+    auto const by_run = sums_.view().subspan(by_lane.size(), std::size_t{runs} * Floats);
+    kernel.lanes = lanes, kernel.sums = by_lane.data();
+    parallel_for(*exec_, label, lanes, kernel);
+    span<u32 const> const ends = ends_;
+    segmented_reduce(*exec_, by_lane, Floats, ends, by_run);
+    segmented_reduce(*exec_, by_run, Floats, ends.subspan(0, 2), gradient_.view());
+    return gradient_;
+  }
+
+  /// Adam's step of a row, by the last sum.
+  void move(std::size_t row, float rate) {
+    std::size_t const from = row * Floats;
+    int const visit = static_cast<int>(++visits_[row]);
+    adam_options const adam;
+    parallel_for(*exec_, "row_adam", Floats,
+                 detail::row_adam_kernel{gradient_.data(), value_.data() + from, first_.data() + from,
+                                         second_.data() + from, adam_rule(adam, visit),
+                                         static_cast<float>(rate * adam_rule::first_correction(adam, visit))});
+  }
+  /// By the sum that another rank has found, [Floats], in host memory.
+  void move(std::size_t row, span<float const> gradient, float rate) {
+    gradient_.assign(std::vector<float>(gradient.begin(), gradient.end()));
+    move(row, rate);
+  }
+
+  /// For a checkpoint.
+  State state() const { return {value_.to_host(), first_.to_host(), second_.to_host(), visits_}; }
+  /// From a checkpoint.
+  void set_state(State const& s) {
+    value_.assign(s.value), first_.assign(s.first), second_.assign(s.second), visits_ = s.visits;
+  }
+
+ private:
+  static constexpr index_t runs = E::device ? 128 : 8;  // of as many lanes: two short sums, not a long one
+
+  E* exec_;
+  buffer<float, E> value_, first_, second_;
+  std::vector<u32> visits_;
+  buffer<float, E> sums_, gradient_;
+  buffer<u32, E> ends_;
+};
+
+}  // namespace gart::inline GART_ISA

@@ -1,0 +1,61 @@
+#pragma once
+/// \file
+/// The falloff of a lens: towards the corners of its images the same light makes a darker pixel. Each channel is
+/// multiplied by
+///   V(u) = 1 + k0 u + k1 u^2 + k2 u^3,   u = (the distance from the principal point over half of the diagonal)^2,
+/// the same for all photographs of a lens. A scene has no such falloff: Gaussians see the same surface in the middle of
+/// one photograph and in the corner of another, and can only learn the difference as veils.
+
+#include <gart/core/macros.hpp>
+#include <gart/core/types.hpp>
+#include <gart/math/arith.hpp>
+#include <gart/scene/camera.hpp>
+
+#include <cmath>
+#include <vector>
+
+namespace gart {
+
+/// The falloff of a lens; none where all is zero.
+struct vignetting {
+  static constexpr int powers = 3, floats = 3 * powers;  ///< numbers of a channel, and of a falloff
+  float k[floats] = {};                                  ///< [3][3]: of a channel those of u, u^2 and u^3
+
+  /// V(u) of a channel.
+  GART_HD GART_INLINE float gain(int channel, float u) const {
+    float const* const c = k + powers * channel;
+    return fma(u, fma(u, fma(u, c[2], c[1]), c[0]), 1.0f);
+  }
+};
+
+/// What of a camera a falloff depends on: where the light falls on its image.
+struct image_circle {
+  float cx = 0, cy = 0;  ///< principal point, pixels
+  float scale = 0;       ///< of squared distances; 0: u is 0 everywhere
+
+  image_circle() = default;
+  /// Of a camera with a principal point.
+  explicit image_circle(camera const& c)
+      : cx(c.cx), cy(c.cy), scale(static_cast<float>(4.0 / (1.0 * c.width * c.width + 1.0 * c.height * c.height))) {}
+
+  /// u at the middle of pixel (x, y).
+  GART_HD GART_INLINE float square(float x, float y) const {
+    float const dx = x + 0.5f - cx, dy = y + 0.5f - cy;
+    return fma(dx, dx, dy * dy) * scale;
+  }
+};
+
+/// Whether two views are taken to be through one lens: of the same model and size, and focal lengths that differ by a
+/// tenth at most. A lens that was calibrated for each photograph anew has another focal length in each.
+inline bool one_lens(camera const& a, camera const& b) {
+  auto const near = [](float x, float y) { return !(std::fabs(x - y) > 0.1f * std::fabs(x)); };
+  return a.kind == b.kind && a.width == b.width && a.height == b.height && near(a.fx, b.fx) && near(a.fy, b.fy);
+}
+
+/// The falloffs of a capture's lenses and Adam's moments of them, as a checkpoint holds them.
+struct vignetting_state {
+  std::vector<float> value, first, second;  ///< [lenses][9]; empty: none are learned
+  std::vector<u32> visits;                  ///< [lenses] steps taken
+};
+
+}  // namespace gart
