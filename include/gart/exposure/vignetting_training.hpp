@@ -123,7 +123,7 @@ class vignetting_training : public learned_rows<E, vignetting::floats, vignettin
     for (named_camera const& v : views) {
       if (v.view.kind == camera_kind::equirectangular)
         throw invalid_argument("train_options.vignetting: view " + v.name +
-                               " has no principal point that a falloff could go by (equirectangular)");
+                               " has no principal point that a falloff could go by (equirectangular); set it to false");
       if (place_of(v.view, lenses) == lenses.size()) lenses.push_back(v.view);
     }
     return lenses;
