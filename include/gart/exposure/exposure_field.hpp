@@ -41,7 +41,7 @@ struct lens_falloff {
 
   lens_falloff() = default;
   /// Of the lens of a view.
-  lens_falloff(camera const& view, vignetting const& falloff) : value(falloff) {
+  GART_HD GART_INLINE lens_falloff(camera const& view, vignetting const& falloff) : value(falloff) {
     vec2 const size(static_cast<float>(view.width), static_cast<float>(view.height));
     focal = vec2(view.fx, view.fy) / size, center = vec2(view.cx, view.cy) / size;
   }

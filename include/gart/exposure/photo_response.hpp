@@ -16,7 +16,7 @@ struct photo_response {
   image_circle circle;  ///< on its image
 
   /// V of a channel at a pixel.
-  float gain(int channel, int x, int y) const {
+  GART_HD GART_INLINE float gain(int channel, int x, int y) const {
     return falloff.gain(channel, circle.square(static_cast<float>(x), static_cast<float>(y)));
   }
 };

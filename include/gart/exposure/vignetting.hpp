@@ -35,7 +35,7 @@ struct image_circle {
 
   image_circle() = default;
   /// Of a camera with a principal point.
-  explicit image_circle(camera const& c)
+  GART_HD GART_INLINE explicit image_circle(camera const& c)
       : cx(c.cx), cy(c.cy), scale(static_cast<float>(4.0 / (1.0 * c.width * c.width + 1.0 * c.height * c.height))) {}
 
   /// u at the middle of pixel (x, y).
@@ -45,13 +45,6 @@ struct image_circle {
   }
 };
 
-/// Whether two views are taken to be through one lens: of the same model and size, and focal lengths that differ by a
-/// tenth at most. A lens that was calibrated for each photograph anew has another focal length in each.
-inline bool one_lens(camera const& a, camera const& b) {
-  auto const near = [](float x, float y) { return !(std::fabs(x - y) > 0.1f * std::fabs(x)); };
-  return a.kind == b.kind && a.width == b.width && a.height == b.height && near(a.fx, b.fx) && near(a.fy, b.fy);
-}
-
 /// The falloffs of a capture's lenses and Adam's moments of them, as a checkpoint holds them.
 struct vignetting_state {
   std::vector<float> value, first, second;  ///< [lenses][9]; empty: none are learned
@@ -59,3 +52,14 @@ struct vignetting_state {
 };
 
 }  // namespace gart
+
+namespace gart::inline GART_ISA {
+
+/// Whether two views are taken to be through one lens: of the same model and size, and focal lengths that differ by a
+/// tenth at most. A lens that was calibrated for each photograph anew has another focal length in each.
+inline bool one_lens(camera const& a, camera const& b) {
+  auto const near = [](float x, float y) { return !(std::fabs(x - y) > 0.1f * std::fabs(x)); };
+  return a.kind == b.kind && a.width == b.width && a.height == b.height && near(a.fx, b.fx) && near(a.fy, b.fy);
+}
+
+}  // namespace gart::inline GART_ISA
