@@ -200,3 +200,43 @@ TEST_CASE_TEMPLATE("a state carries falloffs, and one of another number of lense
   CHECK_THROWS_WITH_AS(gart::vignetting_training<E>(exec, views), doctest::Contains("view 2 has no principal point"),
                        gart::invalid_argument);
 }
+
+TEST_CASE_TEMPLATE("an exposure is of what the lens let through, and the falloff of the scene's own colours", E,
+                   GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  auto const data = capture(exec, seed);
+  auto options = learning_falloffs(40);
+  options.exposure = true;
+  run_of<E> run(exec, options, data, cloud(seed + 1, 0.6f));
+  auto state = run.state();
+  for (int c = 0; c < 3; ++c) state.vignetting.value[static_cast<std::size_t>(3 * c)] = -0.5f - 0.1f * c;
+  auto const falloff = state.vignetting.value;
+  run.set_state(state);
+  std::vector<float> shown;
+  run.step([&](gart::loss_input<E> const& in) {
+    shown.resize(in.image.size());
+    in.exec.copy_out(shown.data(), in.image.data(), shown.size() * sizeof(float));
+    std::vector<float> const ones(shown.size(), 1.0f);
+    in.exec.copy_in(in.gradient.data(), ones.data(), ones.size() * sizeof(float));
+    in.exec.copy_in(in.value.data(), ones.data(), 2 * sizeof(float));
+  });
+  // Where all gradients are 1 the exposure's are sums of the image, and the falloff's of the image before the lens.
+  double by_exposure[3] = {}, by_falloff[9] = {};
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    std::size_t const c = i % 3;
+    double const u = square_in_double(data.train[0].view, i / 3);
+    double power = static_cast<double>(shown[i]) / gain_in_double(falloff.data() + 3 * c, u);
+    by_exposure[c] += static_cast<double>(shown[i]);
+    for (std::size_t j = 3 * c; j < 3 * c + 3; ++j) power *= u, by_falloff[j] += power;
+  }
+  state = run.state();
+  std::size_t view = 0;
+  while (state.exposures.visits[view] == 0) ++view;
+  for (std::size_t c = 0; c < 3; ++c)
+    for (std::size_t k = 0; k < 3; ++k)
+      CHECK(10 * state.exposures.first[12 * view + 4 * c + k] == doctest::Approx(by_exposure[k]).epsilon(1e-4));
+  for (std::size_t j = 0; j < 9; ++j)
+    CHECK(10 * state.vignetting.first[j] == doctest::Approx(by_falloff[j]).epsilon(1e-4));
+}
