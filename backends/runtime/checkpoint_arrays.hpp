@@ -29,22 +29,15 @@ void for_each_state_array(training_state const& state, F const& f) {
   f("error_growth/error_sum", state.error_sum, 1);
   f("adc/gradient_sum", state.gradient_sum, 1), f("adc/touched", state.touched, 1);
   f("sh_trials", state.trials, 0);
-  if (exposure_state const& e = state.exposures; !e.value.empty()) {
-    f("exposure", e.value, 0), f("exposure/first", e.first, 0), f("exposure/second", e.second, 0);
-    f("exposure/visits", e.visits, 0);
-  }
-  if (vignetting_state const& v = state.vignetting; !v.value.empty()) {
-    f("vignetting", v.value, 0), f("vignetting/first", v.first, 0), f("vignetting/second", v.second, 0);
-    f("vignetting/visits", v.visits, 0);
-  }
-  if (pose_state const& p = state.poses; !p.value.empty()) {
-    f("pose", p.value, 0), f("pose/first", p.first, 0), f("pose/second", p.second, 0);
-    f("pose/metric", p.metric, 0), f("pose/visits", p.visits, 0);
-  }
-  if (lens_state const& l = state.lenses; !l.value.empty()) {
-    f("lens", l.value, 0), f("lens/first", l.first, 0), f("lens/second", l.second, 0);
-    f("lens/visits", l.visits, 0);
-  }
+  // Rows with Adam's moments, where any are learned.
+  auto const learned = [&](std::string const& name, auto const& rows) {
+    if (rows.value.empty()) return;
+    f(name, rows.value, 0), f(name + "/first", rows.first, 0), f(name + "/second", rows.second, 0);
+    if constexpr (requires { rows.metric; }) f(name + "/metric", rows.metric, 0);
+    f(name + "/visits", rows.visits, 0);
+  };
+  learned("exposure", state.exposures), learned("vignetting", state.vignetting);
+  learned("pose", state.poses), learned("lens", state.lenses);
 }
 
 // Of a reader with the members get, has and fail (runtime/checkpoint.hpp).
@@ -75,40 +68,21 @@ training_state state_of(Reader const& in) {
   if (in.has("error_growth/error_sum")) s.error_sum = in.template get<float>("error_growth/error_sum");
   s.gradient_sum = in.template get<float>("adc/gradient_sum"), s.touched = in.template get<u32>("adc/touched");
   if (s.gradient_sum.size() != s.touched.size()) in.fail("its arrays adc/* differ in length");
-  if (in.has("exposure")) {
-    exposure_state& e = s.exposures;
-    e.value = in.template get<float>("exposure"), e.visits = in.template get<u32>("exposure/visits");
-    e.first = in.template get<float>("exposure/first"), e.second = in.template get<float>("exposure/second");
-    std::size_t const floats = exposure::floats * e.visits.size();
-    if (e.value.size() != floats || e.first.size() != floats || e.second.size() != floats)
-      in.fail("its arrays exposure* differ in length");
-  }
-  if (in.has("vignetting")) {
-    vignetting_state& v = s.vignetting;
-    v.value = in.template get<float>("vignetting"), v.visits = in.template get<u32>("vignetting/visits");
-    v.first = in.template get<float>("vignetting/first"), v.second = in.template get<float>("vignetting/second");
-    std::size_t const floats = vignetting::floats * v.visits.size();
-    if (v.value.size() != floats || v.first.size() != floats || v.second.size() != floats)
-      in.fail("its arrays vignetting* differ in length");
-  }
-  if (in.has("pose")) {
-    pose_state& p = s.poses;
-    p.value = in.template get<double>("pose"), p.visits = in.template get<u32>("pose/visits");
-    p.metric = in.template get<double>("pose/metric");
-    p.first = in.template get<double>("pose/first"), p.second = in.template get<double>("pose/second");
-    std::size_t const numbers = std::tuple_size_v<pose_numbers> * p.visits.size();
-    if (p.value.size() != numbers || p.first.size() != numbers || p.second.size() != numbers ||
-        p.metric.size() != std::tuple_size_v<pose_numbers> * numbers)
-      in.fail("its arrays pose* differ in length");
-  }
-  if (in.has("lens")) {
-    lens_state& l = s.lenses;
-    l.value = in.template get<double>("lens"), l.visits = in.template get<u32>("lens/visits");
-    l.first = in.template get<double>("lens/first"), l.second = in.template get<double>("lens/second");
-    std::size_t const numbers = std::tuple_size_v<lens_numbers> * l.visits.size();
-    if (l.value.size() != numbers || l.first.size() != numbers || l.second.size() != numbers)
-      in.fail("its arrays lens* differ in length");
-  }
+  auto const learned = [&]<class Rows>(std::string const& name, std::size_t width, Rows& rows) {
+    if (!in.has(name)) return;
+    using number = typename decltype(rows.value)::value_type;
+    rows.value = in.template get<number>(name), rows.visits = in.template get<u32>(name + "/visits");
+    rows.first = in.template get<number>(name + "/first"), rows.second = in.template get<number>(name + "/second");
+    std::size_t const numbers = width * rows.visits.size();
+    bool agree = rows.value.size() == numbers && rows.first.size() == numbers && rows.second.size() == numbers;
+    if constexpr (requires { rows.metric; }) {
+      rows.metric = in.template get<number>(name + "/metric");
+      agree = agree && rows.metric.size() == width * numbers;
+    }
+    if (!agree) in.fail("its arrays " + name + "* differ in length");
+  };
+  learned("exposure", exposure::floats, s.exposures), learned("vignetting", vignetting::floats, s.vignetting);
+  learned("pose", std::tuple_size_v<pose_numbers>, s.poses), learned("lens", std::tuple_size_v<lens_numbers>, s.lenses);
   if (in.has("sh_trials")) s.trials = in.template get<band_trial>("sh_trials");
   for (band_trial const& t : s.trials)
     if (t.band < 1 || t.band > 3) in.fail("is damaged: a trial of SH band " + std::to_string(t.band));

@@ -9,13 +9,6 @@ using namespace gart_test;
 
 namespace {
 
-std::vector<float> values(std::mt19937_64& random, std::size_t n) {
-  std::normal_distribution<float> normal;
-  std::vector<float> out(n);
-  for (float& x : out) x = normal(random);
-  return out;
-}
-
 gart::exposure_state some_state(std::mt19937_64& random, std::size_t views) {
   std::size_t const n = views * gart::exposure::floats;
   return {values(random, n), std::vector<float>(n), std::vector<float>(n), std::vector<gart::u32>(views)};

@@ -108,6 +108,9 @@ TEST_CASE("a view has the falloff of the lens that is most like its own, whateve
       }
     }
   }
+  gart::camera sphere = camera_at(5, 0, 0);
+  sphere.kind = gart::camera_kind::equirectangular;
+  CHECK(field.at(sphere).gain(0, 3, 2) == 1);
   // Without lenses there is none, without views colours stay but for it.
   gart::image_float plain(4, 3, 3, 0.6f), shaded = plain;
   apply(gart::exposure_field().at(camera_at(0, 0, 0)), plain);

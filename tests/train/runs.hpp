@@ -12,6 +12,14 @@ namespace gart_test {
 template <class E, class Strategy = gart::primitive_strategy>
 using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy>;
 
+// Numbers of either sign.
+inline std::vector<float> values(std::mt19937_64& random, std::size_t n) {
+  std::normal_distribution<float> normal;
+  std::vector<float> out(n);
+  for (float& x : out) x = normal(random);
+  return out;
+}
+
 // The Gaussians of the capture stand still: what is learned besides them is learned alone.
 inline gart::train_options still(int iterations) {
   gart::train_options options;

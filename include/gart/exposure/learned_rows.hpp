@@ -40,7 +40,7 @@ template <execution E, int Floats, class State>
 class learned_rows {
  public:
   /// [rows][Floats] to begin with.
-  learned_rows(E& exec, std::vector<float> start)
+  learned_rows(E& exec, std::vector<float> const& start)
       : exec_(&exec),
         value_(exec, start),
         first_(exec, std::vector<float>(start.size())),
@@ -52,25 +52,6 @@ class learned_rows {
     std::vector<u32> ends(runs + 1);
     for (u32 r = 0; r <= runs; ++r) ends[r] = r * runs;
     ends_.assign(ends);
-  }
-
-  /// A row.
-  float* at(std::size_t row) { return value_.data() + row * Floats; }
-
-  /// Sums up what an image says of a row: lane i of kernel.lanes writes its part to kernel.sums[Floats * i]. The sum
-  /// stays until the next call.
-  template <class Kernel>
-  span<float const> sum(char const* label, Kernel kernel) {
-    constexpr index_t lanes = runs * runs;
-    sums_.resize(std::size_t{lanes + runs} * Floats);
-    auto const by_lane = sums_.view().subspan(0, std::size_t{lanes} * Floats);
-    auto const by_run = sums_.view().subspan(by_lane.size(), std::size_t{runs} * Floats);
-    kernel.lanes = lanes, kernel.sums = by_lane.data();
-    parallel_for(*exec_, label, lanes, kernel);
-    span<u32 const> const ends = ends_;
-    segmented_reduce(*exec_, by_lane, Floats, ends, by_run);
-    segmented_reduce(*exec_, by_run, Floats, ends.subspan(0, 2), gradient_.view());
-    return gradient_;
   }
 
   /// Adam's step of a row, by the last sum.
@@ -94,6 +75,26 @@ class learned_rows {
   /// From a checkpoint.
   void set_state(State const& s) {
     value_.assign(s.value), first_.assign(s.first), second_.assign(s.second), visits_ = s.visits;
+  }
+
+ protected:
+  /// A row.
+  float* at(std::size_t row) { return value_.data() + row * Floats; }
+
+  /// Sums up what an image says of a row: lane i of kernel.lanes writes its part to kernel.sums[Floats * i]. The sum
+  /// stays until the next call.
+  template <class Kernel>
+  span<float const> sum(char const* label, Kernel kernel) {
+    constexpr index_t lanes = runs * runs;
+    sums_.resize(std::size_t{lanes + runs} * Floats);
+    auto const by_lane = sums_.view().subspan(0, std::size_t{lanes} * Floats);
+    auto const by_run = sums_.view().subspan(by_lane.size(), std::size_t{runs} * Floats);
+    kernel.lanes = lanes, kernel.sums = by_lane.data();
+    parallel_for(*exec_, label, lanes, kernel);
+    span<u32 const> const ends = ends_;
+    segmented_reduce(*exec_, by_lane, Floats, ends, by_run);
+    segmented_reduce(*exec_, by_run, Floats, ends.subspan(0, 2), gradient_.view());
+    return gradient_;
   }
 
  private:

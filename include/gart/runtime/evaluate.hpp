@@ -21,7 +21,7 @@ struct view_score {
   double psnr = 0,           ///< in dB
       ssim = 0;              ///< at most 1
   double affine_psnr = 0;    ///< after the affine colour that fits best
-  double own_psnr = 0;       ///< without an exposure: of the scene's own colours
+  double own_psnr = 0;       ///< of the scene's own colours, without exposure and lens
   double captured_psnr = 0;  ///< at the capture's pose, where the view was placed at another
   double milliseconds = 0;   ///< of rendering, to an image in host memory
 };

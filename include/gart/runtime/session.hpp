@@ -73,7 +73,8 @@ class session {
   /// The rows of all ranks as one model file, as save_model has it.
   virtual void write_part(std::filesystem::path const& model, gaussian_model const& mine,
                           splat_traits const& traits) const = 0;
-  /// Of the training views so far; empty where none are learned. render() shows the scene's own colours.
+  /// Of the training views so far and their lenses; empty where none are learned. render() shows the scene's own
+  /// colours.
   virtual exposure_field exposures() const { return {}; }
   /// The cameras of the training views as they are learned, in order; empty where neither poses nor lenses are.
   virtual std::vector<named_camera> poses() const { return {}; }
