@@ -5,8 +5,7 @@
 /// capture's poses, translations in units of the scene's extent, stands in the loss.
 ///
 /// Where the whole capture is moved, turned and scaled with its scene every image stays as it is: no loss holds the
-/// views there. So each time all have been visited, the similarity that comes nearest to their increments is taken out
-/// of them,
+/// views there. So once an epoch the similarity that comes nearest to their increments is taken out of them,
 ///   minimise over v, o, s:  sum_i |a_i - v - o x r_i - s r_i|^2 / extent^2 + |b_i - o|^2,
 /// a_i and b_i the world's increments of position and turn, r_i the position from the mean. Positions and turns then
 /// are, in the mean, where the capture has them.
@@ -79,17 +78,15 @@ class pose_training {
     }
     move = metric.step(move);
     for (std::size_t k = 0; k < 6; ++k) state_.value[6 * i + k] -= move[k];
-    if (++since_centred_ >= visited()) since_centred_ = 0, take_out_similarity();
+    u64 visits = 0;
+    for (u32 const v : state_.visits) visits += v;
+    if (visits % state_.visits.size() == 0) take_out_similarity();
   }
 
   /// For a checkpoint.
   pose_state const& state() const { return state_; }
   /// From a checkpoint.
-  void set_state(pose_state const& s) {
-    state_ = s, since_centred_ = 0;
-    for (u32 const v : s.visits) since_centred_ += v;
-    since_centred_ %= std::max<std::size_t>(visited(), 1);
-  }
+  void set_state(pose_state const& s) { state_ = s; }
 
  private:
   int warm_up(int iterations) const {
@@ -152,7 +149,6 @@ class pose_training {
   std::vector<camera> captured_;
   double extent_;
   pose_state state_;
-  std::size_t since_centred_ = 0;
 };
 
 }  // namespace gart::inline GART_ISA
