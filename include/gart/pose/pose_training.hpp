@@ -78,7 +78,7 @@ class pose_training {
     }
     move = metric.step(move);
     for (std::size_t k = 0; k < 6; ++k) state_.value[6 * i + k] -= move[k];
-    u64 visits = 0;
+    u64 visits = 0;  // all that says when: a run that is resumed knows nothing else
     for (u32 const v : state_.visits) visits += v;
     if (visits % state_.visits.size() == 0) take_out_similarity();
   }
