@@ -34,6 +34,7 @@ std::vector<field> const& fields() {
   static std::vector<field> const all{
       named("near", [](options& o) -> float& { return o.near; }),
       named("ssim_weight", [](options& o) -> float& { return o.ssim_weight; }),
+      named("dropout", [](options& o) -> float& { return o.dropout; }),
       named("sh_every", [](options& o) -> int& { return o.sh_every; }),
       named("rates.mean", [](options& o) -> float& { return o.rates.mean; }),
       named("rates.mean_final", [](options& o) -> float& { return o.rates.mean_final; }),

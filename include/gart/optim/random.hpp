@@ -13,7 +13,7 @@
 namespace gart::inline GART_ISA {
 
 /// What a number is drawn for: draws for different purposes are independent.
-enum class random_use : u32 { relocation = 1, growth, noise, split, user = 0x10000 };
+enum class random_use : u32 { relocation = 1, growth, noise, split, dropout, user = 0x10000 };
 
 /// 128 random bits.
 struct random_words {

@@ -50,6 +50,7 @@ struct train_options {
   float initial_opacity = 0;
   float initial_scale = 0;   ///< times the distance to the neighbours; 0 as above
   float ssim_weight = 0.2f;  ///< share of D-SSIM in the loss, the rest is L1
+  float dropout = 0;         ///< share of the Gaussians that each step leaves out (optim/dropout.hpp)
   /// Of the depth's loss beside the colours', in units of the scene's extent (loss/depth_loss.hpp); 0: depth is not
   /// looked at. The dataset must have maps (dataset_options.depth).
   float depth_weight = 0;

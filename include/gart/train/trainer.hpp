@@ -32,6 +32,7 @@
 #include <gart/loss/image_loss.hpp>
 #include <gart/optim/adam.hpp>
 #include <gart/optim/adc.hpp>
+#include <gart/optim/dropout.hpp>
 #include <gart/optim/error_growth.hpp>
 #include <gart/optim/finite.hpp>
 #include <gart/optim/mcmc.hpp>
@@ -261,6 +262,7 @@ class basic_trainer {
   image_loss<E> loss_;
   training_images<E> images_;
   view_order order_;
+  dropout<E> dropout_;
   error_growth<E> error_;
   buffer<float, E> error_map_;  // of the step's image, where densification asks for it
   mcmc<E> mcmc_;

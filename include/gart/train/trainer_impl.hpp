@@ -28,6 +28,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       loss_(exec),
       images_(data),
       order_(data.train.size(), options.held_out, options.seed),
+      dropout_(exec, options.dropout, options.seed),
       error_(exec, error_options_of(options, data),
              growth_budget(options.error, options.max_gaussians, data.training_pixels()), options.iterations,
              options.seed),
@@ -96,6 +97,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::make_room() {
   u64 here = all;
   if constexpr (!Comm::alone) here = shards_.rows.owners().owned(all);
   for (gaussians<E>* each : {&scene_, &gradients_, &state_.first, &state_.second}) each->reserve(here);
+  dropout_.reserve(here);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -131,6 +133,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
   std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
   color_.resize(floats), color_gradient_.resize(floats);
 
+  auto shown = dropout_.leave_out(scene_, step_, all_rows().owners());
   frame_.prepare(std::as_const(scene_).view(), seen, render, degree);
   span<float const> moments;
   char const* used = nullptr;
@@ -144,6 +147,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
   ++step_;
   if (grows_by_error()) error_.add_errors(scene_, moments);
   if (options_.densify == densify_kind::adc) adc_.accumulate(scene_, gradients_, seen);
+  shown.end();
   optimize(rates, degree, all_rows());
 
   step_report report;

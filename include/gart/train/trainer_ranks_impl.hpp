@@ -54,6 +54,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
   std::vector<image_result> images(static_cast<std::size_t>(batch));  // of the step, in their order
   lt_bytes_ = 0, shards_.arrived.reset();
   step_report report;
+  auto shown = dropout_.leave_out(scene_, before, shards_.rows.owners());
   for (int done = 0; done < batch;) {
     int const views = std::min(batch - done, ranks);
     span<image_result> const round =
@@ -79,6 +80,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
   if (batch > 1)
     for (float* rate : {&hasty.mean, &hasty.log_scale, &hasty.quaternion, &hasty.opacity, &hasty.sh_dc, &hasty.sh_rest})
       *rate *= haste;
+  shown.end();
   optimize(hasty, degree, shards_.rows);
   // Read when all is queued: a device that waits for its host to read has nothing to do.
   std::size_t const last = static_cast<std::size_t>((batch - 1) / ranks * ranks);

@@ -1,0 +1,98 @@
+#pragma once
+/// \file
+/// Dropout of Gaussians (Srivastava et al. 2014; of Gaussians: Park, Ryu and Kim, DropGaussian, CVPR 2025). A step
+/// shows its views without a share r of the Gaussians, drawn anew each time, and those that stay are as much more
+/// opaque,
+///   o' = o / (1 - r),
+/// that opacities are in the mean what they were. A Gaussian that has one photograph by heart is then of little use:
+/// what is seen has to be shared with others, that more photographs see.
+///
+/// An o' over 0.995 is that, or o where that is more. The gradient by o' goes to the logit of o as if it were by o, and
+/// what is left out has none. Draws go by the numbers that Gaussians have in the scene, so that ranks draw as one does.
+/// Cost: 4 bytes a Gaussian, and a pass that reads and writes as much. Without a share there is nothing of it.
+
+#include <gart/comm/row_owners.hpp>
+#include <gart/core/error.hpp>
+#include <gart/exec/buffer.hpp>
+#include <gart/math/logit.hpp>
+#include <gart/optim/random.hpp>
+#include <gart/scene/gaussians.hpp>
+
+#include <string>
+#include <utility>
+
+namespace gart::inline GART_ISA {
+
+namespace detail {
+
+struct dropout_kernel {
+  static constexpr float none = -40.0f;                           // the logit of what is under any alpha_min
+  static constexpr float most = 0.995f, logit_of_most = 5.2933f;  // that a Gaussian is made more opaque up to
+  float const* opacity;
+  float* shown;
+  row_owners owners;
+  random_source random;
+  float share;
+  GART_KERNEL void operator()(index_t i) const {
+    float const o = opacity[i], raised = sigmoid(o) / (1.0f - share);
+    float const stays = raised < most ? logf(raised / (1.0f - raised)) : o > logit_of_most ? o : logit_of_most;
+    shown[i] = uniform(random.words(owners.global(i)).v[0]) < share ? none : stays;
+  }
+};
+
+}  // namespace detail
+
+/// The dropout of a run.
+template <execution E>
+class dropout {
+ public:
+  /// For a share of the Gaussians. Errors: invalid_argument for one that is not in [0, 1).
+  dropout(E& exec, float share, u64 seed) : exec_(&exec), share_(share), seed_(seed), shown_(exec) {
+    if (!(share >= 0 && share < 1))
+      throw invalid_argument("train_options.dropout is " + std::to_string(share) + ": at least 0, less than 1");
+  }
+
+  /// Makes room for so many Gaussians.
+  void reserve(u64 count) {
+    if (share_ > 0) shown_.reserve(count);
+  }
+
+  /// While it lives, the scene has the opacities that a step shows.
+  class scope {
+   public:
+    scope(scope const&) = delete;
+    scope& operator=(scope const&) = delete;
+    ~scope() { end(); }
+    /// The scene has its own again; kernels and frames that took the others in may go on with them.
+    void end() {
+      if (auto* const scene = std::exchange(scene_, nullptr)) std::swap(scene->opacity, *shown_);
+    }
+
+   private:
+    friend class dropout;
+    scope(gaussians<E>* scene, buffer<float, E>* shown) : scene_(scene), shown_(shown) {}
+    gaussians<E>* scene_;
+    buffer<float, E>* shown_;
+  };
+
+  /// Leaves out of `scene`, the rows of these owners, what step `step` is not to show, until the scope ends. The scene
+  /// keeps its count until then.
+  [[nodiscard]] scope leave_out(gaussians<E>& scene, int step, row_owners const& owners) {
+    if (share_ == 0 || scene.size() == 0) return scope(nullptr, nullptr);
+    shown_.resize(scene.size());
+    parallel_for(
+        *exec_, "dropout", scene.size(),
+        detail::dropout_kernel{
+            scene.opacity.data(), shown_.data(), owners, {seed_, static_cast<u32>(step), random_use::dropout}, share_});
+    std::swap(scene.opacity, shown_);
+    return scope(&scene, &shown_);
+  }
+
+ private:
+  E* exec_;
+  float share_;
+  u64 seed_;
+  buffer<float, E> shown_;  // outside of a scope; in one, the scene's own
+};
+
+}  // namespace gart::inline GART_ISA

@@ -1,0 +1,80 @@
+// Training with dropout of Gaussians: a step is one of the scene that it shows, and a run that was stopped goes on with
+// the same draws.
+#include "runs.hpp"
+
+#include <cstring>
+
+using namespace gart_test;
+
+namespace {
+
+template <class E>
+using run = run_of<E, gart::deterministic_strategy>;
+
+gart::train_options options_with(float dropout, gart::densify_kind densify = gart::densify_kind::none) {
+  gart::train_options options;
+  options.iterations = 80, options.max_gaussians = 230, options.densify = densify, options.dropout = dropout;
+  options.error.from = 10, options.error.every = 10;
+  return options;
+}
+
+bool same(gart::gaussian_model const& a, gart::gaussian_model const& b) {
+  bool equal = a.size() == b.size();
+  gart::for_each_array([&](auto const&, auto const& x, auto const& y) { equal = equal && x == y; }, a, b);
+  return equal;
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("a step's gradients are those of the scene that it shows, and the scene keeps what is left out", E,
+                   GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  auto const data = capture(exec, seed);
+  auto const start = cloud(seed + 1, 0.7f);
+  run<E> dropping(exec, options_with(0.4f), data, start);
+
+  gart::gaussian_model shown = start;
+  {
+    gart::gaussians<E> scene(exec, start);
+    gart::dropout<E> dropout(exec, 0.4f, options_with(0.4f).seed);
+    auto const scope = dropout.leave_out(scene, 0, {});
+    shown.opacity = scene.opacity.to_host();
+  }
+  run<E> plain(exec, options_with(0), data, shown);
+  CHECK(dropping.step().loss == plain.step().loss);
+  auto const got = dropping.gradients().to_host(), expected = plain.gradients().to_host();
+  CHECK(same(got, expected));
+  gart::gaussian_model const after = dropping.model();
+  int out = 0;
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    if (shown.opacity[i] > -20) continue;
+    ++out;
+    CHECK(got.opacity[i] == 0);
+    CHECK(after.opacity[i] == start.opacity[i]);
+  }
+  CHECK(out > 20);
+}
+
+TEST_CASE_TEMPLATE("with dropout a run learns, grows, and goes on from a state as if it had not been stopped", E,
+                   GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  auto const data = capture(exec, seed);
+  auto const start = cloud(seed + 1, 0.7f);
+  auto const options = options_with(0.2f, gart::densify_kind::error);
+  run<E> whole(exec, options, data, start), resumed(exec, options, data, start);
+  float before = 0, after = 0;
+  for (int i = 0; i < options.iterations; ++i) {
+    float const loss = whole.step().loss;
+    if (i < 8) before += loss;
+    if (i >= options.iterations - 8) after += loss;
+    if (i == 36) resumed.set_state(whole.state());
+  }
+  while (resumed.steps_done() < options.iterations) resumed.step();
+  CHECK(whole.scene().size() > start.size());
+  CHECK(after < 0.8f * before);
+  CHECK(same(resumed.model(), whole.model()));
+}
