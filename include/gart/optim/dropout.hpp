@@ -7,9 +7,10 @@
 /// that opacities are in the mean what they were. A Gaussian that has one photograph by heart is then of little use:
 /// what is seen has to be shared with others, that more photographs see.
 ///
-/// An o' over 0.995 is that, or o where that is more. The gradient by o' goes to the logit of o as if it were by o, and
-/// what is left out has none. Draws go by the numbers that Gaussians have in the scene, so that ranks draw as one does.
-/// Cost: 4 bytes a Gaussian, and a pass that reads and writes as much. Without a share there is nothing of it.
+/// An o' over 0.995 is that, or o where that is more. The gradient by the logit of o' is taken for that by the logit of
+/// o, and what is left out has none. Draws go by the numbers that Gaussians have in the scene, so that ranks draw as
+/// one does. Cost: 4 bytes a Gaussian, and a pass that reads and writes as much. Without a share there is nothing of
+/// it.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/core/error.hpp>
