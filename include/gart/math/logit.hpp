@@ -1,7 +1,8 @@
 #pragma once
 /// \file
 /// Opacities as they are stored, logits, and as they are: sigmoid(x) = 1 / (1 + exp(-x)), logit(p) = ln(p / (1 - p)).
-/// The float's arithmetic is fixed (math/arith.hpp), because opacities decide hits; the double's is the platform's.
+/// The float's sigmoid has fixed arithmetic (math/arith.hpp), because opacities decide hits; the rest is the
+/// platform's.
 
 #include <gart/math/arith.hpp>
 
@@ -14,6 +15,9 @@ GART_HD GART_INLINE float sigmoid(float x) {
   float const clamped = x < -80.0f ? -80.0f : x;  // below, sigma is under any alpha_min
   return divide(1.0f, add(1.0f, exponential(-clamped)));
 }
+
+/// ln(p / (1 - p)).
+GART_HD inline float logit(float p) { return logf(p / (1.0f - p)); }
 
 /// 1 / (1 + exp(-x)).
 GART_HD inline double sigmoid_in_double(double x) { return 1 / (1 + exp(-x)); }

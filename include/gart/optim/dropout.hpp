@@ -27,8 +27,8 @@ namespace gart::inline GART_ISA {
 namespace detail {
 
 struct dropout_kernel {
-  static constexpr float none = -40.0f;                           // the logit of what is under any alpha_min
-  static constexpr float most = 0.995f, logit_of_most = 5.2933f;  // that a Gaussian is made more opaque up to
+  static constexpr float none = -40.0f;  // the logit of what is under any alpha_min
+  static constexpr float most = 0.995f;  // the opacity up to which a Gaussian is made more opaque
   float const* opacity;
   float* shown;
   row_owners owners;
@@ -36,8 +36,9 @@ struct dropout_kernel {
   float share;
   GART_KERNEL void operator()(index_t i) const {
     float const o = opacity[i], raised = sigmoid(o) / (1.0f - share);
-    float const stays = raised < most ? logf(raised / (1.0f - raised)) : o > logit_of_most ? o : logit_of_most;
-    shown[i] = uniform(random.words(owners.global(i)).v[0]) < share ? none : stays;
+    float const stays = logit(raised < most ? raised : most);
+    bool const out = uniform(random.words(owners.global(i)).v[0]) < share;
+    shown[i] = out ? none : o > stays ? o : stays;
   }
 };
 

@@ -28,6 +28,7 @@
 #include <gart/algorithm/sort_pairs.hpp>
 #include <gart/core/error.hpp>
 #include <gart/math/hit_gradient.hpp>
+#include <gart/math/logit.hpp>
 #include <gart/optim/adam.hpp>
 #include <gart/optim/long_axis_split.hpp>
 #include <gart/optim/options.hpp>
@@ -110,7 +111,7 @@ struct error_split_kernel {
     float const opacity = half.opacity > least_opacity ? half.opacity : least_opacity;
     vec3 const center = second ? mean - half.offset : mean + half.offset;
     for (int c = 0; c < 3; ++c) m[c] = center[c], s[c] = half.log_scale[c];
-    model.opacity[row] = logf(opacity / (1.0f - opacity));
+    model.opacity[row] = logit(opacity);
   }
 };
 
