@@ -32,6 +32,10 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(train_options, shard_block), "shard_block"},  // no option
       {GART_CLI_FIELD(train_options, seed), "--seed"},
       {GART_CLI_FIELD(train_options, dropout), "--set dropout"},
+      {GART_CLI_FIELD(resolution_options, quarter_until), "--set resolution.quarter_until"},
+      {GART_CLI_FIELD(resolution_options, half_until), "--set resolution.half_until"},
+      {GART_CLI_FIELD(resolution_options, least), "--set resolution.least"},
+      {GART_CLI_FIELD(resolution_options, long_run), "--set resolution.long_run"},
       {GART_CLI_FIELD(split_shape, share), "--set error.split.share"},
       {GART_CLI_FIELD(split_shape, opacity), "--set error.split.opacity"},
       {GART_CLI_FIELD(render_options, alpha_min), "--alpha-min"},

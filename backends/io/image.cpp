@@ -3,6 +3,7 @@
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
 #include <gart/io/image_file.hpp>
+#include <gart/scene/block_mean.hpp>
 
 #include <algorithm>
 #include <string_view>
@@ -43,27 +44,11 @@ image8 box_downscale(image8 const& image, int factor) {
     throw invalid_argument("box_downscale: factor " + std::to_string(factor) + " leaves nothing of an image of " +
                            std::to_string(image.width) + " x " + std::to_string(image.height));
   }
-  bool const alpha = channels == 4;
   image8 result(width, height, channels);
-  u64 const area = static_cast<u64>(factor) * static_cast<u64>(factor);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      u64 sum[4] = {}, weight = 0;
-      for (int v = y * factor; v < (y + 1) * factor; ++v) {
-        u8 const* pixel = &image.at(x * factor, v, 0);
-        for (int u = 0; u < factor; ++u, pixel += channels) {
-          u64 const w = alpha ? pixel[3] : 1;
-          weight += w;
-          for (int c = 0; c < (alpha ? 3 : channels); ++c) sum[c] += w * pixel[c];
-        }
-      }
-      if (weight > 0) {
-        for (int c = 0; c < (alpha ? 3 : channels); ++c)
-          result.at(x, y, c) = static_cast<u8>((sum[c] + weight / 2) / weight);
-      }
-      if (alpha) result.at(x, y, 3) = static_cast<u8>((weight + area / 2) / area);
-    }
-  }
+  pixel_blocks const blocks{static_cast<std::size_t>(image.width), static_cast<std::size_t>(factor),
+                            static_cast<std::size_t>(width)};
+  for (std::size_t i = 0; i < blocks.across * static_cast<std::size_t>(height); ++i)
+    block_mean(image.data.data(), channels, nullptr, blocks, i, &result.data[i * static_cast<std::size_t>(channels)]);
   return result;
 }
 

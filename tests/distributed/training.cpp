@@ -80,6 +80,7 @@ TEST_CASE("by strips the bits are those of one rank, whatever the number of rank
     CAPTURE(to_string(densify));
     train_options options = short_run(densify);
     options.dropout = densify == densify_kind::mcmc ? 0 : 0.2f;
+    options.resolution = {0.2f, 0.5f, 1};
     gaussian_model const start = gart_test::cloud(11, 0.5f);
     plain one(exec, options, data, start);
     shared all(exec, options, data, start, every_rank());
@@ -191,6 +192,7 @@ TEST_CASE("exposures and poses are learned as by one rank, bit by bit") {
   train_options options = short_run(densify_kind::error);
   options.shard_block = 64, options.iterations = 120;  // three blocks
   options.exposure = options.vignetting = options.refine_poses = true, options.dropout = 0.2f;
+  options.resolution = {0.2f, 0.5f, 1};
   gaussian_model const start = gart_test::cloud(17, 0.5f);
   for (int const batch : {1, 3}) {
     CAPTURE(batch);
@@ -225,6 +227,7 @@ TEST_CASE("depth and lenses are learned as by one rank, bit by bit") {
   train_options options = short_run(densify_kind::error);
   options.shard_block = 64, options.iterations = 120;  // three blocks
   options.depth_weight = 1, options.refine_lens = options.refine_poses = true;
+  options.resolution = {0.2f, 0.5f, 1};
   options.lens.warm_up = 0;
   gaussian_model const start = gart_test::cloud(18, 0.5f);
   using deep = with_depth<deterministic_strategy>;

@@ -2,6 +2,7 @@
 #include <train/runs.hpp>
 
 #include <gart/core/error.hpp>
+#include <gart/io/image_file.hpp>
 
 using namespace gart_test;
 
@@ -49,6 +50,41 @@ TEST_CASE_TEMPLATE("depth comes nearer to the maps", E, GART_TEST_POLICIES) {
   double const without = after(0), with = after(2);
   CAPTURE(without);
   CHECK(with < 0.7 * without);
+}
+
+TEST_CASE_TEMPLATE("an image smaller than its map is compared with the means of what the map knows", E,
+                   GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  std::mt19937_64 random(seed);
+  E exec;
+  gart::dataset data = mapped_capture(exec, seed);
+  for (gart::dataset_view& v : data.train)
+    for (float& d : v.depth.data) d = random() % 4 ? std::round(64 * d) / 64 : 0;
+  gart::dataset half = data;
+  for (std::size_t i = 0; i < data.train.size(); ++i) {
+    gart::image_float const& map = data.train[i].depth;
+    gart::dataset_view& v = half.train[i];
+    v.view = gart::downscaled(v.view, 2, v.name);
+    v.image = gart::box_downscale(v.image, 2);
+    v.depth = gart::image_float(14, 11, 1);
+    for (int y = 0; y < 11; ++y)
+      for (int x = 0; x < 14; ++x) {
+        double sum = 0, count = 0;
+        for (int k = 0; k < 4; ++k) {
+          double const d = double{map.at(2 * x + k % 2, 2 * y + k / 2, 0)};
+          sum += d, count += d > 0;
+        }
+        v.depth.at(x, y, 0) = count > 0 ? static_cast<float>(sum / count) : 0;
+      }
+  }
+  gart::train_options options = options_of(2);
+  options.resolution = {0, 1, 1};
+  using deep = run_of<E, gart::with_depth<gart::primitive_strategy>>;
+  deep shrunk(exec, options, data, cloud(seed + 1, 0.8f));
+  options.resolution = {0, 0, 1};
+  deep taken(exec, options, half, cloud(seed + 1, 0.8f));
+  CHECK(shrunk.step().loss == taken.step().loss);
 }
 
 TEST_CASE_TEMPLATE("a loss of one's own may add to the gradient of depth", E, GART_TEST_POLICIES) {

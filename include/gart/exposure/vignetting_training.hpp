@@ -70,33 +70,36 @@ class vignetting_training : public learned_rows<E, vignetting::floats, vignettin
   vignetting_training(E& exec, std::vector<named_camera> const& views)
       : vignetting_training(exec, lenses_of(views), views) {}
 
-  /// The image [H][W][3] of a view as its lens lets it through, shaded() until the next call.
-  span<float const> shade(std::size_t view, span<float const> image) {
+  /// The image [H][W][3] of a view as its lens lets it through, shaded() until the next call. `captured`: the view's
+  /// camera as the capture has it, for an image of that size, here and below.
+  span<float const> shade(std::size_t view, camera const& captured, span<float const> image) {
     shaded_.resize(image.size());
     parallel_for(*exec_, "shade", static_cast<index_t>(image.size() / 3),
-                 detail::shade_kernel{of(view), views_[view].circle, views_[view].width, image.data(), shaded_.data()});
+                 detail::shade_kernel{of(view), image_circle(captured), static_cast<index_t>(captured.width),
+                                      image.data(), shaded_.data()});
     return shaded_;
   }
   /// The image that was shaded last.
   span<float const> shaded() const { return shaded_; }
 
   /// Turns dL/d shaded into dL/d image, and takes Adam's step for the view's lens.
-  void step(std::size_t view, span<float const> image, span<float> gradient, float rate) {
-    differentiate(view, image, gradient);
-    this->move(views_[view].lens, rate);
+  void step(std::size_t view, camera const& captured, span<float const> image, span<float> gradient, float rate) {
+    differentiate(view, captured, image, gradient);
+    this->move(lens_of_[view], rate);
   }
 
   /// The first half of a step: turns dL/d shaded into dL/d image. What it says of the lens, [9], stays until the next
   /// call.
-  span<float const> differentiate(std::size_t view, span<float const> image, span<float> gradient) {
-    return this->sum("vignetting_gradient",
-                     detail::vignetting_gradient_kernel{of(view), views_[view].circle, views_[view].width, image.data(),
-                                                        gradient.data(), static_cast<index_t>(image.size() / 3)});
+  span<float const> differentiate(std::size_t view, camera const& captured, span<float const> image,
+                                  span<float> gradient) {
+    return this->sum("vignetting_gradient", detail::vignetting_gradient_kernel{
+                                                of(view), image_circle(captured), static_cast<index_t>(captured.width),
+                                                image.data(), gradient.data(), static_cast<index_t>(image.size() / 3)});
   }
 
   /// The second, of another rank's view.
   void move_lens_of(std::size_t view, span<float const> gradient, float rate) {
-    this->move(views_[view].lens, gradient, rate);
+    this->move(lens_of_[view], gradient, rate);
   }
 
   /// A view through each lens.
@@ -110,8 +113,7 @@ class vignetting_training : public learned_rows<E, vignetting::floats, vignettin
         exec_(&exec),
         lenses_(std::move(lenses)),
         shaded_(exec) {
-    for (named_camera const& v : views)
-      views_.push_back({place_of(v.view, lenses_), image_circle(v.view), static_cast<index_t>(v.view.width)});
+    for (named_camera const& v : views) lens_of_.push_back(place_of(v.view, lenses_));
   }
 
   static std::size_t place_of(camera const& view, std::vector<camera> const& lenses) {
@@ -128,16 +130,11 @@ class vignetting_training : public learned_rows<E, vignetting::floats, vignettin
     }
     return lenses;
   }
-  vignetting const* of(std::size_t view) { return reinterpret_cast<vignetting const*>(this->at(views_[view].lens)); }
+  vignetting const* of(std::size_t view) { return reinterpret_cast<vignetting const*>(this->at(lens_of_[view])); }
 
-  struct lens_view {
-    std::size_t lens;  // its place in lenses_
-    image_circle circle;
-    index_t width;
-  };
   E* exec_;
   std::vector<camera> lenses_;
-  std::vector<lens_view> views_;
+  std::vector<std::size_t> lens_of_;  // of each view, its place there
   buffer<float, E> shaded_;
 };
 

@@ -27,9 +27,10 @@ struct lens_gradient {
   static constexpr int floats = 4;        ///< numbers
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< by each
   ///@{
-  /// Zero, or from four numbers in this order.
+  /// Zero, or from four numbers in this order; of an image `shrink` times as small as the one that it is to be of.
   lens_gradient() = default;
-  explicit lens_gradient(float const* v) : fx(v[0]), fy(v[1]), cx(v[2]), cy(v[3]) {}
+  explicit lens_gradient(float const* v, int shrink = 1)
+      : fx(double{v[0]} / shrink), fy(double{v[1]} / shrink), cx(double{v[2]} / shrink), cy(double{v[3]} / shrink) {}
   ///@}
 };
 

@@ -45,9 +45,9 @@ class pose_training {
 
   /// Whether view i has yet to be told how its image moves.
   bool wants_metric(std::size_t i) const { return state_.metric[36 * i] == 0; }
-  /// It, from the image's depth and transmittance.
-  std::array<double, 36> metric_of(std::size_t i, span<float const> depth, span<float const> transmittance) const {
-    return pose_metric(view(i), depth, transmittance, extent_);
+  /// It, from the depth and transmittance of an image by the view's camera as it is learned.
+  std::array<double, 36> metric_of(camera const& view, span<float const> depth, span<float const> transmittance) const {
+    return pose_metric(view, depth, transmittance, extent_);
   }
   /// Told, before the view's first step.
   void set_metric(std::size_t i, std::array<double, 36> const& metric) {

@@ -7,6 +7,7 @@
 #include <gart/backward/backward.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/loss/depth_loss.hpp>
+#include <gart/train/smaller_photo.hpp>
 
 #include <vector>
 
@@ -28,7 +29,8 @@ class depth_supervision {
         by_depth_(exec),
         by_transmittance_(exec),
         value_(exec, 1),
-        maps_(data.train.size()) {}
+        maps_(data.train.size()),
+        smaller_(exec) {}
 
   /// Adds the targets of an image of so many pixels, the gradients by which are zero.
   void begin(image_targets& targets, std::size_t pixels) {
@@ -36,10 +38,12 @@ class depth_supervision {
     by_depth_.zero(), by_transmittance_.zero(), value_.zero();
     targets.depth = depth_.data(), targets.transmittance = transmittance_.data();
   }
-  /// The loss of the image of a training view that has a map.
-  void evaluate(std::size_t view, truth_view const& truth) {
+  /// The loss of the image of a training view that has a map, so many times smaller than it.
+  void evaluate(std::size_t view, truth_view const& truth, int shrink) {
     image_float const& map = data_->train[view].depth;
-    if (scale_ > 0 && !map.empty()) loss_.evaluate(pixels(), resident(view, map), truth, scale_, value_);
+    if (scale_ == 0 || map.empty()) return;
+    float const* const distance = smaller_.shrink(resident(view, map), map.width, map.height, shrink);
+    loss_.evaluate(pixels(), distance, truth, scale_, value_);
   }
   /// Images and gradients, of a loss of one's own to read and add to.
   depth_pixels pixels() { return {depth_, transmittance_, by_depth_, by_transmittance_}; }
@@ -67,6 +71,7 @@ class depth_supervision {
   depth_loss<E> loss_;
   buffer<float, E> depth_, transmittance_, by_depth_, by_transmittance_, value_;
   std::vector<buffer<float, E>> maps_;
+  smaller_photo<E> smaller_;
 };
 
 /// In its place where the strategy has no depth.

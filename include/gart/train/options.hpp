@@ -33,6 +33,15 @@ constexpr auto names_of(background_kind) {
   return std::array<name_of<background_kind>, 3>{{{white, "white"}, {black, "black"}, {random, "random"}}};
 }
 
+/// The size of a step's images (train/resolution.hpp). Shares are of the run, and of a long one's first steps: what it
+/// has more are at full size.
+struct resolution_options {
+  float quarter_until = 0.1f;  ///< until then a quarter of a photograph's pixels across and down
+  float half_until = 0.5f;     ///< until then half
+  int least = 128;             ///< never fewer pixels across or down
+  int long_run = 15000;        ///< steps that a longer run's shares are of
+};
+
 /// The options of a run.
 struct train_options {
   int iterations = 30000;                      ///< steps of the run
@@ -70,6 +79,7 @@ struct train_options {
   index_t shard_block = row_owners::usual_block;  ///< Gaussians in a row that one of several ranks has
   u64 seed = 1;                                   ///< of all numbers drawn at random
   float near = 0.002f;                            ///< hits lie at t > near, times the scene's extent
+  resolution_options resolution = {};             ///< of a step's images
   approximation_options render = {};              ///< what is traded for time
   learning_rates rates = {};                      ///< of Adam, by group of parameters
   adam_options adam = {};                         ///< of Adam

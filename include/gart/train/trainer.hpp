@@ -46,6 +46,7 @@
 #include <gart/train/depth_supervision.hpp>
 #include <gart/train/memory_need.hpp>
 #include <gart/train/options.hpp>
+#include <gart/train/resolution.hpp>
 #include <gart/train/shards.hpp>
 #include <gart/train/shown_share.hpp>
 #include <gart/train/start_model.hpp>
@@ -64,8 +65,8 @@ namespace gart::inline GART_ISA {
 template <execution E>
 struct loss_input {
   E& exec;                   ///< the policy
-  dataset_view const& view;  ///< of this step
-  truth_view truth;          ///< the photograph, in the policy's memory
+  dataset_view const& view;  ///< of this step, as the capture has it
+  truth_view truth;          ///< the photograph at the image's size, in the policy's memory
   int width, height;         ///< of the image, in pixels
   span<float const> image;   ///< [H][W][3]
   span<float> gradient;      ///< [H][W][3]
@@ -165,7 +166,7 @@ class basic_trainer {
   void optimize(learning_rates const& rates, int degree, Rows&& rows);
   // The step's image as the view's photograph would show it, and before its exposure.
   span<float const> photographed(std::size_t view) {
-    if (vignetting_) vignetting_->shade(view, color_);
+    if (vignetting_) vignetting_->shade(view, captured(view), color_);
     return exposures_ ? exposures_->expose(view, through_lens()) : through_lens();
   }
   span<float const> through_lens() const { return vignetting_ ? vignetting_->shaded() : span<float const>(color_); }
@@ -225,6 +226,20 @@ class basic_trainer {
 
   // The camera of a training view, with what is learned of it.
   camera seen_by(std::size_t index) const { return as_learned(poses_ ? poses_->view(index) : data_.train[index].view); }
+  // A camera of the capture at the size of the step's images, by that factor of this view's.
+  int shrink_of_view(std::size_t index) const {
+    return shrink_of(data_.train[index].view, shrink_, options_.resolution);
+  }
+  camera at_size(camera const& c, std::size_t index) const {
+    int const shrink = shrink_of_view(index);
+    return shrink == 1 ? c : downscaled(c, shrink, data_.train[index].name);
+  }
+  camera traced(std::size_t index) const { return at_size(seen_by(index), index); }
+  camera captured(std::size_t index) const { return at_size(data_.train[index].view, index); }
+  std::array<double, 36> pose_metric_of(std::size_t index, span<float const> depth,
+                                        span<float const> transmittance) const {
+    return poses_->metric_of(at_size(poses_->view(index), index), depth, transmittance);
+  }
   bool learns_poses() const { return poses_ && poses_->learns(step_, options_.iterations); }
   bool learns_lenses() const { return lenses_ && lenses_->learns(step_, options_.iterations); }
 
@@ -278,7 +293,7 @@ class basic_trainer {
   lens_differentiation<E> by_lens_;
   std::optional<finite_check<E>> finite_;  // where options.check_finite asks for it
   index_t started_with_ = 0, total_ = 0;   // Gaussians of all ranks
-  int step_ = 0;
+  int step_ = 0, shrink_ = 1;              // of the step's images (resolution.hpp)
   float growth_ = 1;
   std::size_t lt_bytes_ = 0;
 };

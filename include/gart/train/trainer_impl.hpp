@@ -26,7 +26,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       frame_(exec),
       passes_(exec),
       loss_(exec),
-      images_(data),
+      images_(exec, data),
       order_(data.train.size(), options.held_out, options.seed),
       dropout_(exec, options.dropout, options.seed),
       error_(exec, error_options_of(options, data),
@@ -47,6 +47,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       started_with_(static_cast<index_t>(total_of(comm_, start))),
       total_(started_with_) {
   require_ranks();
+  require_resolution(options.resolution);
   if (start.rows.sh_degree != sh_degree)
     throw invalid_argument("trainer: the model to start from has another SH degree");
   make_room();
@@ -126,11 +127,12 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
     if (in_ranks()) return step_in_ranks(loss);
   std::size_t const index = order_.at(step_);
   dataset_view const& view = data_.train[index];
-  camera const seen = seen_by(index);
+  shrink_ = shrink_at(options_.resolution, step_, options_.iterations);
+  camera const seen = traced(index);
   int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
   learning_rates const rates = rates_of_step();
   render_options const render = render_options_of(options_, data_.extent, background_of(step_));
-  std::size_t const floats = std::size_t{3} * view.view.width * view.view.height;
+  std::size_t const floats = std::size_t{3} * seen.width * seen.height;
   color_.resize(floats), color_gradient_.resize(floats);
 
   auto shown = dropout_.leave_out(scene_, step_, all_rows().owners());
@@ -159,7 +161,8 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
   std::vector<float> const value = value_.to_host();
   if (moves) poses_->step(index, pose_gradient(value.data() + 2), step_ - 1, options_.iterations);
   if (bends)
-    lenses_->step(index, lens_gradient(value.data() + 2 + pose_gradient::floats), step_ - 1, options_.iterations);
+    lenses_->step(index, lens_gradient(value.data() + 2 + pose_gradient::floats, shrink_of_view(index)), step_ - 1,
+                  options_.iterations);
   report.loss = value[0];
   if constexpr (has_depth<Strategy>) report.loss += supervision_.value();
   report.psnr = value[1] > 0 ? -10.0f * std::log10(value[1]) : 99.0f;
@@ -185,14 +188,15 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
   {
     stage_scope stage(exec_, "loss");
     span<float const> const image = photographed(index);
-    truth_view const truth = images_.get(exec_, index, frame_.options().background);
+    int const shrink = shrink_of_view(index);
+    truth_view const truth = images_.get(index, frame_.options().background, shrink);
     depth_pixels depth;
-    if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth), depth = supervision_.pixels();
-    evaluate(loss, {exec_, view, truth, view.view.width, view.view.height, image, color_gradient_,
+    if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth, shrink), depth = supervision_.pixels();
+    evaluate(loss, {exec_, view, truth, frame_.view().width, frame_.view().height, image, color_gradient_,
                     value_.view().subspan(0, 2), depth});
     if (grows_by_error()) error_map(exec_, image, truth, error_map_);
     if (exposures_) exposures_->step(index, through_lens(), color_gradient_, rates.exposure);
-    if (vignetting_) vignetting_->step(index, color_, color_gradient_, rates.vignetting);
+    if (vignetting_) vignetting_->step(index, captured(index), color_, color_gradient_, rates.vignetting);
   }
   image_gradients image{color_gradient_};
   depth_and_transmittance more;
@@ -209,7 +213,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
       depth = supervision_.depth(), transmittance = supervision_.transmittance();
     else
       depth = depth_.to_host(), transmittance = transmittance_.to_host();
-    poses_->set_metric(index, poses_->metric_of(index, depth, transmittance));
+    poses_->set_metric(index, pose_metric_of(index, depth, transmittance));
   }
 }
 

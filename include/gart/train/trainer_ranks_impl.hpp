@@ -53,6 +53,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
   bool const moves = learns_poses(), bends = learns_lenses();
   std::vector<image_result> images(static_cast<std::size_t>(batch));  // of the step, in their order
   lt_bytes_ = 0, shards_.arrived.reset();
+  shrink_ = shrink_at(options_.resolution, step_, options_.iterations);
   step_report report;
   auto shown = dropout_.leave_out(scene_, before, shards_.rows.owners());
   for (int done = 0; done < batch;) {
@@ -62,8 +63,10 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
     std::vector<camera> cameras;
     std::vector<std::size_t> names;
     for (int v = 0; v < views; ++v) {
-      names.push_back(round.data()[v].view = order_.at(before + done + v));
-      cameras.push_back(seen_by(names.back()));
+      std::size_t const index = round.data()[v].view = order_.at(before + done + v);
+      cameras.push_back(traced(index));
+      // What a view costs is remembered of each size of its image.
+      names.push_back(index + data_.train.size() * static_cast<std::size_t>(shrink_of_view(index)));
     }
     // Near distance and the like are those of any view; the background is the view's own.
     shards_.round.fetch(std::as_const(scene_).view(), cameras, names, render_options_of(options_, data_.extent));
@@ -91,7 +94,9 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
     if (exposures_) exposures_->move(image.view, {image.by_exposure, exposure::floats}, rates.exposure);
     if (vignetting_) vignetting_->move_lens_of(image.view, {image.by_falloff, vignetting::floats}, rates.vignetting);
     if (moves) poses_->step(image.view, image.by_pose, before + k, options_.iterations);
-    if (bends) lenses_->step(image.view, lens_gradient(image.by_lens), before + k, options_.iterations);
+    if (bends)
+      lenses_->step(image.view, lens_gradient(image.by_lens, shrink_of_view(image.view)), before + k,
+                    options_.iterations);
   }
 
   report.step = step_, report.gaussians = total_, report.view = data_.train[images.back().view].name;
@@ -136,18 +141,19 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   shards_.loss_by_strips = !loss && !exposures_ && !vignetting_ && !targets.depth && !bends;
   auto const by_image = [&] {
     stage_scope stage(exec_, "loss");
-    if (shards_.loss_by_strips) return differentiate_strip(seen, images_.get(exec_, index, background));
+    if (shards_.loss_by_strips) return differentiate_strip(seen, images_.get(index, background, shrink_of_view(index)));
     shards_.round.share_image(color_.data(), seen, 3 * sizeof(float));
     if (targets.depth) share(targets.depth), share(targets.transmittance);
     span<float const> const shown = photographed(index);
-    truth_view const truth = images_.get(exec_, index, background);
+    truth_view const truth = images_.get(index, background, shrink_of_view(index));
     depth_pixels depth;
-    if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth), depth = supervision_.pixels();
+    if constexpr (has_depth<Strategy>)
+      supervision_.evaluate(index, truth, shrink_of_view(index)), depth = supervision_.pixels();
     evaluate(loss,
              {exec_, view, truth, seen.width, seen.height, shown, color_gradient_, value_.view().subspan(0, 2), depth});
     if (grows_by_error()) error_map(exec_, shown, truth, error_map_);
     if (exposures_) shards_.by_exposure = exposures_->differentiate(index, through_lens(), color_gradient_);
-    if (vignetting_) shards_.by_falloff = vignetting_->differentiate(index, color_, color_gradient_);
+    if (vignetting_) shards_.by_falloff = vignetting_->differentiate(index, captured(index), color_, color_gradient_);
   };
   if (unit.empty()) {
     shards_.round.finish_fetch();
@@ -208,9 +214,9 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_result(image_result&
   bool const measures = metric && poses_->wants_metric(result.view);
   if constexpr (has_depth<Strategy>) {
     result.loss += supervision_.value();
-    if (measures) result.metric = poses_->metric_of(result.view, supervision_.depth(), supervision_.transmittance());
+    if (measures) result.metric = pose_metric_of(result.view, supervision_.depth(), supervision_.transmittance());
   } else if (measures) {
-    result.metric = poses_->metric_of(result.view, depth_.to_host(), transmittance_.to_host());
+    result.metric = pose_metric_of(result.view, depth_.to_host(), transmittance_.to_host());
   }
 }
 

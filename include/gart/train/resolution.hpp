@@ -1,0 +1,47 @@
+#pragma once
+/// \file
+/// The size of a step's images. Early in a run Gaussians are few and large, and a quarter or a half of an image's width
+/// tells where they belong as well as all of it, for a sixteenth or a quarter of the rays; detail is learned at the
+/// full size (as Chen et al., DashGaussian, CVPR 2025, let size and number grow together). The sizes are halves of each
+/// other, so that a pixel is the mean of a block of the photograph's.
+
+#include <gart/core/error.hpp>
+#include <gart/io/dataset.hpp>
+#include <gart/train/options.hpp>
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+namespace gart::inline GART_ISA {
+
+/// Pixels of a photograph, across and down, to one of the image of step `step`: 1, 2 or 4.
+inline int shrink_at(resolution_options const& options, int step, int iterations) {
+  float const share = static_cast<float>(step) / static_cast<float>(std::min(iterations, options.long_run));
+  return share < options.quarter_until ? 4 : share < options.half_until ? 2 : 1;
+}
+
+/// As much of it as an image of this camera allows: a view of the whole sphere cannot be cropped to whole blocks.
+inline int shrink_of(camera const& c, int shrink, resolution_options const& options) {
+  auto const fits = [&](int by) {
+    bool const whole = c.kind != camera_kind::equirectangular || (c.width % by == 0 && c.height % by == 0);
+    return whole && c.width / by >= options.least && c.height / by >= options.least;
+  };
+  while (shrink > 1 && !fits(shrink)) shrink /= 2;
+  return shrink;
+}
+
+/// Errors: invalid_argument for what is out of its range.
+inline void require_resolution(resolution_options const& options) {
+  for (auto const& [name, share] :
+       {std::pair{"quarter_until", options.quarter_until}, {"half_until", options.half_until}})
+    if (!(share >= 0 && share <= 1))
+      throw invalid_argument(std::string("resolution_options.") + name + " is " + std::to_string(share) +
+                             ": a share of the run, from 0 to 1");
+  if (options.least < 1)
+    throw invalid_argument("resolution_options.least is " + std::to_string(options.least) + ": at least 1 pixel");
+  if (options.long_run < 1)
+    throw invalid_argument("resolution_options.long_run is " + std::to_string(options.long_run) + ": at least 1 step");
+}
+
+}  // namespace gart::inline GART_ISA
