@@ -14,11 +14,17 @@ using gart_test::sigmoid;
 
 namespace {
 
+error_growth_options usual() {
+  error_growth_options options;
+  options.split.share = 0.4f;
+  return options;
+}
+
 template <class E>
 struct training : gart_test::with_moments<E> {
   using gart_test::with_moments<E>::with_moments;
   error_growth<E> densifier(index_t most, std::vector<float> const& error, u64 seed = 1) {
-    error_growth<E> out(this->exec, {}, most, 2000, seed);
+    error_growth<E> out(this->exec, usual(), most, 2000, seed);
     out.error_sum.assign(error);
     return out;
   }
@@ -39,8 +45,7 @@ TEST_CASE("halves end where the whole ended, and are as thick in their middles a
   std::mt19937_64 random(gart_test::seed());
   std::uniform_real_distribution<float> uniform(-1, 1);
   for (int i = 0; i < 200; ++i) {
-    split_shape shape;
-    if (i % 2) shape = {0.25f, 0.5f};
+    split_shape const shape{i % 3 == 0 ? 0.4f : i % 3 == 1 ? 0.35f : 0.25f, i % 2 ? 0.5f : 0.6f};
     vec3 const log_scale(3 * uniform(random), 3 * uniform(random), 3 * uniform(random));
     quaternion const q{uniform(random), uniform(random), uniform(random), uniform(random)};
     split_half const half = split_long_axis(shape, log_scale, q, 0.5f);
@@ -169,7 +174,7 @@ TEST_CASE_TEMPLATE("sources are drawn in proportion to the error seen through th
 TEST_CASE_TEMPLATE("the count follows its curve and at most doubles", E, GART_TEST_POLICIES) {
   std::mt19937_64 random(gart_test::seed());
   E exec;
-  error_growth<E> const plan(exec, {}, 10000, 2000, 1);
+  error_growth<E> const plan(exec, usual(), 10000, 2000, 1);
   CHECK(!plan.due(500));
   CHECK(plan.due(600));
   CHECK(!plan.due(601));
@@ -214,7 +219,7 @@ TEST_CASE_TEMPLATE("the statistic adds up steps, and the penalty is that of the 
   std::vector<float> moments(std::size_t{moment_stride} * n);
   gart_test::fill(moments, random, 0, 1);
   buffer<float, E> const on_policy(t.exec, moments);
-  error_growth<E> densifier(t.exec, {}, n, 1000, 1);
+  error_growth<E> densifier(t.exec, usual(), n, 1000, 1);
   for (int i = 0; i < 3; ++i) densifier.accumulate(t.model, on_policy, gradient);
   auto const sum = densifier.error_sum.to_host();
   gaussian_model const got = gradient.to_host();
@@ -255,4 +260,17 @@ TEST_CASE("growth ends where the capture has too few pixels for more") {
   CHECK(budget(1'000'000, 0) == 0);
   options.pixels_each = 0;
   CHECK(budget(1'000'000, 912'384) == 1'000'000);
+}
+
+TEST_CASE("halves are nearer where the capture has pixels for all of the Gaussians, or as the options say") {
+  gart::error_growth_options options;
+  auto const share = [&](gart::index_t most, gart::u64 pixels) { return gart::split_share(options, most, pixels); };
+  CHECK(share(1'000'000, 22'809'600) == 0.4f);
+  CHECK(share(228'097, 22'809'600) == 0.4f);
+  CHECK(share(228'096, 22'809'600) == 0.35f);
+  CHECK(share(1'000'000, 108'732'000) == 0.35f);
+  options.pixels_each = 0;
+  CHECK(share(1'000'000, 22'809'600) == 0.35f);
+  options.pixels_each = 100, options.split.share = 0.25f;
+  CHECK(share(1'000'000, 22'809'600) == 0.25f);
 }

@@ -125,6 +125,14 @@ inline index_t growth_budget(error_growth_options const& options, index_t most, 
   return static_cast<index_t>(std::clamp(fit, least, limit));
 }
 
+/// The q that halves are made by, in a capture of so many training pixels: options.split.share, or what suits it.
+/// Nearer halves overlap, and fit better what they share; where pixels end growth the overlap of large Gaussians takes
+/// more memory than it is worth.
+inline float split_share(error_growth_options const& options, index_t most, u64 pixels) {
+  if (options.split.share != 0) return options.split.share;
+  return growth_budget(options, most, pixels) < most ? 0.4f : 0.35f;
+}
+
 /// Steps count from 1.
 template <execution E>
 class error_growth {
@@ -132,8 +140,8 @@ class error_growth {
   /// The error seen through each Gaussian since the last densification, [N]: what a checkpoint must hold.
   buffer<float, E> error_sum;
 
-  /// For a run of so many steps, up to so many Gaussians (growth_budget). Errors: invalid_argument for a split that
-  /// leaves no halves.
+  /// For a run of so many steps, up to so many Gaussians (growth_budget), with the split's share given (split_share).
+  /// Errors: invalid_argument for a split that leaves no halves.
   error_growth(E& exec, error_growth_options const& options, index_t max_gaussians, int iterations, u64 seed)
       : error_sum(exec),
         exec_(&exec),

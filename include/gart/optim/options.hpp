@@ -53,7 +53,9 @@ struct mcmc_options {
 
 /// How one Gaussian becomes two along its longest axis (optim/long_axis_split.hpp).
 struct split_shape {
-  float share = 0.4f;    ///< q, in (0, 1): the halves' centres lie at +-q 3 s, and they are 1 - q times as long
+  /// q, in (0, 1): the halves' centres lie at +-q 3 s, and they are 1 - q times as long. 0: by the capture's pixels
+  /// (split_share).
+  float share = 0;
   float opacity = 0.6f;  ///< what opacity is multiplied by
 };
 

@@ -255,6 +255,7 @@ class basic_trainer {
     if (options.densify == densify_kind::error && e.opacity_penalty > 0)
       e.opacity_penalty *=
           penalty_scale(shown_share(data, views_trained_on(data.train.size(), options.held_out), options.background));
+    e.split.share = split_share(e, options.max_gaussians, data.training_pixels());
     e.dead_opacity = least_opacity(e.dead_opacity, options.render.alpha_min);
     return e;
   }
