@@ -6,7 +6,7 @@
 /// other, so that a pixel is the mean of a block of the photograph's.
 
 #include <gart/core/error.hpp>
-#include <gart/io/dataset.hpp>
+#include <gart/scene/camera.hpp>
 #include <gart/train/options.hpp>
 
 #include <algorithm>
