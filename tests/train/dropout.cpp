@@ -2,8 +2,6 @@
 // the same draws.
 #include "runs.hpp"
 
-#include <cstring>
-
 using namespace gart_test;
 
 namespace {
@@ -16,12 +14,6 @@ gart::train_options options_with(float dropout, gart::densify_kind densify = gar
   options.iterations = 80, options.max_gaussians = 230, options.densify = densify, options.dropout = dropout;
   options.error.from = 10, options.error.every = 10;
   return options;
-}
-
-bool same(gart::gaussian_model const& a, gart::gaussian_model const& b) {
-  bool equal = a.size() == b.size();
-  gart::for_each_array([&](auto const&, auto const& x, auto const& y) { equal = equal && x == y; }, a, b);
-  return equal;
 }
 
 }  // namespace

@@ -50,12 +50,6 @@ gart::dataset_view smaller(gart::dataset_view const& v, int by) {
 // Images a quarter and a half as wide until these shares of the run, however small.
 gart::resolution_options sizes(float quarter_until, float half_until) { return {quarter_until, half_until, 1}; }
 
-bool same(gart::gaussian_model const& a, gart::gaussian_model const& b) {
-  bool equal = a.size() == b.size();
-  gart::for_each_array([&](auto const&, auto const& x, auto const& y) { equal = equal && x == y; }, a, b);
-  return equal;
-}
-
 }  // namespace
 
 TEST_CASE_TEMPLATE("a step by smaller images is one of a capture of that size, bit by bit", E, GART_TEST_POLICIES) {

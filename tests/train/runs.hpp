@@ -20,6 +20,13 @@ inline std::vector<float> values(std::mt19937_64& random, std::size_t n) {
   return out;
 }
 
+// Whether they are of the same numbers.
+inline bool same(gart::gaussian_model const& a, gart::gaussian_model const& b) {
+  bool equal = a.size() == b.size();
+  gart::for_each_array([&](auto const&, auto const& x, auto const& y) { equal = equal && x == y; }, a, b);
+  return equal;
+}
+
 // The Gaussians of the capture stand still: what is learned besides them is learned alone.
 inline gart::train_options still(int iterations) {
   gart::train_options options;

@@ -308,3 +308,4 @@ using trainer = basic_trainer<E, Traits, Tracer, Strategy, Comm>;
 
 #include <gart/train/trainer_impl.hpp>
 #include <gart/train/trainer_ranks_impl.hpp>
+#include <gart/train/trainer_state_impl.hpp>
