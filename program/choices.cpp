@@ -1,9 +1,13 @@
 #include "choices.hpp"
 
 #include "progress.hpp"
+#include "train_fields.hpp"
 
+#include <gart/optim/error_growth.hpp>
 #include <gart/runtime/degree_selection.hpp>
+#include <gart/train/resolution.hpp>
 
+#include <algorithm>
 #include <cstdio>
 
 namespace gart_cli {
@@ -16,6 +20,27 @@ std::string short_number(float value) {
   char text[32];
   std::snprintf(text, sizeof text, "%g", static_cast<double>(value));
   return text;
+}
+
+// Until which step images are smaller than their photographs: the largest photographs'.
+gart::chosen<std::string> sizes_in_words(gart::dataset const& data, gart::train_options const& options) {
+  int most = 1;
+  for (auto const& v : data.train) most = std::max(most, gart::shrink_of(v.view, 4, options.resolution));
+  auto const until = [&](int shrink) {
+    return most < shrink ? 0 : gart::steps_shrunk(options.resolution, shrink, options.iterations);
+  };
+  auto const words = [&](char const* size, int steps) {
+    return std::string(size) + " of their width until step " + with_commas(static_cast<std::uint64_t>(steps));
+  };
+  int const quarter = until(4), half = until(2);
+  if (quarter + half == 0)
+    return {"full size", most > 1 ? by_option
+                                  : "smaller ones would be less than " + std::to_string(options.resolution.least) +
+                                        " pixels wide or high"};
+  return {quarter == 0     ? words("half", half)
+          : half > quarter ? words("a quarter", quarter) + ", " + words("half", half)
+                           : words("a quarter", quarter),
+          "few and large Gaussians need no more pixels"};
 }
 
 }  // namespace
@@ -66,6 +91,25 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   if (options.densify != gart::densify_kind::none) {
     auto const budget = gart::choose_budget(data, options);
     say("budget", with_commas(budget.value), budget.why);
+  }
+  auto const [sizes, why_sizes] = sizes_in_words(data, options);
+  say("images", sizes, why_sizes);
+  auto const careful = gart::choose_regularization(traits, options);
+  // What is chosen is recorded as if it had been given, so that a resumed run has it whatever it would choose.
+  auto const settle_field = [&](std::string const& name, float as_said, float choice) {
+    bool const given = sets_field(a.set, name), changes = !given && choice != as_said;
+    if (given || changes) say("--set " + name, short_number(given ? as_said : choice), given ? by_option : careful.why);
+    if (changes) a.set = name + "=" + short_number(choice) + (a.set.empty() ? "" : "," + a.set);
+    return given || changes;
+  };
+  settle_field("dropout", options.dropout, careful.value.dropout);
+  settle_field("ssim_weight", options.ssim_weight, careful.value.ssim_weight);
+  if (!settle_field("error.split.share", options.error.split.share, careful.value.split_share) &&
+      options.densify == gart::densify_kind::error) {
+    gart::u64 const pixels = data.training_pixels();
+    bool const few = gart::growth_budget(options.error, options.max_gaussians, pixels) < options.max_gaussians;
+    say("--set error.split.share", short_number(gart::split_share(options.error, options.max_gaussians, pixels)),
+        few ? "their pixels end growth, and nearer halves take more memory" : "near halves fit what they share");
   }
   gart::configuration_request const wanted = configuration_request_of(a);
   auto const plan = gart::plan_trials(wanted, options, data.train.size());

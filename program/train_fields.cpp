@@ -113,4 +113,8 @@ void set_fields(options& o, std::string const& settings) {
   }
 }
 
+bool sets_field(std::string const& settings, std::string const& name) {
+  return ("," + settings).find("," + name + "=") != std::string::npos;
+}
+
 }  // namespace gart_cli

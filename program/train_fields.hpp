@@ -11,5 +11,7 @@ namespace gart_cli {
 // "error.fill=0.25,rates.opacity=0.05". usage_error for a name that there is not, with those there are, and for a value
 // that is no finite number.
 void set_fields(gart::train_options& options, std::string const& settings);
+// Whether they name the field.
+bool sets_field(std::string const& settings, std::string const& name);
 
 }  // namespace gart_cli

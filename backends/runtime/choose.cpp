@@ -24,6 +24,9 @@ std::string percent(double share) {
   return text;
 }
 
+// What stands before a background that is not of the scene.
+bool is_object(capture_traits const& t) { return t.bounded() || t.transparent > 0; }
+
 std::string counted(std::size_t n, char const* noun) { return std::to_string(n) + " " + noun + (n == 1 ? "" : "s"); }
 
 // f(pixel, channels) for the outermost pixels of some training images; images have 3 or 4 channels.
@@ -151,7 +154,7 @@ chosen<std::string> choose_backward(capture_traits const& t) {
 }
 
 chosen<bool> choose_exposure(capture_traits const& t) {
-  if (t.bounded() || t.transparent > 0) return {false, "a bounded object, lit alike in all images"};
+  if (is_object(t)) return {false, "a bounded object, lit alike in all images"};
   std::string const step = percent(t.brightness_step);
   if (t.brightness_step > brightness_step_most)
     return {true, "the brightness of neighbouring photographs differs by " + step};
@@ -159,7 +162,7 @@ chosen<bool> choose_exposure(capture_traits const& t) {
 }
 
 chosen<bool> choose_vignetting(capture_traits const& t) {
-  if (t.bounded() || t.transparent > 0) return {false, "a bounded object, which says nothing of the corners"};
+  if (is_object(t)) return {false, "a bounded object, which says nothing of the corners"};
   if (t.panoramas) return {false, counted(t.panoramas, "view") + " of the whole sphere, which have no corners"};
   return {true, "photographs, which lenses darken towards the corners"};
 }
@@ -191,6 +194,19 @@ chosen<index_t> choose_budget(dataset const& data, train_options const& options)
   return {budget, text};
 }
 
+chosen<regularization> choose_regularization(capture_traits const& t, train_options const& options) {
+  regularization const as_said{options.dropout, options.ssim_weight, options.error.split.share};
+  if (options.densify != densify_kind::error) return {as_said, "measured with growth by error alone"};
+  if (is_object(t)) return {as_said, "a bounded object"};
+  std::size_t const visits = static_cast<std::size_t>(options.iterations) / std::max<std::size_t>(t.views, 1);
+  std::string const shown = "each of " + counted(t.views, "photograph") + " is shown " + counted(visits, "time");
+  if (visits < visits_by_heart) return {as_said, shown + " only"};
+  if (!options.exposure && choose_exposure(t).value)
+    return {{0.25f, 0.6f, 0.25f}, shown + ", they differ in brightness, and no exposure is learned"};
+  if (t.views < few_photographs) return {{0.2f, as_said.ssim_weight, as_said.split_share}, shown};
+  return {as_said, "there are many photographs"};
+}
+
 chosen<float> choose_sh_gain(train_options const& options) {
   if (options.iterations >= measured_from) return {usual_sh_gain, "what a band buys is measured"};
   return {0, "a run of less than " + std::to_string(measured_from) + " steps would miss the views held out"};
@@ -205,6 +221,9 @@ recommendation recommended(train_options const& options, dataset const& data, co
   all.options.exposure = choose_exposure(traits).value;
   all.options.vignetting = choose_vignetting(traits).value;
   all.options.sh_gain = choose_sh_gain(options).value;
+  regularization const r = choose_regularization(traits, all.options).value;
+  all.options.dropout = r.dropout, all.options.ssim_weight = r.ssim_weight;
+  all.options.error.split.share = r.split_share;
   return all;
 }
 

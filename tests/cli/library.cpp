@@ -74,6 +74,38 @@ TEST_CASE("a short program over the library and gart train give the same bits") 
   CHECK(same("uneven").exposure);
 }
 
+TEST_CASE("what keeps a training from learning by heart is chosen by both, recorded, and gives way to what is given") {
+  folder const here;
+  write_capture(here / "few");
+  repaint(here / "few", [](gart::image8& image, int) {
+    for (std::size_t i = 0; i < image.data.size(); ++i)
+      if (image.data[i] == 20) image.data[i] = static_cast<u8>(60 + 37 * i % 150);
+  });
+  gart::train_options options;
+  options.iterations = 700, options.max_gaussians = 60, options.error.least_budget = 30;
+  auto const use = train(here / "few", options, here / "mine.ply");
+  CHECK(use.options.dropout == 0.2f);
+  std::string const run = "train few --iterations 700 --max-gaussians 60 --backend serial --out ";
+  auto const whole = here.gart(run + "whole --set error.least_budget=30");
+  REQUIRE_MESSAGE(whole.code == 0, whole.err);
+  CHECK_MESSAGE(has(whole.err, "  --set dropout 0.2: each of "), whole.err);
+  CHECK(has(whole.err, "  --set error.split.share 0.4: their pixels end growth"));
+  CHECK(has(whole.err, "  images full size: "));
+  CHECK(here.json("whole/config.json")["options"]["set"] == "dropout=0.2,error.least_budget=30");
+  CHECK(text_of(here / "mine.ply") == text_of(here / "whole/model.ply"));
+
+  CHECK(here.gart(run + "parts --set error.least_budget=30 --quiet --stop-at 350").code == 130);
+  auto const resumed = here.gart("train --resume --out parts --quiet");
+  REQUIRE_MESSAGE(resumed.code == 0, resumed.err);
+  CHECK(text_of(here / "parts/model.ply") == text_of(here / "whole/model.ply"));
+  CHECK(here.json("parts/metrics.json")["chosen"] == here.json("whole/metrics.json")["chosen"]);
+
+  auto const given = here.gart(run + "given --stop-at 1 --set dropout=0,error.least_budget=30");
+  CHECK(given.code == 130);
+  CHECK_MESSAGE(has(given.err, "  --set dropout 0: given\n"), given.err);
+  CHECK(here.json("given/config.json")["options"]["set"] == "dropout=0,error.least_budget=30");
+}
+
 TEST_CASE("the library's presets, exposures and measured bands are those of gart train") {
   folder const here;
   write_capture(here / "capture", 20);

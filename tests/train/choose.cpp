@@ -84,6 +84,46 @@ TEST_CASE("a scene that fills the images is unbounded") {
   CHECK(background_of(noisy) == background_kind::white);
 }
 
+TEST_CASE("what keeps a training from learning by heart goes by visits, photographs and exposures") {
+  gart::capture_traits traits;  // unbounded, of photographs that are alike in brightness
+  traits.views = 50;
+  gart::train_options options;
+  options.iterations = 5000, options.ssim_weight = 0.3f;
+  auto const choice = [&] { return gart::choose_regularization(traits, options).value; };
+  auto const is = [](gart::regularization const& r, float dropout, float ssim_weight, float share) {
+    CHECK(r.dropout == dropout);
+    CHECK(r.ssim_weight == ssim_weight);
+    CHECK(r.split_share == share);
+  };
+  is(choice(), 0.2f, 0.3f, 0);
+  options.iterations = 4999;  // a photograph is shown less than 100 times
+  is(choice(), 0, 0.3f, 0);
+  options.iterations = 30000, traits.views = 99;
+  is(choice(), 0.2f, 0.3f, 0);
+  traits.views = 100;  // enough of them
+  is(choice(), 0, 0.3f, 0);
+  traits.brightness_step = 0.05;
+  REQUIRE(gart::choose_exposure(traits).value);
+  is(choice(), 0.25f, 0.6f, 0.25f);
+  traits.views = 50;
+  is(choice(), 0.25f, 0.6f, 0.25f);
+  options.exposure = true;
+  is(choice(), 0.2f, 0.3f, 0);
+  options.error.split.share = 0.45f;
+  is(choice(), 0.2f, 0.3f, 0.45f);
+  for (auto const kind : {gart::densify_kind::mcmc, gart::densify_kind::adc, gart::densify_kind::none}) {
+    options.densify = kind;
+    is(choice(), 0, 0.3f, 0.45f);
+  }
+  options.densify = gart::densify_kind::error, options.dropout = 0.05f;
+  traits.plain_border = true;  // an object
+  is(choice(), 0.05f, 0.3f, 0.45f);
+  traits.plain_border = false, traits.transparent = 0.1;
+  is(choice(), 0.05f, 0.3f, 0.45f);
+  traits.transparent = 0, traits.views = 0;
+  is(choice(), 0.2f, 0.3f, 0.45f);
+}
+
 TEST_CASE("masks are counted, and a capture without images has nothing to tell") {
   auto data = capture(3, 90);
   data.train[2].mask = gart::image8(width, height, 1, 255);

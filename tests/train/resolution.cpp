@@ -143,6 +143,8 @@ TEST_CASE("a long run has its smaller images in the first of its steps") {
     CHECK(gart::shrink_at(options, 125, iterations) == 2);
     CHECK(gart::shrink_at(options, 499, iterations) == 2);
     CHECK(gart::shrink_at(options, 500, iterations) == 1);
+    CHECK(gart::steps_shrunk(options, 4, iterations) == 125);
+    CHECK(gart::steps_shrunk(options, 2, iterations) == 500);
   }
   CHECK(gart::shrink_at(options, 99, 800) == 4);
   CHECK(gart::shrink_at(options, 100, 800) == 2);

@@ -21,6 +21,13 @@ inline int shrink_at(resolution_options const& options, int step, int iterations
   return share < options.quarter_until ? 4 : share < options.half_until ? 2 : 1;
 }
 
+/// Steps of a run whose photographs are at least so many times smaller.
+inline int steps_shrunk(resolution_options const& options, int shrink, int iterations) {
+  int step = 0;
+  while (step < iterations && shrink_at(options, step, iterations) >= shrink) ++step;
+  return step;
+}
+
 /// As much of it as an image of this camera allows: a view of the whole sphere cannot be cropped to whole blocks.
 inline int shrink_of(camera const& c, int shrink, resolution_options const& options) {
   auto const fits = [&](int by) {
