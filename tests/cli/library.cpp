@@ -100,10 +100,11 @@ TEST_CASE("what keeps a training from learning by heart is chosen by both, recor
   CHECK(text_of(here / "parts/model.ply") == text_of(here / "whole/model.ply"));
   CHECK(here.json("parts/metrics.json")["chosen"] == here.json("whole/metrics.json")["chosen"]);
 
-  auto const given = here.gart(run + "given --stop-at 1 --set dropout=0,error.least_budget=30");
+  auto const given = here.gart(run + "given --stop-at 1 --set dropout=0,resolution.least=1");
   CHECK(given.code == 130);
   CHECK_MESSAGE(has(given.err, "  --set dropout 0: given\n"), given.err);
-  CHECK(here.json("given/config.json")["options"]["set"] == "dropout=0,error.least_budget=30");
+  CHECK(has(given.err, "  images a quarter of their width until step 70, half of their width until step 350: "));
+  CHECK(here.json("given/config.json")["options"]["set"] == "dropout=0,resolution.least=1");
 }
 
 TEST_CASE("the library's presets, exposures and measured bands are those of gart train") {
