@@ -95,9 +95,9 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   auto const [sizes, why_sizes] = sizes_in_words(data, options);
   say("images", sizes, why_sizes);
   auto const careful = gart::choose_regularization(traits, options);
-  // What is chosen is recorded as if it had been given, so that a resumed run has it whatever it would choose.
+  // What is chosen is recorded as if it had been given: a resumed run has that, and chooses nothing.
   auto const settle_field = [&](std::string const& name, float as_said, float choice) {
-    bool const given = sets_field(a.set, name), changes = !given && choice != as_said;
+    bool const given = sets_field(a.set, name), changes = !given && !a.resume && choice != as_said;
     if (given || changes) say("--set " + name, short_number(given ? as_said : choice), given ? by_option : careful.why);
     if (changes) a.set = name + "=" + short_number(choice) + (a.set.empty() ? "" : "," + a.set);
     return given || changes;

@@ -105,7 +105,7 @@ bool one_to_one(camera const& view) {
 
 capture_traits inspect(dataset const& data) {
   capture_traits traits;
-  traits.views = data.train.size();
+  traits.views = data.train.size(), traits.pixels = data.training_pixels();
   for (auto const* views : {&data.train, &data.test}) {
     for (dataset_view const& v : *views) {
       if (v.view.kind == camera_kind::perspective && !v.view.lens.any()) continue;
@@ -201,6 +201,9 @@ chosen<regularization> choose_regularization(capture_traits const& t, train_opti
   std::size_t const visits = static_cast<std::size_t>(options.iterations) / std::max<std::size_t>(t.views, 1);
   std::string const shown = "each of " + counted(t.views, "photograph") + " is shown " + counted(visits, "time");
   if (visits < visits_by_heart) return {as_said, shown + " only"};
+  error_growth_options const& growth = options.error;
+  if (growth_budget(growth, options.max_gaussians, t.pixels) <= static_cast<index_t>(std::max(growth.least_budget, 0)))
+    return {as_said, "few Gaussians have little to learn by heart"};
   if (!options.exposure && choose_exposure(t).value)
     return {{0.25f, 0.6f, 0.25f}, shown + ", they differ in brightness, and no exposure is learned"};
   if (t.views < few_photographs) return {{0.2f, as_said.ssim_weight, as_said.split_share}, shown};

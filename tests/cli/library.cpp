@@ -83,18 +83,19 @@ TEST_CASE("what keeps a training from learning by heart is chosen by both, recor
   });
   gart::train_options options;
   options.iterations = 700, options.max_gaussians = 60, options.error.least_budget = 30;
+  options.error.pixels_each = 25;  // for 40 Gaussians
   auto const use = train(here / "few", options, here / "mine.ply");
   CHECK(use.options.dropout == 0.2f);
   std::string const run = "train few --iterations 700 --max-gaussians 60 --backend serial --out ";
-  auto const whole = here.gart(run + "whole --set error.least_budget=30");
+  auto const whole = here.gart(run + "whole --set error.least_budget=30,error.pixels_each=25");
   REQUIRE_MESSAGE(whole.code == 0, whole.err);
   CHECK_MESSAGE(has(whole.err, "  --set dropout 0.2: each of "), whole.err);
   CHECK(has(whole.err, "  --set error.split.share 0.4: their pixels end growth"));
   CHECK(has(whole.err, "  images full size: "));
-  CHECK(here.json("whole/config.json")["options"]["set"] == "dropout=0.2,error.least_budget=30");
+  CHECK(here.json("whole/config.json")["options"]["set"] == "dropout=0.2,error.least_budget=30,error.pixels_each=25");
   CHECK(text_of(here / "mine.ply") == text_of(here / "whole/model.ply"));
 
-  CHECK(here.gart(run + "parts --set error.least_budget=30 --quiet --stop-at 350").code == 130);
+  CHECK(here.gart(run + "parts --set error.least_budget=30,error.pixels_each=25 --quiet --stop-at 350").code == 130);
   auto const resumed = here.gart("train --resume --out parts --quiet");
   REQUIRE_MESSAGE(resumed.code == 0, resumed.err);
   CHECK(text_of(here / "parts/model.ply") == text_of(here / "whole/model.ply"));

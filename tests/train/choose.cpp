@@ -86,7 +86,7 @@ TEST_CASE("a scene that fills the images is unbounded") {
 
 TEST_CASE("what keeps a training from learning by heart goes by visits, photographs and exposures") {
   gart::capture_traits traits;  // unbounded, of photographs that are alike in brightness
-  traits.views = 50;
+  traits.views = 50, traits.pixels = 10'000'100;
   gart::train_options options;
   options.iterations = 5000, options.ssim_weight = 0.3f;
   auto const choice = [&] { return gart::choose_regularization(traits, options).value; };
@@ -98,7 +98,11 @@ TEST_CASE("what keeps a training from learning by heart goes by visits, photogra
   is(choice(), 0.2f, 0.3f, 0);
   options.iterations = 4999;  // a photograph is shown less than 100 times
   is(choice(), 0, 0.3f, 0);
-  options.iterations = 30000, traits.views = 99;
+  options.iterations = 30000, traits.pixels -= 1;  // for no more Gaussians than any capture gets
+  is(choice(), 0, 0.3f, 0);
+  traits.pixels = 100'000'000, options.max_gaussians = 100'000;
+  is(choice(), 0, 0.3f, 0);
+  options.max_gaussians = 100'001, traits.views = 99;
   is(choice(), 0.2f, 0.3f, 0);
   traits.views = 100;  // enough of them
   is(choice(), 0, 0.3f, 0);
