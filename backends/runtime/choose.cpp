@@ -201,11 +201,12 @@ chosen<regularization> choose_regularization(capture_traits const& t, train_opti
   std::size_t const visits = static_cast<std::size_t>(options.iterations) / std::max<std::size_t>(t.views, 1);
   std::string const shown = "each of " + counted(t.views, "photograph") + " is shown " + counted(visits, "time");
   if (visits < visits_by_heart) return {as_said, shown + " only"};
-  error_growth_options const& growth = options.error;
-  if (growth_budget(growth, options.max_gaussians, t.pixels) <= static_cast<index_t>(std::max(growth.least_budget, 0)))
-    return {as_said, "few Gaussians have little to learn by heart"};
+  index_t const least = static_cast<index_t>(std::max(options.error.least_budget, 0));
+  bool const many = growth_budget(options.error, options.max_gaussians, t.pixels) > least;
   if (!options.exposure && choose_exposure(t).value)
-    return {{0.25f, 0.6f, 0.25f}, shown + ", they differ in brightness, and no exposure is learned"};
+    return {{many ? 0.25f : as_said.dropout, 0.6f, 0.25f},
+            shown + ", they differ in brightness, and no exposure is learned"};
+  if (!many) return {as_said, "few Gaussians need each other"};
   if (t.views < few_photographs) return {{0.2f, as_said.ssim_weight, as_said.split_share}, shown};
   return {as_said, "there are many photographs"};
 }

@@ -109,7 +109,9 @@ TEST_CASE("what keeps a training from learning by heart goes by visits, photogra
   traits.brightness_step = 0.05;
   REQUIRE(gart::choose_exposure(traits).value);
   is(choice(), 0.25f, 0.6f, 0.25f);
-  traits.views = 50;
+  options.max_gaussians = 100'000;
+  is(choice(), 0, 0.6f, 0.25f);
+  options.max_gaussians = 1'000'000, traits.views = 50;
   is(choice(), 0.25f, 0.6f, 0.25f);
   options.exposure = true;
   is(choice(), 0.2f, 0.3f, 0);

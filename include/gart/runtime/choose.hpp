@@ -95,11 +95,11 @@ struct regularization {
 };
 inline constexpr int visits_by_heart = 100;  ///< steps for each photograph, from which on it is chosen
 inline constexpr int few_photographs = 100;  ///< fewer of them are soon learned by heart
-/// What the options say, but for growth by error in an unbounded scene, past error_growth_options::least_budget, and a
-/// run of visits_by_heart: fewer Gaussians of averaged pixels have little to learn by heart, and need each other. Of
-/// few photographs a step leaves out a fifth of the Gaussians. Where photographs differ in brightness and the options
-/// learn no exposures, veils say what these would have: there it is a quarter, halves are nearer, and most of the loss
-/// is D-SSIM, in which brightness has little part.
+/// What the options say, but for growth by error in an unbounded scene and a run of visits_by_heart. Of few photographs
+/// a step leaves out a fifth of the Gaussians. Where photographs differ in brightness and the options learn no
+/// exposures, veils say what these would have: there it is a quarter, halves are nearer, and most of the loss is
+/// D-SSIM, in which brightness has little part. Nothing is left out where there cannot be more Gaussians than
+/// error_growth_options::least_budget: they have little to learn by heart, and need each other.
 chosen<regularization> choose_regularization(capture_traits const& traits, train_options const& options);
 
 /// All of these, as `gart train` takes them: what `request` leaves to gart's choice, and in the options background,
