@@ -88,10 +88,8 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
     say("--init-scale", short_number(start.value.scale), a.initial_scale != 0 ? by_option : start.why);
   }
   gart::train_options const options = train_options_of(a);
-  if (options.densify != gart::densify_kind::none) {
-    auto const budget = gart::choose_budget(data, options);
-    say("budget", with_commas(budget.value), budget.why);
-  }
+  auto const budget = gart::choose_budget(data, options);
+  if (options.densify != gart::densify_kind::none) say("budget", with_commas(budget.value), budget.why);
   auto const [sizes, why_sizes] = sizes_in_words(data, options);
   say("images", sizes, why_sizes);
   auto const careful = gart::choose_regularization(traits, options);
@@ -106,10 +104,10 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   settle_field("ssim_weight", options.ssim_weight, careful.value.ssim_weight);
   if (!settle_field("error.split.share", options.error.split.share, careful.value.split_share) &&
       options.densify == gart::densify_kind::error) {
-    gart::u64 const pixels = data.training_pixels();
-    bool const few = gart::growth_budget(options.error, options.max_gaussians, pixels) < options.max_gaussians;
-    say("--set error.split.share", short_number(gart::split_share(options.error, options.max_gaussians, pixels)),
-        few ? "their pixels end growth, and nearer halves take more memory" : "near halves fit what they share");
+    float const share = gart::split_share(options.error, options.max_gaussians, traits.pixels);
+    say("--set error.split.share", short_number(share),
+        budget.value < options.max_gaussians ? "their pixels end growth, and nearer halves take more memory"
+                                             : "near halves fit what they share");
   }
   gart::configuration_request const wanted = configuration_request_of(a);
   auto const plan = gart::plan_trials(wanted, options, data.train.size());

@@ -86,6 +86,7 @@ TEST_CASE("what keeps a training from learning by heart is chosen by both, recor
   options.error.pixels_each = 25;  // for 40 Gaussians
   auto const use = train(here / "few", options, here / "mine.ply");
   CHECK(use.options.dropout == 0.2f);
+  std::string const set = " --set error.least_budget=30,error.pixels_each=25 --quiet";
   std::string const run = "train few --iterations 700 --max-gaussians 60 --backend serial --out ";
   auto const whole = here.gart(run + "whole --set error.least_budget=30,error.pixels_each=25");
   REQUIRE_MESSAGE(whole.code == 0, whole.err);
@@ -95,11 +96,21 @@ TEST_CASE("what keeps a training from learning by heart is chosen by both, recor
   CHECK(here.json("whole/config.json")["options"]["set"] == "dropout=0.2,error.least_budget=30,error.pixels_each=25");
   CHECK(text_of(here / "mine.ply") == text_of(here / "whole/model.ply"));
 
-  CHECK(here.gart(run + "parts --set error.least_budget=30,error.pixels_each=25 --quiet --stop-at 350").code == 130);
+  CHECK(here.gart(run + "parts --stop-at 350" + set).code == 130);
   auto const resumed = here.gart("train --resume --out parts --quiet");
   REQUIRE_MESSAGE(resumed.code == 0, resumed.err);
   CHECK(text_of(here / "parts/model.ply") == text_of(here / "whole/model.ply"));
   CHECK(here.json("parts/metrics.json")["chosen"] == here.json("whole/metrics.json")["chosen"]);
+
+  // A run that began without goes on without, though it gets long enough for it.
+  auto const longer = [&](std::string const& out, std::string const& settings) {
+    std::string const begun = "train few --iterations 399 --max-gaussians 60 --backend serial --stop-at 1 --out " + out;
+    CHECK(here.gart(begun + settings).code == 130);
+    CHECK(here.gart("train --resume --iterations 700 --stop-at 20 --quiet --out " + out).code == 130);
+    return text_of(here / (out + "/model.ply"));
+  };
+  CHECK(longer("without", set) ==
+        longer("with_none", " --quiet --set dropout=0,error.least_budget=30,error.pixels_each=25"));
 
   auto const given = here.gart(run + "given --stop-at 1 --set dropout=0,resolution.least=1");
   CHECK(given.code == 130);

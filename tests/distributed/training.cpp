@@ -4,7 +4,6 @@
 #include "policy.hpp"
 
 #include <gart/io/file.hpp>
-#include <gart/runtime/request.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>
 #include <gart/train/trainer.hpp>
@@ -13,8 +12,6 @@
 
 #include <unistd.h>
 
-#include <map>
-#include <set>
 #include <string>
 
 using namespace gart;
@@ -365,17 +362,6 @@ TEST_CASE("a run that grows has the memory of its end from the start, and no mor
     CHECK(run.scene().sh.data() == place);
     CHECK(holds(run.scene()));
     CHECK(holds(run.gradients()));
-  }
-}
-
-TEST_CASE("where ranks train, they do so at every degree, so that a choice of bands leaves no GPU idle") {
-  std::map<std::string, std::set<int>> degrees;
-  for (configuration_info const& c : compiled_configurations())
-    if (c.ranks) degrees[std::string(to_string(c.backend)) + " " + c.backward].insert(c.sh_degree);
-  CHECK(degrees.size() >= 2);  // with sums in a fixed order and without
-  for (auto const& [name, there] : degrees) {
-    CAPTURE(name);
-    CHECK(there == std::set<int>{0, 1, 2, 3});
   }
 }
 
