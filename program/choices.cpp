@@ -101,6 +101,8 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
     return given || changes;
   };
   settle_field("dropout", options.dropout, careful.value.dropout);
+  if (train_options_of(a).dropout > 0)
+    settle_field("dropout_until", options.dropout_until, careful.value.dropout_until);
   settle_field("ssim_weight", options.ssim_weight, careful.value.ssim_weight);
   if (!settle_field("error.split.share", options.error.split.share, careful.value.split_share) &&
       options.densify == gart::densify_kind::error) {

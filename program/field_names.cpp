@@ -32,6 +32,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(train_options, shard_block), "shard_block"},  // no option
       {GART_CLI_FIELD(train_options, seed), "--seed"},
       {GART_CLI_FIELD(train_options, dropout), "--set dropout"},
+      {GART_CLI_FIELD(train_options, dropout_until), "--set dropout_until"},
       {GART_CLI_FIELD(resolution_options, quarter_until), "--set resolution.quarter_until"},
       {GART_CLI_FIELD(resolution_options, half_until), "--set resolution.half_until"},
       {GART_CLI_FIELD(resolution_options, least), "--set resolution.least"},

@@ -35,6 +35,7 @@ std::vector<field> const& fields() {
       named("near", [](options& o) -> float& { return o.near; }),
       named("ssim_weight", [](options& o) -> float& { return o.ssim_weight; }),
       named("dropout", [](options& o) -> float& { return o.dropout; }),
+      named("dropout_until", [](options& o) -> float& { return o.dropout_until; }),
       named("resolution.quarter_until", [](options& o) -> float& { return o.resolution.quarter_until; }),
       named("resolution.half_until", [](options& o) -> float& { return o.resolution.half_until; }),
       named("resolution.least", [](options& o) -> int& { return o.resolution.least; }),

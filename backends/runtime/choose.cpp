@@ -97,6 +97,12 @@ std::string folds(capture_traits const& t) {
   return "the lenses of " + counted(t.folding, "view") + " are not one to one over the image, and footprints need that";
 }
 
+// The fewer Gaussians there are, the less another can stand in for one that is left out. In hundredths, upwards.
+float rising_dropout(index_t budget, error_growth_options const& options) {
+  double const times = static_cast<double>(budget) / std::max(options.least_budget, 1);
+  return static_cast<float>(std::ceil(30 * std::clamp(std::log10(times), 0.0, 1.0)) / 100);
+}
+
 }  // namespace
 
 bool one_to_one(camera const& view) {
@@ -195,20 +201,23 @@ chosen<index_t> choose_budget(dataset const& data, train_options const& options)
 }
 
 chosen<regularization> choose_regularization(capture_traits const& t, train_options const& options) {
-  regularization const as_said{options.dropout, options.ssim_weight, options.error.split.share};
+  regularization const as_said{options.dropout, options.dropout_until, options.ssim_weight, options.error.split.share};
   if (options.densify != densify_kind::error) return {as_said, "measured with growth by error alone"};
   if (is_object(t)) return {as_said, "a bounded object"};
   std::size_t const visits = static_cast<std::size_t>(options.iterations) / std::max<std::size_t>(t.views, 1);
   std::string const shown = "each of " + counted(t.views, "photograph") + " is shown " + counted(visits, "time");
   if (visits < visits_by_heart) return {as_said, shown + " only"};
-  index_t const least = static_cast<index_t>(std::max(options.error.least_budget, 0));
-  bool const many = growth_budget(options.error, options.max_gaussians, t.pixels) > least;
-  if (!options.exposure && choose_exposure(t).value)
-    return {{many ? 0.25f : as_said.dropout, 0.6f, 0.25f},
-            shown + ", they differ in brightness, and no exposure is learned"};
-  if (!many) return {as_said, "few Gaussians need each other"};
-  if (t.views < few_photographs) return {{0.2f, as_said.ssim_weight, as_said.split_share}, shown};
-  return {as_said, "there are many photographs"};
+  float const rising = rising_dropout(growth_budget(options.error, options.max_gaussians, t.pixels), options.error);
+  regularization careful = as_said;
+  if (!options.exposure && choose_exposure(t).value) {
+    if (rising > 0) careful.dropout = rising, careful.dropout_until = 0.95f;
+    careful.ssim_weight = 0.6f, careful.split_share = 0.25f;
+    return {careful, shown + ", they differ in brightness, and no exposure is learned"};
+  }
+  if (rising == 0) return {as_said, "few Gaussians need each other"};
+  if (t.views >= few_photographs) return {as_said, "there are many photographs"};
+  careful.dropout = 0.2f;
+  return {careful, shown};
 }
 
 chosen<float> choose_sh_gain(train_options const& options) {
@@ -226,8 +235,8 @@ recommendation recommended(train_options const& options, dataset const& data, co
   all.options.vignetting = choose_vignetting(traits).value;
   all.options.sh_gain = choose_sh_gain(options).value;
   regularization const r = choose_regularization(traits, all.options).value;
-  all.options.dropout = r.dropout, all.options.ssim_weight = r.ssim_weight;
-  all.options.error.split.share = r.split_share;
+  all.options.dropout = r.dropout, all.options.dropout_until = r.dropout_until;
+  all.options.ssim_weight = r.ssim_weight, all.options.error.split.share = r.split_share;
   return all;
 }
 

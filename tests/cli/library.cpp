@@ -119,6 +119,30 @@ TEST_CASE("what keeps a training from learning by heart is chosen by both, recor
   CHECK(here.json("given/config.json")["options"]["set"] == "dropout=0,resolution.least=1");
 }
 
+TEST_CASE("where photographs differ in brightness and no exposure is learned, more is chosen against veils") {
+  folder const here;
+  write_capture(here / "few");
+  repaint(here / "few", [](gart::image8& image, int view) {
+    for (std::size_t i = 0; i < image.data.size(); ++i) {
+      int const v = image.data[i] == 20 ? static_cast<int>(60 + 37 * i % 150) : image.data[i];
+      image.data[i] = static_cast<u8>(view % 2 ? v / 2 : v);
+    }
+  });
+  std::string const rules = "error.least_budget=30,error.pixels_each=25",
+                    of_run = "--max-gaussians 60 --backend serial ";
+  auto const settings = [&](std::string const& out, std::string const& more) {
+    auto const run = here.gart("train few --iterations 700 --stop-at 1 " + of_run + more + rules + " --out " + out);
+    CHECK(run.code == 130);
+    CHECK(has(run.err, "--set dropout_until 0.95: each of ") == (out == "off" || out == "given"));
+    return here.json(out + "/config.json")["options"]["set"].get<std::string>();
+  };
+  std::string const near = "error.split.share=0.25,ssim_weight=0.6,";
+  CHECK(settings("off", "--exposure off --set ") == near + "dropout_until=0.95,dropout=0.04," + rules);
+  CHECK(settings("given", "--exposure off --set dropout=0.1,") == near + "dropout_until=0.95,dropout=0.1," + rules);
+  CHECK(settings("none", "--exposure off --set dropout=0,") == near + "dropout=0," + rules);
+  CHECK(settings("learned", "--set ") == "dropout=0.2," + rules);
+}
+
 TEST_CASE("the library's presets, exposures and measured bands are those of gart train") {
   folder const here;
   write_capture(here / "capture", 20);

@@ -12,10 +12,12 @@ using namespace gart_test;
 
 namespace {
 
+constexpr int iterations = 100;
+
 template <class E>
 std::vector<float> shown_of(gart::dropout<E>& dropout, gart::gaussians<E>& scene, int step,
                             gart::row_owners const& owners = {}) {
-  auto const shown = dropout.leave_out(scene, step, owners);
+  auto const shown = dropout.leave_out(scene, step, iterations, owners);
   return scene.opacity.to_host();
 }
 
@@ -34,7 +36,7 @@ TEST_CASE_TEMPLATE("a share of the Gaussians is left out, and the rest is as muc
   gart::gaussians<E> scene(exec, model);
   for (float const share : {0.05f, 0.2f, 0.6f}) {
     CAPTURE(share);
-    gart::dropout<E> dropout(exec, share, seed);
+    gart::dropout<E> dropout(exec, share, 1, seed);
     auto const shown = shown_of(dropout, scene, 7);
     int out = 0;
     for (gart::index_t i = 0; i < n; ++i) {
@@ -65,7 +67,7 @@ TEST_CASE_TEMPLATE("ranks leave out what one does", E, GART_TEST_POLICIES) {
   gart::gaussian_model const model = random_model(1000, 0, random);
   E exec;
   gart::gaussians<E> scene(exec, model);
-  gart::dropout<E> one(exec, 0.3f, seed);
+  gart::dropout<E> one(exec, 0.3f, 1, seed);
   auto const all = shown_of(one, scene, 3);
   for (int rank = 0; rank < 3; ++rank) {
     gart::row_owners const owners{3, rank, 8};
@@ -74,7 +76,7 @@ TEST_CASE_TEMPLATE("ranks leave out what one does", E, GART_TEST_POLICIES) {
     for (std::size_t i = 0; i < part.size(); ++i)
       part.opacity[i] = model.opacity[owners.global(static_cast<gart::index_t>(i))];
     gart::gaussians<E> mine(exec, part);
-    gart::dropout<E> dropout(exec, 0.3f, seed);
+    gart::dropout<E> dropout(exec, 0.3f, 1, seed);
     auto const shown = shown_of(dropout, mine, 3, owners);
     for (std::size_t i = 0; i < part.size(); ++i)
       REQUIRE(shown[i] == all[owners.global(static_cast<gart::index_t>(i))]);
@@ -87,9 +89,9 @@ TEST_CASE_TEMPLATE("a scope ends once, without a share there is none, and a shar
   gart::gaussian_model const model = random_model(100, 0, random);
   E exec;
   gart::gaussians<E> scene(exec, model);
-  gart::dropout<E> dropout(exec, 0.5f, 1), nothing(exec, 0, 1);
+  gart::dropout<E> dropout(exec, 0.5f, 1, 1), nothing(exec, 0, 1, 1);
   {
-    auto shown = dropout.leave_out(scene, 0, {});
+    auto shown = dropout.leave_out(scene, 0, iterations, {});
     CHECK(scene.opacity.to_host() != model.opacity);
     shown.end();
     CHECK(scene.opacity.to_host() == model.opacity);
@@ -97,5 +99,28 @@ TEST_CASE_TEMPLATE("a scope ends once, without a share there is none, and a shar
   CHECK(scene.opacity.to_host() == model.opacity);
   CHECK(shown_of(nothing, scene, 0) == model.opacity);
   for (float const share : {-0.1f, 1.0f, std::numeric_limits<float>::quiet_NaN()})
-    CHECK_THROWS_AS(gart::dropout<E>(exec, share, 1), gart::invalid_argument);
+    CHECK_THROWS_AS(gart::dropout<E>(exec, share, 1, 1), gart::invalid_argument);
+}
+
+TEST_CASE_TEMPLATE("the last steps of a run show the whole scene", E, GART_TEST_POLICIES) {
+  std::mt19937_64 random(1);
+  gart::gaussian_model const model = random_model(100, 0, random);
+  E exec;
+  gart::gaussians<E> scene(exec, model);
+  auto const steps_without = [&](float until) {
+    gart::dropout<E> dropout(exec, 0.5f, until, 1);
+    int all = 0;
+    for (int step = 0; step < iterations; ++step) {
+      bool const whole = shown_of(dropout, scene, step) == model.opacity;
+      CHECK((whole || all == 0));  // none is left out again
+      all += whole;
+    }
+    return all;
+  };
+  CHECK(steps_without(1) == 0);
+  CHECK(steps_without(0.75f) == 25);
+  CHECK(steps_without(0.95f) == 5);
+  CHECK(steps_without(0) == iterations);
+  for (float const until : {-0.1f, 1.01f, std::numeric_limits<float>::quiet_NaN()})
+    CHECK_THROWS_AS(gart::dropout<E>(exec, 0.5f, until, 1), gart::invalid_argument);
 }

@@ -90,8 +90,9 @@ TEST_CASE("what keeps a training from learning by heart goes by visits, photogra
   gart::train_options options;
   options.iterations = 5000, options.ssim_weight = 0.3f;
   auto const choice = [&] { return gart::choose_regularization(traits, options).value; };
-  auto const is = [](gart::regularization const& r, float dropout, float ssim_weight, float share) {
+  auto const is = [](gart::regularization const& r, float dropout, float ssim_weight, float share, float until = 1) {
     CHECK(r.dropout == dropout);
+    CHECK(r.dropout_until == until);
     CHECK(r.ssim_weight == ssim_weight);
     CHECK(r.split_share == share);
   };
@@ -108,11 +109,19 @@ TEST_CASE("what keeps a training from learning by heart goes by visits, photogra
   is(choice(), 0, 0.3f, 0);
   traits.brightness_step = 0.05;
   REQUIRE(gart::choose_exposure(traits).value);
-  is(choice(), 0.25f, 0.6f, 0.25f);
+  is(choice(), 0.01f, 0.6f, 0.25f, 0.95f);  // of 100,001 Gaussians
   options.max_gaussians = 100'000;
   is(choice(), 0, 0.6f, 0.25f);
-  options.max_gaussians = 1'000'000, traits.views = 50;
-  is(choice(), 0.25f, 0.6f, 0.25f);
+  options.max_gaussians = 316'000;
+  is(choice(), 0.15f, 0.6f, 0.25f, 0.95f);
+  options.max_gaussians = 2'000'000;  // the photographs have pixels for a million
+  is(choice(), 0.3f, 0.6f, 0.25f, 0.95f);
+  traits.pixels *= 4;
+  is(choice(), 0.3f, 0.6f, 0.25f, 0.95f);
+  options.error.least_budget = 0;
+  is(choice(), 0.3f, 0.6f, 0.25f, 0.95f);
+  options.error.least_budget = 100'000, options.max_gaussians = 1'000'000, traits.views = 50;
+  is(choice(), 0.3f, 0.6f, 0.25f, 0.95f);
   options.exposure = true;
   is(choice(), 0.2f, 0.3f, 0);
   options.error.split.share = 0.45f;

@@ -5,7 +5,8 @@
 /// opaque,
 ///   o' = o / (1 - r),
 /// that opacities are in the mean what they were. A Gaussian that has one photograph by heart is then of little use:
-/// what is seen has to be shared with others, that more photographs see.
+/// what is seen has to be shared with others, that more photographs see. The last steps, from a share `until` of the
+/// run on, show the whole scene, which is what will be rendered.
 ///
 /// An o' over 0.995 is that, or o where that is more. The gradient by the logit of o' is taken for that by the logit of
 /// o, and what is left out has none. Draws go by the numbers that Gaussians have in the scene, so that ranks draw as
@@ -48,10 +49,14 @@ struct dropout_kernel {
 template <execution E>
 class dropout {
  public:
-  /// For a share of the Gaussians. Errors: invalid_argument for one that is not in [0, 1).
-  dropout(E& exec, float share, u64 seed) : exec_(&exec), share_(share), seed_(seed), shown_(exec) {
+  /// For a share of the Gaussians, until a share of the run. Errors: invalid_argument for what is out of its range.
+  dropout(E& exec, float share, float until, u64 seed)
+      : exec_(&exec), share_(share), until_(until), seed_(seed), shown_(exec) {
     if (!(share >= 0 && share < 1))
       throw invalid_argument("train_options.dropout is " + std::to_string(share) + ": at least 0, less than 1");
+    if (!(until >= 0 && until <= 1))
+      throw invalid_argument("train_options.dropout_until is " + std::to_string(until) +
+                             ": a share of the run, from 0 to 1");
   }
 
   /// Makes room for so many Gaussians.
@@ -77,10 +82,11 @@ class dropout {
     buffer<float, E>* shown_;
   };
 
-  /// Leaves out of `scene`, the rows of these owners, what step `step` is not to show, until the scope ends. The scene
-  /// keeps its count until then.
-  [[nodiscard]] scope leave_out(gaussians<E>& scene, int step, row_owners const& owners) {
-    if (share_ == 0 || scene.size() == 0) return scope(nullptr, nullptr);
+  /// Leaves out of `scene`, the rows of these owners, what step `step` of so many is not to show, until the scope ends.
+  /// The scene keeps its count until then.
+  [[nodiscard]] scope leave_out(gaussians<E>& scene, int step, int iterations, row_owners const& owners) {
+    bool const drops = share_ > 0 && static_cast<float>(step) < until_ * static_cast<float>(iterations);
+    if (!drops || scene.size() == 0) return scope(nullptr, nullptr);
     shown_.resize(scene.size());
     parallel_for(
         *exec_, "dropout", scene.size(),
@@ -92,7 +98,7 @@ class dropout {
 
  private:
   E* exec_;
-  float share_;
+  float share_, until_;
   u64 seed_;
   buffer<float, E> shown_;  // outside of a scope; in one, the scene's own
 };

@@ -89,17 +89,19 @@ chosen<index_t> choose_budget(dataset const& data, train_options const& options)
 
 /// What keeps a training from learning its photographs by heart (docs/training.md).
 struct regularization {
-  float dropout = 0;      ///< train_options::dropout
-  float ssim_weight = 0;  ///< train_options::ssim_weight
-  float split_share = 0;  ///< train_options::error.split.share
+  float dropout = 0;        ///< train_options::dropout
+  float dropout_until = 1;  ///< train_options::dropout_until
+  float ssim_weight = 0;    ///< train_options::ssim_weight
+  float split_share = 0;    ///< train_options::error.split.share
 };
 inline constexpr int visits_by_heart = 100;  ///< steps for each photograph, from which on it is chosen
 inline constexpr int few_photographs = 100;  ///< fewer of them are soon learned by heart
 /// What the options say, but for growth by error in an unbounded scene and a run of visits_by_heart. Of few photographs
 /// a step leaves out a fifth of the Gaussians. Where photographs differ in brightness and the options learn no
-/// exposures, veils say what these would have: there it is a quarter, halves are nearer, and most of the loss is
-/// D-SSIM, in which brightness has little part. Nothing is left out where there cannot be more Gaussians than
-/// error_growth_options::least_budget: they have little to learn by heart, and need each other.
+/// exposures, veils say what these would have: there it is 0.3 times the logarithm to base 10 of how many times
+/// error_growth_options::least_budget there may be, at most 0.3, the last twentieth of the steps shows the whole scene,
+/// halves are nearer, and most of the loss is D-SSIM, in which brightness has little part. Nothing is left out where
+/// there cannot be more Gaussians than least_budget: they have little to learn by heart, and need each other.
 chosen<regularization> choose_regularization(capture_traits const& traits, train_options const& options);
 
 /// All of these, as `gart train` takes them: what `request` leaves to gart's choice, and in the options background,

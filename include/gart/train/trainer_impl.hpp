@@ -28,7 +28,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       loss_(exec),
       images_(exec, data),
       order_(data.train.size(), options.held_out, options.seed),
-      dropout_(exec, options.dropout, options.seed),
+      dropout_(exec, options.dropout, options.dropout_until, options.seed),
       error_(exec, error_options_of(options, data),
              growth_budget(options.error, options.max_gaussians, data.training_pixels()), options.iterations,
              options.seed),
@@ -135,7 +135,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
   std::size_t const floats = std::size_t{3} * seen.width * seen.height;
   color_.resize(floats), color_gradient_.resize(floats);
 
-  auto shown = dropout_.leave_out(scene_, step_, all_rows().owners());
+  auto shown = dropout_.leave_out(scene_, step_, options_.iterations, all_rows().owners());
   frame_.prepare(std::as_const(scene_).view(), seen, render, degree);
   span<float const> moments;
   char const* used = nullptr;

@@ -55,7 +55,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
   lt_bytes_ = 0, shards_.arrived.reset();
   shrink_ = shrink_at(options_.resolution, step_, options_.iterations);
   step_report report;
-  auto shown = dropout_.leave_out(scene_, before, shards_.rows.owners());
+  auto shown = dropout_.leave_out(scene_, before, options_.iterations, shards_.rows.owners());
   for (int done = 0; done < batch;) {
     int const views = std::min(batch - done, ranks);
     span<image_result> const round =
