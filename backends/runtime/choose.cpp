@@ -97,10 +97,12 @@ std::string folds(capture_traits const& t) {
   return "the lenses of " + counted(t.folding, "view") + " are not one to one over the image, and footprints need that";
 }
 
-// The fewer Gaussians there are, the less another can stand in for one that is left out. In hundredths, upwards.
+// The fewer Gaussians there are, the less another can stand in for one that is left out. In whole hundredths, upwards:
+// none only where there are no more than the least budget.
 float rising_dropout(index_t budget, error_growth_options const& options) {
+  constexpr double most_hundredths = 30;
   double const times = static_cast<double>(budget) / std::max(options.least_budget, 1);
-  return static_cast<float>(std::ceil(30 * std::clamp(std::log10(times), 0.0, 1.0)) / 100);
+  return static_cast<float>(std::ceil(most_hundredths * std::clamp(std::log10(times), 0.0, 1.0)) / 100);
 }
 
 }  // namespace

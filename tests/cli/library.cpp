@@ -39,6 +39,19 @@ void repaint(fs::path const& capture, Paint const& paint) {
   }
 }
 
+// Something of many colours in place of the background, all images as bright; `uneven`: every other one half as bright.
+void fill_images(fs::path const& capture, bool uneven) {
+  repaint(capture, [uneven](gart::image8& image, int view) {
+    double sum = 0;
+    for (std::size_t i = 0; i < image.data.size(); ++i) {
+      if (image.data[i] == 20) image.data[i] = static_cast<u8>(60 + 37 * i % 150);
+      sum += image.data[i];
+    }
+    double const mean = uneven && view % 2 ? 50 : 100, gain = mean * static_cast<double>(image.data.size()) / sum;
+    for (u8& v : image.data) v = static_cast<u8>(gain * v);
+  });
+}
+
 }  // namespace
 
 TEST_CASE("a short program over the library and gart train give the same bits") {
@@ -64,23 +77,19 @@ TEST_CASE("a short program over the library and gart train give the same bits") 
   });
   CHECK(same("white").background == gart::background_kind::white);
 
+  write_capture(here / "even");
+  fill_images(here / "even", false);
+  CHECK(!same("even").exposure);
+
   write_capture(here / "uneven");
-  repaint(here / "uneven", [](gart::image8& image, int view) {
-    for (std::size_t i = 0; i < image.data.size(); ++i) {
-      int const v = image.data[i] == 20 ? static_cast<int>(60 + 37 * i % 150) : image.data[i];
-      image.data[i] = static_cast<u8>(view % 2 ? v / 2 : v);
-    }
-  });
+  fill_images(here / "uneven", true);
   CHECK(same("uneven").exposure);
 }
 
 TEST_CASE("what keeps a training from learning by heart is chosen by both, recorded, and gives way to what is given") {
   folder const here;
   write_capture(here / "few");
-  repaint(here / "few", [](gart::image8& image, int) {
-    for (std::size_t i = 0; i < image.data.size(); ++i)
-      if (image.data[i] == 20) image.data[i] = static_cast<u8>(60 + 37 * i % 150);
-  });
+  fill_images(here / "few", false);
   gart::train_options options;
   options.iterations = 700, options.max_gaussians = 60, options.error.least_budget = 30;
   options.error.pixels_each = 25;  // for 40 Gaussians
@@ -122,12 +131,7 @@ TEST_CASE("what keeps a training from learning by heart is chosen by both, recor
 TEST_CASE("where photographs differ in brightness and no exposure is learned, more is chosen against veils") {
   folder const here;
   write_capture(here / "few");
-  repaint(here / "few", [](gart::image8& image, int view) {
-    for (std::size_t i = 0; i < image.data.size(); ++i) {
-      int const v = image.data[i] == 20 ? static_cast<int>(60 + 37 * i % 150) : image.data[i];
-      image.data[i] = static_cast<u8>(view % 2 ? v / 2 : v);
-    }
-  });
+  fill_images(here / "few", true);
   std::string const rules = "error.least_budget=30,error.pixels_each=25",
                     of_run = "--max-gaussians 60 --backend serial ";
   auto const settings = [&](std::string const& out, std::string const& more) {

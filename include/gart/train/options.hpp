@@ -60,7 +60,7 @@ struct train_options {
   float initial_scale = 0;   ///< times the distance to the neighbours; 0 as above
   float ssim_weight = 0.2f;  ///< share of D-SSIM in the loss, the rest is L1
   float dropout = 0;         ///< share of the Gaussians that each step leaves out (optim/dropout.hpp)
-  float dropout_until = 1;   ///< share of the run after which they leave out none
+  float dropout_until = 1;   ///< share of the run after which steps leave out none
   /// Of the depth's loss beside the colours', in units of the scene's extent (loss/depth_loss.hpp); 0: depth is not
   /// looked at. The dataset must have maps (dataset_options.depth).
   float depth_weight = 0;
