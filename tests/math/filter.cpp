@@ -208,6 +208,30 @@ TEST_CASE("a widened Gaussian covers what it did, and grows by the filter") {
   CHECK(worst_sigma < 2e-5);
 }
 
+TEST_CASE("a filter leaves most of what is seen along its shortest axis") {
+  CAPTURE(gart_test::seed());
+  source from(gart_test::seed() + 5);
+  for (int trial = 0; trial < 300; ++trial) {
+    double const r = static_cast<float>(std::exp(from.uniform(-7, 2)));
+    parameters p = gaussian(from, r);
+    auto const share = [&](Vector3d const& direction) {
+      parameters q = p;
+      for (std::size_t k = 0; k < 3; ++k) q[k] = 3 * direction[static_cast<int>(k)];
+      return std::exp(seen_through(q, r).log_sigma + std::log1p(std::exp(-p[10])));
+    };
+    gart::gaussian_parameters const g = stored(p);
+    double const most = gart::largest_share_left(g.log_scale, static_cast<float>(r));
+    double seen = 0;
+    for (int k = 0; k < 50; ++k) seen = std::max(seen, share(from.direction()));
+    CHECK(seen <= most * (1 + 1e-5));
+    gart::mat3 const turn = gart::to_matrix(g.rotation);
+    for (int k = 0; k < 3; ++k) seen = std::max(seen, share(Vector3d(turn[k].x, turn[k].y, turn[k].z)));
+    CHECK(seen == doctest::Approx(most).epsilon(2e-5));
+  }
+  CHECK(gart::largest_share_left(gart::vec3(2.0f), 0.0f) == 1);
+  CHECK(gart::largest_share_left(gart::vec3(-INFINITY), 1.0f) == 0);
+}
+
 TEST_CASE("the way back through the filter is the derivative of the way there") {
   CAPTURE(gart_test::seed());
   source from(gart_test::seed() + 3);

@@ -81,6 +81,18 @@ GART_HD GART_INLINE gaussian_parameters widened(gaussian_parameters const& g, ve
   return out;
 }
 
+/// The largest share of its opacity that a Gaussian keeps under a filter, of all directions it may be seen from: along
+/// its shortest axis, where the other two are widened. F is a mean of such products, weighted by the direction.
+GART_HD GART_INLINE float largest_share_left(vec3 const& log_scale, float r) {
+  float left[3];
+  for (int k = 0; k < 3; ++k) {
+    float const ratio = exponential(log_scale[k]) / r, square = ratio * ratio;
+    left[k] = ratio < largest_filter_ratio ? square / (1.0f + square) : 1.0f;
+  }
+  float const first = left[0] > left[1] ? left[0] : left[1], less = left[0] > left[1] ? left[1] : left[0];
+  return square_root(first * (less > left[2] ? less : left[2]));
+}
+
 /// From the gradient of the widened parameters to that of the stored ones; by_log_sigma is dL/d ln sigma', the moment
 /// m0. Each may depend on the mean by the direction and by r, on the scales and on the rotation by F:
 ///   d ln s'_k / d ln s_k = a_k / (1 + a_k), the rest of 1 is d ln s'_k / d ln r;

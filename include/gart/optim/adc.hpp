@@ -66,8 +66,9 @@ struct adc_rule {
   float const* sum;
   u32 const* touched;
   float gradient, prune_opacity;
-  float split_scale;  // larger ones split
-  float prune_scale;  // larger ones go
+  float split_scale;    // larger ones split
+  float prune_scale;    // larger ones go
+  float const* filter;  // or null
 
   GART_HD float statistic(index_t i) const { return touched[i] ? sum[i] / static_cast<float>(touched[i]) : 0.0f; }
   GART_HD float largest_scale(index_t i) const {
@@ -77,7 +78,7 @@ struct adc_rule {
   GART_HD u32 outcome(index_t i) const {
     bool finite = is_finite(model.opacity[i]);
     for (index_t c = 0; c < geometry_columns; ++c) finite = finite && is_finite(row_element(model, i, c));
-    float const opacity = sigmoid(model.opacity[i]), scale = largest_scale(i);
+    float const opacity = opacity_shown(model, i, filter), scale = largest_scale(i);
     if (!finite || !(opacity >= prune_opacity)) return adc_gone;
     bool const grows = statistic(i) >= gradient;
     bool const split = grows && scale > split_scale;
@@ -219,16 +220,18 @@ class adaptive_density {
 
   /// After the optimizer's step: densification and the reset of opacities, where they are due.
   template <class Rows = all_rows>
-  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {}) {
+  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {},
+                            span<float const> filter = {}) {
     density_change change;
-    if (due(step)) change = densify(model, state, step, rows);
+    if (due(step)) change = densify(model, state, step, rows, filter);
     if (running(step) && passes(step, options_.opacity_reset_every, batch_)) reset_opacity(model, state);
     return change;
   }
 
-  /// Clones, splits and prunes. `rows`: all_rows, or as it.
+  /// Clones, splits and prunes. `rows`: all_rows, or as it; `filter`: as opacity_shown has it.
   template <class Rows = all_rows>
-  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {}) {
+  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {},
+                         span<float const> filter = {}) {
     stage_scope stage(*exec_, "densify");
     density_change change;
     index_t const here = model.size(), n = rows.total(here);
@@ -243,7 +246,8 @@ class adaptive_density {
                                 options_.gradient,
                                 options_.prune_opacity,
                                 options_.dense * extent_,
-                                was_reset ? options_.prune_scale * extent_ : INFINITY};
+                                was_reset ? options_.prune_scale * extent_ : INFINITY,
+                                filter.data()};
     outcome_.resize(here);
     parallel_for(*exec_, "adc_plan", here, detail::adc_plan_kernel{rule, outcome_.data()});
     rows.gather(*exec_, outcome_);

@@ -66,13 +66,14 @@ struct error_key_kernel {
   row_owners owners;
   float const* sum;
   float dead_opacity;
+  float const* filter;  // or null
   random_source random;
   u32* dead;
   u32* drawable;
   u32* key;
   u32* id;
   GART_KERNEL void operator()(index_t i) const {
-    bool const lives = is_alive(model, i, dead_opacity);
+    bool const lives = is_alive(model, i, dead_opacity, filter);
     float const weight = sum[i] * sigmoid(model.opacity[i]);
     bool const fits = lives && weight > 0 && is_finite(weight);
     float const u = (static_cast<float>(random.words(owners.global(i)).v[0] >> 8) + 0.5f) * 0x1p-24f;
@@ -208,13 +209,16 @@ class error_growth {
 
   /// After the optimizer's step.
   template <class Rows = all_rows>
-  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {}) {
-    return due(step) ? densify(model, state, step, rows) : density_change{};
+  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {},
+                            span<float const> filter = {}) {
+    return due(step) ? densify(model, state, step, rows, filter) : density_change{};
   }
 
-  /// Splits those with the most error, and moves the dead. `rows`: all_rows, or as it.
+  /// Splits those with the most error, and moves the dead. `rows`: all_rows, or as it; `filter`: as opacity_shown has
+  /// it.
   template <class Rows = all_rows>
-  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {}) {
+  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {},
+                         span<float const> filter = {}) {
     stage_scope stage(*exec_, "densify");
     density_change change;
     index_t const here = model.size(), n = rows.total(here);
@@ -227,6 +231,7 @@ class error_growth {
                                           owners,
                                           errors,
                                           options_.dead_opacity,
+                                          filter.data(),
                                           {seed_, static_cast<u32>(step), random_use::growth},
                                           dead_.data(),
                                           drawable_.data(),

@@ -58,12 +58,13 @@ namespace detail {
 struct mcmc_weight_kernel {
   gaussians_view<float const> model;
   float dead_opacity;
-  u32* weight;  // 0 for the dead
+  float const* filter;  // or null
+  u32* weight;          // 0 for the dead
   u32* dead;
 
   GART_KERNEL void operator()(index_t i) const {
     float const o = sigmoid(model.opacity[i]);
-    bool const alive = is_alive(model, i, dead_opacity);
+    bool const alive = is_alive(model, i, dead_opacity, filter);
     dead[i] = !alive;
     u32 const fixed = static_cast<u32>(static_cast<double>(o < 1 ? o : 1.0f) * 4294967295.0 * alive);
     weight[i] = alive && fixed == 0 ? 1u : fixed;
@@ -223,22 +224,23 @@ class mcmc {
   /// After the optimizer's step: relocation and growth where they are due, and the noise. `mean_rate` is the rate the
   /// means had in this step.
   template <class Rows = all_rows>
-  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, float mean_rate,
-                            Rows&& rows = {}) {
+  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, float mean_rate, Rows&& rows = {},
+                            span<float const> filter = {}) {
     density_change change;
-    if (due(step)) change = densify(model, state, step, rows);
+    if (due(step)) change = densify(model, state, step, rows, filter);
     add_noise(model, step, mean_rate, rows.owners());
     return change;
   }
 
-  /// Relocates and grows. `rows`: all_rows, or as it.
+  /// Relocates and grows. `rows`: all_rows, or as it; `filter`: as opacity_shown has it.
   template <class Rows = all_rows>
-  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {}) {
+  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {},
+                         span<float const> filter = {}) {
     stage_scope stage(*exec_, "densify");
     density_change change;
     index_t const n = rows.total(model.size());
     if (n == 0) return change;
-    weigh(model, options_.dead_opacity, rows);
+    weigh(model, options_.dead_opacity, filter.data(), rows);
     u64 totals[2];
     exec_->copy_out(totals, totals_.data(), sizeof totals);
     if (totals[0] == 0) return change;
@@ -255,7 +257,7 @@ class mcmc {
     if (goal > n) {
       change.added = goal - n;
       // Relocation may have left Gaussians at the opacity that counts as dead; all but broken ones may be drawn here.
-      weigh(model, 0, rows);
+      weigh(model, 0, nullptr, rows);
       index_t const next = rows.here(goal);
       model.resize_keep(next), state.first.resize_keep(next), state.second.resize_keep(next);
       target_.resize(change.added);
@@ -278,11 +280,11 @@ class mcmc {
 
  private:
   template <class Rows>
-  void weigh(gaussians<E> const& model, float dead_opacity, Rows& rows) {
+  void weigh(gaussians<E> const& model, float dead_opacity, float const* filter, Rows& rows) {
     index_t const here = model.size(), n = rows.total(here);
     weight_.resize(here), dead_.resize(here), before_.resize(n), dead_before_.resize(n);
     parallel_for(*exec_, "mcmc_weights", here,
-                 detail::mcmc_weight_kernel{model.view(), dead_opacity, weight_.data(), dead_.data()});
+                 detail::mcmc_weight_kernel{model.view(), dead_opacity, filter, weight_.data(), dead_.data()});
     rows.gather(*exec_, weight_), rows.gather(*exec_, dead_);
     exclusive_scan(*exec_, span<u32 const>(weight_), before_.view(), totals_.view().subspan(0, 1));
     exclusive_scan(*exec_, span<u32 const>(dead_), dead_before_.view(), totals_.view().subspan(1, 1));

@@ -7,6 +7,7 @@
 #include <gart/comm/row_owners.hpp>
 #include <gart/exec/concepts.hpp>
 #include <gart/math/ray_gaussian.hpp>
+#include <gart/math/widened.hpp>
 #include <gart/optim/adam.hpp>
 #include <gart/scene/gaussians.hpp>
 
@@ -38,9 +39,20 @@ GART_HD GART_INLINE T& row_element(gaussians_view<T> const& g, index_t row, inde
   return *element;
 }
 
-/// Whether a Gaussian is of use: its opacity above the least, and it and the geometry finite.
-GART_HD inline bool is_alive(gaussians_view<float const> const& g, index_t row, float least_opacity) {
-  bool alive = is_finite(g.opacity[row]) && sigmoid(g.opacity[row]) > least_opacity;
+/// The largest opacity that a Gaussian may be seen with. `filter`: of each Gaussian, the narrowest filter that a
+/// training view has where it is (train/least_filter.hpp); null where there is none.
+GART_HD inline float opacity_shown(gaussians_view<float const> const& g, index_t row, float const* filter) {
+  float const own = sigmoid(g.opacity[row]);
+  if (!filter) return own;
+  float const* const s = g.log_scale + std::size_t{3} * row;
+  return own * largest_share_left(vec3(s[0], s[1], s[2]), filter[row]);
+}
+
+/// Whether a Gaussian is of use: the opacity that it may be seen with above the least, and it and the geometry finite.
+/// One that no view's filter leaves anything of is met by no ray, and has no gradient that would bring it back.
+GART_HD inline bool is_alive(gaussians_view<float const> const& g, index_t row, float least_opacity,
+                             float const* filter = nullptr) {
+  bool alive = is_finite(g.opacity[row]) && opacity_shown(g, row, filter) > least_opacity;
   for (index_t c = 0; c < geometry_columns; ++c) alive = alive && is_finite(row_element(g, row, c));
   return alive;
 }

@@ -44,6 +44,7 @@
 #include <gart/scene/traits.hpp>
 #include <gart/train/checkpoint_part.hpp>
 #include <gart/train/depth_supervision.hpp>
+#include <gart/train/least_filter.hpp>
 #include <gart/train/memory_need.hpp>
 #include <gart/train/options.hpp>
 #include <gart/train/resolution.hpp>
@@ -244,6 +245,18 @@ class basic_trainer {
   bool learns_lenses() const { return lenses_ && lenses_->learns(step_, options_.iterations); }
 
   bool grows_by_error() const { return options_.densify == densify_kind::error; }
+  bool densifies() const {
+    switch (options_.densify) {
+      case densify_kind::error:
+        return error_.due(step_);
+      case densify_kind::mcmc:
+        return mcmc_.due(step_);
+      case densify_kind::adc:
+        return adc_.due(step_);
+      default:
+        return false;
+    }
+  }
   vec3 background_of(int step) const;
   static mcmc_options mcmc_options_of(train_options const& options) {
     mcmc_options m = options.mcmc;
@@ -279,6 +292,7 @@ class basic_trainer {
   training_images<E> images_;
   view_order order_;
   dropout<E> dropout_;
+  least_filter<E> least_filter_;
   error_growth<E> error_;
   buffer<float, E> error_map_;  // of the step's image, where densification asks for it
   mcmc<E> mcmc_;

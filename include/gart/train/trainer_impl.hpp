@@ -29,6 +29,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       images_(exec, data),
       order_(data.train.size(), options.held_out, options.seed),
       dropout_(exec, options.dropout, options.dropout_until, options.seed),
+      least_filter_(exec),
       error_(exec, error_options_of(options, data),
              growth_budget(options.error, options.max_gaussians, data.training_pixels()), options.iterations,
              options.seed),
@@ -230,10 +231,17 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates c
     adam.all(exec_);
   else
     move_parameters(adam);
+  span<float const> filter;
+  if (options_.render.antialias > 0 && densifies()) {
+    std::vector<std::size_t> const views = views_trained_on(data_.train.size(), options_.held_out);
+    filter = least_filter_.of(
+        exec_, scene_.view(), views.size(), [&](std::size_t k) { return seen_by(views[k]); },
+        options_.render.antialias);
+  }
   density_change change;
-  if (grows_by_error()) change = error_.after_step(scene_, state_, step_, rows);
-  if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean, rows);
-  if (use_adc) change = adc_.after_step(scene_, state_, step_, rows);
+  if (grows_by_error()) change = error_.after_step(scene_, state_, step_, rows, filter);
+  if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean, rows, filter);
+  if (use_adc) change = adc_.after_step(scene_, state_, step_, rows, filter);
   total_ += change.added - change.removed;
   if (!change.added && !change.removed) return;
   gradients_.resize_keep(scene_.size());
