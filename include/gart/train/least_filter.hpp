@@ -38,6 +38,9 @@ class least_filter {
   /// Allocates nothing; `exec` must outlive it.
   explicit least_filter(E& exec) : least_(exec) {}
 
+  /// Makes room for so many Gaussians.
+  void reserve(u64 count) { least_.reserve(count); }
+
   /// camera view(k) for k under `views`; pixels: the filter's standard deviation. [N], valid until the next call.
   template <class View>
   span<float const> of(E& exec, gaussians_view<float const> scene, std::size_t views, View const& view, float pixels) {

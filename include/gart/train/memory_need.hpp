@@ -63,7 +63,9 @@ void require_room(E& exec, Comm& comm, train_options const& options, dataset con
                            std::to_string(comm.size()) + (comm.size() == 1 ? " rank" : " ranks") +
                            " are more than the " + std::to_string(most_gaussians) +
                            " that a rank can hold; lower it, or take more ranks");
-  u64 const shown = options.dropout > 0 ? sizeof(float) * row_owners{comm.size(), 0, block}.owned(gaussians) : 0;
+  u64 const rows = row_owners{comm.size(), 0, block}.owned(gaussians);
+  u64 const shown =
+      (options.dropout > 0 ? sizeof(float) * rows : 0) + (options.render.antialias > 0 ? sizeof(float) * rows : 0);
   u64 const need = least_bytes(gaussians, sh_degree, comm.size(), block, options.batch) + shown;
   if (free == 0 || need <= free) return;
   u64 const fit = free / (need / std::max<u64>(gaussians, 1) + 1);

@@ -100,6 +100,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::make_room() {
   if constexpr (!Comm::alone) here = shards_.rows.owners().owned(all);
   for (gaussians<E>* each : {&scene_, &gradients_, &state_.first, &state_.second}) each->reserve(here);
   dropout_.reserve(here);
+  if (options_.render.antialias > 0) least_filter_.reserve(here);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
