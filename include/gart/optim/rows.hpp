@@ -51,7 +51,7 @@ GART_HD inline float opacity_shown(gaussians_view<float const> const& g, index_t
 /// Whether a Gaussian is of use: the opacity that it may be seen with above the least, and it and the geometry finite.
 /// One that no view's filter leaves anything of is met by no ray, and has no gradient that would bring it back.
 GART_HD inline bool is_alive(gaussians_view<float const> const& g, index_t row, float least_opacity,
-                             float const* filter = nullptr) {
+                             float const* filter) {
   bool alive = is_finite(g.opacity[row]) && opacity_shown(g, row, filter) > least_opacity;
   for (index_t c = 0; c < geometry_columns; ++c) alive = alive && is_finite(row_element(g, row, c));
   return alive;

@@ -63,10 +63,10 @@ void require_room(E& exec, Comm& comm, train_options const& options, dataset con
                            std::to_string(comm.size()) + (comm.size() == 1 ? " rank" : " ranks") +
                            " are more than the " + std::to_string(most_gaussians) +
                            " that a rank can hold; lower it, or take more ranks");
-  u64 const rows = row_owners{comm.size(), 0, block}.owned(gaussians);
-  u64 const shown =
-      (options.dropout > 0 ? sizeof(float) * rows : 0) + (options.render.antialias > 0 ? sizeof(float) * rows : 0);
-  u64 const need = least_bytes(gaussians, sh_degree, comm.size(), block, options.batch) + shown;
+  // What dropout shows of a Gaussian, and how narrow a filter is there: a float each.
+  u64 const floats = (options.dropout > 0 ? 1u : 0u) + (options.render.antialias > 0 ? 1u : 0u);
+  u64 const need = least_bytes(gaussians, sh_degree, comm.size(), block, options.batch) +
+                   sizeof(float) * floats * row_owners{comm.size(), 0, block}.owned(gaussians);
   if (free == 0 || need <= free) return;
   u64 const fit = free / (need / std::max<u64>(gaussians, 1) + 1);
   throw out_of_memory(E::device ? "CUDA device" : "host", need, free,

@@ -245,18 +245,6 @@ class basic_trainer {
   bool learns_lenses() const { return lenses_ && lenses_->learns(step_, options_.iterations); }
 
   bool grows_by_error() const { return options_.densify == densify_kind::error; }
-  bool densifies() const {
-    switch (options_.densify) {
-      case densify_kind::error:
-        return error_.due(step_);
-      case densify_kind::mcmc:
-        return mcmc_.due(step_);
-      case densify_kind::adc:
-        return adc_.due(step_);
-      default:
-        return false;
-    }
-  }
   vec3 background_of(int step) const;
   static mcmc_options mcmc_options_of(train_options const& options) {
     mcmc_options m = options.mcmc;

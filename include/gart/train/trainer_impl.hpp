@@ -233,7 +233,10 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates c
   else
     move_parameters(adam);
   span<float const> filter;
-  if (options_.render.antialias > 0 && densifies()) {
+  bool const densifies = grows_by_error() ? error_.due(step_)
+                         : use_mcmc       ? mcmc_.due(step_)
+                                          : use_adc && adc_.due(step_);
+  if (options_.render.antialias > 0 && densifies) {
     std::vector<std::size_t> const views = views_trained_on(data_.train.size(), options_.held_out);
     filter = least_filter_.of(
         exec_, scene_.view(), views.size(), [&](std::size_t k) { return seen_by(views[k]); },
