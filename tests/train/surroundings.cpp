@@ -70,9 +70,17 @@ TEST_CASE("a run that cannot have its Gaussians is refused in bytes before it st
                        gart::invalid_argument);
   options.densify = gart::densify_kind::none, options.max_gaussians = 1'000'000;
   made();  // it stays at 150
-  CHECK(gart::least_bytes(200'000'000, 3, 1, 4096, 1) == 211'200'000'000);
-  CHECK(gart::least_bytes(200'000'000, 3, 4, 4096, 4) == (944ull + 112) * 50'000'384);  // blocks are whole
-  CHECK(gart::least_bytes(200'000'000, 3, 4, 4096, 1) == (944ull + 176) * 50'000'384);
+  options.shard_block = 4096, options.batch = 1;
+  CHECK(gart::least_bytes(options, 200'000'000, 3, 1) == 211'200'000'000);
+  CHECK(gart::least_bytes(options, 200'000'000, 3, 4) == (944ull + 176) * 50'000'384);  // blocks are whole
+  options.batch = 4;
+  CHECK(gart::least_bytes(options, 200'000'000, 3, 4) == (944ull + 112) * 50'000'384);
+  options.dropout = 0.1f;  // an opacity
+  CHECK(gart::least_bytes(options, 200'000'000, 3, 4) == (944ull + 112 + 4) * 50'000'384);
+  options.render.antialias = 0.3f;  // the narrowest filter, three sizes and an opacity
+  CHECK(gart::least_bytes(options, 200'000'000, 3, 4) == (944ull + 112 + 24) * 50'000'384);
+  options.batch = 1;  // seen once to be sent, and once by the rank that finishes it
+  CHECK(gart::least_bytes(options, 200'000'000, 3, 4) == (944ull + 176 + 40) * 50'000'384);
 }
 
 TEST_CASE("bands move fast from a capture's points, and at a twentieth of that from random ones") {

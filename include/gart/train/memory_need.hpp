@@ -36,20 +36,28 @@ inline u64 gaussians_at_end(train_options const& options, dataset const& data, u
   }
 }
 
-/// Bytes of a Gaussian on the rank that has it, for ranks that share steps of `batch` images.
-inline u64 bytes_of_gaussian(int sh_degree, int ranks, int batch) {
-  u64 const floats = 11 + 3 * static_cast<u64>(sh_degree + 1) * static_cast<u64>(sh_degree + 1);
-  int const views = std::min(batch, ranks);  // of a round
-  u64 bytes = 16 * floats;
-  // Its record in a view and its moments there; where ranks trace whole views they have these of what a view shows.
-  if (ranks == 1 || views < ranks) bytes += sizeof(ray_gaussian) + moment_stride * sizeof(float);
+/// Which Gaussians the first rank has, which has most.
+inline row_owners owners_of(train_options const& options, int ranks) {
+  return {ranks, 0, std::max<index_t>(options.shard_block, 1)};
+}
+
+/// Bytes of a Gaussian on the rank that has it, of so many ranks.
+inline u64 bytes_of_gaussian(train_options const& options, int sh_degree, int ranks) {
+  u64 const parameters = 11 + 3 * static_cast<u64>(sh_degree + 1) * static_cast<u64>(sh_degree + 1);
+  int const views = std::min(options.batch, ranks);   // of a round
+  bool const finishes = ranks == 1 || views < ranks;  // where ranks trace whole views, those that trace finish
+  u64 bytes = 16 * parameters;
+  if (finishes) bytes += sizeof(ray_gaussian) + moment_stride * sizeof(float);  // its record in a view, its moments
+  if (options.dropout > 0) bytes += sizeof(float);                              // the opacity that a step shows
+  // How narrow the filter gets there; three sizes and an opacity as a view shows them, to be sent and to be finished.
+  if (options.render.antialias > 0) bytes += sizeof(float) * (finishes && ranks > 1 ? 9 : 5);
   if (ranks > 1) bytes += detail::exchange_bytes_of_row(views, ranks);
   return bytes;
 }
 
 /// Bytes of the rank that has most, for so many Gaussians on `ranks` ranks.
-inline u64 least_bytes(u64 gaussians, int sh_degree, int ranks, index_t block, int batch) {
-  return bytes_of_gaussian(sh_degree, ranks, batch) * row_owners{ranks, 0, block}.owned(gaussians);
+inline u64 least_bytes(train_options const& options, u64 gaussians, int sh_degree, int ranks) {
+  return bytes_of_gaussian(options, sh_degree, ranks) * owners_of(options, ranks).owned(gaussians);
 }
 
 /// Throws where the policy has not even that, of what it shares with other ranks.
@@ -57,16 +65,12 @@ template <execution E, class Comm>
 void require_room(E& exec, Comm& comm, train_options const& options, dataset const& data, int sh_degree, u64 start) {
   u64 const free = exec.free_bytes() / static_cast<u64>(comm.sharers()),
             gaussians = gaussians_at_end(options, data, start);
-  index_t const block = std::max<index_t>(options.shard_block, 1);
-  if (row_owners{comm.size(), 0, block}.owned(gaussians) > most_gaussians)
+  if (owners_of(options, comm.size()).owned(gaussians) > most_gaussians)
     throw invalid_argument("train_options.max_gaussians: " + std::to_string(gaussians) + " Gaussians on " +
                            std::to_string(comm.size()) + (comm.size() == 1 ? " rank" : " ranks") +
                            " are more than the " + std::to_string(most_gaussians) +
                            " that a rank can hold; lower it, or take more ranks");
-  // What dropout shows of a Gaussian, and how narrow a filter is there: a float each.
-  u64 const floats = (options.dropout > 0 ? 1u : 0u) + (options.render.antialias > 0 ? 1u : 0u);
-  u64 const need = least_bytes(gaussians, sh_degree, comm.size(), block, options.batch) +
-                   sizeof(float) * floats * row_owners{comm.size(), 0, block}.owned(gaussians);
+  u64 const need = least_bytes(options, gaussians, sh_degree, comm.size());
   if (free == 0 || need <= free) return;
   u64 const fit = free / (need / std::max<u64>(gaussians, 1) + 1);
   throw out_of_memory(E::device ? "CUDA device" : "host", need, free,
