@@ -317,12 +317,12 @@ TEST_CASE("more ranks than Gaussians, than rows of tiles, than anything to see")
 TEST_CASE("a Gaussian that no view shows takes the bytes that were told before, and hardly more") {
   constexpr index_t unseen = 40'000;
   int const ranks = mpi_comm().size();
-  for (int const batch : {1, ranks}) {
+  for (auto const& [batch, antialias] : {std::pair{1, 0.0f}, {ranks, 0.0f}, {1, 0.3f}, {ranks, 0.3f}}) {
+    train_options options = short_run(densify_kind::none);
+    options.batch = batch, options.lt_budget = 1 << 26, options.render.antialias = antialias;
     auto const peak = [&](index_t more) {
       exec_type exec = gart_test::make_exec();
       dataset const data = gart_test::capture(exec, 4);
-      train_options options = short_run(densify_kind::none);
-      options.batch = batch, options.lt_budget = 1 << 26;
       gaussian_model start = gart_test::cloud(11, 0.5f);
       std::size_t const seen = start.size();
       start.resize(seen + more, start.sh_degree);
@@ -331,9 +331,10 @@ TEST_CASE("a Gaussian that no view shows takes the bytes that were told before, 
       shared run(exec, options, data, start, every_rank());
       return run.step(), run.step(), static_cast<double>(exec.memory.peak);
     };
-    double const told = static_cast<double>(bytes_of_gaussian(1, ranks, batch)) * unseen / ranks,
+    double const told = static_cast<double>(bytes_of_gaussian(options, 1, ranks)) * unseen / ranks,
                  taken = peak(unseen) - peak(0);
     CAPTURE(batch);
+    CAPTURE(antialias);
     CHECK(taken / told > 0.98);                       // a block more here, and less there
     CHECK(taken / told < (ranks == 1 ? 1.1 : 1.02));  // one rank has its own lists of all
   }
