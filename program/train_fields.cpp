@@ -34,6 +34,7 @@ std::vector<field> const& fields() {
   static std::vector<field> const all{
       named("near", [](options& o) -> float& { return o.near; }),
       named("ssim_weight", [](options& o) -> float& { return o.ssim_weight; }),
+      named("antialias", [](options& o) -> float& { return o.render.antialias; }),
       named("dropout", [](options& o) -> float& { return o.dropout; }),
       named("dropout_until", [](options& o) -> float& { return o.dropout_until; }),
       named("resolution.quarter_until", [](options& o) -> float& { return o.resolution.quarter_until; }),
