@@ -4,7 +4,7 @@
 #include "train_fields.hpp"
 
 #include <gart/optim/error_growth.hpp>
-#include <gart/runtime/degree_selection.hpp>
+#include <gart/runtime/validation.hpp>
 #include <gart/train/resolution.hpp>
 
 #include <algorithm>
@@ -43,6 +43,14 @@ gart::chosen<std::string> sizes_in_words(gart::dataset const& data, gart::train_
           "few and large Gaussians need no more pixels"};
 }
 
+// Of a setting that has an option of its own; null for those of --set.
+std::string* option_of(train_arguments& a, std::string const& setting) {
+  return setting == "exposure"     ? &a.exposure
+         : setting == "vignetting" ? &a.vignetting
+         : setting == "densify"    ? &a.densify
+                                   : nullptr;
+}
+
 }  // namespace
 
 gart::chosen<std::string> background_for(gart::capture_traits const& traits) {
@@ -70,10 +78,6 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   auto const tracer = gart::choose_tracer(traits);
   settle("--tracer", a.tracer, {gart::to_string(tracer.value), tracer.why});
   settle("--backward", a.backward, gart::choose_backward(traits));
-  auto const exposure = gart::choose_exposure(traits);
-  settle("--exposure", a.exposure, {exposure.value ? "on" : "off", exposure.why});
-  auto const vignetting = gart::choose_vignetting(traits);
-  settle("--vignetting", a.vignetting, {vignetting.value ? "on" : "off", vignetting.why});
   say("masks", traits.masked ? std::to_string(traits.masked) + " of " + std::to_string(traits.views) : "none",
       traits.masked ? "what they exclude counts in no loss" : "the capture has none");
 
@@ -92,32 +96,12 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   if (options.densify != gart::densify_kind::none) say("budget", with_commas(budget.value), budget.why);
   auto const [sizes, why_sizes] = sizes_in_words(data, options);
   say("images", sizes, why_sizes);
-  auto const careful = gart::choose_regularization(traits, options);
-  // What is chosen is recorded as if it had been given: a resumed run has that, and chooses nothing.
-  auto const settle_field = [&](std::string const& name, float as_said, float choice) {
-    bool const given = sets_field(a.set, name), changes = !given && !a.resume && choice != as_said;
-    if (given || changes) say("--set " + name, short_number(given ? as_said : choice), given ? by_option : careful.why);
-    if (changes) a.set = name + "=" + short_number(choice) + (a.set.empty() ? "" : "," + a.set);
-    return given || changes;
-  };
-  settle_field("dropout", options.dropout, careful.value.dropout);
-  if (train_options_of(a).dropout > 0)
-    settle_field("dropout_until", options.dropout_until, careful.value.dropout_until);
-  settle_field("ssim_weight", options.ssim_weight, careful.value.ssim_weight);
-  if (!settle_field("error.split.share", options.error.split.share, careful.value.split_share) &&
-      options.densify == gart::densify_kind::error) {
+  if (options.densify == gart::densify_kind::error && !sets_field(a.set, "error.split.share")) {
     float const share = gart::split_share(options.error, options.max_gaussians, traits.pixels);
     say("--set error.split.share", short_number(share),
         budget.value < options.max_gaussians ? "their pixels end growth, and nearer halves take more memory"
                                              : "near halves fit what they share");
   }
-  gart::configuration_request const wanted = configuration_request_of(a);
-  auto const plan = gart::plan_trials(wanted, options, data.train.size());
-  bool const measured = !plan.held_out.empty();
-  say("--sh-degree", (measured ? "at most " : "") + std::to_string(wanted.sh_degree),
-      a.sh_degree != "auto" ? by_option
-      : !a.automatic        ? "every band; --auto measures which pay"
-                            : plan.why);
   return all;
 }
 
@@ -131,29 +115,48 @@ nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const&
   return *found;
 }
 
-nlohmann::json trials_of(std::vector<gart::band_trial> const& trials) {
-  nlohmann::json all = nlohmann::json::array();
-  for (auto const& t : trials) {
-    all.push_back({{"band", t.band},
-                   {"step", t.step},
-                   {"psnr_with", t.with},
-                   {"psnr_without", t.without},
-                   {"gain", t.gain()},
-                   {"gain_error", t.error},
-                   {"forecast", t.forecast},
-                   {"gain_wanted", t.gain_wanted},
-                   {"kept", t.kept()}});
-  }
-  return all;
+nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::validation_progress const& progress) {
+  gart::train_options const options = train_options_of(a);
+  std::vector<gart::candidate> candidates;
+  if (a.automatic) candidates = gart::usual_candidates(gart::inspect(data), options);
+  std::erase_if(candidates, [&](gart::candidate const& c) {
+    std::string const* const own = option_of(a, c.setting);
+    return own ? *own != "auto" : sets_field(a.set, c.setting);
+  });
+  gart::validation const found = gart::validate(configuration_request_of(a), options, data, candidates, progress);
+  nlohmann::json trials = nlohmann::json::array();
+  for (gart::trial const& t : found.trials)
+    trials.push_back({{"setting", t.setting},
+                      {"value", t.value},
+                      {"psnr", t.psnr},
+                      {"gain", t.gain},
+                      {"noise", t.noise},
+                      {"taken", t.taken}});
+  return {{"held_out", found.plan.held_out.size()},
+          {"shrink", found.plan.shrink},
+          {"steps", found.plan.steps},
+          {"trials", trials},
+          {"why", a.automatic ? found.plan.why : "--no-auto: the literature's settings"}};
 }
 
-std::string in_words(gart::band_trial const& t) {
-  return "SH band " + std::to_string(t.band) + ": " + fixed(t.with, 3) + " dB on the views held out, " +
-         fixed(t.without, 3) + " dB without it: a gain of " + fixed(t.gain(), 3) + " dB, give or take " +
-         fixed(t.error, 3) + ", by the end at most " + fixed(t.forecast, 3) + " dB: " +
-         (!t.kept()                    ? "goes"
-          : t.forecast < t.gain_wanted ? "the views differ too much to tell, and it stays"
-                                       : "stays");
+void settle(train_arguments& a, nlohmann::json const& measured, nlohmann::json& chosen) {
+  auto const say = [&](std::string const& what, std::string const& value, std::string const& why) {
+    chosen.push_back({{"option", what}, {"value", value}, {"why", why}});
+  };
+  say("measured", measured["trials"].empty() ? "nothing" : "on held-out views", measured["why"]);
+  for (auto const& t : measured["trials"]) {
+    std::string const setting = t["setting"], value = t["value"];
+    if (setting.empty()) continue;
+    std::string* const own = option_of(a, setting);
+    double const gain = t["gain"];
+    if (t["taken"] && own) *own = value;
+    if (t["taken"] && !own) a.set = with_field(a.set, setting, value);
+    say((own ? "--" : "--set ") + setting + " " + value, t["taken"] ? "taken" : "left",
+        (gain < 0 ? "" : "+") + fixed(gain, 2) + " dB, give or take " + fixed(t["noise"].get<double>(), 2));
+  }
+  // What nothing was measured of is as the literature has it.
+  for (auto const& [own, usual] : {std::pair{&a.exposure, "off"}, {&a.vignetting, "off"}, {&a.densify, "error"}})
+    if (*own == "auto") *own = usual;
 }
 
 }  // namespace gart_cli

@@ -22,8 +22,9 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data);
 // What a run that is resumed had chosen, as its config.json has it; `now` where that does not say.
 nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const& now);
 
-// What was measured since: the degree the run ended in, and each trial.
-nlohmann::json trials_of(std::vector<gart::band_trial> const& trials);
-std::string in_words(gart::band_trial const& trial);
+// Tries in short trainings what the command line leaves open (gart/runtime/validation.hpp): how, and each trial.
+nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::validation_progress const& progress);
+// Settles in `a` what was measured, and adds it to the choices.
+void settle(train_arguments& a, nlohmann::json const& measured, nlohmann::json& chosen);
 
 }  // namespace gart_cli

@@ -17,7 +17,6 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(train_options, max_gaussians), "--max-gaussians"},
       {GART_CLI_FIELD(train_options, random_points), "--points"},
       {GART_CLI_FIELD(train_options, densify), "--densify"},
-      {GART_CLI_FIELD(train_options, sh_gain), "--sh-gain"},
       {GART_CLI_FIELD(train_options, background), "--background"},
       {GART_CLI_FIELD(train_options, initial_opacity), "--init-opacity"},
       {GART_CLI_FIELD(train_options, initial_scale), "--init-scale"},

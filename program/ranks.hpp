@@ -47,6 +47,11 @@ class ranks {
     broadcast(&value, sizeof value);
     return value;
   }
+  static std::string agreed_text(std::string text) {
+    text.resize(agreed(text.size()));
+    broadcast(text.data(), text.size());
+    return text;
+  }
   // What each has, on all of them, in their order.
   template <class T>
   static std::vector<T> of_all(T const& mine) {

@@ -128,21 +128,23 @@ std::string choices(json const& m) {
             text_of(c, "why") + "</td></tr>";
   }
   html += "</table></div>";
-  if (!m.contains("sh_trials") || m["sh_trials"].empty()) return html;
-  html +=
-      "<p class=\"soft\">Bands of spherical harmonics on trial: PSNR of training views held out, where two branches of "
-      "the run end, with the band and without; and how sure the views are of the gain.</p><div "
-      "class=\"box\"><table><tr><th>Band</th><th class=\"n\">with, dB</th><th class=\"n\">without, dB</th><th "
-      "class=\"n\">gain, dB</th><th class=\"n\">by the end, at most, dB</th><th></th></tr>";
-  for (auto const& t : m["sh_trials"]) {
-    html += "<tr><td>" + count_of(t, "band") + "</td><td class=\"n\">" + fixed(number_of(t, "psnr_with"), 3) +
-            "</td><td class=\"n\">" + fixed(number_of(t, "psnr_without"), 3) + "</td><td class=\"n\">" +
-            fixed(number_of(t, "gain"), 3) + " &plusmn; " + fixed(number_of(t, "gain_error"), 3) +
-            "</td><td class=\"n\">" + fixed(number_of(t, "forecast"), 3) + "</td><td>" +
-            (t.value("kept", true) ? "stays" : "goes") + "</td></tr>";
+  if (!m.contains("measured") || m["measured"].value("trials", json::array()).empty()) return html;
+  json const& measured = m["measured"];
+  html += "<p class=\"soft\">Tried before the run: " + text_of(measured, "why") +
+          ". PSNR is of these; a gain counts where it is more than twice its noise.</p><div class=\"box\"><table><tr>"
+          "<th>Setting</th><th>Value</th><th class=\"n\">PSNR, dB</th><th class=\"n\">gain, dB</th><th></th></tr>";
+  for (auto const& t : measured["trials"]) {
+    bool const first = text_of(t, "setting").empty();
+    html += "<tr><td>" + (first ? "as they come" : text_of(t, "setting")) + "</td><td>" + text_of(t, "value") +
+            "</td><td class=\"n\">" + fixed(number_of(t, "psnr"), 3) + "</td><td class=\"n\">" +
+            (first ? "" : fixed(number_of(t, "gain"), 3) + " &plusmn; " + fixed(number_of(t, "noise"), 3)) +
+            "</td><td>" +
+            (first                     ? ""
+             : t.value("taken", false) ? "taken"
+                                       : "left") +
+            "</td></tr>";
   }
-  return html + "</table></div><p>The model has SH degree " + count_of(m, "sh_degree") + ": " +
-         count_of(m, "floats_per_gaussian") + " floats a Gaussian.</p>";
+  return html + "</table></div>";
 }
 
 std::string settings(json const& m, json const& config) {

@@ -60,22 +60,17 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "Rates, degrees\nand densification go by the larger of both shares. Such a run\ndepends on the "
                  "machine and its load, whatever the seed. It may\nbe raised as --iterations may"))
       ->check(between(0, 1e9));
-  in_group(
-      r.add(train, "--densify", a.densify, "NAME",
-            "How Gaussians are added: error (those split through which\nthe image's error is seen, up to "
-            "--max-gaussians), mcmc\n(copies by opacity, random steps), adc (clones and splits by\ngradient) or none"))
-      ->check(name_of_a<gart::densify_kind>());
+  in_group(r.add(train, "--densify", a.densify, "NAME",
+                 "How Gaussians are added: error (those split through which\nthe image's error is seen, up to "
+                 "--max-gaussians), mcmc\n(copies by opacity, random steps), adc (clones and splits by\ngradient) or "
+                 "none;\nauto: error, or what --auto measures"))
+      ->check(one_of({"auto", "error", "mcmc", "adc", "none"}));
   in_group(r.add_flag(train, "--auto,!--no-auto", a.automatic,
-                      "Model only what the scene requires: measure on held-out\ntraining views which bands of "
-                      "spherical harmonics pay, and\nstore no others. --no-auto stores all and holds no view out.\n"
-                      "Where neither is given: --auto from " +
-                          std::to_string(gart::measured_from) +
-                          " steps on; shorter\nruns would miss the views held out"));
-  in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3",
-                 "Degree of the spherical harmonics of colour; auto: 3, or\nwhat --auto measures"))
-      ->check(one_of({"auto", "0", "1", "2", "3"}));
-  in_group(r.add(train, "--sh-gain", a.sh_gain, "DB", "PSNR on the held-out views that a band must buy by the end"))
-      ->check(between(1e-6, 100));
+                      "Measure what the capture asks for before the run: settings\nleft open are tried in short "
+                      "trainings on small images, and\ntraining views held out of them judge (docs/auto.md).\n"
+                      "--no-auto: the literature's settings, the same for all"));
+  in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3", "Degree of the spherical harmonics of colour"))
+      ->check(between(0, 3));
   in_group(r.add(train, "--points", a.points, "N",
                  "Gaussians to start with where the capture has no points: at\nrandom, or where its depth maps are "
                  "trained on, of these"))
@@ -122,11 +117,11 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   group = "Capture";
   in_group(r.add(train, "--exposure", a.exposure, "NAME",
                  "on: learn the exposure and white balance of each photograph;\ntest views get theirs from the "
-                 "training views about them.\nauto: where neighbouring photographs differ in brightness"))
+                 "training views about them.\nauto: where --auto measures a gain"))
       ->check(one_of({"auto", "on", "off"}));
   in_group(r.add(train, "--vignetting", a.vignetting, "NAME",
                  "on: learn by how much each lens darkens the corners of its\nphotographs, three numbers for all of "
-                 "them, which test views\nhave too. auto: where photographs fill their images"))
+                 "them, which test views\nhave too. auto: where --auto measures a gain"))
       ->check(one_of({"auto", "on", "off"}));
   in_group(
       r.add_flag(train, "--refine-poses", a.refine_poses,
@@ -260,7 +255,6 @@ void fill_in(CLI::App const& train, train_arguments& a) {
   set("--alpha-min", a.alpha_min, chosen.alpha_min);
   set("--t-min", a.t_min, chosen.transmittance_min);
   if (chosen.iterations) set("--iterations", a.iterations, chosen.iterations);
-  set("--auto", a.automatic, a.iterations >= gart::measured_from);
 }
 
 void continue_run(train_arguments& a) {
@@ -288,7 +282,7 @@ gart::configuration_request configuration_request_of(train_arguments const& a) {
   wanted.backend = gart::from_string<gart::backend_kind>(a.backend);
   wanted.tracer = gart::from_string<gart::tracer_kind>(a.tracer);
   wanted.backward = a.backward;
-  wanted.sh_degree = a.sh_degree == "auto" ? wanted.sh_degree : std::stoi(a.sh_degree);
+  wanted.sh_degree = a.sh_degree;
   wanted.kernel_degree = a.kernel_degree;
   wanted.arithmetic = gart::from_string<gart::arithmetic_kind>(a.arithmetic);
   wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
@@ -302,7 +296,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.iterations = a.iterations;
   o.max_gaussians = a.max_gaussians;
   o.random_points = std::min(a.points, a.max_gaussians);
-  o.densify = gart::from_string<gart::densify_kind>(a.densify);
+  o.densify = gart::from_string(a.densify, o.densify);
   o.initial_opacity = a.initial_opacity;
   o.initial_scale = a.initial_scale;
   o.exposure = a.exposure == "on", o.vignetting = a.vignetting == "on";
@@ -312,7 +306,6 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.mcmc.opacity_penalty *= a.mcmc_penalty, o.mcmc.scale_penalty *= a.mcmc_penalty;
   o.adam.seen_only = a.adam == "seen";
   o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
-  o.sh_gain = a.automatic && a.sh_degree == "auto" ? a.sh_gain : 0;
   // Until it is settled it decides nothing.
   o.background = gart::from_string(a.background, gart::background_kind::black);
   o.check_finite = a.check_finite;

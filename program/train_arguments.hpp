@@ -29,8 +29,7 @@ struct train_arguments {
   double view_share = 0.1;
 
   // What follows decides the result and is recorded.
-  std::string backend = "auto", tracer = "auto", backward = "auto", densify = "error", background = "auto", start,
-              poses;
+  std::string backend = "auto", tracer = "auto", backward = "auto", densify = "auto", background = "auto", start, poses;
   std::string arithmetic = "exact", lt_format = "auto";
   std::string preset = "exact";
   gart::train_options defaults;
@@ -38,9 +37,8 @@ struct train_arguments {
   double time_budget = 0;  // seconds of training; 0: none
   gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
   int kernel_degree = 2, tile_size = 0, window = 0;
-  bool automatic = false;
-  std::string sh_degree = "auto";
-  float sh_gain = gart::usual_sh_gain;
+  bool automatic = true;
+  int sh_degree = 3;
   int downscale = 1, test_every = 8, eval_every = -1;
   float depth_weight = defaults.depth_weight;
   std::string depth_kind = "auto";
@@ -75,8 +73,7 @@ struct train_arguments {
 };
 
 void add_arguments(CLI::App& train, train_arguments& a);
-// Sets what the command line leaves open: what the preset says, and --auto in runs of gart::measured_from steps or
-// more.
+// Sets what the command line leaves open and the preset says.
 void fill_in(CLI::App const& train, train_arguments& a);
 // Takes the options of the run in `out`, and its dataset where none was named. io_error where there is no such run.
 void continue_run(train_arguments& a);

@@ -115,6 +115,14 @@ void set_fields(options& o, std::string const& settings) {
   }
 }
 
+std::string with_field(std::string const& settings, std::string const& name, std::string const& value) {
+  std::string others;
+  std::istringstream list(settings);
+  for (std::string one; std::getline(list, one, ',');)
+    if (one.substr(0, one.find('=')) != name) others += "," + one;
+  return name + "=" + value + others;
+}
+
 bool sets_field(std::string const& settings, std::string const& name) {
   return ("," + settings).find("," + name + "=") != std::string::npos;
 }

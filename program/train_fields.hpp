@@ -13,5 +13,7 @@ namespace gart_cli {
 void set_fields(gart::train_options& options, std::string const& settings);
 // Whether they name the field.
 bool sets_field(std::string const& settings, std::string const& name);
+// With this value in place of the one they may have.
+std::string with_field(std::string const& settings, std::string const& name, std::string const& value);
 
 }  // namespace gart_cli

@@ -170,7 +170,7 @@ nlohmann::json training_run::metrics_of(gart::scores const& result, gart::scores
   m["iterations"] = session_->steps_done(), m["time_budget"] = a_.time_budget, m["raised"] = raised_;
   m["gaussians"] = gaussians_, m["sh_degree"] = session_->configuration().sh_degree;
   m["floats_per_gaussian"] = 11 + 3 * gart::sh_coefficients(session_->configuration().sh_degree);
-  m["chosen"] = chosen_, m["sh_trials"] = trials_of(session_->trials());
+  m["chosen"] = chosen_, m["measured"] = measured_;
   m["model_bytes"] = fs::file_size(a_.model_file()), m["checkpoint_bytes"] = fs::file_size(a_.checkpoint_file());
   m["backend"] = a_.backend, m["tracer"] = a_.tracer, m["backward"] = configuration_.backward;
   m["kernel_degree"] = configuration_.kernel_degree;
@@ -180,8 +180,11 @@ nlohmann::json training_run::metrics_of(gart::scores const& result, gart::scores
   if (a_.check_finite) m["skipped_updates"] = skipped_updates_;
   m["seconds"] = course_.seconds;
   m["iterations_per_second"] = course_.seconds > 0 ? session_->steps_done() / course_.seconds : 0;
-  m["wall_seconds"] = {
-      {"loading", load_seconds_}, {"training", step_seconds_}, {"testing", test_seconds_}, {"saving", save_seconds_}};
+  m["wall_seconds"] = {{"loading", load_seconds_},
+                       {"measuring", measure_seconds_},
+                       {"training", step_seconds_},
+                       {"testing", test_seconds_},
+                       {"saving", save_seconds_}};
   m["stages_ms"] = nlohmann::json::object();
   for (auto const& [label, time] : session_->profile().stages()) {
     if (profiled_steps_ > 0) m["stages_ms"][label] = time.milliseconds / profiled_steps_;

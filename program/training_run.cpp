@@ -6,7 +6,6 @@
 #include "ranks.hpp"
 
 #include <gart/io/placed_views.hpp>
-#include <gart/runtime/degree_selection.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/train/memory_need.hpp>
 
@@ -57,16 +56,14 @@ void training_run::prepare() {
     if (choice["option"] == "--backward") choice["value"] = a_.backward;
   }
   eval_background_ = background_color(a_.background);
+  if (!a_.resume) measure_capture();
   if (!a_.start.empty()) {
     std::error_code not_there;
     if (!a_.resume && fs::equivalent(a_.start, a_.model_file(), not_there)) {
       throw usage_error("--start " + a_.start +
                         ": is the model in --out, which the run replaces (choose another --out)");
     }
-    // A run that measures bands looks at all of it.
-    bool const measures = !gart::plan_trials(request(), train_options_of(a_), data_.train.size()).held_out.empty();
-    gart::model_file file = measures ? gart::load_model(a_.start) : gart::load_model(a_.start, owners());
-    start_is_part_ = !measures;
+    gart::model_file file = gart::load_model(a_.start, owners());
     if (file.kernel_degree != a_.kernel_degree) {
       throw usage_error("--start " + a_.start + ": is of kernel degree " + std::to_string(file.kernel_degree) +
                         ", the run of " + std::to_string(a_.kernel_degree) + " (give --kernel-degree " +
@@ -85,12 +82,11 @@ void training_run::prepare() {
     prepare_folder(a_.out / "renders");
   }
   if (ranks::size() > 1) say_memory();
-  session_ = a_.start.empty() ? gart::make_session(request(), train_options_of(a_), data_)
-                              : gart::make_session(request(), train_options_of(a_), data_,
-                                                   gart::start_model(start_, start_is_part_));
+  session_ = a_.start.empty()
+                 ? gart::make_session(request(), train_options_of(a_), data_)
+                 : gart::make_session(request(), train_options_of(a_), data_, gart::start_model(start_, true));
   start_ = {};
   a_.resume ? go_on() : begin_anew();
-  trials_ = session_->trials().size();
   say_choices();
   say_.note(a_.backend + " backend, " + a_.tracer + " tracer, " + configuration_.backward + " backward pass");
   load_seconds_ = loading.seconds();
@@ -140,6 +136,20 @@ void training_run::say_memory() {
             " at the least, for its part of " + with_commas(most) + " Gaussians, and what the views take");
 }
 
+// Rank 0 measures, and all take what it found. Of a run that ends at a time it is a tenth of that at most.
+void training_run::measure_capture() {
+  stopwatch const measuring;
+  if (writes_) {
+    measured_ = measure(a_, data_, [&](double done, std::string const& tried) {
+      say_.state("measuring what the capture asks for: " + tried, done);
+      return a_.time_budget == 0 || measuring.seconds() < 0.1 * a_.time_budget;
+    });
+  }
+  measured_ = nlohmann::json::parse(ranks::agreed_text(measured_.dump()));
+  settle(a_, measured_, chosen_);
+  measure_seconds_ = measuring.seconds(), course_.seconds += measure_seconds_;
+}
+
 void training_run::say_choices() {
   say_.note("chosen for this capture, each by its option where one is given:");
   for (auto const& choice : chosen_) {
@@ -185,7 +195,7 @@ void training_run::begin_anew() {
   if (writes_) {
     remove_run(a_.out);
     nlohmann::json config = config_of(a_, data_);
-    config["chosen"] = chosen_;
+    config["chosen"] = chosen_, config["measured"] = measured_;
     write_json(a_.config_file(), config);
   }
   session_->save(a_.checkpoint_file());
@@ -195,6 +205,7 @@ void training_run::go_on() {
   check_same_dataset(a_, data_);
   nlohmann::json config = read_json(a_.config_file());
   chosen_ = chosen_before(config, chosen_);
+  measured_ = config.value("measured", nlohmann::json::object());
   try {
     session_->load(a_.checkpoint_file());
   } catch (gart::io_error const& e) {

@@ -61,6 +61,7 @@ class training_run {
   gart::row_owners owners() const;
   void say_memory();
   void say_choices();
+  void measure_capture();
   void enter();
   void load();
   void begin_anew();
@@ -71,7 +72,6 @@ class training_run {
   static history course_of(train_arguments const& a);
   double progress_at(int step) const { return a_.progress(step, course_.seconds); }
   gart::step_report checked_step();
-  void say_new_trials();
   void serve();
   bool attend(interrupt_guard const& interrupt, double seconds, gart::step_report const& report,
               recent_steps const& recent);  // false where a viewer stops it
@@ -98,11 +98,9 @@ class training_run {
   gart::configuration_info configuration_;
   bool fell_back_ = false;
   gart::dataset data_;
-  nlohmann::json chosen_, raised_ = nlohmann::json::array();
-  std::size_t trials_ = 0;      // that have been told of
+  nlohmann::json chosen_, measured_, raised_ = nlohmann::json::array();
   gart::gaussian_model start_;  // of several ranks this one's rows
   gart::u64 start_total_ = 0;
-  bool start_is_part_ = false;
   gart::vec3 eval_background_{0.0f};
   std::unique_ptr<gart::session> session_;
   std::unique_ptr<training_view> view_;
@@ -110,7 +108,8 @@ class training_run {
   int steps_ = 0, profiled_steps_ = 0;
   int finite_steps_ = 0;               // steps of this process after which everything was finite, by --check-finite
   std::uint64_t skipped_updates_ = 0;  // numbers that Adam left as they were in them
-  double load_seconds_ = 0, step_seconds_ = 0, test_seconds_ = 0, save_seconds_ = 0, profiled_seconds_ = 0;
+  double load_seconds_ = 0, measure_seconds_ = 0, step_seconds_ = 0, test_seconds_ = 0, save_seconds_ = 0,
+         profiled_seconds_ = 0;
 };
 
 }  // namespace gart_cli

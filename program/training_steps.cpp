@@ -62,8 +62,7 @@ bool training_run::train(interrupt_guard const& interrupt) {
     }
     finite_steps_ += a_.check_finite, skipped_updates_ += report.skipped;
     ++steps_, step_seconds_ += seconds, course_.seconds += seconds, gaussians_ = report.gaussians;
-    if (!report.trial) course_.add(report);
-    say_new_trials();
+    course_.add(report);
     recent.add(report, seconds, own);
     show(report, recent);
     double const done = progress_at(report.step);
@@ -74,7 +73,7 @@ bool training_run::train(interrupt_guard const& interrupt) {
     bool const due = by_time && a_.eval_every < 0
                          ? passes(5)
                          : between > 0 && report.step / between != (report.step - a_.batch) / between;
-    if (!report.trial && due && report.step < a_.length(report.step, course_.seconds)) {
+    if (due && report.step < a_.length(report.step, course_.seconds)) {
       test(report.step);
       show_curve();
     }
@@ -132,12 +131,6 @@ gart::step_report training_run::checked_step() {
   }
 }
 
-void training_run::say_new_trials() {
-  auto const trials = session_->trials();
-  for (; trials_ < trials.size(); ++trials_)
-    say_.note("step " + with_commas(session_->steps_done()) + ": " + in_words(trials[trials_]));
-}
-
 void training_run::show(gart::step_report const& report, recent_steps const& recent) {
   double const share = progress_at(report.step);
   if (!ranks::agreed(say_.due(share))) return;
@@ -147,7 +140,7 @@ void training_run::show(gart::step_report const& report, recent_steps const& rec
                  fixed(rate, rate < 10 ? 2 : 0) + " it/s  loss " + fixed(recent.loss, 4) + "  PSNR " +
                  fixed(recent.psnr, 2) + " dB  " + with_commas(report.gaussians) + " Gaussians  " +
                  as_duration(a_.time_budget > 0 ? std::min(left, a_.time_budget - course_.seconds) : left) + " left" +
-                 (report.trial ? ", a band on trial" : "") + in_ranks(recent, session_->peak_bytes()),
+                 in_ranks(recent, session_->peak_bytes()),
              share);
 }
 

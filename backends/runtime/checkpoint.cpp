@@ -107,15 +107,9 @@ std::vector<char> const& checkpoint_reader::find(std::string const& name, std::s
   return bytes;
 }
 
-training_state with_sh_degree(training_state state, int degree) {
-  for (gaussian_model* model : {&state.scene, &state.first, &state.second})
-    *model = with_sh_degree(std::move(*model), degree);
-  return state;
-}
-
 training_state without_rows(training_state const& state) {
   training_state out;
-  out.step = state.step, out.growth = state.growth, out.seed = state.seed, out.trials = state.trials;
+  out.step = state.step, out.growth = state.growth, out.seed = state.seed;
   out.exposures = state.exposures, out.vignetting = state.vignetting, out.poses = state.poses,
   out.lenses = state.lenses;
   return out;

@@ -28,7 +28,6 @@ void for_each_state_array(training_state const& state, F const& f) {
   f("seed", std::vector<u64>{state.seed}, 0);
   f("error_growth/error_sum", state.error_sum, 1);
   f("adc/gradient_sum", state.gradient_sum, 1), f("adc/touched", state.touched, 1);
-  f("sh_trials", state.trials, 0);
   // Rows with Adam's moments, where any are learned.
   auto const learned = [&](std::string const& name, auto const& rows) {
     if (rows.value.empty()) return;
@@ -83,9 +82,6 @@ training_state state_of(Reader const& in) {
   };
   learned("exposure", exposure::floats, s.exposures), learned("vignetting", vignetting::floats, s.vignetting);
   learned("pose", std::tuple_size_v<pose_numbers>, s.poses), learned("lens", std::tuple_size_v<lens_numbers>, s.lenses);
-  if (in.has("sh_trials")) s.trials = in.template get<band_trial>("sh_trials");
-  for (band_trial const& t : s.trials)
-    if (t.band < 1 || t.band > 3) in.fail("is damaged: a trial of SH band " + std::to_string(t.band));
   return s;
 }
 

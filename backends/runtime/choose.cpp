@@ -1,5 +1,4 @@
 #include <gart/camera/models.hpp>
-#include <gart/exposure/exposure_field.hpp>
 #include <gart/optim/error_growth.hpp>
 #include <gart/runtime/choose.hpp>
 
@@ -15,7 +14,6 @@ namespace {
 constexpr std::size_t most_images = 64;
 constexpr int plain_levels = 12;      // of 255
 constexpr double plain_share = 0.95;  // of the border's pixels
-constexpr double brightness_step_most = 0.03;
 constexpr int white_from = 230, black_to = 25;
 
 std::string percent(double share) {
@@ -23,9 +21,6 @@ std::string percent(double share) {
   std::snprintf(text, sizeof text, share > 0 && share < 0.001 ? "%.2g%%" : "%.1f%%", 100 * share);
   return text;
 }
-
-// What stands before a background that is not of the scene.
-bool is_object(capture_traits const& t) { return t.bounded() || t.transparent > 0; }
 
 std::string counted(std::size_t n, char const* noun) { return std::to_string(n) + " " + noun + (n == 1 ? "" : "s"); }
 
@@ -66,28 +61,6 @@ void look_at_borders(dataset const& data, capture_traits& traits) {
   traits.plain_border = most(alike);
 }
 
-// Of opaque photographs, every seventh pixel of a row; 0 where fewer than two are.
-double brightness_step(std::vector<dataset_view> const& views) {
-  std::vector<view_exposure> poses;
-  std::vector<double> level;
-  for (dataset_view const& v : views) {
-    if (v.image.channels != 3 || v.image.empty()) continue;
-    double sum = 0;
-    std::size_t values = 0;
-    for (std::size_t i = 0; i < v.image.data.size(); i += 7) sum += v.image.data[i], ++values;
-    poses.push_back({v.name, v.view.position, v.view.rotation[2], {}});
-    level.push_back(std::log(std::max(sum / static_cast<double>(values), 1.0)));
-  }
-  exposure_field const field(std::move(poses));
-  std::vector<double> steps;
-  for (std::size_t i = 0; i < level.size() && level.size() > 1; ++i)
-    steps.push_back(std::abs(level[i] - level[field.nearest(i)]));
-  if (steps.empty()) return 0;
-  auto const middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
-}
-
 std::string lenses(capture_traits const& t) {
   return t.distorted == 0 ? "the lenses are pinholes"
                           : "the lenses of " + counted(t.distorted, "view") + " are distorted, and traced as they are";
@@ -95,14 +68,6 @@ std::string lenses(capture_traits const& t) {
 
 std::string folds(capture_traits const& t) {
   return "the lenses of " + counted(t.folding, "view") + " are not one to one over the image, and footprints need that";
-}
-
-// The fewer Gaussians there are, the less another can stand in for one that is left out. In whole hundredths, upwards:
-// none only where there are no more than the least budget.
-float rising_dropout(index_t budget, error_growth_options const& options) {
-  constexpr double most_hundredths = 30;
-  double const times = static_cast<double>(budget) / std::max(options.least_budget, 1);
-  return static_cast<float>(std::ceil(most_hundredths * std::clamp(std::log10(times), 0.0, 1.0)) / 100);
 }
 
 }  // namespace
@@ -132,7 +97,6 @@ capture_traits inspect(dataset const& data) {
   }
   if (pixels) traits.transparent = static_cast<double>(clear) / static_cast<double>(pixels);
   look_at_borders(data, traits);
-  traits.brightness_step = brightness_step(data.train);
   return traits;
 }
 
@@ -159,20 +123,6 @@ chosen<tracer_kind> choose_tracer(capture_traits const& t) {
 chosen<std::string> choose_backward(capture_traits const& t) {
   if (t.folding) return {"pixel", folds(t)};
   return {"auto", "the fastest there is"};
-}
-
-chosen<bool> choose_exposure(capture_traits const& t) {
-  if (is_object(t)) return {false, "a bounded object, lit alike in all images"};
-  std::string const step = percent(t.brightness_step);
-  if (t.brightness_step > brightness_step_most)
-    return {true, "the brightness of neighbouring photographs differs by " + step};
-  return {false, "the brightness of neighbouring photographs differs by " + step + " only"};
-}
-
-chosen<bool> choose_vignetting(capture_traits const& t) {
-  if (is_object(t)) return {false, "a bounded object, which says nothing of the corners"};
-  if (t.panoramas) return {false, counted(t.panoramas, "view") + " of the whole sphere, which have no corners"};
-  return {true, "photographs, which lenses darken towards the corners"};
 }
 
 chosen<starting_points> choose_start(dataset const& data, train_options const& options) {
@@ -202,43 +152,21 @@ chosen<index_t> choose_budget(dataset const& data, train_options const& options)
   return {budget, text};
 }
 
-chosen<regularization> choose_regularization(capture_traits const& t, train_options const& options) {
-  regularization const as_said{options.dropout, options.dropout_until, options.ssim_weight, options.error.split.share};
-  if (options.densify != densify_kind::error) return {as_said, "measured with growth by error alone"};
-  if (is_object(t)) return {as_said, "a bounded object"};
-  std::size_t const visits = static_cast<std::size_t>(options.iterations) / std::max<std::size_t>(t.views, 1);
-  std::string const shown = "each of " + counted(t.views, "photograph") + " is shown " + counted(visits, "time");
-  if (visits < visits_by_heart) return {as_said, shown + " only"};
-  float const rising = rising_dropout(growth_budget(options.error, options.max_gaussians, t.pixels), options.error);
-  regularization careful = as_said;
-  if (!options.exposure && choose_exposure(t).value) {
-    if (rising > 0) careful.dropout = rising, careful.dropout_until = 0.95f;
-    careful.ssim_weight = 0.6f, careful.split_share = 0.25f;
-    return {careful, shown + ", they differ in brightness, and no exposure is learned"};
-  }
-  if (rising == 0) return {as_said, "few Gaussians need each other"};
-  if (t.views >= few_photographs) return {as_said, "there are many photographs"};
-  careful.dropout = 0.2f;
-  return {careful, shown};
-}
-
-chosen<float> choose_sh_gain(train_options const& options) {
-  if (options.iterations >= measured_from) return {usual_sh_gain, "what a band buys is measured"};
-  return {0, "a run of less than " + std::to_string(measured_from) + " steps would miss the views held out"};
-}
-
-recommendation recommended(train_options const& options, dataset const& data, configuration_request const& request) {
+recommendation recommended(train_options const& options, dataset const& data, configuration_request const& request,
+                           std::vector<std::string> const& given, validation_progress const& progress) {
   capture_traits const traits = inspect(data);
-  recommendation all{request, options};
+  auto const is_given = [&](std::string const& setting) {
+    return std::find(given.begin(), given.end(), setting) != given.end();
+  };
+  recommendation all{request, options, {}};
   if (request.tracer == tracer_kind::automatic) all.request.tracer = choose_tracer(traits).value;
   if (request.backward == "auto") all.request.backward = choose_backward(traits).value;
-  all.options.background = choose_background(traits).value;
-  all.options.exposure = choose_exposure(traits).value;
-  all.options.vignetting = choose_vignetting(traits).value;
-  all.options.sh_gain = choose_sh_gain(options).value;
-  regularization const r = choose_regularization(traits, all.options).value;
-  all.options.dropout = r.dropout, all.options.dropout_until = r.dropout_until;
-  all.options.ssim_weight = r.ssim_weight, all.options.error.split.share = r.split_share;
+  if (!is_given("background")) all.options.background = choose_background(traits).value;
+  std::vector<candidate> candidates;
+  for (candidate& c : usual_candidates(traits, all.options))
+    if (!is_given(c.setting)) candidates.push_back(std::move(c));
+  all.measured = validate(all.request, all.options, data, candidates, progress);
+  all.options = all.measured.options;
   return all;
 }
 

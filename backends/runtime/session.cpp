@@ -1,5 +1,4 @@
 #include <gart/core/error.hpp>
-#include <gart/runtime/degree_selection.hpp>
 #include <gart/runtime/initial.hpp>
 #include <gart/runtime/registry.hpp>
 
@@ -30,11 +29,7 @@ std::unique_ptr<session> make_session(configuration_request const& wanted, train
   configuration_request const request = with_depth_of(wanted, options);
   compiled_configuration const& found = find_configuration(request);
   require_tree(options.render.rebuild_every, found.info.tracer);
-  trial_plan const plan = plan_trials(request, options, data.train.size());
-  if (plan.held_out.empty()) return found.make_session(request, options, data, start);
-  if (start.is_part)
-    throw invalid_argument("train_options.sh_gain: bands are measured of a start that every rank has whole");
-  return make_degree_selection(request, options, data, start.rows, plan);
+  return found.make_session(request, options, data, start);
 }
 
 }  // namespace gart

@@ -24,7 +24,6 @@
 #include <gart/reference/reference.hpp>
 #include <gart/render/frame.hpp>
 #include <gart/runtime/choose.hpp>
-#include <gart/runtime/degree_selection.hpp>
 #include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/initial.hpp>
 #include <gart/runtime/model_file.hpp>
@@ -32,6 +31,7 @@
 #include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
 #include <gart/runtime/track.hpp>
+#include <gart/runtime/validation.hpp>
 #include <gart/scene/similarity.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/trace/tile_tracer.hpp>

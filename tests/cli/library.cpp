@@ -9,6 +9,8 @@
 
 #include <support/policies.hpp>
 
+#include <set>
+
 using namespace cli_test;
 using gart::u8;
 
@@ -79,90 +81,68 @@ TEST_CASE("a short program over the library and gart train give the same bits") 
 
   write_capture(here / "even");
   fill_images(here / "even", false);
-  CHECK(!same("even").exposure);
+  same("even");
 
   write_capture(here / "uneven");
   fill_images(here / "uneven", true);
-  CHECK(same("uneven").exposure);
+  same("uneven");
 }
 
-TEST_CASE("what keeps a training from learning by heart is chosen by both, recorded, and gives way to what is given") {
+TEST_CASE("the library's presets and what it measures are those of gart train, recorded, and the same after resuming") {
   folder const here;
-  write_capture(here / "few");
-  fill_images(here / "few", false);
+  write_capture(here / "capture", 24);
+  fill_images(here / "capture", true);
   gart::train_options options;
-  options.iterations = 700, options.max_gaussians = 60, options.error.least_budget = 30;
-  options.error.pixels_each = 25;  // for 40 Gaussians
-  auto const use = train(here / "few", options, here / "mine.ply");
-  CHECK(use.options.dropout == 0.2f);
-  std::string const set = " --set error.least_budget=30,error.pixels_each=25 --quiet";
-  std::string const run = "train few --iterations 700 --max-gaussians 60 --backend serial --out ";
-  auto const whole = here.gart(run + "whole --set error.least_budget=30,error.pixels_each=25");
+  options.iterations = 5000, options.max_gaussians = 30;
+  gart::preset_named("quick").apply(options.render);
+  auto const use = train(here / "capture", options, here / "mine.ply");
+  REQUIRE_FALSE(use.measured.trials.empty());
+  std::string const run = "train capture --iterations 5000 --max-gaussians 30 --preset quick --backend serial --out ";
+  auto const whole = here.gart(run + "whole");
   REQUIRE_MESSAGE(whole.code == 0, whole.err);
-  CHECK_MESSAGE(has(whole.err, "  --set dropout 0.2: each of "), whole.err);
-  CHECK(has(whole.err, "  --set error.split.share 0.4: their pixels end growth"));
-  CHECK(has(whole.err, "  images full size: "));
-  CHECK(here.json("whole/config.json")["options"]["set"] == "dropout=0.2,error.least_budget=30,error.pixels_each=25");
+  CHECK_MESSAGE(has(whole.err, "measuring what the capture asks for: "), whole.err);
   CHECK(text_of(here / "mine.ply") == text_of(here / "whole/model.ply"));
+  auto const metrics = here.json("whole/metrics.json");
+  REQUIRE(metrics["measured"]["trials"].size() == use.measured.trials.size());
+  for (std::size_t i = 0; i < use.measured.trials.size(); ++i) {
+    CHECK(metrics["measured"]["trials"][i]["psnr"] == use.measured.trials[i].psnr);
+    CHECK(metrics["measured"]["trials"][i]["taken"] == use.measured.trials[i].taken);
+  }
+  CHECK(metrics["measured"] == here.json("whole/config.json")["measured"]);
+  CHECK(metrics["wall_seconds"]["measuring"] > 0);
+  CHECK(has(text_of(here / "whole/report.html"), "Tried before the run: "));
 
-  CHECK(here.gart(run + "parts --stop-at 350" + set).code == 130);
+  CHECK(here.gart(run + "parts --quiet --stop-at 250").code == 130);
   auto const resumed = here.gart("train --resume --out parts --quiet");
   REQUIRE_MESSAGE(resumed.code == 0, resumed.err);
   CHECK(text_of(here / "parts/model.ply") == text_of(here / "whole/model.ply"));
-  CHECK(here.json("parts/metrics.json")["chosen"] == here.json("whole/metrics.json")["chosen"]);
-
-  // A run that began without goes on without, though it gets long enough for it.
-  auto const longer = [&](std::string const& out, std::string const& settings) {
-    std::string const begun = "train few --iterations 399 --max-gaussians 60 --backend serial --stop-at 1 --out " + out;
-    CHECK(here.gart(begun + settings).code == 130);
-    CHECK(here.gart("train --resume --iterations 700 --stop-at 20 --quiet --out " + out).code == 130);
-    return text_of(here / (out + "/model.ply"));
-  };
-  CHECK(longer("without", set) ==
-        longer("with_none", " --quiet --set dropout=0,error.least_budget=30,error.pixels_each=25"));
-
-  auto const given = here.gart(run + "given --stop-at 1 --set dropout=0,resolution.least=1");
-  CHECK(given.code == 130);
-  CHECK_MESSAGE(has(given.err, "  --set dropout 0: given\n"), given.err);
-  CHECK(has(given.err, "  images a quarter of their width until step 70, half of their width until step 350: "));
-  CHECK(here.json("given/config.json")["options"]["set"] == "dropout=0,resolution.least=1");
+  CHECK(here.json("parts/metrics.json")["measured"] == metrics["measured"]);
+  CHECK(here.json("parts/metrics.json")["chosen"] == metrics["chosen"]);
 }
 
-TEST_CASE("where photographs differ in brightness and no exposure is learned, more is chosen against veils") {
+TEST_CASE("what is given is not measured, and --no-auto takes the literature's settings") {
   folder const here;
-  write_capture(here / "few");
-  fill_images(here / "few", true);
-  std::string const rules = "error.least_budget=30,error.pixels_each=25",
-                    of_run = "--max-gaussians 60 --backend serial ";
-  auto const settings = [&](std::string const& out, std::string const& more) {
-    auto const run = here.gart("train few --iterations 700 --stop-at 1 " + of_run + more + rules + " --out " + out);
-    CHECK(run.code == 130);
-    CHECK(has(run.err, "--set dropout_until 0.95: each of ") == (out == "off" || out == "given"));
-    return here.json(out + "/config.json")["options"]["set"].get<std::string>();
+  write_capture(here / "capture", 24);
+  std::string const run = "train capture --iterations 5000 --max-gaussians 30 --backend serial --stop-at 1 ";
+  auto const tried = [&](std::string const& more) {
+    auto const made = here.gart(run + more + " --out run");
+    CHECK_MESSAGE(made.code == 130, made.err);
+    std::set<std::string> settings;
+    for (auto const& t : here.json("run/config.json")["measured"]["trials"]) settings.insert(t["setting"]);
+    return settings;
   };
-  std::string const near = "error.split.share=0.25,ssim_weight=0.6,";
-  CHECK(settings("off", "--exposure off --set ") == near + "dropout_until=0.95,dropout=0.04," + rules);
-  CHECK(settings("given", "--exposure off --set dropout=0.1,") == near + "dropout_until=0.95,dropout=0.1," + rules);
-  CHECK(settings("none", "--exposure off --set dropout=0,") == near + "dropout=0," + rules);
-  CHECK(settings("learned", "--set ") == "dropout=0.2," + rules);
-}
-
-TEST_CASE("the library's presets, exposures and measured bands are those of gart train") {
-  folder const here;
-  write_capture(here / "capture", 20);
-  gart::train_options options;
-  options.iterations = gart::measured_from;
-  options.max_gaussians = 30;
-  gart::preset_named("fast").apply(options.render);
-  auto const use = train(here / "capture", options, here / "mine.ply");
-  CHECK(use.options.sh_gain == gart::usual_sh_gain);
-  auto const run = here.gart("train capture --out run --iterations " + std::to_string(gart::measured_from) +
-                             " --max-gaussians 30 --preset fast --backend serial --quiet");
-  REQUIRE_MESSAGE(run.code == 0, run.err);
-  auto const metrics = here.json("run/metrics.json");
-  CHECK_FALSE(metrics["sh_trials"].empty());
-  CHECK((metrics["exposure"] == true) == use.options.exposure);
-  CHECK(text_of(here / "mine.ply") == text_of(here / "run/model.ply"));
+  CHECK(tried("--no-auto").empty());
+  auto const options = here.json("run/config.json")["options"];
+  CHECK(options["exposure"] == "off");
+  CHECK(options["vignetting"] == "off");
+  CHECK(options["densify"] == "error");
+  CHECK(options["set"] == "");
+  CHECK(tried("").contains("exposure"));
+  auto const given = tried("--exposure on --set rates.sh_rest=1e-3");
+  CHECK(!given.contains("exposure"));
+  CHECK(!given.contains("rates.sh_rest"));
+  CHECK(given.contains("vignetting"));
+  CHECK(here.json("run/config.json")["options"]["exposure"] == "on");
 }
 
 template <class Data>

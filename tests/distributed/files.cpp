@@ -53,7 +53,6 @@ training_state state_of(std::size_t n, int degree, bool statistics) {
   training_state s;
   s.scene = model_of(n, degree, 1), s.first = model_of(n, degree, -50), s.second = model_of(n, degree, 3000);
   s.step = 77, s.growth = 1.5f, s.seed = 9;
-  s.trials.push_back({2, 40, 30.5, 30.25, 0.3, 0.1, 0.01});
   if (!statistics) return s;
   for (std::size_t i = 0; i < n; ++i) {
     s.error_sum.push_back(static_cast<float>(i) + 0.5f), s.gradient_sum.push_back(static_cast<float>(i) - 7);
@@ -88,7 +87,7 @@ bool same(gaussian_model const& a, gaussian_model const& b) {
 bool same(training_state const& a, training_state const& b) {
   return same(a.scene, b.scene) && same(a.first, b.first) && same(a.second, b.second) && a.step == b.step &&
          a.growth == b.growth && a.seed == b.seed && a.error_sum == b.error_sum && a.gradient_sum == b.gradient_sum &&
-         a.touched == b.touched && a.trials.size() == b.trials.size() && a.exposures.value == b.exposures.value;
+         a.touched == b.touched && a.exposures.value == b.exposures.value;
 }
 
 std::vector<u32> sum_of(std::vector<std::vector<u32>> const& shares) {

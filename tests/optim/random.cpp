@@ -69,7 +69,6 @@ TEST_CASE("the rate of the means decays exponentially") {
   CHECK(exponential_decay(1e-2f, 1e-4f, 1000, 100) == doctest::Approx(1e-4));
   CHECK(exponential_decay(1e-2f, 0, 50, 100) == 1e-2f);
   learning_rates usual;
-  usual.sh_rest = usual.sh_dc;
   CHECK(rates_at(usual, 3.0f, 0, 20000).mean == doctest::Approx(3 * usual.mean));
   CHECK(rates_at(usual, 3.0f, 20000, 20000).mean == doctest::Approx(3 * usual.mean_final));
   CHECK(rates_at(usual, 3.0f, 10000, 20000).opacity == usual.opacity);
@@ -87,15 +86,6 @@ TEST_CASE("the rate of the means decays exponentially") {
   CHECK(rates_at(usual, 3.0f, quarter / 2, quarter).sh_dc == usual.sh_dc);
   CHECK(rates_at(usual, 3.0f, 0, quarter).sh_rest == usual.sh_rest);
   CHECK(rates_at(usual, 3.0f, 0, 10).opacity == doctest::Approx(4 * usual.opacity));
-}
-
-TEST_CASE("the bands' rate is that of the first where a run starts from points, else a twentieth") {
-  learning_rates rates;
-  CHECK(sh_rest_of(rates, true) == rates.sh_dc);
-  CHECK(sh_rest_of(rates, false) == doctest::Approx(rates.sh_dc / 20));
-  rates.sh_rest = 1e-3f;
-  CHECK(sh_rest_of(rates, false) == 1e-3f);
-  CHECK(sh_rest_of(rates, true) == 1e-3f);
 }
 
 TEST_CASE("the SH degree rises every so many steps, sooner in short runs") {

@@ -3,7 +3,6 @@
 
 #include <gart/camera/models.hpp>
 #include <gart/runtime/choose.hpp>
-#include <gart/runtime/degree_selection.hpp>
 #include <gart/runtime/initial.hpp>
 
 #include <algorithm>
@@ -82,61 +81,6 @@ TEST_CASE("a scene that fills the images is unbounded") {
       p = static_cast<gart::u8>(std::clamp<int>(p + static_cast<int>(random() % 9) - 4, 0, 255));
   CHECK(gart::inspect(noisy).bounded());
   CHECK(background_of(noisy) == background_kind::white);
-}
-
-TEST_CASE("what keeps a training from learning by heart goes by visits, photographs and exposures") {
-  gart::capture_traits traits;  // unbounded, of photographs that are alike in brightness
-  traits.views = 50, traits.pixels = 10'000'100;
-  gart::train_options options;
-  options.iterations = 5000, options.ssim_weight = 0.3f;
-  auto const choice = [&] { return gart::choose_regularization(traits, options).value; };
-  auto const is = [](gart::regularization const& r, float dropout, float ssim_weight, float share, float until = 1) {
-    CHECK(r.dropout == dropout);
-    CHECK(r.dropout_until == until);
-    CHECK(r.ssim_weight == ssim_weight);
-    CHECK(r.split_share == share);
-  };
-  is(choice(), 0.2f, 0.3f, 0);
-  options.iterations = 4999;  // a photograph is shown less than 100 times
-  is(choice(), 0, 0.3f, 0);
-  options.iterations = 30000, traits.pixels -= 1;  // for no more Gaussians than any capture gets
-  is(choice(), 0, 0.3f, 0);
-  traits.pixels = 100'000'000, options.max_gaussians = 100'000;
-  is(choice(), 0, 0.3f, 0);
-  options.max_gaussians = 100'001, traits.views = 99;
-  is(choice(), 0.2f, 0.3f, 0);
-  traits.views = 100;  // enough of them
-  is(choice(), 0, 0.3f, 0);
-  traits.brightness_step = 0.05;
-  REQUIRE(gart::choose_exposure(traits).value);
-  is(choice(), 0.01f, 0.6f, 0.25f, 0.95f);  // of 100,001 Gaussians
-  options.max_gaussians = 100'000;
-  is(choice(), 0, 0.6f, 0.25f);
-  options.max_gaussians = 316'000;
-  is(choice(), 0.15f, 0.6f, 0.25f, 0.95f);
-  options.max_gaussians = 2'000'000;  // the photographs have pixels for a million
-  is(choice(), 0.3f, 0.6f, 0.25f, 0.95f);
-  traits.pixels *= 4;
-  is(choice(), 0.3f, 0.6f, 0.25f, 0.95f);
-  options.error.least_budget = 0;
-  is(choice(), 0.3f, 0.6f, 0.25f, 0.95f);
-  options.error.least_budget = 100'000, options.max_gaussians = 1'000'000, traits.views = 50;
-  is(choice(), 0.3f, 0.6f, 0.25f, 0.95f);
-  options.exposure = true;
-  is(choice(), 0.2f, 0.3f, 0);
-  options.error.split.share = 0.45f;
-  is(choice(), 0.2f, 0.3f, 0.45f);
-  for (auto const kind : {gart::densify_kind::mcmc, gart::densify_kind::adc, gart::densify_kind::none}) {
-    options.densify = kind;
-    is(choice(), 0, 0.3f, 0.45f);
-  }
-  options.densify = gart::densify_kind::error, options.dropout = 0.05f;
-  traits.plain_border = true;  // an object
-  is(choice(), 0.05f, 0.3f, 0.45f);
-  traits.plain_border = false, traits.transparent = 0.1;
-  is(choice(), 0.05f, 0.3f, 0.45f);
-  traits.transparent = 0, traits.views = 0;
-  is(choice(), 0.2f, 0.3f, 0.45f);
 }
 
 TEST_CASE("masks are counted, and a capture without images has nothing to tell") {
@@ -233,30 +177,4 @@ TEST_CASE("training on depth starts from what the maps measured, where the captu
                        gart::invalid_argument);
   data.points.position.assign(30, 0.0f), data.points.color.assign(30, 0);
   CHECK_FALSE(gart::choose_start(data, options).value.measured);
-}
-
-TEST_CASE("bands are measured where views and steps allow, on views evenly spread, within a quarter of the run") {
-  gart::configuration_request request{gart::backend_kind::serial};
-  gart::train_options options;
-  options.sh_gain = 0.02f;
-  auto const plan = gart::plan_trials(request, options, 100);
-  CHECK(plan.held_out == std::vector<std::size_t>{10, 30, 50, 70, 90});
-  CHECK(plan.begin == 15000);
-  CHECK(plan.steps == 600);
-  CHECK(gart::plan_trials(request, options, 20).held_out.size() == 2);
-  CHECK(gart::plan_trials(request, options, 1000).held_out.size() == 8);
-  CHECK(gart::plan_trials(request, options, 19).held_out.empty());
-  for (int const iterations : {1, 599, 600, 5000, 30000}) {
-    options.iterations = iterations;
-    auto const p = gart::plan_trials(request, options, 40);
-    CAPTURE(iterations);
-    CHECK(p.held_out.empty() == (iterations < 600));
-    if (!p.held_out.empty()) CHECK(4 * p.degree * p.steps <= iterations);
-    CHECK_FALSE(p.why.empty());
-  }
-  request.sh_degree = 0;
-  CHECK(gart::plan_trials(request, options, 40).held_out.empty());
-  request.sh_degree = 3, options.sh_gain = 0;
-  CHECK(gart::plan_trials(request, options, 40).held_out.empty());
-  CHECK(gart::forecast_gain(0.01, 100, 300, 500) == doctest::Approx(0.02));
 }

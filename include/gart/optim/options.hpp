@@ -15,10 +15,7 @@ struct learning_rates {
   float quaternion = 1e-3f;    ///< of the raw quaternion
   float opacity = 2.5e-2f;     ///< of the logit
   float sh_dc = 2.5e-3f;       ///< of the first band
-  /// Of the bands above the first; 0: what suits the run (sh_rest_of). A run that starts from a capture's points moves
-  /// them as fast as the first; one that starts at random has its geometry to find, and colours that follow the view
-  /// would stand in for it.
-  float sh_rest = 0;
+  float sh_rest = 1.25e-4f;    ///< of the bands above the first: a twentieth, as in 3DGS
   /// All rates but those of the means, exposures and lenses stay as they are for a share of the run, then decay
   /// exponentially to `settled` of it.
   float settled = 0.1f, settle_from = 0.5f;  ///< the share

@@ -18,14 +18,7 @@ inline float exponential_decay(float from, float to, int step, int steps) {
   return static_cast<float>(from * std::pow(static_cast<double>(to) / from, share));
 }
 
-/// The rate of the bands above the first: what `rates` says, or that of the first where the run starts from points;
-/// where it does not, a twentieth, as in 3DGS.
-inline float sh_rest_of(learning_rates const& rates, bool has_points) {
-  if (rates.sh_rest > 0) return rates.sh_rest;
-  return has_points ? rates.sh_dc : rates.sh_dc / 20;
-}
-
-/// The rates of one step; `extent` is the scene's. sh_rest is what sh_rest_of gave.
+/// The rates of one step; `extent` is the scene's.
 inline learning_rates rates_at(learning_rates rates, float extent, int step, int steps) {
   double const length = static_cast<double>(std::max(steps, 1)) / std::max(rates.long_run, 1);
   float const haste = static_cast<float>(std::clamp(1 / std::sqrt(length), 1.0, 4.0));

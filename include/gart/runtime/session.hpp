@@ -32,7 +32,7 @@ class session {
   virtual ~session() = default;
   /// One step of training, and what it says of itself.
   virtual step_report step() = 0;
-  /// Steps that count: those of a trial do when it is decided.
+  /// Of this run and, where it was resumed, of those before.
   virtual int steps_done() const = 0;
   /// The length of the run that rates, degrees and densification go by from the next step on, in place of
   /// options.iterations: for a run that ends at a time, whose number of steps is not known beforehand. No part of the
@@ -80,7 +80,6 @@ class session {
   virtual std::vector<named_camera> poses() const { return {}; }
   /// A camera of the capture, at whatever pose, with its lens as it is learned; as it is where none are.
   virtual camera as_learned(camera const& view) const { return view; }
-  virtual std::vector<band_trial> trials() const { return {}; }  ///< that are over
   /// Times of stages; waits for the policy.
   virtual profiler& profile() = 0;
   /// Most bytes of the policy's memory that were in use at a time.
@@ -92,15 +91,13 @@ class session {
 };
 
 /// The dataset must outlive the session. `start` seeds the Gaussians where given, else the dataset's points or random
-/// ones. With options.sh_gain the session measures which bands of spherical harmonics to store, and its configuration
-/// and degree change in its course (runtime/degree_selection.hpp). options.depth_weight asks for a configuration with
-/// depth. Errors: invalid_argument for
+/// ones. options.depth_weight asks for a configuration with depth. Errors: invalid_argument for
 /// options.render.rebuild_every where the tracer builds no tree.
 std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,
                                       dataset const& data, gaussian_model const* start = nullptr);
 std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,
                                       dataset const&& temporary, gaussian_model const* start = nullptr) = delete;
-/// Of several ranks `start` may have each rank's rows alone; invalid_argument where bands are to be measured.
+/// Of several ranks `start` may have each rank's rows alone.
 std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,
                                       dataset const& data, start_model const& start);
 

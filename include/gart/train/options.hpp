@@ -49,9 +49,6 @@ struct train_options {
   index_t random_points = 100'000;             ///< where the capture has no points
   densify_kind densify = densify_kind::error;  ///< how their number grows
   int sh_every = 1000;  ///< a degree more after so many steps (or iterations / (10 * degrees) in shorter runs)
-  /// Held-out gain in PSNR, dB, that a band of spherical harmonics must buy to be stored
-  /// (runtime/degree_selection.hpp); 0: every band is, without a measurement.
-  float sh_gain = 0;
   std::vector<std::size_t> held_out = {};               ///< training views, by index, that are not trained on
   background_kind background = background_kind::black;  ///< behind the scene
   /// Of the first Gaussians; the scale is times the distance to the neighbours. 0: what suits the start

@@ -11,31 +11,10 @@
 #include <gart/pose/pose.hpp>
 #include <gart/scene/gaussians.hpp>
 
-#include <algorithm>
 #include <filesystem>
 #include <vector>
 
 namespace gart {
-
-/// What a trial of one band of spherical harmonics found (runtime/degree_selection.hpp). PSNR in dB, the mean over the
-/// views held out.
-struct band_trial {
-  int band = 0;            ///< the degree whose coefficients were tried
-  int step = 0;            ///< steps done when the two branches parted
-  double with = 0;         ///< PSNR where the branch that kept the band ended
-  double without = 0;      ///< and where the other did
-  double forecast = 0;     ///< the gain to be expected at the end of the run
-  double gain_wanted = 0;  ///< in dB: train_options.sh_gain
-  double error = 0;        ///< standard error of the gain, from how far the views that judged it differ
-
-  static constexpr double tellable = 0.05;  ///< dB
-  /// In dB.
-  double gain() const { return with - without; }
-  /// A gain that is not told to 0.05 dB, or to what is wanted of it, is no reason to drop the band.
-  bool told() const { return error <= std::max(gain_wanted, tellable); }
-  /// Whether the band is stored.
-  bool kept() const { return !(forecast < gain_wanted) || !told(); }
-};
 
 /// A run between two steps.
 struct training_state {
@@ -52,11 +31,8 @@ struct training_state {
   vignetting_state vignetting;      ///< learned, or empty
   pose_state poses;                 ///< learned, or empty
   lens_state lenses;                ///< learned, or empty
-  std::vector<band_trial> trials;   ///< that are over
 };
 
-/// The state with bands above `degree` dropped, or zero bands added, moments too.
-training_state with_sh_degree(training_state state, int degree);
 /// What of a state is not of each Gaussian.
 training_state without_rows(training_state const& state);
 

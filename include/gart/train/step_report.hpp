@@ -17,7 +17,6 @@ struct step_report {
   std::string view;       ///< its name
   std::string backward;  ///< the strategy of this step: not the one asked for where its LT buffer would pass the budget
   u64 skipped = 0;       ///< with check_finite: numbers that Adam left as they were, their updates not being finite
-  bool trial = false;    ///< a step of a trial (runtime/degree_selection.hpp): `step` stands still until it is decided
 };
 
 }  // namespace gart

@@ -38,9 +38,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::require_ranks() const {
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 learning_rates basic_trainer<E, Traits, Tracer, Strategy, Comm>::rates_of_step() const {
-  learning_rates rates = options_.rates;
-  rates.sh_rest = sh_rest_of(rates, data_.points.size() > 0);
-  return rates_at(rates, data_.extent, step_, options_.iterations);
+  return rates_at(options_.rates, data_.extent, step_, options_.iterations);
 }
 
 // A step over options.batch views, in as many rounds as it takes all ranks to trace them.

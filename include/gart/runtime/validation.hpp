@@ -1,0 +1,88 @@
+#pragma once
+/// \file
+/// What a capture asks for, measured before a run: short trainings on small images of a share of the training views,
+/// judged by the views held out of them. No threshold of a statistic of the capture decides, and test views are never
+/// seen.
+///
+/// The trials. One training view in 8 is held out, from the middle of each eighth view on. Images are shrunk, at most
+/// by 4 and to no less than 128 pixels, and the Gaussians that there may be with them. The first trial is of the
+/// options as they come, which should be the literature's. Each candidate after it is that best so far with one setting
+/// changed: the order of candidates is the order of the questions, and later ones are asked of what earlier ones gave.
+///
+/// The verdict. Each held-out view gives a gain in PSNR, of the candidate over the best so far. The noise is the
+/// standard error of their mean. A candidate is taken where its gain is more than twice the noise and more than
+/// least_gain, since a second run of the same options differs by about that; else the literature's value stays.
+///
+/// Cost: trials have a fixed number of steps, so that the same capture and options give the same choice on the serial
+/// policy whatever the machine's load: together at most a tenth of a run's time (validation_plan). Memory: the training
+/// views once more, shrunk, and one session at a time. Errors: as make_session.
+
+#include <gart/io/dataset.hpp>
+#include <gart/runtime/request.hpp>
+#include <gart/train/options.hpp>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace gart {
+
+struct capture_traits;
+
+/// A setting that training may have in place of the literature's.
+struct candidate {
+  std::string setting;  ///< its name as `gart train` has it: "exposure", or "rates.sh_rest" of --set
+  std::string value;    ///< in words, as `gart train` takes it
+  std::function<void(train_options&)> take;  ///< sets it
+};
+
+/// Those that pay on some captures and cost on others, in the order in which they are tried; none that the capture
+/// cannot have: images of the whole sphere have no corners for vignetting.
+std::vector<candidate> usual_candidates(capture_traits const& traits, train_options const& options);
+
+/// How candidates are tried.
+struct validation_plan {
+  std::vector<std::size_t> held_out = {};  ///< training views by index; empty: nothing is measured
+  int shrink = 1;                          ///< pixels of a photograph to one of a trial's image, across and down
+  int steps = 0;                           ///< of each trial
+  std::size_t trials = 0;                  ///< the first, of the options as they come, and one for each candidate
+  std::string why;                         ///< in words
+};
+
+/// For so many candidates at most: fewer where the run is too short for all of them, none where it is too short for
+/// one, or has too few training views to hold some out.
+validation_plan plan_validation(train_options const& options, dataset const& data, std::size_t candidates);
+
+/// What a trial gave.
+struct trial {
+  std::string setting;  ///< the candidate's; empty: the options as they came
+  std::string value;    ///< the candidate's
+  double psnr = 0;      ///< dB, the mean of the views held out
+  double gain = 0;      ///< dB, over the best so far
+  double noise = 0;     ///< dB, the gain's standard error over the views held out
+  bool taken = false;   ///< whether it is the best from here on
+
+  static constexpr double least_gain = 0.05;  ///< dB: less is a tie
+  /// Whether so much gain is no chance.
+  bool is_better() const { return gain > least_gain && gain > 2 * noise; }
+};
+
+/// What was measured, and what came of it.
+struct validation {
+  validation_plan plan;       ///< how
+  std::vector<trial> trials;  ///< in order
+  train_options options;      ///< with the candidates that were taken
+};
+
+/// Called between steps: how much of the validation is done, 0 to 1, and what is tried. False ends it: what was taken
+/// so far is the result.
+using validation_progress = std::function<bool(double done, std::string const& tried)>;
+
+/// Tries the candidates in their order.
+validation validate(configuration_request const& request, train_options const& options, dataset const& data,
+                    std::vector<candidate> const& candidates, validation_progress const& progress = {});
+
+/// The capture as its trials see it: the training views alone, shrunk, and the same points.
+dataset shrunk(dataset const& data, int shrink);
+
+}  // namespace gart

@@ -1,0 +1,166 @@
+// What short trainings say of a capture: exposures that differ by design are found, a room that is lit unevenly is not
+// taken for one, and nothing but the training views decides.
+#include <support/policies.hpp>
+
+#include <gart/runtime/choose.hpp>
+#include <gart/runtime/renderer.hpp>
+#include <gart/runtime/validation.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace {
+
+constexpr int width = 40, height = 32, views = 48;
+gart::configuration_request const serial{gart::backend_kind::serial, gart::tracer_kind::automatic, "auto", 1};
+
+// Noisy photographs of a cloud, from all around it. `exposed`: each third of the way round at another exposure;
+// `lit`: the cloud is bright on one side and dark on the other, and the walls behind it with it.
+gart::dataset capture(std::uint64_t seed, bool exposed, bool lit) {
+  std::mt19937_64 engine(seed);
+  std::normal_distribution<float> normal;
+  gart::gaussian_model truth;
+  truth.resize(120, 1);
+  for (auto& x : truth.log_scale) x = -1.5f + 0.3f * normal(engine);
+  for (auto& x : truth.quaternion) x = normal(engine);
+  for (auto& x : truth.opacity) x = 1 + normal(engine);
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) truth.mean[3 * i + k] = 0.9f * normal(engine);
+    float const light = lit ? 1 + 0.8f * std::tanh(truth.mean[3 * i]) : 1;
+    for (std::size_t k = 0; k < 3; ++k)
+      truth.sh[12 * i + k] = (light * (0.5f + 0.15f * normal(engine)) - 0.5f) / 0.28209479f;
+  }
+  gart::dataset data;
+  data.extent = 4.4f;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      data.points.position.push_back(truth.mean[3 * i + k]);
+      data.points.color.push_back(128);
+    }
+  }
+  auto const renderer = gart::make_renderer(serial);
+  renderer->set_model(truth);
+  for (int v = 0; v < views; ++v) {
+    gart::dataset_view view;
+    view.name = std::to_string(v);
+    view.view.width = width, view.view.height = height;
+    view.view.fx = view.view.fy = 44, view.view.cx = 20, view.view.cy = 16;
+    float const angle = 6.2831853f * static_cast<float>(v) / views, c = std::cos(angle), s = std::sin(angle);
+    view.view.rotation = gart::mat3(gart::vec3(c, 0, -s), gart::vec3(0, 1, 0), gart::vec3(s, 0, c));
+    view.view.position = gart::vec3d(-4.0 * s, 0, -4.0 * c);
+    auto const picture = renderer->render(view.view, gart::render_options{});
+    float const gain = exposed && v / 8 % 2 ? 0.6f : 1.0f;
+    view.image = gart::image8(width, height, 3);
+    for (std::size_t i = 0; i < picture.color.data.size(); ++i) {
+      float const noisy = 255 * gain * picture.color.data[i] + 4 * normal(engine);
+      view.image.data[i] = static_cast<gart::u8>(std::lround(std::clamp(noisy, 0.0f, 255.0f)));
+    }
+    data.train.push_back(std::move(view));
+  }
+  return data;
+}
+
+gart::train_options options() {
+  gart::train_options of;
+  of.iterations = 5000, of.max_gaussians = 120, of.densify = gart::densify_kind::none;
+  return of;
+}
+
+std::vector<gart::candidate> exposures() {
+  return {{"exposure", "on", [](gart::train_options& o) { o.exposure = true; }}};
+}
+
+}  // namespace
+
+TEST_CASE("exposures that differ by design are taken, a room lit unevenly and exposed alike gets none") {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  auto const exposed = gart::validate(serial, options(), capture(seed, true, false), exposures());
+  REQUIRE(exposed.trials.size() == 2);
+  CAPTURE(exposed.trials[1].gain);
+  CAPTURE(exposed.trials[1].noise);
+  CHECK(exposed.options.exposure);
+  CHECK(exposed.trials[1].taken);
+  CHECK(exposed.trials[1].gain > 1);
+  auto const lit = gart::validate(serial, options(), capture(seed, false, true), exposures());
+  REQUIRE(lit.trials.size() == 2);
+  CAPTURE(lit.trials[1].gain);
+  CAPTURE(lit.trials[1].noise);
+  CHECK(!lit.options.exposure);
+  CHECK(!lit.trials[1].taken);
+}
+
+TEST_CASE("a trial is judged by training views that it is not trained on, and test views decide nothing") {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  auto const data = capture(seed, false, false);
+  auto const plan = gart::plan_validation(options(), data, 1);
+  CHECK(plan.held_out == std::vector<std::size_t>{4, 12, 20, 28, 36, 44});
+  CHECK(plan.trials == 2);
+  CHECK(plan.shrink == 1);
+  // The same bits, whatever the test views are; others where a held-out photograph is another.
+  auto const psnr = [&](gart::dataset const& of) { return gart::validate(serial, options(), of, exposures()).trials; };
+  auto const first = psnr(data);
+  auto tested = data;
+  tested.test = {data.train[3], data.train[4]};
+  CHECK(psnr(tested)[1].psnr == first[1].psnr);
+  auto other = data;
+  for (auto& v : other.train[4].image.data) v = 255 - v;
+  auto const changed = psnr(other);
+  CHECK(changed[0].psnr < first[0].psnr - 0.5);
+  other.train[4] = data.train[4];
+  CHECK(psnr(other)[0].psnr == first[0].psnr);
+}
+
+TEST_CASE("trials take a tenth of a run at the most, and none is made where there is too little to judge by") {
+  gart::dataset data;
+  data.train.resize(40);
+  for (auto& v : data.train) v.view.width = 1000, v.view.height = 600;
+  gart::train_options of;
+  auto const plan = gart::plan_validation(of, data, 5);
+  CHECK(plan.trials == 6);
+  CHECK(plan.shrink == 4);
+  CHECK(plan.held_out.size() == 5);
+  for (int const iterations : {1, 3000, 4000, 7000, 15000, 30000, 1000000}) {
+    CAPTURE(iterations);
+    of.iterations = iterations;
+    auto const p = gart::plan_validation(of, data, 5);
+    CHECK(static_cast<double>(p.trials) * p.steps <= 0.3 * iterations);
+    CHECK((p.trials > 0) == (iterations >= 4000));
+    CHECK(p.held_out.empty() == (p.trials == 0));
+    CHECK_FALSE(p.why.empty());
+  }
+  data.train[7].view.height = 300;  // the smallest decides
+  CHECK(gart::plan_validation(of, data, 5).shrink == 2);
+  data.train.resize(23);
+  CHECK(gart::plan_validation(of, data, 5).trials == 0);
+  CHECK(gart::validate(serial, of, data, {}).trials.empty());
+}
+
+TEST_CASE("a gain counts where it is more than twice its noise and more than two runs of the same differ by") {
+  gart::trial t;
+  t.gain = 0.3, t.noise = 0.1;
+  CHECK(t.is_better());
+  t.noise = 0.16;
+  CHECK(!t.is_better());
+  t.gain = 0.04, t.noise = 0.001;
+  CHECK(!t.is_better());
+  t.gain = -1;
+  CHECK(!t.is_better());
+}
+
+TEST_CASE("what a capture cannot have is no candidate, and what is given stays") {
+  gart::capture_traits traits;
+  auto const has = [&](char const* setting) {
+    auto const all = gart::usual_candidates(traits, {});
+    return std::any_of(all.begin(), all.end(), [&](auto const& c) { return c.setting == setting; });
+  };
+  CHECK(has("exposure"));
+  CHECK(has("vignetting"));
+  traits.panoramas = 1;
+  CHECK(!has("vignetting"));
+  gart::train_options of;
+  for (auto const& c : gart::usual_candidates({}, of)) c.take(of);
+  CHECK(of.exposure);
+  CHECK(of.vignetting);
+}
