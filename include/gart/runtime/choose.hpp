@@ -55,7 +55,7 @@ chosen<tracer_kind> choose_tracer(capture_traits const& traits);
 chosen<std::string> choose_backward(capture_traits const& traits);
 
 /// Exposures are learned where photographs of neighbouring poses differ in brightness by more than 3%, the median
-/// (exposure/exposure.hpp), and the scene is unbounded (docs/exposure.md says what captures give).
+/// (exposure/exposure.hpp), and the scene is unbounded (docs/calibration.md says what captures give).
 chosen<bool> choose_exposure(capture_traits const& traits);
 
 /// The falloff of lenses is learned where photographs fill their images (exposure/vignetting.hpp): an object before a
