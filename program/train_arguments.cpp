@@ -151,7 +151,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--depth-weight", a.depth_weight, "X",
                  "Train by the capture's depth maps too: weight of their mean\nerror, in units of the scene's extent, "
                  "beside the colours' loss;\n0: none. Maps are depths/NAME.png (16 bits) or NAME.npy\n(float32) beside "
-                 "images/, or what 'depth_file_path' of a\ntransforms.json names (docs/depth.md)"))
+                 "images/, or what 'depth_file_path' of a\ntransforms.json names (docs/rendering.md)"))
       ->check(between(0, 1e6));
   in_group(
       r.add(train, "--depth-kind", a.depth_kind, "NAME",

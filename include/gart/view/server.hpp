@@ -17,7 +17,7 @@
 ///
 /// It listens on this machine alone unless options.listen says otherwise. An address has a token of 128 random bits;
 /// requests with another one, or from another host's page, are answered by 403. There is no encryption: over a network
-/// it goes through `ssh -L` (docs/view.md).
+/// it goes through `ssh -L` (docs/rendering.md).
 ///
 /// Errors: unsupported, naming the package to install, where gart was built without libwebsockets; invalid_argument for
 /// an address that is not this machine's; error where the port is taken.
