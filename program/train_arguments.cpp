@@ -185,7 +185,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "same"))
       ->check(between(1, 1e6));
   in_group(train.add_option("--parallel", a.parallel,
-                            "How ranks share a step (mpirun -n 4 gart train ...,\ndocs/scale.md): strips of one view, "
+                            "How ranks share a step (mpirun -n 4 gart train ...,\ndocs/backends.md): strips of one view, "
                             "the training of one\nrank itself, or views, a --batch of one for each"))
       ->type_name("NAME")
       ->capture_default_str()

@@ -11,7 +11,7 @@
 /// On several ranks the Gaussians are spread over them, with their moments (comm/row_owners.hpp), and each takes a part
 /// of every step (shard/work_units.hpp): strips of one view, or views of a batch. With a strategy that is `ordered` the
 /// bits of a run are those of any number of ranks. All ranks make the same calls; what is said of the Gaussians is of
-/// all of them, but for scene() and gradients(), which are of this rank's rows. docs/scale.md has more.
+/// all of them, but for scene() and gradients(), which are of this rank's rows. docs/backends.md has more.
 ///
 ///   mpi_comm ranks;
 ///   trainer<openmp_exec, traits, tracer, deterministic_strategy, mpi_comm> run(exec, options, data, start, ranks);
