@@ -22,7 +22,7 @@ namespace {
 std::string presets_help() {
   std::string text =
       "What is left out for speed; options given besides win. What\nit costs in quality: gart tradeoff, and "
-      "docs/tradeoffs.md";
+      "docs/performance.md";
   for (gart::preset const& p : gart::presets()) {
     char knobs[80];
     std::snprintf(knobs, sizeof knobs, ": --alpha-min %.4g --t-min %.4g", p.alpha_min, p.transmittance_min);

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// What speed may cost: sets of approximations to train and render with, chosen from the front that `gart tradeoff`
-/// draws (docs/tradeoffs.md), and a training of fewer steps (docs/training.md).
+/// draws (docs/performance.md), and a training of fewer steps (docs/training.md).
 /// Errors: preset_named throws invalid_argument, naming those there are.
 
 #include <gart/render/options.hpp>
