@@ -61,7 +61,7 @@ PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits",
 TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
               [(f"kernel degree {n}", 3, n, {}) for n in (1, 3, 4, 5, 8)] +
               [("fast arithmetic", 3, 2, {"arithmetic": "fast"}),
-               ("LT half", 3, 2, {"lt-format": "half"}), ("LT shared", 3, 2, {"lt-format": "shared"}),
+               ("LT half", 3, 2, {"lt-format": "half"}),
                ("hybrid", 3, 2, {"backward": "hybrid"}), ("deterministic", 3, 2, {"backward": "deterministic"}),
                ("tiles of 4", 3, 2, {"tile-size": 4}), ("tiles of 16", 3, 2, {"tile-size": 16}),
                ("window 16", 3, 2, {"window": 16}), ("window 64", 3, 2, {"window": 64})])

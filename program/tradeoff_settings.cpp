@@ -79,7 +79,7 @@ std::vector<setting> settings_of(configuration const& exact) {
       std::vector{gart::arithmetic_kind::fast});
   t.sweep(
       "lt_format", [](c & x) -> auto& { return x.configuration.lt_format; },
-      std::vector{gart::lt_format_kind::half, gart::lt_format_kind::shared});
+      std::vector{gart::lt_format_kind::half});
   t.sweep(
       "tile_size", [](c& x) -> int& { return x.configuration.tile_size; }, std::vector<int>{4, 16});
   t.sweep(

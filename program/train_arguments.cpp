@@ -212,8 +212,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--arithmetic", a.arithmetic, "NAME", "exact, or fast: shorter exponentials and reciprocals"))
       ->check(name_of_a<gart::arithmetic_kind>());
   in_group(r.add(train, "--lt-format", a.lt_format, "NAME",
-                 "What the forward pass leaves of a hit for primitive: float4,\nhalf or shared (half the memory, less "
-                 "exact gradients)"))
+                 "What the forward pass leaves of a hit for primitive: float4,\nor half (half the memory, less exact "
+                 "gradients)"))
       ->check(name_of_a<gart::lt_format_kind>());
   in_group(r.add(train, "--tile-size", a.tile_size, "N", "Pixels a side of a tile, 0: what suits"))
       ->check(between(0, 64));

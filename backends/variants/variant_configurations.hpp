@@ -33,7 +33,6 @@ void register_shape_variants(bool (*available)(std::string*) = always_available)
   register_variant<E, generalized_gaussian<>, 8, 16>(available);
   register_variant<E, generalized_gaussian<>, 8, 64>(available);
   register_variant<E, generalized_gaussian<>, 8, 32, primitive_strategy_in<lt_half_entry>>(available);
-  register_variant<E, generalized_gaussian<>, 8, 32, primitive_strategy_in<lt_shared_entry>>(available);
 }
 
 }  // namespace gart

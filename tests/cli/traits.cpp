@@ -73,8 +73,7 @@ TEST_CASE("what is traded is chosen by name and reported, and tiles and windows 
       CHECK(text_of(file.path()) == text_of(here / ("other/" + file.path().filename().string())));
   }
   for (auto const& [option, name, value] :
-       {std::array{"--lt-format half", "lt_format", "half"}, std::array{"--lt-format shared", "lt_format", "shared"},
-        std::array{"--arithmetic fast", "arithmetic", "fast"}}) {
+       {std::array{"--lt-format half", "lt_format", "half"}, std::array{"--arithmetic fast", "arithmetic", "fast"}}) {
     CAPTURE(option);
     auto const done = here.gart(std::string("train capture --out traded ") + option + openmp);
     REQUIRE_MESSAGE(done.code == 0, done.err);

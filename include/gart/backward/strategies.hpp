@@ -139,6 +139,6 @@ inline std::vector<std::string> strategy_names(strategy_use use = strategy_use::
   return names;
 }
 
-static_assert(strategy<primitive_strategy_in<lt_half_entry>> && strategy<primitive_strategy_in<lt_shared_entry>>);
+static_assert(strategy<primitive_strategy_in<lt_half_entry>>);
 
 }  // namespace gart::inline GART_ISA

@@ -35,14 +35,13 @@ constexpr auto names_of(arithmetic_kind) {
 }
 
 /// What the forward pass leaves of a hit (backward/lt_slot.hpp): nothing for pixel, its weight for hybrid.
-enum class lt_format_kind { automatic, float4, half, shared, weight, none };
+enum class lt_format_kind { automatic, float4, half, weight, none };
 /// Their names.
 constexpr auto names_of(lt_format_kind) {
   using enum lt_format_kind;
-  return std::array<name_of<lt_format_kind>, 6>{{{automatic, "auto"},
+  return std::array<name_of<lt_format_kind>, 5>{{{automatic, "auto"},
                                                  {float4, "float4"},
                                                  {half, "half"},
-                                                 {shared, "shared"},
                                                  {weight, "weight"},
                                                  {none, "none"}}};
 }
