@@ -108,7 +108,6 @@ int run_bench(bench_arguments const& a) {
                            {"backward", configuration.backward},
                            {"sh_degree", configuration.sh_degree},
                            {"kernel_degree", configuration.kernel_degree},
-                           {"arithmetic", gart::to_string(configuration.arithmetic)},
                            {"lt_format", gart::to_string(configuration.lt_format)},
                            {"tile_size", configuration.tile_size},
                            {"window", configuration.window},
@@ -171,7 +170,7 @@ void add_bench(CLI::App& app, command& selected) {
       ->type_name("NAME")
       ->capture_default_str()
       ->check(name_of_a<gart::lt_format_kind>())
-      ->group(bench->get_option("--arithmetic")->get_group());
+      ->group(bench->get_option("--tile-size")->get_group());
   bench->footer(
       "\nStages nest: \"backward\" is everything between the image's gradient and the parameters', \"backward/...\" "
       "its\n"

@@ -54,7 +54,6 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(configuration_request, backward), "--backward"},
       {GART_CLI_FIELD(configuration_request, sh_degree), "--sh-degree"},
       {GART_CLI_FIELD(configuration_request, kernel_degree), "--kernel-degree"},
-      {GART_CLI_FIELD(configuration_request, arithmetic), "--arithmetic"},
       {GART_CLI_FIELD(configuration_request, lt_format), "--lt-format"},
       {GART_CLI_FIELD(configuration_request, tile_size), "--tile-size"},
       {GART_CLI_FIELD(configuration_request, window), "--window"},

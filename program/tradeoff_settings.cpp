@@ -75,11 +75,7 @@ std::vector<setting> settings_of(configuration const& exact) {
       "kernel_degree", [](c& x) -> int& { return x.configuration.kernel_degree; },
       std::vector<int>(std::begin(gart::kernel_degrees), std::end(gart::kernel_degrees)));
   t.sweep(
-      "arithmetic", [](c & x) -> auto& { return x.configuration.arithmetic; },
-      std::vector{gart::arithmetic_kind::fast});
-  t.sweep(
-      "lt_format", [](c & x) -> auto& { return x.configuration.lt_format; },
-      std::vector{gart::lt_format_kind::half});
+      "lt_format", [](c & x) -> auto& { return x.configuration.lt_format; }, std::vector{gart::lt_format_kind::half});
   t.sweep(
       "tile_size", [](c& x) -> int& { return x.configuration.tile_size; }, std::vector<int>{4, 16});
   t.sweep(
@@ -104,10 +100,6 @@ std::vector<setting> settings_of(configuration const& exact) {
         [](c& x) { x.format = ".spz", x.packing.sh1_bits = x.packing.sh_bits = 8; });
   t.add("together", "alpha_min=0.02+t_min=0.01",
         [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f; });
-  t.add("together", "alpha_min=0.01+t_min=0.03+arithmetic=fast", [](c& x) {
-    x.render.alpha_min = 0.01f, x.render.transmittance_min = 0.03f,
-    x.configuration.arithmetic = gart::arithmetic_kind::fast;
-  });
   t.add("together", "alpha_min=0.02+t_min=0.01+resolution=1/2",
         [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f, x.shrink = 2; });
   return t.take();

@@ -209,8 +209,6 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--max-hits", a.max_hits, "N", "Hits after which a ray ends, 0: no cap"))
       ->check(between(0, gart::max_hits_most));
 
-  in_group(r.add(train, "--arithmetic", a.arithmetic, "NAME", "exact, or fast: shorter exponentials and reciprocals"))
-      ->check(name_of_a<gart::arithmetic_kind>());
   in_group(r.add(train, "--lt-format", a.lt_format, "NAME",
                  "What the forward pass leaves of a hit for primitive: float4,\nor half (half the memory, less exact "
                  "gradients)"))
@@ -290,7 +288,6 @@ gart::configuration_request configuration_request_of(train_arguments const& a) {
   wanted.backward = a.backward;
   wanted.sh_degree = a.sh_degree == "auto" ? wanted.sh_degree : std::stoi(a.sh_degree);
   wanted.kernel_degree = a.kernel_degree;
-  wanted.arithmetic = gart::from_string<gart::arithmetic_kind>(a.arithmetic);
   wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
   wanted.tile_size = a.tile_size, wanted.window = a.window, wanted.threads = a.threads;
   wanted.depth = a.depth_weight > 0;

@@ -31,7 +31,7 @@ struct train_arguments {
   // What follows decides the result and is recorded.
   std::string backend = "auto", tracer = "auto", backward = "auto", densify = "error", background = "auto", start,
               poses;
-  std::string arithmetic = "exact", lt_format = "auto";
+  std::string lt_format = "auto";
   std::string preset = "exact";
   gart::train_options defaults;
   int iterations = defaults.iterations, batch = defaults.batch;

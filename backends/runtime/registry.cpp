@@ -33,7 +33,6 @@ std::string peculiarities(configuration_info const& r) {
   std::string out;
   auto const add = [&out](std::string const& text) { out += ", " + text; };
   if (r.kernel_degree != 2) add("kernel degree " + std::to_string(r.kernel_degree));
-  if (r.arithmetic != arithmetic_kind::exact) add(std::string(to_string(r.arithmetic)) + " arithmetic");
   using enum lt_format_kind;
   if (r.lt_format != none && r.lt_format != weight && r.lt_format != float4)
     add(std::string("LT format ") + to_string(r.lt_format));
@@ -66,8 +65,8 @@ bool matches(configuration_request const& wanted, configuration_info const& ther
   return matches(wanted.backend, there.backend) && matches(wanted.tracer, there.tracer) &&
          (wanted.backward == "auto" || wanted.backward == there.backward) && wanted.sh_degree == there.sh_degree &&
          wanted.depth == there.depth && wanted.kernel_degree == there.kernel_degree &&
-         wanted.arithmetic == there.arithmetic && (wanted.ranks != nullptr) == there.ranks &&
-         matches(wanted.lt_format, there.lt_format) && (wanted.tile_size == 0 || wanted.tile_size == there.tile_size) &&
+         (wanted.ranks != nullptr) == there.ranks && matches(wanted.lt_format, there.lt_format) &&
+         (wanted.tile_size == 0 || wanted.tile_size == there.tile_size) &&
          (wanted.window == 0 || wanted.window == there.window) &&
          ((wanted.device == 0 && !wanted.stream) || there.backend == backend_kind::cuda);
 }
@@ -76,7 +75,6 @@ std::string as_text(configuration_request const& r) {
   std::string out = std::string("backend ") + to_string(r.backend) + ", tracer " + to_string(r.tracer) + ", backward " +
                     r.backward + ", SH degree " + std::to_string(r.sh_degree);
   if (r.kernel_degree != 2) out += ", kernel degree " + std::to_string(r.kernel_degree);
-  if (r.arithmetic != arithmetic_kind::exact) out += std::string(", ") + to_string(r.arithmetic) + " arithmetic";
   if (r.lt_format != lt_format_kind::automatic) out += std::string(", LT format ") + to_string(r.lt_format);
   if (r.depth) out += ", with depth";
   if (r.ranks) out += ", on several ranks";

@@ -14,7 +14,7 @@ void register_variant(bool (*available)(std::string*)) {
       rank, available);
 }
 
-// Other responses: the kernel degrees besides 2, and fast arithmetic.
+// Other responses: the kernel degrees besides 2.
 template <execution E>
 void register_kernel_variants(bool (*available)(std::string*) = always_available) {
   register_variant<E, generalized_gaussian<1>>(available);
@@ -22,7 +22,6 @@ void register_kernel_variants(bool (*available)(std::string*) = always_available
   register_variant<E, generalized_gaussian<4>>(available);
   register_variant<E, generalized_gaussian<5>>(available);
   register_variant<E, generalized_gaussian<8>>(available);
-  register_variant<E, generalized_gaussian<2, arithmetic::fast>>(available);
 }
 
 // Other shapes of the work and its memory: tiles, windows, slots of the LT buffer.

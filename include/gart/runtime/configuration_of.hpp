@@ -21,7 +21,6 @@ configuration_info configuration_of() {
   configuration.tracer = from_string(Tracer::name, tracer_kind::own);
   configuration.backward = Strategy::name;
   configuration.sh_degree = Traits::sh_degree, configuration.kernel_degree = response::degree;
-  configuration.arithmetic = response::fast ? arithmetic_kind::fast : arithmetic_kind::exact;
   configuration.lt_format =
       from_string(Strategy::template record<Tracer::tile_size>::entry::name, lt_format_kind::none);
   configuration.depth = has_depth<Strategy>;

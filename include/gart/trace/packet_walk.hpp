@@ -105,7 +105,7 @@ class packet_walk {
     for (int i = 0; i < n; ++i) {
       typename P::cell const& cell = cells_[near_[i]];
       ray_gaussian const& g = scene.gaussians[cell.id];
-      ray_peak_of<lanes> const r = evaluate<Response>(g, primary_ray_of<lanes>{d});
+      ray_peak_of<lanes> const r = evaluate(g, primary_ray_of<lanes>{d});
       hits& h = found_[count];  // alpha: |p|^2 for now
       h.t = r.t, h.alpha = r.d2, h.rays = alive_ & is_hit(g, r, scene.near), h.id = cell.id;
       h.note = program.expect(state, cell);

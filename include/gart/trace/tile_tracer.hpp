@@ -80,7 +80,7 @@ struct walk_tiles {
             if (!pass_on()) return;
           if (resume < end && pending.empty() && limit.t * depth_of_t < bound) break;
         }
-        ray_peak const r = evaluate<Response>(g, ray);
+        ray_peak const r = evaluate(g, ray);
         if (!is_hit(g, r, scene.near) || !before(last_t, last_id, r.t, id)) continue;
         pending_hit h{r.t, k, 0};
         if (resume < end && !nearer(h, limit)) {
