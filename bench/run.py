@@ -11,7 +11,7 @@ What (comma-separated; default tests and paper):
   strategies  `gart bench`: a training step by strategy and tracer, on the first two scenes
   memory      `gart bench`: LT and peak memory against the number of Gaussians, at two resolutions
   traits      `gart bench`: a training step by row (docs/traits.md): SH and kernel degree, LT format, tile,
-              window, determinism; on --backend, a host by one thread, and bytes a Gaussian. Needs -DGART_VARIANTS=ON
+              determinism; on --backend, a host by one thread, and bytes a Gaussian. Needs -DGART_VARIANTS=ON
   paper       strategies, memory and stages
   tradeoff    `gart tradeoff` on the first scene and on every --model: what each approximation costs and buys
   formats     every --model in each format and setting, by its test views: bytes, PSNR, SSIM (bench/formats.py)
@@ -62,8 +62,7 @@ TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
               [(f"kernel degree {n}", 3, n, {}) for n in (1, 3, 4, 5, 8)] +
               [("LT half", 3, 2, {"lt-format": "half"}),
                ("hybrid", 3, 2, {"backward": "hybrid"}), ("deterministic", 3, 2, {"backward": "deterministic"}),
-               ("tiles of 4", 3, 2, {"tile-size": 4}), ("tiles of 16", 3, 2, {"tile-size": 16}),
-               ("window 16", 3, 2, {"window": 16}), ("window 64", 3, 2, {"window": 64})])
+               ("tiles of 4", 3, 2, {"tile-size": 4}), ("tiles of 16", 3, 2, {"tile-size": 16})])
 
 
 class Bench(Checks, Trainings, Formats, View):

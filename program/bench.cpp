@@ -110,7 +110,6 @@ int run_bench(bench_arguments const& a) {
                            {"kernel_degree", configuration.kernel_degree},
                            {"lt_format", gart::to_string(configuration.lt_format)},
                            {"tile_size", configuration.tile_size},
-                           {"window", configuration.window},
                            {"gaussians", file.model.size()},
                            {"width", cameras[0].view.width},
                            {"height", cameras[0].view.height},

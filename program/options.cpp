@@ -65,7 +65,7 @@ gart::configuration_request configuration_options::request() const {
   gart::configuration_request wanted;
   wanted.backend = gart::from_string<gart::backend_kind>(backend);
   wanted.tracer = gart::from_string<gart::tracer_kind>(tracer);
-  wanted.tile_size = tile_size, wanted.window = window, wanted.threads = threads;
+  wanted.tile_size = tile_size, wanted.threads = threads;
   return wanted;
 }
 
@@ -93,11 +93,6 @@ void add_configuration_options(CLI::App& app, configuration_options& options) {
       ->type_name("N")
       ->capture_default_str()
       ->check(between(0, 64))
-      ->group(group);
-  app.add_option("--window", options.window, "Hits a ray keeps in order at a time, 0: what suits")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(0, 1024))
       ->group(group);
 }
 

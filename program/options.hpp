@@ -50,10 +50,10 @@ class recorded_options {
 };
 
 // --backend --tracer --threads, as every command that traces rays has them, and the traits that trade one thing for
-// another: --tile-size --window.
+// another: --tile-size.
 struct configuration_options {
   std::string backend = "auto", tracer = "auto";
-  int tile_size = 0, window = 0, threads = 0;
+  int tile_size = 0, threads = 0;
 
   gart::configuration_request request() const;
 };

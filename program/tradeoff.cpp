@@ -266,7 +266,6 @@ class tradeoff_run {
             {"sh_degree", configuration.sh_degree},
             {"kernel_degree", configuration.kernel_degree},
             {"tile_size", configuration.tile_size},
-            {"window", configuration.window},
             {"approximations", approximations_of(s.use.render.approximations(), configuration)},
             {"rebuild_every", s.use.render.rebuild_every},
             {"shrink", s.use.shrink},

@@ -79,8 +79,6 @@ std::vector<setting> settings_of(configuration const& exact) {
   t.sweep(
       "tile_size", [](c& x) -> int& { return x.configuration.tile_size; }, std::vector<int>{4, 16});
   t.sweep(
-      "window", [](c& x) -> int& { return x.configuration.window; }, std::vector<int>{16, 64});
-  t.sweep(
       "backward", [](c& x) -> std::string& { return x.configuration.backward; },
       gart::strategy_names(gart::strategy_use::measuring));
   t.sweep(

@@ -215,8 +215,6 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(name_of_a<gart::lt_format_kind>());
   in_group(r.add(train, "--tile-size", a.tile_size, "N", "Pixels a side of a tile, 0: what suits"))
       ->check(between(0, 64));
-  in_group(r.add(train, "--window", a.window, "N", "Hits a ray keeps in order at a time, 0: what suits"))
-      ->check(between(0, 1024));
 
   group = "Course";
   in_group(r.add(train, "--eval-every", a.eval_every, "N",
@@ -289,7 +287,7 @@ gart::configuration_request configuration_request_of(train_arguments const& a) {
   wanted.sh_degree = a.sh_degree == "auto" ? wanted.sh_degree : std::stoi(a.sh_degree);
   wanted.kernel_degree = a.kernel_degree;
   wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
-  wanted.tile_size = a.tile_size, wanted.window = a.window, wanted.threads = a.threads;
+  wanted.tile_size = a.tile_size, wanted.threads = a.threads;
   wanted.depth = a.depth_weight > 0;
   return wanted;
 }

@@ -20,14 +20,6 @@ bool matches(E wanted, E there) {
   return wanted == E::automatic || wanted == there;
 }
 
-// The window of the configuration that "auto" takes.
-int usual_window(configuration_info const& of) {
-  compiled_configuration const* best = nullptr;
-  for (auto const& r : configurations())
-    if (r.info.backend == of.backend && r.info.tracer == of.tracer && (!best || r.rank > best->rank)) best = &r;
-  return best->info.window;
-}
-
 // What a configuration has that the ordinary one has not.
 std::string peculiarities(configuration_info const& r) {
   std::string out;
@@ -39,7 +31,6 @@ std::string peculiarities(configuration_info const& r) {
   if (r.depth) add("with depth");
   if (r.ranks) add("on several ranks");
   if (r.tile_size != 8) add("tiles of " + std::to_string(r.tile_size));
-  if (r.window != usual_window(r)) add("window " + std::to_string(r.window));
   return out;
 }
 
@@ -67,7 +58,6 @@ bool matches(configuration_request const& wanted, configuration_info const& ther
          wanted.depth == there.depth && wanted.kernel_degree == there.kernel_degree &&
          (wanted.ranks != nullptr) == there.ranks && matches(wanted.lt_format, there.lt_format) &&
          (wanted.tile_size == 0 || wanted.tile_size == there.tile_size) &&
-         (wanted.window == 0 || wanted.window == there.window) &&
          ((wanted.device == 0 && !wanted.stream) || there.backend == backend_kind::cuda);
 }
 
@@ -79,7 +69,6 @@ std::string as_text(configuration_request const& r) {
   if (r.depth) out += ", with depth";
   if (r.ranks) out += ", on several ranks";
   if (r.tile_size != 0) out += ", tiles of " + std::to_string(r.tile_size);
-  if (r.window != 0) out += ", window " + std::to_string(r.window);
   if (r.device != 0) out += ", device " + std::to_string(r.device);
   if (r.stream) out += ", a CUDA stream of the caller's";
   return out;

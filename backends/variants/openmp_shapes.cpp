@@ -5,5 +5,5 @@
 #include <gart/exec/parallel.hpp>
 
 GART_REGISTER_CONFIGURATIONS(gart_openmp_shapes, gart::register_shape_variants<gart::openmp_exec>();
-                             gart::register_variant<gart::openmp_exec, gart::generalized_gaussian<>, 8, 32,
+                             gart::register_variant<gart::openmp_exec, gart::generalized_gaussian<>, 8,
                                                     gart::deterministic_strategy>(gart::always_available))

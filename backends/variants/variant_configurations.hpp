@@ -7,11 +7,11 @@
 
 namespace gart {
 
-template <execution E, class Response, int TileSize = 8, int Window = 32, class Strategy = primitive_strategy>
+template <execution E, class Response, int TileSize = 8, class Strategy = primitive_strategy>
 void register_variant(bool (*available)(std::string*)) {
   constexpr int rank = E::device ? -1 : -2;
-  register_configuration_of<E, scene_traits<3, Response>, tile_tracer<E, TileSize, Response, Window>, Strategy>(
-      rank, available);
+  register_configuration_of<E, scene_traits<3, Response>, tile_tracer<E, TileSize, Response>, Strategy>(rank,
+                                                                                                        available);
 }
 
 // Other responses: the kernel degrees besides 2.
@@ -24,14 +24,12 @@ void register_kernel_variants(bool (*available)(std::string*) = always_available
   register_variant<E, generalized_gaussian<8>>(available);
 }
 
-// Other shapes of the work and its memory: tiles, windows, slots of the LT buffer.
+// Other shapes of the work and its memory: tiles, slots of the LT buffer.
 template <execution E>
 void register_shape_variants(bool (*available)(std::string*) = always_available) {
   register_variant<E, generalized_gaussian<>, 4>(available);
   register_variant<E, generalized_gaussian<>, 16>(available);
-  register_variant<E, generalized_gaussian<>, 8, 16>(available);
-  register_variant<E, generalized_gaussian<>, 8, 64>(available);
-  register_variant<E, generalized_gaussian<>, 8, 32, primitive_strategy_in<lt_half_entry>>(available);
+  register_variant<E, generalized_gaussian<>, 8, primitive_strategy_in<lt_half_entry>>(available);
 }
 
 }  // namespace gart

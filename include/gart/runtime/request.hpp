@@ -23,7 +23,6 @@ struct configuration_request {
   lt_format_kind lt_format = lt_format_kind::automatic;  ///< of the slots of the LT buffer
   int tile_size = 0;                                     ///< pixels a side
   bool depth = false;  ///< gradients of depth and transmittance too; training by depth_weight asks for it itself
-  int window = 0;      ///< hits that a ray keeps in order before it goes over the scene again
   int threads = 0;     ///< of the openmp policy; 0: as many as OpenMP gives
   int device = 0;      ///< of the cuda policy; ranks take a host's GPUs in turn
   /// Of the cuda policy: a cudaStream_t of the caller's that all work goes to (cudaStreamLegacy for the default one);
@@ -43,8 +42,7 @@ struct configuration_info {
   int kernel_degree = 2;                            ///< of the generalised Gaussians
   lt_format_kind lt_format = lt_format_kind::none;  ///< of the slots of the LT buffer
   bool depth = false;                               ///< gradients of depth and transmittance too
-  int tile_size = 8,                                ///< pixels a side
-      window = 0;                                   ///< hits of a ray that are kept at a time
+  int tile_size = 8;                                ///< pixels a side
   bool ranks = false;                               ///< trains on several ranks
   std::string instruction_set = "";  ///< that a host configuration was compiled for (core/isa.hpp); empty on a device
 };
