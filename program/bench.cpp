@@ -109,7 +109,6 @@ int run_bench(bench_arguments const& a) {
                            {"sh_degree", configuration.sh_degree},
                            {"kernel_degree", configuration.kernel_degree},
                            {"lt_format", gart::to_string(configuration.lt_format)},
-                           {"tile_size", configuration.tile_size},
                            {"gaussians", file.model.size()},
                            {"width", cameras[0].view.width},
                            {"height", cameras[0].view.height},
@@ -168,8 +167,7 @@ void add_bench(CLI::App& app, command& selected) {
   bench->add_option("--lt-format", a->lt_format, "What the forward pass leaves of a hit: float4 or half")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(name_of_a<gart::lt_format_kind>())
-      ->group(bench->get_option("--tile-size")->get_group());
+      ->check(name_of_a<gart::lt_format_kind>());
   bench->footer(
       "\nStages nest: \"backward\" is everything between the image's gradient and the parameters', \"backward/...\" "
       "its\n"

@@ -65,7 +65,7 @@ gart::configuration_request configuration_options::request() const {
   gart::configuration_request wanted;
   wanted.backend = gart::from_string<gart::backend_kind>(backend);
   wanted.tracer = gart::from_string<gart::tracer_kind>(tracer);
-  wanted.tile_size = tile_size, wanted.threads = threads;
+  wanted.threads = threads;
   return wanted;
 }
 
@@ -88,12 +88,6 @@ void add_configuration_options(CLI::App& app, configuration_options& options) {
       ->capture_default_str()
       ->check(name_of_a<gart::tracer_kind>());
   add_threads(app, options.threads);
-  std::string const group = "Traits that trade (gart info lists the configurations that have them)";
-  app.add_option("--tile-size", options.tile_size, "Pixels a side of a tile, 0: what suits")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(0, 64))
-      ->group(group);
 }
 
 void add_max_hits(CLI::App& app, int& max_hits) {

@@ -49,11 +49,10 @@ class recorded_options {
   std::vector<entry> entries_;
 };
 
-// --backend --tracer --threads, as every command that traces rays has them, and the traits that trade one thing for
-// another: --tile-size.
+// --backend --tracer --threads, as every command that traces rays has them.
 struct configuration_options {
   std::string backend = "auto", tracer = "auto";
-  int tile_size = 0, threads = 0;
+  int threads = 0;
 
   gart::configuration_request request() const;
 };

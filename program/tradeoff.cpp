@@ -265,7 +265,6 @@ class tradeoff_run {
             {"backward", configuration.backward},
             {"sh_degree", configuration.sh_degree},
             {"kernel_degree", configuration.kernel_degree},
-            {"tile_size", configuration.tile_size},
             {"approximations", approximations_of(s.use.render.approximations(), configuration)},
             {"rebuild_every", s.use.render.rebuild_every},
             {"shrink", s.use.shrink},

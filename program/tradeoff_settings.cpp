@@ -72,12 +72,9 @@ std::vector<setting> settings_of(configuration const& exact) {
   t.sweep(
       "sh_degree", [](c& x) -> int& { return x.configuration.sh_degree; }, degrees);
   t.sweep(
-      "kernel_degree", [](c& x) -> int& { return x.configuration.kernel_degree; },
-      std::vector<int>(std::begin(gart::kernel_degrees), std::end(gart::kernel_degrees)));
+      "kernel_degree", [](c& x) -> int& { return x.configuration.kernel_degree; }, std::vector<int>{2, 4});
   t.sweep(
       "lt_format", [](c & x) -> auto& { return x.configuration.lt_format; }, std::vector{gart::lt_format_kind::half});
-  t.sweep(
-      "tile_size", [](c& x) -> int& { return x.configuration.tile_size; }, std::vector<int>{4, 16});
   t.sweep(
       "backward", [](c& x) -> std::string& { return x.configuration.backward; },
       gart::strategy_names(gart::strategy_use::measuring));

@@ -110,8 +110,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(whole_number());
 
   in_group(r.add(train, "--kernel-degree", a.kernel_degree, "N",
-                 "How Gaussians fall from their centres, exp(-4.5 (r / 3)^N):\n2, or the generalised 1, 3, 4, 5, 8 of "
-                 "3DGRT"))
+                 "How Gaussians fall from their centres, exp(-4.5 (r / 3)^N):\n2, or 4, as 3DGRT has it"))
       ->check(kernel_degree_names());
 
   in_group(r.add_flag(
@@ -213,8 +212,6 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "What the forward pass leaves of a hit for primitive: float4,\nor half (half the memory, less exact "
                  "gradients)"))
       ->check(name_of_a<gart::lt_format_kind>());
-  in_group(r.add(train, "--tile-size", a.tile_size, "N", "Pixels a side of a tile, 0: what suits"))
-      ->check(between(0, 64));
 
   group = "Course";
   in_group(r.add(train, "--eval-every", a.eval_every, "N",
@@ -287,7 +284,7 @@ gart::configuration_request configuration_request_of(train_arguments const& a) {
   wanted.sh_degree = a.sh_degree == "auto" ? wanted.sh_degree : std::stoi(a.sh_degree);
   wanted.kernel_degree = a.kernel_degree;
   wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
-  wanted.tile_size = a.tile_size, wanted.threads = a.threads;
+  wanted.threads = a.threads;
   wanted.depth = a.depth_weight > 0;
   return wanted;
 }

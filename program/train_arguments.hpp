@@ -37,7 +37,7 @@ struct train_arguments {
   int iterations = defaults.iterations, batch = defaults.batch;
   double time_budget = 0;  // seconds of training; 0: none
   gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
-  int kernel_degree = 2, tile_size = 0;
+  int kernel_degree = 2;
   bool automatic = false;
   std::string sh_degree = "auto";
   float sh_gain = gart::usual_sh_gain;

@@ -30,7 +30,6 @@ std::string peculiarities(configuration_info const& r) {
     add(std::string("LT format ") + to_string(r.lt_format));
   if (r.depth) add("with depth");
   if (r.ranks) add("on several ranks");
-  if (r.tile_size != 8) add("tiles of " + std::to_string(r.tile_size));
   return out;
 }
 
@@ -57,7 +56,6 @@ bool matches(configuration_request const& wanted, configuration_info const& ther
          (wanted.backward == "auto" || wanted.backward == there.backward) && wanted.sh_degree == there.sh_degree &&
          wanted.depth == there.depth && wanted.kernel_degree == there.kernel_degree &&
          (wanted.ranks != nullptr) == there.ranks && matches(wanted.lt_format, there.lt_format) &&
-         (wanted.tile_size == 0 || wanted.tile_size == there.tile_size) &&
          ((wanted.device == 0 && !wanted.stream) || there.backend == backend_kind::cuda);
 }
 
@@ -68,7 +66,6 @@ std::string as_text(configuration_request const& r) {
   if (r.lt_format != lt_format_kind::automatic) out += std::string(", LT format ") + to_string(r.lt_format);
   if (r.depth) out += ", with depth";
   if (r.ranks) out += ", on several ranks";
-  if (r.tile_size != 0) out += ", tiles of " + std::to_string(r.tile_size);
   if (r.device != 0) out += ", device " + std::to_string(r.device);
   if (r.stream) out += ", a CUDA stream of the caller's";
   return out;

@@ -24,7 +24,6 @@ configuration_info configuration_of() {
   configuration.lt_format =
       from_string(Strategy::template record<Tracer::tile_size>::entry::name, lt_format_kind::none);
   configuration.depth = has_depth<Strategy>;
-  configuration.tile_size = Tracer::tile_size;
   configuration.ranks = !Comm::alone;
   if constexpr (!E::device) configuration.instruction_set = instruction_set;
   return configuration;

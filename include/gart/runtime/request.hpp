@@ -21,7 +21,6 @@ struct configuration_request {
   int sh_degree = 3;              ///< of the spherical harmonics of colour that are stored, 0 to 3
   int kernel_degree = 2;          ///< of the generalised Gaussians (math/response.hpp)
   lt_format_kind lt_format = lt_format_kind::automatic;  ///< of the slots of the LT buffer
-  int tile_size = 0;                                     ///< pixels a side
   bool depth = false;  ///< gradients of depth and transmittance too; training by depth_weight asks for it itself
   int threads = 0;     ///< of the openmp policy; 0: as many as OpenMP gives
   int device = 0;      ///< of the cuda policy; ranks take a host's GPUs in turn
@@ -42,7 +41,6 @@ struct configuration_info {
   int kernel_degree = 2;                            ///< of the generalised Gaussians
   lt_format_kind lt_format = lt_format_kind::none;  ///< of the slots of the LT buffer
   bool depth = false;                               ///< gradients of depth and transmittance too
-  int tile_size = 8;                                ///< pixels a side
   bool ranks = false;                               ///< trains on several ranks
   std::string instruction_set = "";  ///< that a host configuration was compiled for (core/isa.hpp); empty on a device
 };
