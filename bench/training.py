@@ -50,7 +50,8 @@ RULES = (("all", []),
          ("antialias", ["--antialias"]),
          ("mcmc", ["--densify", "mcmc"]),
          ("mcmc, no noise", ["--densify", "mcmc", "--set", "mcmc.noise=0"]),
-         ("mcmc, no penalties", ["--densify", "mcmc", "--mcmc-penalty", "0"]),
+         ("mcmc, no penalties", ["--densify", "mcmc", "--set",
+                                  "mcmc.opacity_penalty=0,mcmc.scale_penalty=0"]),
          ("adc", ["--densify", "adc"]),
          ("adc, no resets", ["--densify", "adc", "--set", "adc.opacity_reset_every=0"]))
 

@@ -87,12 +87,6 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 for random points "
                  "with\nerror or mcmc, else 1"))
       ->check(between(0, 100));
-  in_group(
-      r.add(train, "--mcmc-noise", a.mcmc_noise, "X", "Strength of the random steps of mcmc over the usual; 0: none"))
-      ->check(between(0, 1e6));
-  in_group(r.add(train, "--mcmc-penalty", a.mcmc_penalty, "X",
-                 "Strength of the penalties of mcmc on opacity and size over\nthe usual; 0: none"))
-      ->check(between(0, 1e6));
   in_group(r.add(train, "--adam", a.adam, "NAME",
                  "all: each step moves every Gaussian; seen: only those that\nits view shows, as sparse Adam does; for "
                  "views that show a\nsmall part of a large scene"))
@@ -300,8 +294,6 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.exposure = a.exposure == "on", o.vignetting = a.vignetting == "on";
   o.depth_weight = a.depth_weight;
   o.refine_poses = a.refine_poses, o.refine_lens = a.refine_lens;
-  o.mcmc.noise *= a.mcmc_noise;
-  o.mcmc.opacity_penalty *= a.mcmc_penalty, o.mcmc.scale_penalty *= a.mcmc_penalty;
   o.adam.seen_only = a.adam == "seen";
   o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
   o.sh_gain = a.automatic && a.sh_degree == "auto" ? a.sh_gain : 0;
