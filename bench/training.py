@@ -13,7 +13,7 @@ import shutil
 
 from common import last_line, run
 
-PRESETS = ("exact", "balanced", "fast")
+PRESETS = ("exact", "quick")
 FULL_STEPS = 30000
 # Gaussians at most, for captures that are known, where --train does not say.
 GAUSSIANS = {"lego": 300000, "bonsai": 1000000, "tandt_train": 1000000, "fox": 500000, "many_cameras": 500000}

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <gart/backward/strategies.hpp>
-#include <gart/runtime/presets.hpp>
 #include <iterator>
 
 namespace gart_cli {
@@ -54,11 +53,6 @@ class table {
 std::vector<setting> settings_of(configuration const& exact) {
   using c = configuration;
   table t(exact);
-  for (gart::preset const& p : gart::presets()) {
-    if (!p.approximates()) continue;
-    t.add("preset", p.name,
-          [&](c& x) { x.render.alpha_min = p.alpha_min, x.render.transmittance_min = p.transmittance_min; });
-  }
   t.sweep(
       "alpha_min", [](c& x) -> float& { return x.render.alpha_min; },
       std::vector<float>{0.5f / 255, 1.0f / 255, 2.0f / 255, 4.0f / 255, 0.02f, 0.05f});

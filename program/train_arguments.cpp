@@ -17,21 +17,6 @@ namespace gart_cli {
 
 namespace fs = std::filesystem;
 
-namespace {
-// A line a preset, with what it sets.
-std::string presets_help() {
-  std::string text =
-      "What is left out for speed; options given besides win. What\nit costs in quality: gart tradeoff, and "
-      "docs/tradeoffs.md";
-  for (gart::preset const& p : gart::presets()) {
-    char knobs[80];
-    std::snprintf(knobs, sizeof knobs, ": --alpha-min %.4g --t-min %.4g", p.alpha_min, p.transmittance_min);
-    text += "\n" + p.name + (p.iterations ? ": --iterations " + std::to_string(p.iterations) : knobs);
-  }
-  return text;
-}
-}  // namespace
-
 void add_arguments(CLI::App& train, train_arguments& a) {
   auto& r = a.recorded;
   train
@@ -193,7 +178,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(train.get_option("--threads"));
 
   group = "Accuracy";
-  in_group(r.add(train, "--preset", a.preset, "NAME", presets_help()))->check(one_of(gart::preset_names()));
+  in_group(r.add(train, "--preset", a.preset, "NAME",
+                 "exact, or quick: " + std::to_string(gart::preset_named("quick").iterations) +
+                     " steps, where --iterations is not given"))
+      ->check(one_of(gart::preset_names()));
   in_group(r.add(train, "--alpha-min", a.alpha_min, "A",
                  "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as others have it"))
       ->check(between(1e-6, 0.99));
@@ -241,11 +229,9 @@ void add_arguments(CLI::App& train, train_arguments& a) {
 
 void fill_in(CLI::App const& train, train_arguments& a) {
   gart::preset const& chosen = gart::preset_named(a.preset);
-  auto const set = [&](char const* option, auto& value, auto const& by_preset) {
-    if (train.get_option(option)->count() == 0) value = by_preset;
+  auto const set = [&](char const* option, auto& value, auto const& otherwise) {
+    if (train.get_option(option)->count() == 0) value = otherwise;
   };
-  set("--alpha-min", a.alpha_min, chosen.alpha_min);
-  set("--t-min", a.t_min, chosen.transmittance_min);
   if (chosen.iterations) set("--iterations", a.iterations, chosen.iterations);
   set("--auto", a.automatic, a.iterations >= gart::measured_from);
 }
