@@ -16,7 +16,6 @@ What (comma-separated; default tests and paper):
   tradeoff    `gart tradeoff` on the first scene and on every --model: what each approximation costs and buys
   formats     every --model in each format and setting, by its test views: bytes, PSNR, SSIM (bench/formats.py)
   view        every --model served by `gart view`, and what a viewer takes from training every --capture (bench/view.py)
-  presets     `gart train` with each --preset on every --capture: what they cost in quality
   rules       `gart train` with each rule of docs/training.md changed alone (--rules names some), --seeds of each (3):
               a file rules_NAME.json a capture, written after each rule
   auto        `gart train --auto` against --no-auto on every --capture: scores, seconds, bytes, what was chosen and
@@ -53,7 +52,7 @@ from formats import Formats
 from training import LONG_PARTS, RULES, Trainings
 from view import View
 
-TRAININGS = ("presets", "rules", "auto", "curves", "long")
+TRAININGS = ("rules", "auto", "curves", "long")
 PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff", "formats",
          "view") + TRAININGS
 
@@ -295,7 +294,7 @@ def arguments():
                         help="tradeoff, and traits, which takes the first: a trained model and its capture or camera "
                              "JSON; may be repeated")
     parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("NAME", "DATASET"),
-                        help="presets, rules, auto, curves and long: a capture to train on; may be repeated")
+                        help="rules, auto, curves and long: a capture to train on; may be repeated")
     parser.add_argument("--train", default="",
                         help="the same: options of gart train, in one string; --iterations, where it is not among "
                              "them, is 1000 for curves and 30000 for the others")
