@@ -3,7 +3,7 @@ import glob
 import os
 
 from charts import courses
-from tables import clock_of, source, table
+from tables import source, table
 
 
 def shown(value, form):

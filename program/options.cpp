@@ -49,8 +49,8 @@ nlohmann::json recorded_options::continue_from(nlohmann::json const& saved, std:
   return raised;
 }
 
-CLI::Validator one_of_strategies(gart::strategy_use use) {
-  std::vector<std::string> names = gart::strategy_names(use);
+CLI::Validator one_of_strategies() {
+  std::vector<std::string> names = gart::strategy_names();
   names.insert(names.begin(), "auto");
   return one_of(names);
 }

@@ -68,8 +68,8 @@ template <gart::named E>
 CLI::Validator name_of_a() {
   return one_of(gart::list_of_names<E>());
 }
-// "auto", or a strategy of that use.
-CLI::Validator one_of_strategies(gart::strategy_use use = gart::strategy_use::measuring);
+// "auto", or a strategy.
+CLI::Validator one_of_strategies();
 CLI::Validator kernel_degree_names();
 
 gart::vec3 background_color(std::string const& name);

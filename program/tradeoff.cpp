@@ -342,9 +342,9 @@ void add_tradeoff(CLI::App& app, command& selected) {
       ->capture_default_str()
       ->check(one_of({"auto", "white", "black"}));
   tradeoff
-      ->add_option("--backward", a->backward,
-                   "Backward strategy of all settings that do not name one:\nauto, pixel, hybrid, primitive, "
-                   "deterministic or cleared")
+      ->add_option(
+          "--backward", a->backward,
+          "Backward strategy of all settings that do not name one:\nauto, pixel, hybrid, primitive or deterministic")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(one_of_strategies());

@@ -70,8 +70,7 @@ std::vector<setting> settings_of(configuration const& exact) {
   t.sweep(
       "lt_format", [](c & x) -> auto& { return x.configuration.lt_format; }, std::vector{gart::lt_format_kind::half});
   t.sweep(
-      "backward", [](c& x) -> std::string& { return x.configuration.backward; },
-      gart::strategy_names(gart::strategy_use::measuring));
+      "backward", [](c& x) -> std::string& { return x.configuration.backward; }, gart::strategy_names());
   t.sweep(
       "tracer", [](c & x) -> auto& { return x.configuration.tracer; },
       std::vector{gart::tracer_kind::tiles, gart::tracer_kind::bvh, gart::tracer_kind::embree});

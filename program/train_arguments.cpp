@@ -152,7 +152,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--backward", a.backward, "NAME",
                  "How gradients are summed: primitive (one sum a Gaussian and\ntile), hybrid (a quarter of the "
                  "memory), pixel, or\ndeterministic (the same bits in every run); auto: the fastest"))
-      ->check(one_of_strategies(gart::strategy_use::training));
+      ->check(one_of_strategies());
   in_group(r.add(train, "--lt-budget", a.lt_budget_gb, "GB",
                  "Memory for what the forward pass records; a step that\nneeds more is done by hybrid, which needs a "
                  "quarter, and where\nthat is too much by pixel, which needs none. 0: half of what\nis free "
