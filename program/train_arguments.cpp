@@ -17,21 +17,6 @@ namespace gart_cli {
 
 namespace fs = std::filesystem;
 
-namespace {
-// A line a preset, with what it sets.
-std::string presets_help() {
-  std::string text =
-      "What is left out for speed; options given besides win. What\nit costs in quality: gart tradeoff, and "
-      "docs/performance.md";
-  for (gart::preset const& p : gart::presets()) {
-    char knobs[80];
-    std::snprintf(knobs, sizeof knobs, ": --alpha-min %.4g --t-min %.4g", p.alpha_min, p.transmittance_min);
-    text += "\n" + p.name + (p.iterations ? ": --iterations " + std::to_string(p.iterations) : knobs);
-  }
-  return text;
-}
-}  // namespace
-
 void add_arguments(CLI::App& train, train_arguments& a) {
   auto& r = a.recorded;
   train
@@ -87,12 +72,6 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 for random points "
                  "with\nerror or mcmc, else 1"))
       ->check(between(0, 100));
-  in_group(
-      r.add(train, "--mcmc-noise", a.mcmc_noise, "X", "Strength of the random steps of mcmc over the usual; 0: none"))
-      ->check(between(0, 1e6));
-  in_group(r.add(train, "--mcmc-penalty", a.mcmc_penalty, "X",
-                 "Strength of the penalties of mcmc on opacity and size over\nthe usual; 0: none"))
-      ->check(between(0, 1e6));
   in_group(r.add(train, "--adam", a.adam, "NAME",
                  "all: each step moves every Gaussian; seen: only those that\nits view shows, as sparse Adam does; for "
                  "views that show a\nsmall part of a large scene"))
@@ -110,8 +89,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(whole_number());
 
   in_group(r.add(train, "--kernel-degree", a.kernel_degree, "N",
-                 "How Gaussians fall from their centres, exp(-4.5 (r / 3)^N):\n2, or the generalised 1, 3, 4, 5, 8 of "
-                 "3DGRT"))
+                 "How Gaussians fall from their centres, exp(-4.5 (r / 3)^N):\n2, or 4, as 3DGRT has it"))
       ->check(kernel_degree_names());
 
   in_group(r.add_flag(
@@ -174,7 +152,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--backward", a.backward, "NAME",
                  "How gradients are summed: primitive (one sum a Gaussian and\ntile), hybrid (a quarter of the "
                  "memory), pixel, or\ndeterministic (the same bits in every run); auto: the fastest"))
-      ->check(one_of_strategies(gart::strategy_use::training));
+      ->check(one_of_strategies());
   in_group(r.add(train, "--lt-budget", a.lt_budget_gb, "GB",
                  "Memory for what the forward pass records; a step that\nneeds more is done by hybrid, which needs a "
                  "quarter, and where\nthat is too much by pixel, which needs none. 0: half of what\nis free "
@@ -200,7 +178,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(train.get_option("--threads"));
 
   group = "Accuracy";
-  in_group(r.add(train, "--preset", a.preset, "NAME", presets_help()))->check(one_of(gart::preset_names()));
+  in_group(r.add(train, "--preset", a.preset, "NAME",
+                 "exact, or quick: " + std::to_string(gart::preset_named("quick").iterations) +
+                     " steps, where --iterations is not given"))
+      ->check(one_of(gart::preset_names()));
   in_group(r.add(train, "--alpha-min", a.alpha_min, "A",
                  "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as others have it"))
       ->check(between(1e-6, 0.99));
@@ -209,16 +190,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--max-hits", a.max_hits, "N", "Hits after which a ray ends, 0: no cap"))
       ->check(between(0, gart::max_hits_most));
 
-  in_group(r.add(train, "--arithmetic", a.arithmetic, "NAME", "exact, or fast: shorter exponentials and reciprocals"))
-      ->check(name_of_a<gart::arithmetic_kind>());
   in_group(r.add(train, "--lt-format", a.lt_format, "NAME",
-                 "What the forward pass leaves of a hit for primitive: float4,\nhalf or shared (half the memory, less "
-                 "exact gradients)"))
+                 "What the forward pass leaves of a hit for primitive: float4,\nor half (half the memory, less exact "
+                 "gradients)"))
       ->check(name_of_a<gart::lt_format_kind>());
-  in_group(r.add(train, "--tile-size", a.tile_size, "N", "Pixels a side of a tile, 0: what suits"))
-      ->check(between(0, 64));
-  in_group(r.add(train, "--window", a.window, "N", "Hits a ray keeps in order at a time, 0: what suits"))
-      ->check(between(0, 1024));
 
   group = "Course";
   in_group(r.add(train, "--eval-every", a.eval_every, "N",
@@ -254,11 +229,9 @@ void add_arguments(CLI::App& train, train_arguments& a) {
 
 void fill_in(CLI::App const& train, train_arguments& a) {
   gart::preset const& chosen = gart::preset_named(a.preset);
-  auto const set = [&](char const* option, auto& value, auto const& by_preset) {
-    if (train.get_option(option)->count() == 0) value = by_preset;
+  auto const set = [&](char const* option, auto& value, auto const& otherwise) {
+    if (train.get_option(option)->count() == 0) value = otherwise;
   };
-  set("--alpha-min", a.alpha_min, chosen.alpha_min);
-  set("--t-min", a.t_min, chosen.transmittance_min);
   if (chosen.iterations) set("--iterations", a.iterations, chosen.iterations);
   set("--auto", a.automatic, a.iterations >= gart::measured_from);
 }
@@ -290,9 +263,8 @@ gart::configuration_request configuration_request_of(train_arguments const& a) {
   wanted.backward = a.backward;
   wanted.sh_degree = a.sh_degree == "auto" ? wanted.sh_degree : std::stoi(a.sh_degree);
   wanted.kernel_degree = a.kernel_degree;
-  wanted.arithmetic = gart::from_string<gart::arithmetic_kind>(a.arithmetic);
   wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
-  wanted.tile_size = a.tile_size, wanted.window = a.window, wanted.threads = a.threads;
+  wanted.threads = a.threads;
   wanted.depth = a.depth_weight > 0;
   return wanted;
 }
@@ -308,8 +280,6 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.exposure = a.exposure == "on", o.vignetting = a.vignetting == "on";
   o.depth_weight = a.depth_weight;
   o.refine_poses = a.refine_poses, o.refine_lens = a.refine_lens;
-  o.mcmc.noise *= a.mcmc_noise;
-  o.mcmc.opacity_penalty *= a.mcmc_penalty, o.mcmc.scale_penalty *= a.mcmc_penalty;
   o.adam.seen_only = a.adam == "seen";
   o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
   o.sh_gain = a.automatic && a.sh_degree == "auto" ? a.sh_gain : 0;

@@ -20,27 +20,16 @@ bool matches(E wanted, E there) {
   return wanted == E::automatic || wanted == there;
 }
 
-// The window of the configuration that "auto" takes.
-int usual_window(configuration_info const& of) {
-  compiled_configuration const* best = nullptr;
-  for (auto const& r : configurations())
-    if (r.info.backend == of.backend && r.info.tracer == of.tracer && (!best || r.rank > best->rank)) best = &r;
-  return best->info.window;
-}
-
 // What a configuration has that the ordinary one has not.
 std::string peculiarities(configuration_info const& r) {
   std::string out;
   auto const add = [&out](std::string const& text) { out += ", " + text; };
   if (r.kernel_degree != 2) add("kernel degree " + std::to_string(r.kernel_degree));
-  if (r.arithmetic != arithmetic_kind::exact) add(std::string(to_string(r.arithmetic)) + " arithmetic");
   using enum lt_format_kind;
   if (r.lt_format != none && r.lt_format != weight && r.lt_format != float4)
     add(std::string("LT format ") + to_string(r.lt_format));
   if (r.depth) add("with depth");
   if (r.ranks) add("on several ranks");
-  if (r.tile_size != 8) add("tiles of " + std::to_string(r.tile_size));
-  if (r.window != usual_window(r)) add("window " + std::to_string(r.window));
   return out;
 }
 
@@ -66,9 +55,7 @@ bool matches(configuration_request const& wanted, configuration_info const& ther
   return matches(wanted.backend, there.backend) && matches(wanted.tracer, there.tracer) &&
          (wanted.backward == "auto" || wanted.backward == there.backward) && wanted.sh_degree == there.sh_degree &&
          wanted.depth == there.depth && wanted.kernel_degree == there.kernel_degree &&
-         wanted.arithmetic == there.arithmetic && (wanted.ranks != nullptr) == there.ranks &&
-         matches(wanted.lt_format, there.lt_format) && (wanted.tile_size == 0 || wanted.tile_size == there.tile_size) &&
-         (wanted.window == 0 || wanted.window == there.window) &&
+         (wanted.ranks != nullptr) == there.ranks && matches(wanted.lt_format, there.lt_format) &&
          ((wanted.device == 0 && !wanted.stream) || there.backend == backend_kind::cuda);
 }
 
@@ -76,12 +63,9 @@ std::string as_text(configuration_request const& r) {
   std::string out = std::string("backend ") + to_string(r.backend) + ", tracer " + to_string(r.tracer) + ", backward " +
                     r.backward + ", SH degree " + std::to_string(r.sh_degree);
   if (r.kernel_degree != 2) out += ", kernel degree " + std::to_string(r.kernel_degree);
-  if (r.arithmetic != arithmetic_kind::exact) out += std::string(", ") + to_string(r.arithmetic) + " arithmetic";
   if (r.lt_format != lt_format_kind::automatic) out += std::string(", LT format ") + to_string(r.lt_format);
   if (r.depth) out += ", with depth";
   if (r.ranks) out += ", on several ranks";
-  if (r.tile_size != 0) out += ", tiles of " + std::to_string(r.tile_size);
-  if (r.window != 0) out += ", window " + std::to_string(r.window);
   if (r.device != 0) out += ", device " + std::to_string(r.device);
   if (r.stream) out += ", a CUDA stream of the caller's";
   return out;

@@ -4,7 +4,6 @@
 
 #include <gart/runtime/choose.hpp>
 #include <gart/runtime/model_file.hpp>
-#include <gart/runtime/presets.hpp>
 #include <gart/runtime/session.hpp>
 
 #include <support/policies.hpp>
@@ -147,17 +146,16 @@ TEST_CASE("where photographs differ in brightness and no exposure is learned, mo
   CHECK(settings("learned", "--set ") == "dropout=0.2," + rules);
 }
 
-TEST_CASE("the library's presets, exposures and measured bands are those of gart train") {
+TEST_CASE("the library's exposures and measured bands are those of gart train") {
   folder const here;
   write_capture(here / "capture", 20);
   gart::train_options options;
   options.iterations = gart::measured_from;
   options.max_gaussians = 30;
-  gart::preset_named("fast").apply(options.render);
   auto const use = train(here / "capture", options, here / "mine.ply");
   CHECK(use.options.sh_gain == gart::usual_sh_gain);
   auto const run = here.gart("train capture --out run --iterations " + std::to_string(gart::measured_from) +
-                             " --max-gaussians 30 --preset fast --backend serial --quiet");
+                             " --max-gaussians 30 --backend serial --quiet");
   REQUIRE_MESSAGE(run.code == 0, run.err);
   auto const metrics = here.json("run/metrics.json");
   CHECK_FALSE(metrics["sh_trials"].empty());

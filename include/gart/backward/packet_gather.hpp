@@ -142,7 +142,7 @@ struct packet_gather {
       auto& f = found[count];
       f.at = &at, f.slots = packet_slots(cell, at.x, at.y);
       if (!any(f.slots.inside)) continue;
-      f.r = evaluate<response_type>(g, primary_ray_of<lanes>{at.direction});
+      f.r = evaluate(g, primary_ray_of<lanes>{at.direction});
       f.hit = f.slots.inside;
       if constexpr (recomputed)
         f.hit &= is_hit(g, f.r, gather.near) &

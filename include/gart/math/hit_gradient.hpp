@@ -42,10 +42,22 @@ struct moments_of {
   F v[moment_stride];  ///< as above
 };
 
+/// 1 / a where it decides no hit: on a device by its estimate, within 2^-23.
+template <class F>
+GART_HD GART_INLINE F estimated_reciprocal(F a) {
+#if defined(__CUDA_ARCH__)
+  float r;
+  asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(r) : "f"(a));
+  return r;
+#else
+  return reciprocal(a);
+#endif
+}
+
 /// dL/dalpha of a hit: V.g and C.g.
 template <class F>
 GART_HD GART_INLINE F alpha_gradient(F opaque_g, F color_g, F alpha) {
-  return (opaque_g - color_g) * fast_reciprocal(F(1.0f) - alpha);
+  return (opaque_g - color_g) * estimated_reciprocal(F(1.0f) - alpha);
 }
 
 /// The front-to-back walk of a ray's gradient.

@@ -13,8 +13,8 @@ struct pose_options {
   /// What is added to how the image moves (pose/pose_metric.hpp), from and to: at first a view hardly goes where its
   /// image says little, later it does.
   float held = 1.0f, held_final = 1e-3f;
-  float prior = 1e-3f;                ///< of the pull to the capture's poses: a loss of half of it times |t|^2 + |w|^2
-  float beta1 = 0.9f, beta2 = 0.99f;  ///< Adam's, by visit: a view has few
+  float prior = 1e-3f;  ///< of the pull to the capture's poses: a loss of half of it times |t|^2 + |w|^2
+  static constexpr float beta1 = 0.9f, beta2 = 0.99f;  ///< Adam's, by visit: a view has few
 };
 
 }  // namespace gart

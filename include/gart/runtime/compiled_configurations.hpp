@@ -99,20 +99,13 @@ void register_depth(int rank, bool (*available)(std::string*) = always_available
   register_configurations<E, Tracer, with_depth<primitive_strategy>>(rank, available);
 }
 
-/// Which strategies gart's libraries compile for a policy and a tracer: those to train by, but on hosts none with
-/// ordered sums (a variant has it); on a device's tile lists also those to measure.
-template <execution E, class Tracer, strategy Strategy>
-inline constexpr bool is_compiled =
-    Strategy::use == strategy_use::training
-        ? E::device || !Strategy::ordered
-        : Strategy::use == strategy_use::measuring && E::device && Tracer::lends_footprints;
-
-/// All of these, ranked from first_rank in the list's order of preference.
+/// All strategies, but on hosts none with ordered sums (a variant has it), ranked from first_rank in the list's order
+/// of preference.
 template <execution E, class Tracer>
 void register_strategies(int first_rank, bool (*available)(std::string*) = always_available) {
   int rank = first_rank;
   strategies::for_each([&]<strategy Strategy>(Strategy) {
-    if constexpr (is_compiled<E, Tracer, Strategy>) register_configurations<E, Tracer, Strategy>(rank++, available);
+    if constexpr (E::device || !Strategy::ordered) register_configurations<E, Tracer, Strategy>(rank++, available);
   });
 }
 

@@ -21,12 +21,9 @@ configuration_info configuration_of() {
   configuration.tracer = from_string(Tracer::name, tracer_kind::own);
   configuration.backward = Strategy::name;
   configuration.sh_degree = Traits::sh_degree, configuration.kernel_degree = response::degree;
-  configuration.arithmetic = response::fast ? arithmetic_kind::fast : arithmetic_kind::exact;
   configuration.lt_format =
       from_string(Strategy::template record<Tracer::tile_size>::entry::name, lt_format_kind::none);
   configuration.depth = has_depth<Strategy>;
-  configuration.tile_size = Tracer::tile_size;
-  configuration.window = Tracer::window;
   configuration.ranks = !Comm::alone;
   if constexpr (!E::device) configuration.instruction_set = instruction_set;
   return configuration;

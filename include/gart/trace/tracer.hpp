@@ -62,7 +62,6 @@ concept tracer = execution<E> && std::constructible_from<T, E&> &&
              camera const& view, trace_options const& options, trace_kernels::no_rays const& program) {
   typename T::response_type;                        // of the Gaussians whose hits it finds (math/response.hpp)
   { T::name } -> std::convertible_to<char const*>;  // "bvh", "tiles", ...
-  { T::window } -> std::convertible_to<int>;        // hits of a ray that are kept at a time
   // `gaussians` are those of `scene` in the view's frame. Both are read until the next prepare. The view is a camera or
   // a camera model (camera/model.hpp).
   t.prepare(e, scene, gaussians, view, options);
