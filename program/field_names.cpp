@@ -40,7 +40,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(split_shape, share), "--set error.split.share"},
       {GART_CLI_FIELD(split_shape, opacity), "--set error.split.opacity"},
       {GART_CLI_FIELD(render_options, alpha_min), "--alpha-min"},
-      {GART_CLI_FIELD(render_options, transmittance_min), "--t-min"},
+      {GART_CLI_FIELD(render_options, transmittance_min), "--transmittance-min"},
       {GART_CLI_FIELD(render_options, near), "near"},  // no option: a model's file may say it
       {GART_CLI_FIELD(render_options, max_hits), "--max-hits"},
       {GART_CLI_FIELD(render_options, antialias), "--antialias"},

@@ -162,9 +162,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "Steps between builds of the bvh tracer's tree, which is\nrefitted in between; the images are the "
                  "same"))
       ->check(between(1, 1e6));
-  in_group(train.add_option("--parallel", a.parallel,
-                            "How ranks share a step (mpirun -n 4 gart train ...,\ndocs/backends.md): strips of one view, "
-                            "the training of one\nrank itself, or views, a --batch of one for each"))
+  in_group(
+      train.add_option("--parallel", a.parallel,
+                       "How ranks share a step (mpirun -n 4 gart train ...,\ndocs/backends.md): strips of one view, "
+                       "the training of one\nrank itself, or views, a --batch of one for each"))
       ->type_name("NAME")
       ->capture_default_str()
       ->check(one_of({"strips", "views"}));
@@ -185,7 +186,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--alpha-min", a.alpha_min, "A",
                  "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as others have it"))
       ->check(between(1e-6, 0.99));
-  in_group(r.add(train, "--t-min", a.t_min, "T", "Transmittance below which a ray ends, 0 to 1"))
+  in_group(
+      r.add(train, "--transmittance-min", a.transmittance_min, "T", "Transmittance below which a ray ends, 0 to 1"))
       ->check(between(0, 0.99));
   in_group(r.add(train, "--max-hits", a.max_hits, "N", "Hits after which a ray ends, 0: no cap"))
       ->check(between(0, gart::max_hits_most));
@@ -247,7 +249,10 @@ void continue_run(train_arguments& a) {
   if (!config.is_object() || !config.contains("options") || !config["options"].is_object()) {
     throw gart::io_error(a.config_file().string(), "has no \"options\"", "start anew without --resume");
   }
-  a.raised = a.recorded.continue_from(config["options"], a.config_file(), {"iterations", "time-budget"});
+  nlohmann::json options = config["options"];
+  // Earlier runs call it t-min.
+  if (options.contains("t-min")) options.emplace("transmittance-min", options["t-min"]);
+  a.raised = a.recorded.continue_from(options, a.config_file(), {"iterations", "time-budget"});
   if (a.dataset.empty()) {
     if (!config.contains("dataset") || !config["dataset"].is_string()) {
       throw gart::io_error(a.config_file().string(), "has no \"dataset\"", "name the dataset on the command line");
@@ -289,7 +294,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.batch = a.batch;
   o.seed = a.seed;
   o.render.alpha_min = a.alpha_min;
-  o.render.transmittance_min = a.t_min;
+  o.render.transmittance_min = a.transmittance_min;
   o.render.max_hits = a.max_hits;
   o.render.antialias = a.antialias ? gart::usual_antialias : 0;
   // The other tracers build no tree, and the images are the same.

@@ -47,7 +47,7 @@ struct train_arguments {
   double depth_unit = 0;
   float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
   std::string exposure = "auto", vignetting = "auto", adam = "all", set;
-  float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;
+  float alpha_min = defaults.render.alpha_min, transmittance_min = defaults.render.transmittance_min;
   gart::u32 max_hits = defaults.render.max_hits;
   bool antialias = false, refine_poses = false, refine_lens = false;
   int rebuild_every = defaults.render.rebuild_every;

@@ -195,7 +195,7 @@ TEST_CASE("what a run leaves out of images is in its model and its report") {
   auto const plain = here.json("plain/metrics.json")["approximations"];
   CHECK(plain["alpha_min"].get<double>() == doctest::Approx(1.0 / 255));
   CHECK(plain["t_min"].get<double>() == doctest::Approx(1e-4));
-  REQUIRE(here.gart("train capture --out run --alpha-min 0.01 --t-min 0.125" + small).code == 0);
+  REQUIRE(here.gart("train capture --out run --alpha-min 0.01 --transmittance-min 0.125" + small).code == 0);
   auto const left_out = here.json("run/metrics.json")["approximations"];
   CHECK(left_out["t_min"] == 0.125);
   CHECK(left_out["alpha_min"].get<double>() == doctest::Approx(0.01));
