@@ -143,7 +143,8 @@ class tile_tracer : public tracer_base {
   static constexpr bool lends_footprints = true;  ///< to the backward pass
 
   /// Allocates nothing; `exec` must outlive it.
-  explicit tile_tracer(E& exec) : rays_(exec), prints_(exec), map_(exec), orders_(exec), next_(exec), spilled_(exec) {
+  explicit tile_tracer(E& exec)
+      : rays_(exec), footprints_(exec), map_(exec), orders_(exec), next_(exec), spilled_(exec) {
     static_assert(footprint_tracer<tile_tracer, E>);
   }
 
@@ -156,9 +157,9 @@ class tile_tracer : public tracer_base {
       grid_ = {model.width, model.height};
       rays_.cast(exec, model);
       depth_ = model.depth();
-      prints_.template measure<Response>(exec, scene, model, options.alpha_min, options.near, options.rows);
-      auto const order = orders_.of(exec, model, rays_, prints_.depths().data(), gaussians.data());
-      map_.build(exec, grid_, prints_, order, orders_.test_of(model, gaussians.data()));
+      footprints_.template measure<Response>(exec, scene, model, options.alpha_min, options.near, options.rows);
+      auto const order = orders_.of(exec, model, rays_, footprints_.depths().data(), gaussians.data());
+      map_.build(exec, grid_, footprints_, order, orders_.test_of(model, gaussians.data()));
     });
     if constexpr (E::device) map_.rank_tiles(exec);
     scene_ = {gaussians.data(), scene.count, options.near};
@@ -180,9 +181,9 @@ class tile_tracer : public tracer_base {
       u32 const parts = grid_.count() * walk::tile_parts, teams = parts < most ? parts : most;
       next_.resize(1), spilled_.resize(teams * walk::spill_floats);
       next_.zero();
-      parallel_for(
-          exec, label, tile_range{teams, walk::block_size},
-          walk{grid_, map_.view(), prints_.ranges().data(), scene_, depth_, program, next_.data(), spilled_.data()});
+      parallel_for(exec, label, tile_range{teams, walk::block_size},
+                   walk{grid_, map_.view(), footprints_.ranges().data(), scene_, depth_, program, next_.data(),
+                        spilled_.data()});
       return;
     }
 #endif
@@ -190,7 +191,7 @@ class tile_tracer : public tracer_base {
 #if !defined(__CUDACC__)
     if constexpr (!E::device && P::has_packets) {
       parallel_for(exec, label, tile_range{grid_.count(), 1},
-                   trace_kernels::walk_tile_packets<Response, Size, P>{walk, prints_.ranges().data()});
+                   trace_kernels::walk_tile_packets<Response, Size, P>{walk, footprints_.ranges().data()});
       return;
     }
 #endif
@@ -198,14 +199,14 @@ class tile_tracer : public tracer_base {
   }
 
   /// Boxes and slots of the Gaussians in the view.
-  footprints<E, Size> const& prints() const { return prints_; }
+  footprints<E, Size> const& footprints() const { return footprints_; }
   /// The tiles' lists.
   tile_map_view map() const { return map_.view(); }
 
  private:
   tile_grid<Size> grid_;
   camera_rays<E> rays_;
-  footprints<E, Size> prints_;
+  footprints<E, Size> footprints_;
   tile_map<E, Size> map_;
   depth_orders<E, Size> orders_;
   buffer<u32, E> next_;  // of the device's walk (trace/warp_walk.hpp)

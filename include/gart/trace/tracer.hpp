@@ -77,7 +77,7 @@ concept tracer = execution<E> && std::constructible_from<T, E&> &&
 template <class T, class E>
 concept footprint_tracer = tracer<T, E> && requires(T const& t) {
   requires T::lends_footprints;
-  { t.prints() } -> std::same_as<footprints<E, T::tile_size> const&>;
+  { t.footprints() } -> std::same_as<footprints<E, T::tile_size> const&>;
   { t.map() } -> std::same_as<tile_map_view>;
 };
 
