@@ -85,7 +85,7 @@ TEST_CASE("lanes: numbers in turns and in fours") {
   for (int n : {3, 12, 27, 48}) {
     if (n > 3 * gart::lane_count) continue;
     std::vector<float> turns(static_cast<std::size_t>(n) + 1, -1.0f);
-    gart::write_in_turns(turns.data(), n, from[0], from[1], from[2]);
+    gart::write_interleaved(turns.data(), n, from[0], from[1], from[2]);
     for (int i = 0; i < n; ++i) CHECK(turns[static_cast<std::size_t>(i)] == from[i % 3].v[i / 3]);
     CHECK(turns.back() == -1.0f);
   }
