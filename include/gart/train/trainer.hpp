@@ -44,8 +44,8 @@
 #include <gart/scene/traits.hpp>
 #include <gart/train/checkpoint_part.hpp>
 #include <gart/train/depth_supervision.hpp>
-#include <gart/train/least_filter.hpp>
 #include <gart/train/memory_need.hpp>
+#include <gart/train/min_pixel_filter.hpp>
 #include <gart/train/options.hpp>
 #include <gart/train/resolution.hpp>
 #include <gart/train/shards.hpp>
@@ -280,7 +280,7 @@ class basic_trainer {
   training_images<E> images_;
   view_order order_;
   dropout<E> dropout_;
-  least_filter<E> least_filter_;
+  min_pixel_filter<E> min_pixel_filter_;
   error_growth<E> error_;
   buffer<float, E> error_map_;  // of the step's image, where densification asks for it
   mcmc<E> mcmc_;

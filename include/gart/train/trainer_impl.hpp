@@ -29,7 +29,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       images_(exec, data),
       order_(data.train.size(), options.held_out, options.seed),
       dropout_(exec, options.dropout, options.dropout_until, options.seed),
-      least_filter_(exec),
+      min_pixel_filter_(exec),
       error_(exec, error_options_of(options, data),
              growth_budget(options.error, options.max_gaussians, data.training_pixels()), options.iterations,
              options.seed),
@@ -100,7 +100,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::make_room() {
   if constexpr (!Comm::alone) here = shards_.rows.owners().owned(all);
   for (gaussians<E>* each : {&scene_, &gradients_, &state_.first, &state_.second}) each->reserve(here);
   dropout_.reserve(here);
-  if (options_.render.antialias > 0) least_filter_.reserve(here);
+  if (options_.render.antialias > 0) min_pixel_filter_.reserve(here);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -238,7 +238,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates c
                                           : use_adc && adc_.due(step_);
   if (options_.render.antialias > 0 && densifies) {
     std::vector<std::size_t> const views = views_trained_on(data_.train.size(), options_.held_out);
-    filter = least_filter_.of(
+    filter = min_pixel_filter_.of(
         exec_, scene_.view(), views.size(), [&](std::size_t k) { return seen_by(views[k]); },
         options_.render.antialias);
   }

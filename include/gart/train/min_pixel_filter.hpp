@@ -18,7 +18,7 @@ namespace detail {
 
 /// Filter: of a camera model.
 template <class Filter>
-struct least_filter_kernel {
+struct min_pixel_filter_kernel {
   gaussians_view<float const> scene;
   Filter filter;
   bool first;  // of the views
@@ -33,10 +33,10 @@ struct least_filter_kernel {
 
 /// The filter's least width at each Gaussian; its memory outlives a call, of().
 template <execution E>
-class least_filter {
+class min_pixel_filter {
  public:
   /// Allocates nothing; `exec` must outlive it.
-  explicit least_filter(E& exec) : least_(exec) {}
+  explicit min_pixel_filter(E& exec) : least_(exec) {}
 
   /// Makes room for so many Gaussians.
   void reserve(u64 count) { least_.reserve(count); }
@@ -48,9 +48,9 @@ class least_filter {
     for (std::size_t k = 0; k < views; ++k)
       visit_camera(view(k), [&](auto const& model) {
         auto const filter = model.filter(pixels);
-        parallel_for(
-            exec, "least_filter", scene.count,
-            detail::least_filter_kernel<std::remove_const_t<decltype(filter)>>{scene, filter, k == 0, least_.data()});
+        parallel_for(exec, "min_pixel_filter", scene.count,
+                     detail::min_pixel_filter_kernel<std::remove_const_t<decltype(filter)>>{scene, filter, k == 0,
+                                                                                            least_.data()});
       });
     return least_.view();
   }
