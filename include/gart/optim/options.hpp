@@ -67,7 +67,7 @@ struct error_growth_options {
   float fill = 0.5f;               ///< share of the run at which the count has reached its budget
   float until = 5.0f / 6;          ///< share of the run after which the dead stay where they are
   float dead_opacity = 0.005f;     ///< as least_opacity has it for the alpha_min traced with
-  float opacity_penalty = 0.003f;  ///< times the mean opacity (and train/shown_share.hpp)
+  float opacity_penalty = 0.003f;  ///< times the mean opacity (and train/foreground_fraction.hpp)
   split_shape split;               ///< how one becomes two
   /// The count ends at one Gaussian for so many pixels of the training views: more would learn them by heart. 0: at
   /// max_gaussians, whatever the capture.

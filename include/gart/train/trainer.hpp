@@ -44,12 +44,12 @@
 #include <gart/scene/traits.hpp>
 #include <gart/train/checkpoint_part.hpp>
 #include <gart/train/depth_supervision.hpp>
+#include <gart/train/foreground_fraction.hpp>
 #include <gart/train/memory_need.hpp>
 #include <gart/train/min_pixel_filter.hpp>
 #include <gart/train/options.hpp>
 #include <gart/train/resolution.hpp>
 #include <gart/train/shards.hpp>
-#include <gart/train/shown_share.hpp>
 #include <gart/train/start_model.hpp>
 #include <gart/train/state.hpp>
 #include <gart/train/step_report.hpp>
@@ -254,8 +254,8 @@ class basic_trainer {
   static error_growth_options error_options_of(train_options const& options, dataset const& data) {
     error_growth_options e = options.error;
     if (options.densify == densify_kind::error && e.opacity_penalty > 0)
-      e.opacity_penalty *=
-          penalty_scale(shown_share(data, views_trained_on(data.train.size(), options.held_out), options.background));
+      e.opacity_penalty *= penalty_scale(
+          foreground_fraction(data, views_trained_on(data.train.size(), options.held_out), options.background));
     e.split.share = split_share(e, options.max_gaussians, data.training_pixels());
     e.dead_opacity = least_opacity(e.dead_opacity, options.render.alpha_min);
     return e;

@@ -19,7 +19,8 @@ namespace gart::inline GART_ISA {
 /// The share of the pixels of data.train's `views`, by index, that count in the loss and are not as the background, at
 /// least a thousandth. Those looked at are evenly spread over the views. Before a random background only transparent
 /// pixels are empty.
-inline double shown_share(dataset const& data, std::vector<std::size_t> const& views, background_kind background) {
+inline double foreground_fraction(dataset const& data, std::vector<std::size_t> const& views,
+                                  background_kind background) {
   constexpr std::size_t most_views = 32;
   constexpr int alike = 12;  // of 255, a channel
   int const empty = background == background_kind::white ? 255 : 0;
