@@ -37,10 +37,10 @@ struct row_adam_kernel {
 
 /// Rows of so many floats, and Adam's moments of them. State: a struct of value, first, second and visits.
 template <execution E, int Floats, class State>
-class learned_rows {
+class adam_table {
  public:
   /// [rows][Floats] to begin with.
-  learned_rows(E& exec, std::vector<float> const& start)
+  adam_table(E& exec, std::vector<float> const& start)
       : exec_(&exec),
         value_(exec, start),
         first_(exec, std::vector<float>(start.size())),
