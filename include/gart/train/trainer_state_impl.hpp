@@ -41,7 +41,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesyste
   if constexpr (Comm::alone)
     write_checkpoint(path, mine);
   else
-    write_checkpoint_together(comm_, shards_.rows.owners(), path, mine);
+    write_checkpoint_collectively(comm_, shards_.rows.owners(), path, mine);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -49,7 +49,7 @@ training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_part(std::
   if constexpr (Comm::alone)
     return read_checkpoint(path);
   else
-    return read_checkpoint_together(comm_, shards_.rows.owners(), path);
+    return read_checkpoint_collectively(comm_, shards_.rows.owners(), path);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -60,7 +60,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesyste
     if (comm_.size() > 1 && is_splat_ply(path)) {
       u64 total = mine.size();
       comm_.all_reduce(span<u64>(&total, 1));
-      write_together(comm_, path, [&](shared_file& file) {
+      write_collectively(comm_, path, [&](shared_file& file) {
         write_splat_ply_rows(file, path, mine, shards_.rows.owners(), total, traits);
       });
       return;
