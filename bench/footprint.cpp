@@ -8,12 +8,12 @@ namespace {
 template <int TileSize, gart::execution E>
 void footprint(benchmark::State& state, E& exec) {
   gart_bench::frame<E> frame(exec);
-  gart::footprints<E, TileSize> footprints(exec);
+  gart::footprints<E, TileSize> prints(exec);
   gart_bench::measure(state, exec, [&] {
-    footprints.measure(exec, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);
+    prints.measure(exec, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);
   });
-  state.counters["lt_slots"] = static_cast<double>(footprints.slots());
-  state.counters["pairs"] = static_cast<double>(footprints.pairs());
+  state.counters["lt_slots"] = static_cast<double>(prints.slots());
+  state.counters["pairs"] = static_cast<double>(prints.pairs());
 }
 
 }  // namespace

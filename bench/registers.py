@@ -3,7 +3,7 @@
 
     python3 bench/registers.py --nvcc nvcc --arch sm_90 --out bench/results/registers.json
 
-Compiles bench/registers.cu with -Xptxas -v, writes the figures as JSON and footprints them as a table.
+Compiles bench/registers.cu with -Xptxas -v, writes the figures as JSON and prints them as a table.
 """
 import argparse
 import json

@@ -26,9 +26,9 @@ void sort(benchmark::State& state, E& exec, std::size_t n, int bits) {
 template <gart::execution E>
 void sort_tiles(benchmark::State& state, E& exec) {
   gart_bench::frame<E> frame(exec);
-  gart::footprints<E, 8> footprints(exec);
-  footprints.measure(exec, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);
-  sort<gart::u32>(state, exec, footprints.pairs(), 32);
+  gart::footprints<E, 8> prints(exec);
+  prints.measure(exec, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);
+  sort<gart::u32>(state, exec, prints.pairs(), 32);
 }
 
 template <gart::execution E>

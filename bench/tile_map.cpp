@@ -9,8 +9,8 @@ template <int TileSize, bool ByDepth, gart::execution E>
 void tile_map(benchmark::State& state, E& exec) {
   gart_bench::frame<E> frame(exec);
   frame.prepare();
-  gart::footprints<E, TileSize> footprints(exec);
-  footprints.measure(exec, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);
+  gart::footprints<E, TileSize> prints(exec);
+  prints.measure(exec, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);
   gart::tile_map<E, TileSize> map(exec);
   gart::tile_grid<TileSize> const grid{frame.view.width, frame.view.height};
   if constexpr (ByDepth) {
@@ -19,14 +19,14 @@ void tile_map(benchmark::State& state, E& exec) {
     rays.cast(exec, frame.view);
     gart::visit_camera(frame.view, [&](auto const& model) {
       gart::ray_gaussian const* const gaussians = frame.traced.gaussians().data();
-      auto const by_depth = orders.of(exec, model, rays, footprints.depths().data(), gaussians);
+      auto const by_depth = orders.of(exec, model, rays, prints.depths().data(), gaussians);
       auto const test = orders.test_of(model, gaussians);
-      gart_bench::measure(state, exec, [&] { map.build(exec, grid, footprints, by_depth, test); });
+      gart_bench::measure(state, exec, [&] { map.build(exec, grid, prints, by_depth, test); });
     });
   } else {
-    gart_bench::measure(state, exec, [&] { map.build(exec, grid, footprints, gart::number_order{}); });
+    gart_bench::measure(state, exec, [&] { map.build(exec, grid, prints, gart::number_order{}); });
   }
-  state.counters["pairs"] = static_cast<double>(footprints.pairs());
+  state.counters["pairs"] = static_cast<double>(prints.pairs());
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-"""A client of gart's viewer, as its page is one: starts the program, opens the address that it footprints, sends views and
+"""A client of gart's viewer, as its page is one: starts the program, opens the address that it prints, sends views and
 takes frames (docs/rendering.md has the protocol). Python 3 alone."""
 import base64
 import json

@@ -12,7 +12,7 @@
 //   }
 //
 // A command returns the program's exit code: 0, or exit_interrupted. It fails by throwing: gart::error and its kin exit
-// with 1, usage_error with 2; main footprints "gart: error: ...".
+// with 1, usage_error with 2; main prints "gart: error: ...".
 
 #include <gart/core/error.hpp>
 

@@ -39,7 +39,7 @@ void write_json(fs::path const& file, nlohmann::json const& value) {
 
 nlohmann::json read_json(fs::path const& file) {
   auto const bytes = gart::read_file(file);
-  // nlohmann parses any depth, but copies and footprints a value by recursion.
+  // nlohmann parses any depth, but copies and prints a value by recursion.
   auto const bounded = [&](int depth, nlohmann::json::parse_event_t, nlohmann::json&) {
     if (depth > 32) throw gart::io_error(file.string(), "is nested more than 32 deep", "restore it, or start anew");
     return true;

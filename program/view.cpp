@@ -95,7 +95,7 @@ void add_view(CLI::App& app, command& selected) {
       "in, and no one else: it holds 128 random bits, new in every run. Ctrl-C ends it, with 130.\n"
       "\nOn another machine, say `remote`: leave --listen as it is, name a port there, and on your own machine run\n"
       "  ssh -L 8765:127.0.0.1:8765 remote\n"
-      "then open the address that gart footprints. The port must be the same on both sides.\n"
+      "then open the address that gart prints. The port must be the same on both sides.\n"
       "\nExamples:\n"
       "  gart view run/model.ply\n"
       "  gart view run/model.ply capture\n"

@@ -1,5 +1,5 @@
 // Boxes of all models against the silhouettes of random ellipsoids in double. GART_TEST_COUNT ellipsoids a model and
-// size class; GART_TEST_TABLE=1 footprints the table of docs/cameras.md.
+// size class; GART_TEST_TABLE=1 prints the table of docs/cameras.md.
 #include "lenses.hpp"
 
 #include <doctest/doctest.h>

@@ -43,10 +43,10 @@ TEST_CASE_TEMPLATE("what a lens shows large is measured later, to the same boxes
     gart::visit_camera(c, [&](auto const& view) {
       auto const bounds = view.bounds(near);
       if constexpr (gart::detail::staged_bounds<std::remove_const_t<decltype(bounds)>>) {
-        gart::footprints<E, 8> footprints(exec);
-        footprints.measure(exec, scene.view(), view, alpha_min, near);
+        gart::footprints<E, 8> prints(exec);
+        prints.measure(exec, scene.view(), view, alpha_min, near);
         std::vector<gart::footprint_slots> ranges(model.size());
-        exec.copy_out(ranges.data(), footprints.ranges().data(), ranges.size() * sizeof ranges[0]);
+        exec.copy_out(ranges.data(), prints.ranges().data(), ranges.size() * sizeof ranges[0]);
         int late = 0, worst = 0;
         for (gart::index_t i = 0; i < model.size(); ++i) {
           gart::gaussian_parameters const g = gart::load_parameters(same.view(), i);

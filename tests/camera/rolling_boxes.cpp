@@ -1,5 +1,5 @@
 // Boxes of lenses that move while they are exposed, against the silhouettes of random ellipsoids in double.
-// GART_TEST_COUNT ellipsoids a model and size class; GART_TEST_TABLE=1 footprints the ratios.
+// GART_TEST_COUNT ellipsoids a model and size class; GART_TEST_TABLE=1 prints the ratios.
 #include "moving_pose.hpp"
 
 #include <support/policies.hpp>

@@ -239,8 +239,8 @@ void check_hits(E& exec, Model const& view, gart::gaussian_model const& model) {
   seam_scene<E, Model> scene(exec, model, view);
   every_hit const by_tiles = scene.template list<gart::tile_tracer<E>>();
   every_hit const by_bvh = scene.template list<gart::bvh_tracer<E>>();
-  std::vector<gart::footprint> footprints;
-  for (gart::u32 i = 0; i < model.size(); ++i) footprints.push_back(scene.footprint(model, i));
+  std::vector<gart::footprint> prints;
+  for (gart::u32 i = 0; i < model.size(); ++i) prints.push_back(scene.footprint(model, i));
   gart::ray_depth const depth = view.depth();
   CHECK(other_lists(by_tiles, by_bvh) == 0);
 #if defined(GART_WITH_EMBREE)
@@ -248,13 +248,13 @@ void check_hits(E& exec, Model const& view, gart::gaussian_model const& model) {
 #endif
   long hits = 0, outside = 0, too_near = 0, missed = 0, invented = 0;
   double box_area = 0;
-  for (gart::footprint const& f : footprints) box_area += f.box.area();
+  for (gart::footprint const& f : prints) box_area += f.box.area();
   for (std::size_t p = 0; p < by_bvh.of.size(); ++p) {
     int const x = static_cast<int>(p) % view.width, y = static_cast<int>(p) / view.width;
     auto const& b = by_bvh.of[p];
     hits += static_cast<long>(b.size());
     for (gart::hit const& h : b) {
-      gart::footprint const& f = footprints[h.id];
+      gart::footprint const& f = prints[h.id];
       int const column = x < f.box.x0 ? x + f.seam : x;
       outside += column < f.box.x0 || column >= f.box.x1 || y < f.box.y0 || y >= f.box.y1;
       too_near += h.t * depth.per_distance(by_bvh.rays[p].direction) < f.depth;

@@ -15,7 +15,7 @@ using namespace cli_test;
 
 namespace {
 
-// The first address that a program footprints into a file, once it is there.
+// The first address that a program prints into a file, once it is there.
 struct address {
   int port = 0;
   std::string path;

@@ -67,22 +67,22 @@ TEST_CASE_TEMPLATE("sums past 2^32 and pairs past 2^31", E, GART_TEST_POLICIES) 
   gart::camera view = gart_test::looking_along_z(65535, 65528, 30000);
   gart::gaussian_model const model = around_the_camera(40);
   gart::gaussians<E> const scene(exec, model);
-  gart::footprints<E, 8> footprints(exec);
-  footprints.measure(exec, scene.view(), view, 1.0f / 255, 0.01f);
-  CHECK(footprints.pairs() == u64{40} * 8192 * 8191);
-  CHECK(footprints.slots() == u64{40} * 65535 * 65528);
+  gart::footprints<E, 8> prints(exec);
+  prints.measure(exec, scene.view(), view, 1.0f / 255, 0.01f);
+  CHECK(prints.pairs() == u64{40} * 8192 * 8191);
+  CHECK(prints.slots() == u64{40} * 65535 * 65528);
   gart::buffer<gart::footprint_slots, E> ranges(exec, 40);
-  exec.copy(ranges.data(), footprints.ranges().data(), 40 * sizeof(gart::footprint_slots));
+  exec.copy(ranges.data(), prints.ranges().data(), 40 * sizeof(gart::footprint_slots));
   CHECK(u64{ranges.to_host()[39].offset} == u64{39} * 65535 * 65528);
 
   auto const before = exec.memory.current;
   gart::tile_map<E, 8> map(exec);
   try {
-    map.build(exec, {view.width, view.height}, footprints, gart::number_order{});
+    map.build(exec, {view.width, view.height}, prints, gart::number_order{});
     FAIL("a map of 2.7e9 pairs was built");
   } catch (gart::out_of_memory const& e) {
-    CHECK(e.asked == footprints.pairs() * 16);
-    CHECK(holds(e.what(), std::to_string(footprints.pairs())));
+    CHECK(e.asked == prints.pairs() * 16);
+    CHECK(holds(e.what(), std::to_string(prints.pairs())));
     CHECK(holds(e.what(), "train_options.max_gaussians"));
   }
   CHECK(exec.memory.current == before);

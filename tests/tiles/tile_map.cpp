@@ -31,16 +31,16 @@ bool same(gart::pixel_box const& a, gart::pixel_box const& b) {
 
 template <class E, int Size>
 struct pass {
-  gart::footprints<E, Size> footprints;
+  gart::footprints<E, Size> prints;
   gart::tile_map<E, Size> map;
   long left_out = 0;  // pairs of boxes and tiles that no list has
-  explicit pass(E& exec) : footprints(exec), map(exec) {}
+  explicit pass(E& exec) : prints(exec), map(exec) {}
 
   void check(E& exec, gart::gaussian_model const& model, gart::camera const& view, float near) {
     gart::gaussians<E> const scene(exec, model);
-    footprints.measure(exec, scene.view(), view, alpha_min, near);
-    auto const ranges = host_copy(exec, footprints.ranges());
-    auto const depths = host_copy(exec, footprints.depths());
+    prints.measure(exec, scene.view(), view, alpha_min, near);
+    auto const ranges = host_copy(exec, prints.ranges());
+    auto const depths = host_copy(exec, prints.depths());
     REQUIRE(ranges.size() == model.size());
     REQUIRE(depths.size() == model.size());
     check_boxes(model, view, near, ranges, depths);
@@ -92,7 +92,7 @@ struct pass {
   }
 
   void check_places(E& exec, std::vector<gart::footprint_slots> const& ranges) const {
-    auto const pair_offsets = host_copy(exec, footprints.pair_offsets());
+    auto const pair_offsets = host_copy(exec, prints.pair_offsets());
     u64 slots = 0, pairs = 0;
     long wrong = 0;
     for (std::size_t i = 0; i < ranges.size(); ++i) {
@@ -101,8 +101,8 @@ struct pass {
       pairs += gart::tiles_of<Size>(ranges[i].box).area();
     }
     CHECK(wrong == 0);
-    CHECK(footprints.slots() == slots);
-    CHECK(footprints.pairs() == pairs);
+    CHECK(prints.slots() == slots);
+    CHECK(prints.pairs() == pairs);
   }
 
   // Whether the map holds each overlapping pair once, tile after tile, sorted by `key` of a primitive and its cell.
@@ -126,7 +126,7 @@ struct pass {
 
   void check_number_order(E& exec, gart::tile_grid<Size> const& grid,
                           std::vector<gart::footprint_slots> const& ranges) {
-    map.build(exec, grid, footprints, gart::number_order{});
+    map.build(exec, grid, prints, gart::number_order{});
     check_pairs(exec, grid, ranges, [](u32, u32 i) { return i; });
   }
 
@@ -147,8 +147,8 @@ struct pass {
     rays.cast(exec, view);
     gart::depth_orders<E, Size> orders(exec);
     gart::visit_camera(view, [&](auto const& model) {
-      auto const order = orders.of(exec, model, rays, footprints.depths().data(), records.data());
-      map.build(exec, grid, footprints, order, orders.test_of(model, records.data()));
+      auto const order = orders.of(exec, model, rays, prints.depths().data(), records.data());
+      map.build(exec, grid, prints, order, orders.test_of(model, records.data()));
     });
     gart::ray_depth const depth = gart::visit_camera(view, [](auto const& model) { return model.depth(); });
     gart::tile_map_view const made = map.view();
@@ -283,8 +283,8 @@ TEST_CASE_TEMPLATE("what can never be hit has an empty box", E, GART_TEST_POLICI
   weak.opacity = -7, lost.mean.x = NAN;
   for (auto const& g : {weak, lost, at(0, 0, -20, 0.1), at(50, 0, 2, 0.1)}) gart_test::append(model, g);
   gart::gaussians<E> const scene(exec, model);
-  gart::footprints<E, 8> footprints(exec);
-  footprints.measure(exec, scene.view(), straight(64, 48), alpha_min, 0.01f);
-  CHECK(footprints.slots() == 0);
-  CHECK(footprints.pairs() == 0);
+  gart::footprints<E, 8> prints(exec);
+  prints.measure(exec, scene.view(), straight(64, 48), alpha_min, 0.01f);
+  CHECK(prints.slots() == 0);
+  CHECK(prints.pairs() == 0);
 }

@@ -1,4 +1,4 @@
-// The built program: run to its end, or as a server whose addresses it footprints.
+// The built program: run to its end, or as a server whose addresses it prints.
 
 import {execFile, spawn} from 'node:child_process';
 import {promisify} from 'node:util';

@@ -151,10 +151,10 @@ class tile_map {
 
   /// A new map of a view's footprints; out_of_memory for 2^31 pairs or more.
   template <tile_order Order, pair_test Test = every_pair>
-  void build(E& exec, tile_grid<Size> const& grid, footprints<E, Size> const& footprints, Order order,
+  void build(E& exec, tile_grid<Size> const& grid, footprints<E, Size> const& prints, Order order,
              Test const& test = {}) {
     stage_scope stage(exec, "map");
-    u64 const pairs = footprints.pairs();
+    u64 const pairs = prints.pairs();
     if (pairs >= (u64{1} << 31))
       throw out_of_memory("tile map", pairs * 16, 0,
                           std::to_string(pairs) +
@@ -168,9 +168,8 @@ class tile_map {
     using emit = tile_kernels::emit_pairs<E, Size, Order, Test>;
     parallel_for(
         exec, "map/emit",
-        tile_range{(static_cast<u32>(footprints.ranges().size()) + emit::share - 1) / emit::share, emit::block_size},
-        emit{grid, footprints.ranges(), footprints.pair_offsets(), pairs, order, test, order_bits_, keys_,
-             primitives_});
+        tile_range{(static_cast<u32>(prints.ranges().size()) + emit::share - 1) / emit::share, emit::block_size},
+        emit{grid, prints.ranges(), prints.pair_offsets(), pairs, order, test, order_bits_, keys_, primitives_});
     sort_pairs(exec, keys_.view(), primitives_.view(), tile_bits + order_bits_);
     parallel_for(exec, "map/begin", static_cast<index_t>(offsets_.size()),
                  tile_kernels::begin_lists{keys_, order_bits_, offsets_});

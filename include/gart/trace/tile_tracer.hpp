@@ -199,14 +199,14 @@ class tile_tracer : public tracer_base {
   }
 
   /// Boxes and slots of the Gaussians in the view.
-  footprints<E, Size> const& footprints() const { return footprints_; }
+  gart::footprints<E, Size> const& footprints() const { return footprints_; }
   /// The tiles' lists.
   tile_map_view map() const { return map_.view(); }
 
  private:
   tile_grid<Size> grid_;
   camera_rays<E> rays_;
-  footprints<E, Size> footprints_;
+  gart::footprints<E, Size> footprints_;
   tile_map<E, Size> map_;
   depth_orders<E, Size> orders_;
   buffer<u32, E> next_;  // of the device's walk (trace/warp_walk.hpp)

@@ -12,6 +12,6 @@ struct left_half {
 };
 
 void build(gart::serial_exec& exec, gart::tile_map<gart::serial_exec, 8>& map,
-           gart::footprints<gart::serial_exec, 8> const& footprints) {
-  map.build(exec, {64, 64}, footprints, gart::number_order{}, left_half{});
+           gart::footprints<gart::serial_exec, 8> const& prints) {
+  map.build(exec, {64, 64}, prints, gart::number_order{}, left_half{});
 }

@@ -17,6 +17,6 @@ struct backwards {
 };
 
 void build(gart::serial_exec& exec, gart::tile_map<gart::serial_exec, 8>& map,
-           gart::footprints<gart::serial_exec, 8> const& footprints) {
-  map.build(exec, {64, 64}, footprints, backwards{});
+           gart::footprints<gart::serial_exec, 8> const& prints) {
+  map.build(exec, {64, 64}, prints, backwards{});
 }
