@@ -26,7 +26,7 @@ struct backward_frame {
   }
   static constexpr bool of_depth = gart::has_depth<Strategy>;
   void prepare() {
-    if (!pass.prepare(frame.traced)) throw pass.no_room();
+    if (!pass.prepare(frame.traced)) throw pass.out_of_memory_error();
   }
 };
 

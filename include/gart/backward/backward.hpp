@@ -128,7 +128,7 @@ class backward_pass {
   std::size_t lt_bytes() const { return records ? slots_.size() * slot_bytes : 0; }
 
   /// What to throw where prepare() said no without a budget.
-  out_of_memory no_room() const {
+  out_of_memory out_of_memory_error() const {
     u64 const slots = footprints_ ? footprints_->slots() : 0;
     return out_of_memory("LT buffer", slots * slot_bytes, 0,
                          std::to_string(slots) +

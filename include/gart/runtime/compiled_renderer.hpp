@@ -66,7 +66,7 @@ class compiled_renderer final : public renderer {
                           gaussians_view<float> gradients, render_targets const& targets) override {
     stage_scope stage(exec_, "gradients");
     prepare(view, options);
-    if (!pass_.prepare(frame_)) throw pass_.no_room();
+    if (!pass_.prepare(frame_)) throw pass_.out_of_memory_error();
     image_targets const images = images_of(targets, true);
     pass_.render(frame_, images);
     gart::differentiate(frame_, pass_, {color_gradient, std::size_t{3} * pixels_of(view)}, gradients);

@@ -170,7 +170,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   sums.resize_keep(shards_.round.scene().count);
   passes_.with_room(frame_, options_.lt_budget, [&]<class Pass>(Pass& pass) {
     if constexpr (Strategy::ordered && !Pass::ordered) {
-      throw pass.no_room();
+      throw pass.out_of_memory_error();
     } else {
       pass.render(frame_, targets);
       by_image();
