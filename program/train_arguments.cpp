@@ -285,7 +285,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.exposure = a.exposure == "on", o.vignetting = a.vignetting == "on";
   o.depth_weight = a.depth_weight;
   o.refine_poses = a.refine_poses, o.refine_lens = a.refine_lens;
-  o.adam.seen_only = a.adam == "seen";
+  o.adam.sparse = a.adam == "seen";
   o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
   o.sh_gain = a.automatic && a.sh_degree == "auto" ? a.sh_gain : 0;
   // Until it is settled it decides nothing.

@@ -36,7 +36,7 @@ struct learning_rates {
 /// Adam's constants.
 struct adam_options {
   static constexpr float beta1 = 0.9f, beta2 = 0.999f, epsilon = 1e-15f;  ///< as in adam.hpp
-  bool seen_only = false;  ///< Gaussians that the step's view did not show stay as they are (adam.hpp)
+  bool sparse = false;  ///< Gaussians that the step's view did not show stay as they are (adam.hpp)
 };
 
 /// The opacity below which a Gaussian is of no use: `usual`, for the usual alpha_min of 1/255, and in proportion above.
