@@ -28,8 +28,8 @@ inline float sh_rest_of(learning_rates const& rates, bool has_points) {
 /// The rates of one step; `extent` is the scene's. sh_rest is what sh_rest_of gave.
 inline learning_rates rates_at(learning_rates rates, float extent, int step, int steps) {
   double const length = static_cast<double>(std::max(steps, 1)) / std::max(rates.long_run, 1);
-  float const haste = static_cast<float>(std::clamp(1 / std::sqrt(length), 1.0, 4.0));
-  for (float* rate : {&rates.mean, &rates.mean_final, &rates.log_scale, &rates.opacity}) *rate *= haste;
+  float const scale = static_cast<float>(std::clamp(1 / std::sqrt(length), 1.0, 4.0));
+  for (float* rate : {&rates.mean, &rates.mean_final, &rates.log_scale, &rates.opacity}) *rate *= scale;
   rates.mean = exponential_decay(rates.mean, rates.mean_final, step, steps) * extent;
   rates.exposure = exponential_decay(rates.exposure, rates.exposure_final, step, steps);
   rates.vignetting = exponential_decay(rates.vignetting, rates.vignetting_final, step, steps);

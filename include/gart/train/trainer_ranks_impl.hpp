@@ -78,13 +78,14 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
   }
   shards_.sent += shards_.round.take_traffic();
   step_ += batch;
-  float const haste = std::sqrt(static_cast<float>(batch));
-  learning_rates hasty = rates;
+  float const batch_scale = std::sqrt(static_cast<float>(batch));
+  learning_rates scaled_rates = rates;
   if (batch > 1)
-    for (float* rate : {&hasty.mean, &hasty.log_scale, &hasty.quaternion, &hasty.opacity, &hasty.sh_dc, &hasty.sh_rest})
-      *rate *= haste;
+    for (float* rate : {&scaled_rates.mean, &scaled_rates.log_scale, &scaled_rates.quaternion, &scaled_rates.opacity,
+                        &scaled_rates.sh_dc, &scaled_rates.sh_rest})
+      *rate *= batch_scale;
   shown.end();
-  optimize(hasty, degree, shards_.rows);
+  optimize(scaled_rates, degree, shards_.rows);
   // Read when all is queued: a device that waits for its host to read has nothing to do.
   std::size_t const last = static_cast<std::size_t>((batch - 1) / ranks * ranks);
   collect_results(span<image_result>(images).subspan(last, images.size() - last), moves, bends);
