@@ -296,7 +296,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.render.alpha_min = a.alpha_min;
   o.render.transmittance_min = a.transmittance_min;
   o.render.max_hits = a.max_hits;
-  o.render.antialias = a.antialias ? gart::usual_antialias : 0;
+  o.render.antialias = a.antialias ? gart::default_antialias : 0;
   // The other tracers build no tree, and the images are the same.
   o.render.rebuild_every = a.tracer == gart::to_string(gart::tracer_kind::bvh) ? a.rebuild_every : 1;
   set_fields(o, a.set);
