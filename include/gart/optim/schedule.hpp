@@ -42,7 +42,7 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
 }
 
 /// Whether a step that ends at `step` images, and has `batch` of them, is one that comes every so many.
-inline bool passes(int step, int every, int batch) { return every > 0 && step / every != (step - batch) / every; }
+inline bool is_multiple(int step, int every, int batch) { return every > 0 && step / every != (step - batch) / every; }
 
 /// One degree more every `every` steps, sooner where the run is too short for that: the full degree is reached within
 /// the first tenth of any run.
