@@ -28,7 +28,7 @@ class compiled_renderer final : public renderer {
         gradients_(exec_, 0, sh_degree),
         color_(exec_),
         color_gradient_(exec_),
-        by_pose_(exec_) {}
+        pose_backward_(exec_) {}
 
   void set_model(gaussian_model const& model) override {
     require_degree(model.sh_degree);
@@ -75,7 +75,7 @@ class compiled_renderer final : public renderer {
   pose_gradient differentiate_pose() override {
     if (gradients_.size() != scene_.count || scene_.count == 0)
       throw invalid_argument("renderer.differentiate_pose: call renderer.differentiate first");
-    return by_pose_(frame_, std::as_const(gradients_).view());
+    return pose_backward_(frame_, std::as_const(gradients_).view());
   }
   gaussian_model gradients() const override { return gradients_.to_host(); }
   void wait() override { exec_.synchronize(); }
@@ -115,7 +115,7 @@ class compiled_renderer final : public renderer {
   gaussians<E> model_, gradients_;
   gaussians_view<float const> scene_{.sh_degree = sh_degree};
   buffer<float, E> color_, color_gradient_;
-  pose_differentiation<E> by_pose_;
+  pose_differentiation<E> pose_backward_;
 };
 
 }  // namespace gart::inline GART_ISA

@@ -193,7 +193,7 @@ class basic_trainer {
   void read_result(image_result& result, bool metric, bool lens) requires(!Comm::alone);
   void collect_results(span<image_result> round, bool metrics, bool lens) requires(!Comm::alone);
   void take_gradients(std::vector<camera> const& views, int image, span<image_result> round,
-                      bool moves) requires(!Comm::alone);
+                      bool learn_poses) requires(!Comm::alone);
   void move_parameters(adam_pass<E> const& adam) requires(!Comm::alone);
   void sum_arrived() const requires(!Comm::alone);
   rendered render_in_ranks(camera const& view, vec3 background) requires(!Comm::alone);
@@ -291,9 +291,9 @@ class basic_trainer {
   std::optional<vignetting_training<E>> vignetting_;  // and options.vignetting
   buffer<float, E> depth_, transmittance_;            // of the step's image, where a pose asks for them
   std::optional<pose_training> poses_;                // where options.refine_poses asks for them
-  pose_differentiation<E> by_pose_;
+  pose_differentiation<E> pose_backward_;
   std::optional<lens_training> lenses_;  // where options.refine_lens asks for them
-  lens_differentiation<E> by_lens_;
+  lens_differentiation<E> lens_backward_;
   std::optional<finite_check<E>> finite_;  // where options.check_finite asks for it
   index_t started_with_ = 0, total_ = 0;   // Gaussians of all ranks
   int step_ = 0, shrink_ = 1;              // of the step's images (resolution.hpp)

@@ -43,8 +43,8 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       supervision_(exec, data, options.depth_weight),
       depth_(exec),
       transmittance_(exec),
-      by_pose_(exec),
-      by_lens_(exec),
+      pose_backward_(exec),
+      lens_backward_(exec),
       started_with_(static_cast<index_t>(total_of(comm_, start))),
       total_(started_with_) {
   require_ranks();
@@ -146,8 +146,9 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
     differentiate_by(pass, loss, index, rates);
     moments = pass.moments(), lt_bytes_ = pass.lt_bytes(), used = Pass::strategy_type::name;
   });
-  bool const moves = learns_poses(), bends = learns_lenses();
-  if (moves) by_pose_(frame_, std::as_const(gradients_).view(), value_.view().subspan(2, pose_gradient::floats));
+  bool const learn_poses = learns_poses(), learn_lenses = learns_lenses();
+  if (learn_poses)
+    pose_backward_(frame_, std::as_const(gradients_).view(), value_.view().subspan(2, pose_gradient::floats));
   ++step_;
   if (grows_by_error()) error_.add_errors(scene_, moments);
   if (options_.densify == densify_kind::adc) adc_.accumulate(scene_, gradients_, seen);
@@ -161,8 +162,8 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
   report.view = view.name;
   report.backward = used;
   std::vector<float> const value = value_.to_host();
-  if (moves) poses_->step(index, pose_gradient(value.data() + 2), step_ - 1, options_.iterations);
-  if (bends)
+  if (learn_poses) poses_->step(index, pose_gradient(value.data() + 2), step_ - 1, options_.iterations);
+  if (learn_lenses)
     lenses_->step(index, lens_gradient(value.data() + 2 + pose_gradient::floats, shrink_of_view(index)), step_ - 1,
                   options_.iterations);
   report.loss = value[0];
@@ -208,7 +209,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
   }
   differentiate(frame_, pass, image, gradients_, error_map_);
   if (learns_lenses())
-    by_lens_(frame_, color_, image, value_.view().subspan(2 + pose_gradient::floats, lens_gradient::floats), more);
+    lens_backward_(frame_, color_, image, value_.view().subspan(2 + pose_gradient::floats, lens_gradient::floats),
+                   more);
   if (measures) {
     std::vector<float> depth, transmittance;
     if constexpr (has_depth<Strategy>)
