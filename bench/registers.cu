@@ -52,8 +52,6 @@ using backward_depth_kernel =
 using plain = generalized_gaussian<>;
 
 ROW(0, plain, lt_entry)
-ROW(1, plain, lt_entry)
-ROW(2, plain, lt_entry)
 ROW(3, plain, lt_entry)
 ROW(3, generalized_gaussian<4>, lt_entry)
 ROW(3, plain, lt_half_entry)

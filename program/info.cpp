@@ -124,9 +124,9 @@ int run_info() {
     configurations[{to_string(r.backend), to_string(r.tracer),
                     r.backward + (r.depth ? "+depth" : "") + (r.ranks ? "+ranks" : ""), r.kernel_degree,
                     to_string(r.lt_format)}]
-        .insert(r.sh_degree);
+        .insert(r.stored_degree);
   }
-  std::puts("\nbackend  tracer  backward            kernel  LT format  SH degrees");
+  std::puts("\nbackend  tracer  backward            kernel  LT format  SH degrees stored");
   for (auto const& [names, degrees] : configurations) {
     auto const& [backend, tracer, backward, kernel_degree, lt_format] = names;
     std::printf("%-8s %-7s %-19s %-7d %-10s", backend.c_str(), tracer.c_str(), backward.c_str(), kernel_degree,

@@ -134,9 +134,10 @@ void training_run::say_memory() {
   gart::train_options const options = train_options_of(a_);
   gart::u64 const begin = a_.start.empty() ? gart::choose_start(data_, options).value.count : start_total_;
   gart::u64 const most = gart::gaussians_at_end(options, data_, begin);
-  say_.note("each rank needs " +
-            as_bytes(static_cast<double>(gart::least_bytes(options, most, configuration_.sh_degree, ranks::size()))) +
-            " at the least, for its part of " + with_commas(most) + " Gaussians, and what the views take");
+  say_.note(
+      "each rank needs " +
+      as_bytes(static_cast<double>(gart::least_bytes(options, most, configuration_.stored_degree, ranks::size()))) +
+      " at the least, for its part of " + with_commas(most) + " Gaussians, and what the views take");
 }
 
 void training_run::say_choices() {

@@ -33,14 +33,14 @@ std::string peculiarities(configuration_info const& r) {
   return out;
 }
 
-// "openmp / tiles / primitive (SH 0 1 2 3)", configurations of one kind together.
+// "openmp / tiles / primitive (SH 0 3)", configurations of one kind together.
 std::string list_configurations() {
   std::vector<std::pair<std::string, std::set<int>>> kinds;
   for (auto const& r : configurations()) {
     std::string const kind = std::string(to_string(r.info.backend)) + " / " + to_string(r.info.tracer) + " / " +
                              r.info.backward + peculiarities(r.info);
     auto const same = std::find_if(kinds.begin(), kinds.end(), [&](auto const& k) { return k.first == kind; });
-    (same == kinds.end() ? kinds.emplace_back(kind, std::set<int>{}) : *same).second.insert(r.info.sh_degree);
+    (same == kinds.end() ? kinds.emplace_back(kind, std::set<int>{}) : *same).second.insert(r.info.stored_degree);
   }
   std::string out;
   for (auto const& [kind, degrees] : kinds) {
@@ -53,9 +53,10 @@ std::string list_configurations() {
 
 bool matches(configuration_request const& wanted, configuration_info const& there) {
   return matches(wanted.backend, there.backend) && matches(wanted.tracer, there.tracer) &&
-         (wanted.backward == "auto" || wanted.backward == there.backward) && wanted.sh_degree == there.sh_degree &&
-         wanted.depth == there.depth && wanted.kernel_degree == there.kernel_degree &&
-         (wanted.ranks != nullptr) == there.ranks && matches(wanted.lt_format, there.lt_format) &&
+         (wanted.backward == "auto" || wanted.backward == there.backward) && wanted.sh_degree >= 0 &&
+         wanted.sh_degree <= there.stored_degree && wanted.depth == there.depth &&
+         wanted.kernel_degree == there.kernel_degree && (wanted.ranks != nullptr) == there.ranks &&
+         matches(wanted.lt_format, there.lt_format) &&
          ((wanted.device == 0 && !wanted.stream) || there.backend == backend_kind::cuda);
 }
 
@@ -82,7 +83,9 @@ compiled_configuration const& find_configuration(configuration_request const& re
       unavailable = to_string(r.info.backend);
       continue;
     }
-    if (!best || r.rank > best->rank) best = &r;
+    // Of two that are alike, the one that stores less.
+    bool const stores_less = best && r.rank == best->rank && r.info.stored_degree < best->info.stored_degree;
+    if (!best || r.rank > best->rank || stores_less) best = &r;
   }
   if (best) return *best;
   if (!unavailable.empty())
@@ -96,7 +99,11 @@ compiled_configuration const& find_configuration(configuration_request const& re
 
 void register_configuration(compiled_configuration const& entry) { configurations().push_back(entry); }
 
-configuration_info resolve(configuration_request const& request) { return find_configuration(request).info; }
+configuration_info resolve(configuration_request const& request) {
+  configuration_info found = find_configuration(request).info;
+  found.sh_degree = request.sh_degree;
+  return found;
+}
 
 std::vector<configuration_info> compiled_configurations() {
   std::vector<configuration_info> out;

@@ -18,7 +18,7 @@ struct configuration_request {
   backend_kind backend = backend_kind::automatic;  ///< where it computes
   tracer_kind tracer = tracer_kind::automatic;     ///< what finds the hits
   std::string backward = "auto";  ///< a strategy by its name (backward/strategies.hpp), or one of a program's own
-  int sh_degree = 3;              ///< of the spherical harmonics of colour that are stored, 0 to 3
+  int sh_degree = 3;              ///< of the spherical harmonics of colour, 0 to 3
   int kernel_degree = 2;          ///< of the generalised Gaussians (math/response.hpp)
   lt_format_kind lt_format = lt_format_kind::automatic;  ///< of the slots of the LT buffer
   bool depth = false;  ///< gradients of depth and transmittance too; training by depth_weight asks for it itself
@@ -34,11 +34,12 @@ struct configuration_request {
 
 /// One that was compiled.
 struct configuration_info {
-  backend_kind backend = backend_kind::automatic;   ///< where it computes
-  tracer_kind tracer = tracer_kind::automatic;      ///< what finds the hits
-  std::string backward;                             ///< the strategy's name
-  int sh_degree = 3;                                ///< of the coefficients that are stored
-  int kernel_degree = 2;                            ///< of the generalised Gaussians
+  backend_kind backend = backend_kind::automatic;  ///< where it computes
+  tracer_kind tracer = tracer_kind::automatic;     ///< what finds the hits
+  std::string backward;                            ///< the strategy's name
+  int sh_degree = 3;      ///< of the model's coefficients; of compiled_configurations() the highest
+  int stored_degree = 3;  ///< that rows of coefficients have room for in the policy's memory
+  int kernel_degree = 2;  ///< of the generalised Gaussians
   lt_format_kind lt_format = lt_format_kind::none;  ///< of the slots of the LT buffer
   bool depth = false;                               ///< gradients of depth and transmittance too
   bool ranks = false;                               ///< trains on several ranks

@@ -84,10 +84,10 @@ template <execution E, class Traits, class Tracer, strategy Strategy, class Comm
 requires communicator<Comm, E>
 class basic_trainer {
  public:
-  static constexpr int sh_degree = Traits::sh_degree;  ///< of the coefficients that are stored
+  static constexpr int sh_degree = Traits::sh_degree;  ///< that rows of coefficients have room for
 
-  /// Starts from `start`, of that degree. Errors: invalid_argument for another degree, or where no view is left to
-  /// train on, and for options that several ranks do not have; out_of_memory.
+  /// Starts from `start`, of that degree or a lower one, which the run keeps. Errors: invalid_argument for a higher
+  /// degree, or where no view is left to train on, and for options that several ranks do not have; out_of_memory.
   basic_trainer(E& exec, train_options const& options, dataset const& data, start_model const& start,
                 Comm comm = Comm());
   /// The dataset must outlive the trainer.
@@ -103,11 +103,13 @@ class basic_trainer {
     return step_by(&own);
   }
 
+  /// Of the run's model; bands above it are zero in the policy's memory.
+  int degree() const { return degree_; }
   /// Steps done.
   int steps_done() const { return step_; }
   void set_iterations(int iterations);  ///< as session has it
   /// The Gaussians, in host memory.
-  gaussian_model model() const { return whole_of(scene_.to_host()); }
+  gaussian_model model() const { return whole_of(model_part()); }
   /// A view of the Gaussians to host memory.
   rendered render(camera const& view, vec3 background);
   /// Its colours alone, in 8 bits a channel: [H][W][3].
@@ -131,7 +133,7 @@ class basic_trainer {
   ///@{
   /// Of a rank's part, as session has them.
   training_state part() const;
-  gaussian_model model_part() const { return scene_.to_host(); }
+  gaussian_model model_part() const { return with_sh_degree(scene_.to_host(), degree_); }
   void set_part(training_state const& mine);
   void write_part(std::filesystem::path const& path, training_state const& mine) const;
   void write_part(std::filesystem::path const& path, gaussian_model const& mine, splat_traits const& traits) const;
@@ -147,7 +149,7 @@ class basic_trainer {
   std::size_t lt_bytes() const { return lt_bytes_; }  ///< of the last step
   /// Bytes that this rank has sent to others in its steps.
   u64 sent_bytes() const requires(!Comm::alone) { return shards_.sent; }
-  /// The Gaussians, in the policy's memory.
+  /// The Gaussians, in the policy's memory, in rows of sh_degree.
   gaussians<E>& scene() { return scene_; }
   /// Of the last step, in their shape; where it changed the count of the Gaussians, undefined.
   gaussians<E> const& gradients() const {
@@ -198,6 +200,14 @@ class basic_trainer {
   void sum_arrived() const requires(!Comm::alone);
   rendered render_in_ranks(camera const& view, vec3 background) requires(!Comm::alone);
   bool in_ranks() const { return !Comm::alone && (comm_.size() > 1 || options_.batch > 1); }
+  // Gaussians of the run's degree in the policy's memory.
+  gaussians<E> in_rows(gaussian_model const& model) {
+    if (model.sh_degree >= sh_degree) return gaussians<E>(exec_, model);
+    return gaussians<E>(exec_, with_sh_degree(model, sh_degree));
+  }
+  static void assign_rows(gaussians<E>& to, gaussian_model const& from) {
+    from.sh_degree == sh_degree ? to.assign(from) : to.assign(with_sh_degree(from, sh_degree));
+  }
   // What of values of all Gaussians is this rank's, and the way back.
   decltype(auto) part_of(start_model const& start) const {
     if constexpr (Comm::alone)
@@ -269,6 +279,7 @@ class basic_trainer {
   E& exec_;
   train_options options_;
   dataset const& data_;
+  int degree_;  // of the run's model
   mutable Comm comm_;
   mutable std::conditional_t<Comm::alone, no_shards, shards<E, Comm, Traits, Tracer>> shards_;
   gaussians<E> scene_;

@@ -18,9 +18,10 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
     : exec_(exec),
       options_(with_room(exec, comm, options, data, start)),
       data_(data),
+      degree_(start.rows.sh_degree),
       comm_(std::move(comm)),
       shards_(exec, comm_, std::max<index_t>(options.shard_block, 1)),
-      scene_(exec, part_of(start)),
+      scene_(in_rows(part_of(start))),
       gradients_(exec, scene_.size(), sh_degree),
       state_(exec, scene_.size(), sh_degree),
       frame_(exec),
@@ -49,8 +50,8 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       total_(started_with_) {
   require_ranks();
   require_resolution(options.resolution);
-  if (start.rows.sh_degree != sh_degree)
-    throw invalid_argument("trainer: the model to start from has another SH degree");
+  if (degree_ > sh_degree)
+    throw invalid_argument("trainer: the model to start from has a higher SH degree than the trainer's traits");
   make_room();
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
   if (options.depth_weight > 0) {
@@ -131,7 +132,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
   dataset_view const& view = data_.train[index];
   shrink_ = shrink_at(options_.resolution, step_, options_.iterations);
   camera const seen = traced(index);
-  int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
+  int const degree = sh_degree_at(step_, degree_, options_.sh_every, options_.iterations);
   learning_rates const rates = rates_of_step();
   render_options const render = render_options_of(options_, data_.extent, background_of(step_));
   std::size_t const floats = std::size_t{3} * seen.width * seen.height;
@@ -272,7 +273,7 @@ template <execution E, class Traits, class Tracer, strategy Strategy, class Comm
 rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& view, vec3 background) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return render_in_ranks(view, background);
-  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background));
+  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background), degree_);
   return render_image(frame_);
 }
 
@@ -280,7 +281,7 @@ template <execution E, class Traits, class Tracer, strategy Strategy, class Comm
 image8 basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_8bit(camera const& view, vec3 background) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return to_8bit(render_in_ranks(view, background).color);
-  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background));
+  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background), degree_);
   return render_image_8bit(frame_);
 }
 

@@ -47,7 +47,7 @@ learning_rates basic_trainer<E, Traits, Tracer, Strategy, Comm>::rates_of_step()
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss_function<E> const* loss) requires(
     !Comm::alone) {
-  int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
+  int const degree = sh_degree_at(step_, degree_, options_.sh_every, options_.iterations);
   learning_rates const rates = rates_of_step();
   int const ranks = comm_.size(), batch = options_.batch, before = step_;
   bool const learn_poses = learns_poses(), learn_lenses = learns_lenses();
@@ -328,7 +328,7 @@ rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_in_ranks(camer
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
   buffer<float, E> color(exec_, 3 * pixels), transmittance(exec_, pixels), depth(exec_, pixels);
   buffer<u32, E> hits(exec_, pixels);
-  if (traces) frame_.prepare(round.scene(), view, render);
+  if (traces) frame_.prepare(round.scene(), view, render, degree_);
   round.finish_fetch();
   if (traces) {
     frame_.render({color.data(), transmittance.data(), depth.data(), hits.data()});
