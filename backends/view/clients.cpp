@@ -98,7 +98,7 @@ bool clients::take_frame(int id, std::vector<u8>& to, double now) {
   auto const found = clients_.find(id);
   if (found == clients_.end() || found->second.frame.empty()) return false;
   to = std::exchange(found->second.frame, {});
-  found->second.view_time = now;  // who moves on sends the next view when this one is there
+  found->second.view_time = now;  // a moving page sends its next view when it has this frame
   changed_.notify_all();          // the next one may be rendered
   return true;
 }

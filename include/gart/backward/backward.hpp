@@ -127,7 +127,7 @@ class backward_pass {
   /// Bytes of the LT buffer for the view last prepared; 0 where the strategy records nothing.
   std::size_t lt_bytes() const { return records ? slots_.size() * slot_bytes : 0; }
 
-  /// What to throw where prepare() said no without a budget.
+  /// The error to throw when prepare() returns false without a budget.
   out_of_memory out_of_memory_error() const {
     u64 const slots = footprints_ ? footprints_->slots() : 0;
     return out_of_memory("LT buffer", slots * slot_bytes, 0,

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// What ranks do together with a file, so that all of them do it or none: an error of any is an error of all, which
-/// names the rank that met it, and a file is written to a temporary name and renamed when every rank is done.
+/// File operations that all ranks finish or none does. An error of one rank is an error of all, and names that rank. A
+/// file is written to a temporary name, and renamed when every rank is done.
 ///
 ///   write_collectively(comm, path, [&](shared_file& file) { file.write(place_of_mine, mine.data(), bytes); });
 ///
@@ -35,7 +35,7 @@ std::string name_of_rank(Comm const& comm) {
   return name;
 }
 
-// What the first rank that has something to say says, on all ranks; empty where none has.
+// The message of the first rank that has one, on all ranks; empty where none has.
 template <class Comm>
 std::string first_error(Comm& comm, std::string const& mine) {
   std::vector<u64> lengths(static_cast<std::size_t>(comm.size()));

@@ -20,8 +20,8 @@
 ///
 /// A ray o + t d passes the point at t, so that what moves the Gaussian by dx moves the ray by -dx: of a hit
 ///   dL/do = -M^T m1,   dL/dd = -M^T (t m1 + e p),
-/// the last term by how t itself changes, dt = -(p + t d_g).M dd / |d_g|^2. Both but for what colours see of d, and
-/// what changes its length.
+/// the last term by how t itself changes, dt = -(p + t d_g).M dd / |d_g|^2. Neither
+/// includes how colour changes with d, nor what changes the length of d.
 
 #include <gart/math/quaternion.hpp>
 #include <gart/math/ray_gaussian.hpp>

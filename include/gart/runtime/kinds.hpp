@@ -1,8 +1,7 @@
 #pragma once
 /// \file
-/// What a configuration is chosen by, by name (core/names.hpp). `automatic` is the best that there is on this machine,
-/// `own` a tracer that a program wrote for itself, under
-/// whatever name. Backward strategies go by the names that they have (backward/strategies.hpp).
+/// The kinds that choose a configuration, with their names (core/names.hpp). `automatic` is the best on this machine.
+/// `own` is a tracer that a program wrote for itself. Backward strategies go by their names (backward/strategies.hpp).
 
 #include <gart/core/names.hpp>
 

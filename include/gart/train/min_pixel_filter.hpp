@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// How narrow the filter of a pixel gets where a Gaussian is, of all training views (render_options.antialias):
+/// The narrowest pixel filter at each Gaussian, over all training views (render_options.antialias):
 ///   r = min over the views of the standard deviation of the filter at the mean, world units.
-/// The view that has it sees most of a Gaussian that is smaller than its pixels. Densification asks for it: what is
-/// left of an opacity there decides whether a Gaussian is dead (opacity_shown in optim/rows.hpp). Views are those of
+/// The view of the narrowest filter shows the most of a small Gaussian. Densification uses it: a Gaussian whose opacity
+/// through that filter is too low is dead (opacity_shown in optim/rows.hpp). Views are those of
 /// whole photographs, whatever size a step's images have.
 ///
 /// Cost: 4 bytes a Gaussian, and a small launch a view at each densification. Without a filter there is nothing of it.
@@ -31,7 +31,7 @@ struct min_pixel_filter_kernel {
 
 }  // namespace detail
 
-/// The filter's least width at each Gaussian; its memory outlives a call, of().
+/// The narrowest filter at each Gaussian. Its memory outlives a call of of().
 template <execution E>
 class min_pixel_filter {
  public:
