@@ -7,15 +7,15 @@
 
 namespace {
 
-// SeenOnly: with one Gaussian of four seen.
-template <bool SeenOnly, gart::execution E>
+// Sparse: with one Gaussian of four seen.
+template <bool Sparse, gart::execution E>
 void adam(benchmark::State& state, E& exec) {
   gart::gaussian_model const& model = gart_bench::the_scene().model;
   gart::gaussian_model any = model;  // finite numbers
   gart::adam_options options;
-  options.seen_only = SeenOnly;
-  std::size_t const seen = SeenOnly ? model.size() / 4 : model.size();
-  for (std::size_t i = 0; SeenOnly && i < model.size(); ++i)
+  options.sparse = Sparse;
+  std::size_t const seen = Sparse ? model.size() / 4 : model.size();
+  for (std::size_t i = 0; Sparse && i < model.size(); ++i)
     if (i % 4 != 0) std::fill_n(&any.mean[3 * i], 3, 0.0f);
   gart::gaussians<E> parameters(exec, model);
   gart::gaussians<E> const gradients(exec, any);

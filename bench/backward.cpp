@@ -26,7 +26,7 @@ struct backward_frame {
   }
   static constexpr bool of_depth = gart::has_depth<Strategy>;
   void prepare() {
-    if (!pass.prepare(frame.traced)) throw pass.no_room();
+    if (!pass.prepare(frame.traced)) throw pass.out_of_memory_error();
   }
 };
 
@@ -55,22 +55,18 @@ void add(std::string const& name) {
 using gart_bench::by_bvh;
 using gart_bench::by_tiles;
 
-// Every strategy on tile lists; on the BVH those for training. `/8`: the tiles that footprints are cut into.
+// Every strategy on tile lists; on the BVH those without ordered sums. `/8`: the tiles that footprints are cut into.
 bool const added = [] {
   gart::strategies::for_each([]<class Strategy>(Strategy) {
     std::string const name = Strategy::name, cut = Strategy::gather::any ? "/8" : "";
-    if constexpr (!Strategy::lane_by_lane || gart_bench::on_device)
-      add<by_tiles<8>, Strategy>("backward/tiles/" + name + cut);
-    if constexpr (!Strategy::ordered && Strategy::use == gart::strategy_use::training)
-      add<by_bvh, Strategy>("backward/bvh/" + name + cut);
+    add<by_tiles<8>, Strategy>("backward/tiles/" + name + cut);
+    if constexpr (!Strategy::ordered) add<by_bvh, Strategy>("backward/bvh/" + name + cut);
   });
   return true;
 }();
 
 }  // namespace
 
-GART_BENCH("backward/tiles/primitive/4", backward<by_tiles<4>, gart::primitive_strategy>)
 GART_BENCH("backward/tiles/primitive_depth/8", backward<by_tiles<8>, gart::with_depth<gart::primitive_strategy>>)
-GART_BENCH("backward/tiles/primitive/16", backward<by_tiles<16>, gart::primitive_strategy>)
 GART_BENCH("prepare/bvh/primitive/8", prepare<by_bvh, gart::primitive_strategy>)
 GART_BENCH("prepare/tiles/primitive/8", prepare<by_tiles<8>, gart::primitive_strategy>)

@@ -10,7 +10,7 @@ void forward(benchmark::State& state, E& exec) {
   gart_bench::frame<E, By> frame(exec);
   frame.prepare();
   gart::backward_pass<typename gart_bench::frame<E, By>::traced_type, Strategy> pass(exec);
-  if (!pass.prepare(frame.traced)) throw pass.no_room();
+  if (!pass.prepare(frame.traced)) throw pass.out_of_memory_error();
   gart::buffer<float, E> color(exec, 3 * frame.pixels());
   gart_bench::measure(state, exec, [&] { pass.render(frame.traced, {color.data()}); });
   state.counters["lt_bytes"] = static_cast<double>(pass.lt_bytes());

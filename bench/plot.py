@@ -265,7 +265,6 @@ def main():
     pages.tradeoff()
     pages.formats()
     pages.viewer()
-    pages.presets()
     pages.cutoffs()
     pages.auto()
     pages.curves()

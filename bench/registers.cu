@@ -50,20 +50,11 @@ using backward_depth_kernel =
   BACKWARD(degree, response, entry)
 
 using plain = generalized_gaussian<>;
-using fast = generalized_gaussian<2, arithmetic::fast>;
 
 ROW(0, plain, lt_entry)
-ROW(1, plain, lt_entry)
-ROW(2, plain, lt_entry)
 ROW(3, plain, lt_entry)
-ROW(3, generalized_gaussian<1>, lt_entry)
-ROW(3, generalized_gaussian<3>, lt_entry)
 ROW(3, generalized_gaussian<4>, lt_entry)
-ROW(3, generalized_gaussian<5>, lt_entry)
-ROW(3, generalized_gaussian<8>, lt_entry)
-ROW(3, fast, lt_entry)
 ROW(3, plain, lt_half_entry)
-ROW(3, plain, lt_shared_entry)
 BACKWARD(3, plain, lt_entry, gather_sums::ordered)
 DEPTH(0, plain, lt_entry)
 DEPTH(3, plain, lt_entry)

@@ -10,13 +10,12 @@ What (comma-separated; default tests and paper):
   cpu         gart_bench: the same stages on the host policies, on a small scene; a minute or two
   strategies  `gart bench`: a training step by strategy and tracer, on the first two scenes
   memory      `gart bench`: LT and peak memory against the number of Gaussians, at two resolutions
-  traits      `gart bench`: a training step by row (docs/traits.md): SH and kernel degree, arithmetic, LT format, tile,
-              window, determinism; on --backend, a host by one thread, and bytes a Gaussian. Needs -DGART_VARIANTS=ON
+  traits      `gart bench`: a training step by row (docs/performance.md): SH and kernel degree, LT format,
+              determinism; on --backend, a host by one thread, and bytes a Gaussian. Needs -DGART_VARIANTS=ON
   paper       strategies, memory and stages
   tradeoff    `gart tradeoff` on the first scene and on every --model: what each approximation costs and buys
   formats     every --model in each format and setting, by its test views: bytes, PSNR, SSIM (bench/formats.py)
   view        every --model served by `gart view`, and what a viewer takes from training every --capture (bench/view.py)
-  presets     `gart train` with each --preset on every --capture: what they cost in quality
   rules       `gart train` with each rule of docs/training.md changed alone (--rules names some), --seeds of each (3):
               a file rules_NAME.json a capture, written after each rule
   auto        `gart train --auto` against --no-auto on every --capture: scores, seconds, bytes, what was chosen and
@@ -53,18 +52,15 @@ from formats import Formats
 from training import LONG_PARTS, RULES, Trainings
 from view import View
 
-TRAININGS = ("presets", "rules", "auto", "curves", "long")
+TRAININGS = ("rules", "auto", "curves", "long")
 PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff", "formats",
          "view") + TRAININGS
 
-# Rows of docs/traits.md: name, SH degree, kernel degree, options of gart bench.
+# Rows of docs/performance.md: name, SH degree, kernel degree, options of gart bench.
 TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
-              [(f"kernel degree {n}", 3, n, {}) for n in (1, 3, 4, 5, 8)] +
-              [("fast arithmetic", 3, 2, {"arithmetic": "fast"}),
-               ("LT half", 3, 2, {"lt-format": "half"}), ("LT shared", 3, 2, {"lt-format": "shared"}),
-               ("hybrid", 3, 2, {"backward": "hybrid"}), ("deterministic", 3, 2, {"backward": "deterministic"}),
-               ("tiles of 4", 3, 2, {"tile-size": 4}), ("tiles of 16", 3, 2, {"tile-size": 16}),
-               ("window 16", 3, 2, {"window": 16}), ("window 64", 3, 2, {"window": 64})])
+              [(f"kernel degree {n}", 3, n, {}) for n in (4,)] +
+              [("LT half", 3, 2, {"lt-format": "half"}),
+               ("hybrid", 3, 2, {"backward": "hybrid"}), ("deterministic", 3, 2, {"backward": "deterministic"})])
 
 
 class Bench(Checks, Trainings, Formats, View):
@@ -298,7 +294,7 @@ def arguments():
                         help="tradeoff, and traits, which takes the first: a trained model and its capture or camera "
                              "JSON; may be repeated")
     parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("NAME", "DATASET"),
-                        help="presets, rules, auto, curves and long: a capture to train on; may be repeated")
+                        help="rules, auto, curves and long: a capture to train on; may be repeated")
     parser.add_argument("--train", default="",
                         help="the same: options of gart train, in one string; --iterations, where it is not among "
                              "them, is 1000 for curves and 30000 for the others")

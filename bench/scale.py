@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Times training on several ranks (docs/scale.md), on one machine with several GPUs or on its cores, and writes what it
+"""Times training on several ranks (docs/backends.md), on one machine with several GPUs or on its cores, and writes what it
 measured as JSON. Python 3 and MPI's launcher are needed, and gart_bench_ranks of a build (-DGART_BUILD_BENCH=ON).
 
     python3 bench/scale.py --build DIR --out FILE.json --ranks 1,2 --scene synth_1000k.ply

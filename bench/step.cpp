@@ -29,7 +29,7 @@ void step(benchmark::State& state, E& exec) {
 template <class By>
 void add_steps(std::string const& tracer) {
   gart::strategies::for_each([&]<class Strategy>(Strategy) {
-    if constexpr (!Strategy::ordered && Strategy::use == gart::strategy_use::training)
+    if constexpr (!Strategy::ordered)
       gart_bench::add(("step/" + tracer + "/" + Strategy::name).c_str(),
                       [](benchmark::State& state, auto& exec) { step<By, Strategy>(state, exec); });
   });

@@ -1,4 +1,4 @@
-"""The parts of bench/run.py that train captures: presets, rules, auto, curves and long.
+"""The parts of bench/run.py that train captures: rules, auto, curves and long.
 
 Each --capture NAME DIR is trained by `gart train`; what is reported is read from the metrics.json, history.json and
 model.ply that it leaves. Steps and Gaussians are those of --train, else the part's own.
@@ -13,7 +13,6 @@ import shutil
 
 from common import last_line, run
 
-PRESETS = ("exact", "balanced", "fast")
 FULL_STEPS = 30000
 # Gaussians at most, for captures that are known, where --train does not say.
 GAUSSIANS = {"lego": 300000, "bonsai": 1000000, "tandt_train": 1000000, "fox": 500000, "many_cameras": 500000}
@@ -50,7 +49,8 @@ RULES = (("all", []),
          ("antialias", ["--antialias"]),
          ("mcmc", ["--densify", "mcmc"]),
          ("mcmc, no noise", ["--densify", "mcmc", "--set", "mcmc.noise=0"]),
-         ("mcmc, no penalties", ["--densify", "mcmc", "--mcmc-penalty", "0"]),
+         ("mcmc, no penalties", ["--densify", "mcmc", "--set",
+                                  "mcmc.opacity_penalty=0,mcmc.scale_penalty=0"]),
          ("adc", ["--densify", "adc"]),
          ("adc, no resets", ["--densify", "adc", "--set", "adc.opacity_reset_every=0"]))
 
@@ -131,18 +131,6 @@ class Trainings:
             return None, last_line(done.stderr), None
         return (folder, read_json(os.path.join(folder, "metrics.json")),
                 resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
-
-    def presets(self):
-        kept = ("psnr", "ssim", "seconds", "gaussians", "iterations", "approximations", "backend", "image_size",
-                "test_views", "peak_bytes")
-        for name, capture in self.a.capture:
-            runs, options = [], self.train_options(name)
-            for preset in PRESETS:
-                folder, metrics, _ = self.train(f"{name}, {preset}", capture, options, "--preset", preset, "--no-auto")
-                if folder:
-                    runs.append({"preset": preset, **{key: metrics[key] for key in kept}})
-                    self.say(f"{name}, {preset}: {metrics['psnr']:.2f} dB, {metrics['seconds']:.0f} s")
-            self.write("presets_" + name, runs, scene=name, train=options)
 
     def rules(self):
         kept = ("psnr", "ssim", "psnr_affine_colour", "seconds", "gaussians", "iterations", "peak_bytes", "exposure")

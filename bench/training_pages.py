@@ -1,9 +1,9 @@
-"""What bench/plot.py draws of the trainings of bench/training.py: presets, auto, curves and long."""
+"""What bench/plot.py draws of the trainings of bench/training.py: auto, curves and long."""
 import glob
 import os
 
 from charts import courses
-from tables import clock_of, source, table
+from tables import source, table
 
 
 def shown(value, form):
@@ -43,26 +43,6 @@ def mean_and_spread(values, form):
 
 class TrainingPages:
     """A base of plot.py's Pages, which loads results and writes tables."""
-
-    def presets(self):
-        rows = []
-        for path in sorted(glob.glob(os.path.join(self.results, "presets_*.json"))):
-            result = self.load(os.path.basename(path)[:-5])
-            trade = self.load("tradeoff_" + result["scene"])
-            of = {r["name"].replace("preset=", ""): r for r in trade["runs"]} if trade else {}
-            for r in result["runs"]:
-                a, t = r["approximations"], of.get(r["preset"])
-                if t and any(abs(t["approximations"][k] - a[k]) > 1e-6 for k in ("alpha_min", "t_min")):
-                    t = None  # of a preset that was another then
-                rows.append([result["scene"], r["preset"], f"{a['alpha_min']:.3g}", f"{a['t_min']:.3g}"] +
-                            ([f"{t['image']['psnr']:.1f}", f"{t['gradient_worst']:.1e}", f"{t[clock_of(trade)]:.1f}"] if t
-                             else ["", "", ""]) +
-                            [f"{r['psnr']:.2f}", f"{r['ssim']:.4f}", f"{r['seconds']:.0f}", f"{r['gaussians']:,}"])
-            rows.append([f"{result['scene']}: {source(result)}"] + [""] * 10)
-        if rows:
-            self.tables["presets"] = table(["scene", "preset", "alpha_min", "t_min", "image PSNR, dB",
-                                            "gradient, worst group", "a view, ms", "trained PSNR, dB", "SSIM",
-                                            "training, s", "Gaussians"], rows)
 
     def cutoffs(self):
         result = self.load("cutoffs")

@@ -1,4 +1,4 @@
-"""The part `view` of bench/run.py: what the viewer reaches (docs/view.md).
+"""The part `view` of bench/run.py: what the viewer reaches (docs/rendering.md).
 
 Each --model NAME PLY CAMERAS is served by `gart view`; a client asks for views as the page does: one each sixtieth of a
 second along a smooth path through the cameras, and one at rest a moment after the last. Measured are frames a second,

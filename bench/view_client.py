@@ -1,5 +1,5 @@
 """A client of gart's viewer, as its page is one: starts the program, opens the address that it prints, sends views and
-takes frames (docs/view.md has the protocol). Python 3 alone."""
+takes frames (docs/rendering.md has the protocol). Python 3 alone."""
 import base64
 import json
 import os

@@ -108,10 +108,7 @@ int run_bench(bench_arguments const& a) {
                            {"backward", configuration.backward},
                            {"sh_degree", configuration.sh_degree},
                            {"kernel_degree", configuration.kernel_degree},
-                           {"arithmetic", gart::to_string(configuration.arithmetic)},
                            {"lt_format", gart::to_string(configuration.lt_format)},
-                           {"tile_size", configuration.tile_size},
-                           {"window", configuration.window},
                            {"gaussians", file.model.size()},
                            {"width", cameras[0].view.width},
                            {"height", cameras[0].view.height},
@@ -147,8 +144,7 @@ void add_bench(CLI::App& app, command& selected) {
   bench->add_option("CAMERAS", a->cameras, "A dataset, or a camera JSON as for gart render")->type_name("")->required();
   bench
       ->add_option("--backward", a->backward,
-                   "Backward strategy: auto, pixel, hybrid, primitive,\ndeterministic (sums in a fixed order) or "
-                   "cleared (primitive\nwith its LT buffer cleared)")
+                   "Backward strategy: auto, pixel, hybrid, primitive or\ndeterministic (sums in a fixed order)")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(one_of_strategies());
@@ -167,11 +163,10 @@ void add_bench(CLI::App& app, command& selected) {
   bench->add_option("--json", a->json, "Write the figures to this file")->type_name("FILE");
   bench->add_flag("--quiet", a->quiet, "No progress line");
   add_configuration_options(*bench, a->configuration);
-  bench->add_option("--lt-format", a->lt_format, "What the forward pass leaves of a hit: float4, half or shared")
+  bench->add_option("--lt-format", a->lt_format, "What the forward pass leaves of a hit: float4 or half")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(name_of_a<gart::lt_format_kind>())
-      ->group(bench->get_option("--arithmetic")->get_group());
+      ->check(name_of_a<gart::lt_format_kind>());
   bench->footer(
       "\nStages nest: \"backward\" is everything between the image's gradient and the parameters', \"backward/...\" "
       "its\n"

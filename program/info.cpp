@@ -119,19 +119,18 @@ int run_info() {
   std::printf("gart       %s\n", gart::version);
   print_devices(places);
   // Configurations that differ only in the degree of the spherical harmonics share a line.
-  std::map<std::tuple<std::string, std::string, std::string, int, std::string, std::string, int, int>, std::set<int>>
-      configurations;
+  std::map<std::tuple<std::string, std::string, std::string, int, std::string>, std::set<int>> configurations;
   for (auto const& r : gart::compiled_configurations()) {
     configurations[{to_string(r.backend), to_string(r.tracer),
                     r.backward + (r.depth ? "+depth" : "") + (r.ranks ? "+ranks" : ""), r.kernel_degree,
-                    to_string(r.arithmetic), to_string(r.lt_format), r.tile_size, r.window}]
-        .insert(r.sh_degree);
+                    to_string(r.lt_format)}]
+        .insert(r.stored_degree);
   }
-  std::puts("\nbackend  tracer  backward            kernel  arithmetic  LT format  tile  window  SH degrees");
+  std::puts("\nbackend  tracer  backward            kernel  LT format  SH degrees stored");
   for (auto const& [names, degrees] : configurations) {
-    auto const& [backend, tracer, backward, kernel_degree, arithmetic, lt_format, tile_size, window] = names;
-    std::printf("%-8s %-7s %-19s %-7d %-11s %-10s %-5d %-7d", backend.c_str(), tracer.c_str(), backward.c_str(),
-                kernel_degree, arithmetic.c_str(), lt_format.c_str(), tile_size, window);
+    auto const& [backend, tracer, backward, kernel_degree, lt_format] = names;
+    std::printf("%-8s %-7s %-19s %-7d %-10s", backend.c_str(), tracer.c_str(), backward.c_str(), kernel_degree,
+                lt_format.c_str());
     for (int const degree : degrees) std::printf(" %d", degree);
     std::puts("");
   }

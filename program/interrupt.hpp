@@ -1,9 +1,8 @@
 #pragma once
-// Ctrl-C, SIGTERM and SIGHUP as a wish that is asked for between steps, so that a run ends with its files whole. A
-// second one ends the program at once, but not within a second of the first: one wish may come twice, from a terminal
-// to all of its programs and from the one that waits for this. After a wish the handler stays, for the second may come
-// while the program takes its leave. A hang-up that the program was started to outlive (nohup) stays so. While the
-// guard stands a pipe whose reader is gone is no reason to die: where a terminal goes, so may what reads the progress.
+// Turns Ctrl-C, SIGTERM and SIGHUP into a flag that the run reads between steps, so that its files end whole. A second
+// signal ends the program at once, but not within a second of the first: a terminal and a parent may each send one. The
+// handler stays after the first signal, since the second may come while the program ends. An ignored SIGHUP (nohup)
+// stays ignored. While the guard exists, SIGPIPE does not end the program: the reader of its progress may be gone.
 
 #include <csignal>
 #include <ctime>

@@ -49,8 +49,8 @@ nlohmann::json recorded_options::continue_from(nlohmann::json const& saved, std:
   return raised;
 }
 
-CLI::Validator one_of_strategies(gart::strategy_use use) {
-  std::vector<std::string> names = gart::strategy_names(use);
+CLI::Validator one_of_strategies() {
+  std::vector<std::string> names = gart::strategy_names();
   names.insert(names.begin(), "auto");
   return one_of(names);
 }
@@ -65,8 +65,7 @@ gart::configuration_request configuration_options::request() const {
   gart::configuration_request wanted;
   wanted.backend = gart::from_string<gart::backend_kind>(backend);
   wanted.tracer = gart::from_string<gart::tracer_kind>(tracer);
-  wanted.arithmetic = gart::from_string<gart::arithmetic_kind>(arithmetic);
-  wanted.tile_size = tile_size, wanted.window = window, wanted.threads = threads;
+  wanted.threads = threads;
   return wanted;
 }
 
@@ -89,22 +88,6 @@ void add_configuration_options(CLI::App& app, configuration_options& options) {
       ->capture_default_str()
       ->check(name_of_a<gart::tracer_kind>());
   add_threads(app, options.threads);
-  std::string const group = "Traits that trade (gart info lists the configurations that have them)";
-  app.add_option("--arithmetic", options.arithmetic, "exact, or fast: shorter exponentials and reciprocals")
-      ->type_name("NAME")
-      ->capture_default_str()
-      ->check(name_of_a<gart::arithmetic_kind>())
-      ->group(group);
-  app.add_option("--tile-size", options.tile_size, "Pixels a side of a tile, 0: what suits")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(0, 64))
-      ->group(group);
-  app.add_option("--window", options.window, "Hits a ray keeps in order at a time, 0: what suits")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(0, 1024))
-      ->group(group);
 }
 
 void add_max_hits(CLI::App& app, int& max_hits) {
@@ -141,7 +124,6 @@ nlohmann::json approximations_of(gart::approximation_options const& render,
           {"t_min", render.transmittance_min},
           {"max_hits", render.max_hits},
           {"antialias", render.antialias},
-          {"arithmetic", gart::to_string(configuration.arithmetic)},
           {"lt_format", gart::to_string(configuration.lt_format)}};
 }
 

@@ -49,11 +49,10 @@ class recorded_options {
   std::vector<entry> entries_;
 };
 
-// --backend --tracer --threads, as every command that traces rays has them, and the traits that trade one thing for
-// another: --arithmetic --tile-size --window.
+// --backend --tracer --threads, as every command that traces rays has them.
 struct configuration_options {
-  std::string backend = "auto", tracer = "auto", arithmetic = "exact";
-  int tile_size = 0, window = 0, threads = 0;
+  std::string backend = "auto", tracer = "auto";
+  int threads = 0;
 
   gart::configuration_request request() const;
 };
@@ -69,8 +68,8 @@ template <gart::named E>
 CLI::Validator name_of_a() {
   return one_of(gart::list_of_names<E>());
 }
-// "auto", or a strategy of that use.
-CLI::Validator one_of_strategies(gart::strategy_use use = gart::strategy_use::measuring);
+// "auto", or a strategy.
+CLI::Validator one_of_strategies();
 CLI::Validator kernel_degree_names();
 
 gart::vec3 background_color(std::string const& name);

@@ -32,7 +32,7 @@ struct render_arguments {
   std::string background = "black", camera;
   int downscale = 1, samples = 1, frames = 0;
   bool closed = false;
-  float alpha_min = -1, t_min = -1;
+  float alpha_min = -1, transmittance_min = -1;
   int max_hits = -1;
   image_choice images;
   bool depth = false, quiet = false;
@@ -95,7 +95,7 @@ int run_render(render_arguments const& a) {
   gart::render_options options = file.render;
   options.background = background_color(a.background);
   if (a.alpha_min >= 0) options.alpha_min = a.alpha_min;
-  if (a.t_min >= 0) options.transmittance_min = a.t_min;
+  if (a.transmittance_min >= 0) options.transmittance_min = a.transmittance_min;
   if (a.max_hits >= 0) options.max_hits = static_cast<gart::u32>(a.max_hits);
 
   gart::exposure_field const exposures =
@@ -197,7 +197,7 @@ void add_render(CLI::App& app, command& selected) {
       ->type_name("A")
       ->check(between(1e-6, 0.99));
   render
-      ->add_option("--t-min", a->t_min,
+      ->add_option("--transmittance-min", a->transmittance_min,
                    "Transmittance below which a ray ends, 0 to 1\n(default: what the model says, else 1e-4)")
       ->type_name("T")
       ->check(between(0, 0.99));

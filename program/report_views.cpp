@@ -75,7 +75,7 @@ report_view make_report_view(std::string const& name, double psnr, double ssim, 
           ssim,
           page_jpeg(gart::to_8bit(render)),
           page_jpeg(gart::to_8bit(truth)),
-          page_jpeg(gart::error_in_colors(difference, gart::usual_error_scale))};
+          page_jpeg(gart::error_in_colors(difference, gart::default_error_scale))};
 }
 
 void report_views::add(std::size_t index, std::size_t total, std::string const& name, double psnr, double ssim,
@@ -108,7 +108,7 @@ std::string report_pictures(json const& m, std::vector<report_view> const& shown
                                 : "All " + std::to_string(total) + ", also in renders/.") +
           " The worst comes first.</p><div class=\"heads\"><span>Render, and right of the slider the "
           "photograph</span><span>Absolute error 0<i class=\"scale\" style=\"background:" +
-          error_gradient() + "\"></i>" + fixed(gart::usual_error_scale, 2) + "</span></div>";
+          error_gradient() + "\"></i>" + fixed(gart::default_error_scale, 2) + "</span></div>";
   for (auto const& v : shown) html += figure_of(v);
   return html + slide_script + all_scores(m["views"]);
 }

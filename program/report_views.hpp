@@ -19,7 +19,7 @@ struct report_view {
 };
 
 // Scaled down by a whole factor where the images are wide. The error is the mean over channels of |render - truth|,
-// coloured over [0, gart::usual_error_scale].
+// coloured over [0, gart::default_error_scale].
 report_view make_report_view(std::string const& name, double psnr, double ssim, gart::image_float const& render,
                              gart::image_float const& truth);
 

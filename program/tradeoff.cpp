@@ -265,8 +265,6 @@ class tradeoff_run {
             {"backward", configuration.backward},
             {"sh_degree", configuration.sh_degree},
             {"kernel_degree", configuration.kernel_degree},
-            {"tile_size", configuration.tile_size},
-            {"window", configuration.window},
             {"approximations", approximations_of(s.use.render.approximations(), configuration)},
             {"rebuild_every", s.use.render.rebuild_every},
             {"shrink", s.use.shrink},
@@ -344,9 +342,9 @@ void add_tradeoff(CLI::App& app, command& selected) {
       ->capture_default_str()
       ->check(one_of({"auto", "white", "black"}));
   tradeoff
-      ->add_option("--backward", a->backward,
-                   "Backward strategy of all settings that do not name one:\nauto, pixel, hybrid, primitive, "
-                   "deterministic or cleared")
+      ->add_option(
+          "--backward", a->backward,
+          "Backward strategy of all settings that do not name one:\nauto, pixel, hybrid, primitive or deterministic")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(one_of_strategies());

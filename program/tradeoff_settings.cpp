@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <gart/backward/strategies.hpp>
-#include <gart/runtime/presets.hpp>
 #include <iterator>
 
 namespace gart_cli {
@@ -54,11 +53,6 @@ class table {
 std::vector<setting> settings_of(configuration const& exact) {
   using c = configuration;
   table t(exact);
-  for (gart::preset const& p : gart::presets()) {
-    if (!p.approximates()) continue;
-    t.add("preset", p.name,
-          [&](c& x) { x.render.alpha_min = p.alpha_min, x.render.transmittance_min = p.transmittance_min; });
-  }
   t.sweep(
       "alpha_min", [](c& x) -> float& { return x.render.alpha_min; },
       std::vector<float>{0.5f / 255, 1.0f / 255, 2.0f / 255, 4.0f / 255, 0.02f, 0.05f});
@@ -72,21 +66,11 @@ std::vector<setting> settings_of(configuration const& exact) {
   t.sweep(
       "sh_degree", [](c& x) -> int& { return x.configuration.sh_degree; }, degrees);
   t.sweep(
-      "kernel_degree", [](c& x) -> int& { return x.configuration.kernel_degree; },
-      std::vector<int>(std::begin(gart::kernel_degrees), std::end(gart::kernel_degrees)));
+      "kernel_degree", [](c& x) -> int& { return x.configuration.kernel_degree; }, std::vector<int>{2, 4});
   t.sweep(
-      "arithmetic", [](c & x) -> auto& { return x.configuration.arithmetic; },
-      std::vector{gart::arithmetic_kind::fast});
+      "lt_format", [](c & x) -> auto& { return x.configuration.lt_format; }, std::vector{gart::lt_format_kind::half});
   t.sweep(
-      "lt_format", [](c & x) -> auto& { return x.configuration.lt_format; },
-      std::vector{gart::lt_format_kind::half, gart::lt_format_kind::shared});
-  t.sweep(
-      "tile_size", [](c& x) -> int& { return x.configuration.tile_size; }, std::vector<int>{4, 16});
-  t.sweep(
-      "window", [](c& x) -> int& { return x.configuration.window; }, std::vector<int>{16, 64});
-  t.sweep(
-      "backward", [](c& x) -> std::string& { return x.configuration.backward; },
-      gart::strategy_names(gart::strategy_use::measuring));
+      "backward", [](c& x) -> std::string& { return x.configuration.backward; }, gart::strategy_names());
   t.sweep(
       "tracer", [](c & x) -> auto& { return x.configuration.tracer; },
       std::vector{gart::tracer_kind::tiles, gart::tracer_kind::bvh, gart::tracer_kind::embree});
@@ -104,10 +88,6 @@ std::vector<setting> settings_of(configuration const& exact) {
         [](c& x) { x.format = ".spz", x.packing.sh1_bits = x.packing.sh_bits = 8; });
   t.add("together", "alpha_min=0.02+t_min=0.01",
         [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f; });
-  t.add("together", "alpha_min=0.01+t_min=0.03+arithmetic=fast", [](c& x) {
-    x.render.alpha_min = 0.01f, x.render.transmittance_min = 0.03f,
-    x.configuration.arithmetic = gart::arithmetic_kind::fast;
-  });
   t.add("together", "alpha_min=0.02+t_min=0.01+resolution=1/2",
         [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f, x.shrink = 2; });
   return t.take();

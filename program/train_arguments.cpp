@@ -17,21 +17,6 @@ namespace gart_cli {
 
 namespace fs = std::filesystem;
 
-namespace {
-// A line a preset, with what it sets.
-std::string presets_help() {
-  std::string text =
-      "What is left out for speed; options given besides win. What\nit costs in quality: gart tradeoff, and "
-      "docs/tradeoffs.md";
-  for (gart::preset const& p : gart::presets()) {
-    char knobs[80];
-    std::snprintf(knobs, sizeof knobs, ": --alpha-min %.4g --t-min %.4g", p.alpha_min, p.transmittance_min);
-    text += "\n" + p.name + (p.iterations ? ": --iterations " + std::to_string(p.iterations) : knobs);
-  }
-  return text;
-}
-}  // namespace
-
 void add_arguments(CLI::App& train, train_arguments& a) {
   auto& r = a.recorded;
   train
@@ -82,12 +67,6 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 for random points "
                  "with\nerror or mcmc, else 1"))
       ->check(between(0, 100));
-  in_group(
-      r.add(train, "--mcmc-noise", a.mcmc_noise, "X", "Strength of the random steps of mcmc over the usual; 0: none"))
-      ->check(between(0, 1e6));
-  in_group(r.add(train, "--mcmc-penalty", a.mcmc_penalty, "X",
-                 "Strength of the penalties of mcmc on opacity and size over\nthe usual; 0: none"))
-      ->check(between(0, 1e6));
   in_group(r.add(train, "--adam", a.adam, "NAME",
                  "all: each step moves every Gaussian; seen: only those that\nits view shows, as sparse Adam does; for "
                  "views that show a\nsmall part of a large scene"))
@@ -105,8 +84,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(whole_number());
 
   in_group(r.add(train, "--kernel-degree", a.kernel_degree, "N",
-                 "How Gaussians fall from their centres, exp(-4.5 (r / 3)^N):\n2, or the generalised 1, 3, 4, 5, 8 of "
-                 "3DGRT"))
+                 "How Gaussians fall from their centres, exp(-4.5 (r / 3)^N):\n2, or 4, as 3DGRT has it"))
       ->check(kernel_degree_names());
 
   in_group(r.add_flag(
@@ -146,7 +124,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--depth-weight", a.depth_weight, "X",
                  "Train by the capture's depth maps too: weight of their mean\nerror, in units of the scene's extent, "
                  "beside the colours' loss;\n0: none. Maps are depths/NAME.png (16 bits) or NAME.npy\n(float32) beside "
-                 "images/, or what 'depth_file_path' of a\ntransforms.json names (docs/depth.md)"))
+                 "images/, or what 'depth_file_path' of a\ntransforms.json names (docs/rendering.md)"))
       ->check(between(0, 1e6));
   in_group(
       r.add(train, "--depth-kind", a.depth_kind, "NAME",
@@ -169,7 +147,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--backward", a.backward, "NAME",
                  "How gradients are summed: primitive (one sum a Gaussian and\ntile), hybrid (a quarter of the "
                  "memory), pixel, or\ndeterministic (the same bits in every run); auto: the fastest"))
-      ->check(one_of_strategies(gart::strategy_use::training));
+      ->check(one_of_strategies());
   in_group(r.add(train, "--lt-budget", a.lt_budget_gb, "GB",
                  "Memory for what the forward pass records; a step that\nneeds more is done by hybrid, which needs a "
                  "quarter, and where\nthat is too much by pixel, which needs none. 0: half of what\nis free "
@@ -179,9 +157,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "Steps between builds of the bvh tracer's tree, which is\nrefitted in between; the images are the "
                  "same"))
       ->check(between(1, 1e6));
-  in_group(train.add_option("--parallel", a.parallel,
-                            "How ranks share a step (mpirun -n 4 gart train ...,\ndocs/scale.md): strips of one view, "
-                            "the training of one\nrank itself, or views, a --batch of one for each"))
+  in_group(
+      train.add_option("--parallel", a.parallel,
+                       "How ranks share a step (mpirun -n 4 gart train ...,\ndocs/backends.md): strips of one view, "
+                       "the training of one\nrank itself, or views, a --batch of one for each"))
       ->type_name("NAME")
       ->capture_default_str()
       ->check(one_of({"strips", "views"}));
@@ -195,25 +174,23 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(train.get_option("--threads"));
 
   group = "Accuracy";
-  in_group(r.add(train, "--preset", a.preset, "NAME", presets_help()))->check(one_of(gart::preset_names()));
+  in_group(r.add(train, "--preset", a.preset, "NAME",
+                 "exact, or quick: " + std::to_string(gart::preset_named("quick").iterations) +
+                     " steps, where --iterations is not given"))
+      ->check(one_of(gart::preset_names()));
   in_group(r.add(train, "--alpha-min", a.alpha_min, "A",
                  "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as others have it"))
       ->check(between(1e-6, 0.99));
-  in_group(r.add(train, "--t-min", a.t_min, "T", "Transmittance below which a ray ends, 0 to 1"))
+  in_group(
+      r.add(train, "--transmittance-min", a.transmittance_min, "T", "Transmittance below which a ray ends, 0 to 1"))
       ->check(between(0, 0.99));
   in_group(r.add(train, "--max-hits", a.max_hits, "N", "Hits after which a ray ends, 0: no cap"))
       ->check(between(0, gart::max_hits_most));
 
-  in_group(r.add(train, "--arithmetic", a.arithmetic, "NAME", "exact, or fast: shorter exponentials and reciprocals"))
-      ->check(name_of_a<gart::arithmetic_kind>());
   in_group(r.add(train, "--lt-format", a.lt_format, "NAME",
-                 "What the forward pass leaves of a hit for primitive: float4,\nhalf or shared (half the memory, less "
-                 "exact gradients)"))
+                 "What the forward pass leaves of a hit for primitive: float4,\nor half (half the memory, less exact "
+                 "gradients)"))
       ->check(name_of_a<gart::lt_format_kind>());
-  in_group(r.add(train, "--tile-size", a.tile_size, "N", "Pixels a side of a tile, 0: what suits"))
-      ->check(between(0, 64));
-  in_group(r.add(train, "--window", a.window, "N", "Hits a ray keeps in order at a time, 0: what suits"))
-      ->check(between(0, 1024));
 
   group = "Course";
   in_group(r.add(train, "--eval-every", a.eval_every, "N",
@@ -249,11 +226,9 @@ void add_arguments(CLI::App& train, train_arguments& a) {
 
 void fill_in(CLI::App const& train, train_arguments& a) {
   gart::preset const& chosen = gart::preset_named(a.preset);
-  auto const set = [&](char const* option, auto& value, auto const& by_preset) {
-    if (train.get_option(option)->count() == 0) value = by_preset;
+  auto const set = [&](char const* option, auto& value, auto const& otherwise) {
+    if (train.get_option(option)->count() == 0) value = otherwise;
   };
-  set("--alpha-min", a.alpha_min, chosen.alpha_min);
-  set("--t-min", a.t_min, chosen.transmittance_min);
   if (chosen.iterations) set("--iterations", a.iterations, chosen.iterations);
 }
 
@@ -268,7 +243,10 @@ void continue_run(train_arguments& a) {
   if (!config.is_object() || !config.contains("options") || !config["options"].is_object()) {
     throw gart::io_error(a.config_file().string(), "has no \"options\"", "start anew without --resume");
   }
-  a.raised = a.recorded.continue_from(config["options"], a.config_file(), {"iterations", "time-budget"});
+  nlohmann::json options = config["options"];
+  // Earlier runs call it t-min.
+  if (options.contains("t-min")) options.emplace("transmittance-min", options["t-min"]);
+  a.raised = a.recorded.continue_from(options, a.config_file(), {"iterations", "time-budget"});
   if (a.dataset.empty()) {
     if (!config.contains("dataset") || !config["dataset"].is_string()) {
       throw gart::io_error(a.config_file().string(), "has no \"dataset\"", "name the dataset on the command line");
@@ -284,9 +262,8 @@ gart::configuration_request configuration_request_of(train_arguments const& a) {
   wanted.backward = a.backward;
   wanted.sh_degree = a.sh_degree;
   wanted.kernel_degree = a.kernel_degree;
-  wanted.arithmetic = gart::from_string<gart::arithmetic_kind>(a.arithmetic);
   wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
-  wanted.tile_size = a.tile_size, wanted.window = a.window, wanted.threads = a.threads;
+  wanted.threads = a.threads;
   wanted.depth = a.depth_weight > 0;
   return wanted;
 }
@@ -302,9 +279,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.exposure = a.exposure == "on", o.vignetting = a.vignetting == "on";
   o.depth_weight = a.depth_weight;
   o.refine_poses = a.refine_poses, o.refine_lens = a.refine_lens;
-  o.mcmc.noise *= a.mcmc_noise;
-  o.mcmc.opacity_penalty *= a.mcmc_penalty, o.mcmc.scale_penalty *= a.mcmc_penalty;
-  o.adam.seen_only = a.adam == "seen";
+  o.adam.sparse = a.adam == "seen";
   o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
   // Until it is settled it decides nothing.
   o.background = gart::from_string(a.background, gart::background_kind::black);
@@ -312,9 +287,9 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.batch = a.batch;
   o.seed = a.seed;
   o.render.alpha_min = a.alpha_min;
-  o.render.transmittance_min = a.t_min;
+  o.render.transmittance_min = a.transmittance_min;
   o.render.max_hits = a.max_hits;
-  o.render.antialias = a.antialias ? gart::usual_antialias : 0;
+  o.render.antialias = a.antialias ? gart::default_antialias : 0;
   // The other tracers build no tree, and the images are the same.
   o.render.rebuild_every = a.tracer == gart::to_string(gart::tracer_kind::bvh) ? a.rebuild_every : 1;
   set_fields(o, a.set);

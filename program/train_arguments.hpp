@@ -30,13 +30,13 @@ struct train_arguments {
 
   // What follows decides the result and is recorded.
   std::string backend = "auto", tracer = "auto", backward = "auto", densify = "auto", background = "auto", start, poses;
-  std::string arithmetic = "exact", lt_format = "auto";
+  std::string lt_format = "auto";
   std::string preset = "exact";
   gart::train_options defaults;
   int iterations = defaults.iterations, batch = defaults.batch;
   double time_budget = 0;  // seconds of training; 0: none
   gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
-  int kernel_degree = 2, tile_size = 0, window = 0;
+  int kernel_degree = 2;
   bool automatic = true;
   int sh_degree = 3;
   int downscale = 1, test_every = 8, eval_every = -1;
@@ -45,8 +45,7 @@ struct train_arguments {
   double depth_unit = 0;
   float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
   std::string exposure = "auto", vignetting = "auto", adam = "all", set;
-  float mcmc_noise = 1, mcmc_penalty = 1;
-  float alpha_min = defaults.render.alpha_min, t_min = defaults.render.transmittance_min;
+  float alpha_min = defaults.render.alpha_min, transmittance_min = defaults.render.transmittance_min;
   gart::u32 max_hits = defaults.render.max_hits;
   bool antialias = false, refine_poses = false, refine_lens = false;
   int rebuild_every = defaults.render.rebuild_every;

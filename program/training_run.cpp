@@ -49,8 +49,7 @@ void training_run::prepare() {
   configuration_ = gart::resolve(request());
   a_.backend = to_string(configuration_.backend), a_.tracer = to_string(configuration_.tracer),
   a_.backward = configuration_.backward;
-  a_.lt_format = to_string(configuration_.lt_format), a_.tile_size = configuration_.tile_size,
-  a_.window = configuration_.window;
+  a_.lt_format = to_string(configuration_.lt_format);
   for (auto& choice : chosen_) {
     if (choice["option"] == "--tracer") choice["value"] = a_.tracer;
     if (choice["option"] == "--backward") choice["value"] = a_.backward;
@@ -131,9 +130,10 @@ void training_run::say_memory() {
   gart::train_options const options = train_options_of(a_);
   gart::u64 const begin = a_.start.empty() ? gart::choose_start(data_, options).value.count : start_total_;
   gart::u64 const most = gart::gaussians_at_end(options, data_, begin);
-  say_.note("each rank needs " +
-            as_bytes(static_cast<double>(gart::least_bytes(options, most, configuration_.sh_degree, ranks::size()))) +
-            " at the least, for its part of " + with_commas(most) + " Gaussians, and what the views take");
+  say_.note(
+      "each rank needs " +
+      as_bytes(static_cast<double>(gart::least_bytes(options, most, configuration_.stored_degree, ranks::size()))) +
+      " at the least, for its part of " + with_commas(most) + " Gaussians, and what the views take");
 }
 
 // Rank 0 measures, and all take what it found. Of a run that ends at a time it is a tenth of that at most.

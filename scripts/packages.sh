@@ -21,7 +21,7 @@ missing_packages() {
 
 install_packages() {
   command -v apt-get >/dev/null ||
-    fail "no apt-get here. Install what these Debian packages hold, then follow docs/install.md: ${packages[*]}"
+    fail "no apt-get here. Install what these Debian packages hold, then follow docs/getting_started.md: ${packages[*]}"
   local missing root=()
   missing=$(missing_packages)
   if [[ -z $missing ]]; then

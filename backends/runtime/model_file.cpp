@@ -41,7 +41,7 @@ model_file load_model(std::filesystem::path const& path, row_owners const& owner
   number("t_min", file.render.transmittance_min);
   number("near", file.render.near, 3e38f);
   if (auto const found = traits.find("antialias"); found != traits.end() && found->second.empty())
-    file.render.antialias = usual_antialias;  // another program's, which does not say how wide
+    file.render.antialias = default_antialias;  // another program's, which does not say how wide
   else
     number("antialias", file.render.antialias, 100);
   if (auto const found = traits.find("max_hits"); found != traits.end()) {

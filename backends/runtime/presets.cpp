@@ -4,10 +4,7 @@
 namespace gart {
 
 std::vector<preset> const& presets() {
-  // No more of transmittance_min: a ray that ends early leaves what lies behind without a gradient, and training loses
-  // by that far more than the image does (docs/tradeoffs.md).
-  static std::vector<preset> const all{
-      {"exact"}, {.name = "quick", .iterations = 13000}, {"balanced", 0.006f, 0.001f}, {"fast", 0.01f, 0.001f}};
+  static std::vector<preset> const all{{"exact"}, {"quick", 13000}};
   return all;
 }
 

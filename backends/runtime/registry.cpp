@@ -20,38 +20,27 @@ bool matches(E wanted, E there) {
   return wanted == E::automatic || wanted == there;
 }
 
-// The window of the configuration that "auto" takes.
-int usual_window(configuration_info const& of) {
-  compiled_configuration const* best = nullptr;
-  for (auto const& r : configurations())
-    if (r.info.backend == of.backend && r.info.tracer == of.tracer && (!best || r.rank > best->rank)) best = &r;
-  return best->info.window;
-}
-
 // What a configuration has that the ordinary one has not.
 std::string peculiarities(configuration_info const& r) {
   std::string out;
   auto const add = [&out](std::string const& text) { out += ", " + text; };
   if (r.kernel_degree != 2) add("kernel degree " + std::to_string(r.kernel_degree));
-  if (r.arithmetic != arithmetic_kind::exact) add(std::string(to_string(r.arithmetic)) + " arithmetic");
   using enum lt_format_kind;
   if (r.lt_format != none && r.lt_format != weight && r.lt_format != float4)
     add(std::string("LT format ") + to_string(r.lt_format));
   if (r.depth) add("with depth");
   if (r.ranks) add("on several ranks");
-  if (r.tile_size != 8) add("tiles of " + std::to_string(r.tile_size));
-  if (r.window != usual_window(r)) add("window " + std::to_string(r.window));
   return out;
 }
 
-// "openmp / tiles / primitive (SH 0 1 2 3)", configurations of one kind together.
+// "openmp / tiles / primitive (SH 0 3)", configurations of one kind together.
 std::string list_configurations() {
   std::vector<std::pair<std::string, std::set<int>>> kinds;
   for (auto const& r : configurations()) {
     std::string const kind = std::string(to_string(r.info.backend)) + " / " + to_string(r.info.tracer) + " / " +
                              r.info.backward + peculiarities(r.info);
     auto const same = std::find_if(kinds.begin(), kinds.end(), [&](auto const& k) { return k.first == kind; });
-    (same == kinds.end() ? kinds.emplace_back(kind, std::set<int>{}) : *same).second.insert(r.info.sh_degree);
+    (same == kinds.end() ? kinds.emplace_back(kind, std::set<int>{}) : *same).second.insert(r.info.stored_degree);
   }
   std::string out;
   for (auto const& [kind, degrees] : kinds) {
@@ -64,11 +53,10 @@ std::string list_configurations() {
 
 bool matches(configuration_request const& wanted, configuration_info const& there) {
   return matches(wanted.backend, there.backend) && matches(wanted.tracer, there.tracer) &&
-         (wanted.backward == "auto" || wanted.backward == there.backward) && wanted.sh_degree == there.sh_degree &&
-         wanted.depth == there.depth && wanted.kernel_degree == there.kernel_degree &&
-         wanted.arithmetic == there.arithmetic && (wanted.ranks != nullptr) == there.ranks &&
-         matches(wanted.lt_format, there.lt_format) && (wanted.tile_size == 0 || wanted.tile_size == there.tile_size) &&
-         (wanted.window == 0 || wanted.window == there.window) &&
+         (wanted.backward == "auto" || wanted.backward == there.backward) && wanted.sh_degree >= 0 &&
+         wanted.sh_degree <= there.stored_degree && wanted.depth == there.depth &&
+         wanted.kernel_degree == there.kernel_degree && (wanted.ranks != nullptr) == there.ranks &&
+         matches(wanted.lt_format, there.lt_format) &&
          ((wanted.device == 0 && !wanted.stream) || there.backend == backend_kind::cuda);
 }
 
@@ -76,12 +64,9 @@ std::string as_text(configuration_request const& r) {
   std::string out = std::string("backend ") + to_string(r.backend) + ", tracer " + to_string(r.tracer) + ", backward " +
                     r.backward + ", SH degree " + std::to_string(r.sh_degree);
   if (r.kernel_degree != 2) out += ", kernel degree " + std::to_string(r.kernel_degree);
-  if (r.arithmetic != arithmetic_kind::exact) out += std::string(", ") + to_string(r.arithmetic) + " arithmetic";
   if (r.lt_format != lt_format_kind::automatic) out += std::string(", LT format ") + to_string(r.lt_format);
   if (r.depth) out += ", with depth";
   if (r.ranks) out += ", on several ranks";
-  if (r.tile_size != 0) out += ", tiles of " + std::to_string(r.tile_size);
-  if (r.window != 0) out += ", window " + std::to_string(r.window);
   if (r.device != 0) out += ", device " + std::to_string(r.device);
   if (r.stream) out += ", a CUDA stream of the caller's";
   return out;
@@ -98,7 +83,9 @@ compiled_configuration const& find_configuration(configuration_request const& re
       unavailable = to_string(r.info.backend);
       continue;
     }
-    if (!best || r.rank > best->rank) best = &r;
+    // Of two that are alike, the one that stores less.
+    bool const stores_less = best && r.rank == best->rank && r.info.stored_degree < best->info.stored_degree;
+    if (!best || r.rank > best->rank || stores_less) best = &r;
   }
   if (best) return *best;
   if (!unavailable.empty())
@@ -112,7 +99,11 @@ compiled_configuration const& find_configuration(configuration_request const& re
 
 void register_configuration(compiled_configuration const& entry) { configurations().push_back(entry); }
 
-configuration_info resolve(configuration_request const& request) { return find_configuration(request).info; }
+configuration_info resolve(configuration_request const& request) {
+  configuration_info found = find_configuration(request).info;
+  found.sh_degree = request.sh_degree;
+  return found;
+}
 
 std::vector<configuration_info> compiled_configurations() {
   std::vector<configuration_info> out;

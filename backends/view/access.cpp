@@ -76,10 +76,10 @@ request_path access::path_of(std::string_view path) const {
   std::size_t const slash = path.empty() || path[0] != '/' ? path.npos : path.find('/', 1);
   if (slash == path.npos) return {};
   std::string_view const token = path.substr(1, slash - 1);
-  right of = right::none;
-  if (same(token, view_)) of = right::view;
-  if (same(token, control_)) of = right::control;
-  return {of, of == right::none ? std::string() : std::string(path.substr(slash + 1))};
+  access_right of = access_right::none;
+  if (same(token, view_)) of = access_right::view;
+  if (same(token, control_)) of = access_right::control;
+  return {of, of == access_right::none ? std::string() : std::string(path.substr(slash + 1))};
 }
 
 bool access::host_is_ours(std::string_view host) const {
@@ -92,9 +92,9 @@ bool access::origin_is(std::string_view origin, std::string_view host) {
   return lower(origin) == "http://" + lower(host);
 }
 
-std::string access::address(right of) const {
-  return "http://" + hosts_.front() + ":" + std::to_string(port_) + "/" + (of == right::control ? control_ : view_) +
-         "/";
+std::string access::address(access_right of) const {
+  return "http://" + hosts_.front() + ":" + std::to_string(port_) + "/" +
+         (of == access_right::control ? control_ : view_) + "/";
 }
 
 listen_place listen_place_of(std::string const& listen) {

@@ -10,11 +10,11 @@ namespace gart::view {
 // 128 random bits of the system, in hex.
 std::string new_token();
 
-enum class right { none, view, control };
+enum class access_right { none, view, control };
 
 // A path "/TOKEN/rest", and whose token it is.
 struct request_path {
-  right of = right::none;
+  access_right of = access_right::none;
   std::string rest;
 };
 
@@ -29,7 +29,7 @@ class access {
   // Whether an Origin header is that of a page from this Host.
   static bool origin_is(std::string_view origin, std::string_view host);
 
-  std::string address(right of) const;  // for the browser
+  std::string address(access_right of) const;  // for the browser
 
  private:
   std::vector<std::string> hosts_;

@@ -55,7 +55,7 @@ verdict clients::receive(int id, std::string_view text, double now) {
   auto const index_in_range = [&](int i) { return i < static_cast<int>(scene_.cameras.size()); };
   if (auto* const view = std::get_if<view_message>(&message)) {
     if (view->photo && !index_in_range(*view->photo)) return {policy_violation, "'photo' is no camera of the scene"};
-    c.view = std::move(*view), c.view_time = now, c.fresh = true, c.still_done = false;
+    c.view = std::move(*view), c.view_time = now, c.dirty = true, c.still_done = false;
   } else if (auto* const pick = std::get_if<pick_message>(&message)) {
     c.pick = std::move(*pick);
   } else if (auto* const path = std::get_if<path_message>(&message)) {
@@ -98,7 +98,7 @@ bool clients::take_frame(int id, std::vector<u8>& to, double now) {
   auto const found = clients_.find(id);
   if (found == clients_.end() || found->second.frame.empty()) return false;
   to = std::exchange(found->second.frame, {});
-  found->second.view_time = now;  // who moves on sends the next view when this one is there
+  found->second.view_time = now;  // a moving page sends its next view when it has this frame
   changed_.notify_all();          // the next one may be rendered
   return true;
 }
@@ -124,13 +124,13 @@ bool clients::overflows(int id) const {
   return found != clients_.end() && found->second.texts.size() > texts_most;
 }
 
-bool clients::rests(client const& c, double now) const {
+bool clients::at_rest(client const& c, double now) const {
   return !c.view->moving || now - c.view_time >= options_.rest_seconds;
 }
 
 int clients::moving(double now) const {
   int n = 0;
-  for (auto const& [id, c] : clients_) n += c.view && c.frame.empty() && !rests(c, now);
+  for (auto const& [id, c] : clients_) n += c.view && c.frame.empty() && !at_rest(c, now);
   return n;
 }
 
@@ -144,14 +144,14 @@ std::optional<job> clients::job_of(int id, client& c, double now, int urgency) {
   }
   if (!c.view || !c.frame.empty()) return {};
   int const width = c.view->view.width, height = c.view->view.height;
-  if (urgency == 1 && c.fresh && !rests(c, now)) {
-    c.fresh = false;
+  if (urgency == 1 && c.dirty && !at_rest(c, now)) {
+    c.dirty = false;
     c.pacing.start_from(pacing_);
     auto const [w, h] = c.pacing.size(width, height, 1000 * options_.frame_seconds / std::max(1, moving(now)));
     return job{id, *c.view, false, w, h};
   }
-  if (urgency == 2 && rests(c, now) && !c.still_done) {
-    c.fresh = false, c.still_done = true;
+  if (urgency == 2 && at_rest(c, now) && !c.still_done) {
+    c.dirty = false, c.still_done = true;
     return job{id, *c.view, true, width, height};
   }
   return {};
@@ -180,7 +180,7 @@ std::optional<job> clients::choose(double now) {
 double clients::next_rest(double now) const {
   double least = HUGE_VAL;
   for (auto const& [id, c] : clients_)
-    if (c.view && c.frame.empty() && !c.still_done && !rests(c, now))
+    if (c.view && c.frame.empty() && !c.still_done && !at_rest(c, now))
       least = std::min(least, c.view_time + options_.rest_seconds - now);
   return least;
 }
@@ -211,7 +211,7 @@ void clients::finish_frame(job const& done, std::vector<u8> bytes, double millis
   wake();
 }
 
-void clients::say(int id, std::string text) {
+void clients::send(int id, std::string text) {
   {
     std::lock_guard const lock(mutex_);
     auto const found = clients_.find(id);
@@ -221,7 +221,7 @@ void clients::say(int id, std::string text) {
   wake();
 }
 
-void clients::say_all(std::string const& text) {
+void clients::send_all(std::string const& text) {
   {
     std::lock_guard const lock(mutex_);
     for (auto& [id, c] : clients_) c.texts.push_back(text);

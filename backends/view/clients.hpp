@@ -46,13 +46,13 @@ class clients {
   // The thread that renders.
   std::optional<job> next_job(double now, double wait_seconds);
   void finish_frame(job const& done, std::vector<u8> bytes, double milliseconds);
-  void say(int client, std::string text);
+  void send(int client, std::string text);
   std::optional<train_action> next_action();
   std::optional<double> next_share();
   void set_status(view_status const& status);
   void set_curve(view_curve const& curve);
 
-  void say_all(std::string const& text);
+  void send_all(std::string const& text);
   int count() const noexcept { return count_.load(std::memory_order_relaxed); }
   bool idle() const noexcept { return wishes_.load(std::memory_order_relaxed) == 0; }
   view_scene const& scene() const { return scene_; }
@@ -64,7 +64,7 @@ class clients {
     bool control = false;
     std::optional<view_message> view;  // the newest
     double view_time = 0;              // when it came, or the last frame went
-    bool fresh = false;                // not rendered in any size
+    bool dirty = false;                // not rendered in any size
     bool still_done = false;           // rendered whole
     std::optional<pick_message> pick;
     std::optional<path_message> path;
@@ -75,7 +75,7 @@ class clients {
   };
   static bool waits(client const& c);  // whether there is something to send to it
   // All with mutex_ held.
-  bool rests(client const& c, double now) const;
+  bool at_rest(client const& c, double now) const;
   std::optional<job> job_of(int id, client& c, double now, int urgency);
   std::optional<job> choose(double now);
   double next_rest(double now) const;

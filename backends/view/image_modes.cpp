@@ -190,7 +190,7 @@ shown_image shown(rendered const& r, camera const& view, view_mode mode, image8 
     case view_mode::error:
       if (!photo || photo->empty())
         throw invalid_argument("view_mode::error: there is no photograph of this view (name a camera that has one)");
-      out.high = usual_error_scale;
+      out.high = default_error_scale;
       out.image = error_in_colors(error_between(r.color, *photo, background), out.high);
       break;
   }

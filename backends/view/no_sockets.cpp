@@ -15,7 +15,7 @@ sockets::sockets(clients&, view_server_options const&) {
       "build gart again)");
 }
 sockets::~sockets() = default;
-std::string sockets::address(right) const { return {}; }
+std::string sockets::address(access_right) const { return {}; }
 int sockets::port() const { return 0; }
 
 }  // namespace gart::view

@@ -48,10 +48,10 @@ pick_place place_of(pick_message const& pick) {
 struct view_server::state {
   view_server_options options;
   view::clients all;
-  view::sockets doors;
+  view::sockets listener;
 
   state(view_scene scene, view_server_options const& o)
-      : options(o), all(std::move(scene), options), doors(all, options) {}
+      : options(o), all(std::move(scene), options), listener(all, options) {}
 
   void answer(view::job const& j, view_message const& m, view_render const& render) {
     std::optional<image8> photo;
@@ -76,11 +76,11 @@ struct view_server::state {
     ray const through = ray_through(m.view, m.x, m.y);
     vec3d point = m.view.position;
     for (int k = 0; k < 3; ++k) point[k] += double{through.origin[k]} + double{t} * double{through.direction[k]};
-    all.say(j.client, picked_text(m.id, t, point));
+    all.send(j.client, picked_text(m.id, t, point));
   }
 
   void answer(view::job const& j, path_message const& m, view_render const&) {
-    all.say(j.client, path_text(m.id, smooth_path(m.keyframes, m.frames, m.closed)));
+    all.send(j.client, path_text(m.id, smooth_path(m.keyframes, m.frames, m.closed)));
   }
 };
 
@@ -88,9 +88,9 @@ view_server::view_server(view_scene scene, view_server_options options)
     : state_(std::make_unique<state>(std::move(scene), options)) {}
 view_server::~view_server() = default;
 
-std::string view_server::control_address() const { return state_->doors.address(view::right::control); }
-std::string view_server::view_address() const { return state_->doors.address(view::right::view); }
-int view_server::port() const { return state_->doors.port(); }
+std::string view_server::control_address() const { return state_->listener.address(view::access_right::control); }
+std::string view_server::view_address() const { return state_->listener.address(view::access_right::view); }
+int view_server::port() const { return state_->listener.port(); }
 int view_server::clients() const noexcept { return state_->all.count(); }
 bool view_server::idle() const noexcept { return state_->all.idle(); }
 
@@ -101,7 +101,7 @@ double view_server::render_next(view_render const& render, double wait_seconds) 
   try {
     std::visit([&](auto const& message) { state_->answer(*job, message, render); }, job->wanted);
   } catch (std::exception const& e) {
-    state_->all.say(job->client, error_text(e.what()));
+    state_->all.send(job->client, error_text(e.what()));
   }
   return seconds_now() - start;
 }

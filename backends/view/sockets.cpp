@@ -75,7 +75,7 @@ image8 opaque(image8 const& image, vec3 background) {
 struct sockets::state {
   clients& all;
   view_server_options options;
-  std::unique_ptr<access> doors;
+  std::unique_ptr<access> gate;
   lws_context* context = nullptr;
   lws_vhost* vhost = nullptr;
   std::array<lws_protocols, 3> protocols{};
@@ -110,7 +110,7 @@ struct sockets::state {
                                          end);
     };
     std::string const host = header(wsi, WSI_TOKEN_HOST);
-    std::string const socket = doors->host_is_ours(host) ? " ws://" + host : std::string();
+    std::string const socket = gate->host_is_ours(host) ? " ws://" + host : std::string();
     if (add("content-security-policy:", "default-src 'self'; img-src 'self' blob:; connect-src 'self'" + socket) ||
         add("x-content-type-options:", "nosniff") || add("referrer-policy:", "no-referrer") ||
         add("cache-control:", "no-store") || add("cross-origin-resource-policy:", "same-origin") ||
@@ -134,13 +134,13 @@ struct sockets::state {
   // Whether the request is from a page of ours, or from none.
   bool from_here(lws* wsi, bool origin_required) const {
     std::string const host = header(wsi, WSI_TOKEN_HOST), origin = header(wsi, WSI_TOKEN_ORIGIN);
-    if (!doors->host_is_ours(host)) return false;
+    if (!gate->host_is_ours(host)) return false;
     return origin.empty() ? !origin_required : access::origin_is(origin, host);
   }
 
   int request(lws* wsi, std::string_view path) const {
-    request_path const asked = doors->path_of(path);
-    if (asked.of == right::none || !from_here(wsi, false)) {
+    request_path const asked = gate->path_of(path);
+    if (asked.of == access_right::none || !from_here(wsi, false)) {
       log("403: a request with another token, Host or Origin");
       return refuse(wsi, HTTP_STATUS_FORBIDDEN, "403: not the address that gart printed\n");
     }
@@ -170,8 +170,8 @@ struct sockets::state {
 
   // 0: may go on; the HTTP status of the refusal.
   unsigned refusal_of_upgrade(lws* wsi, std::string_view to) const {
-    request_path const asked = doors->path_of(header(wsi, WSI_TOKEN_GET_URI));
-    if (to != "websocket" || asked.of == right::none || asked.rest != "socket" || !from_here(wsi, true))
+    request_path const asked = gate->path_of(header(wsi, WSI_TOKEN_GET_URI));
+    if (to != "websocket" || asked.of == access_right::none || asked.rest != "socket" || !from_here(wsi, true))
       return HTTP_STATUS_FORBIDDEN;
     if (header(wsi, WSI_TOKEN_PROTOCOL) != protocol_name) return HTTP_STATUS_BAD_REQUEST;
     return all.count() >= options.max_clients ? HTTP_STATUS_SERVICE_UNAVAILABLE : 0;
@@ -250,8 +250,8 @@ struct sockets::state {
         slot->own = new connection;
         int const bytes = send_buffer;
         setsockopt(lws_get_socket_fd(wsi), SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
-        right const of = s.doors->path_of(header(wsi, WSI_TOKEN_GET_URI)).of;
-        slot->own->client = s.all.add(of == right::control);
+        access_right const of = s.gate->path_of(header(wsi, WSI_TOKEN_GET_URI)).of;
+        slot->own->client = s.all.add(of == access_right::control);
         lws_callback_on_writable(wsi);
         return 0;
       }
@@ -301,14 +301,14 @@ sockets::sockets(clients& all, view_server_options const& options) : state_(std:
     throw error("the viewer cannot listen at " + options.listen + ", port " + std::to_string(options.port) +
                 " (view_server_options.port = 0 takes one that is free)");
   }
-  s.doors = std::make_unique<access>(place.hosts, port);
+  s.gate = std::make_unique<access>(place.hosts, port);
   all.wake = [&s] { lws_cancel_service(s.context); };
   s.thread = std::thread([&s] {
     while (!s.ends.load() && lws_service(s.context, 0) >= 0) {
     }
     // What is left to say is given a moment, where anyone takes it.
     double const until = seconds_now() + 0.2;
-    s.all.say_all(bye_text("gart ends"));
+    s.all.send_all(bye_text("gart ends"));
     while (s.all.has_output() && seconds_now() < until && lws_service(s.context, 0) >= 0) lws_cancel_service(s.context);
   });
 }
@@ -322,7 +322,7 @@ sockets::~sockets() {
   lws_context_destroy(s.context);
 }
 
-std::string sockets::address(right of) const { return state_->doors->address(of); }
+std::string sockets::address(access_right of) const { return state_->gate->address(of); }
 int sockets::port() const { return lws_get_vhost_listen_port(state_->vhost); }
 
 }  // namespace gart::view

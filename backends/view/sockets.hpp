@@ -15,7 +15,7 @@ class sockets {
   sockets(clients& all, view_server_options const& options);
   ~sockets();
 
-  std::string address(right of) const;
+  std::string address(access_right of) const;
   int port() const;
 
  private:

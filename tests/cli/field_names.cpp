@@ -15,7 +15,7 @@ TEST_CASE("a message names options where the library names fields") {
           "lower train_options.max_gaussians, raise dataset_options.downscale, or use configuration_request.backward = "
           "hybrid") == "lower --max-gaussians, raise --downscale, or use --backward hybrid");
   CHECK(in_options("(configuration_request.tracer = tiles or bvh)") == "(--tracer tiles or bvh)");
-  CHECK(in_options("render_options.transmittance_min") == "--t-min");
+  CHECK(in_options("render_options.transmittance_min") == "--transmittance-min");
   // A field at the end of a sentence, and a value that is not this field's.
   CHECK(in_options("raise dataset_options.downscale. = 3") == "raise --downscale. = 3");
   // What only looks like a field, in a path for one, stays.

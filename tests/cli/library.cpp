@@ -4,7 +4,6 @@
 
 #include <gart/runtime/choose.hpp>
 #include <gart/runtime/model_file.hpp>
-#include <gart/runtime/presets.hpp>
 #include <gart/runtime/session.hpp>
 
 #include <support/policies.hpp>
@@ -88,16 +87,15 @@ TEST_CASE("a short program over the library and gart train give the same bits") 
   same("uneven");
 }
 
-TEST_CASE("the library's presets and what it measures are those of gart train, recorded, and the same after resuming") {
+TEST_CASE("what the library measures is what gart train does, recorded, and the same after resuming") {
   folder const here;
   write_capture(here / "capture", 24);
   fill_images(here / "capture", true);
   gart::train_options options;
   options.iterations = 5000, options.max_gaussians = 30;
-  gart::preset_named("quick").apply(options.render);
   auto const use = train(here / "capture", options, here / "mine.ply");
   REQUIRE_FALSE(use.measured.trials.empty());
-  std::string const run = "train capture --iterations 5000 --max-gaussians 30 --preset quick --backend serial --out ";
+  std::string const run = "train capture --iterations 5000 --max-gaussians 30 --backend serial --out ";
   auto const whole = here.gart(run + "whole");
   REQUIRE_MESSAGE(whole.code == 0, whole.err);
   CHECK_MESSAGE(has(whole.err, "measuring what the capture asks for: "), whole.err);

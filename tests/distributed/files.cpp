@@ -235,11 +235,11 @@ TEST_CASE("ranks write and read a checkpoint together") {
   mpi_comm ranks = here.ranks;
   row_owners const owners{ranks.size(), ranks.rank(), block};
   training_state const all = state_of(100, 1, true);
-  write_checkpoint_together(ranks, owners, here.path / "all.gart", part_of(all, owners));
+  write_checkpoint_collectively(ranks, owners, here.path / "all.gart", part_of(all, owners));
   if (ranks.rank() == 0) write_checkpoint(here.path / "one.gart", all);
   CHECK(here.names() == std::vector<std::string>{"all.gart", "one.gart"});
   CHECK(read_file(here.path / "all.gart") == read_file(here.path / "one.gart"));
-  CHECK(same(read_checkpoint_together(ranks, owners, here.path / "one.gart"), part_of(all, owners)));
+  CHECK(same(read_checkpoint_collectively(ranks, owners, here.path / "one.gart"), part_of(all, owners)));
 
   // A byte that is another is seen by all, whoever has it.
   for (double const share : {0.2, 0.5, 0.9}) {
@@ -249,7 +249,7 @@ TEST_CASE("ranks write and read a checkpoint together") {
       write_file(here.path / "odd.gart", std::string_view(reinterpret_cast<char const*>(bytes.data()), bytes.size()));
     }
     ranks.barrier();
-    std::string const said = error_of([&] { read_checkpoint_together(ranks, owners, here.path / "odd.gart"); });
+    std::string const said = error_of([&] { read_checkpoint_collectively(ranks, owners, here.path / "odd.gart"); });
     CAPTURE(said);
     CHECK(holds(said, "odd.gart: "));
     CHECK(holds(said, "damaged"));
@@ -263,7 +263,7 @@ TEST_CASE("where one rank cannot write, all say which and why, and the last file
   row_owners const owners{ranks.size(), ranks.rank(), block};
   training_state const all = state_of(400, 3, true), mine = part_of(all, owners);
   fs::path const path = here.path / "run.gart";
-  write_checkpoint_together(ranks, owners, path, mine);
+  write_checkpoint_collectively(ranks, owners, path, mine);
   auto const before = read_file(path);
   ranks.barrier();
   auto const named = [&](std::string const& said, int rank) {
@@ -288,7 +288,7 @@ TEST_CASE("where one rank cannot write, all say which and why, and the last file
     auto* const handler = std::signal(SIGXFSZ, SIG_IGN);
     rlimit const few{200, was.rlim_max};
     if (ranks.rank() == last) setrlimit(RLIMIT_FSIZE, &few);
-    std::string const said = error_of([&] { write_checkpoint_together(ranks, owners, path, mine); });
+    std::string const said = error_of([&] { write_checkpoint_collectively(ranks, owners, path, mine); });
     if (ranks.rank() == last) setrlimit(RLIMIT_FSIZE, &was);
     std::signal(SIGXFSZ, handler);
     check(said, last, "cannot be written: ");
@@ -296,10 +296,10 @@ TEST_CASE("where one rank cannot write, all say which and why, and the last file
     ranks.barrier();
   }
 
-  check(error_of([&] { write_checkpoint_together(ranks, owners, here.path / "none" / "run.gart", mine); }), 0,
+  check(error_of([&] { write_checkpoint_collectively(ranks, owners, here.path / "none" / "run.gart", mine); }), 0,
         "cannot be created");
   ranks.barrier();
   if (ranks.rank() == 0) fs::remove(path), fs::create_directories(path / "in the way");
   ranks.barrier();
-  check(error_of([&] { write_checkpoint_together(ranks, owners, path, mine); }), 0, "cannot be replaced");
+  check(error_of([&] { write_checkpoint_collectively(ranks, owners, path, mine); }), 0, "cannot be replaced");
 }

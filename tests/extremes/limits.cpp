@@ -28,7 +28,6 @@ template <class E>
 struct no_tracer : gart::tracer_base {
   using response_type = gart::generalized_gaussian<>;
   static constexpr char const* name = "none";
-  static constexpr int window = 1;
   explicit no_tracer(E&) {}
   void prepare(E&, gart::gaussians_view<float const>, gart::span<gart::ray_gaussian const>, gart::camera const&,
                gart::trace_options const&) {}

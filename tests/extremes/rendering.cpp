@@ -191,7 +191,7 @@ TEST_CASE_TEMPLATE("every extreme through the filter of its pixels: finite, and 
     oracle::scene const& s = p.e.scene;
     CAPTURE(s.name);
     gart::render_options options = s.options;
-    options.antialias = gart::usual_antialias;
+    options.antialias = gart::default_antialias;
     std::vector<outcome> const all = run_all(exec, s.model, s.view, options, p.color_gradient);
     for (outcome const& o : all) {
       CAPTURE(o.way);

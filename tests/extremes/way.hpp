@@ -18,7 +18,7 @@ outcome run_by(E& exec, gart::gaussian_model const& model, gart::camera const& v
   gart::buffer<float, E> gradient(exec, color_gradient);
   gart::buffer<gart::u32, E> hits(exec, pixels);
   frame.prepare(scene.view(), view, options);
-  if (!pass.prepare(frame)) throw pass.no_room();
+  if (!pass.prepare(frame)) throw pass.out_of_memory_error();
   pass.render(frame, {color.data(), transmittance.data(), depth.data(), hits.data()});
   gart::differentiate(frame, pass, gradient, gradients);
   return {std::string(Tracer::name) + ", " + Strategy::name,

@@ -12,7 +12,7 @@ namespace {
 // Calls f(kind, strategy, type_identity of the tracer) for each.
 template <class E, class F>
 void for_each_way(F&& f) {
-  gart::strategies::for_each([&]<class Strategy>(Strategy s) {
+  strategies::for_each([&]<class Strategy>(Strategy s) {
     if constexpr (E::device || !Strategy::lane_by_lane)
       f(tracer_kind::tiles, s, std::type_identity<gart::tile_tracer<E>>{});
     if constexpr (!differs_in_gather<Strategy>) {

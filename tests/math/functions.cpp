@@ -110,21 +110,6 @@ TEST_CASE("sigmoid, and what is finite") {
   CHECK_FALSE(gart::is_finite(NAN));
 }
 
-TEST_CASE("the fast exponential and reciprocal within the errors they state") {
-  double worst_exponential = 0, worst_reciprocal = 0;
-  for (float x = -87.0f; x <= 0; x += 0.0007f)
-    worst_exponential = std::max(worst_exponential, std::fabs(gart::fast_exponential(x) / std::exp(double{x}) - 1));
-  for (float a = 1e-34f; a < 1e35f; a *= 1.001f)
-    worst_reciprocal = std::max(worst_reciprocal, std::fabs(double{gart::fast_reciprocal(a)} * a - 1));
-  CAPTURE(worst_exponential);
-  CAPTURE(worst_reciprocal);
-  CHECK(worst_exponential < 8e-5);
-  CHECK(worst_reciprocal < 1.2e-7);
-  using fast = gart::generalized_gaussian<2, gart::arithmetic::fast>;
-  CHECK(fast::response(4.0f) == gart::fast_exponential(-2.0f));
-  CHECK(fast::response(4.0f) != gart::generalized_gaussian<>::response(4.0f));
-}
-
 TEST_CASE_TEMPLATE("responses, their cut-offs and slopes against double", Response, gart::generalized_gaussian<1>,
                    gart::generalized_gaussian<2>, gart::generalized_gaussian<3>, gart::generalized_gaussian<4>,
                    gart::generalized_gaussian<5>, gart::generalized_gaussian<8>) {

@@ -173,7 +173,7 @@ TEST_CASE_TEMPLATE("moments become the gradients of a weighted sum of alphas", R
       gart::ray_gaussian const g = gart::prepare<Response>(s, gart::vec3d(0.0), 1e-6f);
       gart::moments_of<float> total{};
       for (int k = 0; k < rays; ++k) {
-        gart::ray_peak const r = gart::evaluate<Response>(g, gart::primary_ray{to_vec3(directions[k])});
+        gart::ray_peak const r = gart::evaluate(g, gart::primary_ray{to_vec3(directions[k])});
         gart::moments_of<float> const one = gart::hit_moments<Response>(g, r, static_cast<float>(weights[k]));
         for (int i = 0; i < gart::moment_count; ++i) total.v[i] += one.v[i];
       }
@@ -200,7 +200,7 @@ TEST_CASE("the cusp of degree 1: a gradient of one size from every side, and non
   gart::ray_gaussian const record = gart::prepare<cusp>(g, gart::vec3d(0.0), 1.0f / 255);
   auto const gradient_from = [&](float x, float y) {
     gart::ray const r{{x, y, 0}, {0, 0, 1}};
-    gart::moments_of<float> const m = gart::hit_moments<cusp>(record, gart::evaluate<cusp>(record, r), 1.0f);
+    gart::moments_of<float> const m = gart::hit_moments<cusp>(record, gart::evaluate(record, r), 1.0f);
     return gart::from_moments(m.v, g, record);
   };
   gart::geometry_gradient const centre = gradient_from(0, 0);

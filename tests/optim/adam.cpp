@@ -132,7 +132,7 @@ TEST_CASE_TEMPLATE("what a step did not show stays, if so asked, and all else mo
     gaussians<E> all(exec, start), some(exec, start);
     optimizer_state<E> state_of_all(exec, n, degree), state_of_some(exec, n, degree);
     adam_options options;
-    options.seen_only = true;
+    options.sparse = true;
     for (int step = 1; step <= 3; ++step) {
       adam_step(exec, all, gradient, state_of_all, {}, step, degree);
       adam_step(exec, some, gradient, state_of_some, {}, step, degree, {}, options);
@@ -157,9 +157,9 @@ TEST_CASE_TEMPLATE("a step in two launches, the colours by gradients in no memor
   E exec;
   index_t const n = 391;
   for (int const degree : {0, 2, 3}) {
-    for (bool const seen_only : {false, true}) {
+    for (bool const sparse : {false, true}) {
       CAPTURE(degree);
-      CAPTURE(seen_only);
+      CAPTURE(sparse);
       gaussian_model const start = gart_test::random_model(n, degree, random);
       gaussian_model g = gart_test::random_model(n, degree, random);
       for (index_t i = 0; i < n; ++i)
@@ -174,7 +174,7 @@ TEST_CASE_TEMPLATE("a step in two launches, the colours by gradients in no memor
       optimizer_state<E> state_of_one(exec, n, degree), state_of_two(exec, n, degree);
       buffer<u64, E> skipped(exec, std::vector<u64>{0, 0});
       adam_options options;
-      options.seen_only = seen_only;
+      options.sparse = sparse;
       for (int step = 1; step <= 3; ++step) {
         int const active = std::min(degree, step - 1);
         adam_step(exec, one, whole, state_of_one, {}, step, active, skipped.view().subspan(0, 1), options);
@@ -194,7 +194,7 @@ TEST_CASE_TEMPLATE("a step in two launches, the colours by gradients in no memor
       }
       std::vector<u64> const counts = skipped.to_host();
       CHECK(counts[0] == counts[1]);
-      if (!seen_only || g.mean[3 * 7] != 0) CHECK(counts[0] == 3);
+      if (!sparse || g.mean[3 * 7] != 0) CHECK(counts[0] == 3);
     }
   }
 }

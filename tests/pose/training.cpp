@@ -158,7 +158,8 @@ TEST_CASE_TEMPLATE("a camera is tracked from 2 degrees and 5 % of the extent to 
   E exec;
   auto const data = capture(exec, seed);
   gart::camera truth = gart::resized(data.train[0].view, 58, 44);
-  gart::compiled_renderer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::pixel_strategy> renderer({});
+  gart::compiled_renderer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::pixel_strategy> renderer(
+      {.sh_degree = 1});
   renderer.set_model(cloud(seed, 0.6f));
   CHECK_THROWS_AS(renderer.differentiate_pose(), gart::invalid_argument);
   gart::track_options options;

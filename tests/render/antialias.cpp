@@ -18,7 +18,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double filter_pixels = gart::usual_antialias;
+constexpr double filter_pixels = gart::default_antialias;
 
 // In camera axes; axes in pixels at the mean's depth.
 struct blob {

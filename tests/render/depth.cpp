@@ -70,7 +70,7 @@ TEST_CASE_TEMPLATE("gradients of depth agree with the oracle", E, GART_TEST_POLI
   for (std::size_t i = 0; i < expectations().size(); ++i) {
     auto const& e = expectations()[i];
     CAPTURE(e.scene.name);
-    gart::strategies::for_each(
+    strategies::for_each(
         [&]<class Strategy>(Strategy s) { check_scene<gart::tile_tracer<E>>(exec, e, weights()[i], s); });
     if (e.scene.model.sh_degree == 3) {
       check_scene<gart::bvh_tracer<E>>(exec, e, weights()[i], gart::primitive_strategy{});

@@ -51,7 +51,7 @@ void check_order(E& exec) {
   auto const render = [&] { return error_of([&] { pass.render(frame, {color.data()}); }); };
   auto const prepare = [&] {
     return error_of([&] {
-      if (!pass.prepare(frame)) throw pass.no_room();
+      if (!pass.prepare(frame)) throw pass.out_of_memory_error();
     });
   };
 

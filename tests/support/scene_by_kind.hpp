@@ -2,12 +2,12 @@
 // A small scene through a tracer and a strategy that are chosen at run time: templates over the policy, whose bodies
 // are in scene_images.cpp and scene_gradients.cpp, compiled once for all tests (gart_test's BODIES scene_by_kind).
 
-#include <gart/backward/strategies.hpp>
 #include <gart/camera/models.hpp>
 #include <gart/render/options.hpp>
 #include <gart/runtime/kinds.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/trace/hit.hpp>
+#include <support/test_strategies.hpp>
 
 #include <concepts>
 #include <string>
@@ -64,7 +64,7 @@ constexpr bool compiled_for(tracer_kind kind, int degree) {
 
 inline std::vector<std::string> strategies_for(tracer_kind kind, int degree) {
   std::vector<std::string> names;
-  gart::strategies::for_each([&]<class Strategy>(Strategy) {
+  strategies::for_each([&]<class Strategy>(Strategy) {
     if (compiled_for<Strategy>(kind, degree)) names.emplace_back(Strategy::name);
   });
   return names;

@@ -15,7 +15,7 @@ gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model,
   detail::with_degree(model.sh_degree, [&](auto degree) {
     auto const by = [&]<tracer_kind Kind, class Tracer>(std::integral_constant<tracer_kind, Kind>,
                                                         std::type_identity<Tracer>) {
-      gart::strategies::with(strategy, [&]<class Strategy>(Strategy) {
+      strategies::with(strategy, [&]<class Strategy>(Strategy) {
         if constexpr (compiled_for<Strategy>(Kind, degree))
           out =
               gradients_by<degree, Strategy, Tracer>(exec, model, view, options, active_degree, color_gradient, error);

@@ -94,7 +94,7 @@ gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, ga
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
   gart::buffer<float, E> color(exec, 3 * pixels), gradient(exec, color_gradient);
   frame.prepare(scene.view(), view, options, active_degree);
-  if (!pass.prepare(frame)) throw pass.no_room();
+  if (!pass.prepare(frame)) throw pass.out_of_memory_error();
   pass.render(frame, {color.data()});
   gart::buffer<float, E> pixel_error(exec, error ? error->of_pixels : std::vector<float>{});
   gart::differentiate(frame, pass, gradient, gradients, pixel_error);
@@ -123,7 +123,7 @@ gart::gaussian_model depth_gradients_by(E& exec, gart::gaussian_model const& mod
   gart::buffer<float, E> const by_color(exec, color_gradient), by_depth(exec, depth_gradient),
       by_transmittance(exec, transmittance_gradient);
   frame.prepare(scene.view(), view, options, active_degree);
-  if (!pass.prepare(frame)) throw pass.no_room();
+  if (!pass.prepare(frame)) throw pass.out_of_memory_error();
   pass.render(frame, {.color = color.data(), .transmittance = transmittance.data(), .depth = depth.data()});
   gart::differentiate(frame, pass, {by_color, by_depth, by_transmittance}, gradients);
   return gradients.to_host();

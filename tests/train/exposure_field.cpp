@@ -2,7 +2,6 @@
 #include <support/policies.hpp>
 
 #include <gart/exposure/exposure_field.hpp>
-#include <gart/runtime/choose.hpp>
 
 #include <cmath>
 
@@ -118,38 +117,4 @@ TEST_CASE("a view has the falloff of the lens that is most like its own, whateve
   apply(gart::exposure_field({}, lenses).at(camera_at(0, 0, 0)), shaded);
   CHECK(shaded.at(0, 0, 0) < 0.5f);
   CHECK(shaded.at(1, 1, 0) > shaded.at(0, 0, 0));
-}
-
-TEST_CASE("exposures are learned where neighbouring photographs differ in brightness, and nowhere else") {
-  auto const learned = [](float difference, int channels, bool plain) {
-    gart::dataset data;
-    for (int i = 0; i < 12; ++i) {
-      gart::dataset_view v;
-      v.view = camera_at(i, 0, 0);
-      v.image = gart::image8(40, 30, channels, 0);
-      for (int y = 0; y < 30; ++y) {
-        for (int x = 0; x < 40; ++x) {
-          bool const inside = !plain || (x > 5 && x < 34 && y > 5 && y < 24);
-          for (int c = 0; c < 3; ++c) {
-            double const level = inside ? 60 + 2 * x + y : 0;
-            v.image.at(x, y, c) = static_cast<gart::u8>(std::lround(level * (i % 2 ? 1 + difference : 1)));
-          }
-          if (channels == 4) v.image.at(x, y, 3) = inside ? 255 : 0;
-        }
-      }
-      data.train.push_back(std::move(v));
-    }
-    gart::capture_traits traits = gart::inspect(data);
-    // Lenses darken corners wherever photographs fill their images.
-    CHECK(gart::choose_vignetting(traits).value == (channels == 3 && !plain));
-    traits.panoramas = 1;
-    CHECK_FALSE(gart::choose_vignetting(traits).value);
-    return gart::choose_exposure(traits);
-  };
-  CHECK(learned(0.08f, 3, false).value);
-  CHECK(learned(0.08f, 3, false).why.find("7.") != std::string::npos);
-  CHECK_FALSE(learned(0.01f, 3, false).value);
-  CHECK_FALSE(learned(0.08f, 3, true).value);
-  CHECK_FALSE(learned(0.08f, 4, true).value);
-  CHECK_FALSE(gart::choose_exposure(gart::inspect(gart::dataset{})).value);
 }

@@ -121,7 +121,7 @@ TEST_CASE_TEMPLATE("of all views' filters the narrowest counts", E, GART_TEST_PO
   gart::gaussian_model model = cloud(gart_test::seed(), 0.5f);
   for (float& x : model.mean) x = static_cast<float>(uniform(random));  // all of them are in all images
   gart::gaussians<E> const scene(exec, model);
-  gart::least_filter<E> least(exec);
+  gart::min_pixel_filter<E> least(exec);
   auto const view = [&](std::size_t k) {
     gart::camera c = data.train[k].view;
     c.fx *= k == 2 ? 1.7f : 1.0f;

@@ -55,7 +55,7 @@ class backward_pass {
 
   /// Allocates nothing; `exec` must outlive it.
   explicit backward_pass(execution_type& exec)
-      : moments_(exec), own_prints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec), depths_(exec) {}
+      : moments_(exec), own_footprints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec), depths_(exec) {}
 
   /// After the frame's preparation: a tracer that has the view's footprints lends them. False, and nothing allocated,
   /// where the LT buffer would take more than byte_budget (0: no limit) or have more slots than there are numbers of 32
@@ -69,24 +69,24 @@ class backward_pass {
       grid_ = {view.width, view.height};
       if constexpr (tracer_type::lends_footprints) {
         static_assert(footprint_tracer<tracer_type, execution_type>);
-        prints_ = &frame.tracer().prints();
+        footprints_ = &frame.tracer().footprints();
       } else {
-        own_prints_.template measure<typename Frame::response>(exec, frame.seen(), view, frame.options().alpha_min,
-                                                               frame.options().near, frame.options().rows);
-        prints_ = &own_prints_;
+        own_footprints_.template measure<typename Frame::response>(exec, frame.seen(), view, frame.options().alpha_min,
+                                                                   frame.options().near, frame.options().rows);
+        footprints_ = &own_footprints_;
       }
-      if (byte_budget && prints_->slots() * slot_bytes > byte_budget) return false;
-      if (prints_->slots() >= tile_slots::none) return false;
+      if (byte_budget && footprints_->slots() * slot_bytes > byte_budget) return false;
+      if (footprints_->slots() >= tile_slots::none) return false;
       if constexpr (tracer_type::lends_footprints) {
         lists_ = frame.tracer().map();
       } else {
         visit_camera(view, [&](auto const& model) {
-          map_.build(exec, grid_, *prints_, number_order{}, pair_test_of(model, frame.gaussians().data()));
+          map_.build(exec, grid_, *footprints_, number_order{}, pair_test_of(model, frame.gaussians().data()));
         });
         lists_ = map_.view();
       }
-      slots_.resize(prints_->slots());
-      if constexpr (records_depths) depths_.resize(prints_->slots());
+      slots_.resize(footprints_->slots());
+      if constexpr (records_depths) depths_.resize(footprints_->slots());
       if constexpr (validity == slot_validity::recomputed) {
         last_.resize(static_cast<std::size_t>(view.width) * view.height);
       } else {
@@ -104,7 +104,7 @@ class backward_pass {
     require(frame, prepared, "backward_pass.render: call backward_pass.prepare first, after frame.prepare");
     record_type record{};
     if constexpr (records) {
-      record = {prints_->ranges().data(), slots_.data()};
+      record = {footprints_->ranges().data(), slots_.data()};
       if constexpr (records_depths) record.depths = depths_.data();
       if constexpr (validity == slot_validity::recomputed) targets.last = last_.data();
     }
@@ -120,16 +120,16 @@ class backward_pass {
   /// pair_gradient<sh_degree>::quads for each (primitive, tile) pair, those of primitive i from pair_offsets()[i] on.
   span<quad const> pair_rows() const requires ordered { return rows_; }
   /// The boxes, cut to what was traced.
-  span<footprint_slots const> ranges() const requires ordered { return prints_->ranges(); }
+  span<footprint_slots const> ranges() const requires ordered { return footprints_->ranges(); }
   /// Where the rows of each primitive begin.
-  span<u64 const> pair_offsets() const requires ordered { return prints_->pair_offsets(); }
+  span<u64 const> pair_offsets() const requires ordered { return footprints_->pair_offsets(); }
 
   /// Bytes of the LT buffer for the view last prepared; 0 where the strategy records nothing.
   std::size_t lt_bytes() const { return records ? slots_.size() * slot_bytes : 0; }
 
-  /// What to throw where prepare() said no without a budget.
-  out_of_memory no_room() const {
-    u64 const slots = prints_ ? prints_->slots() : 0;
+  /// The error to throw when prepare() returns false without a budget.
+  out_of_memory out_of_memory_error() const {
+    u64 const slots = footprints_ ? footprints_->slots() : 0;
     return out_of_memory("LT buffer", slots * slot_bytes, 0,
                          std::to_string(slots) +
                              " slots, and there are numbers for 2^32: render smaller, with fewer Gaussians, or take "
@@ -172,13 +172,13 @@ class backward_pass {
       exec.zero(gradients.sh, sizeof(float) * scene.count * static_cast<std::size_t>(gradients.sh_stride()));
     if constexpr (records) {
       if constexpr (ordered) {
-        rows_.resize(prints_->pairs() * pair_gradient<sh_degree>::quads);
+        rows_.resize(footprints_->pairs() * pair_gradient<sh_degree>::quads);
         rows_.zero();  // pairs in no list have no sums
       }
       gather(frame, image.color, error, gradients);
       if constexpr (ordered)
         parallel_for(exec, "backward/sum", scene.count * pair_gradient<sh_degree>::quads,
-                     sum_pairs<sh_degree, typename Strategy::gather>{prints_->pair_offsets(), prints_->pairs(),
+                     sum_pairs<sh_degree, typename Strategy::gather>{footprints_->pair_offsets(), footprints_->pairs(),
                                                                      rows_.data(), gradients.sh, moments_.data()});
     }
     if constexpr (Strategy::scatter::any) {
@@ -228,9 +228,9 @@ class backward_pass {
           gather_of<strategy_gather<execution_type, sh_degree, typename Frame::response, Strategy, tile_size, Rays>>;
       parallel_for(
           frame.exec(), "backward/gather", tile_range{grid_.count(), kernel::block_size},
-          kernel{rays, grid_, lists_, prints_->ranges().data(), slots_.data(), frame.gaussians().data(),
+          kernel{rays, grid_, lists_, footprints_->ranges().data(), slots_.data(), frame.gaussians().data(),
                  frame.active_degree(), color_, color_gradient.data(), error.data(), gradients.sh, moments_.data(),
-                 prints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near, gathered()});
+                 footprints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near, gathered()});
     });
   }
   auto gathered() const {
@@ -245,8 +245,8 @@ class backward_pass {
   standing stands_at_ = nothing;
   float const* color_ = nullptr;
   buffer<float, execution_type> moments_;
-  footprints<execution_type, tile_size> own_prints_;
-  footprints<execution_type, tile_size> const* prints_ = nullptr;
+  footprints<execution_type, tile_size> own_footprints_;
+  footprints<execution_type, tile_size> const* footprints_ = nullptr;
   tile_grid<tile_size> grid_;
   tile_map<execution_type, tile_size> map_;
   tile_map_view lists_;

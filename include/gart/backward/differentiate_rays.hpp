@@ -103,7 +103,7 @@ struct ray_gradients : ray_program_base {
       by_band[k] = k < bands ? row[3 * k] * g.x + row[3 * k + 1] * g.y + row[3 * k + 2] * g.z : 0.0f;
     s.by_turn += sh_turn<most, 1>(by_band, s.basis.y);
     ray_gaussian const gaussian = records[h.id];
-    ray_peak const r = evaluate<Response>(gaussian, s.own);
+    ray_peak const r = evaluate(gaussian, s.own);
     float const by_depth = weight * s.by_depth;
     moments_of<float> const m = hit_moments_with_depth<Response>(gaussian, r, alpha_gradient, by_depth, true);
     ray_part const part = ray_part_of(gaussian, r, m, by_depth);

@@ -33,7 +33,7 @@ class backward_passes {
     if (pass_.prepare(frame, byte_budget))
       f(pass_);
     else if constexpr (is_last)
-      throw pass_.no_room();
+      throw pass_.out_of_memory_error();
     else
       rest_.with_room(frame, byte_budget, f);
   }

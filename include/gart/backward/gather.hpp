@@ -228,7 +228,7 @@ struct gather_kernel {
   template <int N, class F>
   GART_HD GART_INLINE void peaks_at(ray_peak (&out)[N], lane_data const& data, F&& pixel_of) const {
     if constexpr (std::is_same_v<lane_data, record_data>)
-      evaluate_all<response_type>(out, [&](int i) {
+      evaluate_all(out, [&](int i) {
         quad const d = pixel_of(i).direction_total;
         if constexpr (central) {
           return approach_to(data.gaussian, primary_ray{{d.v[0], d.v[1], d.v[2]}});

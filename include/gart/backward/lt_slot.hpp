@@ -7,14 +7,12 @@
 ///   float4   16 bytes  V, whose free sign bits hold the clamps; w
 ///   half      8 bytes  the same in four halves: V within 2^-11 relatively (2^-25 absolutely), at most 65504; 2^15 w,
 ///                      so that a weight keeps its 2^-11 down to 2e-9
-///   shared    8 bytes  V with 9 bits a channel and one exponent: within 0.002 of its largest channel, at most 65408;
-///                      w, whose three lowest bits hold the clamps (a relative error of 2^-20)
-///   weight    4 bytes  w as in shared; no V: enough for the gradient of colour (hybrid)
+///   weight    4 bytes  w, whose three lowest bits hold the clamps (a relative error of 2^-20); no V: enough for the
+///                      gradient of colour (hybrid)
 /// The gradient of alpha is the difference of V and the pixel's colour, over 1 - alpha: an error of V counts by how
 /// little of the ray the hit and what lies behind it are. Relative errors of a whole gradient, group by group, against
-/// double, at most (tests/traits): float4 5e-4, half 1e-2 and shared 4e-2 on clouds and long rays; on stacks of hits at
-/// the clamp 5e-4, 0.15 and 0.6. Slots that no hit wrote hold what the clear left there, all bits set, which `written`
-/// tells.
+/// double, at most (tests/traits): float4 5e-4 and half 1e-2 on clouds and long rays; on stacks of hits at the clamp 5e-4
+/// and 0.15. Slots that no hit wrote hold what the clear left there, all bits set, which `written` tells.
 
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
@@ -113,41 +111,6 @@ struct weight_entry {
   GART_HD GART_INLINE float weight() const { return w; }
   /// Whether that channel of the hit's colour was clamped at zero.
   GART_HD GART_INLINE bool clamped(int channel) const { return float_to_bits(w) >> channel & 1; }
-};
-
-/// The format shared.
-struct alignas(8) lt_shared_entry : weight_entry {
-  static constexpr char const* name = "shared";  ///< in configurations and reports
-  u32 rgb;                                       ///< 9 bits each from the lowest, and the exponent
-
-  /// As lt_entry::of.
-  GART_HD GART_INLINE static lt_shared_entry of(vec3 const& v, float weight, vec3 const& c) {
-    float largest = v.x > v.y ? v.x : v.y;
-    largest = largest > v.z ? largest : v.z;
-    largest = largest < largest_shared ? largest : largest_shared;
-    // The exponent of the largest channel once it is rounded to 9 bits; below 2^-16 all share the least.
-    u32 const rounded = (float_to_bits(largest) + 0x4000u) >> 23,
-              exponent = rounded > least_exponent ? rounded : least_exponent;
-    float const steps = bits_to_float((262u - exponent) << 23);
-    lt_shared_entry out;
-    out.w = weight_entry::of(v, weight, c).w;
-    out.rgb = in_steps(v.x, steps) | in_steps(v.y, steps) << 9 | in_steps(v.z, steps) << 18 |
-              (exponent - least_exponent) << 27;
-    return out;
-  }
-  /// V.
-  GART_HD GART_INLINE vec3 color() const {
-    float const step = bits_to_float(((rgb >> 27) + least_exponent - 8u) << 23);
-    return {step * static_cast<float>(rgb & 511u), step * static_cast<float>(rgb >> 9 & 511u),
-            step * static_cast<float>(rgb >> 18 & 511u)};
-  }
-
- private:
-  static constexpr float largest_shared = 65408.0f;
-  static constexpr u32 least_exponent = 111;
-  GART_HD GART_INLINE static u32 in_steps(float x, float steps) {
-    return static_cast<u32>(fma(x < largest_shared ? x : largest_shared, steps, 0.5f));
-  }
 };
 
 }  // namespace gart::inline GART_ISA

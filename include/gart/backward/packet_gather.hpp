@@ -142,7 +142,7 @@ struct packet_gather {
       auto& f = found[count];
       f.at = &at, f.slots = packet_slots(cell, at.x, at.y);
       if (!any(f.slots.inside)) continue;
-      f.r = evaluate<response_type>(g, primary_ray_of<lanes>{at.direction});
+      f.r = evaluate(g, primary_ray_of<lanes>{at.direction});
       f.hit = f.slots.inside;
       if constexpr (recomputed)
         f.hit &= is_hit(g, f.r, gather.near) &
@@ -187,8 +187,8 @@ struct packet_gather {
 
     float sh[sh_stride], moment_totals[16];
     for (int b = 0; b < band_groups; ++b)
-      write_in_turns(sh + 3 * lane_count * b, sh_stride - 3 * lane_count * b, sh_sum[0][0][b] + sh_sum[1][0][b],
-                     sh_sum[0][1][b] + sh_sum[1][1][b], sh_sum[0][2][b] + sh_sum[1][2][b]);
+      write_interleaved(sh + 3 * lane_count * b, sh_stride - 3 * lane_count * b, sh_sum[0][0][b] + sh_sum[1][0][b],
+                        sh_sum[0][1][b] + sh_sum[1][1][b], sh_sum[0][2][b] + sh_sum[1][2][b]);
     sums_of(moment_sum, moment_totals);
     if constexpr (C::sums == gather_sums::atomic) {
       // One lock for both rows.

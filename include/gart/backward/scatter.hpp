@@ -105,7 +105,7 @@ struct scatter_program : ray_program_base {
     }
     if constexpr (Terms::geometry) {
       ray_gaussian const g = records[h.id];
-      ray_peak const r = evaluate<Response>(g, ray_of(s));
+      ray_peak const r = evaluate(g, ray_of(s));
       moments_of<float> m;
       if constexpr (Terms::depth)
         m = hit_moments_with_depth<Response>(g, r, alpha_gradient, weight * s.depth_gradient[0], true);

@@ -60,22 +60,6 @@ struct deterministic_strategy : primitive_strategy {
   static constexpr bool ordered = true;                 ///< by a second launch
 };
 
-/// The primitive strategy with the other rule: what recomputing is tested and measured against.
-struct cleared_strategy : primitive_strategy {
-  static constexpr char const* name = "cleared";  ///< as requests have it
-  /// NaN in every slot.
-  static constexpr slot_validity validity = slot_validity::cleared;
-  static constexpr strategy_use use = strategy_use::measuring;  ///< not to train by
-};
-
-/// The primitive strategy by the plain gather (backward/gather.hpp): what packets and matrix units are tested and
-/// measured against.
-struct lane_strategy : primitive_strategy {
-  static constexpr char const* name = "lane";                 ///< as requests have it
-  static constexpr bool lane_by_lane = true;                  ///< on every policy
-  static constexpr strategy_use use = strategy_use::testing;  ///< not to train by
-};
-
 template <strategy Strategy>
 struct with_depth;
 
@@ -127,18 +111,11 @@ struct strategy_list {
 };
 
 /// In the order of preference, the best last.
-using strategies = strategy_list<lane_strategy, cleared_strategy, pixel_strategy, hybrid_strategy,
-                                 deterministic_strategy, primitive_strategy>;
+using strategies = strategy_list<pixel_strategy, hybrid_strategy, deterministic_strategy, primitive_strategy>;
 
-/// Of those for training, and up to `use`.
-inline std::vector<std::string> strategy_names(strategy_use use = strategy_use::training) {
-  std::vector<std::string> names;
-  strategies::for_each([&]<strategy S>(S) {
-    if (S::use <= use) names.emplace_back(S::name);
-  });
-  return names;
-}
+/// Their names, in that order.
+inline std::vector<std::string> strategy_names() { return {strategies::names.begin(), strategies::names.end()}; }
 
-static_assert(strategy<primitive_strategy_in<lt_half_entry>> && strategy<primitive_strategy_in<lt_shared_entry>>);
+static_assert(strategy<primitive_strategy_in<lt_half_entry>>);
 
 }  // namespace gart::inline GART_ISA

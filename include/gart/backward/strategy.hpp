@@ -17,15 +17,11 @@ namespace gart::inline GART_ISA {
 /// host (docs/backward.md).
 enum class slot_validity { cleared, recomputed };
 
-/// What a strategy is there for: to train by, to measure what another way would cost, or to be held against in tests.
-enum class strategy_use { training, measuring, testing };
-
 /// What a strategy has unless it says otherwise.
 struct strategy_base {
   static constexpr bool ordered = false;       ///< sums in a fixed order: the same bits in every run
   static constexpr bool lane_by_lane = false;  ///< by the plain gather, whatever the policy (backward/gather_form.hpp)
   static constexpr slot_validity validity = slot_validity::cleared;  ///< how slots that are hits are told
-  static constexpr strategy_use use = strategy_use::training;        ///< what it is there for
   using fallback = void;  ///< the strategy that a step is done by where the LT buffer has no room
 };
 
@@ -40,7 +36,6 @@ concept strategy = requires {
   { S::ordered } -> std::convertible_to<bool>;
   { S::lane_by_lane } -> std::convertible_to<bool>;
   { S::validity } -> std::convertible_to<slot_validity>;
-  { S::use } -> std::convertible_to<strategy_use>;
   typename S::fallback;
   // Each term once, and a record where there is something to gather.
   requires hit_record<typename S::template record<8>>;

@@ -9,8 +9,8 @@
 ///     The ray through the image point (u, v), in pixels; its unit direction is in world axes and decides hits, so its
 ///     arithmetic is fixed (math/arith.hpp), the same bits for a lane as for one point. A model without arithmetic for
 ///     lanes calls each_lane. A direction of zeros is a ray that there is none of: it hits nothing. A camera whose rays
-///     do not share one point returns `ray` for a float, whose origin is relative to `position`: tracers trace such
-///     rays; what composites and differentiates takes cameras with one centre.
+///     do not share one point returns `ray` for a float, whose origin is relative to `position`: tracers, compositing
+///     and gradients take such rays too (origin_rays).
 ///   bounds(float near) const
 ///     Host side: a trivially copyable footprint operator()(ellipsoid const&) const for kernels, the box of all pixels
 ///     whose rays can hit the ellipsoid at t > near, and a lower bound of the depths of these hits. Conservative for

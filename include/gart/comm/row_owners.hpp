@@ -11,7 +11,7 @@
 
 namespace gart {
 
-/// The arithmetic of one rank; as it stands, of a rank that has all.
+/// Which rows one rank owns. By default it is the only rank and owns all.
 struct row_owners {
   static constexpr index_t usual_block = 4096;  ///< rows
   int ranks = 1, rank = 0;                      ///< in all, and which one this is

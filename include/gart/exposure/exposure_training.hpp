@@ -7,10 +7,10 @@
 /// The scene's own colours are those of an exposure that is the identity; nothing holds the views' mean to it but that
 /// they start there.
 ///
-/// Buffers and cost: those of learned_rows.hpp, a copy of the image and another pass over it.
+/// Buffers and cost: those of adam_table.hpp, a copy of the image and another pass over it.
 
+#include <gart/exposure/adam_table.hpp>
 #include <gart/exposure/exposure.hpp>
-#include <gart/exposure/learned_rows.hpp>
 
 namespace gart::inline GART_ISA {
 
@@ -56,7 +56,7 @@ struct exposure_gradient_kernel {
 
 /// The exposures of a run, and Adam's moments of them.
 template <execution E>
-class exposure_training : public learned_rows<E, exposure::floats, exposure_state> {
+class exposure_training : public adam_table<E, exposure::floats, exposure_state> {
  public:
   /// As many identities as there are views.
   exposure_training(E& exec, std::size_t views) : base(exec, identities(views)), exec_(&exec), exposed_(exec) {}
@@ -83,7 +83,7 @@ class exposure_training : public learned_rows<E, exposure::floats, exposure_stat
   }
 
  private:
-  using base = learned_rows<E, exposure::floats, exposure_state>;
+  using base = adam_table<E, exposure::floats, exposure_state>;
   static std::vector<float> identities(std::size_t views) {
     exposure const identity;
     std::vector<float> all;

@@ -4,7 +4,7 @@
 /// multiplied by
 ///   V(u) = 1 + k0 u + k1 u^2 + k2 u^3,   u = (the distance from the principal point over half of the diagonal)^2,
 /// the same for all photographs of a lens. A scene has no such falloff: Gaussians see the same surface in the middle of
-/// one photograph and in the corner of another, and can only learn the difference as veils.
+/// one photograph and in the corner of another, and can only learn the difference as haze.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>

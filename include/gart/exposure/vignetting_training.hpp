@@ -5,10 +5,10 @@
 /// channel
 ///   dL/dx = V dL/dx',   dL/dk_j = sum over pixels of u^(j + 1) x dL/dx'.
 ///
-/// Buffers and cost: those of learned_rows.hpp, a copy of the image and another pass over it.
+/// Buffers and cost: those of adam_table.hpp, a copy of the image and another pass over it.
 
 #include <gart/core/error.hpp>
-#include <gart/exposure/learned_rows.hpp>
+#include <gart/exposure/adam_table.hpp>
 #include <gart/exposure/vignetting.hpp>
 
 #include <algorithm>
@@ -63,7 +63,7 @@ struct vignetting_gradient_kernel {
 
 /// The falloffs of a run, and Adam's moments of them.
 template <execution E>
-class vignetting_training : public learned_rows<E, vignetting::floats, vignetting_state> {
+class vignetting_training : public adam_table<E, vignetting::floats, vignetting_state> {
  public:
   /// Of these views' lenses, no falloff at first. Errors: invalid_argument, naming the view, for a camera that has no
   /// principal point.
@@ -106,7 +106,7 @@ class vignetting_training : public learned_rows<E, vignetting::floats, vignettin
   std::vector<camera> const& lenses() const { return lenses_; }
 
  private:
-  using base = learned_rows<E, vignetting::floats, vignetting_state>;
+  using base = adam_table<E, vignetting::floats, vignetting_state>;
 
   vignetting_training(E& exec, std::vector<camera> lenses, std::vector<named_camera> const& views)
       : base(exec, std::vector<float>(vignetting::floats * lenses.size())),

@@ -1,16 +1,16 @@
 #pragma once
 /// \file
-/// How the lenses of a capture are learned (lens/lens_training.hpp). docs/lenses.md has what was measured.
+/// How the lenses of a capture are learned (lens/lens_training.hpp). docs/calibration.md has what was measured.
 
 namespace gart {
 
 /// Rates are per step of a view through the lens: about how far Adam moves the image, over the focal length.
 struct lens_options {
-  float warm_up = 0.02f;              ///< share of the run in which lenses stay as they are, at most 500 steps
-  float until = 0.9f;                 ///< share of the run at which the rates have come to their last
-  float rate = 2e-3f;                 ///< at first
-  float rate_final = 1e-5f;           ///< where it ends; exponential between
-  float beta1 = 0.9f, beta2 = 0.99f;  ///< Adam's
+  float warm_up = 0.02f;     ///< share of the run in which lenses stay as they are, at most 500 steps
+  float until = 0.9f;        ///< share of the run at which the rates have come to their last
+  float rate = 2e-3f;        ///< at first
+  float rate_final = 1e-5f;  ///< where it ends; exponential between
+  static constexpr float beta1 = 0.9f, beta2 = 0.99f;  ///< Adam's
 };
 
 }  // namespace gart

@@ -20,8 +20,8 @@
 ///
 /// A ray o + t d passes the point at t, so that what moves the Gaussian by dx moves the ray by -dx: of a hit
 ///   dL/do = -M^T m1,   dL/dd = -M^T (t m1 + e p),
-/// the last term by how t itself changes, dt = -(p + t d_g).M dd / |d_g|^2. Both but for what colours see of d, and
-/// what changes its length.
+/// the last term by how t itself changes, dt = -(p + t d_g).M dd / |d_g|^2. Neither
+/// includes how colour changes with d, nor what changes the length of d.
 
 #include <gart/math/quaternion.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -42,10 +42,22 @@ struct moments_of {
   F v[moment_stride];  ///< as above
 };
 
+/// 1 / a where it decides no hit: on a device by its estimate, within 2^-23.
+template <class F>
+GART_HD GART_INLINE F estimated_reciprocal(F a) {
+#if defined(__CUDA_ARCH__)
+  float r;
+  asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(r) : "f"(a));
+  return r;
+#else
+  return reciprocal(a);
+#endif
+}
+
 /// dL/dalpha of a hit: V.g and C.g.
 template <class F>
 GART_HD GART_INLINE F alpha_gradient(F opaque_g, F color_g, F alpha) {
-  return (opaque_g - color_g) * fast_reciprocal(F(1.0f) - alpha);
+  return (opaque_g - color_g) * estimated_reciprocal(F(1.0f) - alpha);
 }
 
 /// The front-to-back walk of a ray's gradient.

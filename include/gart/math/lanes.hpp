@@ -202,7 +202,7 @@ GART_INLINE void sums_of(lanes const (&a)[N], float (&out)[16]) {
 }
 
 /// a[0] b[0] c[0] a[1] and so on: the first n of them, at most three times the lanes.
-GART_INLINE void write_in_turns(float* out, int n, lanes a, lanes b, lanes c) {
+GART_INLINE void write_interleaved(float* out, int n, lanes a, lanes b, lanes c) {
 #if defined(GART_LANES_AVX512)
   struct table {
     alignas(64) int ab[3][16] = {}, abc[3][16] = {};

@@ -193,20 +193,20 @@ GART_HD GART_INLINE ray_peak_of<F> ray_peak_of_approach(approach_of<F> const& a,
 }
 
 /// Where along the ray the response is largest.
-template <class Response = generalized_gaussian<>, class Ray>
+template <class Ray>
 GART_HD GART_INLINE auto evaluate(ray_gaussian const& g, Ray const& r) {
   auto const a = approach_to(g, r);
-  return ray_peak_of_approach(a, Response::reciprocal(a.dd));
+  return ray_peak_of_approach(a, reciprocal(a.dd));
 }
 
 /// N at once, interleaved to hide the latency of each one's chain of steps. `of(i)` is the i-th approach.
-template <class Response, int N, class F>
+template <int N, class F>
 GART_HD GART_INLINE void evaluate_all(ray_peak (&out)[N], F&& of) {
   approach a[N];
   float inverse[N];
   GART_UNROLL
   for (int i = 0; i < N; ++i) a[i] = of(i), inverse[i] = a[i].dd;
-  Response::reciprocals(inverse);
+  reciprocals(inverse);
   GART_UNROLL
   for (int i = 0; i < N; ++i) out[i] = ray_peak_of_approach(a[i], inverse[i]);
 }

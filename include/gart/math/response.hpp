@@ -11,19 +11,15 @@
 ///   cutoff(ratio)  the largest |p|^2 with sigma rho >= alpha_min, ratio = sigma / alpha_min >= 1
 ///   slope(d2)      -2 d ln rho / d |p|^2 = n (4.5 / 3^n) |p|^(n-2), what a hit's moments are weighted with
 ///                  (math/hit_gradient.hpp); 1 for n = 2
-///   reciprocal(a)  1 / a, for the point of largest response; reciprocals(array) of all its elements
-/// All but cutoff and reciprocals take a float or lanes of them. They decide hits: powers by multiplication and square
-/// roots, and by Arithmetic
-///   exact  fixed arithmetic (math/arith.hpp), the same bits on every policy; cutoff is within 4e-7 of exact,
-///   relatively fast   shorter exponential and reciprocal (math/fast_arith.hpp) where hits are evaluated, for what they
-///          cost: alpha is within 1e-4 of exact, relatively; forward and backward still agree bit for bit, policies no
-///                 more
+/// All but cutoff take a float or lanes of them. They decide hits: fixed arithmetic (math/arith.hpp), powers by
+/// multiplication and square roots, the same bits on every policy. cutoff is within 4e-7 of exact, relatively.
 ///
 /// The cusp of n = 1: towards the centre the gradient's norm goes to a limit, its direction does not. At |p| = 0, where
 /// no direction is given, slope is 0 and with it the gradient of mean, scale and rotation: the mean over all
 /// directions.
 
-#include <gart/math/fast_arith.hpp>
+#include <gart/math/arith.hpp>
+#include <gart/math/lanes.hpp>
 
 #include <concepts>
 
@@ -31,35 +27,24 @@ namespace gart::inline GART_ISA {
 
 /// What takes the place of generalized_gaussian wherever a Response is asked for.
 template <class R>
-concept response_function = requires(float x, float (&several)[2]) {
+concept response_function = requires(float x) {
   { R::degree } -> std::convertible_to<int>;  // of the Gaussians it is, for files and for densification
-  { R::fast } -> std::convertible_to<bool>;   // its arithmetic
   { R::response(x) } -> std::same_as<float>;
   { R::cutoff(x) } -> std::same_as<float>;
   { R::slope(x) } -> std::same_as<float>;
-  { R::reciprocal(x) } -> std::same_as<float>;
-  R::reciprocals(several);  // each its reciprocal
 };
 
-/// How hits are evaluated; above.
-enum class arithmetic { exact, fast };
-
 /// A response: exp(s |p|^n), n the degree.
-template <int Degree = 2, arithmetic Arithmetic = arithmetic::exact>
+template <int Degree = 2>
 struct generalized_gaussian {
   static_assert(Degree == 1 || Degree == 2 || Degree == 3 || Degree == 4 || Degree == 5 || Degree == 8,
                 "generalised Gaussians have degree 1, 2, 3, 4, 5 or 8");
-  static constexpr int degree = Degree;                         ///< n
-  static constexpr bool fast = Arithmetic == arithmetic::fast;  ///< whether its arithmetic is
+  static constexpr int degree = Degree;  ///< n
 
   /// rho at the squared distance d2.
   template <class F>
   GART_HD GART_INLINE static F response(F d2) {
-    F const exponent = mul(F(-scale), power(d2));
-    if constexpr (fast)
-      return fast_exponential(exponent);
-    else
-      return exponential(exponent);
+    return exponential(mul(F(-scale), power(d2)));
   }
 
   /// The largest |p|^2 of a hit; ratio: sigma / alpha_min.
@@ -100,23 +85,6 @@ struct generalized_gaussian {
       return factor * d2 * d2 * d2;
   }
 
-  /// 1 / a.
-  template <class F>
-  GART_HD GART_INLINE static F reciprocal(F a) {
-    if constexpr (fast)
-      return fast_reciprocal(a);
-    else
-      return gart::reciprocal(a);
-  }
-  /// Of each element, in its place.
-  template <int N>
-  GART_HD GART_INLINE static void reciprocals(float (&a)[N]) {
-    if constexpr (fast)
-      for (float& x : a) x = fast_reciprocal(x);
-    else
-      gart::reciprocals(a);
-  }
-
  private:
   static constexpr double exact_scale = [] {
     double s = 4.5;
@@ -143,7 +111,6 @@ struct generalized_gaussian {
       return mul(mul(d2, d2), mul(d2, d2));
   }
 };
-static_assert(response_function<generalized_gaussian<>> &&
-              response_function<generalized_gaussian<4, arithmetic::fast>>);
+static_assert(response_function<generalized_gaussian<>>);
 
 }  // namespace gart::inline GART_ISA

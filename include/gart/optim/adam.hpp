@@ -6,7 +6,7 @@
 /// An element whose gradient (or update) is not finite keeps its value and moments, and is counted. Bound by memory:
 /// 28 bytes moved an element.
 ///
-/// With options.seen_only a Gaussian whose mean has no gradient, one that no ray of the step met, keeps its parameters
+/// With options.sparse a Gaussian whose mean has no gradient, one that no ray of the step met, keeps its parameters
 /// and moments: 12 bytes of it are read for each of five groups, and none written. Its moments wait until it is seen
 /// again instead of fading, and so do penalties on it.
 
@@ -108,9 +108,9 @@ struct adam_arguments {
 };
 
 // Each group from first_group on has group_tiles tiles, each of `rows_per_tile` Gaussians.
-template <execution E, bool SeenOnly>
+template <execution E, bool Sparse>
 struct adam_kernel : adam_arguments {
-  static constexpr bool seen_only = SeenOnly;
+  static constexpr bool sparse = Sparse;
   struct scratch {};
 
   GART_KERNEL void operator()(auto const& team) const {
@@ -130,7 +130,7 @@ struct adam_kernel : adam_arguments {
     });
     team.for_each(elements - 4 * quads, [&](index_t k) {
       index_t const e = 4 * quads + k;
-      if (!SeenOnly || seen(row + e / group.stride)) update(group, base + e, e % group.stride);
+      if (!Sparse || seen(row + e / group.stride)) update(group, base + e, e % group.stride);
     });
   }
 
@@ -170,7 +170,7 @@ struct adam_kernel : adam_arguments {
     index_t next = e % group.stride;
     for (index_t k = 0; k < 4; ++k) {
       columns[k] = next, next = next + 1 < group.stride ? next + 1 : 0;
-      wanted[k] = columns[k] < group.active && (!SeenOnly || seen(row + (e + k) / group.stride));
+      wanted[k] = columns[k] < group.active && (!Sparse || seen(row + (e + k) / group.stride));
     }
     if (!(wanted[0] | wanted[1] | wanted[2] | wanted[3])) return;
     std::size_t const i = base + e;
@@ -191,7 +191,7 @@ struct adam_kernel : adam_arguments {
 #if !defined(__CUDACC__)
   // Rows that were seen and follow each other together.
   void update_rows(adam_group const& group, index_t row, index_t rows_here) const {
-    if constexpr (!SeenOnly) return update_elements(group, row, rows_here);
+    if constexpr (!Sparse) return update_elements(group, row, rows_here);
     for (index_t from = 0, to; from < rows_here; from = to + 1) {
       for (to = from; to < rows_here && seen(row + to);) ++to;
       if (to > from) update_elements(group, row + from, to - from);
@@ -248,7 +248,7 @@ struct adam_colors {
     std::size_t const base = std::size_t{row} * group.stride;
     if constexpr (std::is_same_v<decltype(gradient), quad const&>)
       kernel.update_quad(group, base, row, first, [&] { return gradient; });
-    else if (!Kernel::seen_only || kernel.seen(row))
+    else if (!Kernel::sparse || kernel.seen(row))
       kernel.update(group, base + first, first, gradient.v[0]);
   }
 };
@@ -262,7 +262,7 @@ class adam_pass {
   /// As adam_step.
   adam_pass(gaussians<E>& model, gaussians<E> const& gradient, optimizer_state<E>& state, learning_rates const& rates,
             int step, int active_sh_degree, span<u64> skipped = {}, adam_options const& options = {}, int batch = 1)
-      : seen_only_(options.seen_only) {
+      : sparse_(options.sparse) {
     double const correction = adam_rule::first_correction(options, step);
     auto const rate = [&](float r) { return static_cast<float>(r * correction); };
     auto const p = model.view();
@@ -301,7 +301,7 @@ class adam_pass {
  private:
   template <class F>
   void with_kernel(F&& f) const {
-    if (seen_only_)
+    if (sparse_)
       f(detail::adam_kernel<E, true>{with_});
     else
       f(detail::adam_kernel<E, false>{with_});
@@ -315,7 +315,7 @@ class adam_pass {
   }
 
   detail::adam_arguments with_;
-  bool seen_only_;
+  bool sparse_;
 };
 
 /// Step `step` (from 1), or with a batch the step after which there have been `step` images. Coefficients above

@@ -216,7 +216,9 @@ class adaptive_density {
   }
 
   /// Whether the step densifies.
-  bool due(int step) const { return step > options_.from && running(step) && passes(step, options_.every, batch_); }
+  bool due(int step) const {
+    return step > options_.from && running(step) && is_multiple(step, options_.every, batch_);
+  }
 
   /// After the optimizer's step: densification and the reset of opacities, where they are due.
   template <class Rows = all_rows>
@@ -224,7 +226,7 @@ class adaptive_density {
                             span<float const> filter = {}) {
     density_change change;
     if (due(step)) change = densify(model, state, step, rows, filter);
-    if (running(step) && passes(step, options_.opacity_reset_every, batch_)) reset_opacity(model, state);
+    if (running(step) && is_multiple(step, options_.opacity_reset_every, batch_)) reset_opacity(model, state);
     return change;
   }
 

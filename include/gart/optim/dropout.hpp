@@ -1,12 +1,10 @@
 #pragma once
 /// \file
 /// Dropout of Gaussians (Srivastava et al. 2014; of Gaussians: Park, Ryu and Kim, DropGaussian, CVPR 2025). A step
-/// shows its views without a share r of the Gaussians, drawn anew each time, and those that stay are as much more
-/// opaque,
-///   o' = o / (1 - r),
-/// that opacities are in the mean what they were. A Gaussian that has one photograph by heart is then of little use:
-/// what is seen has to be shared with others, that more photographs see. The last steps, from a share `until` of the
-/// run on, show the whole scene, which is what will be rendered.
+/// leaves out a random share r of the Gaussians. The others become more opaque, so that the mean opacity stays:
+///   o' = o / (1 - r).
+/// A Gaussian that explains one photograph alone is then of little use, so this reduces overfitting. From a share
+/// `until` of the run on, steps show the whole scene, which is what will be rendered.
 ///
 /// An o' over 0.995 is that, or o where that is more. The gradient by the logit of o' is taken for that by the logit of
 /// o, and what is left out has none. Draws go by the numbers that Gaussians have in the scene, so that ranks draw as

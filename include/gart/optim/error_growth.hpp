@@ -2,11 +2,11 @@
 /// \file
 /// Densification by error: where the image is wrong, the Gaussians that are seen there split.
 ///
-/// The statistic. A hit of weight w shows its Gaussian with that share of the pixel; the backward pass sums w times the
-/// pixel's error over a Gaussian's hits (backward::moments), for any camera, since no projection is in it. The sums of
-/// all steps since the last densification are its share of the total error. Not the mean over the views that saw it:
-/// that prefers what few views see, veils before single cameras. The opacity counts a second time against veils: much
-/// error is seen through them that is not theirs, and halves of them learn single views by heart.
+/// The statistic. The backward pass sums, over a Gaussian's hits, the weight w of the hit times the error of its pixel.
+/// It works for any camera, since it needs no projection. The sums of all steps since the last densification are the
+/// Gaussian's share of the total error. A mean over the views that saw it would favour haze that few views see. The
+/// share is multiplied by the opacity: much error is seen through haze that other Gaussians cause, and splitting haze
+/// overfits single views.
 ///
 /// A densification draws Gaussians without replacement, in proportion to their share times their opacity (Efraimidis
 /// and Spirakis 2006: the least of -ln(u) / weight, u uniform), and splits each along its long axis
@@ -196,7 +196,7 @@ class error_growth {
 
   /// Whether the step densifies.
   bool due(int step) const {
-    return step > options_.from && passes(step, options_.every, batch_) &&
+    return step > options_.from && is_multiple(step, options_.every, batch_) &&
            static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
   }
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Whether a training is still made of numbers: one launch over all parameters and one over Adam's moments count what
-/// is not finite, and one read brings the counts to the host.
+/// Checks that all parameters and Adam's moments are finite. One launch over each counts what is not; one read brings
+/// the counts to the host.
 ///
 /// Adam leaves updates out that are not finite, so that a gradient never gets as far as a parameter; what is found here
 /// was there at the start, came out of a checkpoint or of densification, or is a bug. How many updates Adam left out is

@@ -6,7 +6,7 @@
 /// cross-section at three standard deviations is sqrt(1 - q^2) of the middle one; they are 1 - q times as long, q 3 s +
 /// (1 - q) 3 s = 3 s, and sqrt(1 - q^2) times as thick. Between middle and end they reach up to 6% further out where q
 /// = 0.4. Opacity falls to split_shape::opacity of what it was: where a half is needed it rises again, and where not
-/// it fades, which keeps a growing model from learning its training views by heart.
+/// it fades, which keeps a growing model from overfitting its training views.
 
 #include <gart/math/quaternion.hpp>
 #include <gart/optim/options.hpp>

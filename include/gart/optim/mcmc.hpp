@@ -217,7 +217,7 @@ class mcmc {
 
   /// Whether the step densifies.
   bool due(int step) const {
-    return step > options_.from && passes(step, options_.every, batch_) &&
+    return step > options_.from && is_multiple(step, options_.every, batch_) &&
            static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
   }
 

@@ -18,20 +18,22 @@ struct learning_rates {
   float sh_rest = 1.25e-4f;    ///< of the bands above the first: a twentieth, as in 3DGS
   /// All rates but those of the means, exposures and lenses stay as they are for a share of the run, then decay
   /// exponentially to `settled` of it.
-  float settled = 0.1f, settle_from = 0.5f;  ///< the share
+  float settled = 0.1f;                       ///< share of a rate that is left at the end
+  static constexpr float settle_from = 0.5f;  ///< share of the run before the decay
   /// The rates are those of a run of at least so many steps. A shorter one has less time to go as far: its rates of
   /// mean, scale and opacity are sqrt(long_run / steps) times as large, at most four times, and it settles the later
   /// the shorter it is, up to settle_late of the run.
   int long_run = 15000;
   float settle_late = 0.9f;                            ///< the share
-  float exposure = 0.05f, exposure_final = 0.005f;     ///< a visit of the view; decays like the means'
+  float exposure = 0.05f;                              ///< a visit of the view; decays like the means'
+  static constexpr float exposure_final = 0.005f;      ///< where it ends
   float vignetting = 1e-2f, vignetting_final = 1e-4f;  ///< a visit of the lens; likewise
 };
 
 /// Adam's constants.
 struct adam_options {
-  float beta1 = 0.9f, beta2 = 0.999f, epsilon = 1e-15f;  ///< as in adam.hpp
-  bool seen_only = false;  ///< Gaussians that the step's view did not show stay as they are (adam.hpp)
+  static constexpr float beta1 = 0.9f, beta2 = 0.999f, epsilon = 1e-15f;  ///< as in adam.hpp
+  bool sparse = false;  ///< Gaussians that the step's view did not show stay as they are (adam.hpp)
 };
 
 /// The opacity below which a Gaussian is of no use: `usual`, for the usual alpha_min of 1/255, and in proportion above.
@@ -62,7 +64,7 @@ struct error_growth_options {
   float fill = 0.5f;               ///< share of the run at which the count has reached its budget
   float until = 5.0f / 6;          ///< share of the run after which the dead stay where they are
   float dead_opacity = 0.005f;     ///< as least_opacity has it for the alpha_min traced with
-  float opacity_penalty = 0.003f;  ///< times the mean opacity (and train/shown_share.hpp)
+  float opacity_penalty = 0.003f;  ///< times the mean opacity (and train/foreground_fraction.hpp)
   split_shape split;               ///< how one becomes two
   /// The count ends at one Gaussian for so many pixels of the training views: more would learn them by heart. 0: at
   /// max_gaussians, whatever the capture.
@@ -77,7 +79,7 @@ struct adc_options {
   float gradient = 2e-4f;        ///< mean length of the mean's gradient in the image that makes a Gaussian grow
   float dense = 0.01f;           ///< times the extent: larger ones split, smaller ones are cloned
   float prune_opacity = 0.005f;  ///< as least_opacity has it for the alpha_min traced with
-  float prune_scale = 0.1f;      ///< times the extent, after the first opacity reset
+  static constexpr float prune_scale = 0.1f;  ///< times the extent, after the first opacity reset
 };
 
 }  // namespace gart

@@ -40,7 +40,7 @@ GART_HD GART_INLINE T& row_element(gaussians_view<T> const& g, index_t row, inde
 }
 
 /// The largest opacity that a Gaussian may be seen with. `filter`: of each Gaussian, the narrowest filter that a
-/// training view has where it is (train/least_filter.hpp); null where there is none.
+/// training view has where it is (train/min_pixel_filter.hpp); null where there is none.
 GART_HD inline float opacity_shown(gaussians_view<float const> const& g, index_t row, float const* filter) {
   float const own = sigmoid(g.opacity[row]);
   if (!filter) return own;

@@ -21,8 +21,8 @@ inline float exponential_decay(float from, float to, int step, int steps) {
 /// The rates of one step; `extent` is the scene's.
 inline learning_rates rates_at(learning_rates rates, float extent, int step, int steps) {
   double const length = static_cast<double>(std::max(steps, 1)) / std::max(rates.long_run, 1);
-  float const haste = static_cast<float>(std::clamp(1 / std::sqrt(length), 1.0, 4.0));
-  for (float* rate : {&rates.mean, &rates.mean_final, &rates.log_scale, &rates.opacity}) *rate *= haste;
+  float const scale = static_cast<float>(std::clamp(1 / std::sqrt(length), 1.0, 4.0));
+  for (float* rate : {&rates.mean, &rates.mean_final, &rates.log_scale, &rates.opacity}) *rate *= scale;
   rates.mean = exponential_decay(rates.mean, rates.mean_final, step, steps) * extent;
   rates.exposure = exponential_decay(rates.exposure, rates.exposure_final, step, steps);
   rates.vignetting = exponential_decay(rates.vignetting, rates.vignetting_final, step, steps);
@@ -35,7 +35,7 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
 }
 
 /// Whether a step that ends at `step` images, and has `batch` of them, is one that comes every so many.
-inline bool passes(int step, int every, int batch) { return every > 0 && step / every != (step - batch) / every; }
+inline bool is_multiple(int step, int every, int batch) { return every > 0 && step / every != (step - batch) / every; }
 
 /// One degree more every `every` steps, sooner where the run is too short for that: the full degree is reached within
 /// the first tenth of any run.

@@ -23,13 +23,13 @@ class metric_root {
  public:
   static constexpr std::size_t size = 6;  ///< numbers of a pose
 
-  /// held: the share of the mean diagonal that is added. metric: [6][6]; of zeros every number stands for itself.
-  metric_root(double const* metric, double held) {
+  /// damping: the share of the mean diagonal that is added. metric: [6][6]; of zeros every number stands for itself.
+  metric_root(double const* metric, double damping) {
     double trace = 0;
     for (std::size_t i = 0; i < size; ++i) trace += metric[size * i + i];
     for (std::size_t i = 0; i < size; ++i)
       for (std::size_t j = 0; j <= i; ++j) {
-        double sum = metric[size * i + j] + (i != j ? 0.0 : trace > 0 ? held * trace / size : 1.0);
+        double sum = metric[size * i + j] + (i != j ? 0.0 : trace > 0 ? damping * trace / size : 1.0);
         for (std::size_t k = 0; k < j; ++k) sum -= root_[size * i + k] * root_[size * j + k];
         root_[size * i + j] = i == j ? std::sqrt(sum) : sum / root_[size * j + j];
       }

@@ -62,7 +62,7 @@ class pose_training {
     auto const between = [&](float first, float last) {
       return double{exponential_decay(first, last, step - from, until - from)};
     };
-    metric_root const metric(state_.metric.data() + 36 * i, between(options_.held, options_.held_final));
+    metric_root const metric(state_.metric.data() + 36 * i, between(options_.damping, options_.damping_final));
     for (std::size_t k = 0; k < 6; ++k) slope[k] += double{options_.prior} * at[k];
     slope = metric.gradient(slope);
     for (double const x : slope)

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
 /// A scene as the pixels of one view see it: every Gaussian widened by the filter of its pixels
-/// (a camera model's filter, camera/model.hpp), once, before anything is made of it, so that every tracer, footprint
-/// and box has the same bits of it. Without a filter it is the scene itself, and nothing is launched. A frame has one
+/// (a camera model's filter, camera/model.hpp), once, first of all. So every tracer, footprint and box sees the
+/// same bits. Without a filter this is the scene itself, and nothing is launched. A frame has one
 /// (render/frame.hpp); the way back is the backward pass's (backward/finish.hpp).
 ///
 ///   antialiased<E> seen(exec);

@@ -16,7 +16,7 @@
 
 namespace gart::inline GART_ISA {
 
-/// Where a ray's list ends; before every hit where it has none. Places stand for ids: those of the hits of a pixel have
+/// The last hit of a ray; t = -1 where the ray has none. A place stands for an id: the places of a pixel's hits have
 /// the order of their Gaussians.
 struct last_hit {
   float t = -1;   ///< distance along the ray

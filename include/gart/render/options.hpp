@@ -46,7 +46,7 @@ struct render_options {
 };
 
 /// The filter of models that are antialiased: a square pixel has a standard deviation of 0.29.
-inline constexpr float usual_antialias = 0.3f;
+inline constexpr float default_antialias = 0.3f;
 
 /// Below this exp has no digits left, and a hit's alpha would be 0.
 inline constexpr float least_alpha_min = 1e-30f;

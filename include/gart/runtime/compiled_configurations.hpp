@@ -2,7 +2,7 @@
 /// \file
 /// Turns templates into configurations: sessions and renderers of a policy, traits, a tracer and a strategy. Include
 /// where the kernels of the policy can be compiled, and call from GART_REGISTER_CONFIGURATIONS register_configurations,
-/// for every SH degree, or register_configuration_of for one configuration:
+/// for all SH degrees, or register_configuration_of for one configuration, which takes models up to its degree:
 ///   using response = gart::generalized_gaussian<4>;
 ///   GART_REGISTER_CONFIGURATIONS(my_configurations,
 ///                                gart::register_configuration_of<gart::openmp_exec, gart::scene_traits<3, response>,
@@ -19,10 +19,13 @@ namespace gart::inline GART_ISA {
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
 class compiled_session final : public session {
  public:
-  /// As make_session has it; `start` is of the configuration's degree.
+  /// As make_session has it; `start` is of the request's degree.
   compiled_session(configuration_request const& request, train_options const& options, dataset const& data,
                    start_model const& start)
-      : exec_(policy_of<E, Comm>(request)), trainer_(exec_, options, data, start, comm_of<Comm>(request)) {}
+      : exec_(policy_of<E, Comm>(request)), trainer_(exec_, options, data, start, comm_of<Comm>(request)) {
+    if (start.rows.sh_degree != request.sh_degree)
+      throw invalid_argument("session: the model to start from has another SH degree than the request");
+  }
   step_report step() override { return trainer_.step(); }
   int steps_done() const override { return trainer_.steps_done(); }
   void set_iterations(int iterations) override { trainer_.set_iterations(iterations); }
@@ -63,7 +66,9 @@ class compiled_session final : public session {
     else
       return trainer_.sent_bytes();
   }
-  configuration_info configuration() const override { return configuration_of<E, Traits, Tracer, Strategy, Comm>(); }
+  configuration_info configuration() const override {
+    return configuration_of<E, Traits, Tracer, Strategy, Comm>(trainer_.degree());
+  }
 
  private:
   E exec_;
@@ -84,35 +89,26 @@ void register_configuration_of(int rank, bool (*available)(std::string*) = alway
                           }});
 }
 
-/// One for each SH degree, 0 to 3.
+/// For SH degree 0, and for 1 to 3 in rows of degree 3.
 template <execution E, class Tracer, strategy Strategy, class Comm = self_comm>
 void register_configurations(int rank, bool (*available)(std::string*) = always_available) {
   register_configuration_of<E, scene_traits<0>, Tracer, Strategy, Comm>(rank, available);
-  register_configuration_of<E, scene_traits<1>, Tracer, Strategy, Comm>(rank, available);
-  register_configuration_of<E, scene_traits<2>, Tracer, Strategy, Comm>(rank, available);
   register_configuration_of<E, scene_traits<3>, Tracer, Strategy, Comm>(rank, available);
 }
 
-/// Those with gradients of depth: the primitive strategy for each SH degree.
+/// Those with gradients of depth: the primitive strategy for all SH degrees.
 template <execution E, class Tracer>
 void register_depth(int rank, bool (*available)(std::string*) = always_available) {
   register_configurations<E, Tracer, with_depth<primitive_strategy>>(rank, available);
 }
 
-/// Which strategies gart's libraries compile for a policy and a tracer: those to train by, but on hosts none with
-/// ordered sums (a variant has it); on a device's tile lists also those to measure.
-template <execution E, class Tracer, strategy Strategy>
-inline constexpr bool is_compiled =
-    Strategy::use == strategy_use::training
-        ? E::device || !Strategy::ordered
-        : Strategy::use == strategy_use::measuring && E::device && Tracer::lends_footprints;
-
-/// All of these, ranked from first_rank in the list's order of preference.
+/// All strategies, but on hosts none with ordered sums (a variant has it), ranked from first_rank in the list's order
+/// of preference.
 template <execution E, class Tracer>
 void register_strategies(int first_rank, bool (*available)(std::string*) = always_available) {
   int rank = first_rank;
   strategies::for_each([&]<strategy Strategy>(Strategy) {
-    if constexpr (is_compiled<E, Tracer, Strategy>) register_configurations<E, Tracer, Strategy>(rank++, available);
+    if constexpr (E::device || !Strategy::ordered) register_configurations<E, Tracer, Strategy>(rank++, available);
   });
 }
 

@@ -12,21 +12,19 @@
 
 namespace gart::inline GART_ISA {
 
-/// What the templates are called at run time.
+/// What the templates are called at run time, for a model of a degree up to theirs.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
-configuration_info configuration_of() {
+configuration_info configuration_of(int sh_degree = Traits::sh_degree) {
   using response = typename Traits::response;
   configuration_info configuration;
   configuration.backend = from_string(E::name, backend_kind::automatic);
   configuration.tracer = from_string(Tracer::name, tracer_kind::own);
   configuration.backward = Strategy::name;
-  configuration.sh_degree = Traits::sh_degree, configuration.kernel_degree = response::degree;
-  configuration.arithmetic = response::fast ? arithmetic_kind::fast : arithmetic_kind::exact;
+  configuration.sh_degree = sh_degree, configuration.stored_degree = Traits::sh_degree;
+  configuration.kernel_degree = response::degree;
   configuration.lt_format =
       from_string(Strategy::template record<Tracer::tile_size>::entry::name, lt_format_kind::none);
   configuration.depth = has_depth<Strategy>;
-  configuration.tile_size = Tracer::tile_size;
-  configuration.window = Tracer::window;
   configuration.ranks = !Comm::alone;
   if constexpr (!E::device) configuration.instruction_set = instruction_set;
   return configuration;

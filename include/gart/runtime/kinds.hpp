@@ -1,8 +1,7 @@
 #pragma once
 /// \file
-/// What a configuration is chosen by, by name (core/names.hpp). `automatic` is the best that there is on this machine,
-/// `own` a tracer that a program wrote for itself, under
-/// whatever name. Backward strategies go by the names that they have (backward/strategies.hpp).
+/// The kinds that choose a configuration, with their names (core/names.hpp). `automatic` is the best on this machine.
+/// `own` is a tracer that a program wrote for itself. Backward strategies go by their names (backward/strategies.hpp).
 
 #include <gart/core/names.hpp>
 
@@ -26,25 +25,13 @@ constexpr auto names_of(tracer_kind) {
       {{automatic, "auto"}, {bvh, "bvh"}, {embree, "embree"}, {tiles, "tiles"}, {own, "own"}}};
 }
 
-/// Of the response: exact, or with the shorter exponential and reciprocal of math/fast_arith.hpp.
-enum class arithmetic_kind { exact, fast };
-/// Their names.
-constexpr auto names_of(arithmetic_kind) {
-  using enum arithmetic_kind;
-  return std::array<name_of<arithmetic_kind>, 2>{{{exact, "exact"}, {fast, "fast"}}};
-}
-
 /// What the forward pass leaves of a hit (backward/lt_slot.hpp): nothing for pixel, its weight for hybrid.
-enum class lt_format_kind { automatic, float4, half, shared, weight, none };
+enum class lt_format_kind { automatic, float4, half, weight, none };
 /// Their names.
 constexpr auto names_of(lt_format_kind) {
   using enum lt_format_kind;
-  return std::array<name_of<lt_format_kind>, 6>{{{automatic, "auto"},
-                                                 {float4, "float4"},
-                                                 {half, "half"},
-                                                 {shared, "shared"},
-                                                 {weight, "weight"},
-                                                 {none, "none"}}};
+  return std::array<name_of<lt_format_kind>, 5>{
+      {{automatic, "auto"}, {float4, "float4"}, {half, "half"}, {weight, "weight"}, {none, "none"}}};
 }
 
 /// The degrees of the generalised Gaussians that math/response.hpp has.

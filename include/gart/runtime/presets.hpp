@@ -1,30 +1,17 @@
 #pragma once
 /// \file
-/// What speed may cost: sets of approximations to train and render with, chosen from the front that `gart tradeoff`
-/// draws (docs/tradeoffs.md), and a training of fewer steps (docs/training.md).
+/// How long to train, by name (docs/training.md).
 /// Errors: preset_named throws invalid_argument, naming those there are.
-
-#include <gart/render/options.hpp>
 
 #include <string>
 #include <vector>
 
 namespace gart {
 
-/// A set of approximations, and how long to train.
+/// How long to train.
 struct preset {
-  std::string name;                                              ///< how it is asked for
-  float alpha_min = render_options{}.alpha_min;                  ///< a Gaussian is hit where sigma * rho >= alpha_min
-  float transmittance_min = render_options{}.transmittance_min;  ///< a ray ends after the hit that brings T below this
-  int iterations = 0;                                            ///< steps of a training; 0: as many as without it
-
-  /// Whether it leaves anything out of an image.
-  bool approximates() const {
-    render_options const exact;
-    return alpha_min != exact.alpha_min || transmittance_min != exact.transmittance_min;
-  }
-  /// Sets those of the options that it has.
-  void apply(approximation_options& to) const { to.alpha_min = alpha_min, to.transmittance_min = transmittance_min; }
+  std::string name;    ///< how it is asked for
+  int iterations = 0;  ///< steps of a training; 0: as many as without it
 };
 
 /// exact first: the library's defaults.

@@ -18,13 +18,10 @@ struct configuration_request {
   backend_kind backend = backend_kind::automatic;  ///< where it computes
   tracer_kind tracer = tracer_kind::automatic;     ///< what finds the hits
   std::string backward = "auto";  ///< a strategy by its name (backward/strategies.hpp), or one of a program's own
-  int sh_degree = 3;              ///< of the spherical harmonics of colour that are stored, 0 to 3
+  int sh_degree = 3;              ///< of the spherical harmonics of colour, 0 to 3
   int kernel_degree = 2;          ///< of the generalised Gaussians (math/response.hpp)
-  arithmetic_kind arithmetic = arithmetic_kind::exact;   ///< of the response
   lt_format_kind lt_format = lt_format_kind::automatic;  ///< of the slots of the LT buffer
-  int tile_size = 0;                                     ///< pixels a side
   bool depth = false;  ///< gradients of depth and transmittance too; training by depth_weight asks for it itself
-  int window = 0;      ///< hits that a ray keeps in order before it goes over the scene again
   int threads = 0;     ///< of the openmp policy; 0: as many as OpenMP gives
   int device = 0;      ///< of the cuda policy; ranks take a host's GPUs in turn
   /// Of the cuda policy: a cudaStream_t of the caller's that all work goes to (cudaStreamLegacy for the default one);
@@ -37,17 +34,15 @@ struct configuration_request {
 
 /// One that was compiled.
 struct configuration_info {
-  backend_kind backend = backend_kind::automatic;       ///< where it computes
-  tracer_kind tracer = tracer_kind::automatic;          ///< what finds the hits
-  std::string backward;                                 ///< the strategy's name
-  int sh_degree = 3;                                    ///< of the coefficients that are stored
-  int kernel_degree = 2;                                ///< of the generalised Gaussians
-  arithmetic_kind arithmetic = arithmetic_kind::exact;  ///< of the response
-  lt_format_kind lt_format = lt_format_kind::none;      ///< of the slots of the LT buffer
-  bool depth = false;                                   ///< gradients of depth and transmittance too
-  int tile_size = 8,                                    ///< pixels a side
-      window = 0;                                       ///< hits of a ray that are kept at a time
-  bool ranks = false;                                   ///< trains on several ranks
+  backend_kind backend = backend_kind::automatic;  ///< where it computes
+  tracer_kind tracer = tracer_kind::automatic;     ///< what finds the hits
+  std::string backward;                            ///< the strategy's name
+  int sh_degree = 3;      ///< of the model's coefficients; of compiled_configurations() the highest
+  int stored_degree = 3;  ///< that rows of coefficients have room for in the policy's memory
+  int kernel_degree = 2;  ///< of the generalised Gaussians
+  lt_format_kind lt_format = lt_format_kind::none;  ///< of the slots of the LT buffer
+  bool depth = false;                               ///< gradients of depth and transmittance too
+  bool ranks = false;                               ///< trains on several ranks
   std::string instruction_set = "";  ///< that a host configuration was compiled for (core/isa.hpp); empty on a device
 };
 

@@ -16,7 +16,7 @@ concept scene_requirements = response_function<typename T::response> &&  // how 
   { T::sh_degree } -> std::convertible_to<int>;
 };
 
-/// Response: how a Gaussian falls from its centre, and in which arithmetic (math/response.hpp).
+/// Response: how a Gaussian falls from its centre (math/response.hpp).
 template <int ShDegree = 3, response_function Response = generalized_gaussian<>>
 struct scene_traits {
   static_assert(ShDegree >= 0 && ShDegree <= 3, "spherical harmonics go to degree 3");

@@ -1,9 +1,8 @@
 #pragma once
 /// \file
-/// Rows that came from all ranks, put in the order of the Gaussians' numbers: where each lay in what came. What arrives
-/// is in the order of ranks, and of each rank in that of the numbers: a run for each block of them
-/// (comm/row_owners.hpp), and runs go in the order of their blocks. Three launches and a scan over blocks; 12 bytes a
-/// block.
+/// For rows that arrived from all ranks: the position of each, in the order of the Gaussians' numbers. Rows arrive by
+/// rank, and from each rank by number. Each block of numbers (comm/row_owners.hpp) is one run; runs are put in the
+/// order of their blocks. Three launches and a scan over blocks; 12 bytes a block.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/comm/row_owners.hpp>

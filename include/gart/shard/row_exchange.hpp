@@ -6,11 +6,11 @@
 ///   row_exchange<E, Comm, 8, 3, response> rows(exec, comm, block);
 ///   rows.fetch(scene, views, names, options);  // `scene`: the rows of this rank
 ///   frame.prepare(rows.scene(), views[rows.unit().view], options of rows.unit().rows);
-///   rows.finish_fetch();                     // what was queued may go on without colours, what is next has them
+///   rows.finish_fetch();                     // colours are there for what is queued from here on
 ///   ...                                      // the image, its gradient, sum_gradients
 ///   rows.give_back(pass, gradients);         // what this rank has summed
 ///   rows.sum_moments(v, moments);            // of a view, for the rows of this rank; sum_finished where it finishes()
-///   rows.sum_colors(0, views, share, sh_gradient, false);  // last, since they arrive last; or take_colors
+///   rows.sum_colors(0, views, share, sh_gradient, false);  // colours arrive last; or take_colors
 ///
 /// An owner finds the boxes of its rows in each view, and sends a row to those whose tiles a box meets. What arrives is
 /// put in the order of the Gaussians' numbers, so that lists, ties and images have the bits of one rank that has all.

@@ -1,11 +1,11 @@
 #pragma once
 /// \file
-/// What the rows of tiles of each view cost when ranks traced it last, the same on all of them: what it is cut by the
-/// next time (work_units.hpp), so that no rank waits for the others' counts before it knows what it traces. A view
-/// changes little from one time to the next, and images and gradients do not depend on where it is cut.
+/// The cost of each row of tiles, from when ranks last traced the view; the same on all ranks. The next time, the view
+/// is cut by these costs (work_units.hpp). So no rank waits for the counts of others before it knows what it traces. A
+/// view changes little between two visits. Images and gradients do not depend on the cut.
 ///
-/// Costs come as box_kernel counts them: of a view one number a row of tiles and one behind, by how much the row's cost
-/// is more than that of the row above, in wrapping arithmetic; views one after another. Memory: 8 bytes a row of tiles.
+/// Costs come as box_kernel counts them: for each view, the difference of each row's cost to the row above, in wrapping
+/// arithmetic, and one more number at the end. Views follow one another. Memory: 8 bytes a row of tiles.
 
 #include <gart/core/isa.hpp>
 #include <gart/core/types.hpp>

@@ -4,9 +4,8 @@
 /// a primitive's box overlaps, in primitive order, and radix sorted by tile; those that fail the test of pairs
 /// (tiles/pair_test.hpp) come last, in no tile. A tile's list begins where its number first stands in a key.
 ///
-/// One 32-bit key sorts both by tile and within it, in the bits that the tile's number leaves free, by an order
-/// (tiles/tile_order.hpp).
-/// Ties stay in primitive order (the sort is stable).
+/// One 32-bit key sorts by tile, and within a tile by an order (tiles/tile_order.hpp) in the bits that the tile's
+/// number leaves free. Ties stay in primitive order, since the sort is stable.
 
 #include <gart/algorithm/sort_pairs.hpp>
 #include <gart/tiles/footprints.hpp>

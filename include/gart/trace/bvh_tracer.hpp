@@ -47,7 +47,6 @@ class bvh_tracer : public tracer_base {
  public:
   using response_type = Response;             ///< of the Gaussians
   static constexpr char const* name = "bvh";  ///< as requests have it
-  static constexpr int window = 16;           ///< hits of a ray that are kept at a time
 
   /// Allocates nothing; `exec` must outlive it.
   explicit bvh_tracer(E& exec) : rays_(exec), boxes_(exec), tree_(exec) { static_assert(tracer<bvh_tracer, E>); }
@@ -85,6 +84,7 @@ class bvh_tracer : public tracer_base {
   bvh<E> const& tree() const { return tree_; }
 
  private:
+  static constexpr int window = 16;  // hits of a ray that are kept at a time
   camera_rays<E> rays_;
   buffer<box, E> boxes_;
   bvh<E> tree_;

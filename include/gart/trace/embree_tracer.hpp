@@ -77,7 +77,6 @@ class embree_tracer : public tracer_base {
  public:
   using response_type = Response;                ///< of the Gaussians
   static constexpr char const* name = "embree";  ///< as requests have it
-  static constexpr int window = 16;              ///< hits of a ray that are kept at a time
 
   /// Allocates nothing of the policy; `exec` must outlive it.
   explicit embree_tracer(E& exec) : rays_(exec), boxes_(exec) { static_assert(tracer<embree_tracer, E>); }
@@ -107,6 +106,7 @@ class embree_tracer : public tracer_base {
   }
 
  private:
+  static constexpr int window = 16;  // hits of a ray that are kept at a time
   camera_rays<E> rays_;
   buffer<box, E> boxes_;
   embree_scene tree_;

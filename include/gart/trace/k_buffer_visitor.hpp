@@ -28,7 +28,7 @@ struct k_buffer_visitor {
   /// A candidate: its hit is kept if it is one, and of the nearest.
   GART_HD GART_INLINE void leaf(u32 id) {
     ray_gaussian const g = scene.gaussians[id];
-    ray_peak const r = evaluate<Response>(g, ray);
+    ray_peak const r = evaluate(g, ray);
     if (is_hit(g, r, scene.near) && before(last_t, last_id, r.t, id) && window.wants(r.t, id))
       window.insert({r.t, id, hit_alpha<Response>(g, r.d2)});
   }

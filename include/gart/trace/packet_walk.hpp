@@ -18,9 +18,9 @@
 
 namespace gart::inline GART_ISA {
 
-/// Window: what a ray traced alone keeps (tile_tracer). A packet keeps 32 times that in groups: what runs over is
-/// traced again from the start, not resumed.
-template <class Response, int Window, int Size, packet_program P>
+/// A packet keeps 32 times the hits of a ray traced alone, in groups: what runs over is traced again from the start,
+/// not resumed.
+template <class Response, int Size, packet_program P>
 class packet_walk {
  public:
   static_assert(Size % packet_block::width == 0 && Size % packet_block::height == 0 &&
@@ -61,7 +61,7 @@ class packet_walk {
   }
 
  private:
-  static constexpr int most_groups = 32 * Window;
+  static constexpr int most_groups = 32 * 32;
   static constexpr int split_threshold = most_groups / 2;  // of groups, from which one may be passed on in parts
   static constexpr int pass_threshold = 12;    // of groups, below which a look at what has become certain does not pay
   static constexpr int batch = 16;             // candidates between two such looks
@@ -105,7 +105,7 @@ class packet_walk {
     for (int i = 0; i < n; ++i) {
       typename P::cell const& cell = cells_[near_[i]];
       ray_gaussian const& g = scene.gaussians[cell.id];
-      ray_peak_of<lanes> const r = evaluate<Response>(g, primary_ray_of<lanes>{d});
+      ray_peak_of<lanes> const r = evaluate(g, primary_ray_of<lanes>{d});
       hits& h = found_[count];  // alpha: |p|^2 for now
       h.t = r.t, h.alpha = r.d2, h.rays = alive_ & is_hit(g, r, scene.near), h.id = cell.id;
       h.note = program.expect(state, cell);

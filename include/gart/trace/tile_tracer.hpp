@@ -25,8 +25,9 @@ namespace gart::inline GART_ISA {
 
 namespace trace_kernels {
 
-template <class Response, int Capacity, int Size, pixel_program P>
+template <class Response, int Size, pixel_program P>
 struct walk_tiles {
+  static constexpr int capacity = 32;  ///< hits that a ray keeps at most, a power of two; more are walked again
   static constexpr int block_size = 64, min_blocks = 8;
   /// Candidates between two looks at what has become certain: the rays of a warp then pass on several hits at a time
   /// together, with less divergence.
@@ -57,7 +58,7 @@ struct walk_tiles {
     };
     float last_t = scene.near;
     u32 last_id = 0xffffffffu;
-    hit_ring<Capacity> pending;
+    hit_ring<capacity> pending;
     auto const pass_on = [&]() {
       pending_hit const h = pending.pop();
       last_t = h.t, last_id = list[h.place];
@@ -80,7 +81,7 @@ struct walk_tiles {
             if (!pass_on()) return;
           if (resume < end && pending.empty() && limit.t * depth_of_t < bound) break;
         }
-        ray_peak const r = evaluate<Response>(g, ray);
+        ray_peak const r = evaluate(g, ray);
         if (!is_hit(g, r, scene.near) || !before(last_t, last_id, r.t, id)) continue;
         pending_hit h{r.t, k, 0};
         if (resume < end && !nearer(h, limit)) {
@@ -102,11 +103,11 @@ struct walk_tiles {
 
 #if !defined(__CUDACC__)
 /// On a host, programs with packets: a tile's packets one after another; rays of a packet that runs over one by one.
-template <class Response, int Window, int Size, pixel_program P>
+template <class Response, int Size, pixel_program P>
 struct walk_tile_packets {
   using packets = decltype(packets_of(std::declval<P const&>()));
-  using scratch = packet_walk<Response, Window, Size, packets>;
-  walk_tiles<Response, Window, Size, P> rays;
+  using scratch = packet_walk<Response, Size, packets>;
+  walk_tiles<Response, Size, P> rays;
   footprint_slots const* ranges;
 
   template <class Team>
@@ -132,19 +133,18 @@ struct walk_tile_packets {
 
 }  // namespace trace_kernels
 
-/// Size: side of a tile. Window: hits that a ray walked alone keeps at most, a power of two; a smaller one is walked
-/// again more often.
-template <execution E, int Size = 8, class Response = generalized_gaussian<>, int Window = 32>
+/// Size: side of a tile, in pixels.
+template <execution E, int Size = 8, class Response = generalized_gaussian<>>
 class tile_tracer : public tracer_base {
  public:
   using response_type = Response;                 ///< of the Gaussians
   static constexpr char const* name = "tiles";    ///< as requests have it
   static constexpr int tile_size = Size;          ///< side of a tile, in pixels
   static constexpr bool lends_footprints = true;  ///< to the backward pass
-  static constexpr int window = Window;           ///< hits of a ray that are kept at a time
 
   /// Allocates nothing; `exec` must outlive it.
-  explicit tile_tracer(E& exec) : rays_(exec), prints_(exec), map_(exec), orders_(exec), next_(exec), spilled_(exec) {
+  explicit tile_tracer(E& exec)
+      : rays_(exec), footprints_(exec), map_(exec), orders_(exec), next_(exec), spilled_(exec) {
     static_assert(footprint_tracer<tile_tracer, E>);
   }
 
@@ -157,9 +157,9 @@ class tile_tracer : public tracer_base {
       grid_ = {model.width, model.height};
       rays_.cast(exec, model);
       depth_ = model.depth();
-      prints_.template measure<Response>(exec, scene, model, options.alpha_min, options.near, options.rows);
-      auto const order = orders_.of(exec, model, rays_, prints_.depths().data(), gaussians.data());
-      map_.build(exec, grid_, prints_, order, orders_.test_of(model, gaussians.data()));
+      footprints_.template measure<Response>(exec, scene, model, options.alpha_min, options.near, options.rows);
+      auto const order = orders_.of(exec, model, rays_, footprints_.depths().data(), gaussians.data());
+      map_.build(exec, grid_, footprints_, order, orders_.test_of(model, gaussians.data()));
     });
     if constexpr (E::device) map_.rank_tiles(exec);
     scene_ = {gaussians.data(), scene.count, options.near};
@@ -181,17 +181,17 @@ class tile_tracer : public tracer_base {
       u32 const parts = grid_.count() * walk::tile_parts, teams = parts < most ? parts : most;
       next_.resize(1), spilled_.resize(teams * walk::spill_floats);
       next_.zero();
-      parallel_for(
-          exec, label, tile_range{teams, walk::block_size},
-          walk{grid_, map_.view(), prints_.ranges().data(), scene_, depth_, program, next_.data(), spilled_.data()});
+      parallel_for(exec, label, tile_range{teams, walk::block_size},
+                   walk{grid_, map_.view(), footprints_.ranges().data(), scene_, depth_, program, next_.data(),
+                        spilled_.data()});
       return;
     }
 #endif
-    trace_kernels::walk_tiles<Response, Window, Size, P> const walk{grid_, map_.view(), scene_, depth_, program};
+    trace_kernels::walk_tiles<Response, Size, P> const walk{grid_, map_.view(), scene_, depth_, program};
 #if !defined(__CUDACC__)
     if constexpr (!E::device && P::has_packets) {
       parallel_for(exec, label, tile_range{grid_.count(), 1},
-                   trace_kernels::walk_tile_packets<Response, Window, Size, P>{walk, prints_.ranges().data()});
+                   trace_kernels::walk_tile_packets<Response, Size, P>{walk, footprints_.ranges().data()});
       return;
     }
 #endif
@@ -199,14 +199,14 @@ class tile_tracer : public tracer_base {
   }
 
   /// Boxes and slots of the Gaussians in the view.
-  footprints<E, Size> const& prints() const { return prints_; }
+  gart::footprints<E, Size> const& footprints() const { return footprints_; }
   /// The tiles' lists.
   tile_map_view map() const { return map_.view(); }
 
  private:
   tile_grid<Size> grid_;
   camera_rays<E> rays_;
-  footprints<E, Size> prints_;
+  gart::footprints<E, Size> footprints_;
   tile_map<E, Size> map_;
   depth_orders<E, Size> orders_;
   buffer<u32, E> next_;  // of the device's walk (trace/warp_walk.hpp)

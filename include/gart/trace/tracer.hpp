@@ -62,7 +62,6 @@ concept tracer = execution<E> && std::constructible_from<T, E&> &&
              camera const& view, trace_options const& options, trace_kernels::no_rays const& program) {
   typename T::response_type;                        // of the Gaussians whose hits it finds (math/response.hpp)
   { T::name } -> std::convertible_to<char const*>;  // "bvh", "tiles", ...
-  { T::window } -> std::convertible_to<int>;        // hits of a ray that are kept at a time
   // `gaussians` are those of `scene` in the view's frame. Both are read until the next prepare. The view is a camera or
   // a camera model (camera/model.hpp).
   t.prepare(e, scene, gaussians, view, options);
@@ -78,7 +77,7 @@ concept tracer = execution<E> && std::constructible_from<T, E&> &&
 template <class T, class E>
 concept footprint_tracer = tracer<T, E> && requires(T const& t) {
   requires T::lends_footprints;
-  { t.prints() } -> std::same_as<footprints<E, T::tile_size> const&>;
+  { t.footprints() } -> std::same_as<footprints<E, T::tile_size> const&>;
   { t.map() } -> std::same_as<tile_map_view>;
 };
 

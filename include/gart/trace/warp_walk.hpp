@@ -234,7 +234,7 @@ class walk_tile_warps {
       ray_peak two[2];
       GART_UNROLL
       for (int c = 0; c < group; ++c) {
-        if (c % 2 == 0) evaluate_all<Response>(two, [&](int k) { return approach_to(from[c + k].gaussian, ray_); });
+        if (c % 2 == 0) evaluate_all(two, [&](int k) { return approach_to(from[c + k].gaussian, ray_); });
         ray_peak const& r = two[c % 2];
         t[c] = r.t, d2[c] = r.d2;
         bool const is_new = is_hit(from[c].gaussian, r, last_t_), exists = first + c < count;

@@ -7,27 +7,27 @@
 ///
 /// Errors: io_error on all ranks, naming the file, the rank and the cause; the checkpoint that was there is whole.
 
-#include <gart/comm/together.hpp>
+#include <gart/comm/collective_io.hpp>
 #include <gart/train/checkpoint_rows.hpp>
 
 namespace gart::inline GART_ISA {
 
 /// `mine`: this rank's rows of the Gaussians, and what all ranks have of the rest. All ranks call it.
 template <class Comm>
-void write_checkpoint_together(Comm& comm, row_owners const& owners, std::filesystem::path const& path,
-                               training_state const& mine) {
+void write_checkpoint_collectively(Comm& comm, row_owners const& owners, std::filesystem::path const& path,
+                                   training_state const& mine) {
   if (comm.size() == 1) return write_checkpoint(path, mine);
   checkpoint_rows rows(mine, owners);
   std::vector<u64> bytes = rows.bytes();
   comm.all_reduce(span<u64>(bytes));
   rows.place(bytes);
   std::vector<u32> const checksums = checksums_of(comm, rows.checksum_shares());
-  write_together(comm, path, [&](shared_file& file) { rows.write(file, checksums); });
+  write_collectively(comm, path, [&](shared_file& file) { rows.write(file, checksums); });
 }
 
 /// This rank's rows of a checkpoint that any number of ranks wrote. All ranks call it.
 template <class Comm>
-training_state read_checkpoint_together(Comm& comm, row_owners const& owners, std::filesystem::path const& path) {
+training_state read_checkpoint_collectively(Comm& comm, row_owners const& owners, std::filesystem::path const& path) {
   if (comm.size() == 1) return read_checkpoint(path);
   training_state mine;
   std::optional<checkpoint_rows_reader> reader;

@@ -11,7 +11,7 @@
 /// On several ranks the Gaussians are spread over them, with their moments (comm/row_owners.hpp), and each takes a part
 /// of every step (shard/work_units.hpp): strips of one view, or views of a batch. With a strategy that is `ordered` the
 /// bits of a run are those of any number of ranks. All ranks make the same calls; what is said of the Gaussians is of
-/// all of them, but for scene() and gradients(), which are of this rank's rows. docs/scale.md has more.
+/// all of them, but for scene() and gradients(), which are of this rank's rows. docs/backends.md has more.
 ///
 ///   mpi_comm ranks;
 ///   trainer<openmp_exec, traits, tracer, deterministic_strategy, mpi_comm> run(exec, options, data, start, ranks);
@@ -44,12 +44,12 @@
 #include <gart/scene/traits.hpp>
 #include <gart/train/checkpoint_part.hpp>
 #include <gart/train/depth_supervision.hpp>
-#include <gart/train/least_filter.hpp>
+#include <gart/train/foreground_fraction.hpp>
 #include <gart/train/memory_need.hpp>
+#include <gart/train/min_pixel_filter.hpp>
 #include <gart/train/options.hpp>
 #include <gart/train/resolution.hpp>
 #include <gart/train/shards.hpp>
-#include <gart/train/shown_share.hpp>
 #include <gart/train/start_model.hpp>
 #include <gart/train/state.hpp>
 #include <gart/train/step_report.hpp>
@@ -84,10 +84,10 @@ template <execution E, class Traits, class Tracer, strategy Strategy, class Comm
 requires communicator<Comm, E>
 class basic_trainer {
  public:
-  static constexpr int sh_degree = Traits::sh_degree;  ///< of the coefficients that are stored
+  static constexpr int sh_degree = Traits::sh_degree;  ///< that rows of coefficients have room for
 
-  /// Starts from `start`, of that degree. Errors: invalid_argument for another degree, or where no view is left to
-  /// train on, and for options that several ranks do not have; out_of_memory.
+  /// Starts from `start`, of that degree or a lower one, which the run keeps. Errors: invalid_argument for a higher
+  /// degree, or where no view is left to train on, and for options that several ranks do not have; out_of_memory.
   basic_trainer(E& exec, train_options const& options, dataset const& data, start_model const& start,
                 Comm comm = Comm());
   /// The dataset must outlive the trainer.
@@ -103,11 +103,13 @@ class basic_trainer {
     return step_by(&own);
   }
 
+  /// Of the run's model; bands above it are zero in the policy's memory.
+  int degree() const { return degree_; }
   /// Steps done.
   int steps_done() const { return step_; }
   void set_iterations(int iterations);  ///< as session has it
   /// The Gaussians, in host memory.
-  gaussian_model model() const { return whole_of(scene_.to_host()); }
+  gaussian_model model() const { return whole_of(model_part()); }
   /// A view of the Gaussians to host memory.
   rendered render(camera const& view, vec3 background);
   /// Its colours alone, in 8 bits a channel: [H][W][3].
@@ -131,7 +133,7 @@ class basic_trainer {
   ///@{
   /// Of a rank's part, as session has them.
   training_state part() const;
-  gaussian_model model_part() const { return scene_.to_host(); }
+  gaussian_model model_part() const { return with_sh_degree(scene_.to_host(), degree_); }
   void set_part(training_state const& mine);
   void write_part(std::filesystem::path const& path, training_state const& mine) const;
   void write_part(std::filesystem::path const& path, gaussian_model const& mine, splat_traits const& traits) const;
@@ -147,7 +149,7 @@ class basic_trainer {
   std::size_t lt_bytes() const { return lt_bytes_; }  ///< of the last step
   /// Bytes that this rank has sent to others in its steps.
   u64 sent_bytes() const requires(!Comm::alone) { return shards_.sent; }
-  /// The Gaussians, in the policy's memory.
+  /// The Gaussians, in the policy's memory, in rows of sh_degree.
   gaussians<E>& scene() { return scene_; }
   /// Of the last step, in their shape; where it changed the count of the Gaussians, undefined.
   gaussians<E> const& gradients() const {
@@ -193,11 +195,19 @@ class basic_trainer {
   void read_result(image_result& result, bool metric, bool lens) requires(!Comm::alone);
   void collect_results(span<image_result> round, bool metrics, bool lens) requires(!Comm::alone);
   void take_gradients(std::vector<camera> const& views, int image, span<image_result> round,
-                      bool moves) requires(!Comm::alone);
+                      bool learn_poses) requires(!Comm::alone);
   void move_parameters(adam_pass<E> const& adam) requires(!Comm::alone);
   void sum_arrived() const requires(!Comm::alone);
   rendered render_in_ranks(camera const& view, vec3 background) requires(!Comm::alone);
   bool in_ranks() const { return !Comm::alone && (comm_.size() > 1 || options_.batch > 1); }
+  // Gaussians of the run's degree in the policy's memory.
+  gaussians<E> in_rows(gaussian_model const& model) {
+    if (model.sh_degree >= sh_degree) return gaussians<E>(exec_, model);
+    return gaussians<E>(exec_, with_sh_degree(model, sh_degree));
+  }
+  static void assign_rows(gaussians<E>& to, gaussian_model const& from) {
+    from.sh_degree == sh_degree ? to.assign(from) : to.assign(with_sh_degree(from, sh_degree));
+  }
   // What of values of all Gaussians is this rank's, and the way back.
   decltype(auto) part_of(start_model const& start) const {
     if constexpr (Comm::alone)
@@ -254,8 +264,8 @@ class basic_trainer {
   static error_growth_options error_options_of(train_options const& options, dataset const& data) {
     error_growth_options e = options.error;
     if (options.densify == densify_kind::error && e.opacity_penalty > 0)
-      e.opacity_penalty *=
-          penalty_scale(shown_share(data, views_trained_on(data.train.size(), options.held_out), options.background));
+      e.opacity_penalty *= penalty_scale(
+          foreground_fraction(data, views_trained_on(data.train.size(), options.held_out), options.background));
     e.split.share = split_share(e, options.max_gaussians, data.training_pixels());
     e.dead_opacity = least_opacity(e.dead_opacity, options.render.alpha_min);
     return e;
@@ -269,6 +279,7 @@ class basic_trainer {
   E& exec_;
   train_options options_;
   dataset const& data_;
+  int degree_;  // of the run's model
   mutable Comm comm_;
   mutable std::conditional_t<Comm::alone, no_shards, shards<E, Comm, Traits, Tracer>> shards_;
   gaussians<E> scene_;
@@ -280,7 +291,7 @@ class basic_trainer {
   training_images<E> images_;
   view_order order_;
   dropout<E> dropout_;
-  least_filter<E> least_filter_;
+  min_pixel_filter<E> min_pixel_filter_;
   error_growth<E> error_;
   buffer<float, E> error_map_;  // of the step's image, where densification asks for it
   mcmc<E> mcmc_;
@@ -291,9 +302,9 @@ class basic_trainer {
   std::optional<vignetting_training<E>> vignetting_;  // and options.vignetting
   buffer<float, E> depth_, transmittance_;            // of the step's image, where a pose asks for them
   std::optional<pose_training> poses_;                // where options.refine_poses asks for them
-  pose_differentiation<E> by_pose_;
+  pose_differentiation<E> pose_backward_;
   std::optional<lens_training> lenses_;  // where options.refine_lens asks for them
-  lens_differentiation<E> by_lens_;
+  lens_differentiation<E> lens_backward_;
   std::optional<finite_check<E>> finite_;  // where options.check_finite asks for it
   index_t started_with_ = 0, total_ = 0;   // Gaussians of all ranks
   int step_ = 0, shrink_ = 1;              // of the step's images (resolution.hpp)

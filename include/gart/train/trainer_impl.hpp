@@ -18,9 +18,10 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
     : exec_(exec),
       options_(with_room(exec, comm, options, data, start)),
       data_(data),
+      degree_(start.rows.sh_degree),
       comm_(std::move(comm)),
       shards_(exec, comm_, std::max<index_t>(options.shard_block, 1)),
-      scene_(exec, part_of(start)),
+      scene_(in_rows(part_of(start))),
       gradients_(exec, scene_.size(), sh_degree),
       state_(exec, scene_.size(), sh_degree),
       frame_(exec),
@@ -29,7 +30,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       images_(exec, data),
       order_(data.train.size(), options.held_out, options.seed),
       dropout_(exec, options.dropout, options.dropout_until, options.seed),
-      least_filter_(exec),
+      min_pixel_filter_(exec),
       error_(exec, error_options_of(options, data),
              growth_budget(options.error, options.max_gaussians, data.training_pixels()), options.iterations,
              options.seed),
@@ -43,14 +44,14 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       supervision_(exec, data, options.depth_weight),
       depth_(exec),
       transmittance_(exec),
-      by_pose_(exec),
-      by_lens_(exec),
+      pose_backward_(exec),
+      lens_backward_(exec),
       started_with_(static_cast<index_t>(total_of(comm_, start))),
       total_(started_with_) {
   require_ranks();
   require_resolution(options.resolution);
-  if (start.rows.sh_degree != sh_degree)
-    throw invalid_argument("trainer: the model to start from has another SH degree");
+  if (degree_ > sh_degree)
+    throw invalid_argument("trainer: the model to start from has a higher SH degree than the trainer's traits");
   make_room();
   if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
   if (options.depth_weight > 0) {
@@ -100,7 +101,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::make_room() {
   if constexpr (!Comm::alone) here = shards_.rows.owners().owned(all);
   for (gaussians<E>* each : {&scene_, &gradients_, &state_.first, &state_.second}) each->reserve(here);
   dropout_.reserve(here);
-  if (options_.render.antialias > 0) least_filter_.reserve(here);
+  if (options_.render.antialias > 0) min_pixel_filter_.reserve(here);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -131,7 +132,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
   dataset_view const& view = data_.train[index];
   shrink_ = shrink_at(options_.resolution, step_, options_.iterations);
   camera const seen = traced(index);
-  int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
+  int const degree = sh_degree_at(step_, degree_, options_.sh_every, options_.iterations);
   learning_rates const rates = rates_of_step();
   render_options const render = render_options_of(options_, data_.extent, background_of(step_));
   std::size_t const floats = std::size_t{3} * seen.width * seen.height;
@@ -146,8 +147,9 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
     differentiate_by(pass, loss, index, rates);
     moments = pass.moments(), lt_bytes_ = pass.lt_bytes(), used = Pass::strategy_type::name;
   });
-  bool const moves = learns_poses(), bends = learns_lenses();
-  if (moves) by_pose_(frame_, std::as_const(gradients_).view(), value_.view().subspan(2, pose_gradient::floats));
+  bool const learn_poses = learns_poses(), learn_lenses = learns_lenses();
+  if (learn_poses)
+    pose_backward_(frame_, std::as_const(gradients_).view(), value_.view().subspan(2, pose_gradient::floats));
   ++step_;
   if (grows_by_error()) error_.add_errors(scene_, moments);
   if (options_.densify == densify_kind::adc) adc_.accumulate(scene_, gradients_, seen);
@@ -161,8 +163,8 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
   report.view = view.name;
   report.backward = used;
   std::vector<float> const value = value_.to_host();
-  if (moves) poses_->step(index, pose_gradient(value.data() + 2), step_ - 1, options_.iterations);
-  if (bends)
+  if (learn_poses) poses_->step(index, pose_gradient(value.data() + 2), step_ - 1, options_.iterations);
+  if (learn_lenses)
     lenses_->step(index, lens_gradient(value.data() + 2 + pose_gradient::floats, shrink_of_view(index)), step_ - 1,
                   options_.iterations);
   report.loss = value[0];
@@ -208,7 +210,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
   }
   differentiate(frame_, pass, image, gradients_, error_map_);
   if (learns_lenses())
-    by_lens_(frame_, color_, image, value_.view().subspan(2 + pose_gradient::floats, lens_gradient::floats), more);
+    lens_backward_(frame_, color_, image, value_.view().subspan(2 + pose_gradient::floats, lens_gradient::floats),
+                   more);
   if (measures) {
     std::vector<float> depth, transmittance;
     if constexpr (has_depth<Strategy>)
@@ -238,7 +241,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates c
                                           : use_adc && adc_.due(step_);
   if (options_.render.antialias > 0 && densifies) {
     std::vector<std::size_t> const views = views_trained_on(data_.train.size(), options_.held_out);
-    filter = least_filter_.of(
+    filter = min_pixel_filter_.of(
         exec_, scene_.view(), views.size(), [&](std::size_t k) { return seen_by(views[k]); },
         options_.render.antialias);
   }
@@ -270,7 +273,7 @@ template <execution E, class Traits, class Tracer, strategy Strategy, class Comm
 rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& view, vec3 background) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return render_in_ranks(view, background);
-  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background));
+  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background), degree_);
   return render_image(frame_);
 }
 
@@ -278,7 +281,7 @@ template <execution E, class Traits, class Tracer, strategy Strategy, class Comm
 image8 basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_8bit(camera const& view, vec3 background) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return to_8bit(render_in_ranks(view, background).color);
-  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background));
+  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background), degree_);
   return render_image_8bit(frame_);
 }
 

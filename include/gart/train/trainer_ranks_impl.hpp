@@ -45,10 +45,10 @@ learning_rates basic_trainer<E, Traits, Tracer, Strategy, Comm>::rates_of_step()
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss_function<E> const* loss) requires(
     !Comm::alone) {
-  int const degree = sh_degree_at(step_, sh_degree, options_.sh_every, options_.iterations);
+  int const degree = sh_degree_at(step_, degree_, options_.sh_every, options_.iterations);
   learning_rates const rates = rates_of_step();
   int const ranks = comm_.size(), batch = options_.batch, before = step_;
-  bool const moves = learns_poses(), bends = learns_lenses();
+  bool const learn_poses = learns_poses(), learn_lenses = learns_lenses();
   std::vector<image_result> images(static_cast<std::size_t>(batch));  // of the step, in their order
   lt_bytes_ = 0, shards_.arrived.reset();
   shrink_ = shrink_at(options_.resolution, step_, options_.iterations);
@@ -70,29 +70,30 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
     shards_.round.fetch(std::as_const(scene_).view(), cameras, names, render_options_of(options_, data_.extent));
     int const mine = shards_.round.unit().view;
     trace_unit(loss, cameras[static_cast<std::size_t>(mine)], done + mine, degree, round.data()[mine], report);
-    take_gradients(cameras, done, round, moves);
+    take_gradients(cameras, done, round, learn_poses);
     done += views;
-    if (done < batch) collect_results(round, moves, bends);
+    if (done < batch) collect_results(round, learn_poses, learn_lenses);
   }
   shards_.sent += shards_.round.take_traffic();
   step_ += batch;
-  float const haste = std::sqrt(static_cast<float>(batch));
-  learning_rates hasty = rates;
+  float const batch_scale = std::sqrt(static_cast<float>(batch));
+  learning_rates scaled_rates = rates;
   if (batch > 1)
-    for (float* rate : {&hasty.mean, &hasty.log_scale, &hasty.quaternion, &hasty.opacity, &hasty.sh_dc, &hasty.sh_rest})
-      *rate *= haste;
+    for (float* rate : {&scaled_rates.mean, &scaled_rates.log_scale, &scaled_rates.quaternion, &scaled_rates.opacity,
+                        &scaled_rates.sh_dc, &scaled_rates.sh_rest})
+      *rate *= batch_scale;
   shown.end();
-  optimize(hasty, degree, shards_.rows);
+  optimize(scaled_rates, degree, shards_.rows);
   // Read when all is queued: a device that waits for its host to read has nothing to do.
   std::size_t const last = static_cast<std::size_t>((batch - 1) / ranks * ranks);
-  collect_results(span<image_result>(images).subspan(last, images.size() - last), moves, bends);
+  collect_results(span<image_result>(images).subspan(last, images.size() - last), learn_poses, learn_lenses);
   // From what each image said of the exposures, poses and lenses that the step began with, whoever traced it.
   for (int k = 0; k < batch; ++k) {
     image_result const& image = images[static_cast<std::size_t>(k)];
     if (exposures_) exposures_->move(image.view, {image.by_exposure, exposure::floats}, rates.exposure);
     if (vignetting_) vignetting_->move_lens_of(image.view, {image.by_falloff, vignetting::floats}, rates.vignetting);
-    if (moves) poses_->step(image.view, image.by_pose, before + k, options_.iterations);
-    if (bends)
+    if (learn_poses) poses_->step(image.view, image.by_pose, before + k, options_.iterations);
+    if (learn_lenses)
       lenses_->step(image.view, lens_gradient(image.by_lens, shrink_of_view(image.view)), before + k,
                     options_.iterations);
   }
@@ -124,7 +125,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   work_unit const unit = shards_.round.unit();
   image_targets targets;
   targets.color = color_.data();
-  bool const measures = learns_poses() && poses_->wants_metric(index), bends = learns_lenses();
+  bool const measures = learns_poses() && poses_->wants_metric(index), learn_lenses = learns_lenses();
   depth_and_transmittance more;  // of the image
   image_gradients gradient{color_gradient_};
   if constexpr (has_depth<Strategy>) {
@@ -136,7 +137,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   }
   auto const share = [&](float* plane) { shards_.round.share_image(plane, seen, sizeof(float)); };
   span<float> const by_lens = value_.view().subspan(2 + pose_gradient::floats, lens_gradient::floats);
-  shards_.loss_by_strips = !loss && !exposures_ && !vignetting_ && !targets.depth && !bends;
+  shards_.loss_by_strips = !loss && !exposures_ && !vignetting_ && !targets.depth && !learn_lenses;
   auto const by_image = [&] {
     stage_scope stage(exec_, "loss");
     if (shards_.loss_by_strips) return differentiate_strip(seen, images_.get(index, background, shrink_of_view(index)));
@@ -156,7 +157,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   if (unit.empty()) {
     shards_.round.finish_fetch();
     by_image();
-    if (bends) by_lens_.of_others(pixels, by_lens, share);
+    if (learn_lenses) lens_backward_.of_others(pixels, by_lens, share);
     shards_.round.give_nothing_back(Strategy::ordered);
     return;
   }
@@ -168,12 +169,12 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
   sums.resize_keep(shards_.round.scene().count);
   passes_.with_room(frame_, options_.lt_budget, [&]<class Pass>(Pass& pass) {
     if constexpr (Strategy::ordered && !Pass::ordered) {
-      throw pass.no_room();
+      throw pass.out_of_memory_error();
     } else {
       pass.render(frame_, targets);
       by_image();
       sum_gradients(frame_, pass, gradient, sums.view(), error_map_);
-      if (bends) by_lens_(frame_, color_, gradient, by_lens, more, share);
+      if (learn_lenses) lens_backward_(frame_, color_, gradient, by_lens, more, share);
       if (shards_.round.finishes())
         finish_gradients(exec_, frame_.scene(), frame_.gaussians(), frame_.view(), render.antialias, pass.moments(),
                          sums.view());
@@ -242,14 +243,15 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::collect_results(span<imag
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(std::vector<camera> const& views, int image,
                                                                       span<image_result> round,
-                                                                      bool moves) requires(!Comm::alone) {
+                                                                      bool learn_poses) requires(!Comm::alone) {
   index_t const n = scene_.size();
   int const count = static_cast<int>(views.size());
   auto const share_after = [&](int images) {
     return images == options_.batch ? 1.0f / static_cast<float>(options_.batch) : 1.0f;
   };
   // Whether a view's own gradients are asked for by nobody, and those of all are added as they come.
-  bool const finishes = shards_.round.finishes(), at_once = finishes && !moves && options_.densify != densify_kind::adc;
+  bool const finishes = shards_.round.finishes(),
+             at_once = finishes && !learn_poses && options_.densify != densify_kind::adc;
   gradients_.resize_keep(n);
   if (!finishes) shards_.moments.resize(std::size_t{moment_stride} * n), shards_.prepared.resize(n);
   if (options_.batch > 1 && !at_once) shards_.view_gradients.resize_keep(n);
@@ -261,7 +263,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(std::vecto
   for (int v = 0; v < count && !at_once; ++v, ++image) {
     camera const& view = views[static_cast<std::size_t>(v)];
     gaussians<E>& to = image == 0 ? gradients_ : shards_.view_gradients;
-    if (moves) shards_.round.sum_colors(v, v + 1, 1, to.sh.view(), false);
+    if (learn_poses) shards_.round.sum_colors(v, v + 1, 1, to.sh.view(), false);
     if (finishes) {
       shards_.round.sum_finished(v, v + 1, 1, to.view(), errors, false);
     } else {
@@ -274,19 +276,19 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(std::vecto
       if (grows_by_error()) error_.add_errors(scene_, shards_.moments);
     }
     if (options_.densify == densify_kind::adc) adc_.accumulate(scene_, to, view);
-    if (moves) {
+    if (learn_poses) {
       span<double const> const runs =
-          by_pose_.template sum_runs<sh_degree>(scene, std::as_const(to).view(), view.position);
+          pose_backward_.template sum_runs<sh_degree>(scene, std::as_const(to).view(), view.position);
       std::vector<double> mine(runs.size());
       exec_.copy_out(mine.data(), runs.data(), runs.size() * sizeof(double));
-      round.data()[v].by_pose = by_pose_.total(shards_.pose_runs.whole_of(mine, pose_gradient::floats));
+      round.data()[v].by_pose = pose_backward_.total(shards_.pose_runs.whole_of(mine, pose_gradient::floats));
     }
     if (image > 0)
-      for_each_column(exec_, "batch/add", n, moves ? row_width(sh_degree) : geometry_columns + 1,
+      for_each_column(exec_, "batch/add", n, learn_poses ? row_width(sh_degree) : geometry_columns + 1,
                       train_kernels::add_gradients_body{gradients_.view(), to.view(), share_after(image + 1)});
   }
   // Last: they arrive last. A device's Adam takes the step's last ones as they come: 8 bytes less to move an element.
-  if (moves) return;
+  if (learn_poses) return;
   if (E::device && image == options_.batch)
     shards_.arrived = {count, share_after(image), adds};
   else
@@ -324,7 +326,7 @@ rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_in_ranks(camer
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
   buffer<float, E> color(exec_, 3 * pixels), transmittance(exec_, pixels), depth(exec_, pixels);
   buffer<u32, E> hits(exec_, pixels);
-  if (traces) frame_.prepare(round.scene(), view, render);
+  if (traces) frame_.prepare(round.scene(), view, render, degree_);
   round.finish_fetch();
   if (traces) {
     frame_.render({color.data(), transmittance.data(), depth.data(), hits.data()});

@@ -10,7 +10,9 @@ namespace gart::inline GART_ISA {
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::part() const {
   training_state s;
-  s.scene = scene_.to_host(), s.first = state_.first.to_host(), s.second = state_.second.to_host();
+  s.scene = model_part();
+  s.first = with_sh_degree(state_.first.to_host(), degree_);
+  s.second = with_sh_degree(state_.second.to_host(), degree_);
   s.step = step_, s.growth = growth_, s.seed = options_.seed;
   if (exposures_) s.exposures = exposures_->state();
   if (vignetting_) s.vignetting = vignetting_->state();
@@ -41,7 +43,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesyste
   if constexpr (Comm::alone)
     write_checkpoint(path, mine);
   else
-    write_checkpoint_together(comm_, shards_.rows.owners(), path, mine);
+    write_checkpoint_collectively(comm_, shards_.rows.owners(), path, mine);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -49,7 +51,7 @@ training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_part(std::
   if constexpr (Comm::alone)
     return read_checkpoint(path);
   else
-    return read_checkpoint_together(comm_, shards_.rows.owners(), path);
+    return read_checkpoint_collectively(comm_, shards_.rows.owners(), path);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
@@ -60,7 +62,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesyste
     if (comm_.size() > 1 && is_splat_ply(path)) {
       u64 total = mine.size();
       comm_.all_reduce(span<u64>(&total, 1));
-      write_together(comm_, path, [&](shared_file& file) {
+      write_collectively(comm_, path, [&](shared_file& file) {
         write_splat_ply_rows(file, path, mine, shards_.rows.owners(), total, traits);
       });
       return;
@@ -79,14 +81,14 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesyste
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::load(std::filesystem::path const& path) {
   training_state const mine = read_part(path);
-  require_degree(path, mine, sh_degree);
+  require_degree(path, mine, degree_);
   set_part(mine);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_part(training_state const& s) {
-  if (s.scene.sh_degree != sh_degree) throw invalid_argument("trainer: the state has another SH degree");
-  scene_.assign(s.scene), state_.first.assign(s.first), state_.second.assign(s.second);
+  if (s.scene.sh_degree != degree_) throw invalid_argument("trainer: the state has another SH degree");
+  assign_rows(scene_, s.scene), assign_rows(state_.first, s.first), assign_rows(state_.second, s.second);
   total_ = static_cast<index_t>(total_of(comm_, {s.scene, true}));
   gradients_.resize_keep(scene_.size());
   error_.error_sum.assign(s.error_sum);

@@ -33,7 +33,7 @@ inline constexpr u8 error_colors[6][3] = {{10, 8, 26},   {74, 20, 96},   {150, 3
                                           {218, 76, 62}, {249, 149, 54}, {252, 240, 170}};
 /// A map of errors in these colours, from 0 to `high`.
 image8 error_in_colors(image_float const& map, float high);
-inline constexpr float usual_error_scale = 0.25f;  ///< the error at the end of that colour map
+inline constexpr float default_error_scale = 0.25f;  ///< the error at the end of that colour map
 
 /// The absolute difference of two images, mean over the colours: [H][W][1]. The photograph is sampled where it is of
 /// another size; alpha in it is laid over the background.

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// What the page of a viewer and its server say to each other, without the sockets: one JSON object a message as text,
-/// and frames in bytes. docs/view.md has the fields of each.
+/// and frames in bytes. docs/rendering.md has the fields of each.
 ///
 /// parse_message reads what a client sent, from outside and therefore held to: at most message_bytes, objects no deeper
 /// than message_depth, every field there and in its range, no other one. Errors: invalid_argument naming the field.

@@ -17,7 +17,7 @@
 ///
 /// It listens on this machine alone unless options.listen says otherwise. An address has a token of 128 random bits;
 /// requests with another one, or from another host's page, are answered by 403. There is no encryption: over a network
-/// it goes through `ssh -L` (docs/view.md).
+/// it goes through `ssh -L` (docs/rendering.md).
 ///
 /// Errors: unsupported, naming the package to install, where gart was built without libwebsockets; invalid_argument for
 /// an address that is not this machine's; error where the port is taken.
@@ -36,11 +36,11 @@ namespace gart {
 
 /// How a viewer is served.
 struct view_server_options {
-  std::string listen = "127.0.0.1";  ///< the address or name of this machine to listen at; IPv4
-  int port = 0;                      ///< 0: one that is free
-  int max_clients = 8;               ///< pages at a time; more are answered by 503
-  double frame_seconds = 1.0 / 12;   ///< that a view takes while it moves, by its resolution
-  double rest_seconds = 0.2;         ///< after the last moving view, until it is rendered whole
+  std::string listen = "127.0.0.1";            ///< the address or name of this machine to listen at; IPv4
+  int port = 0;                                ///< 0: one that is free
+  int max_clients = 8;                         ///< pages at a time; more are answered by 503
+  double frame_seconds = 1.0 / 12;             ///< that a view takes while it moves, by its resolution
+  static constexpr double rest_seconds = 0.2;  ///< after the last moving view, until it is rendered whole
   /// The photograph of a camera of the scene, by its index; empty where there is none. From any thread.
   std::function<image8(int)> photo;
   std::function<void(std::string)> log;  ///< a line: clients that were closed, and why; from the server's thread

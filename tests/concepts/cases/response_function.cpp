@@ -4,7 +4,6 @@
 // (1 - |p|^2 / 9)^2 within three standard deviations.
 struct bump {
   static constexpr int degree = 2;
-  static constexpr bool fast = false;
   template <class F>
   static F response(F d2) {
     return (F(1.0f) - d2 / F(9.0f)) * (F(1.0f) - d2 / F(9.0f));
@@ -16,13 +15,5 @@ struct bump {
     return F(4.0f) / (F(9.0f) - d2);
   }
 #endif
-  template <class F>
-  static F reciprocal(F a) {
-    return gart::reciprocal(a);
-  }
-  template <int N>
-  static void reciprocals(float (&a)[N]) {
-    gart::reciprocals(a);
-  }
 };
 static_assert(gart::response_function<bump>);

@@ -5,7 +5,6 @@
 struct nothing : gart::tracer_base {
   using response_type = gart::generalized_gaussian<>;
   static constexpr char const* name = "nothing";
-  static constexpr int window = 1;
   explicit nothing(gart::serial_exec&) {}
   void prepare(gart::serial_exec&, gart::gaussians_view<float const>, gart::span<gart::ray_gaussian const>,
                gart::camera const&, gart::trace_options const&) {}

@@ -5,7 +5,7 @@
 struct nothing {
   using response_type = gart::generalized_gaussian<>;
   static constexpr char const* name = "nothing";
-  static constexpr int window = 1, tile_size = 8;
+  static constexpr int tile_size = 8;
 #ifdef GART_WHOLE
   static constexpr bool lends_footprints = false;
 #else

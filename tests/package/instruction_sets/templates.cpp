@@ -31,8 +31,7 @@ void train() {
 template <class E, class Tracer, int Degree>
 void every_strategy() {
   gart::strategies::for_each([]<class Strategy>(Strategy) {
-    if constexpr (Strategy::use == gart::strategy_use::training && !Strategy::ordered)
-      train<E, Tracer, Strategy, Degree>();
+    if constexpr (!Strategy::ordered) train<E, Tracer, Strategy, Degree>();
   });
 }
 

@@ -1,7 +1,7 @@
 // The share of its images that a capture fills.
 #include <support/policies.hpp>
 
-#include <gart/train/shown_share.hpp>
+#include <gart/train/foreground_fraction.hpp>
 #include <gart/train/view_order.hpp>
 
 using namespace gart;
@@ -23,7 +23,7 @@ dataset capture_of(int views, int filled, u8 empty, int channels = 3) {
 }
 
 double share_of(dataset const& data, background_kind background, std::vector<std::size_t> const& held_out = {}) {
-  return shown_share(data, views_trained_on(data.train.size(), held_out), background);
+  return foreground_fraction(data, views_trained_on(data.train.size(), held_out), background);
 }
 
 }  // namespace

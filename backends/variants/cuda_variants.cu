@@ -1,4 +1,4 @@
-// The CUDA policy's variants: kernels.
+// The CUDA policy's variants.
 #include <gart/exec/cuda_launch.cuh>
 
 #include "variant_configurations.hpp"
@@ -7,4 +7,4 @@ namespace {
 bool device_available(std::string* reason) { return !gart::cuda_devices(reason).empty(); }
 }  // namespace
 
-GART_REGISTER_CONFIGURATIONS(gart_cuda_kernels, gart::register_kernel_variants<gart::cuda_exec>(device_available))
+GART_REGISTER_CONFIGURATIONS(gart_cuda_variants, gart::register_variants<gart::cuda_exec>(device_available))

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Rows of a few numbers that say how colours become those of a photograph, one row of which a step moves by Adam: the
-/// exposures of views, the falloffs of lenses. What an image says of a row is a sum over its pixels.
+/// A table of a few learned numbers a row: the exposure of a view, the vignetting of a lens. A step moves one row by
+/// Adam. The gradient of a row is a sum over the pixels of an image.
 ///
 /// Buffers: 3 Floats + 1 words a row, and a few sums. Cost: a pass over the image and three launches over a few numbers
 /// a step; no host read. The order of all sums depends on the image's size only. A number whose gradient is not finite
@@ -37,10 +37,10 @@ struct row_adam_kernel {
 
 /// Rows of so many floats, and Adam's moments of them. State: a struct of value, first, second and visits.
 template <execution E, int Floats, class State>
-class learned_rows {
+class adam_table {
  public:
   /// [rows][Floats] to begin with.
-  learned_rows(E& exec, std::vector<float> const& start)
+  adam_table(E& exec, std::vector<float> const& start)
       : exec_(&exec),
         value_(exec, start),
         first_(exec, std::vector<float>(start.size())),

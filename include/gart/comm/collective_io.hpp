@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// What ranks do together with a file, so that all of them do it or none: an error of any is an error of all, which
-/// names the rank that met it, and a file is written to a temporary name and renamed when every rank is done.
+/// File operations that all ranks finish or none does. An error of one rank is an error of all, and names that rank. A
+/// file is written to a temporary name, and renamed when every rank is done.
 ///
-///   write_together(comm, path, [&](shared_file& file) { file.write(place_of_mine, mine.data(), bytes); });
+///   write_collectively(comm, path, [&](shared_file& file) { file.write(place_of_mine, mine.data(), bytes); });
 ///
 /// All ranks make the same calls. Cost: messages of a few bytes. Errors: io_error naming the file, the rank with its
 /// host, the cause and the remedy; then the temporary file is gone, and what was there before is whole.
@@ -35,9 +35,9 @@ std::string name_of_rank(Comm const& comm) {
   return name;
 }
 
-// What the first rank that has something to say says, on all ranks; empty where none has.
+// The message of the first rank that has one, on all ranks; empty where none has.
 template <class Comm>
-std::string first_word(Comm& comm, std::string const& mine) {
+std::string first_error(Comm& comm, std::string const& mine) {
   std::vector<u64> lengths(static_cast<std::size_t>(comm.size()));
   u64 const length = mine.size();
   comm.all_gather(&length, lengths.data(), sizeof length);
@@ -65,12 +65,12 @@ void together(Comm& comm, std::filesystem::path const& path, F const& f, std::fi
       if (!name.empty() && mine.starts_with(name.string() + ": ")) mine.erase(0, name.string().size() + 2);
     if (comm.size() > 1) mine = detail::name_of_rank(comm) + ": " + mine;
   }
-  if (std::string const word = detail::first_word(comm, mine); !word.empty()) throw io_error(path.string(), word);
+  if (std::string const word = detail::first_error(comm, mine); !word.empty()) throw io_error(path.string(), word);
 }
 
 /// One file, of what body(file) writes on each rank.
 template <class Comm>
-void write_together(Comm& comm, std::filesystem::path const& path, std::function<void(shared_file&)> const& body) {
+void write_collectively(Comm& comm, std::filesystem::path const& path, std::function<void(shared_file&)> const& body) {
   static std::atomic<unsigned> serial{0};
   bool const first = comm.rank() == 0;
   u64 const own[2] = {static_cast<u64>(::getpid()), serial++};

@@ -1,10 +1,10 @@
 #pragma once
 /// \file
-/// How much of its images a capture fills. The loss is a mean over all pixels, so that an object before an empty
-/// background gives its Gaussians a gradient in proportion to the share of the pixels that it covers, a fiftieth on
-/// views of the whole sphere; a penalty beside the loss has to be as much smaller, or it fades what is seen. Captures
-/// that the penalties' sizes were measured on fill a quarter of their images and more (penalty_scale).
-/// Cost: a pass over the pixels of at most 32 images, once a run.
+/// The share of its images that a capture fills. The loss is a mean over all pixels. So the gradients of an object
+/// before an empty background are in proportion to the share of pixels that it covers: a fiftieth on views of the whole
+/// sphere. A penalty beside the loss must shrink as much, or it fades the object. The penalties were measured on
+/// captures that fill a quarter of their images or more (penalty_scale). Cost: a pass over the pixels of at most 32
+/// images, once a run.
 
 #include <gart/core/isa.hpp>
 #include <gart/io/dataset.hpp>
@@ -19,7 +19,8 @@ namespace gart::inline GART_ISA {
 /// The share of the pixels of data.train's `views`, by index, that count in the loss and are not as the background, at
 /// least a thousandth. Those looked at are evenly spread over the views. Before a random background only transparent
 /// pixels are empty.
-inline double shown_share(dataset const& data, std::vector<std::size_t> const& views, background_kind background) {
+inline double foreground_fraction(dataset const& data, std::vector<std::size_t> const& views,
+                                  background_kind background) {
   constexpr std::size_t most_views = 32;
   constexpr int alike = 12;  // of 255, a channel
   int const empty = background == background_kind::white ? 255 : 0;

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// How narrow the filter of a pixel gets where a Gaussian is, of all training views (render_options.antialias):
+/// The narrowest pixel filter at each Gaussian, over all training views (render_options.antialias):
 ///   r = min over the views of the standard deviation of the filter at the mean, world units.
-/// The view that has it sees most of a Gaussian that is smaller than its pixels. Densification asks for it: what is
-/// left of an opacity there decides whether a Gaussian is dead (opacity_shown in optim/rows.hpp). Views are those of
+/// The view of the narrowest filter shows the most of a small Gaussian. Densification uses it: a Gaussian whose opacity
+/// through that filter is too low is dead (opacity_shown in optim/rows.hpp). Views are those of
 /// whole photographs, whatever size a step's images have.
 ///
 /// Cost: 4 bytes a Gaussian, and a small launch a view at each densification. Without a filter there is nothing of it.
@@ -18,7 +18,7 @@ namespace detail {
 
 /// Filter: of a camera model.
 template <class Filter>
-struct least_filter_kernel {
+struct min_pixel_filter_kernel {
   gaussians_view<float const> scene;
   Filter filter;
   bool first;  // of the views
@@ -31,12 +31,12 @@ struct least_filter_kernel {
 
 }  // namespace detail
 
-/// The filter's least width at each Gaussian; its memory outlives a call, of().
+/// The narrowest filter at each Gaussian. Its memory outlives a call of of().
 template <execution E>
-class least_filter {
+class min_pixel_filter {
  public:
   /// Allocates nothing; `exec` must outlive it.
-  explicit least_filter(E& exec) : least_(exec) {}
+  explicit min_pixel_filter(E& exec) : least_(exec) {}
 
   /// Makes room for so many Gaussians.
   void reserve(u64 count) { least_.reserve(count); }
@@ -48,9 +48,9 @@ class least_filter {
     for (std::size_t k = 0; k < views; ++k)
       visit_camera(view(k), [&](auto const& model) {
         auto const filter = model.filter(pixels);
-        parallel_for(
-            exec, "least_filter", scene.count,
-            detail::least_filter_kernel<std::remove_const_t<decltype(filter)>>{scene, filter, k == 0, least_.data()});
+        parallel_for(exec, "min_pixel_filter", scene.count,
+                     detail::min_pixel_filter_kernel<std::remove_const_t<decltype(filter)>>{scene, filter, k == 0,
+                                                                                            least_.data()});
       });
     return least_.view();
   }

@@ -1,9 +1,0 @@
-// The OpenMP policy's variants: shapes, and sums in a fixed order, which are among the ordinary configurations of a
-// device.
-#include "variant_configurations.hpp"
-
-#include <gart/exec/parallel.hpp>
-
-GART_REGISTER_CONFIGURATIONS(gart_openmp_shapes, gart::register_shape_variants<gart::openmp_exec>();
-                             gart::register_variant<gart::openmp_exec, gart::generalized_gaussian<>, 8, 32,
-                                                    gart::deterministic_strategy>(gart::always_available))
