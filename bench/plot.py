@@ -266,7 +266,7 @@ def main():
     pages.formats()
     pages.viewer()
     pages.cutoffs()
-    pages.auto()
+    pages.leave_one_out()
     pages.curves()
     pages.long()
     pages.write_tables()

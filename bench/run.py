@@ -18,8 +18,8 @@ What (comma-separated; default tests and paper):
   view        every --model served by `gart view`, and what a viewer takes from training every --capture (bench/view.py)
   rules       `gart train` with each rule of docs/training.md changed alone (--rules names some), --seeds of each (3):
               a file rules_NAME.json a capture, written after each rule
-  auto        `gart train --auto` against --no-auto on every --capture: scores, seconds, bytes, what was chosen and
-              measured; a file auto_NAME.json each
+  leave-one-out  every --capture by what `gart train` chooses and by each fixed setting: a setting tuned on all captures
+              but one, scored on that one, stands against the choices (docs/training.md); leave_one_out.json
   curves      a short training of every --capture by each strategy, same seed: the loss curves against each other and
               against the noise from run to run, the test scores, and whether deterministic gives the same bits twice
   long        a full training of every --capture: every step checked (gart train --check-finite), five seeds, and
@@ -52,7 +52,7 @@ from formats import Formats
 from training import LONG_PARTS, RULES, Trainings
 from view import View
 
-TRAININGS = ("rules", "auto", "curves", "long")
+TRAININGS = ("rules", "leave-one-out", "curves", "long")
 PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff", "formats",
          "view") + TRAININGS
 
@@ -294,11 +294,11 @@ def arguments():
                         help="tradeoff, and traits, which takes the first: a trained model and its capture or camera "
                              "JSON; may be repeated")
     parser.add_argument("--capture", nargs=2, action="append", default=[], metavar=("NAME", "DATASET"),
-                        help="rules, auto, curves and long: a capture to train on; may be repeated")
+                        help="rules, leave-one-out, curves and long: a capture to train on; may be repeated")
     parser.add_argument("--train", default="",
                         help="the same: options of gart train, in one string; --iterations, where it is not among "
                              "them, is 1000 for curves and 30000 for the others")
-    parser.add_argument("--seeds", type=int, help="auto: runs of each kind, 1 where not given; rules: 3; long: seeds, 5")
+    parser.add_argument("--seeds", type=int, help="leave-one-out: runs of each kind, 1 where not given; rules: 3; long: seeds, 5")
     parser.add_argument("--rules", type=listed, help="rules: those whose name begins with one of these, comma-separated")
     parser.add_argument("--long", type=listed, default=list(LONG_PARTS),
                         help="of " + ",".join(LONG_PARTS) + ": the trainings of long to run")
@@ -334,7 +334,7 @@ def main():
         for part in bench.a.parts:
             bench.say(f"== {part}")
             try:
-                getattr(bench, part)()
+                getattr(bench, part.replace("-", "_"))()
             except Failure as failure:
                 bench.fail(f"{part}: {failure}")
     finally:

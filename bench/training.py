@@ -1,4 +1,4 @@
-"""The parts of bench/run.py that train captures: rules, auto, curves and long.
+"""The parts of bench/run.py that train captures: rules, leave-one-out, curves and long.
 
 Each --capture NAME DIR is trained by `gart train`; what is reported is read from the metrics.json, history.json and
 model.ply that it leaves. Steps and Gaussians are those of --train, else the part's own.
@@ -55,6 +55,14 @@ RULES = (("all", []),
          ("adc, no resets", ["--densify", "adc", "--set", "adc.opacity_reset_every=0"]))
 
 
+# What gart train chooses among (docs/auto.md), as fixed settings: all combinations.
+EXPOSURE, VIGNETTING = ["--exposure", "on"], ["--vignetting", "on"]
+BANDS = ["--set", "rates.sh_rest=0.0025"]
+SETTINGS = (("literature", []), ("exposure", EXPOSURE), ("vignetting", VIGNETTING), ("bands", BANDS),
+            ("exposure, vignetting", EXPOSURE + VIGNETTING), ("exposure, bands", EXPOSURE + BANDS),
+            ("vignetting, bands", VIGNETTING + BANDS), ("all", EXPOSURE + VIGNETTING + BANDS))
+
+
 def digest(data):
     return hashlib.sha256(data).hexdigest()
 
@@ -91,6 +99,25 @@ def spread(values):
 def same(rows, key):
     """Whether two rows agree; None where there are fewer."""
     return len({row[key] for row in rows}) == 1 if len(rows) > 1 else None
+
+
+def left_out(runs):
+    """A row a capture: its choices, the fixed setting that is best on all the others, and its own best."""
+    scores = {}
+    for r in runs:
+        scores.setdefault(r["capture"], {}).setdefault(r["setting"], []).append(r["psnr"])
+    scores = {c: {s: sum(v) / len(v) for s, v in of.items()} for c, of in scores.items()}
+    rows = []
+    for capture, of in scores.items():
+        fixed = [s for s in of if s != "chosen"]
+        others = [o for c, o in scores.items() if c != capture and all(s in o for s in fixed)]
+        if "chosen" not in of or not fixed or not others:
+            continue
+        tuned = max(fixed, key=lambda s: sum(o[s] for o in others))
+        best = max(fixed, key=lambda s: of[s])
+        rows.append({"capture": capture, "chosen": of["chosen"], "literature": of.get("literature"),
+                     "tuned_on_others": tuned, "tuned": of[tuned], "best": best, "best_psnr": of[best]})
+    return rows
 
 
 def summary_of(runs):
@@ -153,27 +180,22 @@ class Trainings:
                     self.say(f"{name}, {rule}: {scores['mean']:.2f} dB of {len(rows)} seeds")
                 self.write("rules_" + name, runs, scene=name, train=options)
 
-    def auto(self):
-        kept = ("psnr", "ssim", "test_views", "seconds", "gaussians", "sh_degree", "floats_per_gaussian", "model_bytes",
-                "checkpoint_bytes", "peak_bytes", "profiled_step_ms", "background", "backend", "tracer", "backward",
-                "image_size", "train_views", "iterations", "sh_trials", "chosen")
+    def leave_one_out(self):
+        """Every capture by the choices of `gart train` and by each fixed setting. What a fixed setting tuned on all
+        captures but one gives on that one stands against the choices, and so does its own best."""
+        kept = ("psnr", "ssim", "test_views", "seconds", "wall_seconds", "gaussians", "peak_bytes", "split", "measured",
+                "image_size", "train_views", "iterations")
+        runs = []
         for name, capture in self.a.capture:
-            runs, options = [], self.train_options(name)
-            for seed in range(1, (self.a.seeds or 1) + 1):
-                for mode in ("--no-auto", "--auto"):
-                    row = {"mode": mode, "seed": seed, "options": options}
-                    folder, metrics, cpu = self.train(f"{name}, {mode}", capture, options, mode, "--seed", seed,
-                                                      "--eval-every", 0)
+            for setting, options in [("chosen", ["--auto"])] + [(n, ["--no-auto", *o]) for n, o in SETTINGS]:
+                for seed in range(1, (self.a.seeds or 1) + 1):
+                    folder, metrics, _ = self.train(f"{name}, {setting}", capture, self.train_options(name), *options,
+                                                    "--seed", str(seed), "--eval-every", "0")
                     if folder:
-                        # The processors' seconds are of the whole process, loading and testing included; other work on
-                        # the machine is not in them.
-                        row.update({k: metrics[k] for k in kept}, cpu_seconds=cpu)
-                        self.say(f"{name}, seed {seed}, {mode}: {row['psnr']:.3f} dB, {row['seconds']:.1f} s, "
-                                 f"{row['floats_per_gaussian']} floats a Gaussian")
-                    else:
-                        row["error"] = metrics
-                    runs.append(row)
-            self.write("auto_" + name, runs, capture=name)
+                        runs.append({"capture": name, "setting": setting, "seed": seed,
+                                     "options": self.train_options(name), **{k: metrics[k] for k in kept}})
+                        self.say(f"{name}, {setting}, seed {seed}: {metrics['psnr']:.2f} dB")
+                    self.write("leave_one_out", runs, summary=left_out(runs))
 
     def training(self, label, capture, options, *more):
         """A row of curves or long: scores, and what tells two runs apart; besides it the points (step, loss)."""

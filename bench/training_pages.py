@@ -1,6 +1,4 @@
-"""What bench/plot.py draws of the trainings of bench/training.py: auto, curves and long."""
-import glob
-import os
+"""What bench/plot.py draws of the trainings of bench/training.py: leave-one-out, curves and long."""
 
 from charts import courses
 from tables import source, table
@@ -13,11 +11,6 @@ def shown(value, form):
 
 def share(value):
     return f"{100 * value:.2g}%"
-
-
-def told(trial):
-    """The standard error of a trial's gain, in results that have it."""
-    return f" ± {trial['gain_error']:.3f}" if "gain_error" in trial else ""
 
 
 def reason(error):
@@ -56,28 +49,15 @@ class TrainingPages:
         self.tables["cutoffs"] = table(["capture", "alpha_min", "t_min", "besides", "trained PSNR, dB", "SSIM",
                                         "training, s"], rows) + ["", f"7,000 steps; {source(result)}."]
 
-    def auto(self):
-        rows = []
-        for path in sorted(glob.glob(os.path.join(self.results, "auto_*.json"))):
-            result = self.load(os.path.basename(path)[:-5])
-            runs = [r for r in result["runs"] if "error" not in r]
-            full = {r["seed"]: r for r in runs if r["mode"] == "--no-auto"}
-            for r in runs:
-                base = full.get(r["seed"], {})
-                change = f"{r['psnr'] - base['psnr']:+.3f}" if r["mode"] == "--auto" and base else ""
-                gains = ", ".join(f"{t['band']}: {t['gain']:+.3f}{told(t)} ({t['forecast']:+.3f})"
-                                  for t in r["sh_trials"])
-                rows.append([result["capture"], "full" if r["mode"] == "--no-auto" else "auto", r["sh_degree"],
-                             r["floats_per_gaussian"], f"{r['psnr']:.3f}", change, shown(r["seconds"], ".0f"),
-                             shown(r["cpu_seconds"], ".0f"), f"{r['model_bytes'] / 1e3:,.0f}",
-                             f"{r['checkpoint_bytes'] / 1e3:,.0f}", f"{r['peak_bytes'] / 1e6:.1f}", gains])
-            first = runs[0] if runs else {}
-            rows.append([f"{result['capture']}: {first.get('image_size', '')}, {first.get('options', '')}; "
-                         f"{first.get('backend', '')}, {source(result)}"] + [""] * 11)
-        if rows:
-            self.tables["auto"] = table(["capture", "model", "SH", "floats", "PSNR, dB", "against full", "training, s",
-                                         "CPU, s", "PLY, kB", "checkpoint, kB", "peak, MB",
-                                         "bands tried: gain (forecast), dB"], rows)
+    def leave_one_out(self):
+        result = self.load("leave_one_out")
+        if not result:
+            return
+        rows = [[r["capture"], f"{r['chosen']:.2f}", shown(r["literature"], ".2f"),
+                 f"{r['tuned']:.2f} ({r['tuned_on_others']})", f"{r['best_psnr']:.2f} ({r['best']})"]
+                for r in result["summary"]]
+        self.tables["leave_one_out"] = table(["capture", "as chosen, dB", "literature", "tuned on the others",
+                                              "its own best"], rows) + ["", f"Test views; {source(result)}."]
 
     def curves(self):
         result = self.load("curves")

@@ -28,6 +28,7 @@ struct eval_arguments {
   configuration_options configuration;
   std::string background = "auto";
   int downscale = 1, test_every = 8;
+  std::string test_split = "nth";
   int max_hits = -1;
   bool quiet = false;
 };
@@ -84,6 +85,7 @@ int run_eval(eval_arguments const& a) {
   gart::dataset_options load;
   load.downscale = a.downscale;
   load.test_every = a.test_every;
+  load.test_split = gart::from_string<gart::split_kind>(a.test_split);
   load.host = ranks::on_host();
   gart::dataset const data = gart::load_dataset(a.dataset, load);
   if (data.test.empty()) {
@@ -181,6 +183,10 @@ void add_eval(CLI::App& app, command& selected) {
       ->type_name("N")
       ->capture_default_str()
       ->check(between(1, 1e6));
+  eval->add_option("--test-split", a->test_split, "Which views are for testing: nth or sector (see gart train --help)")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->check(name_of_a<gart::split_kind>());
   add_max_hits(*eval, a->max_hits);
   eval->add_flag("--quiet", a->quiet, "Say nothing but errors");
   add_configuration_options(*eval, a->configuration);

@@ -120,6 +120,11 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       r.add(train, "--test-every", a.test_every, "N",
             "Keep each Nth view for testing, 0: none; for captures that do\nnot say themselves which are for testing"))
       ->check(between(0, 1e6));
+  in_group(
+      r.add(train, "--test-split", a.test_split, "NAME",
+            "Which views are kept: nth, each Nth by name, or sector, as many\ncameras beside each other, which asks "
+            "more of a scene"))
+      ->check(name_of_a<gart::split_kind>());
 
   in_group(r.add(train, "--depth-weight", a.depth_weight, "X",
                  "Train by the capture's depth maps too: weight of their mean\nerror, in units of the scene's extent, "

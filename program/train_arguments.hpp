@@ -40,6 +40,7 @@ struct train_arguments {
   bool automatic = true;
   int sh_degree = 3;
   int downscale = 1, test_every = 8, eval_every = -1;
+  std::string test_split = "nth";
   float depth_weight = defaults.depth_weight;
   std::string depth_kind = "auto";
   double depth_unit = 0;

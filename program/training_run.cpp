@@ -170,6 +170,7 @@ void training_run::load() {
   gart::dataset_options options;
   options.downscale = a_.downscale;
   options.test_every = a_.test_every;
+  options.test_split = gart::from_string<gart::split_kind>(a_.test_split);
   options.depth = {a_.depth_weight > 0, gart::from_string<gart::depth_kind>(a_.depth_kind), a_.depth_unit};
   options.progress = [&](std::size_t done, std::size_t total) {
     std::lock_guard const lock(mutex);

@@ -402,3 +402,35 @@ TEST_CASE("a rolling shutter is read with the poses of its first and last line, 
                             moving(", \"transform_matrix_end\": [[-1,0,0,0],[0,1,0,0],[0,0,-1,0]]"))),
               "half a turn"));
 }
+
+TEST_CASE("a sector keeps cameras that stand beside each other for testing, whatever their order") {
+  scratch_folder const folder;
+  constexpr int cameras = 24;
+  std::string frames;
+  for (int i = 0; i < cameras; ++i) {
+    // All the way round the y axis, in steps of 7 of 24 by name.
+    double const angle = 6.283185307179586 * (7 * i % cameras) / cameras, c = std::cos(angle), s = std::sin(angle);
+    std::string const n = (i < 10 ? "0" : "") + std::to_string(i);
+    folder.put_image("images/" + n + ".png", 16, 12, 3);
+    frames += std::string(i ? "," : "") + "{\"file_path\": \"images/" + n + ".png\", \"transform_matrix\": [[" +
+              std::to_string(c) + ",0," + std::to_string(s) + "," + std::to_string(4 * s) + "],[0,1,0,0.3],[" +
+              std::to_string(-s) + ",0," + std::to_string(c) + "," + std::to_string(4 * c) + "],[0,0,0,1]]}";
+  }
+  folder.put("transforms.json", scene(lens, frames));
+  gart::dataset_options options;
+  options.test_split = gart::split_kind::sector;
+  for (int const every : {8, 4}) {
+    options.test_every = every;
+    auto const data = gart::load_dataset(folder.path, options);
+    CHECK(holds(data.split, "sector"));
+    REQUIRE(data.test.size() == static_cast<std::size_t>(cameras / every));
+    CHECK(data.train.size() == static_cast<std::size_t>(cameras - cameras / every));
+    double widest = 0, nearest = 7;
+    auto const from_first = [](gart::camera const& v) { return std::abs(std::atan2(v.position.x, v.position.z)); };
+    for (auto const& v : data.test) widest = std::max(widest, from_first(v.view));
+    for (auto const& v : data.train) nearest = std::min(nearest, from_first(v.view));
+    CHECK(widest <= nearest + 1e-6);
+  }
+  options.test_every = 0;
+  CHECK(gart::load_dataset(folder.path, options).test.empty());
+}

@@ -11,6 +11,7 @@
 /// invalid_argument for an option out of its range.
 
 #include <gart/comm/host_group.hpp>
+#include <gart/core/names.hpp>
 #include <gart/io/depth_file.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/scene/image.hpp>
@@ -72,11 +73,22 @@ struct depth_map_options {
   double unit = 0;
 };
 
+/// Which views are kept for testing: each Nth by name, between views that are trained on; or a sector of as many, the
+/// cameras on both sides of the first by name around all cameras' mean, which asks for views from where none is
+/// trained.
+enum class split_kind { nth, sector };
+/// Their names.
+constexpr auto names_of(split_kind) {
+  using enum split_kind;
+  return std::array<name_of<split_kind>, 2>{{{nth, "nth"}, {sector, "sector"}}};
+}
+
 /// What to read of a capture, and how.
 struct dataset_options {
-  int downscale = 1;        ///< integer factor, box filter; a partial last block of pixels is cropped, from cameras too
-  int test_every = 8;       ///< 0: no test views; ignored where the files have their own split
-  bool load_images = true;  ///< false: cameras alone, for which photos may all be absent if the files state sizes
+  int downscale = 1;   ///< integer factor, box filter; a partial last block of pixels is cropped, from cameras too
+  int test_every = 8;  ///< 0: no test views; ignored where the files have their own split
+  split_kind test_split = split_kind::nth;  ///< which of them; likewise
+  bool load_images = true;       ///< false: cameras alone, for which photos may all be absent if the files state sizes
   depth_map_options depth = {};  ///< maps of depth
   /// Called from the loading threads, one at a time.
   std::function<void(std::size_t done, std::size_t total)> progress = {};
