@@ -1,7 +1,6 @@
 // A model of a lower SH degree than the trainer has rows for: the bits of a trainer that is compiled for it.
 #include "runs.hpp"
 
-
 using namespace gart_test;
 
 namespace {
