@@ -17,10 +17,10 @@ namespace {
 
 constexpr std::size_t views_for_one = 8, fewest_held_out = 3;
 constexpr int least_pixels = 128, most_shrink = 4;
-constexpr int fewest_steps = 500, most_steps = 1500;
-// A step of a trial takes at most this share of the time of one of the run: it has a sixteenth of the pixels, but
-// starting its kernels costs as much.
-constexpr double step_share = 1.0 / 3, run_share = 0.1;
+constexpr int fewest_steps = 750, most_steps = 2000;
+// A step of a trial takes about this share of the time of one of the run, where its images are smaller: they have a
+// quarter of the pixels or less, but starting the kernels costs as much.
+constexpr double step_share = 0.4, run_share = 0.1;
 
 // The shorter side of the smallest training image.
 int smallest_side(dataset const& data) {
@@ -103,19 +103,19 @@ dataset shrunk(dataset const& data, int shrink) {
 validation_plan plan_validation(train_options const& options, dataset const& data, std::size_t candidates) {
   validation_plan plan;
   std::size_t const views = data.train.size(), held_out = views / views_for_one;
-  double const steps = run_share / step_share * options.iterations;
-  plan.trials = std::min(candidates, static_cast<std::size_t>(steps / fewest_steps)) + 1;
+  if (views > 0) plan.shrink = std::clamp(smallest_side(data) / least_pixels, 1, most_shrink);
+  while (!divides(data, plan.shrink)) --plan.shrink;
+  double const steps = run_share / (plan.shrink > 1 ? step_share : 1) * options.iterations;
+  plan.trials = std::min(candidates + 1, static_cast<std::size_t>(steps / fewest_steps));
   if (candidates == 0) {
     plan.why = "every setting is given";
   } else if (held_out < fewest_held_out) {
     plan.why = std::to_string(views) + " training views are too few to hold some out";
-  } else if (plan.trials < 3) {
+  } else if (plan.trials < 2) {
     plan.why = "a run of " + std::to_string(options.iterations) + " steps is too short to try anything";
   } else {
     for (std::size_t i = 0; i < held_out; ++i) plan.held_out.push_back(i * views_for_one + views_for_one / 2);
     plan.steps = std::clamp(static_cast<int>(steps / static_cast<double>(plan.trials)), fewest_steps, most_steps);
-    plan.shrink = std::clamp(smallest_side(data) / least_pixels, 1, most_shrink);
-    while (!divides(data, plan.shrink)) --plan.shrink;
     plan.why = std::to_string(plan.trials) + " trials of " + std::to_string(plan.steps) + " steps, judged by " +
                std::to_string(held_out) + " training views held out";
   }

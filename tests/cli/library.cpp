@@ -92,10 +92,10 @@ TEST_CASE("what the library measures is what gart train does, recorded, and the 
   write_capture(here / "capture", 24);
   fill_images(here / "capture", true);
   gart::train_options options;
-  options.iterations = 5000, options.max_gaussians = 30;
+  options.iterations = 15000, options.max_gaussians = 30;
   auto const use = train(here / "capture", options, here / "mine.ply");
   REQUIRE_FALSE(use.measured.trials.empty());
-  std::string const run = "train capture --iterations 5000 --max-gaussians 30 --backend serial --out ";
+  std::string const run = "train capture --iterations 15000 --max-gaussians 30 --backend serial --out ";
   auto const whole = here.gart(run + "whole");
   REQUIRE_MESSAGE(whole.code == 0, whole.err);
   CHECK_MESSAGE(has(whole.err, "measuring what the capture asks for: "), whole.err);
@@ -121,7 +121,7 @@ TEST_CASE("what the library measures is what gart train does, recorded, and the 
 TEST_CASE("what is given is not measured, and --no-auto takes the literature's settings") {
   folder const here;
   write_capture(here / "capture", 24);
-  std::string const run = "train capture --iterations 5000 --max-gaussians 30 --backend serial --stop-at 1 ";
+  std::string const run = "train capture --iterations 30000 --max-gaussians 30 --backend serial --stop-at 1 ";
   auto const tried = [&](std::string const& more) {
     auto const made = here.gart(run + more + " --out run");
     CHECK_MESSAGE(made.code == 130, made.err);
