@@ -108,6 +108,7 @@ int run_eval(eval_arguments const& a) {
                 beside.string().c_str());
 
   progress say(a.quiet || !speaks);
+  say.notes(file.notes);
   auto const draw = [&](gart::camera const& view) { return renderer->render(view, options); };
   gart::some_views const tests = dealt(gart::all_of(data.test));
   image_writer files;

@@ -47,6 +47,10 @@ void progress::note(std::string const& text) {
   std::fprintf(stderr, "%s\n", text.c_str());
 }
 
+void progress::notes(std::vector<std::string> const& texts) {
+  for (std::string const& text : texts) note(text);
+}
+
 void progress::clear() {
   if (!shown_) return;
   std::fputs("\r\033[K", stderr);

@@ -102,6 +102,7 @@ int run_render(render_arguments const& a) {
       a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures);
 
   progress say(a.quiet || !speaks);
+  say.notes(file.notes);
   auto const configuration = renderer->configuration();
   nlohmann::json timings = {{"backend", gart::to_string(configuration.backend)},
                             {"tracer", gart::to_string(configuration.tracer)},

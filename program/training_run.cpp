@@ -63,6 +63,7 @@ void training_run::prepare() {
                         ": is the model in --out, which the run replaces (choose another --out)");
     }
     gart::model_file file = gart::load_model(a_.start, owners());
+    say_.notes(file.notes);
     if (file.kernel_degree != a_.kernel_degree) {
       throw usage_error("--start " + a_.start + ": is of kernel degree " + std::to_string(file.kernel_degree) +
                         ", the run of " + std::to_string(a_.kernel_degree) + " (give --kernel-degree " +

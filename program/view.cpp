@@ -2,6 +2,7 @@
 #include "commands.hpp"
 #include "interrupt.hpp"
 #include "options.hpp"
+#include "progress.hpp"
 #include "run_folder.hpp"
 #include "view_options.hpp"
 
@@ -36,11 +37,13 @@ std::string background_of(view_arguments const& a, gart::dataset const& data) {
 
 int run_view(view_arguments const& a) {
   gart::model_file file = gart::load_model(a.model);
+  progress(false).notes(file.notes);
   gart::dataset data;
   if (!a.capture.empty()) {
     gart::dataset_options options;
     options.downscale = a.downscale, options.test_every = a.test_every;
     data = gart::load_dataset(a.capture, options);
+    progress(false).notes(data.notes);
   }
   auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
   gart::render_options options = file.render;

@@ -12,6 +12,30 @@
 namespace gart::io {
 namespace fs = std::filesystem;
 
+std::vector<u8> with_words_quoted(std::vector<u8> const& bytes) {
+  std::vector<u8> out;
+  out.reserve(bytes.size() + bytes.size() / 8);
+  std::string_view rest(reinterpret_cast<char const*>(bytes.data()), bytes.size());
+  bool in_text = false;
+  while (!rest.empty()) {
+    std::size_t taken = 1;
+    bool quoted = false;
+    if (in_text && rest[0] == '\\') {
+      taken = std::min<std::size_t>(2, rest.size());
+    } else if (rest[0] == '"') {
+      in_text = !in_text;
+    } else if (!in_text) {
+      for (std::string_view const word : {"NaN", "Infinity", "-Infinity"})
+        if (rest.starts_with(word)) taken = word.size(), quoted = true;
+    }
+    if (quoted) out.push_back('"');
+    out.insert(out.end(), rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(taken));
+    if (quoted) out.push_back('"');
+    rest.remove_prefix(taken);
+  }
+  return out;
+}
+
 camera_format const* camera_model_of(record const& r, char const* otherwise) {
   std::string const name = r.has("camera_model") ? r.text("camera_model") : otherwise;
   camera_format const* const model = camera_format_of(name);

@@ -88,6 +88,8 @@ struct dataset_options {
   int downscale = 1;   ///< integer factor, box filter; a partial last block of pixels is cropped, from cameras too
   int test_every = 8;  ///< 0: no test views; ignored where the files have their own split
   split_kind test_split = split_kind::nth;  ///< which of them; likewise
+  std::filesystem::path photos = {};  ///< the folder that the photos' names are in; empty: where the capture has them
+  bool masks = true;                  ///< those that the files name, else those in a folder masks beside the photos'
   bool load_images = true;       ///< false: cameras alone, for which photos may all be absent if the files state sizes
   depth_map_options depth = {};  ///< maps of depth
   /// Called from the loading threads, one at a time.
