@@ -8,6 +8,7 @@ namespace gart::io {
 namespace {
 
 constexpr double most_of_all = 0.99;
+constexpr double scale_reach = 4;  // of the others' scales, below which a stray's would take bits from them
 
 float quantile(std::vector<float>& values, double q) {
   auto const at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
@@ -60,13 +61,16 @@ bulk bulk_of(gaussian_model const& model) {
 
 std::size_t draw_in_strays(gaussian_model& model, double reach) {
   bulk const b = bulk_of(model);
+  if (b.strays.empty()) return 0;
+  float const least = bulk_range(model.log_scale, scale_reach).first;
   for (std::size_t const i : b.strays) {
     double const nearer = reach * b.half / distance(model, i, b.middle);
     for (std::size_t c = 0; c < 3; ++c) {
       float& mean = model.mean[3 * i + c];
       double const middle = b.middle[static_cast<int>(c)];
       mean = static_cast<float>(middle + nearer * (static_cast<double>(mean) - middle));
-      model.log_scale[3 * i + c] += static_cast<float>(std::log(nearer));
+      float& log_scale = model.log_scale[3 * i + c];
+      log_scale = std::max(std::min(log_scale, least), log_scale + static_cast<float>(std::log(nearer)));
     }
   }
   return b.strays.size();

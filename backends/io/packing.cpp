@@ -76,21 +76,18 @@ int largest_positive(std::array<double, 4>& q) {
 }
 
 std::vector<u32> along_a_curve(gaussian_model const& model) {
-  bulk const most = bulk_of(model);
+  // Strays are outside of the box, and go to its edge.
+  std::vector<char> stray(model.size(), 0);
+  for (u32 const i : bulk_of(model).strays) stray[i] = 1;
   box bounds = empty_box();
   auto const mean = [&](std::size_t i) {
     return vec3(model.mean[3 * i], model.mean[3 * i + 1], model.mean[3 * i + 2]);
   };
   for (std::size_t i = 0; i < model.size(); ++i)
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 3 && !stray[i]; ++k) {
       bounds.lo[k] = std::min(bounds.lo[k], mean(i)[k]);
       bounds.hi[k] = std::max(bounds.hi[k], mean(i)[k]);
     }
-  // Strays go to the box's edge.
-  for (int k = 0; k < 3 && most.half > 0; ++k) {
-    bounds.lo[k] = std::max(bounds.lo[k], static_cast<float>(most.middle[k] - far_reach * most.half));
-    bounds.hi[k] = std::min(bounds.hi[k], static_cast<float>(most.middle[k] + far_reach * most.half));
-  }
   std::vector<std::pair<u64, u32>> keys(model.size());
   for (std::size_t i = 0; i < keys.size(); ++i) keys[i] = {morton_code(mean(i), bounds), static_cast<u32>(i)};
   std::sort(keys.begin(), keys.end());
