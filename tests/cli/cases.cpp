@@ -186,6 +186,12 @@ TEST_CASE("captures as people have them") {
     gart::dataset_options options;
     options.test_every = 0, options.photos = at / "elsewhere";
     check_views(gart::load_dataset(at, options));
+    auto const run = here.gart(
+        "train capture --photos capture/elsewhere --no-masks --out run --iterations 1 --backend serial --max-gaussians "
+        "40");
+    CHECK_MESSAGE(run.code == 0, run.err);
+    CHECK(here.gart("eval run/model.ply capture --photos capture/elsewhere --out s.json --backend serial").code == 0);
+    CHECK(has(here.gart("eval run/model.ply capture --out s.json --backend serial").err, "--photos"));
     options.photos = at / "nowhere";
     CHECK(has(refused([&] { gart::load_dataset(at, options); }), "nowhere: is no folder"));
   }
@@ -364,6 +370,58 @@ TEST_CASE("captures as people have them") {
     }
     CHECK(renders > 0);
   }
+}
+
+TEST_CASE("a run goes on with the capture that it began with, and clears what a killed one left") {
+  folder const here;
+  colmap_text c;
+  c.write(here / "capture");
+  std::string const small =
+      "train capture --out run --iterations 4 --stop-at 2 --backend serial --max-gaussians 40 --quiet";
+  REQUIRE(here.gart(small).code == 130);
+  auto const resumed = [&](std::string const& what) {
+    auto const run = here.gart("train capture --resume --out run --stop-at 2 --quiet");
+    CHECK(run.code == (what.empty() ? 130 : 2));
+    CHECK_MESSAGE((what.empty() || has(run.err, "its " + what + " are not those")), run.err);
+  };
+  for (char const* begun : {"run/.model.ply.123-4.tmp", "run/renders/.view_00.png.9-0.tmp", "run/.mine.tmp"})
+    gart::write_file(here / begun, "half");
+  resumed("");
+  CHECK_FALSE(fs::exists(here / "run/.model.ply.123-4.tmp"));
+  CHECK_FALSE(fs::exists(here / "run/renders/.view_00.png.9-0.tmp"));
+  CHECK(fs::exists(here / "run/.mine.tmp"));
+  gart::write_png(here / "capture/images/view_03.png", gart::image8(width, height, 3, 41));
+  resumed("images");
+  c.lens = "1 RADIAL 24 18 21 12 9 0 0";
+  c.write(here / "capture");
+  resumed("cameras");
+  c.lens = colmap_text().lens, c.name = [](int i) { return i == 2 ? "view_02b.png" : name_of(i); };
+  c.write(here / "capture");
+  fs::rename(here / "capture/images/view_02.png", here / "capture/images/view_02b.png");
+  resumed("names");
+  colmap_text().write(here / "capture");
+  fs::remove(here / "capture/images/view_02b.png");
+  resumed("");
+}
+
+TEST_CASE("render takes the background of the run") {
+  folder const here;
+  colmap_text c;
+  c.write(here / "capture");
+  REQUIRE(
+      here.gart("train capture --out run --iterations 1 --backend serial --max-gaussians 3 --background white --quiet")
+          .code == 0);
+  auto const corner = [&](std::string const& more) {
+    REQUIRE(here.gart("render run/model.ply capture --out images --backend serial --quiet" + more).code == 0);
+    return int{gart::read_image(here / "images/view_00.png").at(0, 0, 0)};
+  };
+  int const white = corner(" --background white"), black = corner(" --background black");
+  CHECK(white > black);
+  CHECK(corner("") == white);
+  CHECK(corner(" --background auto") == white);
+  fs::rename(here / "run/model.ply", here / "model.ply");
+  REQUIRE(here.gart("render model.ply capture --out images --backend serial --quiet --background auto").code == 0);
+  CHECK(int{gart::read_image(here / "images/view_00.png").at(0, 0, 0)} == black);
 }
 
 TEST_CASE("models with a Gaussian that is none") {
