@@ -4,6 +4,7 @@
 #include "field_names.hpp"
 #include "help.hpp"
 #include "ranks.hpp"
+#include "threads.hpp"
 
 #include <gart/core/version.hpp>
 
@@ -44,6 +45,7 @@ int fail(std::string const& what, int code) {
 
 int main(int argc, char** argv) {
   using namespace gart_cli;
+  bound_threads(argv);
   CLI::App app{"gart trains and renders scenes of ray-traced 3D Gaussians.", "gart"};
   app.formatter(std::make_shared<help_formatter>());
   app.set_version_flag("--version", std::string("gart ") + gart::version, "Print the version and leave");

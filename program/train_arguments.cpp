@@ -332,6 +332,9 @@ void check_same_dataset(train_arguments const& a, gart::dataset const& data) {
                       config.value(key, nlohmann::json()).dump() + " (" + a.config_file().string() +
                       "; name the dataset it was started with)");
   }
+  if (now.value("poses_checksum", nlohmann::json()) != config.value("poses_checksum", nlohmann::json()))
+    throw usage_error("--poses " + a.poses + ": is not what the run to be resumed began at (" +
+                      a.config_file().string() + "; put that file back, or start anew without --resume)");
   // A run of a gart that wrote none has nothing to compare.
   for (auto const& [what, sum] : now["checksums"].items()) {
     nlohmann::json const before = config.value("checksums", nlohmann::json::object());
@@ -339,9 +342,6 @@ void check_same_dataset(train_arguments const& a, gart::dataset const& data) {
     throw usage_error(a.dataset.string() + ": its " + what + " are not those that the run to be resumed began with (" +
                       a.config_file().string() + "; put the capture back as it was, or start anew without --resume)");
   }
-  if (now.value("poses_checksum", nlohmann::json()) != config.value("poses_checksum", nlohmann::json()))
-    throw usage_error("--poses " + a.poses + ": is not what the run to be resumed began at (" +
-                      a.config_file().string() + "; put that file back, or start anew without --resume)");
 }
 
 }  // namespace gart_cli
