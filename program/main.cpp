@@ -3,6 +3,7 @@
 #include "commands.hpp"
 #include "field_names.hpp"
 #include "help.hpp"
+#include "printable.hpp"
 #include "ranks.hpp"
 #include "threads.hpp"
 
@@ -36,7 +37,7 @@ int flushed(int code) {
 // One rank's error is the end of all: the others would wait for it.
 int fail(std::string const& what, int code) {
   gart_cli::ranks::wait_to_speak();
-  std::fprintf(stderr, "gart: error: %s%s\n", gart_cli::ranks::name().c_str(), what.c_str());
+  std::fprintf(stderr, "gart: error: %s%s\n", gart_cli::ranks::name().c_str(), gart_cli::printable(what).c_str());
   if (gart_cli::ranks::size() > 1) std::fflush(stderr), gart_cli::ranks::end_all(code);
   return code;
 }

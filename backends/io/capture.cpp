@@ -18,6 +18,7 @@ void frame::set_size(int width, int height) {
   if (angle_x > 0) view.fx = static_cast<float>(0.5 * width / std::tan(0.5 * angle_x));
   if (angle_y > 0) {
     view.fy = static_cast<float>(0.5 * height / std::tan(0.5 * angle_y));
+    if (!(angle_x > 0)) view.fx = view.fy;
   } else if (angle_x > 0) {
     view.fy = view.fx;
   }

@@ -43,8 +43,8 @@ void read_lens(record const& r, frame& f) {
     f.view.fx = static_cast<float>(r.number("fl_x"));
   } else if (r.has("camera_angle_x")) {
     f.angle_x = angle("camera_angle_x");
-  } else {
-    throw io_error(r.where, "neither 'fl_x' nor 'camera_angle_x' is there", "add one of them");
+  } else if (!r.has("camera_angle_y")) {
+    throw io_error(r.where, "none of 'fl_x', 'camera_angle_x' and 'camera_angle_y' is there", "add one of them");
   }
   if (r.has("fl_y")) {
     f.view.fy = static_cast<float>(r.number("fl_y"));

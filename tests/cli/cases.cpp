@@ -314,6 +314,47 @@ TEST_CASE("captures as people have them") {
     CHECK(data.train[0].mask.at(0, 0, 0) == 0);
     CHECK(data.train[0].mask.at(1, 1, 0) == 255);
   }
+  SUBCASE("names that a terminal would obey") {
+    c.name = [](int i) { return i == 0 ? "\x1b[31mred\xc2\x9b" : name_of(i); };
+    c.write(at);
+    auto const some = here.gart("train capture --out run --iterations 1 --backend serial --max-gaussians 40");
+    CHECK(some.code == 0);
+    c.name = [](int i) { return "\x1b[31mred" + std::to_string(i); };
+    c.write(at);
+    auto const none = here.gart("train capture --out run --iterations 1");
+    CHECK(none.code == 1);
+    for (auto const& run : {some, none}) {
+      CHECK(run.err.find('\x1b') == std::string::npos);
+      CHECK(run.err.find("\xc2\x9b") == std::string::npos);
+      CHECK_MESSAGE(has(run.err, "\\x1b[31mred"), run.err);
+    }
+  }
+  SUBCASE("words that programs have for the same") {
+    colmap_text::write_photos(at / "images");
+    gart::write_file(at / "transforms.json", transforms("0", ", \"camera_model\": \"opencv\", \"k1\": 0.01"));
+    check_views(load(at));
+    CHECK(load(at).train[0].view.lens.k1 == 0.01f);
+    std::string json = transforms("0");
+    json.replace(json.find("\"fl_x\": 20"), 10, "\"camera_angle_y\": 0.8");
+    gart::write_file(at / "transforms.json", json);
+    auto const data = load(at);
+    check_views(data);
+    CHECK(data.train[0].view.fy == doctest::Approx(9 / std::tan(0.4)));
+    CHECK(data.train[0].view.fx == data.train[0].view.fy);
+    // 3DGS' cameras.json.
+    gart::write_file(at / "cameras.json",
+                     R"([{"id": 0, "img_name": "view_00", "width": 24, "height": 18, "position": [1, 2, 3],)"
+                     R"( "rotation": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], "fy": 21, "fx": 20}])");
+    auto const cameras = gart::load_cameras(at / "cameras.json");
+    REQUIRE(cameras.size() == 1);
+    CHECK(cameras[0].name == "view_00");
+    CHECK(cameras[0].view.fy == 21);
+    CHECK(cameras[0].view.cx == 12);
+    CHECK(cameras[0].view.cy == 9);
+    CHECK(cameras[0].view.position.y == 2);
+    CHECK(cameras[0].view.rotation[2].x == 1);
+    CHECK(cameras[0].view.rotation[0].z == -1);
+  }
   SUBCASE("a pose that is NaN") {
     colmap_text::write_photos(at / "images");
     for (char const* odd : {"NaN", "Infinity", "-Infinity", "1e300"}) {

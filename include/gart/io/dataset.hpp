@@ -2,8 +2,8 @@
 /// \file
 /// A capture in host memory: views with cameras and 8-bit images, a split, starting points where the files have them.
 ///
-/// load_dataset recognises, in a folder or by the file named: COLMAP (sparse/0 or its larger neighbour, sparse, the same
-/// below colmap, or the folder itself, .bin before .txt; photos in images/, images_N/ or input/), Blender
+/// load_dataset recognises, in a folder or by the file named: COLMAP (sparse/0 or its larger neighbour, sparse, the
+/// same below colmap, or the folder itself, .bin before .txt; photos in images/, images_N/ or input/), Blender
 /// (transforms_train.json and transforms_test.json, points3d.ply where it is there), nerfstudio / instant-ngp
 /// (transforms.json). A folder that holds COLMAP and transforms.json is read as COLMAP. Photos are found by names that
 /// differ in case, slashes, extension or folders, masks in a folder masks beside them (docs/captures.md). Images are
