@@ -70,6 +70,7 @@ int run_bench(bench_arguments const& a) {
   std::size_t peak = 0;
   gart::configuration_info configuration;
   progress say(a.quiet);
+  say.notes(file.notes);
   for (std::size_t v = 0; v < cameras.size(); ++v) {
     gart::dataset const data = noise_capture(cameras[v]);
     auto const session = gart::make_session(request, options, data, &file.model);

@@ -1,6 +1,7 @@
 #include "commands.hpp"
 #include "help.hpp"
 #include "output.hpp"
+#include "printable.hpp"
 #include "progress.hpp"
 
 #include <gart/core/error.hpp>
@@ -98,7 +99,8 @@ int run_convert(convert_arguments const& a) {
   prepare_file(a.out);
 
   gart::splat_traits traits;
-  gart::gaussian_model model = gart::read_splats(a.in, &traits);
+  std::vector<std::string> notes;
+  gart::gaussian_model model = gart::read_splats(a.in, &traits, &notes);
   std::size_t const read = model.size();
   if (!box.empty())
     model = kept(model, [&](std::size_t i) {
@@ -124,6 +126,7 @@ int run_convert(convert_arguments const& a) {
                    ", which no format holds");
   gart::write_splats(a.out, model, traits, packing);
   if (a.quiet) return 0;
+  for (std::string const& note : notes) std::printf("%s\n", printable(note).c_str());
   for (std::string const& what : lost) std::printf("left out: %s\n", what.c_str());
   auto const before = static_cast<double>(fs::file_size(a.in)), after = static_cast<double>(fs::file_size(a.out));
   std::printf("%s: %zu of %zu Gaussians, SH degree %d, %s, %.3f of %s\n", a.out.string().c_str(), model.size(), read,

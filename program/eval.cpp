@@ -26,6 +26,7 @@ namespace fs = std::filesystem;
 struct eval_arguments {
   fs::path model, dataset, out, renders, pairs, exposures;
   configuration_options configuration;
+  photo_options photos;
   std::string background = "auto";
   int downscale = 1, test_every = 8;
   std::string test_split = "nth";
@@ -86,6 +87,7 @@ int run_eval(eval_arguments const& a) {
   load.downscale = a.downscale;
   load.test_every = a.test_every;
   load.test_split = gart::from_string<gart::split_kind>(a.test_split);
+  a.photos.set(load);
   load.host = ranks::on_host();
   gart::dataset const data = gart::load_dataset(a.dataset, load);
   if (data.test.empty()) {
@@ -108,6 +110,7 @@ int run_eval(eval_arguments const& a) {
                 beside.string().c_str());
 
   progress say(a.quiet || !speaks);
+  say.notes(file.notes);
   auto const draw = [&](gart::camera const& view) { return renderer->render(view, options); };
   gart::some_views const tests = dealt(gart::all_of(data.test));
   image_writer files;
@@ -175,6 +178,7 @@ void add_eval(CLI::App& app, command& selected) {
       ->type_name("NAME")
       ->capture_default_str()
       ->check(one_of({"auto", "white", "black"}));
+  add_photo_options(*eval, a->photos);
   eval->add_option("--downscale", a->downscale, "Shrink images by this whole factor")
       ->type_name("N")
       ->capture_default_str()

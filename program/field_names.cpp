@@ -48,6 +48,8 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(dataset_options, downscale), "--downscale"},
       {GART_CLI_FIELD(dataset_options, test_every), "--test-every"},
       {GART_CLI_FIELD(dataset_options, test_split), "--test-split"},
+      {GART_CLI_FIELD(dataset_options, photos), "--photos"},
+      {GART_CLI_FIELD(dataset_options, masks), "--no-masks"},
       {GART_CLI_FIELD(dataset_options, depth), "--depth-weight"},
       {GART_CLI_FIELD(configuration_request, backend), "--backend"},
       {GART_CLI_FIELD(configuration_request, tracer), "--tracer"},

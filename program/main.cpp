@@ -3,7 +3,9 @@
 #include "commands.hpp"
 #include "field_names.hpp"
 #include "help.hpp"
+#include "printable.hpp"
 #include "ranks.hpp"
+#include "threads.hpp"
 
 #include <gart/core/version.hpp>
 
@@ -35,7 +37,7 @@ int flushed(int code) {
 // One rank's error is the end of all: the others would wait for it.
 int fail(std::string const& what, int code) {
   gart_cli::ranks::wait_to_speak();
-  std::fprintf(stderr, "gart: error: %s%s\n", gart_cli::ranks::name().c_str(), what.c_str());
+  std::fprintf(stderr, "gart: error: %s%s\n", gart_cli::ranks::name().c_str(), gart_cli::printable(what).c_str());
   if (gart_cli::ranks::size() > 1) std::fflush(stderr), gart_cli::ranks::end_all(code);
   return code;
 }
@@ -44,6 +46,7 @@ int fail(std::string const& what, int code) {
 
 int main(int argc, char** argv) {
   using namespace gart_cli;
+  bound_threads(argv);
   CLI::App app{"gart trains and renders scenes of ray-traced 3D Gaussians.", "gart"};
   app.formatter(std::make_shared<help_formatter>());
   app.set_version_flag("--version", std::string("gart ") + gart::version, "Print the version and leave");

@@ -104,6 +104,16 @@ void add_exposures(CLI::App& app, std::filesystem::path& file) {
       ->type_name("FILE");
 }
 
+void add_photo_options(CLI::App& command, photo_options& o) {
+  command
+      .add_option("--photos", o.photos,
+                  "The folder that the photographs' names are in (default: where the\ncapture has it, as images beside "
+                  "sparse)")
+      ->type_name("DIR");
+  command.add_flag("--no-masks", o.no_masks,
+                   "Leave out the masks that the capture names, or that are in a\nfolder masks beside its photographs");
+}
+
 gart::vec3 background_color(std::string const& name) { return gart::vec3(name == "white" ? 1.0f : 0.0f); }
 
 gart::configuration_request configuration_request_for(gart::model_file const& file, std::filesystem::path const& path,

@@ -4,6 +4,7 @@
 #include "help.hpp"
 
 #include <gart/backward/strategies.hpp>
+#include <gart/io/dataset.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
@@ -73,6 +74,14 @@ CLI::Validator one_of_strategies();
 CLI::Validator kernel_degree_names();
 
 gart::vec3 background_color(std::string const& name);
+
+// --photos and --no-masks of the commands that read a capture's images.
+struct photo_options {
+  std::string photos;
+  bool no_masks = false;
+  void set(gart::dataset_options& options) const { options.photos = photos, options.masks = !no_masks; }
+};
+void add_photo_options(CLI::App& command, photo_options& o);
 
 // The configuration for a model; unsupported, naming its file, where there is none of its degrees.
 gart::configuration_request configuration_request_for(gart::model_file const& file, std::filesystem::path const& path,

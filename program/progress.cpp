@@ -1,5 +1,7 @@
 #include "progress.hpp"
 
+#include "printable.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -44,7 +46,11 @@ void progress::state(std::string const& text, double share) {
 void progress::note(std::string const& text) {
   if (quiet_) return;
   clear();
-  std::fprintf(stderr, "%s\n", text.c_str());
+  std::fprintf(stderr, "%s\n", printable(text).c_str());
+}
+
+void progress::notes(std::vector<std::string> const& texts) {
+  for (std::string const& text : texts) note(text);
 }
 
 void progress::clear() {

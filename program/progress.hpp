@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace gart_cli {
 
@@ -20,6 +21,7 @@ class progress {
   void state(std::string const& text, double share);
   // Something that stays on the screen.
   void note(std::string const& text);
+  void notes(std::vector<std::string> const& texts);
   void clear();
 
  private:

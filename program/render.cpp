@@ -5,6 +5,7 @@
 #include "progress.hpp"
 #include "ranks.hpp"
 #include "render_images.hpp"
+#include "run_folder.hpp"
 #include "samples.hpp"
 
 #include <gart/io/camera_file.hpp>
@@ -29,7 +30,7 @@ namespace fs = std::filesystem;
 struct render_arguments {
   fs::path model, cameras, path, out, json, exposures;
   configuration_options configuration;
-  std::string background = "black", camera;
+  std::string background = "auto", camera;
   int downscale = 1, samples = 1, frames = 0;
   bool closed = false;
   float alpha_min = -1, transmittance_min = -1;
@@ -93,7 +94,7 @@ int run_render(render_arguments const& a) {
   auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
   renderer->set_model(file.model);
   gart::render_options options = file.render;
-  options.background = background_color(a.background);
+  options.background = background_color(a.background != "auto" ? a.background : background_of_run(a.model));
   if (a.alpha_min >= 0) options.alpha_min = a.alpha_min;
   if (a.transmittance_min >= 0) options.transmittance_min = a.transmittance_min;
   if (a.max_hits >= 0) options.max_hits = static_cast<gart::u32>(a.max_hits);
@@ -102,6 +103,7 @@ int run_render(render_arguments const& a) {
       a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures);
 
   progress say(a.quiet || !speaks);
+  say.notes(file.notes);
   auto const configuration = renderer->configuration();
   nlohmann::json timings = {{"backend", gart::to_string(configuration.backend)},
                             {"tracer", gart::to_string(configuration.tracer)},
@@ -177,10 +179,12 @@ void add_render(CLI::App& app, command& selected) {
                    "side")
       ->type_name("MODEL");
   add_exposures(*render, a->exposures);
-  render->add_option("--background", a->background, "black or white: what it was trained on")
+  render
+      ->add_option("--background", a->background,
+                   "black or white. auto: by the config.json of a run beside the\nmodel, else black")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(one_of({"black", "white"}));
+      ->check(one_of({"auto", "black", "white"}));
   render->add_option("--downscale", a->downscale, "Shrink images by this whole factor")
       ->type_name("N")
       ->capture_default_str()

@@ -7,6 +7,8 @@
 #include <cerrno>
 #include <fstream>
 #include <string>
+#include <system_error>
+#include <vector>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -101,6 +103,22 @@ void refuse_foreign_files(fs::path const& folder) {
                            "exposures.json", "poses.json", "poses_test.json"})
     if (fs::exists(folder / name)) refuse(folder / name);
   for (auto const& image : images_in(folder / "renders")) refuse(image);
+}
+
+void remove_temporary_files(fs::path const& folder) {
+  for (fs::path const& of : {folder, folder / "renders"}) {
+    std::error_code code;
+    std::vector<fs::path> begun;
+    for (fs::directory_iterator at(of, code), end; !code && at != end; at.increment(code)) {
+      // As write_file names them: .NAME.PROCESS-NUMBER.tmp
+      std::string const name = at->path().filename().string();
+      if (!name.starts_with('.') || !name.ends_with(".tmp")) continue;
+      std::string const middle = name.substr(0, name.size() - 4), number = middle.substr(middle.rfind('.') + 1);
+      bool const ours = number.find('-') != number.npos && number.find_first_not_of("0123456789-") == number.npos;
+      if (ours && at->is_regular_file(code)) begun.push_back(at->path());
+    }
+    for (fs::path const& file : begun) fs::remove(file, code);
+  }
 }
 
 void remove_results(fs::path const& folder) {

@@ -28,6 +28,9 @@ void refuse_foreign_files(std::filesystem::path const& folder);
 // The background that a model of a run was trained on, by the config.json that lies beside it; empty where none does.
 std::string background_of_run(std::filesystem::path const& model);
 
+// What a run that was killed had begun to write, in the folder and its renders/. For who holds the folder's lock.
+void remove_temporary_files(std::filesystem::path const& folder);
+
 // What a run leaves at its end: metrics, the report, the test views' poses and the images of renders/.
 void remove_results(std::filesystem::path const& folder);
 // And what it leaves on its way: the model, its exposures and poses, the checkpoint and the history. config.json stays,

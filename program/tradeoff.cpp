@@ -110,6 +110,7 @@ class tradeoff_run {
     if (a_.configuration.threads > 0) omp_set_num_threads(a_.configuration.threads);  // the reference's
 #endif
     file_ = gart::load_model(a_.model);
+    say_.notes(file_.notes);
     configuration exact;
     gart::configuration_request wanted = a_.configuration.request();
     wanted.backward = a_.backward;

@@ -1,5 +1,6 @@
 #include "train_arguments.hpp"
 
+#include "capture_checksum.hpp"
 #include "commands.hpp"
 #include "output.hpp"
 #include "train_fields.hpp"
@@ -112,6 +113,12 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                       "Learn the focal length and the centre of each camera of the\ncapture with the Gaussians, for "
                       "calibrations that are a little\noff; test views are scored through what was learned"));
   in_group(r.add(train, "--downscale", a.downscale, "N", "Shrink images by this whole factor"))->check(between(1, 64));
+  in_group(r.add(
+      train, "--photos", a.photos, "DIR",
+      "The folder that the photographs' names are in (default: where the\ncapture has it, as images beside sparse)"));
+  in_group(
+      r.add_flag(train, "--no-masks", a.no_masks,
+                 "Leave out the masks that the capture names, or that are in a\nfolder masks beside its photographs"));
   in_group(r.add(train, "--background", a.background, "NAME",
                  "white, black, or random (another at each step; tests on black);\nauto: white for transparent "
                  "images and plain white borders,\nelse black"))
@@ -306,6 +313,7 @@ nlohmann::json config_of(train_arguments const& a, gart::dataset const& data) {
                         {"dataset", fs::absolute(a.dataset).lexically_normal().string()},
                         {"train_views", data.train.size()},
                         {"test_views", data.test.size()},
+                        {"checksums", checksums_of(data)},
                         {"options", a.recorded.values()}};
   // A run that goes on must begin at the same: what it has learned is from there.
   if (!a.poses.empty()) {
@@ -327,6 +335,13 @@ void check_same_dataset(train_arguments const& a, gart::dataset const& data) {
   if (now.value("poses_checksum", nlohmann::json()) != config.value("poses_checksum", nlohmann::json()))
     throw usage_error("--poses " + a.poses + ": is not what the run to be resumed began at (" +
                       a.config_file().string() + "; put that file back, or start anew without --resume)");
+  // A run of a gart that wrote none has nothing to compare.
+  for (auto const& [what, sum] : now["checksums"].items()) {
+    nlohmann::json const before = config.value("checksums", nlohmann::json::object());
+    if (!before.is_object() || !before.contains(what) || before[what] == sum) continue;
+    throw usage_error(a.dataset.string() + ": its " + what + " are not those that the run to be resumed began with (" +
+                      a.config_file().string() + "; put the capture back as it was, or start anew without --resume)");
+  }
 }
 
 }  // namespace gart_cli

@@ -63,6 +63,7 @@ void training_run::prepare() {
                         ": is the model in --out, which the run replaces (choose another --out)");
     }
     gart::model_file file = gart::load_model(a_.start, owners());
+    say_.notes(file.notes);
     if (file.kernel_degree != a_.kernel_degree) {
       throw usage_error("--start " + a_.start + ": is of kernel degree " + std::to_string(file.kernel_degree) +
                         ", the run of " + std::to_string(a_.kernel_degree) + " (give --kernel-degree " +
@@ -162,6 +163,7 @@ void training_run::say_choices() {
 void training_run::enter() {
   if (lock_) return;
   lock_.emplace(a_.out);
+  remove_temporary_files(a_.out);
   if (!a_.resume) refuse_foreign_files(a_.out);
 }
 
@@ -171,6 +173,7 @@ void training_run::load() {
   options.downscale = a_.downscale;
   options.test_every = a_.test_every;
   options.test_split = gart::from_string<gart::split_kind>(a_.test_split);
+  options.photos = a_.photos, options.masks = !a_.no_masks;
   options.depth = {a_.depth_weight > 0, gart::from_string<gart::depth_kind>(a_.depth_kind), a_.depth_unit};
   options.progress = [&](std::size_t done, std::size_t total) {
     std::lock_guard const lock(mutex);

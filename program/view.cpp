@@ -2,6 +2,7 @@
 #include "commands.hpp"
 #include "interrupt.hpp"
 #include "options.hpp"
+#include "progress.hpp"
 #include "run_folder.hpp"
 #include "view_options.hpp"
 
@@ -23,6 +24,7 @@ struct view_arguments {
   fs::path model, capture;
   configuration_options configuration;
   view_options view;
+  photo_options photos;
   std::string background = "auto";
   int downscale = 1, test_every = 8;
 };
@@ -36,11 +38,14 @@ std::string background_of(view_arguments const& a, gart::dataset const& data) {
 
 int run_view(view_arguments const& a) {
   gart::model_file file = gart::load_model(a.model);
+  progress(false).notes(file.notes);
   gart::dataset data;
   if (!a.capture.empty()) {
     gart::dataset_options options;
     options.downscale = a.downscale, options.test_every = a.test_every;
+    a.photos.set(options);
     data = gart::load_dataset(a.capture, options);
+    progress(false).notes(data.notes);
   }
   auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
   gart::render_options options = file.render;
@@ -80,6 +85,7 @@ void add_view(CLI::App& app, command& selected) {
       ->type_name("NAME")
       ->capture_default_str()
       ->check(one_of({"auto", "black", "white"}));
+  add_photo_options(*view, a->photos);
   view->add_option("--downscale", a->downscale, "Shrink photographs and their cameras by this whole factor")
       ->type_name("N")
       ->capture_default_str()

@@ -77,7 +77,10 @@ camera_format const* camera_format_of(int number) {
 }
 
 camera_format const* camera_format_of(std::string_view name) {
-  return find([&](camera_format const& f) { return f.name == name; });
+  // Programs write them in small letters too.
+  auto const same = [](char a, char b) { return a == (b >= 'a' && b <= 'z' ? b - 'a' + 'A' : b); };
+  return find(
+      [&](camera_format const& f) { return std::equal(f.name.begin(), f.name.end(), name.begin(), name.end(), same); });
 }
 
 std::string traced_camera_formats() {

@@ -12,6 +12,30 @@
 namespace gart::io {
 namespace fs = std::filesystem;
 
+std::vector<u8> with_words_quoted(std::vector<u8> const& bytes) {
+  std::vector<u8> out;
+  out.reserve(bytes.size() + bytes.size() / 8);
+  std::string_view rest(reinterpret_cast<char const*>(bytes.data()), bytes.size());
+  bool in_text = false;
+  while (!rest.empty()) {
+    std::size_t taken = 1;
+    bool quoted = false;
+    if (in_text && rest[0] == '\\') {
+      taken = std::min<std::size_t>(2, rest.size());
+    } else if (rest[0] == '"') {
+      in_text = !in_text;
+    } else if (!in_text) {
+      for (std::string_view const word : {"NaN", "Infinity", "-Infinity"})
+        if (rest.starts_with(word)) taken = word.size(), quoted = true;
+    }
+    if (quoted) out.push_back('"');
+    out.insert(out.end(), rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(taken));
+    if (quoted) out.push_back('"');
+    rest.remove_prefix(taken);
+  }
+  return out;
+}
+
 camera_format const* camera_model_of(record const& r, char const* otherwise) {
   std::string const name = r.has("camera_model") ? r.text("camera_model") : otherwise;
   camera_format const* const model = camera_format_of(name);
@@ -97,15 +121,36 @@ bool is_json_list(fs::path const& file) {
 
 namespace {
 
+// 3DGS' cameras.json: the middle of the image for cx and cy, and the pose in two parts.
+void read_position_and_rotation(record const& r, camera& view) {
+  json rows = json::array();
+  json const &position = r.at("position"), &rotation = r.at("rotation");
+  for (std::size_t i = 0; i < 3; ++i) {
+    json row = rotation.is_array() && rotation.size() == 3 ? rotation[i] : json();
+    if (!row.is_array() || row.size() != 3 || !position.is_array() || position.size() != 3)
+      throw io_error(r.where, "'rotation' and 'position' are not 3 x 3 and 3 numbers", "export it again");
+    row.push_back(position[i]);
+    rows.push_back(std::move(row));
+  }
+  json const whole = {{"rotation", rows}};
+  read_pose({whole, nullptr, r.where}, "rotation", false, view);
+}
+
 named_camera camera_of(record const& r) {
   named_camera c;
   c.view.width = r.size("width"), c.view.height = r.size("height");
   camera_format const* const model = camera_model_of(r, "PINHOLE");
   c.view.kind = *model->kind;
   if (c.view.kind != camera_kind::equirectangular)
-    for (char const* key : {"fx", "fy", "cx", "cy"}) set_member(c.view, key, r.number(key));
+    for (char const* key : {"fx", "fy", "cx", "cy"}) {
+      bool const middle = !r.has("c2w") && r.has("position") && !r.has(key) && key[0] == 'c';
+      set_member(c.view, key, middle ? 0.5 * (key[1] == 'x' ? c.view.width : c.view.height) : r.number(key));
+    }
   read_lens_members(r, *model, c.view);
-  read_pose(r, "c2w", false, c.view);
+  if (!r.has("c2w") && r.has("position"))
+    read_position_and_rotation(r, c.view);
+  else
+    read_pose(r, "c2w", false, c.view);
   read_shutter(r, "c2w_end", false, c.view);
   check_camera(c.view, r.where);
   return c;
@@ -142,7 +187,7 @@ std::vector<named_camera> read_camera_json(fs::path const& file) {
   for (std::size_t i = 0; i < root.size(); ++i) {
     record const r{root[i], nullptr, file.string() + ", camera " + std::to_string(i)};
     if (!r.own.is_object()) throw io_error(r.where, "is not a JSON object", "write {\"name\", \"width\", ...}");
-    std::string const name = r.text("name");
+    std::string const name = r.text(!r.has("name") && r.has("img_name") ? "img_name" : "name");
     cameras.push_back(camera_of(r));
     cameras.back().name = name;
   }

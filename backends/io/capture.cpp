@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 #include <system_error>
 
@@ -17,6 +18,7 @@ void frame::set_size(int width, int height) {
   if (angle_x > 0) view.fx = static_cast<float>(0.5 * width / std::tan(0.5 * angle_x));
   if (angle_y > 0) {
     view.fy = static_cast<float>(0.5 * height / std::tan(0.5 * angle_y));
+    if (!(angle_x > 0)) view.fx = view.fy;
   } else if (angle_x > 0) {
     view.fy = view.fx;
   }
@@ -45,8 +47,8 @@ void set_pose(camera& view, mat3d const& axes, vec3d const& center, std::string 
   bool finite = true;
   for (int i = 0; i < 3; ++i) finite = finite && std::isfinite(length[i]) && std::abs(center[i]) <= farthest;
   if (!finite) {
-    throw io_error(where, "the pose is not finite, or farther than 1e18 from the origin",
-                   "remove the image, or correct its pose");
+    throw pose_error(where, "the pose is not finite, or farther than 1e18 from the origin",
+                     "remove the image, or correct its pose");
   }
   bool rotation = length[0] > 1e-12;
   for (int i = 1; i < 3; ++i) rotation = rotation && std::abs(length[i] - length[0]) <= 1e-2 * length[0];
@@ -61,11 +63,25 @@ void set_pose(camera& view, mat3d const& axes, vec3d const& center, std::string 
     view.rotation = mat3(mat3d(x, y, cross(x, y)));
   }
   if (!rotation) {
-    throw io_error(where, "the pose is not a rotation (its columns are not the axes of a right-handed frame)",
-                   "correct the pose");
+    throw pose_error(where, "the pose is not a rotation (its columns are not the axes of a right-handed frame)",
+                     "correct the pose");
   }
   view.position = center;
 }
+
+namespace {
+// File systems take 255 bytes, of which endings and temporary names have some. The end of a long name tells it from
+// others, its start whose it is. No character of UTF-8 is cut.
+std::string short_name(std::string name) {
+  constexpr std::size_t most = 160, head = 40;
+  if (name.size() <= most) return name;
+  auto const within = [&](std::size_t at) { return (static_cast<u8>(name[at]) & 0xc0) == 0x80; };
+  std::size_t begin = head, end = name.size() - (most - head - 1);
+  while (begin > 0 && within(begin)) --begin;
+  while (end < name.size() && within(end)) ++end;
+  return name.substr(0, begin) + "-" + name.substr(end);
+}
+}  // namespace
 
 void make_file_names(std::vector<std::string*> const& names) {
   std::set<std::string> taken;
@@ -93,6 +109,7 @@ void make_file_names(std::vector<std::string*> const& names) {
       if (!fit) c = '_';
     }
     if (flat.empty() || flat[0] == '.') flat.insert(0, "view");
+    flat = short_name(std::move(flat));
     // NAME_truth is the true picture beside a render.
     std::string unique = flat;
     while (taken.count(unique) || taken.count(unique + "_truth"))
@@ -102,7 +119,58 @@ void make_file_names(std::vector<std::string*> const& names) {
   }
 }
 
-capture read_capture(fs::path const& path) {
+namespace {
+
+struct colmap_place {
+  fs::path folder;
+  bool text = false;
+};
+
+// The model of a folder: binary before text.
+std::optional<colmap_place> colmap_in(fs::path const& folder) {
+  for (bool text : {false, true})
+    if (has_colmap_model(folder, text)) return colmap_place{folder, text};
+  return std::nullopt;
+}
+
+// COLMAP numbers the parts that it could not join: the one of most images, and what to say of the others.
+std::optional<colmap_place> largest_colmap_below(fs::path const& sparse, std::vector<std::string>& notes) {
+  std::error_code code;
+  std::vector<fs::path> folders;
+  for (fs::directory_iterator at(sparse, code), end; !code && at != end; at.increment(code))
+    if (at->is_directory(code)) folders.push_back(at->path());
+  std::sort(folders.begin(), folders.end(), [](fs::path const& a, fs::path const& b) {
+    std::string const x = a.filename().string(), y = b.filename().string();
+    return x.size() != y.size() ? x.size() < y.size() : x < y;
+  });
+  std::vector<colmap_place> models;
+  for (fs::path const& folder : folders)
+    if (auto const model = colmap_in(folder)) models.push_back(*model);
+  if (models.empty()) return std::nullopt;
+  if (models.size() == 1) return models[0];
+  std::size_t best = 0, most = 0;
+  std::string all;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    std::size_t const images = images_in_colmap(models[i].folder, models[i].text);
+    if (images > most) best = i, most = images;
+    all += (i ? ", " : "") + models[i].folder.filename().string() + " of " + counted(images, "image");
+  }
+  notes.push_back(sparse.string() + " has " + counted(models.size(), "model") + " (" + all +
+                  "): " + models[best].folder.filename().string() + " is used (to use another, name its folder)");
+  return models[best];
+}
+
+std::optional<colmap_place> colmap_of(fs::path const& capture, std::vector<std::string>& notes) {
+  for (fs::path const& sparse : {capture / "sparse", capture / "colmap" / "sparse"}) {
+    if (auto const model = largest_colmap_below(sparse, notes)) return model;
+    if (auto const model = colmap_in(sparse)) return model;
+  }
+  for (fs::path const& folder : {capture / "colmap", capture})
+    if (auto const model = colmap_in(folder)) return model;
+  return std::nullopt;
+}
+
+capture read_files(fs::path const& path, fs::path const& photos) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) throw io_error(path.string(), "there is no such file or folder", "check the path");
   if (!fs::is_directory(path, ignored)) {
@@ -111,29 +179,41 @@ capture read_capture(fs::path const& path) {
     if (name == "transforms_train.json") return read_blender(folder);
     if (extension == ".json") return read_transforms(path);
     bool const model = path.stem() == "cameras" || path.stem() == "images" || path.stem() == "points3D";
-    if (model && (extension == ".bin" || extension == ".txt")) return read_colmap(folder, extension == ".txt");
+    if (model && (extension == ".bin" || extension == ".txt")) return read_colmap(folder, extension == ".txt", photos);
     throw io_error(path.string(), "is not a capture that gart reads",
                    "name a folder, a transforms.json, or a COLMAP cameras.bin or cameras.txt");
   }
   fs::path const transforms = path / "transforms.json";
-  for (fs::path const& folder : {path / "sparse" / "0", path / "sparse", path}) {
-    for (bool text : {false, true}) {
-      if (!has_colmap_model(folder, text)) continue;
-      capture c = read_colmap(folder, text);
-      if (fs::exists(transforms, ignored)) {
-        c.notes.push_back(
-            "both a COLMAP model and transforms.json are there: COLMAP is used, for its points (to use the "
-            "other, name " +
-            transforms.string() + ")");
-      }
-      return c;
+  std::vector<std::string> notes;
+  if (auto const model = colmap_of(path, notes)) {
+    capture c = read_colmap(model->folder, model->text, photos);
+    c.notes.insert(c.notes.begin(), notes.begin(), notes.end());
+    if (fs::exists(transforms, ignored)) {
+      c.notes.push_back(
+          "both a COLMAP model and transforms.json are there: COLMAP is used, for its points (to use the "
+          "other, name " +
+          transforms.string() + ")");
     }
+    return c;
   }
   if (fs::exists(path / "transforms_train.json", ignored)) return read_blender(path);
   if (fs::exists(transforms, ignored)) return read_transforms(transforms);
   throw io_error(
       path.string(), "holds no capture that gart reads",
       "expected sparse/0 (COLMAP), transforms_train.json (Blender) or transforms.json (nerfstudio, instant-ngp)");
+}
+
+}  // namespace
+
+capture read_capture(fs::path const& path, dataset_options const& options) {
+  std::error_code ignored;
+  if (!options.photos.empty() && !fs::is_directory(options.photos, ignored))
+    throw io_error(options.photos.string(), "is no folder", "name the folder that the photos are in");
+  capture c = read_files(path, options.photos);
+  if (!options.photos.empty()) c.photos = options.photos;
+  find_photos(c);
+  if (options.masks) find_masks(c);
+  return c;
 }
 
 }  // namespace gart::io

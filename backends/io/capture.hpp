@@ -1,6 +1,8 @@
 #pragma once
 // A capture as its files describe it, before any photo is opened: what the format readers hand to load_dataset.
 
+#include "unusable.hpp"
+
 #include <gart/camera/models.hpp>
 #include <gart/io/dataset.hpp>
 
@@ -31,19 +33,36 @@ struct frame {
 struct capture {
   std::filesystem::path source;  // what errors name
   std::string format;
-  std::string own_split;  // in words; empty: every nth view by name is a test view
+  std::string own_split;         // in words; empty: every nth view by name is a test view
+  std::filesystem::path photos;  // the folder that the frames' names are in
   std::vector<frame> frames;
   point_cloud points;
   std::vector<std::string> notes;
   bool synthetic_bounds = false;  // Blender's box, not one around the cameras
 };
 
-// Which files a path means, and what to say about the choice.
-capture read_capture(std::filesystem::path const& path);
+// Which files a path means, and what to say about the choice; with their photos and masks.
+capture read_capture(std::filesystem::path const& path, dataset_options const& options);
 
-// A COLMAP model folder: binary or text, whichever `text` says.
-capture read_colmap(std::filesystem::path const& model, bool text);
+// A COLMAP model folder: binary or text, whichever `text` says; its photos in `photos`, or where captures have them.
+capture read_colmap(std::filesystem::path const& model, bool text, std::filesystem::path const& photos);
 bool has_colmap_model(std::filesystem::path const& folder, bool text);
+std::size_t images_in_colmap(std::filesystem::path const& folder, bool text);
+
+// The folders of photos in a capture's: images, then its smaller copies by their factor, then input.
+std::vector<std::filesystem::path> photo_folders_in(std::filesystem::path const& capture);
+
+// Finds what photos the frames have not, by their names; says which names are others than the files', and which none.
+void find_photos(capture& c);
+// Masks in a folder `masks` beside that of the photos, where the files of the capture name none.
+void find_masks(capture& c);
+
+// Where maps of a kind are: a folder of that name beside the photo's folder of photos; the photo's path below the
+// latter.
+struct place_beside {
+  std::filesystem::path folder, below;
+};
+place_beside beside_photos(std::filesystem::path const& photo, char const* name);
 
 capture read_blender(std::filesystem::path const& folder);
 capture read_transforms(std::filesystem::path const& file);
@@ -51,6 +70,13 @@ capture read_transforms(std::filesystem::path const& file);
 // Whether the JSON file's outermost value is a list: the camera JSON.
 bool is_json_list(std::filesystem::path const& file);
 std::vector<named_camera> read_camera_json(std::filesystem::path const& file);
+
+// Of one image: the others are read without it.
+struct pose_error : io_error {
+  pose_error(std::string const& where, std::string const& what, std::string const& remedy)
+      : io_error(where, what, remedy), fault(what) {}
+  std::string fault;  // without the place
+};
 
 // Sizes and intrinsics that can be traced, a finite pose; `where` names the file and the camera in errors.
 void check_camera(camera const& view, std::string const& where);
@@ -60,9 +86,5 @@ void set_pose(camera& view, mat3d const& camera_to_world, vec3d const& center, s
 
 // Names that are fit for files and differ from each other: folders flattened, extensions dropped.
 void make_file_names(std::vector<std::string*> const& names);
-
-inline std::string counted(std::size_t n, char const* noun) {
-  return std::to_string(n) + " " + noun + (n == 1 ? "" : "s");
-}
 
 }  // namespace gart::io

@@ -1,5 +1,6 @@
 #include "codebook.hpp"
 
+#include "bulk.hpp"
 #include "packing.hpp"
 
 #include <cmath>
@@ -10,6 +11,7 @@ namespace gart::io {
 
 namespace {
 
+constexpr double codebook_reach = 8;
 constexpr int moves = 24;          // of a codebook's numbers
 constexpr int rounds = 4;          // of a palette's means
 constexpr double most_work = 8e9;  // of a round: multiplications, about a second
@@ -169,13 +171,14 @@ class palette_maker {
 
 codebook::codebook(std::vector<float> const& values) {
   if (values.empty()) return;
-  auto const [least, most] = std::minmax_element(values.begin(), values.end());
-  double const low = static_cast<double>(*least), size = static_cast<double>(*most) - low;
+  auto const [least, most] = bulk_range(values, codebook_reach);
+  double const low = static_cast<double>(least), size = static_cast<double>(most) - low;
   std::vector<bin> bins(16384);
   for (float const v : values) {
-    double const at = size > 0 ? (static_cast<double>(v) - low) / size * static_cast<double>(bins.size()) : 0;
+    double const inside = static_cast<double>(std::clamp(v, least, most));
+    double const at = size > 0 ? (inside - low) / size * static_cast<double>(bins.size()) : 0;
     bin& b = bins[std::min(bins.size() - 1, static_cast<std::size_t>(at))];
-    ++b.count, b.sum += static_cast<double>(v);
+    ++b.count, b.sum += inside;
   }
   double all = 0;
   for (bin const& b : bins) all += std::cbrt(b.count);
@@ -187,7 +190,7 @@ codebook::codebook(std::vector<float> const& values) {
     while (next < at.size() && b.count > 0 && seen >= all * (static_cast<double>(next) + 0.5) / 256)
       at[next++] = b.sum / b.count;
   }
-  while (next < at.size()) at[next++] = static_cast<double>(*most);
+  while (next < at.size()) at[next++] = static_cast<double>(most);
   for (int move = 0; move < moves; ++move) {
     std::array<bin, 256> nearest_to{};
     std::size_t k = 0;
@@ -214,9 +217,9 @@ u8 codebook::nearest(float value) const {
 codebook codebook::even(std::vector<float> const& values, double step) {
   codebook c({});
   if (values.empty()) return c;
-  auto const [least, most] = std::minmax_element(values.begin(), values.end());
-  double const first = std::floor(static_cast<double>(*least) / step + 0.5),
-               last = std::floor(static_cast<double>(*most) / step + 0.5);
+  auto const [least, most] = bulk_range(values, codebook_reach);
+  double const first = std::floor(static_cast<double>(least) / step + 0.5),
+               last = std::floor(static_cast<double>(most) / step + 0.5);
   if (!(last - first < 256)) return codebook(values);
   for (std::size_t i = 0; i < c.numbers_.size(); ++i)
     c.numbers_[i] = static_cast<float>(std::min(last, first + static_cast<double>(i)) * step);

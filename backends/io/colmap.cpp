@@ -4,16 +4,18 @@
 #include "bytes.hpp"
 #include "camera_formats.hpp"
 #include "capture.hpp"
+#include "file_names.hpp"
+#include "text_lines.hpp"
 
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
+#include <gart/io/ply.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
 #include <map>
-#include <optional>
 
 namespace gart::io {
 namespace fs = std::filesystem;
@@ -35,20 +37,25 @@ struct pose {
 struct model_files {
   std::map<u32, sensor> sensors;
   std::vector<pose> poses;
-  point_cloud points;
-  std::size_t wild_points = 0;
 };
 
-void add_point(model_files& model, std::array<double, 3> const& position, std::array<u8, 3> const& color) {
-  bool finite = true;
-  for (double v : position) finite = finite && std::isfinite(static_cast<float>(v));
-  if (!finite) {
-    ++model.wild_points;
-    return;
+// Points of a file, and those that are not finite.
+struct model_points {
+  point_cloud cloud;
+  std::size_t read = 0;
+  unusable bad;
+
+  void add(u64 id, std::array<double, 3> const& position, std::array<u8, 3> const& color) {
+    bool finite = true;
+    for (double v : position) finite = finite && std::isfinite(static_cast<float>(v));
+    if (!finite) bad.add(read, [&] { return "point " + std::to_string(id) + " is not finite"; });
+    if (finite) {
+      for (double v : position) cloud.position.push_back(static_cast<float>(v));
+      cloud.color.insert(cloud.color.end(), color.begin(), color.end());
+    }
+    ++read;
   }
-  for (double v : position) model.points.position.push_back(static_cast<float>(v));
-  model.points.color.insert(model.points.color.end(), color.begin(), color.end());
-}
+};
 
 void read_cameras_bin(fs::path const& path, model_files& model) {
   std::vector<u8> const bytes = read_file(path);
@@ -90,69 +97,22 @@ void read_images_bin(fs::path const& path, model_files& model) {
   }
 }
 
-void read_points_bin(fs::path const& path, model_files& model) {
+void read_points_bin(fs::path const& path, model_points& points) {
   std::vector<u8> const bytes = read_file(path);
   byte_reader in(bytes, path.string());
   u64 const n = in.count("the number of points", 51);
-  model.points.position.reserve(n * 3), model.points.color.reserve(n * 3);
+  points.cloud.position.reserve(n * 3), points.cloud.color.reserve(n * 3);
   for (u64 i = 0; i < n; ++i) {
-    in.get<u64>("a point's id");
+    u64 const id = in.get<u64>("a point's id");
     std::array<double, 3> position;
     std::array<u8, 3> color;
     for (double& v : position) v = in.get<double>("a point's position");
     for (u8& v : color) v = in.get<u8>("a point's colour");
     in.get<double>("a point's error");
     in.skip(in.count("a point's track length", 8) * 8, "a point's track");
-    add_point(model, position, color);
+    points.add(id, position, color);
   }
 }
-
-// A text file by lines, with the line number for errors.
-class text_lines {
- public:
-  explicit text_lines(fs::path const& path) : file_(path.string()), bytes_(read_file(path)) {
-    rest_ = std::string_view(reinterpret_cast<char const*>(bytes_.data()), bytes_.size());
-  }
-  // The next line that is neither blank nor a comment.
-  bool next_record() {
-    while (next()) {
-      std::string_view probe = line_;
-      std::string_view const word = next_word(probe);
-      if (!word.empty() && word[0] != '#') return true;
-    }
-    return false;
-  }
-  bool next() { return next_line(rest_, line_) && ++number_; }
-  std::string_view word(char const* field) {
-    std::string_view const w = next_word(line_);
-    if (w.empty()) refuse(std::string(field) + " is missing");
-    return w;
-  }
-  template <class T>
-  T number(char const* field) {
-    std::string_view const w = word(field);
-    T value{};
-    if (!parse_number(w, value))
-      refuse(std::string(field) + " is '" + std::string(w.substr(0, 40)) + "', not a number in range");
-    return value;
-  }
-  std::string rest_of_line(char const* field) {
-    while (!line_.empty() && is_space(line_.front())) line_.remove_prefix(1);
-    while (!line_.empty() && is_space(line_.back())) line_.remove_suffix(1);
-    if (line_.empty()) refuse(std::string(field) + " is missing");
-    return std::string(line_);
-  }
-  [[noreturn]] void refuse(std::string const& what) const {
-    throw io_error(file_ + ", line " + std::to_string(number_), what,
-                   "the file is truncated or damaged: export it again");
-  }
-
- private:
-  std::string file_;
-  std::vector<u8> bytes_;
-  std::string_view rest_, line_;
-  std::size_t number_ = 0;
-};
 
 void read_cameras_txt(fs::path const& path, model_files& model) {
   text_lines in(path);
@@ -168,8 +128,20 @@ void read_cameras_txt(fs::path const& path, model_files& model) {
     for (int k = 0; k < s.model->parameters(); ++k)
       s.parameters[static_cast<std::size_t>(k)] =
           in.number<double>(("the camera's " + std::string(s.model->field(k))).c_str());
+    in.end("camera " + std::to_string(id) + ", " + std::string(s.model->name) + " of " +
+           std::to_string(s.model->parameters()) + " parameters,");
     model.sensors[id] = s;
   }
+}
+
+// Whether a line is one of points, triples of numbers or nothing, and no image whose line comes without one.
+bool is_line_of_points(std::string_view line) {
+  std::size_t words = 0;
+  for (std::string_view word; !(word = next_word(line)).empty(); ++words) {
+    double value = 0;
+    if (!parse_number(word, value)) return false;
+  }
+  return words % 3 == 0;
 }
 
 void read_images_txt(fs::path const& path, model_files& model) {
@@ -182,20 +154,20 @@ void read_images_txt(fs::path const& path, model_files& model) {
     p.camera_id = in.number<u32>("an image's camera");
     p.name = in.rest_of_line("an image's name");
     model.poses.push_back(std::move(p));
-    in.next();  // its points, which may be an empty line
+    if (is_line_of_points(in.ahead())) in.next();
   }
 }
 
-void read_points_txt(fs::path const& path, model_files& model) {
+void read_points_txt(fs::path const& path, model_points& points) {
   text_lines in(path);
   while (in.next_record()) {
-    in.number<u64>("a point's id");
+    u64 const id = in.number<u64>("a point's id");
     std::array<double, 3> position;
     std::array<u8, 3> color;
     for (double& v : position) v = in.number<double>("a point's position");
     for (u8& v : color) v = in.number<u8>("a point's colour");
     in.number<double>("a point's error");
-    add_point(model, position, color);
+    points.add(id, position, color);
   }
 }
 
@@ -224,7 +196,8 @@ void set_world_to_camera(camera& view, pose const& p, std::string const& where) 
   double norm2 = 0;
   for (double v : p.rotation) norm2 += v * v;
   if (!std::isfinite(norm2) || !(norm2 > 1e-12)) {
-    throw io_error(where, "its rotation is not a finite quaternion other than zero", "remove the image from the model");
+    throw pose_error(where, "its rotation is not a finite quaternion other than zero",
+                     "remove the image from the model");
   }
   double const s = 1 / std::sqrt(norm2);
   double const w = p.rotation[0] * s, x = p.rotation[1] * s, y = p.rotation[2] * s, z = p.rotation[3] * s;
@@ -240,15 +213,55 @@ fs::path file_of(fs::path const& folder, char const* stem, bool text) {
   return folder / (std::string(stem) + (text ? ".txt" : ".bin"));
 }
 
-// The photos lie in images/ beside the model or up to two folders above it.
-std::optional<fs::path> image_folder(fs::path const& model) {
+// The folder that the capture's photos lie in or below: that of the model, or up to three above it.
+fs::path above_of(fs::path const& model) {
   std::error_code ignored;
   fs::path const base = fs::absolute(model, ignored).lexically_normal();
-  fs::path folder = base.has_filename() ? base : base.parent_path();
-  for (int up = 0; up < 3; ++up, folder = folder.parent_path()) {
-    if (fs::is_directory(folder / "images", ignored)) return folder / "images";
+  return base.has_filename() ? base : base.parent_path();
+}
+
+// Of the folders of photos beside the model or above it, the one that has most of the names; the nearest of them, and
+// `images` before its smaller copies, where several have as many.
+fs::path photo_folder_of(fs::path const& model, std::vector<pose> const& poses) {
+  constexpr int levels = 4;
+  constexpr std::size_t asked = 64;
+  fs::path best, folder = above_of(model);
+  std::size_t most = 0;
+  for (int up = 0; up < levels && folder.has_filename(); ++up, folder = folder.parent_path()) {
+    // sparse/0 is two below the capture, colmap/sparse/0 three.
+    if (up == levels - 1 && above_of(model).parent_path().parent_path().filename() != "colmap") break;
+    for (fs::path const& candidate : photo_folders_in(folder)) {
+      file_names names(candidate);
+      std::size_t found = 0;
+      for (std::size_t i = 0; i < std::min(asked, poses.size()); ++i) found += !names.find(poses[i].name).file.empty();
+      if (best.empty() || found > most) best = candidate, most = found;
+    }
   }
-  return std::nullopt;
+  return best;
+}
+
+// The points of a model: beside it as its own format, as the other, or as the PLY that other programs leave.
+point_cloud points_of(fs::path const& folder, bool text, std::vector<std::string>& notes) {
+  std::error_code ignored;
+  for (bool const kind : {text, !text}) {
+    fs::path const file = file_of(folder, "points3D", kind);
+    if (!fs::exists(file, ignored)) continue;
+    model_points points;
+    (kind ? read_points_txt : read_points_bin)(file, points);
+    if (!points.bad.records().empty()) points.bad.others(points.read, "point", file.string(), &notes);
+    if (points.cloud.size() == 0) continue;
+    if (kind != text) notes.push_back("the points are those of " + file.string());
+    return std::move(points.cloud);
+  }
+  fs::path const ply = folder / "points3D.ply";
+  if (fs::exists(ply, ignored)) {
+    notes.push_back("the points are those of " + ply.string());
+    return read_point_ply(ply, &notes);
+  }
+  fs::path const own = file_of(folder, "points3D", text);
+  notes.push_back(own.string() + (fs::exists(own, ignored) ? " has no point" : " is not there") +
+                  ": training starts at random points");
+  return {};
 }
 
 }  // namespace
@@ -259,28 +272,34 @@ bool has_colmap_model(fs::path const& folder, bool text) {
          fs::is_regular_file(file_of(folder, "images", text), ignored);
 }
 
-capture read_colmap(fs::path const& folder, bool text) {
+std::size_t images_in_colmap(fs::path const& folder, bool text) {
+  model_files model;
+  try {
+    (text ? read_images_txt : read_images_bin)(file_of(folder, "images", text), model);
+  } catch (io_error const&) {
+    return 0;  // which its own reader says, where there is no other model
+  }
+  return model.poses.size();
+}
+
+capture read_colmap(fs::path const& folder, bool text, fs::path const& photos) {
   capture result;
   result.source = folder;
   result.format = "COLMAP";
   model_files model;
   (text ? read_cameras_txt : read_cameras_bin)(file_of(folder, "cameras", text), model);
-  (text ? read_images_txt : read_images_bin)(file_of(folder, "images", text), model);
-  std::error_code ignored;
-  fs::path const points = file_of(folder, "points3D", text);
-  if (fs::exists(points, ignored)) {
-    (text ? read_points_txt : read_points_bin)(points, model);
-  } else {
-    result.notes.push_back(points.string() + " is not there: training starts at random points");
-  }
-  if (model.wild_points) {
-    result.notes.push_back(counted(model.wild_points, "point") + " of " + points.string() + " left out: not finite");
-  }
-  auto const photos = image_folder(folder);
-  if (!photos) result.notes.push_back("there is no folder images beside " + folder.string() + " or above it");
-
   fs::path const images = file_of(folder, "images", text);
-  for (pose const& p : model.poses) {
+  (text ? read_images_txt : read_images_bin)(images, model);
+  result.points = points_of(folder, text, result.notes);
+
+  result.photos = photos.empty() ? photo_folder_of(folder, model.poses) : photos;
+  if (result.photos.empty())
+    result.notes.push_back("there is no folder images beside " + folder.string() + " or above it");
+  else if (result.photos.filename() != "images")
+    result.notes.push_back("the photos are those of " + result.photos.string());
+  unusable bad;
+  for (std::size_t i = 0; i < model.poses.size(); ++i) {
+    pose const& p = model.poses[i];
     std::string const where = images.string() + ", image " + p.name;
     auto const found = model.sensors.find(p.camera_id);
     if (found == model.sensors.end()) {
@@ -293,12 +312,16 @@ capture read_colmap(fs::path const& folder, bool text) {
     std::string const lens_place =
         file_of(folder, "cameras", text).string() + ", camera " + std::to_string(p.camera_id);
     f.view = lens_of(found->second, lens_place);
-    set_world_to_camera(f.view, p, where);
+    try {
+      set_world_to_camera(f.view, p, where);
+    } catch (pose_error const& e) {
+      bad.add(i, [&] { return "image " + p.name + ", " + e.fault; });
+      continue;
+    }
     check_camera(f.view, lens_place);
-    if (photos && fs::is_regular_file(*photos / p.name, ignored)) f.photo = *photos / p.name;
     result.frames.push_back(std::move(f));
   }
-  result.points = std::move(model.points);
+  if (!bad.records().empty()) bad.others(model.poses.size(), "image", images.string(), &result.notes);
   return result;
 }
 

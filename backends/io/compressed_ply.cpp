@@ -2,6 +2,7 @@
 // the greatest of its chunk; spherical harmonics a byte each, from -4 to 4.
 // https://github.com/playcanvas/splat-transform
 
+#include "bulk.hpp"
 #include "bytes.hpp"
 #include "packing.hpp"
 #include "ply_header.hpp"
@@ -23,6 +24,7 @@ using namespace io::ply;
 namespace fs = std::filesystem;
 
 constexpr std::size_t chunk_size = 256;
+constexpr double chunk_reach = 2;  // of strays, as 255 others share their chunk's 11 bits
 constexpr float scale_limit = 20;  // logarithms beyond are none of a Gaussian that anyone sees
 constexpr double half_root = 0.70710678118654752440;
 
@@ -96,12 +98,12 @@ class compressed_reader {
  public:
   explicit compressed_reader(fs::path const& path) : file_(open(path)) {}
 
-  gaussian_model read(splat_traits* traits) {
+  gaussian_model read(splat_traits* traits, std::vector<std::string>* notes) {
     if (file_.head.format != encoding::little)
       file_.refuse("is a compressed PLY that is not little-endian", "export it again");
     records const chunks = find("chunk"), vertices = find("vertex");
     std::size_t const n = vertices.of.count;
-    require_plausible(file_.name, n, file_.bytes.size());
+    require_plausible(file_.name, n, degree(), file_.bytes.size());
     if (chunks.of.count != (n + chunk_size - 1) / chunk_size)
       file_.refuse("has " + std::to_string(chunks.of.count) + " chunks for " + std::to_string(n) + " Gaussians",
                    "a chunk has 256 of them: export it again");
@@ -136,7 +138,7 @@ class compressed_reader {
         for (std::size_t j = 0; j < 3 * rest; ++j)
           m.sh[3 * (k * i + 1 + j % rest) + j / rest] = unpack_coefficient(harmonics.get<u8>(i, at[j]));
     }
-    require_finite(file_.name, m);
+    keep_usable(file_.name, m, notes);
     if (traits) *traits = file_.head.traits;
     return m;
   }
@@ -197,6 +199,7 @@ void write_compressed(fs::path const& path, gaussian_model const& given, splat_t
                       splat_packing const&) {
   require_packable(path, given);
   gaussian_model m = in_order(given, along_a_curve(given));
+  draw_in_strays(m, chunk_reach);
   for (float& s : m.log_scale) s = std::clamp(s, -scale_limit, scale_limit);
   std::size_t const n = m.size(), chunks = (n + chunk_size - 1) / chunk_size;
   std::size_t const k = static_cast<std::size_t>(sh_coefficients(m.sh_degree)), rest = k - 1;
@@ -255,11 +258,13 @@ extern splat_format const compressed_ply_format;
 splat_format const compressed_ply_format = {
     "compressed PLY",
     ".compressed.ply",
-    {.traits = true, .kernel = true},
+    {.strays = false, .traits = true, .kernel = true},
     [](std::string_view first) {
       return ply_format.begins(first) && first.find("\nelement chunk ") != std::string_view::npos;
     },
-    [](fs::path const& path, splat_traits* traits) { return compressed_reader(path).read(traits); },
+    [](fs::path const& path, splat_traits* traits, std::vector<std::string>* notes) {
+      return compressed_reader(path).read(traits, notes);
+    },
     write_compressed};
 
 }  // namespace gart

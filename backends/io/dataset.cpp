@@ -1,5 +1,6 @@
 #include "capture.hpp"
 #include "codec.hpp"
+#include "file_names.hpp"
 #include "host_images.hpp"
 #include "view_maps.hpp"
 
@@ -82,6 +83,13 @@ image8 three_channels(image8 image) {
   return result;
 }
 
+// A folder of photos, and what it has that is nearest to a name that was not found.
+std::string what_is_in(fs::path const& folder, std::string const& name) {
+  file_names names(folder);
+  if (names.size() == 0) return folder.string() + ", where no photo is";
+  return folder.string() + ", which has " + counted(names.size(), "photo") + ", the most alike " + names.nearest(name);
+}
+
 void drop_frames_without_photo(capture& c, bool load_images) {
   std::size_t const before = c.frames.size();
   auto const missing = [](frame const& f) { return f.photo.empty(); };
@@ -90,14 +98,21 @@ void drop_frames_without_photo(capture& c, bool load_images) {
   if (without == before) {
     bool const sized = std::all_of(c.frames.begin(), c.frames.end(), [](frame const& f) { return f.view.width > 0; });
     if (load_images || !sized) {
-      throw io_error(c.source.string(),
-                     "none of the " + counted(before, "image") + " it lists is there, such as " + c.frames.front().name,
-                     c.format == "COLMAP" ? "put the photos into a folder named images beside sparse"
-                                          : "put the photos where 'file_path' says");
+      throw io_error(
+          c.source.string(),
+          "none of the " + counted(before, "image") + " it lists is there, such as " + c.frames.front().name +
+              (c.photos.empty() ? std::string() : ", looked for in " + what_is_in(c.photos, c.frames.front().name)),
+          c.format == "COLMAP" ? "put the photos into a folder named images beside sparse, or name their "
+                                 "folder: dataset_options.photos"
+                               : "put the photos where 'file_path' says, or name the folder that it is in: "
+                                 "dataset_options.photos");
     }
     c.notes.push_back("no photo is there: the cameras have the sizes the files state");
   } else if (without) {
-    c.notes.push_back(std::to_string(without) + " of " + counted(before, "frame") + " skipped: no photo is there");
+    auto const first = std::find_if(c.frames.begin(), c.frames.end(), missing);
+    c.notes.push_back(std::to_string(without) + " of " + counted(before, "frame") +
+                      " skipped: no photo is there, such as " + first->name + " in " +
+                      what_is_in(c.photos, first->name));
     c.frames.erase(std::remove_if(c.frames.begin(), c.frames.end(), missing), c.frames.end());
   }
   std::size_t const left_out = static_cast<std::size_t>(
@@ -311,7 +326,7 @@ dataset load(fs::path const& path, dataset_options const& options) {
   if (options.downscale < 1) throw invalid_argument("dataset_options.downscale must be at least 1");
   if (options.test_every < 0) throw invalid_argument("dataset_options.test_every must be 0 (no test views) or more");
   if (!(options.depth.unit >= 0)) throw invalid_argument("dataset_options.depth: its unit must not be negative");
-  capture c = read_capture(path);
+  capture c = read_capture(path, options);
   drop_frames_without_photo(c, options.load_images);
   dataset data;
   data.format = c.format;

@@ -1,3 +1,5 @@
+#include "json_record.hpp"
+
 #include <gart/core/error.hpp>
 #include <gart/io/exposure_file.hpp>
 #include <gart/io/file.hpp>
@@ -49,7 +51,7 @@ void write_exposures(std::filesystem::path const& path, exposure_field const& fi
 }
 
 exposure_field read_exposures(std::filesystem::path const& path) {
-  std::vector<u8> const bytes = read_file(path);
+  std::vector<u8> const bytes = io::with_words_quoted(read_file(path));
   json const file = json::parse(bytes.begin(), bytes.end(), nullptr, false);
   auto const list = [&](char const* key) {
     json const all = file.is_object() ? file.value(key, json()) : json();

@@ -13,7 +13,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include <limits>
 #include <ostream>
+#include <vector>
 
 namespace gart {
 namespace {
@@ -43,9 +45,9 @@ class glb_reader {
  public:
   explicit glb_reader(fs::path const& path) : name_(path.string()), bytes_(read_file(path)) {}
 
-  gaussian_model read(splat_traits* traits) {
+  gaussian_model read(splat_traits* traits, std::vector<std::string>* notes) {
     try {
-      return from(json_part(), traits);
+      return from(json_part(), traits, notes);
     } catch (json::exception const& e) {
       throw io_error(name_ + ": glTF", e.what(), "export it again");
     }
@@ -75,7 +77,7 @@ class glb_reader {
     return document;
   }
 
-  gaussian_model from(json const& document, splat_traits* traits) {
+  gaussian_model from(json const& document, splat_traits* traits, std::vector<std::string>* notes) {
     document_ = &document;
     if (document.contains("extensionsRequired"))
       for (auto const& needed : document["extensionsRequired"])
@@ -90,7 +92,7 @@ class glb_reader {
     }
     if (!seen_)
       refuse(std::string("has no mesh with the extension ") + extension + " in its scene", "name a GLB of Gaussians");
-    require_finite(name_, all);
+    keep_usable(name_, all, notes);
     half_turn(all, up_axis);
     json const asset = document.value("asset", json::object());
     if (traits && asset.contains("extras") && asset["extras"].contains("gart"))
@@ -101,6 +103,10 @@ class glb_reader {
   void visit(std::size_t number, similarity const& above, int depth, gaussian_model& all) {
     if (depth > deepest_node) refuse("has nodes within each other more than " + std::to_string(deepest_node) + " deep");
     json const& node = document_->at("nodes").at(number);
+    // glTF's nodes are trees; what is no tree can have as many ways through it as there are names.
+    visited_.resize(document_->at("nodes").size());
+    if (visited_[number]) refuse("node " + std::to_string(number) + " is below two others, or itself");
+    visited_[number] = true;
     similarity const here = above * placement(node, number);
     if (node.contains("mesh"))
       for (auto const& primitive : document_->at("meshes").at(node["mesh"].get<std::size_t>()).at("primitives"))
@@ -148,7 +154,7 @@ class glb_reader {
     while (degree < 3 && attributes.contains(coefficient_name((degree + 1) * (degree + 1)))) ++degree;
     gaussian_model part;
     std::size_t const n = document_->at("accessors").at(attributes.at("POSITION").get<std::size_t>()).at("count");
-    require_plausible(name_, n + all.size(), bytes_.size());
+    require_plausible(name_, n + all.size(), std::max(degree, all.sh_degree), bytes_.size());
     part.resize(n, degree);
     auto const values = [&](std::string const& name, std::size_t width, auto const& store) {
       if (!attributes.contains(name)) refuse("the Gaussians have no attribute " + name);
@@ -160,18 +166,15 @@ class glb_reader {
       part.quaternion[4 * i + (c + 1) % 4] = static_cast<float>(v);
     });
     values(attribute("SCALE"), 3, [&](std::size_t i, std::size_t c, double v) {
-      if (!(v >= 0)) refuse("Gaussian " + std::to_string(i) + " has a negative scale");
-      part.log_scale[3 * i + c] = static_cast<float>(std::log(std::max(v, 1e-30)));
+      part.log_scale[3 * i + c] = static_cast<float>(std::log(v));  // of what is no length not finite
     });
     values(attribute("OPACITY"), 1, [&](std::size_t i, std::size_t, double v) {
-      if (!(v >= 0 && v <= 1)) refuse("Gaussian " + std::to_string(i) + " has an opacity outside of 0 to 1");
-      part.opacity[i] = opacity_logit(v);
+      part.opacity[i] = v >= 0 && v <= 1 ? opacity_logit(v) : std::numeric_limits<float>::quiet_NaN();
     });
     std::size_t const k = static_cast<std::size_t>(sh_coefficients(degree));
     for (std::size_t j = 0; j < k; ++j)
       values(coefficient_name(static_cast<int>(j)), 3,
              [&](std::size_t i, std::size_t c, double v) { part.sh[3 * (k * i + j) + c] = static_cast<float>(v); });
-    require_finite(name_, part);
     apply_placement(placed, part);
     // Of several meshes with other degrees, the highest holds all.
     int const most = std::max(degree, all.sh_degree);
@@ -253,6 +256,7 @@ class glb_reader {
   u8 const* binary_ = nullptr;
   std::size_t binary_size_ = 0;
   json const* document_ = nullptr;
+  std::vector<bool> visited_;
   bool seen_ = false;
 };
 
@@ -348,12 +352,13 @@ void write_glb(fs::path const& path, gaussian_model const& given, splat_traits c
 }  // namespace
 
 extern splat_format const glb_format;
-splat_format const glb_format = {
-    "GLB",
-    ".glb",
-    {.traits = true},
-    [](std::string_view first) { return first.starts_with("glTF"); },
-    [](fs::path const& path, splat_traits* traits) { return glb_reader(path).read(traits); },
-    write_glb};
+splat_format const glb_format = {"GLB",
+                                 ".glb",
+                                 {.traits = true},
+                                 [](std::string_view first) { return first.starts_with("glTF"); },
+                                 [](fs::path const& path, splat_traits* traits, std::vector<std::string>* notes) {
+                                   return glb_reader(path).read(traits, notes);
+                                 },
+                                 write_glb};
 
 }  // namespace gart

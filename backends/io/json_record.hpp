@@ -10,6 +10,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,10 +20,24 @@ using nlohmann::json;
 
 struct camera_format;
 
+// Python writes NaN, Infinity and -Infinity where JSON has no word: texts of these, which readers name or leave out.
+std::vector<u8> with_words_quoted(std::vector<u8> const& bytes);
+
+// A number, or one of these words; nothing where it is neither.
+inline std::optional<double> number_of(json const& value) {
+  if (value.is_number()) return value.get<double>();
+  if (value == "NaN") return std::nan("");
+  if (value == "Infinity") return HUGE_VAL;
+  if (value == "-Infinity") return -HUGE_VAL;
+  return std::nullopt;
+}
+
 inline json read_json(std::filesystem::path const& path) {
   std::vector<u8> const bytes = read_file(path);
+  if (json value = json::parse(bytes.begin(), bytes.end(), nullptr, false); !value.is_discarded()) return value;
+  std::vector<u8> const quoted = with_words_quoted(bytes);
   try {
-    return json::parse(bytes.begin(), bytes.end());
+    return json::parse(quoted.begin(), quoted.end());
   } catch (json::exception const& e) {
     throw io_error(path.string(), std::string("is not valid JSON: ") + e.what(), "the file is truncated or damaged");
   }
@@ -47,11 +62,12 @@ struct record {
     return *value;
   }
   double number(char const* key) const {
-    json const& value = at(key);
-    if (!value.is_number()) throw io_error(where, std::string("'") + key + "' is not a number", "write a number");
-    double const v = value.get<double>();
-    if (!std::isfinite(v)) throw io_error(where, std::string("'") + key + "' is not finite", "write a finite number");
-    return v;
+    std::optional<double> const v = number_of(at(key));
+    if (!v) throw io_error(where, std::string("'") + key + "' is not a number", "write a number");
+    if (!std::isfinite(*v))
+      throw io_error(where, std::string("'") + key + (std::isnan(*v) ? "' is NaN" : "' is not finite"),
+                     "write a finite number");
+    return *v;
   }
   double number_or(char const* key, double other) const { return has(key) ? number(key) : other; }
   int size(char const* key) const {
@@ -85,9 +101,9 @@ inline void read_pose(record const& r, char const* key, bool opengl_axes, camera
     json const& row = rows[static_cast<std::size_t>(i)];
     if (!row.is_array() || row.size() != 4) refuse();
     for (int j = 0; j < 4; ++j) {
-      json const& value = row[static_cast<std::size_t>(j)];
-      if (!value.is_number()) refuse();
-      (j < 3 ? axes[j][i] : center[i]) = value.get<double>();
+      std::optional<double> const value = number_of(row[static_cast<std::size_t>(j)]);
+      if (!value) refuse();
+      (j < 3 ? axes[j][i] : center[i]) = *value;
     }
   }
   if (opengl_axes) axes[1] = -axes[1], axes[2] = -axes[2];

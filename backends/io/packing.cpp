@@ -1,5 +1,8 @@
 #include "packing.hpp"
 
+#include "bulk.hpp"
+#include "unusable.hpp"
+
 #include <gart/bvh/morton.hpp>
 #include <gart/math/logit.hpp>
 #include <gart/math/sh.hpp>
@@ -13,6 +16,9 @@ namespace gart::io {
 
 namespace {
 
+// Of the floats of a model over the bytes of its file; and what is little memory, however small the file.
+constexpr u64 most_growth = 48, small_model = u64{1} << 20;
+constexpr float least_log_scale = -69;  // of a scale of about 1e-30
 constexpr double sh_0 = 0.28209479177387814;
 
 // What half a turn about an axis does to each function of the basis: it changes its sign or leaves it, as any one
@@ -70,12 +76,15 @@ int largest_positive(std::array<double, 4>& q) {
 }
 
 std::vector<u32> along_a_curve(gaussian_model const& model) {
+  // Strays are outside of the box, and go to its edge.
+  std::vector<char> stray(model.size(), 0);
+  for (u32 const i : bulk_of(model).strays) stray[i] = 1;
   box bounds = empty_box();
   auto const mean = [&](std::size_t i) {
     return vec3(model.mean[3 * i], model.mean[3 * i + 1], model.mean[3 * i + 2]);
   };
   for (std::size_t i = 0; i < model.size(); ++i)
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 3 && !stray[i]; ++k) {
       bounds.lo[k] = std::min(bounds.lo[k], mean(i)[k]);
       bounds.hi[k] = std::max(bounds.hi[k], mean(i)[k]);
     }
@@ -133,25 +142,35 @@ void in_parts(std::size_t n, std::function<void(std::size_t, std::size_t)> const
     if (e) std::rethrow_exception(e);
 }
 
-void require_plausible(std::string const& file, u64 gaussians, u64 bytes) {
-  if (gaussians > most_gaussians || gaussians > bytes * 1024 / 9)
+void require_plausible(std::string const& file, u64 gaussians, int sh_degree, u64 bytes) {
+  u64 const a_gaussian = sizeof(float) * (11 + 3 * static_cast<u64>(sh_coefficients(sh_degree)));
+  if (gaussians > most_gaussians || gaussians * a_gaussian > most_growth * bytes + small_model)
     throw io_error(file,
                    "promises " + std::to_string(gaussians) + " Gaussians, more than its " + std::to_string(bytes) +
                        " bytes can hold",
                    "the file is truncated or damaged: copy or export it again");
 }
 
-void require_finite(std::string const& file, gaussian_model const& model) {
-  auto const [at, array] = first_not_finite(model);
-  if (at < model.size())
-    throw io_error(file, "Gaussian " + std::to_string(at) + ", " + array + " is not finite",
-                   "remove or correct that Gaussian, and export it again");
+float settled_opacity(float logit) { return std::isinf(logit) ? opacity_logit(logit > 0 ? 1.0 : 0.0) : logit; }
+float settled_scale(float log_scale) { return std::isinf(log_scale) && log_scale < 0 ? least_log_scale : log_scale; }
+
+void keep_usable(std::string const& file, gaussian_model& model, std::vector<std::string>* notes) {
+  for (float& v : model.opacity) v = settled_opacity(v);
+  for (float& v : model.log_scale) v = settled_scale(v);
+  unusable bad;
   for (std::size_t i = 0; i < model.size(); ++i) {
-    float const* q = model.quaternion.data() + 4 * i;
-    if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0)
-      throw io_error(file, "Gaussian " + std::to_string(i) + ", rotation is all zero, which is no rotation",
-                     "remove that Gaussian");
+    auto const named = [&] { return "Gaussian " + std::to_string(i) + ", "; };
+    for_each_array(
+        [&](parameter_array const& a, std::vector<float> const& values) {
+          std::size_t const width = a.width(model.sh_degree);
+          for (std::size_t c = 0; c < width; ++c)
+            if (!std::isfinite(values[i * width + c])) bad.add(i, [&] { return named() + a.title + " is not finite"; });
+        },
+        model);
+    if (no_rotation(&model.quaternion[4 * i]))
+      bad.add(i, [&] { return named() + "rotation is all zero, which is no rotation"; });
   }
+  if (!bad.records().empty()) model = in_order(model, bad.others(model.size(), "Gaussian", file, notes));
 }
 
 void require_packable(std::filesystem::path const& path, gaussian_model const& model) {

@@ -43,6 +43,8 @@ float opacity_logit(double opacity);
 float base_color(float coefficient);
 float base_coefficient(double color);
 
+inline bool no_rotation(float const* q) { return q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0; }
+
 // The quaternion at q (w, x, y, z) divided by its norm, in double.
 std::array<double, 4> unit(float const* q);
 
@@ -60,10 +62,14 @@ void half_turn(gaussian_model& model, int axis);
 // f(first, last) over parts of [0, n) on as many threads as there are, f free of shared writes.
 void in_parts(std::size_t n, std::function<void(std::size_t, std::size_t)> const& f);
 
-// Refuses a count that no file of so many bytes can hold: none is a thousand times smaller than its content.
-void require_plausible(std::string const& file, u64 gaussians, u64 bytes);
-// Refuses numbers that are not finite, and rotations of no direction, as the reader of PLY does.
-void require_finite(std::string const& file, gaussian_model const& model);
+// Refuses a count of Gaussians that take many times the file's bytes, before there is memory for them: what packs most
+// takes a twentieth.
+void require_plausible(std::string const& file, u64 gaussians, int sh_degree, u64 bytes);
+// A logit without end is an opacity of all or nothing, and the logarithm of nothing a scale: finite ones for these.
+float settled_opacity(float logit);
+float settled_scale(float log_scale);
+// Settles them, and leaves out the Gaussians with other numbers that are not finite, or rotations of no direction.
+void keep_usable(std::string const& file, gaussian_model& model, std::vector<std::string>* notes);
 // Refuses to write numbers that are not finite: packed they would be others.
 void require_packable(std::filesystem::path const& path, gaussian_model const& model);
 

@@ -1,6 +1,7 @@
 // PLY of Gaussians, read by property name (ply_body.hpp) and written in the INRIA layout.
 // http://paulbourke.net/dataformats/ply/
 
+#include "packing.hpp"
 #include "ply_body.hpp"
 
 #include <gart/core/error.hpp>
@@ -32,6 +33,13 @@ std::vector<std::string> splat_columns(int degree, bool normals) {
 struct splat_store {
   gaussian_model& model;
 
+  // By the reader of every format (packing.hpp).
+  double settled(std::size_t c, double value) const {
+    std::size_t const opacity = 3 + 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));
+    if (!std::isinf(value) || c < opacity) return value;
+    float const v = static_cast<float>(value);
+    return static_cast<double>(c == opacity ? io::settled_opacity(v) : c < opacity + 4 ? io::settled_scale(v) : v);
+  }
   void resize(std::size_t n) const { model.resize(n, model.sh_degree); }
   void operator()(std::size_t c, std::size_t i, double value) const {
     float const v = static_cast<float>(value);
@@ -64,7 +72,7 @@ struct splat_store {
   }
 };
 
-gaussian_model splats_of(ply_file const& file) {
+gaussian_model splats_of(ply_file const& file, std::vector<std::string>* notes) {
   element const& e = vertices(file);
   if (!find(e, "f_dc_0") && (find(e, "red") || !find(e, "opacity"))) {
     file.refuse("property 'f_dc_0' is missing: these are points, not Gaussians", "name the model.ply of a training");
@@ -83,16 +91,18 @@ gaussian_model splats_of(ply_file const& file) {
   }
   std::vector<std::string> const columns = splat_columns(model.sh_degree, false);
   require_columns(file, e, columns, "export the model with every property of the INRIA layout");
-  read_vertices(file, columns, splat_store{model});
-  for (std::size_t i = 0; i < model.size(); ++i) {
-    float const* q = model.quaternion.data() + 4 * i;
-    if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) {
-      file.refuse("vertex " + std::to_string(file.owners.global(static_cast<index_t>(i))) +
-                      ", properties rot_0 to rot_3 are all zero, which is no rotation",
-                  "remove that vertex");
-    }
-  }
-  return model;
+  io::unusable bad;
+  read_vertices(file, columns, splat_store{model}, bad);
+  for (std::size_t i = 0; i < model.size(); ++i)
+    if (io::no_rotation(&model.quaternion[4 * i]))
+      bad.add(i, [&] {
+        return "vertex " + std::to_string(file.owners.global(static_cast<index_t>(i))) +
+               ", properties rot_0 to rot_3 are all zero, which is no rotation";
+      });
+  if (bad.records().empty()) return model;
+  // Whose row a Gaussian is goes by its number in the file.
+  if (file.owners.ranks > 1) file.refuse(bad.first(), "gart convert leaves it out: start with what that writes");
+  return io::in_order(model, bad.others(model.size(), "Gaussian", file.name, notes));
 }
 
 std::string header_of(std::filesystem::path const& path, int sh_degree, u64 count, splat_traits const& traits) {
@@ -124,9 +134,10 @@ void require_agreement(std::filesystem::path const& path, gaussian_model const& 
 
 }  // namespace
 
-gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* traits) {
+gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* traits,
+                              std::vector<std::string>* notes) {
   ply_file const file = open(path);
-  gaussian_model model = splats_of(file);
+  gaussian_model model = splats_of(file, notes);
   if (traits) *traits = file.head.traits;
   return model;
 }
@@ -134,9 +145,11 @@ gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* t
 gaussian_model read_splat_ply_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
                                    splat_traits* traits) {
   ply_file const file = open_rows(path, owners, total);
-  gaussian_model model = splats_of(file);
+  gaussian_model model = splats_of(file, nullptr);
   if (traits) *traits = file.head.traits;
-  return file.owners.ranks == owners.ranks ? model : rows_of(model, owners);
+  if (file.owners.ranks == owners.ranks) return model;
+  total = model.size();
+  return rows_of(model, owners);
 }
 
 void write_splat_ply(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits) {

@@ -3,6 +3,7 @@
 
 #include "bytes.hpp"
 #include "ply_header.hpp"
+#include "unusable.hpp"
 
 #include <algorithm>
 #include <array>
@@ -114,9 +115,10 @@ inline property const* find(element const& e, std::string_view name) {
   return nullptr;
 }
 
-// Where a property's value goes: store(column, vertex, value). The values are finite floats.
+// Where a property's value goes: store(column, vertex, value), after store.settled(column, value). Those that are no
+// finite floats even then make their vertex one of `bad`.
 template <class Store>
-void read_vertices(ply_file const& file, std::vector<std::string> const& columns, Store const& store) {
+void read_vertices(ply_file const& file, std::vector<std::string> const& columns, Store const& store, unusable& bad) {
   body_reader body(file);
   for (element const& e : file.head.elements) {
     bool const wanted = e.name == "vertex";
@@ -141,14 +143,15 @@ void read_vertices(ply_file const& file, std::vector<std::string> const& columns
           body.skip_list(e, record, p);
           continue;
         }
-        double const value = body.next(p.type, e, record, p);
+        double const read = body.next(p.type, e, record, p);
         if (column_of[i] < 0) continue;
-        if (!std::isfinite(static_cast<float>(value))) {
-          file.refuse(
-              body.place(e, record, p) + (std::isnan(value) ? " is NaN" : " is infinite or too large for a float"),
-              "remove or correct that vertex");
-        }
-        store(static_cast<std::size_t>(column_of[i]), static_cast<std::size_t>(record), value);
+        auto const column = static_cast<std::size_t>(column_of[i]), vertex = static_cast<std::size_t>(record);
+        double const value = store.settled(column, read);
+        if (!std::isfinite(static_cast<float>(value)))
+          bad.add(vertex, [&] {
+            return body.place(e, record, p) + (std::isnan(value) ? " is NaN" : " is infinite or too large for a float");
+          });
+        store(column, vertex, value);
       }
     }
     if (wanted) return;

@@ -15,6 +15,7 @@ struct point_store {
   point_cloud& points;
   std::array<scalar, 3> color_type;
 
+  double settled(std::size_t, double value) const { return value; }
   void resize(std::size_t n) const { points.position.resize(3 * n), points.color.assign(3 * n, 128); }
   void operator()(std::size_t c, std::size_t i, double value) const {
     if (c < 3) {
@@ -23,13 +24,14 @@ struct point_store {
     }
     scalar const type = color_type[c - 3];
     double const scale = type == scalar::f32 || type == scalar::f64 ? 255.0 : type == scalar::u16 ? 1.0 / 257.0 : 1.0;
-    points.color[3 * i + c - 3] = static_cast<u8>(std::clamp(value * scale + 0.5, 0.0, 255.0));
+    if (std::isfinite(value))
+      points.color[3 * i + c - 3] = static_cast<u8>(std::clamp(value * scale + 0.5, 0.0, 255.0));
   }
 };
 
 }  // namespace
 
-point_cloud read_point_ply(std::filesystem::path const& path) {
+point_cloud read_point_ply(std::filesystem::path const& path, std::vector<std::string>* notes) {
   ply_file const file = open(path);
   element const& e = vertices(file);
   std::vector<std::string> columns{"x", "y", "z"};
@@ -41,8 +43,15 @@ point_cloud read_point_ply(std::filesystem::path const& path) {
     columns.insert(columns.end(), {"red", "green", "blue"});
     for (std::size_t c = 0; c < 3; ++c) store.color_type[c] = color[c]->type;
   }
-  read_vertices(file, columns, store);
-  return points;
+  io::unusable bad;
+  read_vertices(file, columns, store, bad);
+  if (bad.records().empty()) return points;
+  point_cloud usable;
+  for (std::size_t const i : bad.others(points.size(), "point", file.name, notes)) {
+    usable.position.insert(usable.position.end(), &points.position[3 * i], &points.position[3 * i] + 3);
+    usable.color.insert(usable.color.end(), &points.color[3 * i], &points.color[3 * i] + 3);
+  }
+  return usable;
 }
 
 void write_point_ply(std::filesystem::path const& path, point_cloud const& points) {

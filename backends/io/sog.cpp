@@ -2,6 +2,7 @@
 // mean. Scales and colours are numbers of a codebook, spherical harmonics rows of a palette.
 // https://developer.playcanvas.com/user-manual/gaussian-splatting/formats/sog/
 
+#include "bulk.hpp"
 #include "codebook.hpp"
 #include "packing.hpp"
 #include "webp.hpp"
@@ -55,9 +56,9 @@ class sog_reader {
  public:
   explicit sog_reader(fs::path const& path) : name_(path.string()), bytes_(read_file(path)), zip_(bytes_, name_) {}
 
-  gaussian_model read(splat_traits* traits) {
+  gaussian_model read(splat_traits* traits, std::vector<std::string>* notes) {
     try {
-      return from(json::parse(zip_.get("meta.json", 16 << 20)), traits);
+      return from(json::parse(zip_.get("meta.json", bytes_.size() + (1 << 16))), traits, notes);
     } catch (json::exception const& e) {
       throw io_error(name_ + ": meta.json", e.what(), "export it again");
     }
@@ -84,16 +85,16 @@ class sog_reader {
     return all;
   }
 
-  gaussian_model from(json const& meta, splat_traits* traits) {
+  gaussian_model from(json const& meta, splat_traits* traits, std::vector<std::string>* notes) {
     if (!meta.is_object() || meta.value("version", 1) != 2)
       refuse("is not of version 2", "gart reads SOG of version 2: write it again by a newer splat-transform");
     u64 const n = meta.at("count").get<u64>();
-    require_plausible(name_, n, bytes_.size());
-    // A texture has a pixel a Gaussian, and what fills its last rows.
-    std::size_t const most = 4 * n + (std::size_t{1} << 16);
     bool const colored = meta.contains("shN") && !meta["shN"].is_null();
     int const degree = colored ? meta["shN"].at("bands").get<int>() : 0;
     if (degree < 0 || degree > 3) refuse("shN.bands is " + std::to_string(degree) + ", not 0 to 3");
+    require_plausible(name_, n, degree, bytes_.size());
+    // A texture has a pixel a Gaussian, and what fills its last rows.
+    std::size_t const most = n + n / 4 + (std::size_t{1} << 16);
     gaussian_model m;
     m.resize(n, degree);
     means(meta.at("means"), m, most);
@@ -118,7 +119,7 @@ class sog_reader {
       }
     }
     if (degree > 0) harmonics(meta["shN"], m, most);
-    require_finite(name_, m);
+    keep_usable(name_, m, notes);
     if (traits) {
       if (meta.contains("gart"))
         for (auto const& [key, value] : meta["gart"].items()) (*traits)[key] = value.get<std::string>();
@@ -269,12 +270,15 @@ extern splat_format const sog_format;
 splat_format const sog_format = {
     "SOG",
     ".sog",
-    {.traits = true},
+    {.strays = false, .traits = true},
     [](std::string_view first) { return first.starts_with("PK\x03\x04"); },
-    [](fs::path const& path, splat_traits* traits) { return sog_reader(path).read(traits); },
+    [](fs::path const& path, splat_traits* traits, std::vector<std::string>* notes) {
+      return sog_reader(path).read(traits, notes);
+    },
     [](fs::path const& path, gaussian_model const& model, splat_traits const& traits, splat_packing const& packing) {
       require_packable(path, model);
-      gaussian_model const sorted = in_order(model, along_a_curve(model));
+      gaussian_model sorted = in_order(model, along_a_curve(model));
+      draw_in_strays(sorted, far_reach);
       sog_writer(path, sorted).write(traits, packing);
     }};
 

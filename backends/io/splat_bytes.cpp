@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t record = 32;
 
-gaussian_model read_splat_bytes(fs::path const& path, splat_traits*) {
+gaussian_model read_splat_bytes(fs::path const& path, splat_traits*, std::vector<std::string>* notes) {
   std::string const name = path.string();
   std::vector<u8> const bytes = read_file(path);
   if (bytes.empty() || bytes.size() % record)
@@ -29,8 +29,7 @@ gaussian_model read_splat_bytes(fs::path const& path, splat_traits*) {
     for (std::size_t c = 0; c < 3; ++c) m.mean[3 * i + c] = in.get<float>("a position");
     for (std::size_t c = 0; c < 3; ++c) {
       float const scale = in.get<float>("a scale");
-      if (!(scale >= 0)) throw io_error(name, "Gaussian " + std::to_string(i) + ", scale is no length", "remove it");
-      m.log_scale[3 * i + c] = std::log(std::max(scale, 1e-30f));
+      m.log_scale[3 * i + c] = std::log(scale);  // of what is no length not finite
     }
     for (std::size_t c = 0; c < 3; ++c) m.sh[3 * i + c] = base_coefficient(in.get<u8>("a colour") / 255.0);
     m.opacity[i] = opacity_logit(in.get<u8>("an opacity"));
@@ -41,7 +40,7 @@ gaussian_model read_splat_bytes(fs::path const& path, splat_traits*) {
     }
     if (!turned) m.quaternion[4 * i] = 1;  // what writers leave of a rotation that was none
   }
-  require_finite(name, m);
+  keep_usable(name, m, notes);
   return m;
 }
 

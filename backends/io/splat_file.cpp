@@ -1,3 +1,6 @@
+#include "bulk.hpp"
+#include "unusable.hpp"
+
 #include <gart/core/error.hpp>
 #include <gart/io/ply.hpp>
 #include <gart/io/splat_file.hpp>
@@ -68,11 +71,11 @@ bool another_kernel(splat_traits const& traits) {
 
 span<splat_format const* const> splat_formats() { return {formats, std::size(formats)}; }
 
-gaussian_model read_splats(std::filesystem::path const& path, splat_traits* traits) {
+gaussian_model read_splats(std::filesystem::path const& path, splat_traits* traits, std::vector<std::string>* notes) {
   splat_format const* const format = format_of(path);
   if (!format)
     throw io_error(path.string(), "is in no format of Gaussians that gart knows", "it reads " + listed(false));
-  return format->read(path, traits);
+  return format->read(path, traits, notes);
 }
 
 gaussian_model rows_of(gaussian_model const& all, row_owners const& owners) {
@@ -90,9 +93,9 @@ gaussian_model rows_of(gaussian_model const& all, row_owners const& owners) {
 }
 
 gaussian_model read_splat_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
-                               splat_traits* traits) {
+                               splat_traits* traits, std::vector<std::string>* notes) {
   if (owners.ranks > 1 && format_of(path) == &ply_format) return read_splat_ply_rows(path, owners, total, traits);
-  gaussian_model all = read_splats(path, traits);
+  gaussian_model all = read_splats(path, traits, notes);
   total = all.size();
   return owners.ranks == 1 ? all : rows_of(all, owners);
 }
@@ -128,6 +131,10 @@ std::vector<std::string> left_out(std::filesystem::path const& path, gaussian_mo
   if (model.sh_degree > format.room.sh_degree)
     lines.push_back("spherical harmonics above degree " + std::to_string(format.room.sh_degree) +
                     " (the model has degree " + std::to_string(model.sh_degree) + ")");
+  if (std::size_t const strays = format.room.strays ? 0 : io::bulk_of(model).strays.size())
+    lines.push_back("the distance of " + io::counted(strays, "Gaussian") + ", over " +
+                    std::to_string(static_cast<int>(io::far_reach)) +
+                    " times as far out as 99 of 100: nearer, and as much smaller, they look the same from the middle");
   for (auto const& [key, value] : traits) {
     if (!keeps(format.room, key))
       lines.push_back(key + " " + value);

@@ -2,6 +2,7 @@
 // a gzip file, the fourth each in a frame of zstd. Axes: x right, y up, z back.
 // https://github.com/nianticlabs/spz
 
+#include "bulk.hpp"
 #include "bytes.hpp"
 #include "compression.hpp"
 #include "packing.hpp"
@@ -126,10 +127,10 @@ class spz_reader {
  public:
   explicit spz_reader(fs::path const& path) : name_(path.string()), bytes_(read_file(path)) {}
 
-  gaussian_model read(splat_traits* traits) {
+  gaussian_model read(splat_traits* traits, std::vector<std::string>* notes) {
     bool const gzip = bytes_.size() >= 2 && bytes_[0] == 0x1f && bytes_[1] == 0x8b;
     gaussian_model m = gzip ? from_gzip() : from_zstd();
-    require_finite(name_, m);
+    keep_usable(name_, m, notes);
     half_turn(m, 0);
     if (traits && head_.flags & flag_antialiased) (*traits)["antialias"] = "";
     return m;
@@ -153,7 +154,7 @@ class spz_reader {
       refuse("has spherical harmonics of degree " + std::to_string(head_.degree),
              "gart reads degrees 0 to 3: export the model with one of them");
     if (head_.fraction > 63) refuse("the bits of a fraction are " + std::to_string(head_.fraction), "export it again");
-    require_plausible(name_, head_.count, bytes_.size());
+    require_plausible(name_, head_.count, head_.degree, bytes_.size());
   }
 
   gaussian_model from_gzip() {
@@ -250,7 +251,8 @@ int fraction_bits(fs::path const& path, gaussian_model const& m) {
 void write_spz(fs::path const& path, gaussian_model const& given, splat_traits const& traits,
                splat_packing const& packing) {
   require_packable(path, given);
-  gaussian_model const m = in_order(given, along_a_curve(given));
+  gaussian_model m = in_order(given, along_a_curve(given));
+  draw_in_strays(m, far_reach);
   header h;
   h.count = static_cast<u32>(m.size()), h.degree = static_cast<u8>(m.sh_degree);
   h.fraction = static_cast<u8>(fraction_bits(path, m));
@@ -314,9 +316,11 @@ extern splat_format const spz_format;
 splat_format const spz_format = {
     "SPZ",
     ".spz",
-    {.antialias = true},
+    {.strays = false, .antialias = true},
     [](std::string_view first) { return first.starts_with("NGSP") || first.starts_with("\x1f\x8b\x08"); },
-    [](fs::path const& path, splat_traits* traits) { return spz_reader(path).read(traits); },
+    [](fs::path const& path, splat_traits* traits, std::vector<std::string>* notes) {
+      return spz_reader(path).read(traits, notes);
+    },
     write_spz};
 
 }  // namespace gart

@@ -4,6 +4,7 @@
 #include "bytes.hpp"
 #include "camera_formats.hpp"
 #include "capture.hpp"
+#include "file_names.hpp"
 #include "json_record.hpp"
 
 #include <gart/io/ply.hpp>
@@ -18,18 +19,6 @@ namespace {
 fs::path from_text(fs::path const& folder, std::string text) {
   std::replace(text.begin(), text.end(), '\\', '/');
   return (folder / fs::path(text)).lexically_normal();
-}
-
-// The photo of a file_path, which may lack its extension; empty where there is none.
-fs::path find_photo(fs::path const& path) {
-  std::error_code ignored;
-  if (fs::is_regular_file(path, ignored)) return path;
-  for (char const* extension : {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
-    fs::path with = path;
-    with += extension;
-    if (fs::is_regular_file(with, ignored)) return with;
-  }
-  return {};
 }
 
 void read_lens(record const& r, frame& f) {
@@ -54,8 +43,8 @@ void read_lens(record const& r, frame& f) {
     f.view.fx = static_cast<float>(r.number("fl_x"));
   } else if (r.has("camera_angle_x")) {
     f.angle_x = angle("camera_angle_x");
-  } else {
-    throw io_error(r.where, "neither 'fl_x' nor 'camera_angle_x' is there", "add one of them");
+  } else if (!r.has("camera_angle_y")) {
+    throw io_error(r.where, "none of 'fl_x', 'camera_angle_x' and 'camera_angle_y' is there", "add one of them");
   }
   if (r.has("fl_y")) {
     f.view.fy = static_cast<float>(r.number("fl_y"));
@@ -95,7 +84,7 @@ std::set<std::string> name_list(record const& r, char const* key) {
   for (json const& name : r.at(key)) {
     if (!name.is_string())
       throw io_error(r.where, std::string("'") + key + "' holds something that is not a text", "write file names");
-    names.insert(name.get<std::string>());
+    names.insert(plain_name(name.get<std::string>()));
   }
   return names;
 }
@@ -115,26 +104,33 @@ void read_frames(fs::path const& file, part role, capture& result) {
   if (own_split) result.own_split = std::string("the file's own (train_filenames, ") + test_key + ")";
 
   fs::path const folder = file.parent_path();
+  result.photos = folder;
+  unusable bad;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     record const r{frames[i], &root, file.string() + ", frame " + std::to_string(i)};
     if (!r.own.is_object()) throw io_error(r.where, "is not a JSON object", "export it again");
     frame f;
     std::string const path = r.text("file_path");
     f.name = path;
-    f.photo = find_photo(from_text(folder, path));
     f.role = role;
-    if (own_split) f.role = train.count(path) ? part::train : test.count(path) ? part::test : part::left_out;
+    std::string const plain = plain_name(path);
+    if (own_split) f.role = train.count(plain) ? part::train : test.count(plain) ? part::test : part::left_out;
     if (r.own.contains("mask_path") && !r.own["mask_path"].is_null()) f.mask = from_text(folder, r.text("mask_path"));
     read_depth_fields(r, folder, f);
     read_lens(r, f);
-    read_pose(r, "transform_matrix", true, f.view);
-    read_shutter(r, "transform_matrix_end", true, f.view);
+    try {
+      read_pose(r, "transform_matrix", true, f.view);
+      read_shutter(r, "transform_matrix_end", true, f.view);
+    } catch (pose_error const& e) {
+      bad.add(i, [&] { return "frame " + std::to_string(i) + " (" + path + "), " + e.fault; });
+      continue;
+    }
     if (f.view.width) check_camera(f.view, r.where);
     result.frames.push_back(std::move(f));
   }
-  if (top.has("ply_file_path") && result.points.size() == 0) {
-    result.points = read_point_ply(from_text(folder, top.text("ply_file_path")));
-  }
+  if (!bad.records().empty()) bad.others(frames.size(), "frame", file.string(), &result.notes);
+  if (top.has("ply_file_path") && result.points.size() == 0)
+    result.points = read_point_ply(from_text(folder, top.text("ply_file_path")), &result.notes);
 }
 
 }  // namespace
@@ -156,7 +152,7 @@ capture read_blender(fs::path const& folder) {
   }
   // Where the INRIA reference keeps the points of a Blender scene.
   fs::path const points = folder / "points3d.ply";
-  if (result.points.size() == 0 && fs::exists(points, ignored)) result.points = read_point_ply(points);
+  if (result.points.size() == 0 && fs::exists(points, ignored)) result.points = read_point_ply(points, &result.notes);
   return result;
 }
 

@@ -1,10 +1,13 @@
 #include "view_maps.hpp"
 
+#include "file_names.hpp"
+
 #include <gart/camera/models.hpp>
 #include <gart/core/error.hpp>
 #include <gart/io/image_file.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <system_error>
 
@@ -14,23 +17,15 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// The map of a photo in the folder `depths` beside its `images`; the PNG where there is neither.
+// The map of a photo in the folder `depths` beside that of the photos; the PNG's path where there is none.
 fs::path depth_beside(fs::path const& photo) {
-  fs::path found, folder = photo.parent_path(), below;
-  for (; folder.has_filename(); folder = folder.parent_path()) {
-    if (folder.filename().string().starts_with("images")) break;
-    below = folder.filename() / below;
-  }
-  fs::path const map = (folder.has_filename() ? folder.parent_path() : photo.parent_path()) / "depths" /
-                       (folder.has_filename() ? below : fs::path()) / photo.stem();
-  std::error_code ignored;
-  for (char const* extension : {".png", ".npy"}) {
-    fs::path with = map;
-    with += extension;
-    if (fs::is_regular_file(with, ignored)) return with;
-    if (found.empty()) found = with;
-  }
-  return found;
+  auto const [folder, below] = beside_photos(photo, "depths");
+  file_names maps(folder, {".png", ".npy"});
+  for (char const* extension : {".png", ".npy"})
+    if (fs::path const map = maps.find(fs::path(below).replace_extension(extension).generic_string()).file;
+        !map.empty())
+      return map;
+  return folder / fs::path(below).replace_extension(".png");
 }
 
 // Which way the camera looks while a pixel is read.
@@ -43,18 +38,25 @@ vec3 axis_of(camera const& view, float u, float v) {
 
 image8 read_mask(fs::path const& path, image_size size, int factor) {
   image8 const source = read_image(path);
-  if (source.width != size.width || source.height != size.height) {
+  // A mask of the full size serves smaller copies of its photo.
+  double const sx = static_cast<double>(source.width) / size.width,
+               sy = static_cast<double>(source.height) / size.height;
+  if (std::abs(sx / sy - 1) > 0.01 && std::abs(source.height / sx - size.height) > 1) {
     throw io_error(path.string(),
                    "the mask is " + std::to_string(source.width) + " x " + std::to_string(source.height) +
                        " pixels, its photo " + std::to_string(size.width) + " x " + std::to_string(size.height),
-                   "make both the same size");
+                   "make both of the same shape");
   }
   image8 mask(size.width / factor, size.height / factor, 1, 255);
   int const colors = std::min(source.channels, 3);
+  auto const nearest = [](int at, double scale, int most) {
+    return std::min(most - 1, static_cast<int>((at + 0.5) * scale));
+  };
   for (int y = 0; y < mask.height * factor; ++y) {
     for (int x = 0; x < mask.width * factor; ++x) {
       bool used = false;
-      for (int c = 0; c < colors; ++c) used = used || source.at(x, y, c) != 0;
+      for (int c = 0; c < colors; ++c)
+        used = used || source.at(nearest(x, sx, source.width), nearest(y, sy, source.height), c) != 0;
       if (!used) mask.at(x / factor, y / factor, 0) = 0;
     }
   }

@@ -15,7 +15,7 @@ model_file load_model(std::filesystem::path const& path) { return load_model(pat
 model_file load_model(std::filesystem::path const& path, row_owners const& owners) {
   splat_traits traits;
   model_file file;
-  file.model = read_splat_rows(path, owners, file.total, &traits);
+  file.model = read_splat_rows(path, owners, file.total, &traits, &file.notes);
   if (auto const kernel = traits.find("kernel_degree"); kernel != traits.end()) {
     bool const known = std::any_of(std::begin(kernel_degrees), std::end(kernel_degrees),
                                    [&](int degree) { return std::to_string(degree) == kernel->second; });

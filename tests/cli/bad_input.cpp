@@ -51,7 +51,7 @@ TEST_CASE("splat files with values that are not numbers, or cut short") {
   auto model = one_gaussian();
   model.mean[1] = std::numeric_limits<float>::quiet_NaN();
   gart::write_splat_ply(here / "nan.ply", model);
-  model.mean[1] = 0, model.opacity[0] = std::numeric_limits<float>::infinity();
+  model.mean[1] = 0, model.log_scale[2] = std::numeric_limits<float>::infinity();
   gart::write_splat_ply(here / "inf.ply", model);
   gart::write_splat_ply(here / "good.ply", one_gaussian());
   auto const good = text_of(here / "good.ply");
@@ -62,7 +62,7 @@ TEST_CASE("splat files with values that are not numbers, or cut short") {
     CAPTURE(command);
     auto const with = [&](std::string const& name) { return std::string(command).replace(command.find('%'), 1, name); };
     fails(here.gart(with("nan")), {"nan.ply", "y"});
-    fails(here.gart(with("inf")), {"inf.ply", "opacity"});
+    fails(here.gart(with("inf")), {"inf.ply", "scale_2"});
     fails(here.gart(with("cut")), {"cut.ply"});
     fails(here.gart(with("absent")), {"absent.ply"});
     CHECK_FALSE(fs::exists(here / "made/scores.json"));

@@ -303,4 +303,38 @@ TEST_CASE("a GLB is read where its nodes place it, or refused") {
   CHECK(holds(error_of([&] { gart::read_splats(placed("\"scale\":[2,1,1]")); }), "node 0"));
 }
 
+TEST_CASE("what a small file says of much memory is refused before there is any") {
+  scratch_folder const folder;
+  gart::write_splats(folder.path / "a.glb", random_model(4000, 0));
+  std::string const whole = text_of(folder.path / "a.glb");
+  auto const with_nodes = [&](std::string const& nodes, std::string const& first) {
+    std::string text = whole;
+    gart::u32 json = 0;
+    std::memcpy(&json, text.data() + 12, 4);
+    std::string part = text.substr(20, json);
+    part.replace(part.find("\"nodes\":[{\"mesh\":0}]"), 20, "\"nodes\":[" + nodes + "]");
+    part.replace(part.find("{\"nodes\":[0]}"), 13, "{\"nodes\":[" + first + "]}");
+    part.resize((part.size() + 3) / 4 * 4, ' ');
+    text = text.substr(0, 20) + part + text.substr(20 + json);
+    gart::u32 const sizes[] = {static_cast<gart::u32>(text.size()), static_cast<gart::u32>(part.size())};
+    std::memcpy(text.data() + 8, sizes, 8);
+    return folder.put("b.glb", text);
+  };
+  // Each node names the next twice: 2^40 ways.
+  std::string chain, many, all;
+  for (int i = 0; i < 40; ++i) {
+    std::string const next = std::to_string(i + 1);
+    chain += "{\"children\":[" + next + "," + next + "]},";
+  }
+  auto const refused = [&](fs::path const& file) { return error_of([&] { gart::read_splats(file); }); };
+  CHECK(holds(refused(with_nodes(chain + "{\"mesh\":0}", "0")), "is below two others, or itself"));
+  CHECK(holds(refused(with_nodes("{\"children\":[0]}", "0")), "is below two others, or itself"));
+  // One mesh, shown by many nodes.
+  for (int i = 0; i < 3; ++i)
+    many += std::string(i ? "," : "") + "{\"mesh\":0}", all += (i ? "," : "") + std::to_string(i);
+  CHECK(gart::read_splats(with_nodes(many, all)).size() == 12000);
+  for (int i = 3; i < 200; ++i) many += ",{\"mesh\":0}", all += "," + std::to_string(i);
+  CHECK(holds(refused(with_nodes(many, all)), "more than its"));
+}
+
 }  // namespace

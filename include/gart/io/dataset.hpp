@@ -2,12 +2,14 @@
 /// \file
 /// A capture in host memory: views with cameras and 8-bit images, a split, starting points where the files have them.
 ///
-/// load_dataset recognises, in a folder or by the file named: COLMAP (sparse/0, sparse or the folder itself, .bin
-/// before .txt; photos in images/), Blender (transforms_train.json and transforms_test.json, points3d.ply where it is
-/// there), nerfstudio / instant-ngp (transforms.json). A folder that holds COLMAP and transforms.json is read as
-/// COLMAP. Images are decoded in parallel and kept as 8 bits: width * height * channels bytes each. Frames without a
-/// photo, points in a camera's centre and points that are not finite are left out, with a note. Errors: io_error naming
-/// the file, the field and the remedy; unsupported for a camera model that gart does not trace, by its name;
+/// load_dataset recognises, in a folder or by the file named: COLMAP (sparse/0 or its larger neighbour, sparse, the
+/// same below colmap, or the folder itself, .bin before .txt; photos in images/, images_N/ or input/), Blender
+/// (transforms_train.json and transforms_test.json, points3d.ply where it is there), nerfstudio / instant-ngp
+/// (transforms.json). A folder that holds COLMAP and transforms.json is read as COLMAP. Photos are found by names that
+/// differ in case, slashes, extension or folders, masks in a folder masks beside them (docs/captures.md). Images are
+/// decoded in parallel and kept as 8 bits: width * height * channels bytes each. Frames without a photo, or with a pose
+/// that is none, points in a camera's centre and points that are not finite are left out, with a note. Errors: io_error
+/// naming the file, the field and the remedy; unsupported for a camera model that gart does not trace, by its name;
 /// invalid_argument for an option out of its range.
 
 #include <gart/comm/host_group.hpp>
@@ -88,6 +90,8 @@ struct dataset_options {
   int downscale = 1;   ///< integer factor, box filter; a partial last block of pixels is cropped, from cameras too
   int test_every = 8;  ///< 0: no test views; ignored where the files have their own split
   split_kind test_split = split_kind::nth;  ///< which of them; likewise
+  std::filesystem::path photos = {};  ///< the folder that the photos' names are in; empty: where the capture has them
+  bool masks = true;                  ///< those that the files name, else those in a folder masks beside the photos'
   bool load_images = true;       ///< false: cameras alone, for which photos may all be absent if the files state sizes
   depth_map_options depth = {};  ///< maps of depth
   /// Called from the loading threads, one at a time.

@@ -9,8 +9,8 @@
 /// with "comment antialiased 1", and no trait of gart's own is read as one whose antialias has no value.
 ///
 /// Errors: io_error naming the file, the property and the remedy, for a truncated body, a missing property, a count of
-/// f_rest that is no degree from 0 to 3, a 2D Gaussian file (no scale_2), a NaN or infinite value (with its vertex and
-/// property), or a rotation that is all zero; invalid_argument for a model whose arrays disagree in size.
+/// f_rest that is no degree from 0 to 3, a 2D Gaussian file (no scale_2), a file of which no Gaussian can be used (with
+/// the first one's vertex and property); invalid_argument for a model whose arrays disagree in size.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/comm/shared_file.hpp>
@@ -22,8 +22,10 @@
 
 namespace gart {
 
-/// Reads a splat file; the comments of its header that begin with "gart" into `traits`, where that is not null.
-gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* traits = nullptr);
+/// Reads a splat file; the comments of its header that begin with "gart" into `traits`, where that is not null, and
+/// what was left out into `notes`, as read_splats has it (io/splat_file.hpp).
+gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* traits = nullptr,
+                              std::vector<std::string>* notes = nullptr);
 /// Writes a splat file, with these traits.
 void write_splat_ply(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits = {});
 
@@ -38,8 +40,9 @@ void write_splat_ply_rows(shared_file& file, std::filesystem::path const& path, 
 gaussian_model read_splat_ply_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
                                    splat_traits* traits = nullptr);
 
-/// A plain point cloud: x y z, and red green blue where present (else grey).
-point_cloud read_point_ply(std::filesystem::path const& path);
+/// A plain point cloud: x y z, and red green blue where present (else grey). Points that are not finite are left out,
+/// which `notes`, where it is not null, says.
+point_cloud read_point_ply(std::filesystem::path const& path, std::vector<std::string>* notes = nullptr);
 /// Writes x y z and red green blue, binary.
 void write_point_ply(std::filesystem::path const& path, point_cloud const& points);
 

@@ -37,6 +37,7 @@ struct splat_packing {
 /// What a format has room for, besides means, scales, rotations, opacities and a colour.
 struct splat_room {
   int sh_degree = 3;       ///< of its spherical harmonics
+  bool strays = true;      ///< means far beyond the others (256 times the reach of 99 of 100), without loss to these
   bool traits = false;     ///< keys and values
   bool kernel = false;     ///< another kernel than the Gaussian, said by the trait kernel_degree
   bool antialias = false;  ///< a mark for the trait antialias, without its width
@@ -48,7 +49,8 @@ struct splat_format {
   char const* extension;                   ///< with its dots, in lower case
   splat_room room;                         ///< `write` is given no more than that
   bool (*begins)(std::string_view first);  ///< whether its files begin so; null: known by the ending alone
-  gaussian_model (*read)(std::filesystem::path const& path, splat_traits* to);  ///< traits only where `to` is not null
+  gaussian_model (*read)(std::filesystem::path const& path, splat_traits* to,
+                         std::vector<std::string>* notes);  ///< either only where it is not null
   void (*write)(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits,
                 splat_packing const& packing);  ///< null for a format that is only read
 };
@@ -57,13 +59,18 @@ struct splat_format {
 /// end of another, the longer one is first.
 span<splat_format const* const> splat_formats();
 
-/// Reads a file of Gaussians; its traits into `traits`, where that is not null.
-gaussian_model read_splats(std::filesystem::path const& path, splat_traits* traits = nullptr);
+/// Reads a file of Gaussians; its traits into `traits`, where that is not null. A Gaussian with a number that is not
+/// finite, or a rotation of zeros, is left out: `notes`, where it is not null, says how many, and what is wrong with
+/// the first. A file of no other is refused. An opacity whose logit is infinite is 1 or 0, a scale whose logarithm is
+/// -inf nothing: the model has finite numbers for these.
+gaussian_model read_splats(std::filesystem::path const& path, splat_traits* traits = nullptr,
+                           std::vector<std::string>* notes = nullptr);
 /// Of a whole model the rows of a rank.
 gaussian_model rows_of(gaussian_model const& all, row_owners const& owners);
-/// Of the Gaussians of a file, `total` of them, those of this rank: of a binary splat PLY no other is read.
+/// Of the Gaussians of a file, `total` of them, those of this rank: of a binary splat PLY no other is read, so that one
+/// that cannot be used is refused there where there are several ranks.
 gaussian_model read_splat_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
-                               splat_traits* traits = nullptr);
+                               splat_traits* traits = nullptr, std::vector<std::string>* notes = nullptr);
 /// Writes a file of Gaussians, to a temporary name, then renamed.
 void write_splats(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits = {},
                   splat_packing const& packing = {});

@@ -13,15 +13,18 @@
 #include <gart/scene/gaussians.hpp>
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 namespace gart {
 
 /// A model, and what it was trained to be rendered with.
 struct model_file {
-  gaussian_model model;   ///< the Gaussians, or a rank's rows of them
-  render_options render;  ///< the background is in no file
-  int kernel_degree = 2;  ///< of the response (math/response.hpp)
-  u64 total = 0;          ///< Gaussians in the file that was read
+  gaussian_model model;                 ///< the Gaussians, or a rank's rows of them
+  render_options render;                ///< the background is in no file
+  int kernel_degree = 2;                ///< of the response (math/response.hpp)
+  u64 total = 0;                        ///< Gaussians in the file that was read
+  std::vector<std::string> notes = {};  ///< a line each: which of them were left out (io/splat_file.hpp)
 };
 
 /// Errors: io_error naming the file and what is wrong in it.

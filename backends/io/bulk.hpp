@@ -1,0 +1,36 @@
+#pragma once
+// Where most of some numbers are. Bits, boxes and codebooks are made for these: one extreme would take them all.
+
+#include <gart/core/types.hpp>
+#include <gart/math/glm.hpp>
+#include <gart/scene/gaussians.hpp>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gart::io {
+
+// The median, and the distance from it that all but a hundredth of the numbers keep.
+struct spread {
+  double middle = 0, half = 0;
+};
+spread spread_of(std::vector<float> values);
+
+// From the least to the greatest of the numbers, where neither is farther from the middle than `reach` halves.
+std::pair<float, float> bulk_range(std::vector<float> const& values, double reach);
+
+// The same of the Gaussians' means, by the largest of three distances.
+struct bulk {
+  vec3d middle{0.0};
+  double half = 0;
+  std::vector<u32> strays;  // farther than far_reach halves
+};
+inline constexpr double far_reach = 256;
+bulk bulk_of(gaussian_model const& model);
+
+// Strays, along the line to the middle, to the distance of `reach` halves; as much smaller, they look the same from
+// there. How many they were.
+std::size_t draw_in_strays(gaussian_model& model, double reach);
+
+}  // namespace gart::io
