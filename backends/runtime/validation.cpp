@@ -55,13 +55,15 @@ double mean(std::vector<double> const& values) {
 
 // What the run's options are in a trial: as many Gaussians a pixel, and all that is counted in steps as much sooner. A
 // slow rate of the bands above the first would not get as far as in the run, and a fast one would seem to pay: it is
-// raised as those of the geometry are in short runs (optim/schedule.hpp), at most to that of the first band.
+// raised as those of the geometry are in short runs (optim/schedule.hpp), at most to that of the first band. One view a
+// step, by its photograph and the capture's pose: views held out have no pose learned, and small ones no depth map.
 train_options of_trial(train_options options, validation_plan const& plan) {
   int const area = plan.shrink * plan.shrink;
   double const shorter = static_cast<double>(plan.steps) / options.iterations;
   auto const sooner = [&](int& steps) { steps = std::max(1, static_cast<int>(std::lround(steps * shorter))); };
   options.held_out.insert(options.held_out.end(), plan.held_out.begin(), plan.held_out.end());
-  options.iterations = plan.steps;
+  options.iterations = plan.steps, options.batch = 1;
+  options.refine_poses = options.refine_lens = false, options.depth_weight = 0;
   options.max_gaussians = std::max<index_t>(options.max_gaussians / static_cast<index_t>(area), 1);
   options.error.least_budget = options.error.least_budget / area;
   options.random_points = std::min(options.random_points, options.max_gaussians);
@@ -130,7 +132,7 @@ validation validate(configuration_request const& request, train_options const& o
   if (plan.held_out.empty()) return result;
   dataset const small = shrunk(data, plan.shrink);
   configuration_request alone = request;
-  alone.ranks = nullptr;
+  alone.ranks = nullptr, alone.depth = false;
   std::vector<double> best;  // PSNR of each view held out
   for (std::size_t i = 0; i < plan.trials; ++i) {
     train_options changed = result.options;

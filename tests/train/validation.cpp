@@ -110,6 +110,13 @@ TEST_CASE("a trial is judged by training views that it is not trained on, and te
   CHECK(changed[0].psnr < first[0].psnr - 0.5);
   other.train[4] = data.train[4];
   CHECK(psnr(other)[0].psnr == first[0].psnr);
+  // What a trial cannot have of a run is left out of it.
+  auto rich = options();
+  rich.batch = 4, rich.depth_weight = 1, rich.refine_poses = rich.refine_lens = true;
+  auto const of_rich = gart::validate(serial, rich, data, exposures());
+  CHECK(of_rich.trials[0].psnr == first[0].psnr);
+  CHECK(of_rich.options.batch == 4);
+  CHECK(of_rich.options.depth_weight == 1);
 }
 
 TEST_CASE("trials take a tenth of a run at the most, and none is made where there is too little to judge by") {
