@@ -53,11 +53,25 @@ class TrainingPages:
         result = self.load("leave_one_out")
         if not result:
             return
-        rows = [[r["capture"], f"{r['chosen']:.2f}", shown(r["literature"], ".2f"),
-                 f"{r['tuned']:.2f} ({r['tuned_on_others']})", f"{r['best_psnr']:.2f} ({r['best']})"]
-                for r in result["summary"]]
-        self.tables["leave_one_out"] = table(["capture", "as chosen, dB", "literature", "tuned on the others",
-                                              "its own best"], rows) + ["", f"Test views; {source(result)}."]
+        scores, names = {}, []
+        for r in result["runs"]:
+            scores.setdefault(r["capture"], {}).setdefault(r["setting"], []).append(r["psnr"])
+            if r["setting"] not in names and r["setting"] != "chosen":
+                names.append(r["setting"])
+        tuned = {r["capture"]: r["tuned"] for r in result["summary"]}
+        rows = []
+        for capture, of in scores.items():
+            means = {setting: sum(values) / len(values) for setting, values in of.items()}
+            rows.append([capture, means["chosen"], tuned[capture]] + [means[n] for n in names])
+        average = ["mean"] + [sum(column) / len(rows) for column in list(zip(*rows))[1:]]
+        cells = []
+        for row in rows:
+            best = max(row[3:])
+            cells.append([row[0]] + [f"{v:.2f}" for v in row[1:3]] +
+                         [f"**{v:.2f}**" if v == best else f"{v:.2f}" for v in row[3:]])
+        cells.append([average[0]] + [f"{v:.2f}" for v in average[1:]])
+        short = [n.replace("exposure", "E").replace("vignetting", "V").replace("bands", "B").replace(", ", " ") for n in names]
+        self.tables["leave_one_out"] = table(["capture", "as chosen", "tuned on the others"] + short, cells)
 
     def curves(self):
         result = self.load("curves")
