@@ -6,7 +6,7 @@
 /// same below colmap, or the folder itself, .bin before .txt; photos in images/, images_N/ or input/), Blender
 /// (transforms_train.json and transforms_test.json, points3d.ply where it is there), nerfstudio / instant-ngp
 /// (transforms.json). A folder that holds COLMAP and transforms.json is read as COLMAP. Photos are found by names that
-/// differ in case, slashes, extension or folders, masks in a folder masks beside them (docs/captures.md). Images are
+/// differ in case, slashes, extension or folders, masks in a folder masks beside them (docs/formats.md). Images are
 /// decoded in parallel and kept as 8 bits: width * height * channels bytes each. Frames without a photo, or with a pose
 /// that is none, points in a camera's centre and points that are not finite are left out, with a note. Errors: io_error
 /// naming the file, the field and the remedy; unsupported for a camera model that gart does not trace, by its name;

@@ -32,8 +32,8 @@ struct capture_traits;
 
 /// A setting that training may have in place of the literature's.
 struct candidate {
-  std::string setting;  ///< its name as `gart train` has it: "exposure", or "rates.sh_rest" of --set
-  std::string value;    ///< in words, as `gart train` takes it
+  std::string setting;                       ///< the field of train_options that it sets: "exposure", "rates.sh_rest"
+  std::string value;                         ///< in words, as `gart train` takes it
   std::function<void(train_options&)> take;  ///< sets it
 };
 
