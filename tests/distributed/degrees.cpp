@@ -1,4 +1,4 @@
-// Of which degrees the compiled configurations are that ranks train by.
+// Of which degrees the compiled configurations are that ranks train by: rows of degree 3 hold 1 and 2 as well.
 #include <gart/runtime/request.hpp>
 
 #include <doctest/doctest.h>
@@ -9,13 +9,13 @@
 
 using namespace gart;
 
-TEST_CASE("where ranks train, they do so at every degree, so that a choice of bands leaves no GPU idle") {
+TEST_CASE("where ranks train, they do so at every degree, in rows of degree 0 or 3") {
   std::map<std::string, std::set<int>> degrees;
   for (configuration_info const& c : compiled_configurations())
     if (c.ranks) degrees[std::string(to_string(c.backend)) + " " + c.backward].insert(c.sh_degree);
   CHECK(degrees.size() >= 2);  // with sums in a fixed order and without
   for (auto const& [name, there] : degrees) {
     CAPTURE(name);
-    CHECK(there == std::set<int>{0, 1, 2, 3});
+    CHECK(there == std::set<int>{0, 3});
   }
 }
