@@ -126,7 +126,8 @@ TEST_CASE("what is given is not measured, and --no-auto takes the literature's s
     auto const made = here.gart(run + more + " --out run");
     CHECK_MESSAGE(made.code == 130, made.err);
     std::set<std::string> settings;
-    for (auto const& t : here.json("run/config.json")["measured"]["trials"]) settings.insert(t["setting"]);
+    auto const config = here.json("run/config.json");
+    for (auto const& t : config["measured"]["trials"]) settings.insert(t["setting"]);
     return settings;
   };
   CHECK(tried("--no-auto").empty());
