@@ -1,11 +1,9 @@
 // What a trainer takes from its surroundings where the options say nothing: the LT buffer's budget from the memory that
-// is free, and the rate of the bands from whether the capture has points.
+// is free.
 #include "runs.hpp"
 
 #include <gart/exec/serial.hpp>
 
-#include <algorithm>
-#include <cmath>
 #include <string>
 
 using namespace gart_test;
@@ -24,21 +22,6 @@ std::string taken_by(E& exec, gart::dataset const& data, gart::u64 lt_budget) {
   options.lt_budget = lt_budget, options.densify = gart::densify_kind::none;
   run_of<E, Strategy> run(exec, options, data, cloud(5, 0.7f));
   return run.step().backward;
-}
-
-// The farthest that a coefficient above the first band has moved in a few steps of a long run.
-float moved(gart::dataset const& data) {
-  gart::serial_exec exec;
-  gart::train_options options;
-  options.densify = gart::densify_kind::none, options.sh_every = 1;
-  gart::gaussian_model const start = cloud(5, 0.7f);
-  run_of<gart::serial_exec> run(exec, options, data, start);
-  for (int i = 0; i < 3; ++i) run.step();
-  gart::gaussian_model const model = run.model();
-  float most = 0;
-  for (std::size_t i = 0; i < model.sh.size(); ++i)
-    if (i % 12 >= 3) most = std::max(most, std::abs(model.sh[i] - start.sh[i]));
-  return most;
 }
 
 }  // namespace
@@ -81,16 +64,4 @@ TEST_CASE("a run that cannot have its Gaussians is refused in bytes before it st
   CHECK(gart::least_bytes(options, 200'000'000, 3, 4) == (944ull + 112 + 24) * 50'000'384);
   options.batch = 1;  // seen once to be sent, and once by the rank that finishes it
   CHECK(gart::least_bytes(options, 200'000'000, 3, 4) == (944ull + 176 + 40) * 50'000'384);
-}
-
-TEST_CASE("bands move fast from a capture's points, and at a twentieth of that from random ones") {
-  gart::serial_exec exec;
-  auto data = capture(exec, 3);
-  data.extent = 1;
-  float const random = moved(data);
-  data.points.position = {0, 0, 0}, data.points.color = {9, 9, 9};
-  REQUIRE(data.points.size() == 1);
-  float const from_points = moved(data);
-  CHECK(random > 0);
-  CHECK(from_points / random == doctest::Approx(20).epsilon(0.2));
 }
