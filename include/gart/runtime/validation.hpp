@@ -15,7 +15,8 @@
 /// seven captures it left a decibel on two.
 ///
 /// Cost: trials have a fixed number of steps, so that the same capture and options give the same choice on the serial
-/// policy whatever the machine's load: together about a tenth of a run's time at most (plan_validation). Memory: the
+/// policy whatever the machine's load: together about a tenth of a run's time (plan_validation),
+/// more where a run's own images are small. Memory: the
 /// training views once more, shrunk, and one session at a time. Errors: as make_session.
 
 #include <gart/io/dataset.hpp>
