@@ -2,6 +2,7 @@
 #include "codec.hpp"
 #include "file_names.hpp"
 #include "host_images.hpp"
+#include "test_split.hpp"
 #include "view_maps.hpp"
 
 #include <gart/core/error.hpp>
@@ -13,7 +14,6 @@
 #include <cmath>
 #include <exception>
 #include <mutex>
-#include <numeric>
 #include <system_error>
 #include <thread>
 
@@ -125,58 +125,6 @@ void drop_frames_without_photo(capture& c, bool load_images) {
     if (c.frames.empty())
       throw io_error(c.source.string(), "the lists of the file's split hold none of its frames", "correct the lists");
   }
-}
-
-// Gives every frame its role; returns the rule in words.
-// Where each camera stands around the mean of all, as the angle to the first: about the mean of their upward axes.
-std::vector<double> angles_around(std::vector<frame> const& frames) {
-  vec3d middle(0.0), up(0.0);
-  for (frame const& f : frames) {
-    middle += f.view.position / static_cast<double>(frames.size());
-    up -= vec3d(f.view.rotation[1]);
-  }
-  auto const across = [&](vec3d const& v) {
-    return glm::dot(up, up) > 0 ? v - up * (glm::dot(v, up) / glm::dot(up, up)) : v;
-  };
-  vec3d const first = across(frames.front().view.position - middle);
-  std::vector<double> angles;
-  for (frame const& f : frames) {
-    vec3d const at = across(f.view.position - middle);
-    angles.push_back(std::atan2(glm::length(glm::cross(first, at)), glm::dot(first, at)));
-  }
-  return angles;
-}
-
-// The cameras on both sides of the first by name: a part of the scene that training sees from elsewhere alone.
-std::string split_sector(std::vector<frame>& frames, int test_every) {
-  std::vector<double> const angle = angles_around(frames);
-  std::vector<std::size_t> order(frames.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return angle[a] < angle[b]; });
-  std::size_t const count =
-      (frames.size() + static_cast<std::size_t>(test_every) - 1) / static_cast<std::size_t>(test_every);
-  for (std::size_t i = 0; i < order.size(); ++i) frames[order[i]].role = i < count ? part::test : part::train;
-  return "test = a sector, the " + std::to_string(count) + " cameras around the first by name";
-}
-
-std::string split(capture& c, dataset_options const& options) {
-  if (!c.own_split.empty()) return c.own_split;
-  int const test_every = options.test_every;
-  std::stable_sort(c.frames.begin(), c.frames.end(), [](frame const& a, frame const& b) { return a.name < b.name; });
-  if (test_every > 0 && options.test_split == split_kind::sector && !c.frames.empty())
-    return split_sector(c.frames, test_every);
-  for (std::size_t i = 0; i < c.frames.size(); ++i) {
-    bool const test = test_every > 0 && i % static_cast<std::size_t>(test_every) == 0;
-    c.frames[i].role = test ? part::test : part::train;
-  }
-  if (test_every == 0) return "no test views";
-  std::string const nth = std::to_string(test_every);
-  return "test = every " + nth +
-         (test_every == 1   ? "st"
-          : test_every == 2 ? "nd"
-          : test_every == 3 ? "rd"
-                            : "th") +
-         " by name (index % " + nth + " == 0)" + (c.format == "COLMAP" ? "" : "; the files name no split");
 }
 
 double length(vec3d const& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
@@ -330,7 +278,7 @@ dataset load(fs::path const& path, dataset_options const& options) {
   drop_frames_without_photo(c, options.load_images);
   dataset data;
   data.format = c.format;
-  data.split = split(c, options);
+  data.split = assign_roles(c, options);
   data.resize_filter = options.downscale == 1 ? "none" : "box (1/" + std::to_string(options.downscale) + ")";
   std::size_t scaled = 0;
   std::vector<dataset_view> views;

@@ -79,7 +79,7 @@ train_options of_trial(train_options options, validation_plan const& plan) {
 
 }  // namespace
 
-std::vector<candidate> usual_candidates(capture_traits const& traits, train_options const&) {
+std::vector<candidate> usual_candidates(capture_traits const& traits) {
   std::vector<candidate> all;
   all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }});
   if (!traits.panoramas) all.push_back({"vignetting", "on", [](train_options& o) { o.vignetting = true; }});
@@ -120,6 +120,8 @@ validation_plan plan_validation(train_options const& options, dataset const& dat
     plan.steps = std::clamp(static_cast<int>(steps / static_cast<double>(plan.trials)), fewest_steps, most_steps);
     plan.why = std::to_string(plan.trials) + " trials of " + std::to_string(plan.steps) + " steps, judged by " +
                std::to_string(held_out) + " training views held out";
+    if (plan.trials <= candidates)
+      plan.why += "; the run is too short for " + std::to_string(candidates + 1 - plan.trials) + " more";
   }
   if (plan.held_out.empty()) plan.trials = 0;
   return plan;

@@ -127,6 +127,7 @@ TEST_CASE("trials take a tenth of a run at the most, and none is made where ther
   auto const plan = gart::plan_validation(of, data, 5);
   CHECK(plan.trials == 6);
   CHECK(plan.steps == 1250);
+  CHECK(plan.why.find("too short for") == std::string::npos);
   CHECK(plan.shrink == 4);
   CHECK(plan.held_out.size() == 5);
   for (int const iterations : {1, 5999, 6000, 7000, 15000, 30000, 1000000}) {
@@ -144,6 +145,7 @@ TEST_CASE("trials take a tenth of a run at the most, and none is made where ther
   of.iterations = 30000;
   CHECK(gart::plan_validation(of, data, 5).shrink == 1);
   CHECK(gart::plan_validation(of, data, 5).trials == 4);
+  CHECK(gart::plan_validation(of, data, 5).why.find("too short for 2 more") != std::string::npos);
   data.train.resize(23);
   CHECK(gart::plan_validation(of, data, 5).trials == 0);
   CHECK(gart::validate(serial, of, data, {}).trials.empty());
@@ -164,7 +166,7 @@ TEST_CASE("a gain counts where it is above its noise and above what two runs of 
 TEST_CASE("what a capture cannot have is no candidate, and what is given stays") {
   gart::capture_traits traits;
   auto const has = [&](char const* setting) {
-    auto const all = gart::usual_candidates(traits, {});
+    auto const all = gart::usual_candidates(traits);
     return std::any_of(all.begin(), all.end(), [&](auto const& c) { return c.setting == setting; });
   };
   CHECK(has("exposure"));
@@ -172,7 +174,7 @@ TEST_CASE("what a capture cannot have is no candidate, and what is given stays")
   traits.panoramas = 1;
   CHECK(!has("vignetting"));
   gart::train_options of;
-  for (auto const& c : gart::usual_candidates({}, of)) c.take(of);
+  for (auto const& c : gart::usual_candidates({})) c.take(of);
   CHECK(of.exposure);
   CHECK(of.vignetting);
 }

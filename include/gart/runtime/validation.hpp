@@ -11,13 +11,12 @@
 ///
 /// The verdict. Each held-out view gives a gain in PSNR, of the candidate over the best so far. The noise is the
 /// standard error of their mean. A candidate is taken where its gain is above the noise and above least_gain; a tie
-/// leaves the literature's value. Twice the noise would be the test of a claim: here both errors cost alike, and on
-/// seven captures it left a decibel on two.
+/// leaves the literature's value. Twice the noise would be the test of a claim: here both errors cost alike.
 ///
 /// Cost: trials have a fixed number of steps, so that the same capture and options give the same choice on the serial
-/// policy whatever the machine's load: together about a tenth of a run's time (plan_validation),
-/// more where a run's own images are small. Memory: the
-/// training views once more, shrunk, and one session at a time. Errors: as make_session.
+/// policy whatever the machine's load: together about a tenth of a run's time (plan_validation), more where the run's
+/// own images are small. Memory: the training views once more, shrunk, and one session at a time. Errors: as
+/// make_session.
 
 #include <gart/io/dataset.hpp>
 #include <gart/runtime/request.hpp>
@@ -40,7 +39,7 @@ struct candidate {
 
 /// Those that pay on some captures and cost on others, in the order in which they are tried; none that the capture
 /// cannot have: images of the whole sphere have no corners for vignetting.
-std::vector<candidate> usual_candidates(capture_traits const& traits, train_options const& options);
+std::vector<candidate> usual_candidates(capture_traits const& traits);
 
 /// How candidates are tried.
 struct validation_plan {
@@ -65,7 +64,7 @@ struct trial {
   bool taken = false;   ///< whether it is the best from here on
 
   static constexpr double least_gain = 0.05;  ///< dB: less is a tie
-  /// Whether so much gain is no chance.
+  /// Whether the gain is above its noise, and no tie.
   bool is_better() const { return gain > least_gain && gain > noise; }
 };
 
