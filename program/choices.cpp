@@ -118,7 +118,7 @@ nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const&
 nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::validation_progress const& progress) {
   gart::train_options const options = train_options_of(a);
   std::vector<gart::candidate> candidates;
-  if (a.automatic) candidates = gart::usual_candidates(gart::inspect(data));
+  if (a.automatic) candidates = gart::usual_candidates(gart::inspect(data), options);
   std::erase_if(candidates, [&](gart::candidate const& c) {
     std::string const* const own = option_of(a, c.setting);
     return own ? *own != "auto" : sets_field(a.set, c.setting);

@@ -141,8 +141,8 @@ void training_run::say_memory() {
 void training_run::measure_capture() {
   stopwatch const measuring;
   if (writes_) {
-    measured_ = measure(a_, data_, [&](double done, std::string const& tried) {
-      say_.state("measuring what the capture asks for: " + tried, done);
+    measured_ = measure(a_, data_, [&](double done, std::string const& plan) {
+      say_.state("measuring what the capture asks for: " + plan, done);
       return a_.time_budget == 0 || measuring.seconds() < 0.1 * a_.time_budget;
     });
   }

@@ -147,7 +147,7 @@ chosen<index_t> choose_budget(dataset const& data, train_options const& options)
   index_t const budget = growth_budget(options.error, most, data.training_pixels());
   if (budget == most) return {most, "as many as there may be; the photographs have pixels for them"};
   char text[128];
-  std::snprintf(text, sizeof text, "one for %g training pixels, and at least %d: more would learn them by heart",
+  std::snprintf(text, sizeof text, "one for %g training pixels, and at least %d: more would overfit them",
                 static_cast<double>(options.error.pixels_each), options.error.least_budget);
   return {budget, text};
 }
@@ -163,7 +163,7 @@ recommendation recommended(train_options const& options, dataset const& data, co
   if (request.backward == "auto") all.request.backward = choose_backward(traits).value;
   if (!is_given("background")) all.options.background = choose_background(traits).value;
   std::vector<candidate> candidates;
-  for (candidate& c : usual_candidates(traits))
+  for (candidate& c : usual_candidates(traits, options))
     if (!is_given(c.setting)) candidates.push_back(std::move(c));
   all.measured = validate(all.request, all.options, data, candidates, progress);
   all.options = all.measured.options;

@@ -7,7 +7,10 @@
 #include <gart/runtime/validation.hpp>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <future>
 #include <limits>
 #include <memory>
 
@@ -15,12 +18,15 @@ namespace gart {
 
 namespace {
 
-constexpr std::size_t views_for_one = 8, fewest_held_out = 3;
+constexpr std::size_t views_for_one = 4, fewest_held_out = 3;
 constexpr int least_pixels = 128, most_shrink = 4;
-constexpr int fewest_steps = 750, most_steps = 2000;
+constexpr int fewest_steps = 700, most_steps = 2000;
 // A step of a trial takes about this share of the time of one of the run, where its images are smaller: they have a
 // quarter of the pixels or less, but starting the kernels costs as much.
 constexpr double step_share = 0.4, run_share = 0.1;
+// Small images leave a GPU idle between kernels. Trials beside each other fill it: each adds about this share of the
+// time that it takes alone.
+constexpr double beside_share = 0.5;
 
 // The shorter side of the smallest training image.
 int smallest_side(dataset const& data) {
@@ -53,6 +59,46 @@ double mean(std::vector<double> const& values) {
   return sum / static_cast<double>(values.size());
 }
 
+double standard_error(std::vector<double> const& values) {
+  double const n = static_cast<double>(values.size()), middle = mean(values);
+  double squares = 0;
+  for (double const v : values) squares += (v - middle) * (v - middle);
+  return std::sqrt(squares / (n - 1) / n);
+}
+
+// Calls run(i, go_on) for each trial: in turn, or beside each other in threads. go_on() counts a step, and is false
+// from when `progress` ended it all.
+template <class Run>
+void run_trials(validation_plan const& plan, validation_progress const& progress, Run run) {
+  double const all = static_cast<double>(plan.trials) * (plan.steps + 1);
+  std::atomic<int> asked{0};
+  std::atomic<bool> ended{false};
+  auto const report = [&] {
+    if (progress && !progress(std::min(asked / all, 1.0), plan.why)) ended = true;
+  };
+  if (!plan.beside) {
+    for (std::size_t i = 0; i < plan.trials; ++i) {
+      run(i, [&] {
+        ++asked, report();
+        return !ended;
+      });
+    }
+    return;
+  }
+  std::vector<std::future<void>> trials;
+  for (std::size_t i = 0; i < plan.trials; ++i) {
+    trials.push_back(std::async(std::launch::async, [&, i] {
+      run(i, [&] {
+        ++asked;
+        return !ended;
+      });
+    }));
+  }
+  for (std::future<void>& t : trials)
+    while (t.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) report();
+  for (std::future<void>& t : trials) t.get();  // throws what a trial threw
+}
+
 // What the run's options are in a trial: as many Gaussians a pixel, and all that is counted in steps as much sooner. A
 // slow rate of the bands above the first would not get as far as in the run, and a fast one would seem to pay: it is
 // raised as those of the geometry are in short runs (optim/schedule.hpp), at most to that of the first band. One view a
@@ -79,11 +125,17 @@ train_options of_trial(train_options options, validation_plan const& plan) {
 
 }  // namespace
 
-std::vector<candidate> usual_candidates(capture_traits const& traits) {
+std::vector<candidate> usual_candidates(capture_traits const& traits, train_options const& options) {
   std::vector<candidate> all;
   all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }});
   if (!traits.panoramas) all.push_back({"vignetting", "on", [](train_options& o) { o.vignetting = true; }});
   all.push_back({"rates.sh_rest", "0.0025", [](train_options& o) { o.rates.sh_rest = 0.0025f; }});
+  error_growth_options more = options.error;
+  more.pixels_each = 100;
+  index_t const most = options.max_gaussians;
+  if (options.densify == densify_kind::error &&
+      growth_budget(more, most, traits.pixels) > growth_budget(options.error, most, traits.pixels))
+    all.push_back({"error.pixels_each", "100", [](train_options& o) { o.error.pixels_each = 100; }});
   return all;
 }
 
@@ -102,13 +154,15 @@ dataset shrunk(dataset const& data, int shrink) {
   return small;
 }
 
-validation_plan plan_validation(train_options const& options, dataset const& data, std::size_t candidates) {
+validation_plan plan_validation(train_options const& options, dataset const& data, std::size_t candidates,
+                                bool beside) {
   validation_plan plan;
   std::size_t const views = data.train.size(), held_out = views / views_for_one;
   if (views > 0) plan.shrink = std::clamp(smallest_side(data) / least_pixels, 1, most_shrink);
   while (!divides(data, plan.shrink)) --plan.shrink;
   double const steps = run_share / (plan.shrink > 1 ? step_share : 1) * options.iterations;
-  plan.trials = std::min(candidates + 1, static_cast<std::size_t>(steps / fewest_steps));
+  double const each = beside ? beside_share : 1;  // of the time of a trial alone
+  plan.trials = std::min(candidates + 1, static_cast<std::size_t>(steps / fewest_steps / each));
   if (candidates == 0) {
     plan.why = "every setting is given";
   } else if (held_out < fewest_held_out) {
@@ -116,8 +170,10 @@ validation_plan plan_validation(train_options const& options, dataset const& dat
   } else if (plan.trials < 2) {
     plan.why = "a run of " + std::to_string(options.iterations) + " steps is too short to try anything";
   } else {
+    plan.beside = beside;
     for (std::size_t i = 0; i < held_out; ++i) plan.held_out.push_back(i * views_for_one + views_for_one / 2);
-    plan.steps = std::clamp(static_cast<int>(steps / static_cast<double>(plan.trials)), fewest_steps, most_steps);
+    plan.steps =
+        std::clamp(static_cast<int>(steps / each / static_cast<double>(plan.trials)), fewest_steps, most_steps);
     plan.why = std::to_string(plan.trials) + " trials of " + std::to_string(plan.steps) + " steps, judged by " +
                std::to_string(held_out) + " training views held out";
     if (plan.trials <= candidates)
@@ -129,41 +185,34 @@ validation_plan plan_validation(train_options const& options, dataset const& dat
 
 validation validate(configuration_request const& request, train_options const& options, dataset const& data,
                     std::vector<candidate> const& candidates, validation_progress const& progress) {
-  validation result{plan_validation(options, data, candidates.size()), {}, options};
+  bool const beside = !request.stream && resolve(request).backend == backend_kind::cuda;
+  validation result{plan_validation(options, data, candidates.size(), beside), {}, options};
   validation_plan const& plan = result.plan;
   if (plan.held_out.empty()) return result;
   dataset const small = shrunk(data, plan.shrink);
   configuration_request alone = request;
   alone.ranks = nullptr, alone.depth = false;
-  std::vector<double> best;  // PSNR of each view held out
-  for (std::size_t i = 0; i < plan.trials; ++i) {
-    train_options changed = result.options;
+  std::vector<std::vector<double>> psnr(plan.trials);  // of each view held out; none where a trial was ended
+  run_trials(plan, progress, [&](std::size_t i, auto const& go_on) {
+    train_options changed = options;
+    if (i > 0) candidates[i - 1].take(changed);
+    std::unique_ptr<session> const training = make_session(alone, of_trial(changed, plan), small);
+    while (go_on() && training->steps_done() < plan.steps) training->step();
+    if (training->steps_done() == plan.steps) psnr[i] = psnr_of(*training, small, plan, options.background);
+  });
+  for (std::size_t i = 0; i < plan.trials && !psnr[0].empty(); ++i) {
+    if (psnr[i].empty()) continue;
     trial tried;
+    tried.psnr = mean(psnr[i]), tried.taken = i == 0;
     if (i > 0) {
       candidate const& c = candidates[i - 1];
       tried.setting = c.setting, tried.value = c.value;
-      c.take(changed);
-    }
-    std::unique_ptr<session> const training = make_session(alone, of_trial(changed, plan), small);
-    while (training->steps_done() < plan.steps) {
-      double const done = static_cast<double>(training->steps_done()) / plan.steps;
-      double const of_all = (static_cast<double>(i) + done) / static_cast<double>(plan.trials);
-      if (progress && !progress(of_all, i > 0 ? tried.setting + " " + tried.value : "the usual")) return result;
-      training->step();
-    }
-    std::vector<double> const psnr = psnr_of(*training, small, plan, options.background);
-    tried.psnr = mean(psnr), tried.taken = i == 0;
-    if (i > 0) {
       std::vector<double> gains;
-      for (std::size_t v = 0; v < psnr.size(); ++v) gains.push_back(psnr[v] - best[v]);
-      tried.gain = mean(gains);
-      double squares = 0;
-      for (double const g : gains) squares += (g - tried.gain) * (g - tried.gain);
-      double const n = static_cast<double>(gains.size());
-      tried.noise = std::sqrt(squares / (n - 1) / n);
+      for (std::size_t v = 0; v < psnr[i].size(); ++v) gains.push_back(psnr[i][v] - psnr[0][v]);
+      tried.gain = mean(gains), tried.noise = standard_error(gains);
       tried.taken = tried.is_better();
+      if (tried.taken) c.take(result.options);
     }
-    if (tried.taken) best = psnr, result.options = changed;
     result.trials.push_back(tried);
   }
   return result;

@@ -251,12 +251,12 @@ TEST_CASE_TEMPLATE("a split that leaves no halves is refused by field", E, GART_
 TEST_CASE("growth ends where the capture has too few pixels for more") {
   gart::error_growth_options options;
   auto const budget = [&](gart::index_t most, gart::u64 pixels) { return gart::growth_budget(options, most, pixels); };
-  CHECK(budget(1'000'000, 22'809'600) == 228'096);     // 44 photographs of 540 x 960
-  CHECK(budget(1'000'000, 108'732'000) == 1'000'000);  // 255 of 800 x 533
+  CHECK(budget(1'000'000, 22'809'600) == 114'048);     // 44 photographs of 540 x 960
+  CHECK(budget(1'000'000, 217'464'000) == 1'000'000);  // 510 of 800 x 533
   CHECK(budget(1'000'000, 912'384) == 100'000);        // no capture is too small for so many
   CHECK(budget(20'000, 912'384) == 20'000);
   options.least_budget = 0;
-  CHECK(budget(1'000'000, 912'384) == 9'123);
+  CHECK(budget(1'000'000, 912'384) == 4'561);
   CHECK(budget(1'000'000, 0) == 0);
   options.pixels_each = 0;
   CHECK(budget(1'000'000, 912'384) == 1'000'000);
@@ -266,11 +266,11 @@ TEST_CASE("halves are nearer where the capture has pixels for all of the Gaussia
   gart::error_growth_options options;
   auto const share = [&](gart::index_t most, gart::u64 pixels) { return gart::split_share(options, most, pixels); };
   CHECK(share(1'000'000, 22'809'600) == 0.4f);
-  CHECK(share(228'097, 22'809'600) == 0.4f);
-  CHECK(share(228'096, 22'809'600) == 0.35f);
-  CHECK(share(1'000'000, 108'732'000) == 0.35f);
+  CHECK(share(114'049, 22'809'600) == 0.4f);
+  CHECK(share(114'048, 22'809'600) == 0.35f);
+  CHECK(share(1'000'000, 217'464'000) == 0.35f);
   options.pixels_each = 0;
   CHECK(share(1'000'000, 22'809'600) == 0.35f);
-  options.pixels_each = 100, options.split.share = 0.25f;
+  options.pixels_each = 200, options.split.share = 0.25f;
   CHECK(share(1'000'000, 22'809'600) == 0.25f);
 }

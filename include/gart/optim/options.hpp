@@ -66,9 +66,9 @@ struct error_growth_options {
   float dead_opacity = 0.005f;     ///< as least_opacity has it for the alpha_min traced with
   float opacity_penalty = 0.003f;  ///< times the mean opacity (and train/foreground_fraction.hpp)
   split_shape split;               ///< how one becomes two
-  /// The count ends at one Gaussian for so many pixels of the training views: more would learn them by heart. 0: at
-  /// max_gaussians, whatever the capture.
-  float pixels_each = 100;
+  /// The count ends at one Gaussian for so many pixels of the training views: more would overfit them, and take
+  /// time and memory. 0: at max_gaussians, whatever the capture.
+  float pixels_each = 200;
   int least_budget = 100'000;  ///< that pixels_each leaves to the smallest capture
 };
 

@@ -4,19 +4,21 @@
 /// judged by the views held out of them. No threshold of a statistic of the capture decides, and test views are never
 /// seen.
 ///
-/// The trials. One training view in 8 is held out, from the middle of each eighth view on. Images are shrunk, at most
-/// by 4 and to no less than 128 pixels, and the Gaussians that there may be with them. The first trial is of the
-/// options as they come, which should be the literature's. Each candidate after it is that best so far with one setting
-/// changed: the order of candidates is the order of the questions, and later ones are asked of what earlier ones gave.
+/// The trials. One training view in 4 is held out, from the middle of each four on: noise falls with their number, and
+/// three quarters of the views train well enough to compare. Images are shrunk, at most by 4 and to no less than 128
+/// pixels, and the Gaussians that there may be with them. The first trial is of the options as they come, which should
+/// be the literature's. Each candidate is tried on these options with one setting changed.
 ///
-/// The verdict. Each held-out view gives a gain in PSNR, of the candidate over the best so far. The noise is the
+/// The verdict. Each held-out view gives a gain in PSNR, of the candidate over the first trial. The noise is the
 /// standard error of their mean. A candidate is taken where its gain is above the noise and above least_gain; a tie
-/// leaves the literature's value. Twice the noise would be the test of a claim: here both errors cost alike.
+/// leaves the value that was. Gains add up nearly (bench/results/trial_candidates.json), so those taken are taken
+/// together. Twice the noise would be the test of a claim: here both errors cost alike.
 ///
 /// Cost: trials have a fixed number of steps, so that the same capture and options give the same choice on the serial
 /// policy whatever the machine's load: together about a tenth of a run's time (plan_validation), more where the run's
-/// own images are small. Memory: the training views once more, shrunk, and one session at a time. Errors: as
-/// make_session.
+/// own images are small. On a GPU the trials run beside each other, one thread and stream each; with a stream of the
+/// caller's, in turn. Memory: the training views once more, shrunk, and a small session for each trial at a time.
+/// Errors: as make_session.
 
 #include <gart/io/dataset.hpp>
 #include <gart/runtime/request.hpp>
@@ -37,9 +39,9 @@ struct candidate {
   std::function<void(train_options&)> take;  ///< sets it
 };
 
-/// Those that pay on some captures and cost on others, in the order in which they are tried; none that the capture
-/// cannot have: images of the whole sphere have no corners for vignetting.
-std::vector<candidate> usual_candidates(capture_traits const& traits);
+/// Those that pay on some captures and cost on others, the first where a run is too short for all; none that changes
+/// nothing: images of the whole sphere have no corners for vignetting, and some budgets do not depend on pixels.
+std::vector<candidate> usual_candidates(capture_traits const& traits, train_options const& options);
 
 /// How candidates are tried.
 struct validation_plan {
@@ -47,21 +49,23 @@ struct validation_plan {
   int shrink = 1;                          ///< pixels of a photograph to one of a trial's image, across and down
   int steps = 0;                           ///< of each trial
   std::size_t trials = 0;                  ///< the first, of the options as they come, and one for each candidate
+  bool beside = false;                     ///< all at once, each on a stream of its own
   std::string why;                         ///< in words
 };
 
 /// For so many candidates at most: fewer where the run is too short for all of them, none where it is too short for
-/// one, or has too few training views to hold some out.
-validation_plan plan_validation(train_options const& options, dataset const& data, std::size_t candidates);
+/// one, or has too few training views to hold some out. `beside`: they may run beside each other.
+validation_plan plan_validation(train_options const& options, dataset const& data, std::size_t candidates,
+                                bool beside = false);
 
 /// What a trial gave.
 struct trial {
   std::string setting;  ///< the candidate's; empty: the options as they came
   std::string value;    ///< the candidate's
   double psnr = 0;      ///< dB, the mean of the views held out
-  double gain = 0;      ///< dB, over the best so far
+  double gain = 0;      ///< dB, over the first trial
   double noise = 0;     ///< dB, the gain's standard error over the views held out
-  bool taken = false;   ///< whether it is the best from here on
+  bool taken = false;   ///< whether the options have it
 
   static constexpr double least_gain = 0.05;  ///< dB: less is a tie
   /// Whether the gain is above its noise, and no tie.
@@ -75,11 +79,11 @@ struct validation {
   train_options options;      ///< with the candidates that were taken
 };
 
-/// Called between steps: how much of the validation is done, 0 to 1, and what is tried. False ends it: what was taken
-/// so far is the result.
-using validation_progress = std::function<bool(double done, std::string const& tried)>;
+/// Called between steps, by the thread that called validate: how much is done, 0 to 1, and the plan in words. False
+/// ends it: trials that were not finished count for nothing.
+using validation_progress = std::function<bool(double done, std::string const& plan)>;
 
-/// Tries the candidates in their order.
+/// Tries the candidates.
 validation validate(configuration_request const& request, train_options const& options, dataset const& data,
                     std::vector<candidate> const& candidates, validation_progress const& progress = {});
 
