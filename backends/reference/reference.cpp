@@ -230,13 +230,17 @@ reference_image trace_reference(gaussian_model const& model, camera const& view,
   for (std::size_t k = 0; k < pixels.size(); ++k) rays[k] = ray_of(view, pixels[k]);
   std::vector<body> bodies(n);
   filter const view_filter(view, options.antialias);
+#if defined(_OPENMP)
 #pragma omp parallel for
+#endif
   for (std::size_t i = 0; i < n; ++i)
     bodies[i] = body_of(model, i, view.position, options.alpha_min, falloff, view_filter);
 
   pixel_tracer const tracer(model, options, active_degree, falloff, bodies);
   auto const blocks = blocks_of(view, pixels);
+#if defined(_OPENMP)
 #pragma omp parallel for ordered schedule(dynamic, 1)
+#endif
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     cone const around(rays, blocks[b], !(options.near >= 0));
     std::vector<u32> candidates;
@@ -256,12 +260,16 @@ reference_image trace_reference(gaussian_model const& model, camera const& view,
       });
     }
     if (backwards) {
+#if defined(_OPENMP)
 #pragma omp ordered
+#endif
       sums.add_to(out.gradients, candidates);
     }
   }
   if (backwards && view_filter.any()) {
+#if defined(_OPENMP)
 #pragma omp parallel for
+#endif
     for (std::size_t i = 0; i < n; ++i)
       if (bodies[i].valid) pull_back(out.gradients, i, view_filter, stored_parameters(model, i, view.position));
   }

@@ -87,7 +87,9 @@ class nearest_three {
 std::vector<float> neighbor_distance2(std::vector<float> const& position) {
   nearest_three const tree(position);
   std::vector<float> out(position.size() / 3);
+#if defined(_OPENMP)
 #pragma omp parallel for schedule(dynamic, 1024)
+#endif
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = tree.mean_distance2(static_cast<u32>(i));
   return out;
 }

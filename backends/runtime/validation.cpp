@@ -145,7 +145,9 @@ dataset shrunk(dataset const& data, int shrink) {
   small.extent = data.extent, small.alpha = data.alpha;
   small.bounds_min = data.bounds_min, small.bounds_max = data.bounds_max;
   small.train.resize(data.train.size());
+#if defined(_OPENMP)
 #pragma omp parallel for schedule(dynamic)
+#endif
   for (std::size_t i = 0; i < data.train.size(); ++i) {
     dataset_view const& v = data.train[i];
     small.train[i] = {v.name, downscaled(v.view, shrink, v.name), box_downscale(v.image, shrink),

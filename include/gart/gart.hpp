@@ -21,6 +21,7 @@
 #include <gart/loss/affine_color.hpp>
 #include <gart/loss/metrics.hpp>
 #include <gart/pose/differentiate_pose.hpp>
+#include <gart/rays/ray_tracer.hpp>
 #include <gart/reference/reference.hpp>
 #include <gart/render/frame.hpp>
 #include <gart/runtime/choose.hpp>

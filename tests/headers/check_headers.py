@@ -2,7 +2,7 @@
 and all .hpp together; the options as a user names some of them; and templates as a user instantiates them. The host
 compiler gives no warning of any kind that a user may ask for (HOST). First it shows that a header that is not
 self-contained, one without `#pragma once`, one that opens the namespace GART_ISA with no such macro, and one that
-converts or shadows in silence, is seen.
+converts or shadows in silence, is seen. Other compilers that are there (OTHERS) take all headers and the templates.
 
 Most headers include most of the same. So one compilation takes a chain of them, each of which is included, directly or
 not, by the next: what comes before a header is what it would have brought anyway.
@@ -11,11 +11,18 @@ import argparse
 import concurrent.futures
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 
-HOST = ["-std=c++20", "-Wall", "-Wextra", "-Wshadow", "-Wconversion", "-Werror", "-fopenmp", "-ffp-contract=off", "-fsyntax-only", "-x", "c++"]
+# Clang counts signs among conversions, g++ does not.
+PLAIN = ["-std=c++20", "-Wall", "-Wextra", "-Wshadow", "-Wconversion", "-Wno-sign-conversion", "-Werror", "-ffp-contract=off", "-fsyntax-only", "-x", "c++"]
+HOST = [*PLAIN, "-fopenmp"]
+# A user's other compilers, libraries and machines, and a program that is built without OpenMP.
+OTHERS = [["g++"], ["clang++-16", "-fopenmp", "-march=x86-64-v3"], ["clang++-19", "-fopenmp"],
+          ["clang++-16", "-stdlib=libc++"], ["clang++-19", "-stdlib=libc++"], ["aarch64-linux-gnu-g++", "-fopenmp"],
+          ["x86_64-w64-mingw32-g++-posix", "-fopenmp"]]
 # PTX of one architecture: no host compilation and no assembler, because what is looked for is front-end errors.
 CUDA = ["-std=c++20", "--expt-relaxed-constexpr", "-diag-suppress=20012", "-arch=sm_90", "-ptx", "-o", "/dev/null",
         "-x", "cu"]
@@ -92,6 +99,12 @@ def program_failure(what, text, command, include, folder):
     return f"{what}:\n{done.stderr}" if done.returncode else ""
 
 
+def works(command, folder):
+    """Whether the compiler is there, with its libraries and GLM."""
+    program = "#include <atomic>\n#include <glm/glm.hpp>\n#if defined(_OPENMP)\n#include <omp.h>\n#endif\n"
+    return shutil.which(command[0]) is not None and not program_failure("tried", program, command, folder, folder)
+
+
 def self_check(host, folder):
     headers = {
         "good.hpp": ("#pragma once\n#include <cstddef>\ninline std::size_t good() { return 0; }\n", True),
@@ -122,6 +135,7 @@ parser = argparse.ArgumentParser()
 parser.add_argument("include", type=pathlib.Path)
 parser.add_argument("--cxx", required=True)
 parser.add_argument("--nvcc")
+parser.add_argument("--glm", type=pathlib.Path, help="the folder that has glm/glm.hpp, for compilers of other machines")
 parser.add_argument("--jobs", type=int, default=1)
 a = parser.parse_args()
 include = a.include.resolve()
@@ -133,8 +147,18 @@ with tempfile.TemporaryDirectory() as folder:
     plain = [name for name in headers if name.endswith(".hpp")]
     if not plain:
         sys.exit(f"no headers in {include}/gart")
+    glm = []
+    if a.glm:
+        (pathlib.Path(folder) / "with_glm").mkdir()
+        (pathlib.Path(folder) / "with_glm" / "glm").symlink_to(a.glm.resolve() / "glm")
+        glm = ["-isystem", f"{folder}/with_glm"]
+    others = {" ".join(other): [*other, *PLAIN, *glm] for other in OTHERS}
+    there = {name: command for name, command in others.items() if works(command, folder)}
     with concurrent.futures.ThreadPoolExecutor(max(1, a.jobs)) as pool:
         jobs = []
+        everything = "".join(f"#include <{name}>\n" for name in plain) + TEMPLATES
+        for number, (name, command) in enumerate(there.items()):
+            jobs.append(pool.submit(program_failure, f"{number} all headers by {name}", everything, command, include, folder))
         if a.nvcc:
             units = [[name] for name in headers if name.endswith(".cuh")]
             jobs += [pool.submit(failure, [a.nvcc, *CUDA], include, unit, folder) for unit in [plain, *units]]
@@ -146,4 +170,5 @@ with tempfile.TemporaryDirectory() as folder:
 
 print("\n".join(failures) or f"{len(headers if a.nvcc else plain)} headers compile" +
       ("" if a.nvcc else "; .cuh files were not tried: no nvcc"))
+print("also by: " + "; ".join(there) + ". Not there: " + ("; ".join(n for n in others if n not in there) or "none"))
 sys.exit(1 if failures else 0)

@@ -23,9 +23,11 @@ inline std::size_t block_begin(std::size_t n, std::size_t blocks, std::size_t b)
 }
 
 template <host_execution E, class F>
-void for_blocks(E& exec, std::size_t blocks, F const& f) {
+void for_blocks([[maybe_unused]] E& exec, std::size_t blocks, F const& f) {
   if (blocks == 1) return f(std::size_t{0});
+#if defined(_OPENMP)
 #pragma omp parallel for schedule(static) num_threads(exec.threads())
+#endif
   for (std::size_t b = 0; b < blocks; ++b) f(b);
 }
 

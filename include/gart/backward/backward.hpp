@@ -136,20 +136,7 @@ class backward_pass {
                              "configuration_request.backward = pixel, which needs none");
   }
 
- private:
-  template <class F, strategy S>
-  friend void differentiate(F&, backward_pass<F, S>&, image_gradients const&, gaussians_view<float>, span<float const>);
-  template <class F, strategy S>
-  friend void sum_gradients(F&, backward_pass<F, S>&, image_gradients const&, gaussians_view<float>, span<float const>);
-  using entry = typename record_type::entry;
-  static constexpr std::size_t slot_bytes = sizeof(entry) + (records_depths ? sizeof(float) : 0);
-  enum standing { nothing, prepared, rendered };
-
-  void require(Frame const& frame, standing least, char const* what) const {
-    if (stands_at_ < least || frame_ != &frame || preparation_ != frame.preparation()) throw invalid_argument(what);
-  }
-
-  // All but what finish_gradients does.
+  /// What sum_gradients() calls: all but what finish_gradients (backward/finish.hpp) does.
   void sum(Frame& frame, image_gradients const& image, gaussians_view<float> gradients, span<float const> error) {
     using response = typename Frame::response;
     require(frame, rendered, "differentiate: call backward_pass.render first, after frame.prepare");
@@ -202,6 +189,15 @@ class backward_pass {
                         depth_});
       });
     }
+  }
+
+ private:
+  using entry = typename record_type::entry;
+  static constexpr std::size_t slot_bytes = sizeof(entry) + (records_depths ? sizeof(float) : 0);
+  enum standing { nothing, prepared, rendered };
+
+  void require(Frame const& frame, standing least, char const* what) const {
+    if (stands_at_ < least || frame_ != &frame || preparation_ != frame.preparation()) throw invalid_argument(what);
   }
 
   // The gradients by depth and transmittance, where there are any.

@@ -242,7 +242,8 @@ struct gather_kernel {
   GART_HD GART_INLINE bool holds(pixel_data const& at, entry_type const& entry, u32 number, ray_peak const& r,
                                  lane_data const& data) const {
     if constexpr (recomputed)
-      return is_hit(data.gaussian, r, near) & !before(at.last.v[0], float_to_bits(at.last.v[1]), r.t, number);
+      return static_cast<int>(is_hit(data.gaussian, r, near)) &
+             static_cast<int>(!before(at.last.v[0], float_to_bits(at.last.v[1]), r.t, number));
     else
       return entry.written();
   }

@@ -45,7 +45,7 @@
 
 namespace gart::inline GART_ISA {
 
-inline constexpr char const* instruction_set = GART_TEXT(GART_ISA) + sizeof "isa";  ///< "avx2_fma"
+inline constexpr char const* instruction_set = &GART_TEXT(GART_ISA)[sizeof "isa"];  ///< "avx2_fma"
 
 }  // namespace gart::inline GART_ISA
 

@@ -15,8 +15,12 @@
 #include <utility>
 #include <vector>
 
+#if __has_include(<sys/mman.h>)
 #include <sys/mman.h>
+#endif
+#if __has_include(<unistd.h>)
 #include <unistd.h>
+#endif
 
 namespace gart::inline GART_ISA {
 
@@ -101,8 +105,11 @@ class host_memory {
     std::string key;
     for (std::size_t kilobytes = 0; info >> key >> kilobytes; info.ignore(256, '\n'))
       if (key == "MemAvailable:") return 1024 * kilobytes;
+#if defined(_SC_AVPHYS_PAGES)
     long const pages = sysconf(_SC_AVPHYS_PAGES), page = sysconf(_SC_PAGESIZE);
-    return pages > 0 && page > 0 ? static_cast<std::size_t>(pages) * static_cast<std::size_t>(page) : 0;
+    if (pages > 0 && page > 0) return static_cast<std::size_t>(pages) * static_cast<std::size_t>(page);
+#endif
+    return 0;
   }
 
  private:

@@ -24,7 +24,13 @@ class openmp_exec : public host_memory {
   /// Adds v, returns the old value.
   template <class T>
   static T atomic_add(T* p, T v) {
+#if defined(__cpp_lib_atomic_ref)
     return std::atomic_ref<T>(*p).fetch_add(v, std::memory_order_relaxed);
+#else  // libc++ before 19
+    T old = *p, sum = old + v;
+    while (!__atomic_compare_exchange(p, &old, &sum, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) sum = old + v;
+    return old;
+#endif
   }
   /// Calls f while no other thread is in a call for the same `what`. One lock from a striped table: x86 has no atomic
   /// float add, and a compare-and-swap for each of tens of floats costs more than the rest of a hit.

@@ -55,7 +55,9 @@ void parallel_for(openmp_exec& exec, char const* label, index_t n, K const& kern
   if (n == 0) return;
   stage_scope scope(exec, label);
   // Dynamic chunks: rays differ in cost by orders of magnitude; 256 indices amortise the fetch of a chunk.
+#if defined(_OPENMP)
 #pragma omp parallel for schedule(dynamic, 256) num_threads(exec.threads())
+#endif
   for (index_t i = 0; i < n; ++i) kernel(i);
 }
 ///@}
@@ -79,11 +81,15 @@ void parallel_for(openmp_exec& exec, char const* label, tile_range range, K cons
   stage_scope scope(exec, label);
   // Tiles that lie together go to one thread: neighbours write to the same Gaussians, and cache lines shared by cores
   // (false sharing among them) cost more than an uneven share of the work.
-  index_t const chunk = std::max<index_t>(1, range.tiles / static_cast<index_t>(16 * exec.threads()));
+  [[maybe_unused]] index_t const chunk = std::max<index_t>(1, range.tiles / static_cast<index_t>(16 * exec.threads()));
+#if defined(_OPENMP)
 #pragma omp parallel num_threads(exec.threads())
+#endif
   {
     auto scratch = std::make_unique_for_overwrite<typename K::scratch>();
+#if defined(_OPENMP)
 #pragma omp for schedule(dynamic, chunk)
+#endif
     for (index_t t = 0; t < range.tiles; ++t) {
       host_team<typename K::scratch> team(t, *scratch);
       kernel(team);

@@ -30,7 +30,9 @@ namespace detail {
 template <int N, class Sum>
 std::array<double, N> sum_pixels(image_float const& truth, image8 const& mask, Sum const& sum) {
   std::vector<std::array<double, N>> rows(static_cast<std::size_t>(truth.height));
+#if defined(_OPENMP)
 #pragma omp parallel for
+#endif
   for (int y = 0; y < truth.height; ++y) {
     std::array<double, N> row{};
     for (int x = 0; x < truth.width; ++x) {

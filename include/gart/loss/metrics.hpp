@@ -70,7 +70,9 @@ inline double psnr(image_float const& render, image_float const& truth) {
   detail::check_pair(render, truth, "psnr");
   std::size_t const row_size = static_cast<std::size_t>(truth.width) * truth.channels;
   std::vector<double> rows(truth.height);
+#if defined(_OPENMP)
 #pragma omp parallel for
+#endif
   for (int y = 0; y < truth.height; ++y) {
     double sum = 0;
     for (std::size_t i = y * row_size; i < (y + 1) * row_size; ++i) {
@@ -100,7 +102,9 @@ inline double ssim(image_float const& render, image_float const& truth) {
   std::size_t const plane = static_cast<std::size_t>(w) * h;
   std::vector<double> along(5 * plane);
   for (int c = 0; c < channels; ++c) {
+#if defined(_OPENMP)
 #pragma omp parallel for
+#endif
     for (int y = 0; y < h; ++y)
       for (int x = 0; x < w; ++x) {
         double sums[5] = {};
@@ -114,7 +118,9 @@ inline double ssim(image_float const& render, image_float const& truth) {
         }
         for (int p = 0; p < 5; ++p) along[p * plane + static_cast<std::size_t>(y) * w + x] = sums[p];
       }
+#if defined(_OPENMP)
 #pragma omp parallel for
+#endif
     for (int y = 0; y < h; ++y) {
       double row = 0;
       for (int x = 0; x < w; ++x) {

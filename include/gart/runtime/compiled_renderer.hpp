@@ -7,6 +7,7 @@
 #include <gart/pose/differentiate_pose.hpp>
 #include <gart/render/render_image.hpp>
 #include <gart/runtime/configuration_of.hpp>
+#include <gart/runtime/model_arrays.hpp>
 #include <gart/runtime/registry.hpp>
 #include <gart/scene/copy_bands.hpp>
 
@@ -39,12 +40,16 @@ class compiled_renderer final : public renderer {
 
   void set_model(gaussian_model const& model) override {
     require_degree(model.sh_degree);
+    require_arrays(model);
+    differentiated_ = 0;
     degree_ == sh_degree ? model_.assign(model) : model_.assign(with_sh_degree(model, sh_degree));
     scene_ = std::as_const(model_).view();
     bound_bands_ = nullptr;
   }
   void bind(gaussians_view<float const> parameters) override {
     require_degree(parameters.sh_degree);
+    require_arrays(parameters, "renderer.bind");
+    differentiated_ = 0;
     scene_ = parameters;
     bound_bands_ = nullptr;
     if (degree_ == sh_degree) return;
@@ -73,10 +78,15 @@ class compiled_renderer final : public renderer {
       throw invalid_argument("renderer: the colour's gradient must have three values for each pixel of the view");
     color_gradient_.assign(span<float const>(color_gradient.data.data(), color_gradient.data.size()));
     gradients_.resize_keep(scene_.count);
+    differentiated_ = 0;
     differentiate_rows(view, options, color_gradient_.data(), gradients_.view(), {});
+    differentiated_ = frame_.preparation();
   }
   void differentiate_into(camera const& view, render_options const& options, float const* color_gradient,
                           gaussians_view<float> gradients, render_targets const& targets) override {
+    if (!color_gradient && view.width > 0)
+      throw invalid_argument("renderer.differentiate_into: color_gradient is null; give dL/dcolour of the view");
+    require_arrays(gradients, "renderer.differentiate_into");
     if (degree_ == sh_degree) return differentiate_rows(view, options, color_gradient, gradients, targets);
     require_degree(gradients.sh_degree);
     gaussians_view<float> rows = gradients;
@@ -86,8 +96,14 @@ class compiled_renderer final : public renderer {
     copy_bands(exec_, rows.sh, sh_degree, gradients.sh, degree_, gradients.count);
   }
   pose_gradient differentiate_pose() override {
-    if (gradients_.size() != scene_.count || scene_.count == 0)
-      throw invalid_argument("renderer.differentiate_pose: call renderer.differentiate first");
+    if (!differentiated_) throw invalid_argument("renderer.differentiate_pose: call renderer.differentiate first");
+    if (differentiated_ != frame_.preparation())
+      throw invalid_argument(
+          "renderer.differentiate_pose: another view was rendered since renderer.differentiate; ask for the pose "
+          "first, "
+          "or differentiate again");
+    if (scene_.count == 0)
+      throw invalid_argument("renderer.differentiate_pose: the model has no Gaussians, and a pose no gradient by them");
     return pose_backward_(frame_, std::as_const(gradients_).view());
   }
   gaussian_model gradients() const override { return with_sh_degree(gradients_.to_host(), degree_); }
@@ -135,7 +151,8 @@ class compiled_renderer final : public renderer {
     return images;
   }
 
-  int degree_;  // of the model
+  int degree_;              // of the model
+  u64 differentiated_ = 0;  // the frame's preparation that gradients_ are of; 0: they are of none
   E exec_;
   frame<E, Traits, Tracer> frame_;
   backward_pass<frame<E, Traits, Tracer>, Strategy> pass_;

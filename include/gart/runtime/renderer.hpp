@@ -10,8 +10,9 @@
 /// Memory "of the policy" is device memory of the request's device for cuda, host memory for the others.
 ///
 /// Errors: unsupported, naming the configurations there are and how to compile one, for a configuration that is not;
-/// invalid_argument for Gaussians of another SH degree, for options that no view can be rendered by, and for
-/// options.rebuild_every where the tracer builds no tree; out_of_memory; whatever the policy throws.
+/// invalid_argument for Gaussians of another SH degree or whose arrays disagree in size, for options that no view can
+/// be rendered by, and for options.rebuild_every where the tracer builds no tree; out_of_memory; whatever the policy
+/// throws.
 
 #include <gart/exec/profile.hpp>
 #include <gart/pose/pose.hpp>
@@ -63,8 +64,8 @@ class renderer {
   /// the Gaussians, which are overwritten. `targets` takes the view besides.
   virtual void differentiate_into(camera const& view, render_options const& options, float const* color_gradient,
                                   gaussians_view<float> gradients, render_targets const& targets = {}) = 0;
-  /// dL/d the pose of the view of the last differentiate, while the model is the one that it was of. Waits for it.
-  /// Errors: invalid_argument before that.
+  /// dL/d the pose of the view of the last differentiate. Waits for it. Errors: invalid_argument before that, after
+  /// another view was rendered or another model set or bound, and for a model without Gaussians.
   virtual pose_gradient differentiate_pose() = 0;
   virtual void wait() = 0;  ///< until all that was asked for is done
 

@@ -80,8 +80,7 @@ template <execution E>
 using loss_function = std::function<void(loss_input<E> const&)>;
 
 /// A training run on one policy, by one tracer and one strategy, on the ranks of a communicator.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
-requires communicator<Comm, E>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 class basic_trainer {
  public:
   static constexpr int sh_degree = Traits::sh_degree;  ///< that rows of coefficients have room for

@@ -11,7 +11,7 @@
 
 namespace gart::inline GART_ISA {
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_options const& options,
                                                                 dataset const& data, start_model const& start,
                                                                 Comm comm)
@@ -94,7 +94,7 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
 }
 
 // For all that the run is to grow to, at once: growth neither takes slack nor has an array twice while it copies it.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::make_room() {
   u64 const all = gaussians_at_end(options_, data_, started_with_);
   u64 here = all;
@@ -104,7 +104,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::make_room() {
   if (options_.render.antialias > 0) min_pixel_filter_.reserve(here);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_iterations(int iterations) {
   if (iterations == options_.iterations) return;
   options_.iterations = iterations;
@@ -113,18 +113,18 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_iterations(int iterat
   mcmc_.set_growth(growth_);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step() {
   return step_by(nullptr);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::evaluate(loss_function<E> const* loss, loss_input<E> const& in) {
   if (loss) return (*loss)(in);
   loss_.evaluate(in.image, in.truth, in.width, in.height, options_.ssim_weight, in.gradient, in.value);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_function<E> const* loss) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return step_in_ranks(loss);
@@ -173,7 +173,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
   return report;
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 template <class Pass>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pass, loss_function<E> const* loss,
                                                                         std::size_t index,
@@ -223,7 +223,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pa
 }
 
 // The optimizer's step and what grows, moves and prunes the Gaussians.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 template <class Rows>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates const& rates, int degree, Rows&& rows) {
   bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
@@ -255,7 +255,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates c
   if constexpr (!Comm::alone) shards_.arrived.reset();
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 vec3 basic_trainer<E, Traits, Tracer, Strategy, Comm>::background_of(int step) const {
   switch (options_.background) {
     case background_kind::black:
@@ -269,7 +269,7 @@ vec3 basic_trainer<E, Traits, Tracer, Strategy, Comm>::background_of(int step) c
   }
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& view, vec3 background) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return render_in_ranks(view, background);
@@ -277,7 +277,7 @@ rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& 
   return render_image(frame_);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 image8 basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_8bit(camera const& view, vec3 background) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return to_8bit(render_in_ranks(view, background).color);
@@ -285,7 +285,7 @@ image8 basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_8bit(camera cons
   return render_image_8bit(frame_);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 exposure_field basic_trainer<E, Traits, Tracer, Strategy, Comm>::exposures() const {
   std::vector<view_exposure> views;
   exposure_state const learned = exposures_ ? exposures_->state() : exposure_state{};
@@ -307,7 +307,7 @@ exposure_field basic_trainer<E, Traits, Tracer, Strategy, Comm>::exposures() con
   return exposure_field(std::move(views), std::move(lenses));
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 std::vector<named_camera> basic_trainer<E, Traits, Tracer, Strategy, Comm>::poses() const {
   std::vector<named_camera> out;
   for (std::size_t i = 0; (poses_ || lenses_) && i < data_.train.size(); ++i)

@@ -24,7 +24,7 @@ struct add_gradients_body {
 
 }  // namespace train_kernels
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::require_ranks() const {
   if (options_.batch < 1)
     throw invalid_argument("train_options.batch is " + std::to_string(options_.batch) + ": at least 1");
@@ -36,13 +36,13 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::require_ranks() const {
                            ": with refine_poses a multiple of " + std::to_string(pose_differentiation<E>::run));
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 learning_rates basic_trainer<E, Traits, Tracer, Strategy, Comm>::rates_of_step() const {
   return rates_at(options_.rates, data_.extent, step_, options_.iterations);
 }
 
 // A step over options.batch views, in as many rounds as it takes all ranks to trace them.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss_function<E> const* loss) requires(
     !Comm::alone) {
   int const degree = sh_degree_at(step_, degree_, options_.sh_every, options_.iterations);
@@ -113,7 +113,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_in_ranks(loss
 }
 
 // This rank's unit of a round: its rows of the image, the loss of the whole, its sums of the gradients.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<E> const* loss, camera const& seen,
                                                                   int image, int degree, image_result& result,
                                                                   step_report& report) requires(!Comm::alone) {
@@ -186,7 +186,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace_unit(loss_function<
 
 // The loss of this rank's strip alone, where nobody asks for the whole image: its own rows and those that windows reach
 // come from the others, and the sums of the loss go to them, while gradients are gathered.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_strip(
     camera const& seen, truth_view const& truth) requires(!Comm::alone) {
   auto const rows = [&](work_unit const& unit) { return rows_in(unit, seen.height); };
@@ -200,7 +200,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_strip(
 }
 
 // What this rank has found of the image that it traced last.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_result(image_result& result, bool metric,
                                                                    bool lens) requires(!Comm::alone) {
   if (shards_.loss_by_strips) loss_.total(value_.view().subspan(0, 2));
@@ -220,7 +220,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_result(image_result&
 }
 
 // What the first rank of each of the round's views has found, to all; by_pose all have.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::collect_results(span<image_result> round, bool metrics,
                                                                        bool lens) requires(!Comm::alone) {
   image_result& mine = round.data()[shards_.round.unit().view];
@@ -240,7 +240,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::collect_results(span<imag
 
 // From the sums over the pixels of the round's views, of which the first is the image'th of the step, to gradients of
 // this rank's rows. Colours are added over all views at once, but where each view's are asked for: by its pose.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(std::vector<camera> const& views, int image,
                                                                       span<image_result> round,
                                                                       bool learn_poses) requires(!Comm::alone) {
@@ -296,7 +296,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_gradients(std::vecto
 }
 
 // Adam's step, while the last colours arrive.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::move_parameters(adam_pass<E> const& adam) requires(
     !Comm::alone) {
   if (!shards_.arrived) return adam.all(exec_);
@@ -308,13 +308,13 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::move_parameters(adam_pass
 }
 
 // Into gradients_.sh, for who asks for it.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::sum_arrived() const requires(!Comm::alone) {
   if (auto const arrived = std::exchange(shards_.arrived, {}))
     shards_.round.sum_colors(0, arrived->views, arrived->share, gradients_.sh.view(), arrived->adds);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_in_ranks(camera const& view,
                                                                            vec3 background) requires(!Comm::alone) {
   render_options render = render_options_of(options_, data_.extent, background);

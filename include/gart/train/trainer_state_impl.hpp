@@ -7,7 +7,7 @@
 
 namespace gart::inline GART_ISA {
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::part() const {
   training_state s;
   s.scene = model_part();
@@ -23,7 +23,7 @@ training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::part() const {
   return s;
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::whole_of(training_state const& mine) const {
   if constexpr (Comm::alone) {
     return mine;
@@ -37,7 +37,7 @@ training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::whole_of(traini
   }
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesystem::path const& path,
                                                                   training_state const& mine) const {
   if constexpr (Comm::alone)
@@ -46,7 +46,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesyste
     write_checkpoint_collectively(comm_, shards_.rows.owners(), path, mine);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_part(std::filesystem::path const& path) const {
   if constexpr (Comm::alone)
     return read_checkpoint(path);
@@ -54,7 +54,7 @@ training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_part(std::
     return read_checkpoint_collectively(comm_, shards_.rows.owners(), path);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesystem::path const& path,
                                                                   gaussian_model const& mine,
                                                                   splat_traits const& traits) const {
@@ -78,14 +78,14 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesyste
   write_splats(path, mine, traits);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::load(std::filesystem::path const& path) {
   training_state const mine = read_part(path);
   require_degree(path, mine, degree_);
   set_part(mine);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_part(training_state const& s) {
   if (s.scene.sh_degree != degree_) throw invalid_argument("trainer: the state has another SH degree");
   assign_rows(scene_, s.scene), assign_rows(state_.first, s.first), assign_rows(state_.second, s.second);

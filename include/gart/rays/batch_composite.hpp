@@ -1,0 +1,193 @@
+#pragma once
+/// \file
+/// The forward pass of a batch: front-to-back compositing of the hits of a ray, by the arithmetic of an image's pixels
+/// (render/composite.hpp), with the distances and Gaussians that a sensor asks for besides. One program serves all SH
+/// degrees: coefficients are read in their stride.
+
+#include <gart/backward/lt_slot.hpp>
+#include <gart/math/blend.hpp>
+#include <gart/math/sh.hpp>
+#include <gart/rays/batch_rays.hpp>
+#include <gart/render/composite.hpp>
+
+namespace gart::inline GART_ISA {
+
+/// The coefficients of all Gaussians, of any degree.
+struct color_rows {
+  static constexpr int most = 3;  ///< degree
+  float const* sh = nullptr;      ///< [N][K][3], K of stored_degree
+  int stored_degree = 0;          ///< of the rows
+  int active_degree = 0;          ///< bands above it are not evaluated
+
+  /// Of a scene.
+  GART_HD GART_INLINE vec3 unclamped(sh_basis<most> const& basis, u32 id) const {
+    float const* const row = sh + static_cast<std::size_t>(3 * sh_coefficients(stored_degree)) * id;
+    // Whole rows lie on 16 bytes and are read so.
+    if (stored_degree == most) return basis.unclamped(sh_row<most>(row, active_degree).v);
+    return basis.unclamped(row, sh_coefficients(active_degree));
+  }
+};
+
+/// Keeps no hits.
+struct keep_none {
+  static constexpr bool any = false;  ///< none is kept
+  struct state {};                    ///< nothing
+};
+
+/// Keeps what the gradient needs of each hit, in no order, for a sum by Gaussian (rays/batch_gather.hpp). Rays take
+/// places a run at a time; what they leave of their last run is marked. Where there are more hits than places, the rest
+/// is counted, not written.
+template <execution E>
+struct keep_hits {
+  static constexpr bool any = true;  ///< some are kept
+  static constexpr u32 run = 16;     ///< places that a ray takes at a time
+  /// Of a ray: its next place, and how many it has left.
+  struct state {
+    u64 at = 0;    ///< place
+    u32 left = 0;  ///< places
+  };
+  u64* keys = nullptr;          ///< [capacity]: Gaussian << ray_bits | ray
+  lt_entry* entries = nullptr;  ///< [capacity]
+  float* depths = nullptr;      ///< [capacity]: the depth that the ray would have if the hit were opaque
+  u64* used = nullptr;          ///< places that rays have taken
+  u64 capacity = 0;             ///< a multiple of run
+  int ray_bits = 0;             ///< of a ray's number
+  u64 no_key = 0;               ///< of a place without a hit; past all others
+
+  /// Keeps a hit of a ray.
+  GART_KERNEL GART_INLINE void keep(state& s, index_t ray, u32 id, lt_entry const& entry, float depth) const {
+    if (s.left == 0) s.at = E::atomic_add(used, u64{run}), s.left = run;
+    if (s.at < capacity) {
+      keys[s.at] = u64{id} << ray_bits | ray;
+      entries[s.at] = entry, depths[s.at] = depth;
+    }
+    ++s.at, --s.left;
+  }
+  /// After the last one.
+  GART_KERNEL GART_INLINE void end(state& s) const {
+    for (; s.left != 0; --s.left, ++s.at)
+      if (s.at < capacity) keys[s.at] = no_key;
+  }
+};
+
+/// The ray program (trace/ray_program.hpp). Keep: keep_none or keep_hits.
+template <class Keep = keep_none>
+struct batch_composite : ray_program_base {
+  using ray_type = ray;  ///< from anywhere
+  /// A ray on its way.
+  struct state : composited_hits<float> {
+    index_t number;                                   ///< of the ray
+    ray own;                                          ///< the ray
+    float far;                                        ///< where it ends
+    sh_basis<color_rows::most> basis;                 ///< of its direction
+    float first = no_hit, median = no_hit;            ///< t of these hits
+    u32 first_id = no_gaussian;                       ///< of the first hit
+    u32 median_id = no_gaussian;                      ///< of the median hit
+    u32 top_id = no_gaussian;                         ///< of the largest weight
+    float top_weight = 0;                             ///< the largest weight
+    [[no_unique_address]] typename Keep::state kept;  ///< places
+  };
+
+  batch_rays rays;         ///< of the batch
+  color_rows colors;       ///< of the scene
+  render_options options;  ///< thresholds, cap and background
+  batch_targets out;       ///< where it all goes
+  Keep keep;               ///< what a backward pass wants to find of each hit
+
+  /// Every ray is one.
+  GART_HD bool active(index_t) const { return true; }
+  /// Where ray i ends.
+  GART_HD float far(index_t i) const { return rays.far(i); }
+  /// The state before the first hit.
+  GART_HD state begin(index_t i) const {
+    state s;
+    s.number = i, s.own = rays.of(i), s.far = rays.far(i);
+    s.basis = sh_basis<color_rows::most>(s.own.direction);
+    return s;
+  }
+  /// Ray i, in the batch's frame.
+  GART_HD ray ray_of(index_t, state const& s) const { return s.own; }
+
+  /// Composites a hit. False: the ray ends.
+  GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h) const {
+    if (h.t > s.far) return false;
+    vec3 const unclamped = colors.unclamped(s.basis, h.id), c = clamped_color(unclamped);
+    [[maybe_unused]] vec3 const opaque = opaque_color(c, s.color, s.transmittance);
+    [[maybe_unused]] float const depth = opaque_depth(h.t, s.depth, s.transmittance);
+    float const weight = blend(h.alpha, h.t, c, s.color, s.depth, s.transmittance);
+    if constexpr (Keep::any) keep.keep(s.kept, s.number, h.id, lt_entry::of(opaque, weight, unclamped), depth);
+    if (s.hits++ == 0) s.first = h.t, s.first_id = h.id;
+    if (s.median_id == no_gaussian && s.transmittance < 0.5f) s.median = h.t, s.median_id = h.id;
+    if (weight > s.top_weight) s.top_weight = weight, s.top_id = h.id;
+    return s.transmittance >= options.transmittance_min && s.hits != options.max_hits;
+  }
+
+  /// Writes what the ray saw.
+  GART_KERNEL GART_INLINE void end(index_t i, state& s) const {
+    if constexpr (Keep::any) keep.end(s.kept);
+    if (out.color) {
+      vec3 const c = s.color + s.transmittance * options.background;
+      float* const to = out.color + std::size_t{3} * i;
+      to[0] = c.x, to[1] = c.y, to[2] = c.z;
+    }
+    if (out.transmittance) out.transmittance[i] = s.transmittance;
+    if (out.depth) out.depth[i] = s.depth;
+    if (out.median) out.median[i] = s.median;
+    if (out.first) out.first[i] = s.first;
+    if (out.hits) out.hits[i] = s.hits;
+    if (out.first_id) out.first_id[i] = s.first_id;
+    if (out.median_id) out.median_id[i] = s.median_id;
+    if (out.top_id) out.top_id[i] = s.top_id;
+  }
+};
+static_assert(ray_program<batch_composite<>>);
+
+/// The ray program of hit lists: counts them where there are no lists, else writes them to the places that the counts
+/// make. The same hits as those that are composited.
+struct batch_list : ray_program_base {
+  using ray_type = ray;  ///< from anywhere
+  /// A ray on its way.
+  struct state {
+    ray own;                  ///< the ray
+    float far;                ///< where it ends
+    u64 at;                   ///< place of its first hit
+    u32 count = 0;            ///< hits so far
+    float transmittance = 1;  ///< after them
+  };
+
+  batch_rays rays;               ///< of the batch
+  float transmittance_min = 0;   ///< a ray ends after the hit that brings T below this
+  u32 max_hits = 0;              ///< a ray ends after so many; 0: no cap
+  u32* counts = nullptr;         ///< [R], written where there are no lists
+  u64 const* offsets = nullptr;  ///< [R + 1], read where there are lists
+  u32* ids = nullptr;            ///< null: hits are counted
+  float* t = nullptr;            ///< distances
+  float* alpha = nullptr;        ///< opacities
+  float* weight = nullptr;       ///< transmittance before the hit times alpha
+
+  /// Every ray is one.
+  GART_HD bool active(index_t) const { return true; }
+  /// Where ray i ends.
+  GART_HD float far(index_t i) const { return rays.far(i); }
+  /// The state before the first hit.
+  GART_HD state begin(index_t i) const { return {rays.of(i), rays.far(i), ids ? offsets[i] : 0}; }
+  /// Ray i, in the batch's frame.
+  GART_HD ray ray_of(index_t, state const& s) const { return s.own; }
+  /// Counts or writes a hit. False: the ray ends.
+  GART_HD GART_INLINE bool on_hit(state& s, hit const& h) const {
+    if (h.t > s.far) return false;
+    if (ids) {
+      u64 const at = s.at + s.count;
+      ids[at] = h.id, t[at] = h.t, alpha[at] = h.alpha, weight[at] = s.transmittance * h.alpha;
+    }
+    s.transmittance *= 1.0f - h.alpha;
+    return ++s.count != max_hits && s.transmittance >= transmittance_min;
+  }
+  /// Writes the count.
+  GART_HD void end(index_t i, state const& s) const {
+    if (!ids) counts[i] = s.count;
+  }
+};
+static_assert(ray_program<batch_list>);
+
+}  // namespace gart::inline GART_ISA

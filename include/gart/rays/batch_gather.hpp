@@ -1,0 +1,216 @@
+#pragma once
+/// \file
+/// The backward pass of a batch by primitive: the hits that the forward pass kept (keep_hits) are sorted by Gaussian
+/// and ray, cut into pieces of one Gaussian each, and summed: a lane takes a piece, then the pieces of a Gaussian are
+/// added up in order. No ray is traced, nothing is atomic, and the order of every sum follows from the hits alone: the
+/// same bits in every run.
+///
+/// Cost: a sort of 12 bytes a hit by as many bits as Gaussians and rays need, one read of 20 bytes a hit and 48 of its
+/// ray, and 240 bytes a piece of 32 hits at SH degree 3. The host reads how many pieces there are.
+
+#include <gart/algorithm/exclusive_scan.hpp>
+#include <gart/algorithm/sort_pairs.hpp>
+#include <gart/backward/gather.hpp>
+#include <gart/rays/batch_gradient.hpp>
+
+#include <bit>
+
+namespace gart::inline GART_ISA {
+
+/// The hits of a batch, as the forward pass kept them or sorted.
+template <execution E>
+struct kept_batch {
+  /// None yet.
+  explicit kept_batch(E& exec) : keys(exec), entries(exec), depths(exec), places(exec), used(exec) {}
+
+  buffer<u64, E> keys;          ///< Gaussian << ray_bits | ray
+  buffer<lt_entry, E> entries;  ///< by place
+  buffer<float, E> depths;      ///< by place
+  buffer<u32, E> places;        ///< by sorted position
+  buffer<u64, E> used;          ///< [1]: places that rays took
+  u64 count = 0;                ///< places, with those that hold no hit
+  int ray_bits = 0;             ///< of a key
+  bool sorted = false;          ///< keys are in order, and places with them
+
+  /// Bytes that it holds.
+  std::size_t bytes() const {
+    return keys.capacity() * 8 + entries.capacity() * sizeof(lt_entry) + depths.capacity() * 4 + places.capacity() * 4;
+  }
+};
+
+namespace ray_kernels {
+
+inline constexpr u32 piece_hits = 32;
+
+struct number_places {
+  u32* places;
+  GART_KERNEL void operator()(index_t i) const { places[i] = i; }
+};
+
+// Where each Gaussian's hits begin and end, zero at first: a Gaussian without hits has none.
+struct find_segments {
+  u64 const* keys;
+  index_t hits, gaussians;
+  int ray_bits;
+  u32 *begins, *ends;
+  GART_HD u64 id(index_t k) const { return keys[k] >> ray_bits; }
+  GART_KERNEL void operator()(index_t k) const {
+    u64 const here = id(k);
+    if (here >= gaussians) return;
+    if (k == 0 || id(k - 1) != here) begins[here] = k;
+    if (k + 1 == hits || id(k + 1) != here) ends[here] = k + 1;
+  }
+};
+
+struct count_pieces {
+  u32 const *begins, *ends;
+  u32* counts;
+  GART_KERNEL void operator()(index_t i) const { counts[i] = (ends[i] - begins[i] + piece_hits - 1) / piece_hits; }
+};
+
+// Whose a piece is, and where it begins.
+struct cut_pieces {
+  u32 const *begins, *ends;
+  u64 const* offsets;
+  u32* firsts;
+  GART_KERNEL void operator()(index_t i) const {
+    u64 piece = offsets[i];
+    for (u32 k = begins[i]; k < ends[i]; k += piece_hits) firsts[piece++] = k;
+  }
+};
+
+// Rows are laid out as pair_gradient has them, so that sum_pairs adds them up.
+template <class Response>
+struct sum_piece {
+  static constexpr int block_size = 64, min_blocks = 8;
+  static constexpr int bands = sh_basis<color_rows::most>::size;
+  u64 const* keys;
+  u32 const* places;
+  lt_entry const* entries;
+  float const* depths;
+  u32 const *firsts, *ends;
+  int ray_bits;
+  differentiated_ray const* rays;
+  ray_gaussian const* records;
+  int sh_floats, active_floats;  // of a row of gradients; of those the active bands
+  quad* rows;
+
+  GART_KERNEL void operator()(index_t piece) const {
+    u32 const first = firsts[piece], id = static_cast<u32>(keys[first] >> ray_bits);
+    u32 const end = ends[id] - first < piece_hits ? ends[id] : first + piece_hits;
+    ray_gaussian const gaussian = records[id];
+    float color[3 * bands] = {}, moment[moment_stride] = {};
+    for (u32 k = first; k < end; ++k) add(k, gaussian, color, moment);
+    int const sh_quads = (sh_floats + 3) / 4;
+    quad* const row = rows + static_cast<std::size_t>(piece) * static_cast<std::size_t>(sh_quads + moment_stride / 4);
+    GART_UNROLL
+    for (int q = 0; q < (3 * bands + 3) / 4; ++q)
+      if (q < sh_quads) {
+        quad four;
+        GART_UNROLL
+        for (int i = 0; i < 4; ++i) four.v[i] = 4 * q + i < active_floats ? color[4 * q + i] : 0.0f;
+        row[q] = four;
+      }
+    GART_UNROLL
+    for (int q = 0; q < moment_stride / 4; ++q)
+      row[sh_quads + q] = {moment[4 * q], moment[4 * q + 1], moment[4 * q + 2], moment[4 * q + 3]};
+  }
+
+ private:
+  GART_HD GART_INLINE void add(u32 k, ray_gaussian const& gaussian, float (&color)[3 * bands],
+                               float (&moment)[moment_stride]) const {
+    u32 const place = places[k];
+    lt_entry const entry = entries[place];
+    differentiated_ray const from = rays[keys[k] & ((u64{1} << ray_bits) - 1)];
+    vec3 const g = from.by_color, opaque = entry.color();
+    float const w = entry.weight();
+    vec3 const c(entry.clamped(0) ? 0.0f : w * g.x, entry.clamped(1) ? 0.0f : w * g.y,
+                 entry.clamped(2) ? 0.0f : w * g.z);
+    sh_basis<color_rows::most> const basis(from.direction);
+    GART_UNROLL
+    for (int b = 0; b < bands; ++b) {
+      if (3 * b >= active_floats) break;
+      color[3 * b] += basis.y[b] * c.x, color[3 * b + 1] += basis.y[b] * c.y, color[3 * b + 2] += basis.y[b] * c.z;
+    }
+    ray_peak const r = evaluate(gaussian, from.own());
+    float const opaque_g = opaque.x * g.x + opaque.y * g.y + opaque.z * g.z + depths[place] * from.by_depth;
+    float const by_alpha = alpha_gradient(opaque_g, from.total, hit_alpha<Response>(gaussian, r.d2));
+    moments_of<float> const m = hit_moments_with_depth<Response>(gaussian, r, by_alpha, w * from.by_depth, true);
+    GART_UNROLL
+    for (int i = 0; i < error_place; ++i) moment[i] += m.v[i];
+  }
+};
+
+}  // namespace ray_kernels
+
+/// The memory of the sums, kept from one batch to the next.
+template <execution E, class Response>
+class batch_gather {
+ public:
+  /// Allocates nothing; `exec` must outlive it.
+  explicit batch_gather(E& exec)
+      : begins_(exec), ends_(exec), counts_(exec), offsets_(exec), firsts_(exec), rows_(exec) {}
+
+  /// Overwrites gradients.sh, and moments, [N][moment_stride]. `records`: the Gaussians in the batch's frame. Sorts
+  /// the hits, where they are not.
+  void operator()(E& exec, kept_batch<E>& hits, span<differentiated_ray const> rays, span<ray_gaussian const> records,
+                  int active_degree, gaussians_view<float> gradients, span<float> moments) {
+    index_t const n = static_cast<index_t>(hits.count), gaussians = gradients.count;
+    if (gaussians == 0) return;
+    sort(exec, hits, n, gaussians);
+    begins_.resize(gaussians), ends_.resize(gaussians), counts_.resize(gaussians), offsets_.resize(gaussians + 1);
+    begins_.zero(), ends_.zero();
+    parallel_for(
+        exec, "rays/segments", n,
+        ray_kernels::find_segments{hits.keys.data(), n, gaussians, hits.ray_bits, begins_.data(), ends_.data()});
+    parallel_for(exec, "rays/pieces", gaussians,
+                 ray_kernels::count_pieces{begins_.data(), ends_.data(), counts_.data()});
+    span<u64> const offsets = offsets_.view();
+    exclusive_scan(exec, span<u32 const>(counts_), offsets.subspan(0, gaussians), offsets.subspan(gaussians, 1));
+    u64 pieces = 0;
+    exec.copy_out(&pieces, offsets_.data() + gaussians, sizeof pieces);
+    firsts_.resize(pieces);
+    parallel_for(exec, "rays/pieces", gaussians,
+                 ray_kernels::cut_pieces{begins_.data(), ends_.data(), offsets_.data(), firsts_.data()});
+    int const sh_floats = gradients.sh_stride();
+    rows_.resize(pieces * static_cast<u64>((sh_floats + 3) / 4 + moment_stride / 4));
+    parallel_for(
+        exec, "rays/gather", static_cast<index_t>(pieces),
+        ray_kernels::sum_piece<Response>{hits.keys.data(), hits.places.data(), hits.entries.data(), hits.depths.data(),
+                                         firsts_.data(), ends_.data(), hits.ray_bits, rays.data(), records.data(),
+                                         sh_floats, 3 * sh_coefficients(active_degree), rows_.data()});
+    switch (gradients.sh_degree) {
+      case 0:
+        return add_up<0>(exec, pieces, gradients, moments);
+      case 1:
+        return add_up<1>(exec, pieces, gradients, moments);
+      case 2:
+        return add_up<2>(exec, pieces, gradients, moments);
+      default:
+        return add_up<3>(exec, pieces, gradients, moments);
+    }
+  }
+
+ private:
+  static void sort(E& exec, kept_batch<E>& hits, index_t n, index_t gaussians) {
+    if (hits.sorted) return;
+    hits.places.resize(n);
+    parallel_for(exec, "rays/places", n, ray_kernels::number_places{hits.places.data()});
+    sort_pairs(exec, hits.keys.view().subspan(0, n), hits.places.view(),
+               hits.ray_bits + static_cast<int>(std::bit_width(gaussians)));
+    hits.sorted = true;
+  }
+  template <int Degree>
+  void add_up(E& exec, u64 pieces, gaussians_view<float> gradients, span<float> moments) {
+    parallel_for(exec, "rays/sum", gradients.count * static_cast<index_t>(pair_gradient<Degree>::quads),
+                 sum_pairs<Degree, terms<color, geometry>>{offsets_.view().subspan(0, gradients.count), pieces,
+                                                           rows_.data(), gradients.sh, moments.data()});
+  }
+
+  buffer<u32, E> begins_, ends_, counts_;
+  buffer<u64, E> offsets_;
+  buffer<u32, E> firsts_;
+  buffer<quad, E> rows_;
+};
+
+}  // namespace gart::inline GART_ISA

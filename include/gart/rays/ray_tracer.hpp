@@ -1,0 +1,285 @@
+#pragma once
+/// \file
+/// Any rays through a model, on every policy: what they see, their hits, and the gradients of both to the Gaussians and
+/// to the rays.
+///
+///   ray_tracer<E> tracer(exec);
+///   tracer.set_scene(scene.view(), sh_degree);                          // again where the Gaussians may have changed
+///   tracer.trace(rays, options, {.color = color, .median = range});     // or
+///   auto context = tracer.forward(rays, options, {.color = color});     // the same, and what the gradient needs
+///   tracer.backward(context, {by_color, by_depth}, gradients.view(), {.directions = by_direction});
+///
+/// One tree serves all batches until the Gaussians change (rays/world_index.hpp). Hits, their order and what they add
+/// up to are those of an image's pixels. options.antialias must be 0: rays have no pixels to filter by; options.rows is
+/// not looked at.
+///
+/// Memory beside the tree: 64 bytes a Gaussian, with gradients 48 more, and 20 bytes a ray that a context holds; hits
+/// that are kept by gradient_form::primitive take 32 each, and 16 places at a time a ray.
+/// Cost: on the first batch after a change the tree; on a batch in another frame than the last one launch over the
+/// Gaussians; then the trace. Checks wait for the policy once a batch.
+/// Errors: invalid_argument as rays/ray_batch.hpp has it, for options that nothing can be traced by, for a context of
+/// Gaussians that have changed; out_of_memory for more than 2^32 hits kept at a time.
+
+#include <gart/backward/finish.hpp>
+#include <gart/rays/batch_gather.hpp>
+#include <gart/rays/fingerprint.hpp>
+#include <gart/rays/world_index.hpp>
+#include <gart/render/frame.hpp>
+
+#include <algorithm>
+
+namespace gart::inline GART_ISA {
+
+/// What a forward pass leaves for its backward pass. The rays are read again: their memory must stay.
+template <execution E>
+struct batch_context {
+  /// Nothing yet.
+  explicit batch_context(E& exec) : color(exec), transmittance(exec), depth(exec), kept(exec) {}
+
+  ray_batch rays;                                ///< that were traced
+  render_options options;                        ///< by which
+  gradient_form form = gradient_form::scatter;   ///< how gradients of Gaussians are summed
+  u64 scene = 0;                                 ///< ray_tracer's number of the scene that it is of
+  buffer<float, E> color, transmittance, depth;  ///< what was seen
+  kept_batch<E> kept;                            ///< hits, of gradient_form::primitive
+};
+
+/// Hit lists (rays/ray_batch.hpp) in memory of the policy.
+template <execution E>
+struct batch_hits {
+  /// None yet.
+  explicit batch_hits(E& exec) : offsets(exec), ids(exec), t(exec), alpha(exec), weight(exec) {}
+
+  buffer<u64, E> offsets;             ///< [R + 1]
+  buffer<u32, E> ids;                 ///< Gaussians
+  buffer<float, E> t, alpha, weight;  ///< of the hits
+
+  /// A copy for the host; waits for it.
+  hit_lists to_host() const {
+    return {offsets.to_host(), ids.to_host(), t.to_host(), alpha.to_host(), weight.to_host()};
+  }
+};
+
+/// Traces batches of rays.
+template <execution E, class Response = generalized_gaussian<>>
+class ray_tracer {
+ public:
+  /// Allocates nothing; `exec` must outlive it.
+  explicit ray_tracer(E& exec)
+      : exec_(&exec),
+        index_(exec),
+        print_(exec),
+        gaussians_(exec),
+        moments_(exec),
+        differentiated_(exec),
+        gather_(exec),
+        counts_(exec) {}
+
+  /// The Gaussians, of any SH degree, whose arrays must stay; bands above active_degree are not evaluated. Where they
+  /// are the same as before, what was made of them is kept.
+  void set_scene(gaussians_view<float const> scene, int active_degree) {
+    if (scene.sh_degree < 0 || scene.sh_degree > color_rows::most || active_degree < 0 ||
+        active_degree > scene.sh_degree)
+      throw invalid_argument("ray_tracer.set_scene: the SH degree is not from 0 to 3, or less than what is evaluated");
+    u64 const print = print_.of(*exec_, scene);
+    if (number_ == 0 || print != scene_print_ || scene.count != scene_.count || active_degree != active_degree_)
+      ++number_, index_is_old_ = records_are_old_ = true;
+    scene_ = scene, scene_print_ = print, active_degree_ = active_degree;
+  }
+
+  /// What the rays see, to the targets that are wanted.
+  void trace(ray_batch const& rays, render_options const& options, batch_targets const& out) {
+    prepare(rays, options);
+    launch("rays/forward", rays, composite_of<keep_none>(rays, options, out, {}));
+  }
+
+  /// Their hits, exact and complete: up to the end of the ray, or to where options end it.
+  batch_hits<E> list(ray_batch const& rays, render_options const& options) {
+    prepare(rays, options);
+    batch_hits<E> out(*exec_);
+    index_t const n = rays.count();
+    counts_.resize(n), out.offsets.resize(std::size_t{n} + 1);
+    batch_list program{{}, batch_rays(rays), options.transmittance_min, options.max_hits, counts_.data()};
+    launch("rays/count", rays, program);
+    span<u64> const offsets = out.offsets.view();
+    exclusive_scan(*exec_, span<u32 const>(counts_), offsets.subspan(0, n), offsets.subspan(n, 1));
+    u64 total = 0;
+    exec_->copy_out(&total, out.offsets.data() + n, sizeof total);
+    out.ids.resize(total), out.t.resize(total), out.alpha.resize(total), out.weight.resize(total);
+    if (total == 0) return out;
+    program.offsets = out.offsets.data(), program.ids = out.ids.data();
+    program.t = out.t.data(), program.alpha = out.alpha.data(), program.weight = out.weight.data();
+    launch("rays/list", rays, program);
+    return out;
+  }
+
+  /// What the rays see, and what backward() needs of it.
+  batch_context<E> forward(ray_batch const& rays, render_options const& options, batch_targets const& out = {},
+                           gradient_form form = gradient_form::primitive) {
+    prepare(rays, options);
+    batch_context<E> context(*exec_);
+    context.rays = rays, context.options = options, context.form = form, context.scene = number_;
+    index_t const n = rays.count();
+    context.color.resize(std::size_t{3} * n), context.transmittance.resize(n), context.depth.resize(n);
+    batch_targets seen = out;
+    seen.color = context.color.data(), seen.transmittance = context.transmittance.data();
+    seen.depth = context.depth.data();
+    if (form == gradient_form::primitive)
+      keep(context, seen);
+    else
+      launch("rays/forward", rays, composite_of<keep_none>(rays, options, seen, {}));
+    auto const copy = [&](float* to, buffer<float, E> const& from) {
+      if (to) exec_->copy(to, from.data(), from.size() * sizeof(float));
+    };
+    copy(out.color, context.color), copy(out.transmittance, context.transmittance), copy(out.depth, context.depth);
+    return context;
+  }
+
+  /// From dL/d what the rays saw to dL/d the Gaussians, which are overwritten, of at least the degree that is
+  /// evaluated, and to dL/d the rays. Gradients of Gaussians are left out where there are no arrays. May be called
+  /// again.
+  void backward(batch_context<E>& context, output_gradients const& by, gaussians_view<float> gradients,
+                ray_gradient_targets const& of_rays = {}) {
+    stage_scope stage(*exec_, "rays backward");
+    if (context.scene != number_ || number_ == 0)
+      throw invalid_argument("ray_tracer.backward: the Gaussians have changed since forward(); call it again");
+    index_t const n = context.rays.count();
+    require_gradients(by, n, "ray_tracer.backward");
+    bool const of_gaussians = gradients.mean != nullptr;
+    if (of_gaussians && (gradients.count != scene_.count || gradients.sh_degree < active_degree_ ||
+                         gradients.sh_degree > color_rows::most))
+      throw invalid_argument(
+          "ray_tracer.backward: the gradients must have the number of the Gaussians and at least the SH degree that is "
+          "evaluated");
+    stand_at(context.rays.frame, context.options);
+    auto const or_null = [](span<float const> s) { return s.empty() ? nullptr : s.data(); };
+    differentiated_.resize(n);
+    parallel_for(*exec_, "rays/read", n,
+                 ray_kernels::gather_rays{batch_rays(context.rays), context.color.data(), context.depth.data(),
+                                          context.transmittance.data(), or_null(by.color), or_null(by.depth),
+                                          or_null(by.transmittance), differentiated_.data()});
+    bool const gathers = of_gaussians && context.form == gradient_form::primitive;
+    bool const scatters = of_gaussians && !gathers;
+    if (of_gaussians) moments_.resize(std::size_t{moment_stride} * scene_.count);
+    if (gathers) gather_(*exec_, context.kept, differentiated_, gaussians_, active_degree_, gradients, moments_);
+    if (scatters) {
+      moments_.zero();
+      exec_->zero(gradients.sh, sizeof(float) * scene_.count * static_cast<std::size_t>(gradients.sh_stride()));
+    }
+    if (scatters || of_rays.origins || of_rays.directions)
+      launch("rays/scatter", context.rays,
+             batch_scatter<Response, E>{{},
+                                        batch_rays(context.rays),
+                                        differentiated_.data(),
+                                        colors(),
+                                        context.options.transmittance_min,
+                                        context.options.max_hits,
+                                        gaussians_.data(),
+                                        gradients.sh_stride(),
+                                        scatters ? gradients.sh : nullptr,
+                                        moments_.data(),
+                                        of_rays},
+             context.options.near);
+    if (of_gaussians) finish_gradients(*exec_, scene_, gaussians_, camera{}, 0, moments_, gradients);
+  }
+
+  /// The tree that batches are traced by.
+  world_index<E, Response> const& index() const { return index_; }
+
+ private:
+  color_rows colors() const { return {scene_.sh, scene_.sh_degree, active_degree_}; }
+  template <class Keep>
+  batch_composite<Keep> composite_of(ray_batch const& rays, render_options const& options, batch_targets const& out,
+                                     Keep const& keep) const {
+    return {{}, batch_rays(rays), colors(), options, out, keep};
+  }
+  template <class P>
+  void launch(char const* label, ray_batch const& rays, P const& program, float near) {
+    trace_batch<Response>(*exec_, label, index_.seen_from(rays.frame), {gaussians_.data(), scene_.count, near},
+                          rays.count(), program);
+  }
+  template <class P>
+  void launch(char const* label, ray_batch const& rays, P const& program) {
+    launch(label, rays, program, near_);
+  }
+
+  void prepare(ray_batch const& rays, render_options const& options) {
+    if (number_ == 0) throw invalid_argument("ray_tracer: there are no Gaussians; call ray_tracer.set_scene first");
+    require_batch(rays);
+    require_options(options);
+    if (options.antialias != 0)
+      throw invalid_argument("render_options.antialias must be 0 where a batch is traced: rays have no pixels");
+    require_rays(*exec_, rays, options.near);
+    near_ = options.near;
+    stand_at(rays.frame, options);
+  }
+  // The tree over the Gaussians as they are, and the Gaussians in that frame.
+  void stand_at(vec3d const& frame, render_options const& options) {
+    bool const other_boxes = index_.count() != scene_.count || index_.alpha_min() != options.alpha_min;
+    if (index_is_old_ || other_boxes) {
+      stage_scope stage(*exec_, "rays index");
+      if (other_boxes || ++age_ >= options.rebuild_every) {
+        index_.build(*exec_, scene_, options.alpha_min, frame);
+        age_ = 0;
+      } else {
+        index_.refit(*exec_, scene_);
+      }
+      index_is_old_ = false;
+    }
+    prepare_gaussians(frame, options.alpha_min);
+  }
+  void prepare_gaussians(vec3d const& frame, float alpha_min) {
+    if (!records_are_old_ && frame == frame_ && alpha_min == alpha_min_) return;
+    frame_ = frame, alpha_min_ = alpha_min;
+    gaussians_.resize(scene_.count);
+    parallel_for(*exec_, "rays/preprocess", scene_.count,
+                 render_kernels::prepare_gaussians<Response>{scene_, frame, alpha_min, gaussians_.view()});
+    records_are_old_ = false;
+  }
+
+  // The forward pass with its hits, once more where there was no room for them.
+  void keep(batch_context<E>& context, batch_targets const& out) {
+    kept_batch<E>& kept = context.kept;
+    index_t const n = context.rays.count();
+    constexpr u64 run = keep_hits<E>::run;
+    kept.ray_bits = std::max(1, static_cast<int>(std::bit_width(n - (n > 0))));
+    kept.used.resize(1);
+    u64 room = std::max(expected_, run);
+    for (;;) {
+      kept.keys.resize(room), kept.entries.resize(room), kept.depths.resize(room);
+      kept.used.zero();
+      launch("rays/forward", context.rays,
+             composite_of<keep_hits<E>>(context.rays, context.options, out,
+                                        {kept.keys.data(), kept.entries.data(), kept.depths.data(), kept.used.data(),
+                                         room, kept.ray_bits, u64{scene_.count} << kept.ray_bits}));
+      kept.count = kept.used.front();
+      if (kept.count >= 0xffffffffu)
+        throw out_of_memory("hit", kept.count * 32, 0,
+                            "more than 2^32 hits of a batch: trace fewer rays at a time, or by gradient_form::scatter");
+      if (kept.count <= room) break;
+      room = kept.count;
+    }
+    expected_ = std::max<u64>(expected_, (kept.count + kept.count / 8 + run - 1) / run * run);
+  }
+
+  E* exec_;
+  gaussians_view<float const> scene_;
+  int active_degree_ = 0;
+  u64 number_ = 0;       // of the scene; 0: none
+  u64 scene_print_ = 0;  // of its parameters
+  world_index<E, Response> index_;
+  fingerprint<E> print_;
+  bool index_is_old_ = true, records_are_old_ = true;
+  int age_ = 0;
+  float near_ = 0;
+  buffer<ray_gaussian, E> gaussians_;  // in frame_, hit from alpha_min_
+  vec3d frame_{0.0};
+  float alpha_min_ = 0;
+  buffer<float, E> moments_;
+  buffer<differentiated_ray, E> differentiated_;
+  batch_gather<E, Response> gather_;
+  buffer<u32, E> counts_;
+  u64 expected_ = 0;  // places of a batch's hits
+};
+
+}  // namespace gart::inline GART_ISA

@@ -1,0 +1,42 @@
+#pragma once
+/// \file
+/// What renderers ask of the arrays that they are given, before anything reads them.
+/// Errors: invalid_argument, naming the array, what it has and what it should have.
+
+#include <gart/core/error.hpp>
+#include <gart/scene/gaussians.hpp>
+
+#include <string>
+
+namespace gart {
+
+/// Arrays of a model on the host: each has as many numbers as the opacities say.
+inline void require_arrays(gaussian_model const& model) {
+  require_count(model.size());
+  for_each_array(
+      [&](parameter_array const& a, auto const& values) {
+        std::size_t const needed = model.size() * a.width(model.sh_degree);
+        if (values.size() != needed)
+          throw invalid_argument("renderer.set_model: gaussian_model." + std::string(a.name) + " has " +
+                                 std::to_string(values.size()) + " numbers, and " + std::to_string(model.size()) +
+                                 " opacities of SH degree " + std::to_string(model.sh_degree) + " ask for " +
+                                 std::to_string(needed) + ": gaussian_model::resize makes them agree");
+      },
+      model);
+}
+
+/// Arrays that somebody else owns: none is null. `what` names the call.
+template <class T>
+void require_arrays(gaussians_view<T> const& arrays, char const* what) {
+  require_count(arrays.count);
+  if (arrays.count == 0) return;
+  for_each_array(
+      [&](parameter_array const& a, T* values) {
+        if (!values)
+          throw invalid_argument(std::string(what) + ": gaussians_view." + a.name + " is null, and there are " +
+                                 std::to_string(arrays.count) + " Gaussians: set all five arrays");
+      },
+      arrays);
+}
+
+}  // namespace gart
