@@ -1,7 +1,9 @@
 #pragma once
 /// \file
 /// The true images where kernels can read them, at the size of a step's images: the dataset's own memory on host
-/// policies; on a device each is copied at its first use and stays. Masks have the weights of the cameras' pixels
+/// policies. On a device each is copied at its first use and stays while there is room: a quarter of what is free at
+/// the start. Those that find none are copied at each use (1 ms for 8 million pixels, beside the kernels before it), so
+/// that thousands of large photographs need no more. Masks have the weights of the cameras' pixels
 /// (camera/pixel_weights.hpp) in them.
 
 #include <gart/camera/pixel_weights.hpp>
@@ -14,42 +16,55 @@
 
 namespace gart::inline GART_ISA {
 
-/// The photographs of a dataset's training views, in a policy's memory from their first use on.
+/// The photographs of a dataset's training views, in a policy's memory.
 template <execution E>
 class training_images {
  public:
   /// The dataset must outlive it.
-  training_images(E& exec, dataset const& data)
+  training_images(E& exec, dataset const& data) : training_images(exec, data, exec.free_bytes() / 4) {}
+  /// With room for so many bytes of them.
+  training_images(E& exec, dataset const& data, u64 room)
       : exec_(exec),
         data_(data),
+        room_(room),
+        streamed_pixels_(exec),
+        streamed_mask_(exec),
         pixels_(data.train.size()),
         masks_(data.train.size()),
         weights_(data.train.size()),
         smaller_(exec) {}
 
-  /// The photograph of a training view, by its index, over that background; so many times smaller, until the next call.
+  /// The photograph of a training view, by its index, over that background; so many times smaller. Until the next call.
   truth_view get(std::size_t view, vec3 background, int shrink) {
     dataset_view const& v = data_.train[view];
     truth_view out;
     out.channels = v.image.channels;
     out.background = background;
-    out.pixels = resident(v.image, pixels_[view]);
+    out.pixels = in_memory(v.image, pixels_[view], streamed_pixels_);
     if (has_pixel_weights(v.view)) {
       image8& weights = weights_[view];
       if (masks_[view].size() == 0 && weights.empty()) weights = weighted(v);
-      out.mask = resident(weights, masks_[view]);
-      if constexpr (E::device) weights = {};
+      out.mask = in_memory(weights, masks_[view], streamed_mask_);
+      if (masks_[view].size() > 0) weights = {};
     } else {
-      out.mask = v.mask.empty() ? nullptr : resident(v.mask, masks_[view]);
+      out.mask = v.mask.empty() ? nullptr : in_memory(v.mask, masks_[view], streamed_mask_);
     }
     return smaller_.shrink(out, v.image.width, v.image.height, shrink);
   }
 
  private:
-  u8 const* resident(image8 const& image, buffer<u8, E>& copy) {
+  u8 const* in_memory(image8 const& image, buffer<u8, E>& kept, buffer<u8, E>& streamed) {
     if constexpr (!E::device) return image.data.data();
-    if (copy.size() == 0) copy = buffer<u8, E>(exec_, image.data);
-    return copy.data();
+    if (kept.size() > 0) return kept.data();
+    std::size_t const bytes = image.data.size();
+    if (bytes <= room_) {
+      room_ -= bytes;
+      kept = buffer<u8, E>(exec_, image.data);
+      return kept.data();
+    }
+    streamed.resize(bytes);
+    exec_.copy_in(streamed.data(), image.data.data(), bytes);
+    return streamed.data();
   }
   static image8 weighted(dataset_view const& v) {
     image8 out = pixel_weights(v.view);
@@ -59,7 +74,9 @@ class training_images {
   }
   E& exec_;
   dataset const& data_;
+  u64 room_;  // bytes that photographs may still take for good
   std::vector<buffer<u8, E>> pixels_, masks_;
+  buffer<u8, E> streamed_pixels_, streamed_mask_;  // of one that found no room
   std::vector<image8> weights_;
   smaller_photo<E> smaller_;
 };
