@@ -27,10 +27,10 @@ class training_images {
       : exec_(exec),
         data_(data),
         room_(room),
-        streamed_pixels_(exec),
-        streamed_mask_(exec),
         pixels_(data.train.size()),
         masks_(data.train.size()),
+        streamed_pixels_(exec),
+        streamed_mask_(exec),
         weights_(data.train.size()),
         smaller_(exec) {}
 
