@@ -20,7 +20,10 @@ bool plain_text(std::string_view text) {
 // "GET /path HTTP/1.1"
 bool take_first_line(std::string_view line, http_request& to) {
   std::size_t const a = line.find(' '), b = line.rfind(' ');
-  if (a == line.npos || a == 0 || b == a || line.substr(b + 1) != "HTTP/1.1") return false;
+  if (a == line.npos || a == 0 || b == a) return false;
+  std::string_view const version = line.substr(b + 1);
+  if (version != "HTTP/1.1" && version != "HTTP/1.0") return false;
+  to.last = version == "HTTP/1.0";
   to.method = line.substr(0, a), to.path = line.substr(a + 1, b - a - 1);
   return to.path.starts_with('/') && to.path.find(' ') == to.path.npos && plain_text(line);
 }
@@ -90,6 +93,7 @@ head_state take_request(std::string& came, http_request& to) {
     auto const is = [&](auto const& h) { return h.first == once; };
     if (std::count_if(to.headers.begin(), to.headers.end(), is) > 1) return head_state::wrong;
   }
+  to.last = to.last || to.lists("connection", "close");
   std::string_view const length = to.header("content-length");
   bool const body = !to.header("transfer-encoding").empty() || !(length.empty() || length == "0");
   return body ? head_state::wrong : head_state::whole;

@@ -1,5 +1,6 @@
 #pragma once
-// A request of HTTP/1.1 as a browser sends it, read strictly, and the head of an answer. No request has a body here.
+// A request of HTTP/1.1 as a browser sends it, or of HTTP/1.0 as some proxies do, read strictly, and the head of an
+// answer. No request has a body here.
 
 #include <cstddef>
 #include <string>
@@ -15,6 +16,7 @@ inline constexpr std::size_t request_head_most = 32768;
 struct http_request {
   std::string method, path;
   std::vector<std::pair<std::string, std::string>> headers;  // names in small letters
+  bool last = false;                                         // whether the connection ends with its answer
 
   // Empty where there is none.
   std::string_view header(std::string_view name) const;
@@ -24,7 +26,7 @@ struct http_request {
 
 enum class head_state { unfinished, whole, wrong };
 
-// Takes a request's head off the front of what came, once it is all there. Wrong: no HTTP/1.1, too long, two hosts or
+// Takes a request's head off the front of what came, once it is all there. Wrong: no HTTP/1, too long, two hosts or
 // origins, or with a body.
 head_state take_request(std::string& came, http_request& to);
 

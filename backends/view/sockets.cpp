@@ -207,7 +207,7 @@ struct sockets::state {
 
   void respond(connection& c, http_request const& asked, http_answer const& a) {
     if (!a.log.empty()) log(a.log);
-    bool const stays = (a.status == 200 || a.status == 404) && !asked.lists("connection", "close");
+    bool const stays = (a.status == 200 || a.status == 404) && !asked.last;
     auto headers = answers.safe_headers(asked);
     headers.insert(headers.end(), {"content-type: " + a.type, "content-length: " + std::to_string(a.body.size()),
                                    stays ? "connection: keep-alive" : "connection: close"});

@@ -78,6 +78,21 @@ TEST_CASE("render goes along a smooth path through keyframes") {
     CHECK(text_of(here / ("film/" + frame.name + ".png")) == text_of(here / ("one_by_one/" + frame.name + ".png")));
   CHECK(text_of(here / "film/frame_00000.png") != text_of(here / "film/frame_00004.png"));
 
+  // With times of their own: the second keyframe comes after a quarter.
+  nlohmann::json timed = here.json("keys.json");
+  double const seconds[] = {1, 2, 5};
+  for (std::size_t i = 0; i < 3; ++i) timed[i]["time"] = seconds[i];
+  gart::write_file(here / "timed.json", timed.dump());
+  REQUIRE(here.gart("render model.ply --path timed.json --frames 5 --out timed --backend serial --quiet").code == 0);
+  gart::write_cameras(here / "second.json", {{"second", keys[1].view}});
+  REQUIRE(here.gart("render model.ply second.json --out second --backend serial --quiet").code == 0);
+  CHECK(text_of(here / "timed/frame_00001.png") == text_of(here / "second/second.png"));
+  timed[2]["time"] = 2;
+  gart::write_file(here / "timed.json", timed.dump());
+  auto const back = here.gart("render model.ply --path timed.json --frames 5 --out timed --backend serial");
+  CHECK(back.code == 1);
+  CHECK_MESSAGE(has(back.err, "not after the one before"), back.err);
+
   for (char const* wrong : {"", " keys.json --path keys.json --frames 5", " --path keys.json", " keys.json --frames 5",
                             " keys.json --closed", " --path keys.json --frames 1"}) {
     CAPTURE(wrong);

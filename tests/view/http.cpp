@@ -31,14 +31,19 @@ TEST_CASE("a request's line and headers, and what comes behind it") {
   CHECK(r.header("origin").empty());
   CHECK(r.lists("connection", "upgrade"));
   CHECK_FALSE(r.lists("connection", "close"));
+  CHECK_FALSE(r.last);
   CHECK(came == "GET /");
   CHECK(gart::view::take_request(came, r) == head_state::unfinished);
+  for (std::string const text : {"GET / HTTP/1.0\r\n\r\n", "GET / HTTP/1.1\r\nConnection: Close\r\n\r\n"}) {
+    CHECK(read(text, r) == head_state::whole);
+    CHECK(r.last);
+  }
   CHECK(read("POST / HTTP/1.1\r\nContent-Length: 0\r\n\r\n") == head_state::whole);
 }
 
 TEST_CASE("what is no request is wrong") {
   for (char const* text :
-       {"\r\n\r\n", "GET\r\n\r\n", "GET / HTTP/1.0\r\n\r\n", "GET x HTTP/1.1\r\n\r\n", "GET /a b HTTP/1.1\r\n\r\n",
+       {"\r\n\r\n", "GET\r\n\r\n", "GET / HTTP/2\r\n\r\n", "GET x HTTP/1.1\r\n\r\n", "GET /a b HTTP/1.1\r\n\r\n",
         "GET / HTTP/1.1\r\nno colon\r\n\r\n", "GET / HTTP/1.1\r\n: empty\r\n\r\n",
         "GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n", "GET / HTTP/1.1\r\nOrigin: a\r\nOrigin: b\r\n\r\n",
         "GET / HTTP/1.1\r\nA: b\r\n folded\r\n\r\n", "GET / HTTP/1.1\r\nContent-Length: 5\r\n\r\n",
