@@ -20,7 +20,6 @@ set(_package_of_TurboJPEG::TurboJPEG "TurboJPEG")
 set(_package_of_ZLIB::ZLIB "ZLIB")
 set(_package_of_ZSTD::ZSTD "ZSTD")
 set(_package_of_WebP::WebP "WebP")
-set(_package_of_Libwebsockets::Libwebsockets "Libwebsockets")
 set(_package_of_embree "embree")
 set(_package_of_MPI::MPI_CXX "MPI COMPONENTS CXX")
 set(_package_of_NCCL::NCCL "NCCL")
@@ -94,6 +93,6 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/gartConfig.cmake.in ${
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/gartConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/gartConfig.cmake ${PROJECT_BINARY_DIR}/gartConfigVersion.cmake
               ${PROJECT_SOURCE_DIR}/backends/io/FindTurboJPEG.cmake ${PROJECT_SOURCE_DIR}/backends/io/FindZSTD.cmake
-              ${PROJECT_SOURCE_DIR}/backends/io/FindWebP.cmake ${PROJECT_SOURCE_DIR}/backends/view/FindLibwebsockets.cmake
+              ${PROJECT_SOURCE_DIR}/backends/io/FindWebP.cmake
               ${PROJECT_SOURCE_DIR}/backends/distributed/FindNCCL.cmake
         DESTINATION ${_package_dir})

@@ -60,6 +60,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(configuration_request, depth), "--depth-weight"},
       {GART_CLI_FIELD(view_server_options, listen), "--listen"},
       {GART_CLI_FIELD(view_server_options, port), "--port"},
+      {GART_CLI_FIELD(view_server_options, allowed_hosts), "--allow-host"},
   };
   return names;
 }

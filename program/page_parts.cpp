@@ -16,8 +16,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int widest_image = 480;
-
 std::string base64(std::vector<gart::u8> const& bytes) {
   static constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
@@ -47,13 +45,14 @@ std::string count_of(json const& all, char const* key) {
   return std::isfinite(v) ? with_commas(static_cast<std::uint64_t>(v)) : "-";
 }
 
-std::vector<gart::u8> page_jpeg(gart::image8 const& image) {
-  int const factor = std::max(1, (image.width + widest_image - 1) / widest_image);
+std::vector<gart::u8> page_jpeg(gart::image8 const& image, int widest) {
+  int const factor = std::max(1, (image.width + widest - 1) / widest);
   return gart::encode_jpeg(factor > 1 ? gart::box_downscale(image, factor) : image, 88);
 }
 
-std::string page_image(std::vector<gart::u8> const& jpeg, std::string const& alt) {
-  return "<img loading=\"lazy\" alt=\"" + alt + "\" src=\"data:image/jpeg;base64," + base64(jpeg) + "\">";
+std::string page_image(std::vector<gart::u8> const& jpeg, std::string const& alt, bool first) {
+  return std::string("<img ") + (first ? "" : "loading=\"lazy\" ") + "alt=\"" + alt +
+         "\" src=\"data:image/jpeg;base64," + base64(jpeg) + "\">";
 }
 
 std::string page_start(std::string const& title) {

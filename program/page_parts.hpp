@@ -17,10 +17,10 @@ std::string text_of(nlohmann::json const& all, char const* key);
 // With commas; "-" where there is none.
 std::string count_of(nlohmann::json const& all, char const* key);
 
-// Scaled down by a whole factor where it is wide.
-std::vector<gart::u8> page_jpeg(gart::image8 const& image);
-// An <img> with the file in it.
-std::string page_image(std::vector<gart::u8> const& jpeg, std::string const& alt);
+// Scaled down by a whole factor where it is wider than that.
+std::vector<gart::u8> page_jpeg(gart::image8 const& image, int widest = 480);
+// An <img> with the file in it; `first` where a reader sees it at once.
+std::string page_image(std::vector<gart::u8> const& jpeg, std::string const& alt, bool first = false);
 
 // All before the first heading: the title, escaped, and the style sheet.
 std::string page_start(std::string const& title);

@@ -18,6 +18,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
 #include <limits>
 #include <memory>
 
@@ -39,6 +40,27 @@ struct render_arguments {
   bool depth = false, quiet = false;
 };
 
+// When the path passes its keyframes, from 0 on, where each of the file has a "time" in seconds as the viewer saves it;
+// a closed one ends as long after the last as the others are apart.
+std::vector<double> times_of(fs::path const& keyframes, bool closed) {
+  std::ifstream file(keyframes);
+  nlohmann::json const all = nlohmann::json::parse(file, nullptr, false);
+  std::vector<double> times;
+  if (!all.is_array()) return times;
+  for (auto const& key : all) {
+    if (!key.is_object() || !key.contains("time") || !key["time"].is_number()) return {};
+    times.push_back(key["time"].get<double>() - (times.empty() ? 0 : all[0]["time"].get<double>()));
+  }
+  if (times.size() < 2) return {};
+  times.front() = 0;
+  if (closed) times.push_back(times.back() + times.back() / static_cast<double>(times.size() - 1));
+  for (std::size_t i = 1; i < times.size(); ++i)
+    if (!(times[i] > times[i - 1]))
+      throw gart::io_error(keyframes.string(), "has a \"time\" that is not after the one before it",
+                           "give keyframes in their order, or no times");
+  return times;
+}
+
 // Those of the file, or the frames of the path through those of the other one.
 std::vector<gart::named_camera> cameras_of(render_arguments const& a) {
   if (a.path.empty() == a.cameras.empty())
@@ -54,7 +76,7 @@ std::vector<gart::named_camera> cameras_of(render_arguments const& a) {
   for (gart::named_camera const& c : gart::load_cameras(a.path)) keyframes.push_back(c.view);
   std::vector<gart::named_camera> cameras;
   char name[32];
-  for (gart::camera const& view : gart::smooth_path(keyframes, a.frames, a.closed)) {
+  for (gart::camera const& view : gart::smooth_path(keyframes, a.frames, a.closed, times_of(a.path, a.closed))) {
     std::snprintf(name, sizeof name, "frame_%05zu", cameras.size());
     cameras.push_back({name, view});
   }
@@ -165,7 +187,7 @@ void add_render(CLI::App& app, command& selected) {
   render
       ->add_option("--path", a->path,
                    "In place of CAMERAS: keyframes, as a camera JSON. The images are\nframe_00000 and so on along a "
-                   "smooth path through them")
+                   "smooth path through them. A \"time\" of each\nkeyframe says when, as the viewer saves it")
       ->type_name("FILE");
   render->add_option("--frames", a->frames, "Images along --path, evenly in time")
       ->type_name("N")

@@ -188,7 +188,7 @@ std::string settings(json const& m, json const& config) {
 
 }  // namespace
 
-std::string report_page(json const& metrics, json const& config, history const& course,
+std::string report_page(json const& metrics, json const& config, history const& course, report_cover const& cover,
                         std::vector<report_view> const& views) {
   std::string const title = text_of(metrics, "scene");
   std::string page = page_start(title);
@@ -197,6 +197,11 @@ std::string report_page(json const& metrics, json const& config, history const& 
           count_of(metrics, "iterations") + " iterations with the " + text_of(metrics, "backend") + " backend, the " +
           text_of(metrics, "tracer") + " tracer and the " + text_of(metrics, "backward") +
           " backward pass.</p></header>";
+  if (!cover.jpeg.empty()) {
+    std::string const name = html_escape(cover.name);
+    page += "<figure class=\"cover\">" + page_image(cover.jpeg, name + ", render", true) + "<figcaption>" + name +
+            ", as the model shows it</figcaption></figure>";
+  }
   page += figures(metrics);
   page += comparison(metrics);
   page += curves(course, number_of(metrics, "iterations"));

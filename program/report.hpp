@@ -13,6 +13,6 @@
 namespace gart_cli {
 
 std::string report_page(nlohmann::json const& metrics, nlohmann::json const& config, history const& course,
-                        std::vector<report_view> const& views);
+                        report_cover const& cover, std::vector<report_view> const& views);
 
 }  // namespace gart_cli

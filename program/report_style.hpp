@@ -44,9 +44,12 @@ circle.dim { fill: var(--dim); } text.dim, tr.dim { fill: var(--soft); color: va
 circle.line-1 { fill: var(--one); } circle.line-2 { fill: var(--two); }
 circle.line-3 { fill: var(--three); } circle.line-4 { fill: var(--four); } circle.line-5 { fill: var(--five); }
 circle.line-6 { fill: var(--six); }
+.cover { margin-top: 18px; } .cover img { display: block; width: 100%; max-height: 62vh; object-fit: contain;
+  background: var(--card); border: 1px solid var(--rule); border-radius: 10px; }
+.cover figcaption { font-size: 13px; margin-top: 5px; overflow-wrap: anywhere; }
 .view { margin-bottom: 22px; } .view .images { display: grid; grid-template-columns: repeat(2, 1fr); gap: 8px; }
 .view img { display: block; width: 100%; border-radius: 6px; border: 1px solid var(--rule); }
-.view figcaption { display: flex; gap: 14px; font-size: 13px; margin-bottom: 6px; }
+.view figcaption { display: flex; flex-wrap: wrap; gap: 2px 14px; overflow-wrap: anywhere; font-size: 13px; margin-bottom: 6px; }
 .view figcaption b { color: var(--ink); }
 h3 { font-size: 13px; font-weight: 600; margin: 0 0 6px; }
 .side { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 220px), 1fr)); gap: 8px; }
@@ -68,9 +71,10 @@ th, td { padding: 5px 14px 5px 0; border-bottom: 1px solid var(--rule); }
 tr:last-child td { border-bottom: 0; } td.n, th.n { text-align: right; white-space: nowrap; width: 1%; }
 td.bar { width: 45%; padding-right: 0; }
 td.bar i { display: block; height: 9px; border-radius: 3px; background: var(--bar); }
-.columns { columns: 2 380px; column-gap: 40px; }
+.columns { columns: 2 380px; column-gap: 40px; overflow-x: auto; } .box { overflow-x: auto; }
 td.v { overflow-wrap: anywhere; }
-.settings { display: grid; grid-template-columns: repeat(auto-fit, minmax(290px, 1fr)); gap: 0 36px; }
+.settings { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 290px), 1fr)); gap: 0
+  36px; }
 .settings div { display: flex; justify-content: space-between; gap: 16px; padding: 5px 0; border-bottom: 1px solid
   var(--rule);
   font-size: 14px; } .settings span { color: var(--soft); }
@@ -78,7 +82,8 @@ td.v { overflow-wrap: anywhere; }
 summary { cursor: pointer; color: var(--soft); font-size: 14px; margin: 8px 0; }
 .box + p { margin-top: 16px; }
 footer { margin-top: 48px; color: var(--soft); font-size: 13px; }
-@media (max-width: 560px) { main { padding: 24px 14px 40px; } }
+@media (max-width: 560px) { main { padding: 24px 14px 40px; } th, td { padding-right: 8px; }
+  th.n { white-space: normal; } td.bar { width: 25%; } }
 )css";
 
 }  // namespace gart_cli

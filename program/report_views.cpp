@@ -78,10 +78,15 @@ report_view make_report_view(std::string const& name, double psnr, double ssim, 
           page_jpeg(gart::error_in_colors(difference, gart::default_error_scale))};
 }
 
+report_cover make_report_cover(std::string const& name, gart::image_float const& render) {
+  return {name, page_jpeg(gart::to_8bit(render), 960)};
+}
+
 void report_views::add(std::size_t index, std::size_t total, std::string const& name, double psnr, double ssim,
                        gart::image_float const& render, gart::image_float const& truth) {
   bool const spread = evenly_spread(index, total), worst = !any_ || psnr < least_;
   any_ = true;
+  if (index == total / 2) cover_ = make_report_cover(name, render);
   if (worst) least_ = psnr, worst_.reset();
   if (spread) spread_.push_back(make_report_view(name, psnr, ssim, render, truth));
   if (worst && !spread) worst_ = make_report_view(name, psnr, ssim, render, truth);

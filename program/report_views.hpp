@@ -23,6 +23,13 @@ struct report_view {
 report_view make_report_view(std::string const& name, double psnr, double ssim, gart::image_float const& render,
                              gart::image_float const& truth);
 
+// What the model looks like, at the top of the page; no JPEG where nothing was rendered.
+struct report_cover {
+  std::string name;
+  std::vector<gart::u8> jpeg;
+};
+report_cover make_report_cover(std::string const& name, gart::image_float const& render);
+
 // The views that the page has room for, chosen while they are rendered: at most 12, evenly spread, and the worst of
 // all.
 class report_views {
@@ -32,8 +39,11 @@ class report_views {
            gart::image_float const& render, gart::image_float const& truth);
   // The lowest PSNR first.
   std::vector<report_view> worst_first() const;
+  // The one in the middle of them.
+  report_cover const& cover() const { return cover_; }
 
  private:
+  report_cover cover_;
   std::vector<report_view> spread_;
   std::optional<report_view> worst_;  // of those that are not in spread_
   double least_ = 0;                  // PSNR of the worst so far

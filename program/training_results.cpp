@@ -120,6 +120,10 @@ void training_run::conclude() {
   gart::scores const training = score(gart::evenly_spread(data_.train, data_.test.size()), {},
                                       a_.refine_poses ? as_learned() : gart::place_view());
   test_seconds_ += training_views.seconds();
+  report_cover cover = shown.cover();
+  if (data_.test.empty())
+    cover = make_report_cover(data_.train.front().name,
+                              session_->render(session_->as_learned(data_.train.front().view), eval_background_).color);
   files.finish();
   gart::u64 const most_bytes = ranks::largest(session_->peak_bytes()),
                   most_sent = ranks::largest(session_->sent_bytes());
@@ -135,7 +139,7 @@ void training_run::conclude() {
   metrics["peak_bytes"] = most_bytes, metrics["sent_bytes"] = most_sent;
   write_json(a_.out / "metrics.json", metrics);
   gart::write_file(a_.out / "report.html",
-                   report_page(metrics, read_json(a_.config_file()), course_, shown.worst_first()));
+                   report_page(metrics, read_json(a_.config_file()), course_, cover, shown.worst_first()));
   if (a_.quiet) return;
   say_.clear();
   std::printf("trained %s steps in %s, %s Gaussians\n", with_commas(session_->steps_done()).c_str(),

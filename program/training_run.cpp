@@ -20,10 +20,14 @@ int training_run::run() {
   serve();
   std::optional<interrupt_guard> interrupt(std::in_place);  // until a run that it stops is saved
   bool const finished = train(*interrupt);
-  view_.reset();  // there is nothing to see any more
   stopwatch const saving;
   save();
   save_seconds_ += saving.seconds();
+  if (view_)
+    view_->end(finished ? "The training is done, and saved in " + a_.out.string() + "."
+                        : "The training was stopped, and saved: gart train --resume --out " + a_.out.string() +
+                              " goes on with it.");
+  view_.reset();  // there is nothing to see any more
   if (!finished) {
     say_.note("Stopped after step " + with_commas(static_cast<std::uint64_t>(session_->steps_done())) + ". Saved " +
               a_.checkpoint_file().string() + " and " + a_.model_file().string() +

@@ -74,8 +74,9 @@ bool training_run::train(interrupt_guard const& interrupt) {
                          ? passes(5)
                          : between > 0 && report.step / between != (report.step - a_.batch) / between;
     if (due && report.step < a_.length(report.step, course_.seconds)) {
-      test(report.step);
+      gart::scores const scores = test(report.step);
       show_curve();
+      if (view_) view_->set_scores(data_, scores);
     }
     double const elapsed = a_.checkpoint_minutes > 0 ? ranks::agreed(since_start.seconds()) : 0;
     if (a_.checkpoint_minutes > 0 && elapsed - last_checkpoint > 60 * a_.checkpoint_minutes) {
@@ -107,6 +108,7 @@ bool training_run::attend(interrupt_guard const& interrupt, double seconds, gart
     save_checkpoint();
     save_seconds_ += saving.seconds();
     say_.note("saved " + a_.checkpoint_file().string() + ", as a viewer asked");
+    return a_.checkpoint_file().string();
   });
 }
 

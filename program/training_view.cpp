@@ -1,5 +1,7 @@
 #include "training_view.hpp"
 
+#include "progress.hpp"
+
 #include <utility>
 
 namespace gart_cli {
@@ -31,18 +33,20 @@ training_view::training_view(train_arguments const& a, gart::session& session, g
       extent_(data.extent),
       background_(background),
       server_(scene_of(a, session, data, background), options_of(a, data)),
+      browser_(open_address(server_, a.view)),
       render_(
-          [this](gart::camera const& view, gart::view_settings const& left_out) {
-            return left_out.crop || left_out.near ? part().images(view, left_out) : session_.render(view, background_);
+          [this](gart::camera const& view, gart::view_settings const& s) {
+            return s.own_gaussians() && !s.near ? session_.render(view, s.background.value_or(background_))
+                                                : copy().images(view, s);
           },
-          [this](gart::camera const& view, gart::view_settings const& left_out) {
-            return left_out.crop || left_out.near ? part().colours(view, left_out)
-                                                  : session_.render_8bit(view, background_);
+          [this](gart::camera const& view, gart::view_settings const& s) {
+            return s.own_gaussians() && !s.near ? session_.render_8bit(view, s.background.value_or(background_))
+                                                : copy().colours(view, s);
           }),
       share_(a.view_share) {}
 
-// What leaves something out is rendered from a copy of the Gaussians as they are now.
-gart::view_render training_view::part() {
+// What alters the Gaussians is rendered from a copy of them as they are now.
+gart::view_render training_view::copy() {
   gart::gaussian_model model = session_.model();
   if (!part_ || part_->configuration().sh_degree != model.sh_degree) {
     gart::configuration_request request = configuration_request_of(a_);
@@ -52,8 +56,17 @@ gart::view_render training_view::part() {
   return gart::render_of(*part_, std::move(model), gart::render_options_of(train_options_of(a_), extent_, background_));
 }
 
+void training_view::end(std::string const& why) { server_.tell_at_end(why); }
+
+void training_view::set_scores(gart::dataset const& data, gart::scores const& test) {
+  std::vector<std::pair<int, double>> scores;
+  for (std::size_t i = 0; i < test.views.size() && test.views.size() == data.test.size(); ++i)
+    scores.emplace_back(static_cast<int>(data.train.size() + i), test.views[i].psnr);
+  server_.set_scores(scores);
+}
+
 bool training_view::attend(double step_seconds, gart::view_status status, interrupt_guard const& interrupt,
-                           std::function<void()> const& save) {
+                           std::function<std::string()> const& save) {
   share_.worked(step_seconds);
   for (bool once = true; once || paused_; once = false) {
     bool step = false;
@@ -69,9 +82,11 @@ bool training_view::attend(double step_seconds, gart::view_status status, interr
           paused_ = step = true;
           break;
         case gart::train_action::save:
-          save();
+          server_.tell("Saved " + save() + " at step " + with_commas(static_cast<std::uint64_t>(status.step)) + ".");
           break;
         case gart::train_action::stop:
+          server_.tell("The training stops after step " + with_commas(static_cast<std::uint64_t>(status.step)) +
+                       ", and is being saved.");
           return false;
       }
       told_ = {};

@@ -4,6 +4,7 @@
 #include "interrupt.hpp"
 #include "train_arguments.hpp"
 
+#include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/renderer.hpp>
 #include <gart/view/pacing.hpp>
 #include <gart/view/server.hpp>
@@ -24,9 +25,13 @@ class training_view {
   bool idle() const noexcept { return server_.idle() && !paused_; }
 
   // Between two steps, of which the last took so long: tells how it stands, renders what there is time for, does what
-  // was asked, and waits while it is paused. `save` writes the checkpoint. False where the training is to stop.
+  // was asked, and waits while it is paused. `save` writes the checkpoint, and says where. False where the training is
+  // to stop.
   bool attend(double step_seconds, gart::view_status status, interrupt_guard const& interrupt,
-              std::function<void()> const& save);
+              std::function<std::string()> const& save);
+  // What the pages are told when the viewer ends.
+  void end(std::string const& why);
+  void set_scores(gart::dataset const& data, gart::scores const& test);
   void set_curve(gart::view_curve const& curve) { server_.set_curve(curve); }
   gart::view_server const& server() const { return server_; }
   // Seconds that went into views.
@@ -34,16 +39,17 @@ class training_view {
 
  private:
   using clock = std::chrono::steady_clock;
-  gart::view_render part();
+  gart::view_render copy();
 
   train_arguments const& a_;
   gart::session& session_;
   float extent_;
   gart::vec3 background_;
   gart::view_server server_;
+  std::unique_ptr<opened_browser> const browser_;
   gart::view_render const render_;
   gart::time_share share_;
-  std::unique_ptr<gart::renderer> part_;  // of views that leave something out
+  std::unique_ptr<gart::renderer> part_;  // of views that alter the Gaussians
   bool paused_ = false;
   double seconds_ = 0;
   clock::time_point told_{};

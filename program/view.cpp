@@ -1,6 +1,7 @@
 #include "choices.hpp"
 #include "commands.hpp"
 #include "interrupt.hpp"
+#include "model_choice.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "run_folder.hpp"
@@ -30,15 +31,33 @@ struct view_arguments {
 };
 
 // What the run was trained on that left the model, else what suits the capture.
-std::string background_of(view_arguments const& a, gart::dataset const& data) {
+std::string background_of(view_arguments const& a, fs::path const& model, gart::dataset const& data) {
   if (a.background != "auto") return a.background;
-  if (std::string const trained = background_of_run(a.model); !trained.empty()) return trained;
+  if (std::string const trained = background_of_run(model); !trained.empty()) return trained;
   return a.capture.empty() ? "black" : background_for(gart::inspect(data)).value;
 }
 
-int run_view(view_arguments const& a) {
-  gart::model_file file = gart::load_model(a.model);
+// A model that is looked at, and what renders it.
+struct opened_model {
+  std::unique_ptr<gart::renderer> by;
+  gart::view_render render;
+  gart::view_scene scene;
+};
+
+opened_model open_model(view_arguments const& a, fs::path const& path, gart::dataset const& data) {
+  gart::model_file file = gart::load_model(path);
   progress(false).notes(file.notes);
+  opened_model out;
+  out.by = gart::make_renderer(configuration_request_for(file, path, a.configuration.request()));
+  gart::render_options options = file.render;
+  options.background = background_color(background_of(a, path, data));
+  out.scene = gart::scene_of(path.filename().string(), file.model, file.kernel_degree, view_cameras_of(data));
+  out.scene.background = options.background;
+  out.render = gart::render_of(*out.by, std::move(file.model), options);
+  return out;
+}
+
+int run_view(view_arguments const& a) {
   gart::dataset data;
   if (!a.capture.empty()) {
     gart::dataset_options options;
@@ -47,20 +66,34 @@ int run_view(view_arguments const& a) {
     data = gart::load_dataset(a.capture, options);
     progress(false).notes(data.notes);
   }
-  auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
-  gart::render_options options = file.render;
-  options.background = background_color(background_of(a, data));
-  gart::view_scene scene =
-      gart::scene_of(a.model.filename().string(), file.model, file.kernel_degree, view_cameras_of(data));
-  scene.background = options.background;
+  model_choice const models(a.model);
+  auto const named = [&](gart::view_scene scene, int which) {
+    scene.models = models.names(), scene.model = which;
+    return scene;
+  };
+  opened_model shown = open_model(a, a.model, data);
   interrupt_guard const interrupt;
-  gart::view_server server(std::move(scene), server_options_of(a.view, data));
+  gart::view_server server(named(std::move(shown.scene), models.first()), server_options_of(a.view, data));
+  server.set_scores(scores_of_run(a.model, data));
   say_addresses(server, a.view, stdout);
+  auto const browser = open_address(server, a.view);
   std::puts("Ctrl-C ends it.");
   std::fflush(stdout);
-  gart::view_render const render = gart::render_of(*renderer, std::move(file.model), options);
-  while (!interrupt.wanted()) server.render_next(render, 0.1);
-  return exit_interrupted;
+  while (!interrupt.wanted()) {
+    if (auto const wanted = server.next_model()) {
+      fs::path const path = models.path(*wanted);
+      try {
+        opened_model next = open_model(a, path, data);
+        shown = std::move(next);
+        server.set_scene(named(std::move(shown.scene), *wanted));
+        server.set_scores(scores_of_run(path, data));
+      } catch (std::exception const& e) {
+        server.tell(std::string("It could not be opened: ") + e.what());
+      }
+    }
+    server.render_next(shown.render, 0.1);
+  }
+  return 0;
 }
 
 }  // namespace
@@ -70,7 +103,8 @@ void add_view(CLI::App& app, command& selected) {
   CLI::App* view = app.add_subcommand(
       "view",
       "Look at a model in the browser, traced as it is, on this machine's CPU or GPU. Writes no file: what\n"
-      "is kept (cameras, paths, videos) is saved by the browser.");
+      "is kept (cameras, images, paths, videos) is saved by the browser. The page can open other models that\n"
+      "lie beside MODEL, and the model.ply of runs beside its run.");
   view->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")
       ->type_name("")
       ->required();
@@ -98,10 +132,13 @@ void add_view(CLI::App& app, command& selected) {
   view->footer(
       "\nPrints two addresses to open in a browser: one may look and control, one may look. Whoever has an address "
       "gets\n"
-      "in, and no one else: it holds 128 random bits, new in every run. Ctrl-C ends it, with 130.\n"
+      "in, and no one else: it holds 128 random bits, new in every run. Ctrl-C ends it, with 0.\n"
       "\nOn another machine, say `remote`: leave --listen as it is, name a port there, and on your own machine run\n"
       "  ssh -L 8765:127.0.0.1:8765 remote\n"
       "then open the address that gart prints. The port must be the same on both sides.\n"
+      "\nIn a container, or behind a proxy that ends https: --listen 0.0.0.0 --port 8765 --allow-host NAME, with the "
+      "name\n"
+      "that stands in the browser's address; the path of the printed address follows it.\n"
       "\nExamples:\n"
       "  gart view run/model.ply\n"
       "  gart view run/model.ply capture\n"

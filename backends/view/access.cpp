@@ -1,5 +1,7 @@
 #include "access.hpp"
 
+#include "http.hpp"
+
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>
 
@@ -28,11 +30,15 @@ bool same(std::string_view a, std::string_view b) {
   return difference == 0;
 }
 
-std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return out;
+// "name" or "name:port", as a Host header has it.
+bool is_host(std::string_view text) {
+  std::string_view const name = text.substr(0, text.find(':')), port = text.substr(name.size());
+  auto const is_of_name = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' || c == '-' || c == '_';
+  };
+  auto const is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  return !name.empty() && std::all_of(name.begin(), name.end(), is_of_name) &&
+         (port.empty() || (port.size() > 1 && std::all_of(port.begin() + 1, port.end(), is_digit)));
 }
 
 std::string text_of(in_addr address) {
@@ -68,8 +74,16 @@ std::string new_token() {
   return text;
 }
 
-access::access(std::vector<std::string> hosts, int port) : hosts_(std::move(hosts)), port_(port) {
+access::access(std::vector<std::string> hosts, std::vector<std::string> allowed, int port)
+    : hosts_(std::move(hosts)), allowed_(std::move(allowed)), port_(port) {
   for (std::string& host : hosts_) host = lower(host);
+  for (std::string& host : allowed_) {
+    host = lower(host);
+    if (!is_host(host))
+      throw invalid_argument("view_server_options.allowed_hosts: '" + host +
+                             "' is no name of a host (give it without scheme and path, as viewer.example.org or "
+                             "192.168.1.7:9000)");
+  }
 }
 
 request_path access::path_of(std::string_view path) const {
@@ -82,14 +96,25 @@ request_path access::path_of(std::string_view path) const {
   return {of, of == access_right::none ? std::string() : std::string(path.substr(slash + 1))};
 }
 
-bool access::host_is_ours(std::string_view host) const {
-  std::string const asked = lower(host), port = ":" + std::to_string(port_);
-  return std::any_of(hosts_.begin(), hosts_.end(),
-                     [&](std::string const& own) { return asked == own + port || (port_ == 80 && asked == own); });
+bool access::is_allowed(std::string_view host) const {
+  std::string const asked = lower(host), name = asked.substr(0, asked.find(':'));
+  return std::any_of(allowed_.begin(), allowed_.end(),
+                     [&](std::string const& one) { return one == asked || one == name; });
 }
 
-bool access::origin_is(std::string_view origin, std::string_view host) {
-  return lower(origin) == "http://" + lower(host);
+bool access::host_is_ours(std::string_view host) const {
+  std::string const asked = lower(host), port = ":" + std::to_string(port_);
+  return is_allowed(host) || std::any_of(hosts_.begin(), hosts_.end(), [&](std::string const& own) {
+           return asked == own + port || (port_ == 80 && asked == own);
+         });
+}
+
+bool access::origin_is_ours(std::string_view origin, std::string_view host) const {
+  std::string const from = lower(origin);
+  if (from == "http://" + lower(host)) return true;
+  for (std::string_view const scheme : {"http://", "https://"})
+    if (from.starts_with(scheme) && is_allowed(std::string_view(from).substr(scheme.size()))) return true;
+  return false;
 }
 
 std::string access::address(access_right of) const {

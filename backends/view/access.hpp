@@ -20,19 +20,23 @@ struct request_path {
 
 class access {
  public:
-  // `hosts` are the names by which this machine may be called, `port` where it listens.
-  access(std::vector<std::string> hosts, int port);
+  // `hosts` are the names by which this machine may be called at the port where it listens; `allowed` are others, of
+  // containers and proxies that pass requests on: at any port where they name none, and through https too.
+  access(std::vector<std::string> hosts, std::vector<std::string> allowed, int port);
 
   request_path path_of(std::string_view path) const;
   // Whether a Host header names this server: a page of another name that resolves to this machine does not.
   bool host_is_ours(std::string_view host) const;
-  // Whether an Origin header is that of a page from this Host.
-  static bool origin_is(std::string_view origin, std::string_view host);
+  // Whether an Origin header is that of a page from this Host, or from one that is allowed: a proxy may tell its own
+  // name alone.
+  bool origin_is_ours(std::string_view origin, std::string_view host) const;
 
   std::string address(access_right of) const;  // for the browser
 
  private:
-  std::vector<std::string> hosts_;
+  bool is_allowed(std::string_view host) const;
+
+  std::vector<std::string> hosts_, allowed_;
   int port_;
   std::string control_ = new_token(), view_ = new_token();
 };

@@ -58,9 +58,11 @@ std::string hello_text(view_scene const& scene, bool control) {
                     {"max", list_of(high)},
                     {"center", list_of(low + half)},
                     {"up", list_of(scene.up)},
-                    {"extent", std::sqrt(glm::dot(half, half))}}},
+                    {"extent", extent_of(scene)}}},
                   {"cameras", cameras},
                   {"modes", modes},
+                  {"models", control ? scene.models : std::vector<std::string>()},
+                  {"open", scene.model},
                   {"training", scene.training},
                   {"background", list_of(scene.background)}});
 }
@@ -101,14 +103,19 @@ std::string path_text(u64 id, std::vector<camera> const& cameras) {
   return text + "]}";
 }
 
+std::string scores_text(std::vector<std::pair<int, double>> const& scores) {
+  return text_of({{"type", "scores"}, {"psnr", pairs_of(scores)}});
+}
+
+std::string note_text(std::string_view what) { return text_of({{"type", "note"}, {"what", what}}); }
 std::string refused_text(std::string_view what, std::string_view why) {
   return text_of({{"type", "refused"}, {"what", what}, {"why", why}});
 }
 std::string error_text(std::string_view what) { return text_of({{"type", "error"}, {"what", what}}); }
 std::string bye_text(std::string_view why) { return text_of({{"type", "bye"}, {"why", why}}); }
 
-std::vector<u8> frame_bytes(frame_header const& h, std::vector<u8> const& jpeg) {
-  std::string const header = text_of({{"type", "frame"},
+std::vector<u8> frame_bytes(frame_header const& h, std::vector<u8> const& image) {
+  std::string const header = text_of({{"type", h.file ? "image" : "frame"},
                                       {"id", h.id},
                                       {"width", h.width},
                                       {"height", h.height},
@@ -119,10 +126,10 @@ std::vector<u8> frame_bytes(frame_header const& h, std::vector<u8> const& jpeg) 
                                       {"scale", {h.low, h.high}}});
   static_assert(std::endian::native == std::endian::little);
   u32 const length = static_cast<u32>(header.size());
-  std::vector<u8> out(sizeof length + header.size() + jpeg.size());
+  std::vector<u8> out(sizeof length + header.size() + image.size());
   std::memcpy(out.data(), &length, sizeof length);
   std::copy(header.begin(), header.end(), out.begin() + sizeof length);
-  std::copy(jpeg.begin(), jpeg.end(), out.begin() + static_cast<std::ptrdiff_t>(sizeof length + header.size()));
+  std::copy(image.begin(), image.end(), out.begin() + static_cast<std::ptrdiff_t>(sizeof length + header.size()));
   return out;
 }
 

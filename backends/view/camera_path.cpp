@@ -110,7 +110,7 @@ double angle(camera const& a, camera const& b) {
 
 }  // namespace
 
-camera_path::camera_path(std::vector<camera> keyframes, bool closed)
+camera_path::camera_path(std::vector<camera> keyframes, bool closed, std::vector<double> times)
     : keyframes_(std::move(keyframes)), closed_(closed) {
   if (keyframes_.size() < 2) throw invalid_argument("a path goes through at least 2 keyframes");
   for (camera& c : keyframes_) {
@@ -119,6 +119,15 @@ camera_path::camera_path(std::vector<camera> keyframes, bool closed)
     c = resized(c, keyframes_.front().width, keyframes_.front().height);
   }
   std::size_t const stretches = keyframes_.size() - (closed ? 0 : 1);
+  if (!times.empty()) {
+    bool rises = times.size() == stretches + 1 && times.front() == 0;
+    for (std::size_t i = 1; i < times.size(); ++i) rises = rises && times[i] > times[i - 1] && std::isfinite(times[i]);
+    if (!rises)
+      throw invalid_argument("the times of a path are not " + std::to_string(stretches + 1) +
+                             " that begin at 0, each more than the one before");
+    times_ = std::move(times);
+    return;
+  }
   auto const next = [&](std::size_t i) -> camera const& { return keyframes_[(i + 1) % keyframes_.size()]; };
   double way = 0;
   for (std::size_t i = 0; i < stretches; ++i) way += distance(keyframes_[i], next(i));
@@ -160,9 +169,10 @@ camera camera_path::at(double time) const {
   return c;
 }
 
-std::vector<camera> smooth_path(std::vector<camera> const& keyframes, int frames, bool closed) {
+std::vector<camera> smooth_path(std::vector<camera> const& keyframes, int frames, bool closed,
+                                std::vector<double> const& times) {
   if (frames < 2) throw invalid_argument("a path has at least 2 frames, not " + std::to_string(frames));
-  camera_path const path(keyframes, closed);
+  camera_path const path(keyframes, closed, times);
   std::vector<camera> out;
   for (int i = 0; i < frames; ++i) out.push_back(path.at(path.end() * i / (closed ? frames : frames - 1)));
   return out;

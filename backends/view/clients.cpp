@@ -17,15 +17,21 @@ constexpr int policy_violation = 1008;
 
 }  // namespace
 
-clients::clients(view_scene scene, view_server_options const& options) : scene_(std::move(scene)), options_(options) {}
+clients::clients(view_scene scene, view_server_options const& options)
+    : options_(options), scene_(std::make_shared<view_scene const>(std::move(scene))) {}
+
+std::shared_ptr<view_scene const> clients::scene() const {
+  std::lock_guard const lock(mutex_);
+  return scene_;
+}
 
 int clients::add(bool control) {
   std::lock_guard const lock(mutex_);
   int const id = next_id_++;
   client& c = clients_[id];
   c.control = control;
-  c.texts.push_back(hello_text(scene_, control));
-  c.status = status_, c.curve = curve_;
+  c.texts.push_back(hello_text(*scene_, control));
+  c.status = status_, c.curve = curve_, c.scores = scores_;
   counted();
   return id;
 }
@@ -38,7 +44,7 @@ void clients::remove(int id) {
 
 void clients::counted() {
   count_ = static_cast<int>(clients_.size());
-  wishes_ = static_cast<int>(clients_.size() + actions_.size() + share_.has_value());
+  wishes_ = static_cast<int>(clients_.size() + actions_.size() + share_.has_value() + model_.has_value());
 }
 
 verdict clients::receive(int id, std::string_view text, double now) {
@@ -52,29 +58,37 @@ verdict clients::receive(int id, std::string_view text, double now) {
   auto const found = clients_.find(id);
   if (found == clients_.end()) return {};
   client& c = found->second;
-  auto const index_in_range = [&](int i) { return i < static_cast<int>(scene_.cameras.size()); };
+  auto const index_in_range = [&](int i) { return i < static_cast<int>(scene_->cameras.size()); };
+  auto const no_camera = verdict{policy_violation, "'photo' is no camera of the scene"};
   if (auto* const view = std::get_if<view_message>(&message)) {
-    if (view->photo && !index_in_range(*view->photo)) return {policy_violation, "'photo' is no camera of the scene"};
-    c.view = std::move(*view), c.view_time = now, c.dirty = true, c.still_done = false;
+    if (view->photo && !index_in_range(*view->photo)) return no_camera;
+    c.view = std::move(*view), c.view_time = now, c.dirty = true, c.still_done = false, ++c.serial;
+  } else if (auto* const image = std::get_if<image_message>(&message)) {
+    if (image->photo && !index_in_range(*image->photo)) return no_camera;
+    c.image = std::move(*image);
   } else if (auto* const pick = std::get_if<pick_message>(&message)) {
     c.pick = std::move(*pick);
   } else if (auto* const path = std::get_if<path_message>(&message)) {
     c.path = std::move(*path);
-  } else if (!c.control) {
-    c.texts.push_back(refused_text(std::holds_alternative<train_message>(message) ? "train" : "share",
-                                   "this address may look, and not control"));
-  } else if (!scene_.training) {
-    c.texts.push_back(
-        refused_text(std::holds_alternative<train_message>(message) ? "train" : "share", "there is no training here"));
+  } else if (auto const* const model = std::get_if<model_message>(&message)) {
+    bool const there = model->index < static_cast<int>(scene_->models.size());
+    if (controls(c, "model", there, "there is no such model to open")) model_ = model->index;
   } else if (auto const* const train = std::get_if<train_message>(&message)) {
-    if (actions_.size() < actions_most) actions_.push_back(train->action);
-    counted();
+    if (controls(c, "train", scene_->training, "there is no training here") && actions_.size() < actions_most)
+      actions_.push_back(train->action);
   } else if (auto const* const share = std::get_if<share_message>(&message)) {
-    share_ = share->value;
-    counted();
+    if (controls(c, "share", scene_->training, "there is no training here")) share_ = share->value;
   }
+  counted();
   changed_.notify_all();
   return {};
+}
+
+// Whether a client may do what takes the right of control; it is told where not.
+bool clients::controls(client& c, char const* what, bool possible, char const* else_why) const {
+  if (c.control && possible) return true;
+  c.texts.push_back(refused_text(what, c.control ? else_why : "this address may look, and not control"));
+  return false;
 }
 
 bool clients::take_text(int id, std::string& to) {
@@ -88,7 +102,7 @@ bool clients::take_text(int id, std::string& to) {
     changed_.notify_all();
     return true;
   }
-  std::string& newest = c.status.empty() ? c.curve : c.status;
+  std::string& newest = !c.status.empty() ? c.status : !c.curve.empty() ? c.curve : c.scores;
   to = std::exchange(newest, std::string());
   return !to.empty();
 }
@@ -96,7 +110,12 @@ bool clients::take_text(int id, std::string& to) {
 bool clients::take_frame(int id, std::vector<u8>& to, double now) {
   std::lock_guard const lock(mutex_);
   auto const found = clients_.find(id);
-  if (found == clients_.end() || found->second.frame.empty()) return false;
+  if (found == clients_.end()) return false;
+  if (!found->second.file.empty()) {
+    to = std::exchange(found->second.file, {});
+    return true;
+  }
+  if (found->second.frame.empty()) return false;
   to = std::exchange(found->second.frame, {});
   found->second.view_time = now;  // a moving page sends its next view when it has this frame
   changed_.notify_all();          // the next one may be rendered
@@ -104,7 +123,8 @@ bool clients::take_frame(int id, std::vector<u8>& to, double now) {
 }
 
 bool clients::waits(client const& c) {
-  return !c.texts.empty() || !c.status.empty() || !c.curve.empty() || !c.frame.empty();
+  return !c.texts.empty() || !c.status.empty() || !c.curve.empty() || !c.scores.empty() || !c.frame.empty() ||
+         !c.file.empty();
 }
 
 bool clients::has_output(int id) const {
@@ -134,7 +154,7 @@ int clients::moving(double now) const {
   return n;
 }
 
-// What is asked for once comes first, then views that move, then those at rest, which take longest.
+// What is asked for once comes first, then views that move, then those at rest, which take longer, and files last.
 std::optional<job> clients::job_of(int id, client& c, double now, int urgency) {
   if (urgency == 0) {
     if (c.texts.size() >= answers_most) return {};
@@ -142,23 +162,24 @@ std::optional<job> clients::job_of(int id, client& c, double now, int urgency) {
     if (c.path) return job{id, *std::exchange(c.path, {})};
     return {};
   }
+  if (urgency == 3 && c.image && c.file.empty()) return job{id, *std::exchange(c.image, {})};
   if (!c.view || !c.frame.empty()) return {};
   int const width = c.view->view.width, height = c.view->view.height;
   if (urgency == 1 && c.dirty && !at_rest(c, now)) {
     c.dirty = false;
     c.pacing.start_from(pacing_);
     auto const [w, h] = c.pacing.size(width, height, 1000 * options_.frame_seconds / std::max(1, moving(now)));
-    return job{id, *c.view, false, w, h};
+    return job{id, *c.view, c.serial, false, w, h};
   }
   if (urgency == 2 && at_rest(c, now) && !c.still_done) {
     c.dirty = false, c.still_done = true;
-    return job{id, *c.view, true, width, height};
+    return job{id, *c.view, c.serial, true, width, height};
   }
   return {};
 }
 
 std::optional<job> clients::choose(double now) {
-  for (int urgency = 0; urgency < 3; ++urgency) {
+  for (int urgency = 0; urgency < 4; ++urgency) {
     // Each in turn, from the one after the last that was served.
     auto const first = clients_.upper_bound(last_served_);
     auto const serve = [&](auto from, auto to) -> std::optional<job> {
@@ -198,6 +219,28 @@ std::optional<job> clients::next_job(double now, double wait_seconds) {
   }
 }
 
+bool clients::waited_for(job const& j) const {
+  std::lock_guard const lock(mutex_);
+  auto const found = clients_.find(j.client);
+  if (found == clients_.end()) return false;
+  return !std::holds_alternative<view_message>(j.wanted) || found->second.serial == j.serial;
+}
+
+double clients::expected_ms(double pixels) const {
+  std::lock_guard const lock(mutex_);
+  return pacing_.rate() * pixels;
+}
+
+void clients::finish_image(job const& done, std::vector<u8> bytes) {
+  {
+    std::lock_guard const lock(mutex_);
+    auto const found = clients_.find(done.client);
+    if (found == clients_.end()) return;
+    found->second.file = std::move(bytes);
+  }
+  wake();
+}
+
 void clients::finish_frame(job const& done, std::vector<u8> bytes, double milliseconds) {
   {
     std::lock_guard const lock(mutex_);
@@ -206,6 +249,7 @@ void clients::finish_frame(job const& done, std::vector<u8> bytes, double millis
     auto const found = clients_.find(done.client);
     if (found == clients_.end()) return;
     found->second.pacing.measured(milliseconds, pixels);
+    if (!found->second.view) return;  // the scene is another one by now
     found->second.frame = std::move(bytes);
   }
   wake();
@@ -243,6 +287,47 @@ std::optional<double> clients::next_share() {
   auto const asked = std::exchange(share_, {});
   counted();
   return asked;
+}
+
+std::optional<int> clients::next_model() {
+  std::lock_guard const lock(mutex_);
+  auto const asked = std::exchange(model_, {});
+  counted();
+  return asked;
+}
+
+// Cameras, photographs and picks of the scene before are no longer what they were.
+void clients::set_scene(view_scene scene) {
+  {
+    std::lock_guard const lock(mutex_);
+    scene_ = std::make_shared<view_scene const>(std::move(scene));
+    scores_.clear();
+    for (auto& [id, c] : clients_) {
+      ++c.serial;
+      c.view = {}, c.image = {}, c.pick = {}, c.path = {}, c.frame = {}, c.scores = {}, c.dirty = false;
+      c.texts.push_back(hello_text(*scene_, c.control));
+    }
+  }
+  wake();
+}
+
+void clients::set_end(std::string why) {
+  std::lock_guard const lock(mutex_);
+  end_ = std::move(why);
+}
+
+std::string clients::why_it_ends() const {
+  std::lock_guard const lock(mutex_);
+  return end_;
+}
+
+void clients::set_scores(std::vector<std::pair<int, double>> const& scores) {
+  {
+    std::lock_guard const lock(mutex_);
+    scores_ = scores_text(scores);
+    for (auto& [id, c] : clients_) c.scores = scores_;
+  }
+  wake();
 }
 
 void clients::set_status(view_status const& status) {

@@ -18,7 +18,8 @@ namespace gart::view {
 // What is to be rendered or found for a client.
 struct job {
   int client = 0;
-  std::variant<view_message, pick_message, path_message> wanted;
+  std::variant<view_message, image_message, pick_message, path_message> wanted;
+  u64 serial = 0;             // of the view among those of its client
   bool still = false;         // a view of full size
   int width = 0, height = 0;  // that it is rendered at
 };
@@ -45,17 +46,27 @@ class clients {
 
   // The thread that renders.
   std::optional<job> next_job(double now, double wait_seconds);
+  // Whether its client is there, and has asked for no newer view.
+  bool waited_for(job const& j) const;
+  // Milliseconds that so many pixels of a view are expected to take; 0 where nothing is known.
+  double expected_ms(double pixels) const;
   void finish_frame(job const& done, std::vector<u8> bytes, double milliseconds);
+  void finish_image(job const& done, std::vector<u8> bytes);
   void send(int client, std::string text);
   std::optional<train_action> next_action();
   std::optional<double> next_share();
+  std::optional<int> next_model();
   void set_status(view_status const& status);
   void set_curve(view_curve const& curve);
+  void set_scores(std::vector<std::pair<int, double>> const& scores);
+  void set_scene(view_scene scene);
+  void set_end(std::string why);
+  std::string why_it_ends() const;
 
   void send_all(std::string const& text);
   int count() const noexcept { return count_.load(std::memory_order_relaxed); }
   bool idle() const noexcept { return wishes_.load(std::memory_order_relaxed) == 0; }
-  view_scene const& scene() const { return scene_; }
+  std::shared_ptr<view_scene const> scene() const;
 
   std::function<void()> wake = [] {};  // called when there is something to send
 
@@ -64,13 +75,15 @@ class clients {
     bool control = false;
     std::optional<view_message> view;  // the newest
     double view_time = 0;              // when it came, or the last frame went
+    u64 serial = 0;                    // of it
     bool dirty = false;                // not rendered in any size
     bool still_done = false;           // rendered whole
+    std::optional<image_message> image;
     std::optional<pick_message> pick;
     std::optional<path_message> path;
     std::deque<std::string> texts;
-    std::string status, curve;  // the newest, to be sent
-    std::vector<u8> frame;      // the newest, to be sent
+    std::string status, curve, scores;  // the newest, to be sent
+    std::vector<u8> frame, file;        // the newest, to be sent
     frame_pacing pacing;
   };
   static bool waits(client const& c);  // whether there is something to send to it
@@ -80,19 +93,21 @@ class clients {
   std::optional<job> choose(double now);
   double next_rest(double now) const;
   int moving(double now) const;
-  void counted();  // after a change of clients_, actions_ or share_
+  bool controls(client& c, char const* what, bool possible, char const* else_why) const;
+  void counted();  // after a change of clients_, actions_, share_ or model_
 
-  view_scene const scene_;
   view_server_options const options_;
   std::mutex mutable mutex_;
+  std::shared_ptr<view_scene const> scene_;
   std::condition_variable changed_;
   std::map<int, client> clients_;
   std::atomic<int> count_ = 0, wishes_ = 0;  // clients; they and what they asked of the training
   int next_id_ = 1, last_served_ = 0;
   frame_pacing pacing_;  // of all: what a new client starts from
-  std::string status_, curve_;
+  std::string status_, curve_, scores_, end_ = "gart ends";
   std::deque<train_action> actions_;
   std::optional<double> share_;
+  std::optional<int> model_;
 };
 
 }  // namespace gart::view

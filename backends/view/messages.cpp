@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <initializer_list>
+#include <utility>
 
 namespace gart {
 
@@ -64,14 +65,14 @@ class fields {
       refuse(key, e.what());
     }
   }
-  camera view(char const* key) { return camera_of(at(key), key); }
+  camera view(char const* key, int most = view_size_most) { return camera_of(at(key), key, most); }
 
-  static camera camera_of(json const& value, std::string const& field) {
+  static camera camera_of(json const& value, std::string const& field, int most = view_size_most) {
     if (!value.is_object()) refuse(field, "is not an object");
     try {
       camera const view = parse_camera_json(value.dump(), field).view;
-      if (view.width > view_size_most || view.height > view_size_most)
-        refuse(field, "is larger than " + std::to_string(view_size_most) + " pixels a side");
+      if (view.width > most || view.height > most)
+        refuse(field, "is larger than " + std::to_string(most) + " pixels a side");
       return view;
     } catch (json::exception const&) {
       refuse(field, "holds text that is not UTF-8");
@@ -105,7 +106,28 @@ class fields {
     }
     if (json const* const near = find("near"); near && !near->is_null())
       s.near = static_cast<float>(in_range(*near, "near", 1e-6, 1e9));
+    if (json const* const background = find("background"); background && !background->is_null()) {
+      s.background = point(*background, "background");
+      for (int k = 0; k < 3; ++k)
+        if (!((*s.background)[k] >= 0 && (*s.background)[k] <= 1)) refuse("background", "is no colour from 0 to 1");
+    }
+    for (auto const& [key, value] : {std::pair{"opacity", &s.opacity}, std::pair{"size", &s.size}})
+      if (json const* const factor = find(key); factor && !factor->is_null())
+        *value = static_cast<float>(in_range(*factor, key, 1e-3, 1e3));
+    if (json const* const shape = find("shape"); shape && !shape->is_null()) s.shape = name<view_shape>("shape");
     return s;
+  }
+  std::optional<int> photo() {
+    json const* const index = find("photo");
+    return index && !index->is_null() ? std::optional(whole("photo", 0, 1 << 24)) : std::nullopt;
+  }
+  std::vector<double> times() {
+    std::vector<double> out;
+    json const* const list = find("times");
+    if (!list || list->is_null()) return out;
+    if (!list->is_array()) refuse("times", "is not a list of numbers");
+    for (json const& one : *list) out.push_back(in_range(one, "times", 0, 1e6));
+    return out;
   }
   void done() const {
     for (auto const& [key, value] : object_.items()) {
@@ -145,8 +167,14 @@ client_message parse_message(std::string_view text) {
   if (type == "view") {
     view_message m;
     m.id = f.id(), m.view = f.view("camera"), m.mode = f.name<view_mode>("mode"), m.moving = f.flag("moving");
-    m.settings = f.settings();
-    if (json const* const photo = f.find("photo"); photo && !photo->is_null()) m.photo = f.whole("photo", 0, 1 << 24);
+    m.settings = f.settings(), m.photo = f.photo();
+    out = m;
+  } else if (type == "image") {
+    image_message m;
+    m.id = f.id(), m.view = f.view("camera", image_size_most), m.mode = f.name<view_mode>("mode");
+    if (static_cast<double>(m.view.width) * m.view.height > image_pixels_most)
+      refuse("camera", "has more than " + std::to_string(image_pixels_most) + " pixels");
+    m.settings = f.settings(), m.photo = f.photo();
     out = m;
   } else if (type == "pick") {
     pick_message m;
@@ -161,13 +189,16 @@ client_message parse_message(std::string_view text) {
     if (!list.is_array() || list.size() < 2) refuse("keyframes", "is not a list of 2 cameras or more");
     for (std::size_t i = 0; i < list.size(); ++i)
       m.keyframes.push_back(fields::camera_of(list[i], "keyframes[" + std::to_string(i) + "]"));
+    m.times = f.times();
     out = m;
+  } else if (type == "model") {
+    out = model_message{f.whole("index", 0, 1 << 24)};
   } else if (type == "train") {
     out = train_message{f.name<train_action>("action")};
   } else if (type == "share") {
     out = share_message{f.number("value", 0.01, 1)};
   } else {
-    refuse("type", "is none of view, pick, path, train, share");
+    refuse("type", "is none of view, image, pick, path, model, train, share");
   }
   f.done();
   return out;

@@ -25,6 +25,11 @@ std::pair<float, float> robust_range(std::vector<float> values) {
 
 }  // namespace
 
+float extent_of(view_scene const& scene) {
+  vec3 const half = 0.5f * (scene.bounds.high - scene.bounds.low);
+  return std::sqrt(glm::dot(half, half));
+}
+
 view_scene scene_of(std::string name, gaussian_model const& model, int kernel_degree,
                     std::vector<view_camera> cameras) {
   view_scene scene;

@@ -1,6 +1,7 @@
 // The thread that renders: what each client is given for what it asked.
 
 #include "clients.hpp"
+#include "parts.hpp"
 #include "sockets.hpp"
 
 #include <gart/camera/models.hpp>
@@ -17,6 +18,8 @@ namespace gart {
 namespace {
 
 using clock = std::chrono::steady_clock;
+using view::in_parts;
+using view::parts_of;
 
 double seconds_now() { return std::chrono::duration<double>(clock::now().time_since_epoch()).count(); }
 
@@ -53,20 +56,46 @@ struct view_server::state {
   state(view_scene scene, view_server_options const& o)
       : options(o), all(std::move(scene), options), listener(all, options) {}
 
-  void answer(view::job const& j, view_message const& m, view_render const& render) {
+  // What is shown of a view, in parts where it takes long; none where nobody waits for it any more.
+  template <class Message>
+  std::optional<shown_image> seen(view::job const& j, Message const& m, camera const& view, view_render const& render) {
     std::optional<image8> photo;
     if (m.mode == view_mode::error && m.photo && options.photo) photo = options.photo(*m.photo);
+    double const ms = all.expected_ms(static_cast<double>(view.width) * view.height);
+    auto const parts = parts_of(view.height, render.in_parts ? ms : 0);
+    auto const wanted = [&] { return all.waited_for(j); };
+    if (m.mode == view_mode::colour && render.colours) {
+      auto image = in_parts(parts, wanted, m.settings, [&](view_settings const& s) { return render.colours(view, s); });
+      return image ? std::optional(shown_image{std::move(*image)}) : std::nullopt;
+    }
+    auto const all_of_it =
+        in_parts(parts, wanted, m.settings, [&](view_settings const& s) { return render.images(view, s); });
+    if (!all_of_it) return {};
+    return shown(*all_of_it, view, m.mode, photo ? &*photo : nullptr,
+                 m.settings.background.value_or(all.scene()->background));
+  }
+
+  void answer(view::job const& j, view_message const& m, view_render const& render) {
     camera const view = j.still ? m.view : resized(m.view, j.width, j.height);
     auto const start = clock::now();
-    shown_image const seen =
-        m.mode == view_mode::colour && render.colours
-            ? shown_image{render.colours(view, m.settings)}
-            : shown(render.images(view, m.settings), view, m.mode, photo ? &*photo : nullptr, all.scene().background);
-    std::vector<u8> const jpeg = encode_jpeg(seen.image, j.still ? quality_still : quality_moving);
+    auto const image = seen(j, m, view, render);
+    if (!image) return;
+    std::vector<u8> const jpeg = encode_jpeg(image->image, j.still ? quality_still : quality_moving);
     double const ms = std::chrono::duration<double, std::milli>(clock::now() - start).count();
-    frame_header const header{m.id,   view.width, view.height, m.view.width, m.view.height,
-                              m.mode, ms,         j.still,     seen.low,     seen.high};
+    frame_header const header{m.id, view.width, view.height, m.view.width, m.view.height, m.mode,
+                              ms,   j.still,    false,       image->low,   image->high};
     all.finish_frame(j, frame_bytes(header, jpeg), ms);
+  }
+
+  void answer(view::job const& j, image_message const& m, view_render const& render) {
+    auto const start = clock::now();
+    auto const image = seen(j, m, m.view, render);
+    if (!image) return;
+    std::vector<u8> const png = encode_png(image->image);
+    double const ms = std::chrono::duration<double, std::milli>(clock::now() - start).count();
+    frame_header const header{m.id, m.view.width, m.view.height, m.view.width, m.view.height, m.mode,
+                              ms,   true,         true,          image->low,   image->high};
+    all.finish_image(j, frame_bytes(header, png));
   }
 
   void answer(view::job const& j, pick_message const& m, view_render const& render) {
@@ -80,7 +109,7 @@ struct view_server::state {
   }
 
   void answer(view::job const& j, path_message const& m, view_render const&) {
-    all.send(j.client, path_text(m.id, smooth_path(m.keyframes, m.frames, m.closed)));
+    all.send(j.client, path_text(m.id, smooth_path(m.keyframes, m.frames, m.closed, m.times)));
   }
 };
 
@@ -109,6 +138,11 @@ double view_server::render_next(view_render const& render, double wait_seconds) 
 void view_server::set_status(view_status const& status) { state_->all.set_status(status); }
 void view_server::set_curve(view_curve const& curve) { state_->all.set_curve(curve); }
 std::optional<train_action> view_server::next_action() { return state_->all.next_action(); }
+void view_server::set_scores(std::vector<std::pair<int, double>> const& scores) { state_->all.set_scores(scores); }
+void view_server::tell(std::string const& note) { state_->all.send_all(note_text(note)); }
+void view_server::tell_at_end(std::string why) { state_->all.set_end(std::move(why)); }
+void view_server::set_scene(view_scene scene) { state_->all.set_scene(std::move(scene)); }
+std::optional<int> view_server::next_model() { return state_->all.next_model(); }
 std::optional<double> view_server::next_share() { return state_->all.next_share(); }
 
 }  // namespace gart

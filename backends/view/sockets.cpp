@@ -1,17 +1,24 @@
 #include "sockets.hpp"
 
-#include "page.hpp"
+#include "log_lines.hpp"
+#include "requests.hpp"
+#include "websocket.hpp"
 
 #include <gart/core/error.hpp>
-#include <gart/io/image_file.hpp>
 
-#include <libwebsockets.h>
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/eventfd.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
-#include <array>
+#include <algorithm>
 #include <atomic>
-#include <charconv>
+#include <cerrno>
 #include <chrono>
+#include <list>
 #include <thread>
 #include <utility>
 
@@ -20,309 +27,358 @@ namespace gart::view {
 namespace {
 
 constexpr char const* protocol_name = "gart-view";
-// Codes of a close, by RFC 6455.
-constexpr int no_text = 1003, policy_violation = 1008, too_large = 1009;
 // What waits in the system for a slow line is old before it arrives.
 constexpr int send_buffer = 256 * 1024;
-constexpr unsigned connections_most = 96;
-
-// A browser's request for a file, or a client.
-struct connection {
-  int client = 0;  // 0: none
-  std::string incoming;
-  std::vector<u8> body;  // LWS_PRE bytes before it
-};
-struct connection_slot {
-  connection* own;
-};
+// Connections that are no viewers: the one that was longest of no use makes room for the next.
+constexpr std::size_t requests_most = 64;
+// Seconds: a request's head and each part of its answer; a viewer of whom nothing is heard until it is asked and until
+// it is given up; one that takes nothing of what it is sent; a close.
+constexpr double request_seconds = 15, ping_seconds = 20, unheard_seconds = 60, stalled_seconds = 30, close_seconds = 2;
+constexpr int tick_ms = 250;
 
 double seconds_now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-std::vector<u8> padded(u8 const* bytes, std::size_t size) {
-  std::vector<u8> out(LWS_PRE + size);
-  std::copy_n(bytes, size, out.begin() + LWS_PRE);
-  return out;
-}
-
-int send(lws* wsi, std::vector<u8>& bytes, lws_write_protocol kind) {
-  std::size_t const size = bytes.size() - LWS_PRE;
-  return lws_write(wsi, bytes.data() + LWS_PRE, size, kind) < static_cast<int>(size) ? -1 : 0;
-}
-
-// What a client wrote may be anything: a log and the reason of a close are plain text, and short.
-std::string plain(std::string text) {
-  for (char& c : text)
-    if (c < ' ' || c > '~') c = '?';
-  return text.substr(0, 120);
-}
-
-image8 opaque(image8 const& image, vec3 background) {
-  if (image.channels != 4) return image;
-  image8 out(image.width, image.height, 3);
-  for (std::size_t p = 0; p < out.data.size() / 3; ++p) {
-    float const alpha = static_cast<float>(image.data[4 * p + 3]) / 255;
-    for (std::size_t k = 0; k < 3; ++k)
-      out.data[3 * p + k] = static_cast<u8>(alpha * static_cast<float>(image.data[4 * p + k]) +
-                                            (1 - alpha) * 255 * background[static_cast<int>(k)] + 0.5f);
+class descriptor {
+ public:
+  explicit descriptor(int number) : number_(number) {}
+  descriptor(descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+  descriptor& operator=(descriptor&& other) noexcept {
+    std::swap(number_, other.number_);
+    return *this;
   }
-  return out;
+  ~descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  int number() const { return number_; }
+
+ private:
+  int number_;
+};
+
+// A browser's request, or a viewer.
+struct connection {
+  enum phase { open, closing, lingering, gone };
+
+  connection(descriptor own, double seconds_now) : socket(std::move(own)), heard(seconds_now) {}
+
+  descriptor socket;
+  double heard;         // when bytes came last, or a request was done
+  int client = 0;       // 0: no viewer
+  double said = 0;      // when the viewer's last message came
+  bool pinged = false;  // since it was heard
+  phase now = open;
+  double ends = 0;       // when a close is given up
+  std::string came;      // what is not read yet
+  std::string out;       // what is not sent yet
+  std::size_t sent = 0;  // of it
+  double moved = 0;      // when the system took some of it, or it began
+  ws::reader messages{message_bytes};
+};
+
+descriptor listening_at(listen_place const& place, view_server_options const& options) {
+  descriptor own(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  int const yes = 1;
+  setsockopt(own.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  sockaddr_in at{};
+  at.sin_family = AF_INET, at.sin_port = htons(static_cast<std::uint16_t>(options.port));
+  inet_pton(AF_INET, place.address.c_str(), &at.sin_addr);
+  if (own.number() < 0 || ::bind(own.number(), reinterpret_cast<sockaddr const*>(&at), sizeof at) != 0 ||
+      ::listen(own.number(), 128) != 0)
+    throw error("the viewer cannot listen at " + options.listen + ", port " + std::to_string(options.port) +
+                " (view_server_options.port = 0 takes one that is free)");
+  return own;
+}
+
+int port_of(descriptor const& listener) {
+  sockaddr_in at{};
+  socklen_t size = sizeof at;
+  getsockname(listener.number(), reinterpret_cast<sockaddr*>(&at), &size);
+  return ntohs(at.sin_port);
+}
+
+view_server_options const& checked(view_server_options const& options) {
+  if (options.port < 0 || options.port > 65535)
+    throw invalid_argument("view_server_options.port must lie between 0 and 65535, not " +
+                           std::to_string(options.port));
+  return options;
 }
 
 }  // namespace
 
 struct sockets::state {
   clients& all;
-  view_server_options options;
-  std::unique_ptr<access> gate;
-  lws_context* context = nullptr;
-  lws_vhost* vhost = nullptr;
-  std::array<lws_protocols, 3> protocols{};
-  lws_retry_bo_t idle{};
-  std::thread thread;
+  view_server_options const options;
+  listen_place const place;
+  descriptor listener;
+  int const port;
+  access const gate;
+  requests const answers;
+  descriptor woken{eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)};
+  std::list<connection> connections;
+  log_rate lines;
   std::atomic<bool> ends = false;
+  std::thread thread;
 
-  state(clients& c, view_server_options const& o) : all(c), options(o) {}
-
-  static state& of(lws* wsi) { return *static_cast<state*>(lws_context_user(lws_get_context(wsi))); }
-  void log(std::string const& line) const {
-    if (options.log) options.log(plain(line));
+  state(clients& c, view_server_options const& o)
+      : all(c),
+        options(checked(o)),
+        place(listen_place_of(options.listen)),
+        listener(listening_at(place, options)),
+        port(port_of(listener)),
+        gate(place.hosts, options.allowed_hosts, port),
+        answers(gate, all, options) {
+    if (woken.number() < 0) throw error("the viewer cannot start: the system gives no descriptor");
   }
 
-  static std::string header(lws* wsi, lws_token_indexes token) {
-    int const length = lws_hdr_total_length(wsi, token);
-    if (length <= 0) return {};
-    std::string text(static_cast<std::size_t>(length) + 1, '\0');
-    if (lws_hdr_copy(wsi, text.data(), length + 1, token) < 0) return {};
-    text.resize(static_cast<std::size_t>(length));
-    return text;
+  void wake() const { static_cast<void>(!eventfd_write(woken.number(), 1)); }
+  void log(std::string_view line) {
+    if (!options.log) return;
+    std::string const text = lines.line(escaped(line, 300), seconds_now());
+    if (!text.empty()) options.log(text);
   }
 
-  // Headers of every answer; `length` bytes follow.
-  int write_headers(lws* wsi, unsigned code, char const* type, std::size_t length) const {
-    std::array<u8, LWS_PRE + 1536> buffer;
-    u8 *const start = buffer.data() + LWS_PRE, *p = start, *const end = buffer.data() + buffer.size() - 1;
-    if (lws_add_http_common_headers(wsi, code | LWSAHH_FLAG_NO_SERVER_NAME, type, length, &p, end)) return -1;
-    auto const add = [&](char const* name, std::string const& value) {
-      return lws_add_http_header_by_name(wsi, reinterpret_cast<u8 const*>(name),
-                                         reinterpret_cast<u8 const*>(value.data()), static_cast<int>(value.size()), &p,
-                                         end);
-    };
-    std::string const host = header(wsi, WSI_TOKEN_HOST);
-    std::string const socket = gate->host_is_ours(host) ? " ws://" + host : std::string();
-    if (add("content-security-policy:", "default-src 'self'; img-src 'self' blob:; connect-src 'self'" + socket) ||
-        add("x-content-type-options:", "nosniff") || add("referrer-policy:", "no-referrer") ||
-        add("cache-control:", "no-store") || add("cross-origin-resource-policy:", "same-origin") ||
-        add("x-frame-options:", "DENY"))
-      return -1;
-    return lws_finalize_write_http_header(wsi, start, &p, end) ? -1 : 0;
+  // ---- one connection
+
+  void put(connection& c, std::string_view bytes) const {
+    if (c.out.empty()) c.moved = seconds_now();
+    c.out += bytes;
   }
 
-  int answer(lws* wsi, unsigned code, char const* type, std::vector<u8> body) const {
-    if (write_headers(wsi, code, type, body.size() - LWS_PRE) != 0) return -1;
-    auto*& own = static_cast<connection_slot*>(lws_wsi_user(wsi))->own;
-    if (!own) own = new connection;
-    own->body = std::move(body);
-    lws_callback_on_writable(wsi);
-    return 0;
-  }
-  int refuse(lws* wsi, unsigned code, std::string const& why) const {
-    return answer(wsi, code, "text/plain; charset=utf-8", padded(reinterpret_cast<u8 const*>(why.data()), why.size()));
+  void end_after_output(connection& c) const {
+    c.now = connection::closing, c.ends = seconds_now() + close_seconds;
+    c.came.clear();
   }
 
-  // Whether the request is from a page of ours, or from none.
-  bool from_here(lws* wsi, bool origin_required) const {
-    std::string const host = header(wsi, WSI_TOKEN_HOST), origin = header(wsi, WSI_TOKEN_ORIGIN);
-    if (!gate->host_is_ours(host)) return false;
-    return origin.empty() ? !origin_required : access::origin_is(origin, host);
+  void take_leave(connection& c, int code, std::string_view why) const {
+    all.remove(std::exchange(c.client, 0));
+    put(c, ws::close_frame(code, escaped(why, 120)));
+    end_after_output(c);
+  }
+  void close(connection& c, int code, std::string_view why) {
+    log("a client was closed: " + std::string(why));
+    take_leave(c, code, why);
   }
 
-  int request(lws* wsi, std::string_view path) const {
-    request_path const asked = gate->path_of(path);
-    if (asked.of == access_right::none || !from_here(wsi, false)) {
-      log("403: a request with another token, Host or Origin");
-      return refuse(wsi, HTTP_STATUS_FORBIDDEN, "403: not the address that gart printed\n");
+  void drop(connection& c) const {
+    if (c.client) all.remove(std::exchange(c.client, 0));
+    c.now = connection::gone;
+  }
+
+  // What came is thrown away while a close is under way: with it unread the system would take back what was sent.
+  void read(connection& c) {
+    char bytes[16384];
+    ssize_t const n = ::recv(c.socket.number(), bytes, sizeof bytes, 0);
+    if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) return drop(c);
+    if (n <= 0 || c.now != connection::open) return;
+    c.came.append(bytes, static_cast<std::size_t>(n));
+    if (c.client) c.heard = seconds_now(), c.pinged = false;
+    understand(c);
+  }
+
+  void understand(connection& c) {
+    while (c.now == connection::open && !c.client && c.out.empty()) {
+      http_request asked;
+      head_state const is = take_request(c.came, asked);
+      if (is == head_state::unfinished) return;
+      if (is == head_state::wrong)
+        respond(c, {}, {400, "text/plain; charset=utf-8", "400: no request that is understood\n", {}});
+      else
+        request(c, asked);
     }
-    if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0)
-      return refuse(wsi, HTTP_STATUS_METHOD_NOT_ALLOWED, "405: GET alone\n");
-    std::string const name = asked.rest.empty() ? "index.html" : asked.rest;
-    if (page_file const* const file = find_page_file(name))
-      return answer(wsi, HTTP_STATUS_OK, content_type_of(name), padded(file->bytes, file->size));
-    std::string_view number = name;
-    int index = 0;
-    if (number.starts_with("photo/") && number.ends_with(".jpg")) {
-      number = number.substr(6, number.size() - 10);
-      auto const [end, wrong] = std::from_chars(number.data(), number.data() + number.size(), index);
-      auto const& cameras = all.scene().cameras;
-      if (wrong == std::errc() && end == number.data() + number.size() && index >= 0 &&
-          index < static_cast<int>(cameras.size()) && cameras[static_cast<std::size_t>(index)].photo && options.photo) {
-        try {
-          std::vector<u8> const jpeg = encode_jpeg(opaque(options.photo(index), all.scene().background));
-          return answer(wsi, HTTP_STATUS_OK, "image/jpeg", padded(jpeg.data(), jpeg.size()));
-        } catch (std::exception const& e) {
-          log("a photograph could not be sent: " + std::string(e.what()));
-        }
-      }
+    while (c.now == connection::open && c.client) {
+      ws::message const m = c.messages.next(c.came);
+      if (m.is == ws::message::none) return;
+      message(c, m);
     }
-    return refuse(wsi, HTTP_STATUS_NOT_FOUND, "404: there is no such file\n");
   }
 
-  // 0: may go on; the HTTP status of the refusal.
-  unsigned refusal_of_upgrade(lws* wsi, std::string_view to) const {
-    request_path const asked = gate->path_of(header(wsi, WSI_TOKEN_GET_URI));
-    if (to != "websocket" || asked.of == access_right::none || asked.rest != "socket" || !from_here(wsi, true))
-      return HTTP_STATUS_FORBIDDEN;
-    if (header(wsi, WSI_TOKEN_PROTOCOL) != protocol_name) return HTTP_STATUS_BAD_REQUEST;
-    return all.count() >= options.max_clients ? HTTP_STATUS_SERVICE_UNAVAILABLE : 0;
+  void request(connection& c, http_request const& asked) {
+    c.heard = seconds_now();
+    if (asked.header("upgrade").empty()) return respond(c, asked, answers.answer(asked));
+    int status = answers.upgrade(asked);
+    if (status == 101 && !has_room()) status = 503;
+    if (status == 101) return welcome(c, asked);
+    respond(c, asked,
+            {status, "text/plain; charset=utf-8", std::to_string(status) + ": not let in\n",
+             std::to_string(status) + ": a viewer was not let in"});
   }
 
-  int close(lws* wsi, int code, std::string const& why) const {
-    std::string text = plain(why);
-    log("a client was closed: " + text);
-    lws_close_reason(wsi, static_cast<lws_close_status>(code), reinterpret_cast<u8*>(text.data()), text.size());
-    return -1;
+  void respond(connection& c, http_request const& asked, http_answer const& a) {
+    if (!a.log.empty()) log(a.log);
+    bool const stays = (a.status == 200 || a.status == 404) && !asked.last;
+    auto headers = answers.safe_headers(asked);
+    headers.insert(headers.end(), {"content-type: " + a.type, "content-length: " + std::to_string(a.body.size()),
+                                   stays ? "connection: keep-alive" : "connection: close"});
+    put(c, answer_head(a.status, headers) + a.body);
+    if (!stays) end_after_output(c);
+    send(c);
   }
 
-  int receive(lws* wsi, connection& c, char const* bytes, std::size_t size) {
-    if (lws_frame_is_binary(wsi)) return close(wsi, no_text, "a message is not text");
-    if (c.incoming.size() + size > message_bytes) return close(wsi, too_large, "a message is longer than 16384 bytes");
-    c.incoming.append(bytes, size);
-    if (lws_remaining_packet_payload(wsi) != 0 || !lws_is_final_fragment(wsi)) return 0;
-    verdict const said = all.receive(c.client, std::exchange(c.incoming, {}), seconds_now());
-    if (!said.reason.empty()) return close(wsi, said.code, said.reason);
-    if (all.overflows(c.client)) return close(wsi, policy_violation, "nothing of what was sent is read");
-    if (all.has_output(c.client)) lws_callback_on_writable(wsi);
-    return 0;
+  void welcome(connection& c, http_request const& asked) {
+    put(c, answer_head(101, {"upgrade: websocket", "connection: Upgrade",
+                             "sec-websocket-accept: " + ws::accept_of(asked.header("sec-websocket-key")),
+                             std::string("sec-websocket-protocol: ") + protocol_name}));
+    int const bytes = send_buffer;
+    setsockopt(c.socket.number(), SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
+    c.client = all.add(answers.right_of(asked) == access_right::control);
+    c.heard = c.said = seconds_now();
   }
 
-  int write(lws* wsi, connection& c) {
+  // Where all places are taken, the page that has been silent for longest makes room.
+  bool has_room() {
+    if (all.count() < options.max_clients) return true;
+    connection* silent = nullptr;
+    for (connection& c : connections)
+      if (c.client && (!silent || c.said < silent->said)) silent = &c;
+    if (!silent || seconds_now() - silent->said < options.silent_seconds) return false;
+    close(*silent, ws::try_again_later, "another page took the place of this one");
+    return true;
+  }
+
+  void message(connection& c, ws::message const& m) {
+    using kind = ws::message;
+    if (m.is == kind::wrong) return close(c, m.code, m.payload);
+    if (m.is == kind::ping) return put(c, ws::frame_head(ws::pong, m.payload.size()) + m.payload);
+    if (m.is == kind::close) return take_leave(c, ws::normal, "");
+    if (m.is != kind::text) return;
+    c.said = seconds_now();
+    verdict const said = all.receive(c.client, m.payload, c.said);
+    if (!said.reason.empty()) return close(c, said.code, said.reason);
+    if (all.overflows(c.client)) close(c, ws::policy_violation, "nothing of what was sent is read");
+  }
+
+  // Sends what the system takes now; a viewer that has it all is given its next text or its newest frame.
+  void send(connection& c) const {
+    while (c.now == connection::open || c.now == connection::closing) {
+      if (c.out.empty() && !fill(c)) break;
+      ssize_t const n = ::send(c.socket.number(), c.out.data() + c.sent, c.out.size() - c.sent, MSG_NOSIGNAL);
+      if (n < 0 && (errno == EAGAIN || errno == EINTR)) return;
+      if (n < 0) return drop(c);
+      c.sent += static_cast<std::size_t>(n), c.moved = seconds_now();
+      if (c.sent == c.out.size()) std::string().swap(c.out), c.sent = 0;
+    }
+    if (c.now == connection::closing && c.out.empty()) {
+      ::shutdown(c.socket.number(), SHUT_WR);
+      c.now = connection::lingering;
+    }
+  }
+
+  bool fill(connection& c) const {
+    if (!c.client) return false;
     std::string text;
+    std::vector<u8> frame;
     if (all.take_text(c.client, text)) {
-      std::vector<u8> bytes = padded(reinterpret_cast<u8 const*>(text.data()), text.size());
-      if (send(wsi, bytes, LWS_WRITE_TEXT) != 0) return -1;
-    } else if (std::vector<u8> frame; all.take_frame(c.client, frame, seconds_now())) {
-      std::vector<u8> bytes = padded(frame.data(), frame.size());
-      if (send(wsi, bytes, LWS_WRITE_BINARY) != 0) return -1;
+      put(c, ws::frame_head(ws::text, text.size()) + text);
+    } else if (all.take_frame(c.client, frame, seconds_now())) {
+      put(c, ws::frame_head(ws::binary, frame.size()));
+      c.out.append(reinterpret_cast<char const*>(frame.data()), frame.size());
     }
-    if (all.has_output(c.client)) lws_callback_on_writable(wsi);
-    return 0;
+    return !c.out.empty();
   }
 
-  static int on_http(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t size) {
-    auto* const slot = static_cast<connection_slot*>(user);
-    switch (reason) {
-      case LWS_CALLBACK_HTTP:
-        return of(wsi).request(wsi, {static_cast<char const*>(in), size});
-      case LWS_CALLBACK_HTTP_WRITEABLE: {
-        if (!slot || !slot->own || slot->own->body.empty()) return 0;
-        std::vector<u8> body = std::exchange(slot->own->body, {});
-        if (send(wsi, body, LWS_WRITE_HTTP_FINAL) != 0) return -1;
-        return lws_http_transaction_completed(wsi) ? -1 : 0;
-      }
-      case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE: {
-        state& s = of(wsi);
-        unsigned const status = s.refusal_of_upgrade(wsi, static_cast<char const*>(in));
-        if (status == 0) return 0;
-        s.log(std::to_string(status) + ": a viewer was not let in");
-        return s.write_headers(wsi, status, "text/plain", 0) != 0 ? -1 : 1;
-      }
-      case LWS_CALLBACK_HTTP_DROP_PROTOCOL:
-      case LWS_CALLBACK_CLOSED_HTTP:
-        if (slot) delete std::exchange(slot->own, nullptr);
-        return 0;
-      case LWS_CALLBACK_EVENT_WAIT_CANCELLED: {
-        // Whoever has nothing to be sent is not woken for it: asked in write().
-        state& s = of(wsi);
-        lws_callback_on_writable_all_protocol(s.context, &s.protocols[1]);
-        return 0;
-      }
-      default:
-        return 0;
+  void expire(connection& c, double now) {
+    bool const waits = !c.out.empty();
+    if (c.now == connection::closing || c.now == connection::lingering) {
+      if (now > c.ends) drop(c);
+    } else if (!c.client) {
+      if (now - (waits ? c.moved : c.heard) > request_seconds) drop(c);
+    } else if (waits && now - c.moved > stalled_seconds) {
+      close(c, ws::policy_violation, "nothing of what was sent is read");
+    } else if (now - c.heard > unheard_seconds) {
+      close(c, ws::going_away, "nothing was heard");
+    } else if (!c.pinged && now - c.heard > ping_seconds) {
+      c.pinged = true;
+      put(c, ws::frame_head(ws::ping, 0));
     }
   }
 
-  static int on_viewer(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t size) {
-    auto* const slot = static_cast<connection_slot*>(user);
-    switch (reason) {
-      case LWS_CALLBACK_ESTABLISHED: {
-        state& s = of(wsi);
-        slot->own = new connection;
-        int const bytes = send_buffer;
-        setsockopt(lws_get_socket_fd(wsi), SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
-        access_right const of = s.gate->path_of(header(wsi, WSI_TOKEN_GET_URI)).of;
-        slot->own->client = s.all.add(of == access_right::control);
-        lws_callback_on_writable(wsi);
-        return 0;
+  // ---- all of them
+
+  void accept_all() {
+    for (;;) {
+      descriptor one(::accept4(listener.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+      bool const full = one.number() < 0 && (errno == EMFILE || errno == ENFILE);
+      if (one.number() < 0 && !full) return;
+      make_room(full ? 1 : requests_most);
+      if (full) return;
+      int const yes = 1;
+      setsockopt(one.number(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+      connections.emplace_back(std::move(one), seconds_now());
+    }
+  }
+
+  void make_room(std::size_t most) {
+    std::size_t n = 0;
+    connection* oldest = nullptr;
+    for (connection& c : connections) {
+      if (c.client || c.now == connection::gone) continue;
+      ++n;
+      if (!oldest || c.heard < oldest->heard) oldest = &c;
+    }
+    if (n >= most && oldest) drop(*oldest);
+  }
+
+  void turn(int timeout_ms) {
+    std::vector<pollfd> watched = {{woken.number(), POLLIN, 0}, {listener.number(), POLLIN, 0}};
+    for (connection const& c : connections) {
+      bool const reads = c.client || c.now != connection::open || c.out.empty();
+      watched.push_back(
+          {c.socket.number(), static_cast<short>((reads ? POLLIN : 0) | (c.out.empty() ? 0 : POLLOUT)), 0});
+    }
+    ::poll(watched.data(), watched.size(), timeout_ms);
+    eventfd_t ignored;
+    static_cast<void>(!eventfd_read(woken.number(), &ignored));
+    std::size_t i = 2;
+    double const now = seconds_now();
+    for (connection& c : connections) {
+      short const happened = watched[i++].revents;
+      if (happened & (POLLIN | POLLHUP | POLLERR)) read(c);
+      send(c);
+      if (c.now == connection::open && !c.client && c.out.empty()) understand(c);
+      if (c.now != connection::gone) expire(c, now);
+    }
+    if (watched[1].revents) accept_all();
+    connections.remove_if([](connection const& c) { return c.now == connection::gone; });
+  }
+
+  void serve() {
+    while (!ends) turn(tick_ms);
+    // What is left to say is given a moment, where anyone takes it.
+    all.send_all(bye_text(all.why_it_ends()));
+    double const until = seconds_now() + 0.3;
+    bool told = false;
+    while (seconds_now() < until) {
+      bool const waits = all.has_output() || std::any_of(connections.begin(), connections.end(), [](auto const& c) {
+                           return c.now == connection::closing || (c.client && !c.out.empty());
+                         });
+      if (!waits && told) return;
+      if (!waits) {
+        told = true;
+        for (connection& c : connections)
+          if (c.client) take_leave(c, ws::going_away, "");
       }
-      case LWS_CALLBACK_RECEIVE:
-        return slot->own ? of(wsi).receive(wsi, *slot->own, static_cast<char const*>(in), size) : -1;
-      case LWS_CALLBACK_SERVER_WRITEABLE:
-        return slot->own ? of(wsi).write(wsi, *slot->own) : -1;
-      case LWS_CALLBACK_CLOSED:
-        if (slot->own) of(wsi).all.remove(slot->own->client);
-        delete std::exchange(slot->own, nullptr);
-        return 0;
-      default:
-        return 0;
+      turn(5);
     }
   }
 };
 
 sockets::sockets(clients& all, view_server_options const& options) : state_(std::make_unique<state>(all, options)) {
   state& s = *state_;
-  if (options.port < 0 || options.port > 65535)
-    throw invalid_argument("view_server_options.port must lie between 0 and 65535, not " +
-                           std::to_string(options.port));
-  listen_place const place = listen_place_of(options.listen);
-  lws_set_log_level(0, nullptr);
-
-  s.protocols[0] = {"http", &state::on_http, sizeof(connection_slot), 0, 0, nullptr, 0};
-  s.protocols[1] = {protocol_name, &state::on_viewer, sizeof(connection_slot), 4096, 0, nullptr, 0};
-  s.idle.secs_since_valid_ping = 30, s.idle.secs_since_valid_hangup = 90;
-  lws_context_creation_info info{};
-  info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | LWS_SERVER_OPTION_VALIDATE_UTF8 |
-                 LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND | LWS_SERVER_OPTION_DISABLE_IPV6 |
-                 LWS_SERVER_OPTION_SKIP_SERVER_CANONICAL_NAME;
-  info.port = options.port;
-  info.iface = place.address.c_str();
-  info.protocols = s.protocols.data();
-  info.user = &s;
-  info.fd_limit_per_thread = connections_most;
-  info.timeout_secs = 10, info.keepalive_timeout = 10;
-  info.max_http_header_data2 = 8192;
-  info.retry_and_idle_policy = &s.idle;
-  info.gid = info.uid = static_cast<decltype(info.gid)>(-1);
-  s.context = lws_create_context(&info);
-  if (s.context) s.vhost = lws_create_vhost(s.context, &info);
-  int const port = s.vhost ? lws_get_vhost_listen_port(s.vhost) : 0;
-  if (port <= 0) {
-    if (s.context) lws_context_destroy(s.context);
-    throw error("the viewer cannot listen at " + options.listen + ", port " + std::to_string(options.port) +
-                " (view_server_options.port = 0 takes one that is free)");
-  }
-  s.gate = std::make_unique<access>(place.hosts, port);
-  all.wake = [&s] { lws_cancel_service(s.context); };
-  s.thread = std::thread([&s] {
-    while (!s.ends.load() && lws_service(s.context, 0) >= 0) {
-    }
-    // What is left to say is given a moment, where anyone takes it.
-    double const until = seconds_now() + 0.2;
-    s.all.send_all(bye_text("gart ends"));
-    while (s.all.has_output() && seconds_now() < until && lws_service(s.context, 0) >= 0) lws_cancel_service(s.context);
-  });
+  all.wake = [&s] { s.wake(); };
+  s.thread = std::thread([&s] { s.serve(); });
 }
 
 sockets::~sockets() {
   state& s = *state_;
   s.ends = true;
-  lws_cancel_service(s.context);
-  if (s.thread.joinable()) s.thread.join();
+  s.wake();
+  s.thread.join();
   s.all.wake = [] {};
-  lws_context_destroy(s.context);
 }
 
-std::string sockets::address(access_right of) const { return state_->gate->address(of); }
-int sockets::port() const { return lws_get_vhost_listen_port(state_->vhost); }
+std::string sockets::address(access_right of) const { return state_->gate.address(of); }
+int sockets::port() const { return state_->port; }
 
 }  // namespace gart::view

@@ -11,7 +11,7 @@ namespace gart::view {
 
 class sockets {
  public:
-  // Listens from here on. unsupported where gart was built without libwebsockets; error where the port is taken.
+  // Listens from here on. error where the port is taken.
   sockets(clients& all, view_server_options const& options);
   ~sockets();
 

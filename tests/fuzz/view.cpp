@@ -12,6 +12,7 @@ namespace {
 
 void check_settings(gart::view_settings const& s) {
   promise(!s.near || *s.near > 0, "a near distance that is none");
+  promise(s.opacity > 0 && s.size > 0, "a factor that is none");
   if (!s.crop) return;
   for (int k = 0; k < 3; ++k) promise(s.crop->low[k] <= s.crop->high[k], "a crop box that is none");
 }
@@ -23,6 +24,12 @@ struct check {
     promise(m.view.width <= gart::view_size_most && m.view.height <= gart::view_size_most, "a view that is too large");
     promise(!m.photo || *m.photo >= 0, "a photograph of no camera");
   }
+  void operator()(gart::image_message const& m) const {
+    check_camera(m.view);
+    check_settings(m.settings);
+    promise(static_cast<double>(m.view.width) * m.view.height <= gart::image_pixels_most, "an image that is too large");
+  }
+  void operator()(gart::model_message const& m) const { promise(m.index >= 0, "a model of no number"); }
   void operator()(gart::pick_message const& m) const {
     check_camera(m.view);
     check_settings(m.settings);
@@ -31,8 +38,9 @@ struct check {
   void operator()(gart::path_message const& m) const {
     promise(m.keyframes.size() >= 2 && m.frames >= 2 && m.frames <= gart::path_frames_most, "a path that is none");
     try {
-      for (gart::camera const& c : gart::smooth_path(m.keyframes, std::min(m.frames, 20), m.closed)) check_camera(c);
-    } catch (gart::invalid_argument const&) {  // cameras of different models
+      for (gart::camera const& c : gart::smooth_path(m.keyframes, std::min(m.frames, 20), m.closed, m.times))
+        check_camera(c);
+    } catch (gart::invalid_argument const&) {  // cameras of different models, times that do not rise
     }
   }
   void operator()(gart::train_message const& m) const {

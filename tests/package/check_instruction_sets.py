@@ -101,7 +101,7 @@ with tempfile.TemporaryDirectory() as temporary:
         binary = folder / f"build_{library}"
         run(a.cmake, "-S", a.source, "-B", binary, "-G", a.generator, f"-DCMAKE_CXX_COMPILER={a.cxx}",
             "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG", f"-DGART_ARCH_FLAG={'' if library == 'none' else '-march=' + library}",
-            "-DGART_CUDA=OFF", "-DGART_EMBREE=OFF", "-DGART_DISTRIBUTED=OFF", "-DGART_VIEW=OFF",
+            "-DGART_CUDA=OFF", "-DGART_EMBREE=OFF", "-DGART_DISTRIBUTED=OFF",
             "-DGART_BUILD_PROGRAM=OFF", "-DGART_BUILD_EXAMPLES=OFF",
             "-DCMAKE_OPTIMIZE_DEPENDENCIES=ON",  # an archive waits for none that it only names
             "-DGART_BUILD_TESTS=OFF", f"-DGART_SANITIZE={'ON' if a.sanitize else 'OFF'}")

@@ -110,6 +110,23 @@ TEST_CASE("frames: the ends of an open path, each once of a closed one") {
   CHECK(away(closed.back().position, keys.front().position) > 0.05);
 }
 
+TEST_CASE("times that are given are those of the keyframes, and of the end") {
+  auto const keys = some_keyframes();
+  for (bool closed : {false, true}) {
+    std::vector<double> times = {0, 1, 1.5, 4, 5};
+    if (closed) times.push_back(8);
+    gart::camera_path const path(keys, closed, times);
+    CHECK(path.end() == times.back());
+    for (std::size_t i = 0; i < times.size(); ++i)
+      CHECK(away(path.at(times[i]).position, keys[i % keys.size()].position) < 1e-9);
+    auto const frames = gart::smooth_path(keys, closed ? 8 : 6, closed, times);
+    CHECK(away(frames[1].position, keys[1].position) < 1e-9);  // a second each
+  }
+  for (std::vector<double> const& wrong :
+       {std::vector<double>{0, 1}, {1, 2, 3, 4, 5}, {0, 1, 1, 2, 3}, {0, 2, 1, 3, 4}})
+    CHECK_THROWS_AS(gart::camera_path(keys, false, wrong), gart::invalid_argument);
+}
+
 TEST_CASE("keyframes in one place turn, in one pose stand; what is no path is refused") {
   auto const turning = gart::smooth_path({camera_at({1, 1, 1}, 0), camera_at({1, 1, 1}, 1)}, 5);
   CHECK(turned_between(turning[2].rotation, camera_at({}, 0.5).rotation) < 1e-3);

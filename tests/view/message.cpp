@@ -7,6 +7,7 @@
 #include <doctest/doctest.h>
 
 #include <cstring>
+#include <utility>
 
 namespace {
 
@@ -58,6 +59,24 @@ TEST_CASE("every kind of message is read") {
       R"({"type":"path","id":2,"frames":10,"closed":false,"keyframes":[)" + json_of(c) + "," + json_of(c) + "]}"));
   CHECK(path.keyframes.size() == 2);
   CHECK(path.frames == 10);
+  auto const timed = std::get<gart::path_message>(
+      gart::parse_message(R"({"type":"path","id":2,"frames":10,"closed":false,"times":[0,2.5],"keyframes":[)" +
+                          json_of(c) + "," + json_of(c) + "]}"));
+  CHECK(timed.times == std::vector<double>{0, 2.5});
+  gart::camera large = c;
+  large.width = 16000, large.height = 2000;
+  auto const image = std::get<gart::image_message>(
+      gart::parse_message(R"({"type":"image","id":3,"mode":"depth","camera":)" + json_of(large) +
+                          R"(,"background":[0,0.5,1],"opacity":0.5,"size":2,"shape":"points"})"));
+  CHECK(image.view.width == 16000);
+  CHECK(image.mode == gart::view_mode::depth);
+  CHECK(*image.settings.background == gart::vec3(0, 0.5f, 1));
+  CHECK(image.settings.opacity == 0.5f);
+  CHECK(image.settings.size == 2);
+  CHECK(image.settings.shape == gart::view_shape::points);
+  CHECK_FALSE(image.settings.own_gaussians());
+  CHECK(plain.settings.own_gaussians());
+  CHECK(std::get<gart::model_message>(gart::parse_message(R"({"type":"model","index":2})")).index == 2);
   for (auto const& one : names_of(gart::train_action{}))
     CHECK(std::get<gart::train_message>(
               gart::parse_message(std::string(R"({"type":"train","action":")") + one.name + "\"}"))
@@ -106,6 +125,21 @@ TEST_CASE("what is wrong is refused by the field's name") {
             .find("'keyframes'") != std::string::npos);
   CHECK(refusal(R"({"type":"path","id":2,"frames":9,"closed":false,"keyframes":[)" + json_of(c) + ",3]}")
             .find("'keyframes[1]'") != std::string::npos);
+  for (auto const& [field, value] : {std::pair{"background", "[0,0]"},
+                                     {"background", "[0,0,2]"},
+                                     {"opacity", "0"},
+                                     {"size", "1e9"},
+                                     {"size", "[1]"},
+                                     {"shape", "\"cubes\""}})
+    CHECK(refusal(view_text(c, true, 1, ",\"" + std::string(field) + "\":" + value)).find(field) != std::string::npos);
+  CHECK(refusal(R"({"type":"path","id":2,"frames":9,"closed":false,"times":["a"],"keyframes":[)" + json_of(c) + "," +
+                json_of(c) + "]}")
+            .find("'times'") != std::string::npos);
+  gart::camera large = c;
+  large.width = 7000, large.height = 7000;
+  CHECK(refusal(R"({"type":"image","id":3,"mode":"depth","camera":)" + json_of(large) + "}").find("40000000 pixels") !=
+        std::string::npos);
+  CHECK(refusal(R"({"type":"model","index":-1})").find("'index'") != std::string::npos);
   CHECK(refusal(R"({"type":"train","action":"explode"})").find("'action'") != std::string::npos);
   CHECK(refusal(R"({"type":"share","value":2})").find("'value'") != std::string::npos);
 }
@@ -136,4 +170,7 @@ TEST_CASE("a frame's bytes are its header's length, its header and the JPEG") {
                            R"("scale":[1.0,2.0])"})
     CHECK(text.find(part) != std::string::npos);
   CHECK(bytes.back() == 7);
+  header.file = true;
+  auto const file = gart::frame_bytes(header, {1});
+  CHECK(std::string(file.begin() + 4, file.end()).find(R"("type":"image")") != std::string::npos);
 }

@@ -48,8 +48,10 @@ TEST_CASE("a crop box, another one, none, and one that leaves nothing") {
   gart::view_box const left{{-10, -10, -10}, {0, 10, 10}}, right{{0, -10, -10}, {10, 10, 10}},
       nowhere{{5, 5, 5}, {6, 6, 6}};
   auto const of = [&](std::optional<gart::view_box> crop, std::optional<float> near = {}) {
-    auto const image = render.images(view, {crop, near});
-    CHECK(render.colours(view, {crop, near}).data == gart::to_8bit(image.color).data);
+    gart::view_settings settings;
+    settings.crop = crop, settings.near = near;
+    auto const image = render.images(view, settings);
+    CHECK(render.colours(view, settings).data == gart::to_8bit(image.color).data);
     return image.color.data;
   };
   CHECK(of({}) == expected(m, options.near));
@@ -58,7 +60,9 @@ TEST_CASE("a crop box, another one, none, and one that leaves nothing") {
   CHECK(of(left) != of({}));
   CHECK(of({}, 3.0f) == expected(m, 3.0f));
   CHECK(of({}, 3.0f) != of({}));
-  auto const empty = render.images(view, {nowhere, {}});
+  gart::view_settings in_nothing;
+  in_nothing.crop = nowhere;
+  auto const empty = render.images(view, in_nothing);
   CHECK(empty.color.at(3, 4, 1) == 0.4f);
   CHECK(empty.transmittance.at(3, 4, 0) == 1);
   CHECK(of({}) == expected(m, options.near));

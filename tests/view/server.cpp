@@ -53,9 +53,10 @@ struct running {
     scene.training = training;
     return scene;
   }
-  gart::view_server_options options(int most) {
+  gart::view_server_options options(int most, double silent_seconds) {
     gart::view_server_options o;
-    o.max_clients = most;
+    o.max_clients = most, o.silent_seconds = silent_seconds;
+    o.allowed_hosts = {"viewer.example.org"};
     o.photo = [](int) { return gart::image8(16, 12, 4, 200); };
     o.log = [this](std::string const& line) {
       std::lock_guard const lock(mutex);
@@ -63,7 +64,8 @@ struct running {
     };
     return o;
   }
-  explicit running(bool training = false, int most = 8) : server(scene_with(training), options(most)) {
+  explicit running(bool training = false, int most = 8, double silent_seconds = 30)
+      : server(scene_with(training), options(most, silent_seconds)) {
     thread = std::thread([this] {
       auto const render = [this](gart::camera const& view, gart::view_settings const&) {
         {
@@ -184,8 +186,15 @@ TEST_CASE("another token, Host or Origin is forbidden") {
   CHECK(is(answer(r.upgrade(other + "socket", host, origin)), 403));
   CHECK(is(answer(r.upgrade(path, host, origin)), 403));
   CHECK_FALSE(is(answer(r.upgrade(socket, host, origin, "chat")), 101));
+  // A proxy that is allowed, with its own name and with this server's.
+  CHECK_FALSE(is(answer(r.get(path, "viewer.example.org")), 403));
+  CHECK(is(answer(r.upgrade(socket, "viewer.example.org", "https://viewer.example.org")), 101));
+  CHECK(is(answer(r.upgrade(socket, host, "https://viewer.example.org")), 101));
+  CHECK(is(answer(r.upgrade(socket, "viewer.example.org", "https://evil.example")), 403));
   CHECK(r.has_logged("403"));
-  CHECK(r.server.clients() <= 1);
+  CHECK(r.has_logged("view_server_options.allowed_hosts"));
+  for (int i = 0; i < 500 && r.server.clients() > 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  CHECK(r.server.clients() == 0);
 }
 
 TEST_CASE("a photograph is there for the cameras that have one, nothing for other names") {
@@ -199,6 +208,8 @@ TEST_CASE("a photograph is there for the cameras that have one, nothing for othe
   for (char const* name : {"photo/1.jpg", "photo/2.jpg", "photo/-1.jpg", "photo/0x.jpg", "photo/99999999999.jpg",
                            "../../etc/passwd", "%2e%2e/secret", "nothing.js"})
     CHECK_FALSE(is(ask(name), 200));
+  CHECK(is(ask("thumb/0.jpg"), 200));
+  CHECK(is(ask("thumb/1.jpg"), 404));
   socket_client c(r.server.port());
   CHECK_FALSE(is(c.ask("POST " + r.path() + " HTTP/1.1\r\nHost: " + r.host() + "\r\nContent-Length: 0\r\n\r\n"), 200));
 }
@@ -311,6 +322,13 @@ TEST_CASE("what is malformed, binary or too long closes its own connection, and 
   CHECK(closed_by(std::string(gart::message_bytes + 1, ' '), 1).code() == 1009);
   CHECK(closed_by(std::string(1 << 20, ' '), 1).code() == 1009);
   CHECK(closed_by("\xff\xfe", 1).opcode == 8);
+  {
+    auto const c = r.client();
+    c->say(view_text(camera_at({0, 0, 0}), false), 1, false);
+    auto const heard = c->hear();
+    CHECK(heard.code() == 1002);
+    CHECK(heard.payload.find("without a mask") != std::string::npos);
+  }
   CHECK(r.has_logged("'id'"));
   CHECK(r.has_logged("not text"));
   CHECK(r.has_logged("longer than 16384"));
@@ -325,6 +343,105 @@ TEST_CASE("no more clients than there is room for") {
   auto const a = r.client(), b = r.client();
   socket_client third(r.server.port());
   CHECK(is(third.ask(r.upgrade(r.path() + "socket", r.host(), "http://" + r.host())), 503));
+}
+
+TEST_CASE("a page that is silent makes room where all places are taken") {
+  running r(false, 2, 0.3);
+  auto const silent = r.client(), speaks = r.client();
+  std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  gart::camera const view = camera_at({0, 0, 0});
+  speaks->say(view_text(view, false));
+  CHECK(speaks->hear().opcode == 2);
+  auto const third = r.client();  // which hears hello
+  auto const heard = silent->hear();
+  CHECK(heard.opcode == 8);
+  CHECK(heard.code() == 1013);
+  speaks->say(view_text(view, false));
+  CHECK(speaks->hear().opcode == 2);
+  // Both that are left have just spoken.
+  third->say(view_text(view, false));
+  CHECK(third->hear().opcode == 2);
+  socket_client fourth(r.server.port());
+  CHECK(is(fourth.ask(r.upgrade(r.path() + "socket", r.host(), "http://" + r.host())), 503));
+}
+
+TEST_CASE("connections that say nothing, or half of it, lock nobody out") {
+  running r;
+  auto const watches = r.client();
+  std::vector<std::unique_ptr<socket_client>> silent;
+  for (int i = 0; i < 300; ++i) {
+    silent.push_back(std::make_unique<socket_client>(r.server.port()));
+    if (i % 2) silent.back()->send("GET / HTTP/1.1\r\nHost: ");
+  }
+  auto const start = std::chrono::steady_clock::now();
+  auto const comes = r.client();
+  comes->say(view_text(camera_at({0, 0, 0}), false));
+  CHECK(comes->hear().opcode == 2);
+  watches->say(view_text(camera_at({0, 0, 0}), false));
+  CHECK(watches->hear().opcode == 2);
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(5));
+  CHECK(silent.front()->receive(1).empty());  // it made room
+}
+
+TEST_CASE("an image is a PNG of the size that is asked for") {
+  running r;
+  auto const c = r.client(false);
+  gart::camera const view = camera_at({0, 0, -2}, 0, 200, 100);
+  c->say(R"({"type":"image","id":5,"mode":"colour","camera":)" + gart_test::json_of(view) + "}");
+  frame const file = frame_of(c->hear().payload);
+  CHECK(file.header["type"] == "image");
+  CHECK(file.header["id"] == 5);
+  CHECK(file.header["full"] == json({200, 100}));
+  auto const expected = gart::encode_png(gart::to_8bit(noise(view).color));
+  CHECK(file.jpeg == std::string(expected.begin(), expected.end()));
+}
+
+TEST_CASE("a view that takes long is let go when its client moves on") {
+  gart::view_server server(running::scene_with(false));
+  std::atomic<bool> ends = false;
+  std::atomic<int> parts = 0;
+  auto const render = [&](gart::camera const& view, gart::view_settings const& s) {
+    ++parts;
+    double const share = std::min(s.rows.count(), view.height) / static_cast<double>(view.height);
+    std::this_thread::sleep_for(std::chrono::duration<double>(2 * share));
+    return noise(view);
+  };
+  gart::view_render slow(render);
+  slow.in_parts = true;
+  std::thread thread([&] {
+    while (!ends) server.render_next(slow, 0.02);
+  });
+  {
+    std::string const address = server.control_address(), path = address.substr(address.find('/', 7)),
+                      host = "127.0.0.1:" + std::to_string(server.port());
+    socket_client c(server.port());
+    c.ask("GET " + path + "socket HTTP/1.1\r\nHost: " + host + "\r\nOrigin: http://" + host +
+          "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: "
+          "dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: gart-view\r\n\r\n");
+    c.hear();
+    gart::camera const view = camera_at({0, 0, 0}, 0, 32, 512);
+    c.say(view_text(view, false, 1));
+    CHECK(frame_of(c.hear().payload).header["id"] == 1);  // whole: nothing was known of its time
+    CHECK(parts == 1);
+    c.say(view_text(view, false, 2));
+    while (parts < 2) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    c.say(view_text(camera_at({1, 0, 0}, 0, 32, 64), false, 3));
+    CHECK(frame_of(c.hear().payload).header["id"] == 3);
+    CHECK(parts < 7);  // of the one before, one or two of its five
+  }
+  ends = true;
+  thread.join();
+}
+
+TEST_CASE("notes go to all, and the reason of the end with it") {
+  auto r = std::make_unique<running>(true);
+  auto const c = r->client();
+  r->server.tell("saved");
+  CHECK(json::parse(c->hear().payload) == json({{"type", "note"}, {"what", "saved"}}));
+  r->server.tell_at_end("it is done");
+  r.reset();
+  CHECK(json::parse(c->hear().payload)["why"] == "it is done");
+  CHECK(c->hear().opcode == 8);
 }
 
 TEST_CASE("one of four that takes nothing is rendered for no more, and the others go on") {

@@ -66,21 +66,21 @@ class socket_client {
   }
 
   // A message of a client has its bytes masked.
-  void say(std::string const& payload, int opcode = 1) {
+  void say(std::string const& payload, int opcode = 1, bool masked = true) {
     std::string frame(1, static_cast<char>(0x80 | opcode));
-    std::size_t const n = payload.size();
+    std::size_t const n = payload.size(), bit = masked ? 0x80 : 0;
     if (n < 126) {
-      frame += static_cast<char>(0x80 | n);
+      frame += static_cast<char>(bit | n);
     } else if (n < 65536) {
-      frame += static_cast<char>(0x80 | 126);
+      frame += static_cast<char>(bit | 126);
       frame += static_cast<char>(n >> 8), frame += static_cast<char>(n & 255);
     } else {
-      frame += static_cast<char>(0x80 | 127);
+      frame += static_cast<char>(bit | 127);
       for (int shift = 56; shift >= 0; shift -= 8) frame += static_cast<char>((n >> shift) & 255);
     }
     char const mask[4] = {0x11, 0x22, 0x33, 0x44};
-    frame.append(mask, 4);
-    for (std::size_t i = 0; i < n; ++i) frame += static_cast<char>(payload[i] ^ mask[i % 4]);
+    if (masked) frame.append(mask, 4);
+    for (std::size_t i = 0; i < n; ++i) frame += masked ? static_cast<char>(payload[i] ^ mask[i % 4]) : payload[i];
     send(frame);
   }
   struct heard {

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 
 // Seconds until what is waited for is taken to never come: a fault, however much else the machine has to do.
-const longest = 90;
+const longest = Number(process.env.GART_LONGEST ?? 90);
 
 export async function openPage(browser, address, options = {}) {
   const context = await browser.newContext({viewport: {width: 900, height: 600}, acceptDownloads: true, ...options});
@@ -69,6 +69,27 @@ export async function openPage(browser, address, options = {}) {
   await self.atRest();
   return self;
 }
+
+// The mean of an image's colours, 0 to 1, decoded by the browser.
+export async function meanOf(page, bytes) {
+  return page.evaluate(async (source) => {
+    const image = await createImageBitmap(new Blob([Uint8Array.from(atob(source), (c) => c.charCodeAt(0))], {type: 'image/jpeg'}));
+    const canvas = new OffscreenCanvas(image.width, image.height), draw = canvas.getContext('2d');
+    draw.drawImage(image, 0, 0);
+    const {data} = draw.getImageData(0, 0, canvas.width, canvas.height);
+    let sum = 0;
+    for (let i = 0; i < data.length; ++i) if (i % 4 !== 3) sum += data[i];
+    return sum / (0.75 * data.length) / 255;
+  }, bytes.toString('base64'));
+}
+
+// How many pixels of the lines over the frame have about this colour.
+export const linesOf = (page, color) => page.evaluate((wanted) => {
+  const canvas = document.getElementById('lines'), {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+  let n = 0;
+  for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 200 && wanted.every((c, k) => Math.abs(data[i + k] - c) < 30)) ++n;
+  return n;
+}, color);
 
 // PSNR of two images, in dB, decoded by the browser.
 export async function psnr(browser, a, b) {

@@ -11,6 +11,10 @@ import {tools} from './tools.mjs';
 import {paths} from './paths.mjs';
 import {people} from './people.mjs';
 import {training} from './training.mjs';
+import {look} from './look.mjs';
+import {kept} from './kept.mjs';
+import {files} from './files.mjs';
+import {report} from './report.mjs';
 
 const [, , program, folder, executablePath, ...wanted] = process.argv;
 const {chromium} = createRequire(path.join(path.resolve(folder), 'here.js'))('playwright-core');
@@ -35,7 +39,7 @@ const server = await gart.serve('view', 'run/model.ply', 'capture', '--backend',
 const world = {gart, browser, server, work};
 
 let failed = 0;
-for (const [name, body] of Object.entries({...navigation, ...images, ...cameras, ...tools, ...paths, ...people, ...training})) {
+for (const [name, body] of Object.entries({...navigation, ...images, ...cameras, ...tools, ...paths, ...people, ...look, ...files, ...kept, ...report, ...training})) {
   if (wanted.length && !wanted.some((word) => name.includes(word))) continue;
   const from = Date.now();
   try {

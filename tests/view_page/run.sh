@@ -9,7 +9,6 @@ skip() {
   echo "skipped: $*"
   exit 77
 }
-"$gart" view --help >/dev/null 2>&1 || skip "this gart has no view (libwebsockets was not there when it was built)"
 "$gart" info | grep -q '^embree .*not in this build' && skip "this gart makes no capture (it was built without Embree)"
 for program in node npm chromium; do
   command -v "$program" >/dev/null || skip "$program is not here (apt-get install nodejs npm chromium)"

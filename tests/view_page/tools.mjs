@@ -73,7 +73,6 @@ export const tools = {
     assert.ok(Math.abs(measured / truth - 1) < 0.01, `${measured} instead of ${truth}`);
 
     // Where there is nothing, nothing is measured.
-    await p.page.click('#measure');
     await p.page.mouse.click(box.x + 20, box.y + box.height - 20);
     await p.until('the page to say so', async () => (await p.page.textContent('#say')).includes('nothing'));
     await p.close();

@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import path from 'node:path';
 import {openPage} from './browser.mjs';
+import {screens} from './screens.mjs';
 
 export const training = {
   async 'a training is paused, stepped, resumed and stopped from the page'({browser, gart, work}) {
@@ -51,5 +52,28 @@ export const training = {
     await p.until('the page to say so', () => p.page.isVisible('#lost'));
     p.faults.length = 0;  // the socket is gone
     await p.close();
+  },
+
+  async 'save and stop are answered on the page, on every screen'({browser, gart}) {
+    const server = await gart.serve('train', 'capture', '--out', 'answered', '--iterations', '100000', '--max-gaussians', '800',
+      '--backend', 'openmp', '--eval-every', '10', '--view');
+    const pages = [];
+    for (const screen of Object.values(screens)) pages.push(await openPage(browser, server.control, screen));
+    for (const p of pages) {
+      if (!(await p.page.isVisible('#panel-training'))) await p.tab('training');
+      await p.page.click('#save');
+      await p.until('the answer', async () => /^Saved answered\/checkpoint.gart at step [\d,]+\.$/.test(await p.page.textContent('#note')));
+      assert.equal(await p.page.isVisible('#note'), true);
+      await p.until('scores of the test views', async () => p.received.some((m) => m.type === 'scores' && m.psnr.length === 2));
+    }
+    await pages[1].page.click('#stop');
+    await pages[1].page.click('#sure button[value=stop]');
+    await server.ended;
+    for (const p of pages) {
+      await p.until('the last word', async () => /The training was stopped, and saved: gart train --resume/.test(await p.page.textContent('#lost')));
+      assert.equal(await p.page.isVisible('#lost'), true);
+      p.faults.length = 0;
+      await p.close();
+    }
   },
 };

@@ -1,20 +1,22 @@
-// The capture's cameras as a list to choose from.
+// The capture's cameras as a list to choose from, with their photographs in small and how well the model shows them.
 
 export function cameraList(ui, jump) {
   let cameras = [], current = null;
-  const buttons = new Map();
+  const rows = new Map();
+  const element = (name, values) => Object.assign(document.createElement(name), values);
+
   function fill(all) {
     cameras = all;
-    buttons.clear();
+    rows.clear();
     ui.list.replaceChildren(...cameras.map((camera) => {
-      const item = document.createElement('li'), button = document.createElement('button');
-      button.type = 'button';
-      button.className = 'wide';
-      button.append(camera.name);
-      if (camera.test) button.append(Object.assign(document.createElement('small'), {textContent: 'test'}));
+      const item = element('li'), button = element('button', {type: 'button', className: 'wide'}), score = element('small');
+      if (camera.photo) button.append(element('img', {src: `thumb/${camera.index}.jpg`, alt: '', loading: 'lazy', draggable: false}));
+      button.append(element('span', {textContent: camera.name}));
+      if (camera.test) button.append(element('small', {textContent: 'test'}));
+      button.append(score);
       button.addEventListener('click', () => jump(camera));
       item.append(button);
-      buttons.set(camera.index, button);
+      rows.set(camera.index, {item, button, score});
       return item;
     }));
     filter();
@@ -24,13 +26,17 @@ export function cameraList(ui, jump) {
     const words = ui.find.value.toLowerCase().split(' ').filter(Boolean);
     for (const camera of cameras) {
       const text = `${camera.name} ${camera.test ? 'test' : ''}`.toLowerCase();
-      buttons.get(camera.index).parentElement.hidden = !words.every((word) => text.includes(word));
+      rows.get(camera.index).item.hidden = !words.every((word) => text.includes(word));
     }
   };
   function mark(index) {
     if (index !== null) current = index;
-    for (const [i, button] of buttons) button.setAttribute('aria-current', i === index);
-    buttons.get(index)?.scrollIntoView({block: 'nearest'});
+    for (const [i, {button}] of rows) button.setAttribute('aria-current', i === index);
+    rows.get(index)?.button.scrollIntoView({block: 'nearest'});
+  }
+  function scores(all) {
+    const psnr = new Map(all);
+    for (const [i, {score}] of rows) score.textContent = psnr.has(i) ? `${psnr.get(i).toFixed(2)} dB` : '';
   }
   // From the last one that was looked through, round the list.
   function next(by) {
@@ -41,5 +47,5 @@ export function cameraList(ui, jump) {
   ui.find.addEventListener('input', filter);
   ui.previous.addEventListener('click', () => next(-1));
   ui.next.addEventListener('click', () => next(1));
-  return {fill, mark, next};
+  return {fill, mark, next, scores};
 }

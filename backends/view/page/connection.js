@@ -2,7 +2,10 @@
 
 const firstWait = 500, longestWait = 8000;  // milliseconds
 
-// `on` has open(), closed(seconds, why), ended(why), frame(header, jpeg), and a function for each type of message.
+const replaced = 1013;  // the code of a close: another page has the place of this one
+
+// `on` has closed(seconds, why), ended(why), frame(header, jpeg), image(header, png), and a function for each type of
+// message.
 export function connect(on) {
   const address = new URL('socket', location.href);
   address.protocol = address.protocol === 'https:' ? 'wss:' : 'ws:';
@@ -15,6 +18,7 @@ export function connect(on) {
     socket.onmessage = ({data}) => (typeof data === 'string' ? message(JSON.parse(data)) : frame(data));
     socket.onclose = ({code, reason}) => {
       if (ended) return;
+      if (code === replaced) return on.ended(reason);
       on.closed(wait / 1000, reason || (code === 1006 ? '' : `code ${code}`));
       timer = setTimeout(open, wait);
       wait = Math.min(longestWait, 2 * wait);
@@ -30,7 +34,9 @@ export function connect(on) {
   function frame(data) {
     const length = new DataView(data).getUint32(0, true);
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-    on.frame(header, new Blob([new Uint8Array(data, 4 + length)], {type: 'image/jpeg'}));
+    const blob = (type) => new Blob([new Uint8Array(data, 4 + length)], {type});
+    if (header.type === 'image') on.image({...header, file: blob('image/png')});
+    else on.frame(header, blob('image/jpeg'));
   }
 
   open();

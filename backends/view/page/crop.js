@@ -50,8 +50,10 @@ export function cropBox(form, toggle, resetButton, changed) {
     return p;
   };
   return {
-    bounds(min, max) {
+    // Of another model, with the box that it had before, if any.
+    bounds(min, max, before = null) {
       whole = {min: [...min], max: [...max]};
+      box = before;
       write();
     },
     value: () => box,

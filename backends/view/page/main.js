@@ -6,25 +6,31 @@ import {frameShower, rateMeter} from './frames.js';
 import {penFor} from './overlay.js';
 import {drawFrusta, frustaOf, pointedAt} from './frusta.js';
 import {listenTo} from './gestures.js';
-import {lenses, poseOf} from './camera.js';
-import {isPinhole} from './lens.js';
+import {poseOf} from './camera.js';
 import {styles} from './navigation.js';
 import {modes, showLegend} from './legend.js';
+import {lensPanel} from './lenspanel.js';
+import {lookPanel} from './look.js';
+import {imagePanel} from './image.js';
 import {cropBox} from './crop.js';
 import {ruler} from './measure.js';
+import {commandPanel} from './command.js';
 import {keyframes} from './path.js';
 import {recorder} from './record.js';
 import {photoSplit} from './photo.js';
 import {trainingPanel} from './training.js';
 import {cameraList} from './cameras.js';
+import {modelList} from './models.js';
 import {radios} from './radios.js';
-import {tabs} from './tabs.js';
+import {narrow, tabs} from './tabs.js';
 import {saveFile} from './files.js';
+import {keep, kept} from './keep.js';
+import {notes} from './notes.js';
 import {norm, sub} from './vector.js';
 
 const $ = (id) => document.getElementById(id);
 const stage = $('stage'), lines = $('lines'), frame = $('frame');
-const say = (text) => ($('say').textContent = text);
+const {say, aloud} = notes($('say'), $('note'));
 const count = (n) => n.toLocaleString('en');
 
 let cameras = [], frusta = [], tips = [], pointed = null, shown = null, hello = null, asked = 0;
@@ -46,6 +52,7 @@ const answer = (message) => {
 const connection = connect({
   hello: welcome,
   frame: frameShower(frame, frameShown),
+  image: answer,
   picked: answer,
   path: answer,
   status(message) {
@@ -54,15 +61,14 @@ const connection = connect({
     if (!message.paused && !document.hidden) view.refresh();
   },
   curve: (message) => training.curve(message),
+  scores: ({psnr}) => list.scores(psnr),
+  note: ({what}) => say(what),
   refused: ({what, why}) => say(`Refused: ${what}, ${why}`),
-  error: ({what}) => {
-    $('state').textContent = what;
-    say(what);
-  },
+  error: ({what}) => say(what),
   closed(seconds, why) {
     lost(`The connection is lost${why ? ` (${why})` : ''}. Trying again in ${seconds} s.`);
   },
-  ended: (why) => lost(`gart has ended${why ? `: ${why}` : ''}.`),
+  ended: (why) => lost(why === 'gart ends' ? 'gart has ended.' : why),
 });
 function lost(text) {
   $('lost').firstElementChild.textContent = text;
@@ -76,11 +82,11 @@ const view = new View(connection, () => {
   photo.through(null);
   list.mark(null);
   if (view.mode === 'error') setMode('colour');
-  writeLens();
+  lens.write();
 }, () => stage.setAttribute('aria-busy', true));
 
 function welcome(message) {
-  const again = hello !== null;
+  const again = hello?.model.name === message.model.name && hello.open === message.open;
   hello = message;
   cameras = hello.cameras;
   $('lost').hidden = true;
@@ -93,21 +99,42 @@ function welcome(message) {
   $('frame-id').title = `gart ${hello.gart}`;
   frusta = frustaOf(cameras, hello.model.extent);
   list.fill(cameras);
+  models.fill(hello.models, hello.open);
   panel.offer('cameras', cameras.length > 0);
   panel.offer('training', hello.training);
   training.rights(hello.right);
   modeChoice.offer((name) => hello.modes.includes(name));
+  look.model(hello.background);
   if (again) return view.changed();
-  crop.bounds(hello.model.min, hello.model.max);
-  fillLenses();
-  view.start(hello);
-  writeLens();
+  begin(kept(modelKey()));
   if (hello.training && !narrow()) panel.choose('training');
 }
+const modelKey = () => `${hello.open} ${hello.model.name}`;
+
+// A model that is new to the page, or that it was on before it was loaded again.
+function begin(before) {
+  crop.bounds(hello.model.min, hello.model.max, before?.crop);
+  look.restore(before?.look);
+  measure.restore(before?.factor);
+  lens.fill(cameras);
+  Object.assign(view, {crop: crop.value(), look: look.value(), style: before?.style ?? 'orbit', mode: before?.mode ?? 'colour'});
+  view.start(hello, before?.view);
+  const through = cameras.find((c) => c.index === before?.view.through);
+  if (through) jump(through);
+  else photo.through(null);
+  path.restore(before?.path);
+  styleChoice.set(view.style);
+  setMode(hello.modes.includes(view.mode) ? view.mode : 'colour');
+  lens.write();
+  writeCommand();
+  if ($('image-width').value === '') $('image-like').click();
+}
+const keepAll = () => hello && keep(modelKey(), {
+  view: view.state(), look: look.value(), crop: crop.value(), factor: measure.factor(), path: path.state(), style: view.style, mode: view.mode,
+});
+addEventListener('pagehide', keepAll);
 
 // ---- the stage
-
-const narrow = () => matchMedia('(max-width: 700px)').matches;
 
 new ResizeObserver(() => {
   const {clientWidth, clientHeight} = stage, ratio = Math.min(2, devicePixelRatio || 1);
@@ -134,6 +161,7 @@ function frameShown(header) {
   if (header.still && view.upTo(header.id)) {
     stage.setAttribute('aria-busy', false);
     for (const resolve of waiting.splice(0)) resolve();
+    keepAll();
   }
   draw();
 }
@@ -153,6 +181,7 @@ function draw() {
     tips = drawFrusta(pen, frusta.filter((f) => norm(sub(f.place, shown.pose.place)) > near), colors, pointed);
   }
   crop.draw(pen, '#7fd1ae');
+  path.draw(pen, '#8fc4ff');
   measure.draw(pen, '#ffd166');
   pen.done();
 }
@@ -165,7 +194,7 @@ async function pick(place) {
   const pixel = shown && pixelAt(place);
   if (!pixel || pixel.x < 0 || pixel.y < 0 || pixel.x >= pixel.camera.width || pixel.y >= pixel.camera.height) return null;
   try {
-    return await ask({type: 'pick', ...pixel, crop: view.crop}, 10);
+    return await ask({type: 'pick', ...pixel, ...view.settings}, 60);
   } catch (fault) {
     say(fault.message);
     return null;
@@ -174,20 +203,21 @@ async function pick(place) {
 async function measureAt(place) {
   const found = await pick(place);
   if (found) measure.picked(found);
-  measureChanged();
 }
 function measureChanged() {
   stage.classList.toggle('measuring', measure.active());
   $('crosshair').hidden = !measure.active();
+  writeCommand();
   draw();
 }
+const writeCommand = () => hello && command.write(hello.model.name, view.crop, measure.factor());
 
 const middle = () => ({x: stage.clientWidth / 2, y: stage.clientHeight / 2});
 const keys = {
   o: () => setStyle('orbit'), f: () => setStyle('fly'), g: () => setStyle('walk'),
   r: () => $('reset').click(), l: () => view.level(), h: () => $('help').showModal(), '?': () => $('help').showModal(),
   k: () => path.add(), p: () => path.toggle(),
-  m: () => (measure.toggle(), measureChanged()),
+  m: () => measure.toggle(),
   Enter: () => measure.active() && measureAt(middle()),
   c: () => !$('compare').disabled && photo.show(!$('compare').checked),
   '[': () => list.next(-1), ']': () => list.next(1),
@@ -231,7 +261,7 @@ const modeChoice = radios($('modes'), 'mode', Object.fromEntries(Object.entries(
 function setStyle(style) {
   view.setStyle(style);
   styleChoice.set(style);
-  say(styles[style].title);
+  aloud(styles[style].title);
 }
 // The error is that of a photograph: it takes a camera that has one.
 function setMode(mode) {
@@ -243,36 +273,26 @@ function setMode(mode) {
   view.mode = mode;
   modeChoice.set(mode);
   view.changed();
-  say(modes[mode].title);
+  aloud(modes[mode].title);
 }
 
-function fillLenses() {
-  const own = new Map(cameras.filter((c) => !isPinhole(c.camera)).map((c) => [c.camera.camera_model, c.camera]).reverse());
-  const option = (value, title) => Object.assign(document.createElement('option'), {value, textContent: title});
-  $('lens').replaceChildren(...Object.entries(lenses).map(([name, {title}]) => option(name, title)),
-    ...[...own.keys()].map((model) => option(`own ${model}`, `${model}, the capture’s`)));
-  $('lens').onchange = () => {
-    const name = $('lens').value;
-    view.setLens(name.startsWith('own ') ? {camera: own.get(name.slice(4))} : {name, angle: name === 'fisheye' ? 180 : 60});
-    writeLens();
-  };
-}
-function writeLens() {
-  const {camera, name, angle} = view.lens, offered = view.offered;
-  $('lens').value = camera ? `own ${camera.camera_model}` : name;
-  $('lens').title = camera ? 'The lens of a camera of the capture or of a file' : '';
-  $('angle-row').hidden = !offered?.most;
-  if (!offered?.most) return;
-  $('angle').min = offered.least, $('angle').max = offered.most, $('angle').value = angle;
-  $('angle-now').textContent = `${Math.round(angle)}°`;
-}
-$('angle').addEventListener('input', () => {
-  view.leave();
-  view.lens = {...view.lens, angle: Number($('angle').value)};
-  view.changed(true);
-  writeLens();
+const lens = lensPanel({lens: $('lens'), angle: $('angle'), angleRow: $('angle-row'), angleNow: $('angle-now')}, view);
+const look = lookPanel({
+  shapes: $('shapes'), opacity: $('opacity'), opacityNow: $('opacity-now'), size: $('splat-size'), sizeNow: $('splat-size-now'),
+  background: $('background'), reset: $('look-reset'),
+}, (moving) => {
+  view.look = look.value();
+  view.changed(moving);
 });
-$('reset').addEventListener('click', () => (path.stop(), view.home(), writeLens(), say('Home')));
+imagePanel({width: $('image-width'), height: $('image-height'), like: $('image-like'), save: $('save-image')}, {
+  size: () => view.stage,
+  name: () => hello.model.name,
+  image: (size) => ask({type: 'image', camera: view.camera('image', size), ...view.shown}, 3600).then((answer) => ({header: answer, file: answer.file})),
+}, say);
+const models = modelList({part: $('open-model'), list: $('models')}, (index, name) => {
+  if (connection.send({type: 'model', index})) say(`Opening ${name} …`);
+});
+$('reset').addEventListener('click', () => (path.stop(), view.home(), lens.write(), aloud('Home')));
 $('level').addEventListener('click', () => view.level());
 $('save-pose').addEventListener('click', () => saveFile('camera.json', [view.camera()]));
 $('help-button').addEventListener('click', () => $('help').showModal());
@@ -286,30 +306,34 @@ function jump(entry) {
   photo.through(entry);
   list.mark(entry.index);
   pointed = null;
-  say(`Camera ${entry.name}${entry.test ? ', of the test views' : ''}`);
+  aloud(`Camera ${entry.name}${entry.test ? ', of the test views' : ''}`);
 }
 const list = cameraList({list: $('camera-list'), find: $('find'), previous: $('previous'), next: $('next')}, jump);
 
 const crop = cropBox($('crop'), $('crop-on'), $('crop-reset'), () => {
   view.crop = crop.value();
   view.changed(true);
+  writeCommand();
   draw();
 });
-const measure = ruler($('measure'), $('distance'), say);
-$('measure').addEventListener('click', measureChanged);
+const command = commandPanel({part: $('export'), text: $('command'), copy: $('copy')}, say);
+const measure = ruler({
+  button: $('measure'), output: $('distance'), length: $('length'), scale: $('scale'), forget: $('forget-scale'),
+}, say, measureChanged);
 
 const path = keyframes({
   list: $('keys'), add: $('add-key'), play: $('play'), seconds: $('seconds'), closed: $('closed'), hint: $('path-hint'),
-  saveKeys: $('save-keys'), savePath: $('save-path'), record: $('record'), load: $('load-keys'),
+  saveKeys: $('save-keys'), savePath: $('save-path'), record: $('record'), load: $('load-keys'), timed: $('timed'), draw: $('draw-path'),
 }, {
   camera: () => view.camera(),
   resized: (camera) => view.onStage(camera),
   show(camera, atRest) {
     view.show(camera, !atRest);
-    writeLens();
+    lens.write();
   },
+  redraw: draw,
   rest: () => view.changed(),
-  ask: async (all, frames, closed) => (await ask({type: 'path', keyframes: all, frames, closed}, 30)).cameras,
+  ask: async (all, frames, closed, times) => (await ask({type: 'path', keyframes: all, frames, closed, times}, 120)).cameras,
   say,
 });
 recorder($('record'), frame, {play: path.play, whole: atRest}, say);

@@ -49,9 +49,10 @@ export function penFor(canvas, camera, pose, rect) {
       }
       draw.stroke();
     },
+    // Where it is; null where it is not seen.
     dot(point, radius) {
       const here = place(point);
-      if (!here) return null;
+      if (!here || here[0] < rect.x || here[1] < rect.y || here[0] > rect.x + rect.width || here[1] > rect.y + rect.height) return null;
       draw.beginPath();
       draw.arc(here[0], here[1], radius, 0, 2 * Math.PI);
       draw.fill();

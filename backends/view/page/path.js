@@ -2,69 +2,94 @@
 
 import {poseOf, readCameras} from './camera.js';
 import {saveFile} from './files.js';
+import {keyRows} from './keylist.js';
+import {drawPath} from './pathline.js';
 
-const rate = 30;  // frames a second
+const rate = 30;           // frames a second
+const lineSteps = 24;      // pieces of the drawn line between two keyframes
+const drawnAfter = 200;    // milliseconds without a change
 
 // page: camera() the camera now, resized(camera) for the stage, show(camera) one of the path, rest() when it ends,
-// ask(keyframes, frames, closed) -> a promise of the path's cameras, say(text).
+// ask(keyframes, frames, closed, times) -> a promise of the path's cameras, redraw(), say(text).
 export function keyframes(ui, page) {
-  let keys = [], path = null, playing = null;
+  let keys = [], path = null, playing = null, line = [], drawing = 0, asked = Promise.resolve();
 
   const changed = () => {
     path = null;
-    ui.list.replaceChildren(...keys.map((key, i) => row(key, i)));
-    const few = keys.length < 2;
-    ui.play.disabled = ui.savePath.disabled = ui.record.disabled = few;
-    ui.saveKeys.disabled = keys.length === 0;
-    ui.hint.hidden = !few;
-  };
-  function row(key, i) {
-    const item = document.createElement('li');
-    const button = (text, label, action) => {
-      const b = Object.assign(document.createElement('button'), {type: 'button', textContent: text});
-      b.setAttribute('aria-label', label);
-      b.addEventListener('click', action);
-      return b;
-    };
-    const go = button(`Keyframe ${i + 1}`, `Go to keyframe ${i + 1}`, () => page.show(key, true));
-    go.className = 'wide';
-    item.append(go, button('↑', `Move keyframe ${i + 1} up`, () => i > 0 && move(i, i - 1)),
-      button('×', `Remove keyframe ${i + 1}`, () => {
+    keyRows(ui.list, keys, ui.timed.checked, {
+      show: (key) => page.show(key.camera, true),
+      move(from, to) {
+        const times = keys.map((key) => key.time);
+        keys.splice(to, 0, ...keys.splice(from, 1));
+        keys.forEach((key, i) => (key.time = times[i]));  // the places are timed, not what stands there
+        changed();
+        ui.list.querySelectorAll('.wide')[to].focus();
+      },
+      remove(i) {
         keys.splice(i, 1);
         changed();
         (ui.list.querySelectorAll('.wide')[Math.min(i, keys.length - 1)] ?? ui.add).focus();
-      }));
-    return item;
-  }
-  const move = (from, to) => {
-    keys.splice(to, 0, ...keys.splice(from, 1));
-    changed();
-    ui.list.querySelectorAll('.wide')[to].focus();
+      },
+      time(i, seconds) {
+        const low = i > 0 ? keys[i - 1].time : -Infinity, high = keys[i + 1]?.time ?? Infinity;
+        if (seconds > low && seconds < high) keys[i].time = seconds;
+        else page.say('A keyframe comes after the one before it and before the next one.');
+        changed();
+      },
+    });
+    const few = keys.length < 2;
+    ui.play.disabled = ui.savePath.disabled = ui.record.disabled = few;
+    ui.saveKeys.disabled = keys.length === 0;
+    ui.seconds.disabled = ui.timed.checked;
+    ui.hint.hidden = !few;
+    clearTimeout(drawing);
+    drawing = setTimeout(drawLine, drawnAfter);
+    page.redraw();
   };
 
-  async function whole() {
-    const seconds = Math.min(300, Math.max(0.1, ui.seconds.valueAsNumber || 5));
-    const frames = Math.max(2, Math.round(seconds * rate));
-    // All of one size, so that the frames of gart render --path are.
-    const same = keys.map((key, i) => ({...page.resized(key), name: `key${String(i).padStart(3, '0')}`}));
-    const most = 16000 / new TextEncoder().encode(JSON.stringify(same[0])).length;
+  const seconds = () => Math.min(300, Math.max(0.1, ui.seconds.valueAsNumber || 5));
+  // Of the keyframes from 0 on, and of the end of a closed path: as long after the last one as the others are apart.
+  const times = () => {
+    if (!ui.timed.checked) return null;
+    const own = keys.map((key) => key.time - keys[0].time);
+    return ui.closed.checked ? [...own, own.at(-1) * (1 + 1 / (own.length - 1))] : own;
+  };
+  const duration = () => times()?.at(-1) ?? seconds();
+  // All of one size, so that the frames of gart render --path are.
+  const sameSize = () => keys.map((key, i) => ({...page.resized(key.camera), name: `key${String(i).padStart(3, '0')}`}));
+
+  async function cameras(frames) {
+    const same = sameSize();
+    const most = 15000 / new TextEncoder().encode(JSON.stringify(same[0])).length;
     if (same.length > most) throw new Error(`One path has room for ${Math.floor(most)} keyframes. Save them, and use gart render --path.`);
-    path ??= {frames, closed: ui.closed.checked, cameras: await page.ask(same, frames, ui.closed.checked)};
-    return path.cameras;
+    const ask = () => page.ask(same, frames, ui.closed.checked, times());
+    return (asked = asked.then(ask, ask));  // gart keeps one question of a kind
   }
-  const stale = () => (path = null);
-  ui.seconds.addEventListener('change', stale);
-  ui.closed.addEventListener('change', stale);
+  async function whole() {
+    path ??= await cameras(Math.min(10000, Math.max(2, Math.round(duration() * rate))));
+    return path;
+  }
+  async function drawLine() {
+    line = [];
+    try {
+      if (keys.length > 1 && ui.draw.checked)
+        line = (await cameras(Math.min(1000, lineSteps * keys.length))).map((camera) => poseOf(camera).place);
+      if (line.length && ui.closed.checked) line.push(line[0]);
+    } catch {
+      // Without an answer there is no line; what is asked for next says why.
+    }
+    page.redraw();
+  }
 
   // In time with the clock: where frames take longer, some of the path is left out, and none of its speed.
   async function play() {
-    const cameras = await whole(), start = performance.now();
+    const all = await whole(), start = performance.now();
     ui.play.textContent = 'Stop';
     return new Promise((done) => {
       const step = () => {
         const i = Math.floor((performance.now() - start) * rate / 1000);
-        page.show(cameras[Math.min(i, cameras.length - 1)]);
-        if (i >= cameras.length || !playing) return end();
+        page.show(all[Math.min(i, all.length - 1)]);
+        if (i >= all.length || !playing) return end();
         playing.timer = requestAnimationFrame(step);
       };
       const end = () => {
@@ -91,10 +116,18 @@ export function keyframes(ui, page) {
     }
   };
 
+  // A new one comes as long after the last as those are apart.
+  const nextTime = () => (keys.length < 2 ? 2 * keys.length : keys.at(-1).time + (keys.at(-1).time - keys[0].time) / (keys.length - 1));
   const add = () => {
-    keys.push(page.camera());
+    keys.push({camera: page.camera(), time: nextTime()});
     changed();
     page.say(`Keyframe ${keys.length} added.`);
+  };
+  // Evenly over the seconds of the whole, to begin with.
+  const spread = () => keys.forEach((key, i) => (key.time = seconds() * i / Math.max(1, keys.length - 1)));
+  const take = (all) => {
+    keys = all;
+    changed();
   };
   const toggle = orSay(async () => {
     if (stop() || keys.length < 2) return;
@@ -102,19 +135,36 @@ export function keyframes(ui, page) {
   });
   ui.add.addEventListener('click', add);
   ui.play.addEventListener('click', toggle);
+  for (const control of [ui.seconds, ui.closed, ui.draw]) control.addEventListener('change', changed);
+  ui.timed.addEventListener('change', () => {
+    if (ui.timed.checked) spread();
+    changed();
+  });
   ui.savePath.addEventListener('click', orSay(async () => saveFile('path.json', await whole())));
   ui.saveKeys.addEventListener('click', () =>
-    saveFile('keyframes.json', keys.map((key, i) => ({...page.resized(key), name: `key${i}`}))));
+    saveFile('keyframes.json', sameSize().map((camera, i) => (ui.timed.checked ? {...camera, time: keys[i].time} : camera))));
   ui.load.addEventListener('change', orSay(async () => {
     const [file] = ui.load.files;
     if (!file) return;
     const read = readCameras(await file.text());
     read.forEach(poseOf);
-    keys = read;
+    const timed = read.every(({time}, i) => Number.isFinite(time) && (i === 0 || time > read[i - 1].time));
+    keys = read.map(({time, ...camera}) => ({camera, time: timed ? time : 0}));
+    ui.timed.checked = timed && keys.length > 1;
+    if (!timed) spread();
     changed();
     page.say(`${keys.length} keyframes from ${file.name}.`);
     ui.load.value = '';
   }));
   changed();
-  return {add, toggle, stop, play: orSay(play), playing: () => Boolean(playing)};
+  return {
+    add, toggle, stop, play: orSay(play),
+    draw: (pen, color) => ui.draw.checked && drawPath(pen, line, keys, color),
+    state: () => ({keys, timed: ui.timed.checked, seconds: ui.seconds.value, closed: ui.closed.checked}),
+    restore(state) {
+      ui.timed.checked = state?.timed ?? false, ui.closed.checked = state?.closed ?? false;
+      ui.seconds.value = state?.seconds ?? 5;
+      take(state?.keys ?? []);
+    },
+  };
 }

@@ -1,5 +1,8 @@
 // The panel's tabs: arrow keys go from one to the next, and on a narrow screen the chosen one closes the sheet again.
 
+// Where style.css makes the panel a sheet below the view.
+export const narrow = () => matchMedia('(max-width: 700px) and (orientation: portrait)').matches;
+
 export function tabs(list, changed) {
   const all = [...list.querySelectorAll('[role=tab]')];
   const panelOf = (tab) => document.getElementById(tab.getAttribute('aria-controls'));
@@ -15,7 +18,7 @@ export function tabs(list, changed) {
   }
   for (const tab of all)
     tab.addEventListener('click', () => {
-      const again = tab.getAttribute('aria-selected') === 'true' && matchMedia('(max-width: 700px)').matches;
+      const again = tab.getAttribute('aria-selected') === 'true' && narrow();
       choose(again ? null : tab);
     });
   list.addEventListener('keydown', (event) => {

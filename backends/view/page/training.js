@@ -15,12 +15,12 @@ export function trainingPanel(ui, send, say) {
     ui.lossNow.textContent = loss.length ? loss.at(-1)[1].toPrecision(3) : '–';
     ui.testNow.textContent = test.length ? `${test.at(-1)[1].toFixed(2)} dB` : '–';
   }
-  const act = (action) => send({type: 'train', action});
-  ui.pause.addEventListener('click', () => act(paused ? 'resume' : 'pause'));
-  ui.step.addEventListener('click', () => act('step'));
-  ui.save.addEventListener('click', () => act('save'));
+  const act = (action, said) => say(send({type: 'train', action}) ? said : 'There is no connection.');
+  ui.pause.addEventListener('click', () => act(paused ? 'resume' : 'pause', paused ? 'It is asked to go on …' : 'It is asked to pause …'));
+  ui.step.addEventListener('click', () => act('step', 'One step …'));
+  ui.save.addEventListener('click', () => act('save', 'It is asked to save …'));
   ui.stop.addEventListener('click', () => ui.sure.showModal());
-  ui.sure.addEventListener('close', () => ui.sure.returnValue === 'stop' && act('stop'));
+  ui.sure.addEventListener('close', () => ui.sure.returnValue === 'stop' && act('stop', 'It is asked to stop …'));
   ui.share.addEventListener('change', () => send({type: 'share', value: Number(ui.share.value)}));
   ui.share.addEventListener('input', () => (ui.shareNow.textContent = percent(ui.share.value)));
   const percent = (x) => `${Math.round(100 * x)} %`;

@@ -1,4 +1,4 @@
-// What is looked at: pose, lens, mode and crop, told to gart as they change. While a hand moves the camera gart may trace
+// What is looked at: pose, lens, mode, look and crop, told to gart as they change. While a hand moves the camera gart may trace
 // fewer pixels; a moment after the last motion it is asked for all of them.
 
 import {angleLike, cameraOf, largestSide, lenses, lensLike, poseOf} from './camera.js';
@@ -15,6 +15,7 @@ export class View {
   style = 'orbit';
   mode = 'colour';
   crop = null;
+  look = {};  // as look.js has it
   lens = {name: 'pinhole', angle: 60};
   through = null;  // the camera of the capture that is looked through
   stage = {width: 2, height: 2, cssWidth: 2, cssHeight: 2};
@@ -38,12 +39,19 @@ export class View {
     this.pose = lookingAt([0, -2, 0], [0, 0, 0], this.world.up);
   }
 
-  start({model, cameras}) {
+  // state: as state() gave it for this model, where the page was here before.
+  start({model, cameras}, state) {
     const extent = model.extent > 0 ? model.extent : 1;
     this.centre = model.center;
     this.world = {pivot: model.center, up: model.up, extent, speed: 0.35 * extent};
     this.first = cameras[0]?.camera ?? null;
-    this.home();
+    this.through = null;
+    if (!state) return this.home();
+    this.pose = state.pose, this.lens = state.lens, this.world.pivot = state.pivot;
+    this.changed();
+  }
+  state() {
+    return {pose: this.pose, lens: this.lens, pivot: this.world.pivot, through: this.through?.index ?? null};
   }
 
   // As the capture’s first camera sees the scene, or from aside and above, from where all of it is in view.
@@ -69,8 +77,18 @@ export class View {
     this.changed();
   }
 
-  camera(name) {
-    return cameraOf(this.pose, this.through ? {camera: this.through.camera} : this.lens, this.stage, name);
+  camera(name, stage = this.stage) {
+    return cameraOf(this.pose, this.through ? {camera: this.through.camera} : this.lens, stage, name);
+  }
+
+  // How it differs from the model, as messages have it.
+  get settings() {
+    return {...this.look, crop: this.crop};
+  }
+  // With the photograph that the mode is of.
+  get shown() {
+    const photo = this.through?.photo ? this.through.index : null;
+    return {mode: this.mode === 'error' && photo === null ? 'colour' : this.mode, photo, ...this.settings};
   }
 
   // Where a camera's image lies on the stage, in CSS pixels.
@@ -167,11 +185,9 @@ export class View {
 
   #send(now) {
     const camera = this.camera(), id = ++this.#id;
-    const photo = this.through?.photo ? this.through.index : null;
-    const mode = this.mode === 'error' && photo === null ? 'colour' : this.mode;
     this.#dirty = false;
     this.#sentAt = now;
-    const sent = this.connection.send({type: 'view', id, camera, mode, moving: this.#moving, crop: this.crop, photo});
+    const sent = this.connection.send({type: 'view', id, camera, moving: this.#moving, ...this.shown});
     if (sent) this.#sent.set(id, {camera, pose: this.pose, rect: this.rectOf(camera), through: this.through});
   }
 

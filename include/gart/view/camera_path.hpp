@@ -7,9 +7,11 @@
 /// construction scheme for unit quaternion curves", 1995), of the logarithms of focal lengths, of principal points. The
 /// path goes through every keyframe, and its speed has no jump there. The time between two keyframes is the square root
 /// of the way between them, distance and angle (centripetal: close keyframes make no loops), so that no stretch is
-/// without time. Size, model and lens are those of the first keyframe. In double.
+/// without time; times that are given stand in its place. Size, model and lens are those of the first keyframe. In
+/// double.
 ///
-/// Errors: invalid_argument for less than two keyframes or frames, and for keyframes of different camera models.
+/// Errors: invalid_argument for less than two keyframes or frames, for keyframes of different camera models, and for
+/// times that are not one a keyframe, from 0 on, each more than the one before.
 
 #include <gart/scene/camera.hpp>
 
@@ -20,8 +22,9 @@ namespace gart {
 /// The path, by time.
 class camera_path {
  public:
-  /// Through these; a closed one goes on from the last to the first.
-  explicit camera_path(std::vector<camera> keyframes, bool closed = false);
+  /// Through these; a closed one goes on from the last to the first. `times` are those of the keyframes, with the end
+  /// of a closed path behind them.
+  explicit camera_path(std::vector<camera> keyframes, bool closed = false, std::vector<double> times = {});
 
   /// When it passes a keyframe; for their number, the end of a closed path.
   double time_of(std::size_t keyframe) const { return times_[keyframe]; }
@@ -38,6 +41,7 @@ class camera_path {
 
 /// `frames` cameras along the path, evenly in time, the first and the last one at its ends; of a closed path the end is
 /// left out, for it is the start.
-std::vector<camera> smooth_path(std::vector<camera> const& keyframes, int frames, bool closed = false);
+std::vector<camera> smooth_path(std::vector<camera> const& keyframes, int frames, bool closed = false,
+                                std::vector<double> const& times = {});
 
 }  // namespace gart

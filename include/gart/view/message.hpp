@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// What the page of a viewer and its server say to each other, without the sockets: one JSON object a message as text,
-/// and frames in bytes. docs/rendering.md has the fields of each.
+/// and frames and images in bytes. docs/rendering.md has the fields of each.
 ///
 /// parse_message reads what a client sent, from outside and therefore held to: at most message_bytes, objects no deeper
 /// than message_depth, every field there and in its range, no other one. Errors: invalid_argument naming the field.
@@ -26,6 +26,8 @@ namespace gart {
 inline constexpr std::size_t message_bytes = 16384;  ///< of the largest message that a client may send
 inline constexpr int message_depth = 6;              ///< of objects and lists in each other
 inline constexpr int view_size_most = 4096;          ///< pixels a side of a view that a client may ask for
+inline constexpr int image_size_most = 16384;        ///< pixels a side of an image to be saved
+inline constexpr int image_pixels_most = 40000000;   ///< in all of it
 inline constexpr int path_frames_most = 10000;       ///< cameras of a path that a client may ask for
 
 /// A view to be rendered.
@@ -34,8 +36,17 @@ struct view_message {
   camera view;                         ///< of the size of the page's canvas
   view_mode mode = view_mode::colour;  ///< what is shown of it
   bool moving = false;                 ///< soon followed by another: time is worth more than pixels
-  view_settings settings;              ///< what is left out
+  view_settings settings;              ///< how it differs from the model
   std::optional<int> photo;            ///< index of the camera whose photograph view_mode::error is against
+};
+
+/// A view as a PNG, of any size.
+struct image_message {
+  u64 id = 0;                          ///< of the message, sent back with the file
+  camera view;                         ///< of the size of the image
+  view_mode mode = view_mode::colour;  ///< what is shown of it
+  view_settings settings;              ///< how it differs from the model
+  std::optional<int> photo;            ///< as in view_message
 };
 
 /// The point that is seen through one of a view's pixels is to be found.
@@ -43,7 +54,7 @@ struct pick_message {
   u64 id = 0;              ///< of the message
   camera view;             ///< the view
   float x = 0, y = 0;      ///< image point, pixels
-  view_settings settings;  ///< what is left out
+  view_settings settings;  ///< how it differs from the model
 };
 
 /// A smooth path through keyframes is wanted.
@@ -52,6 +63,13 @@ struct path_message {
   std::vector<camera> keyframes;  ///< two at least
   int frames = 0;                 ///< cameras along the path
   bool closed = false;            ///< whether it ends where it began
+  /// Of the keyframes, and of the end of a closed path, in increasing seconds from 0; none: by the way between them.
+  std::vector<double> times;
+};
+
+/// Another of view_scene.models is to be opened; needs the right of control.
+struct model_message {
+  int index = 0;  ///< which
 };
 
 /// What a viewer may ask of a training.
@@ -74,7 +92,8 @@ struct share_message {
 };
 
 /// Anything that a client may send.
-using client_message = std::variant<view_message, pick_message, path_message, train_message, share_message>;
+using client_message =
+    std::variant<view_message, image_message, pick_message, path_message, model_message, train_message, share_message>;
 
 /// Reads a client's text.
 client_message parse_message(std::string_view text);
@@ -89,6 +108,10 @@ std::string curve_text(view_curve const& curve);
 std::string picked_text(u64 id, float t, vec3d point);
 /// The answer to a path.
 std::string path_text(u64 id, std::vector<camera> const& cameras);
+/// PSNR in dB of views of the capture, by the camera's index.
+std::string scores_text(std::vector<std::pair<int, double>> const& scores);
+/// Something that the reader of the page is told.
+std::string note_text(std::string_view what);
 /// A message was not allowed, and why.
 std::string refused_text(std::string_view what, std::string_view why);
 /// Something failed.
@@ -104,9 +127,10 @@ struct frame_header {
   view_mode mode = view_mode::colour;   ///< what it shows
   double milliseconds = 0;              ///< that it took to render
   bool still = false;                   ///< full size, not to be replaced by a better one
+  bool file = false;                    ///< the answer to an image_message: a PNG follows, no JPEG
   float low = 0, high = 0;              ///< values at the ends of the colour map, where it has one
 };
 /// The bytes of a frame.
-std::vector<u8> frame_bytes(frame_header const& header, std::vector<u8> const& jpeg);
+std::vector<u8> frame_bytes(frame_header const& header, std::vector<u8> const& image);
 
 }  // namespace gart

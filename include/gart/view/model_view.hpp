@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Views of a model that does not change, for a viewer: what view_server renders by. The Gaussians outside of a crop
-/// box are left out of a copy, which is made when the box changes and held by the renderer.
+/// Views of a model that does not change, for a viewer: what view_server renders by. Where settings change the
+/// Gaussians (a crop box, another size), the renderer holds a copy, which is made when they change.
 
 #include <gart/render/options.hpp>
 #include <gart/render/rendered.hpp>
@@ -22,6 +22,8 @@ struct view_render {
   /// Its colours alone, as to_8bit makes them of `images`, [H][W][3]: what view_mode::colour shows, where it is given.
   /// On a device it spares the copy of the rest.
   std::function<image8(camera const& view, view_settings const& settings)> colours;
+  /// Whether settings.rows is heeded: then a view that takes long is asked for in parts. Else each part is the whole.
+  bool in_parts = false;
 
   view_render() = default;
   /// Of a function that renders everything, and one of the colours alone where there is one.

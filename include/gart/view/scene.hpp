@@ -6,6 +6,7 @@
 #include <gart/math/glm.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
+#include <gart/scene/image_rows.hpp>
 
 #include <array>
 #include <optional>
@@ -41,10 +42,30 @@ struct view_box {
   friend bool operator==(view_box const&, view_box const&) = default;
 };
 
-/// What a view leaves out.
+/// What Gaussians are drawn as.
+enum class view_shape {
+  gaussians,   ///< as they are
+  ellipsoids,  ///< opaque to one standard deviation, and nothing beyond
+  points,      ///< opaque balls of one size at their means
+};
+/// Their names.
+constexpr auto names_of(view_shape) {
+  return std::array<name_of<view_shape>, 3>{
+      {{view_shape::gaussians, "gaussians"}, {view_shape::ellipsoids, "ellipsoids"}, {view_shape::points, "points"}}};
+}
+
+/// How a view differs from what the model is. All but `background` and `rows` change the Gaussians that are traced.
 struct view_settings {
-  std::optional<view_box> crop;  ///< Gaussians whose mean lies outside
-  std::optional<float> near;     ///< hits nearer than that along the ray, in place of render_options.near
+  std::optional<view_box> crop;              ///< Gaussians whose mean lies outside are left out
+  std::optional<float> near;                 ///< hits nearer than that along the ray are left out
+  std::optional<vec3> background;            ///< in place of the model's own
+  float opacity = 1;                         ///< times that of every Gaussian; 0.001 to 1000
+  float size = 1;                            ///< times every standard deviation; 0.001 to 1000
+  view_shape shape = view_shape::gaussians;  ///< what is drawn
+  image_rows rows = {};                      ///< the part that is traced, in whole tiles, where that is heeded
+
+  /// Whether the Gaussians are traced as they are.
+  bool own_gaussians() const { return !crop && opacity == 1 && size == 1 && shape == view_shape::gaussians; }
 };
 
 /// A camera of the capture.
@@ -64,9 +85,14 @@ struct view_scene {
   view_box bounds;                   ///< from the 1st to the 99th hundredth of the means, along each axis
   vec3 up{0.0f, -1.0f, 0.0f};        ///< away from the ground
   std::vector<view_camera> cameras;  ///< of the capture
+  std::vector<std::string> models;   ///< what else may be opened, and this one; for clients with the right of control
+  int model = 0;                     ///< which of them this is
   bool training = false;             ///< whether it changes
   vec3 background{0.0f};             ///< behind the last hit
 };
+
+/// Half the diagonal of its bounds.
+float extent_of(view_scene const& scene);
 
 /// The scene of a model and of a capture's cameras. Up is the mean of the cameras' own, or -y where there are none.
 view_scene scene_of(std::string name, gaussian_model const& model, int kernel_degree,
@@ -74,6 +100,13 @@ view_scene scene_of(std::string name, gaussian_model const& model, int kernel_de
 
 /// The Gaussians whose mean lies in the box.
 gaussian_model cropped(gaussian_model const& model, view_box const& box);
+
+/// The Gaussians that are traced of a model for these settings. Ellipsoids and points are hit where their response is
+/// at least `solid_response`, which is then the render's alpha_min; of them, what is fainter than `faintest_solid`
+/// after the factor is left out. `extent` is half the scene's diagonal: a point's radius is 0.004 of it.
+gaussian_model altered(gaussian_model model, view_settings const& settings, int kernel_degree, float extent);
+inline constexpr float solid_response = 0.8f;   ///< at the rim of an ellipsoid
+inline constexpr float faintest_solid = 0.05f;  ///< opacity
 
 /// A training, while it runs.
 struct view_status {

@@ -13,14 +13,14 @@
 ///
 /// The server has a thread of its own for its sockets; views are rendered in the thread that calls render_next, one at
 /// a time. Only the newest view of each client is rendered, and none while the client has not yet taken the one before:
-/// one that stalls costs at most two frames, and does not slow the others.
+/// one that stalls costs at most two frames, and does not slow the others. A view at rest that takes long is rendered
+/// in parts, and dropped between two of them when the client has moved on or left.
 ///
 /// It listens on this machine alone unless options.listen says otherwise. An address has a token of 128 random bits;
 /// requests with another one, or from another host's page, are answered by 403. There is no encryption: over a network
-/// it goes through `ssh -L` (docs/rendering.md).
+/// it goes through `ssh -L` (docs/rendering.md). Connections that stay silent make room for others.
 ///
-/// Errors: unsupported, naming the package to install, where gart was built without libwebsockets; invalid_argument for
-/// an address that is not this machine's; error where the port is taken.
+/// Errors: invalid_argument for an address that is not this machine's; error where the port is taken.
 
 #include <gart/scene/image.hpp>
 #include <gart/view/message.hpp>
@@ -31,14 +31,19 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace gart {
 
 /// How a viewer is served.
 struct view_server_options {
-  std::string listen = "127.0.0.1";            ///< the address or name of this machine to listen at; IPv4
-  int port = 0;                                ///< 0: one that is free
+  std::string listen = "127.0.0.1";  ///< the address or name of this machine to listen at; IPv4
+  int port = 0;                      ///< 0: one that is free
+  /// Other hosts that a browser may name, "NAME" or "NAME:PORT": of containers, of proxies (https too), of a network.
+  std::vector<std::string> allowed_hosts = {};
   int max_clients = 8;                         ///< pages at a time; more are answered by 503
+  double silent_seconds = 30;                  ///< after which a page gives its place to another where all are taken
   double frame_seconds = 1.0 / 12;             ///< that a view takes while it moves, by its resolution
   static constexpr double rest_seconds = 0.2;  ///< after the last moving view, until it is rendered whole
   /// The photograph of a camera of the scene, by its index; empty where there is none. From any thread.
@@ -70,12 +75,19 @@ class view_server {
   double render_next(view_render const& render, double wait_seconds);
 
   ///@{
-  /// Of a training: what the clients are told, now and when they come.
+  /// What the clients are told, now and when they come: of a training, and PSNR of views by the camera's index.
   void set_status(view_status const& status);
   void set_curve(view_curve const& curve);
+  void set_scores(std::vector<std::pair<int, double>> const& scores);
   ///@}
+  void tell(std::string const& note);  ///< to those who are there: a line on the page
+  void tell_at_end(std::string why);   ///< what they are told when the server ends
+  /// In place of the scene: what was opened. Views of the one before are let go.
+  void set_scene(view_scene scene);
   /// What a client with the right of control asked for, the oldest first.
   std::optional<train_action> next_action();
+  /// The one of view_scene.models that a client with that right wants opened, since the last call.
+  std::optional<int> next_model();
   /// The share of time that a client with that right asked for, since the last call.
   std::optional<double> next_share();
 

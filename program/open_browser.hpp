@@ -1,0 +1,25 @@
+#pragma once
+// Opens an address in the browser of who started the program.
+
+#include <filesystem>
+#include <string>
+
+namespace gart_cli {
+
+// While it exists there is a file, for this user alone, that leads to the address: the command line of a browser can be
+// read by all users, and an address is a key. Where there is no display or no browser, `said` tells so and nothing else
+// happens.
+class opened_browser {
+ public:
+  explicit opened_browser(std::string const& address);
+  ~opened_browser();
+  opened_browser(opened_browser const&) = delete;
+  opened_browser& operator=(opened_browser const&) = delete;
+
+  std::string said;  // why it was not opened; empty where it was
+
+ private:
+  std::filesystem::path file_;
+};
+
+}  // namespace gart_cli
