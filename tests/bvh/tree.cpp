@@ -286,6 +286,53 @@ TEST_CASE_TEMPLATE("boxes of every size and place", E, GART_TEST_POLICIES) {
   check_boxes(exec, source, boxes);
 }
 
+TEST_CASE_TEMPLATE("one box far away leaves the others their order", E, GART_TEST_POLICIES) {
+  random_boxes random(gart_test::seed());
+  CAPTURE(gart_test::seed());
+  E exec;
+  std::vector<box> boxes(4000);
+  for (box& b : boxes) {
+    vec3 const c = random.point(1);
+    b = {c - vec3(0.01f), c + vec3(0.01f)};
+  }
+  // What a ray of the scene meets on its way to a leaf: the sizes of the inner boxes that are all in the scene.
+  auto const sizes = [&](std::vector<box> const& all) {
+    gart::buffer<box, E> on_device(exec, all);
+    gart::bvh<E> tree(exec);
+    tree.build(exec, std::as_const(on_device).view());
+    auto const nodes = nodes_of(exec, tree);
+    check_tree(nodes, all);
+    double sum = 0;
+    std::vector<u32> open{0};
+    while (!open.empty()) {
+      gart::bvh_node const n = nodes[open.back()];
+      open.pop_back();
+      for (int c = 0; c < gart::bvh_width; ++c) {
+        if (!(n.inner_mask() >> c & 1u)) continue;
+        open.push_back(n.child[c]);
+        vec3 const size = n.child_box(c).hi - n.child_box(c).lo;
+        if (size.x < 100 && size.y < 100 && size.z < 100)
+          sum += double{size.x} * size.y + double{size.y} * size.z + double{size.z} * size.x;
+      }
+    }
+    return sum;
+  };
+  double const without = sizes(boxes);
+  for (vec3 const& far : {vec3(1e7f, 0, 0), vec3(-1e7f, 1e6f, 1e30f)}) {
+    auto strayed = boxes;
+    strayed[1234] = {far, far};
+    CHECK(sizes(strayed) < 1.2 * without);
+  }
+  // One in 400 of them, and a scene of few.
+  auto strayed = boxes;
+  for (std::size_t i = 0; i < strayed.size(); i += 400) strayed[i] = {vec3(1e8f), vec3(1e8f)};
+  CHECK(sizes(strayed) < 1.2 * without);
+  boxes.resize(40);
+  strayed = boxes;
+  strayed[7] = {vec3(1e8f), vec3(1e8f)};
+  CHECK(sizes(strayed) < 1.5 * sizes(boxes));
+}
+
 TEST_CASE_TEMPLATE("a box without an end is met wherever the ray goes", E, GART_TEST_POLICIES) {
   random_boxes source(4);
   E exec;

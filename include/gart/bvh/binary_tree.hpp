@@ -2,7 +2,8 @@
 /// \file
 /// The binary tree that a wide one is made from (Karras, "Maximizing parallelism in the construction of BVHs, octrees,
 /// and k-d trees", HPG 2012): boxes sorted by the Morton codes of their centres, one thread an inner node, boxes fitted
-/// from the leaves up. As they are fitted it is also worked out which nodes become wide ones (bvh/shares.hpp).
+/// from the leaves up. Codes are made for the bulk of the centres: one far away would leave the others few bits. As
+/// they are fitted it is also worked out which nodes become wide ones (bvh/shares.hpp).
 
 #include <gart/bvh/morton.hpp>
 #include <gart/bvh/shares.hpp>
@@ -40,6 +41,52 @@ struct bound_centers {
       all = join(all, b);
     }
     partial[i] = all;
+  }
+};
+
+// The bulk of the centres, robust against strays, which spoil no more than the partial box that each is in: of an axis
+// the lower quartile of the partial boxes' least corners, and the upper quartile of their greatest. Thread i asks
+// whether one of them is the one wanted: its place is how many are less, of equal ones those before it.
+struct find_bulk {
+  span<box const> partial;
+  span<box> bulk;
+  // Nor is it empty, or none of numbers.
+  GART_HD static bool counts(box const& b, index_t axis) {
+    return b.lo[static_cast<int>(axis)] <= b.hi[static_cast<int>(axis)];
+  }
+  GART_HD static float corner(box const& b, index_t side, index_t axis) {
+    return side ? b.hi[static_cast<int>(axis)] : b.lo[static_cast<int>(axis)];
+  }
+  GART_KERNEL void operator()(index_t i) const {
+    index_t const axis = i % 3, side = i / 3 % 2, mine = i / 6;
+    if (!counts(partial[mine], axis)) return;
+    float const value = corner(partial[mine], side, axis);
+    index_t less = 0, filled = 0;
+    for (index_t k = 0; k < partial.size(); ++k) {
+      if (!counts(partial[k], axis)) continue;
+      float const other = corner(partial[k], side, axis);
+      less += other < value || (other == value && k < mine), ++filled;
+    }
+    if (less != (side ? filled - 1 - filled / 4 : filled / 4)) return;
+    (side ? bulk[0].hi : bulk[0].lo)[static_cast<int>(axis)] = value;
+  }
+};
+
+// What codes are made for: the box of all centres, cut off at so many sizes of the bulk. Those beyond go to its edge.
+struct bound_codes {
+  static constexpr float reach = 256;
+  span<box const> partial, bulk;
+  span<box> bounds;
+  GART_KERNEL void operator()(index_t) const {
+    box all = empty_box();
+    for (box const& b : partial) all = join(all, b);
+    for (int k = 0; k < 3; ++k) {
+      if (!(all.lo[k] <= all.hi[k])) continue;  // no centre, and no bulk
+      float const lo = bulk[0].lo[k], hi = bulk[0].hi[k], far = mul(reach, add(hi, -lo));
+      if (!(far > 0)) continue;  // as where most are in one place
+      all.lo[k] = fmaxf(all.lo[k], add(lo, -far)), all.hi[k] = fminf(all.hi[k], add(hi, far));
+    }
+    bounds[0] = all;
   }
 };
 

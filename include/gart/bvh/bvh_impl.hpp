@@ -15,15 +15,16 @@ void bvh<E>::build(E& exec, span<box const> boxes) {
   if (count_ == 0) return;
   stage_scope stage(exec, "bvh build");
   constexpr index_t wide = 16384, narrow = 128;
-  bounds_.resize(wide + narrow + 1);
+  bounds_.resize(wide + narrow + 2);
   codes_.resize(count_), order_.resize(count_), leaf_up_.resize(count_);
   binary_.resize(count_ > 1 ? count_ - 1 : 1);
   span<box> const all = bounds_.view();
   span<box> const stage1 = all.subspan(0, wide), stage2 = all.subspan(wide, narrow),
-                  root = all.subspan(wide + narrow, 1);
+                  root = all.subspan(wide + narrow, 1), bulk = all.subspan(wide + narrow + 1, 1);
   parallel_for(exec, "bvh/bounds", wide, bvh_kernels::bound_centers{boxes, stage1, true});
   parallel_for(exec, "bvh/bounds", narrow, bvh_kernels::bound_centers{stage1, stage2, false});
-  parallel_for(exec, "bvh/bounds", 1, bvh_kernels::bound_centers{stage2, root, false});
+  parallel_for(exec, "bvh/bounds", 6 * narrow, bvh_kernels::find_bulk{stage2, bulk});
+  parallel_for(exec, "bvh/bounds", 1, bvh_kernels::bound_codes{stage2, bulk, root});
   parallel_for(exec, "bvh/codes", count_, bvh_kernels::encode{boxes, root, codes_, order_});
   sort_pairs(exec, codes_.view(), order_.view(), morton_bits);
   if (count_ > 1)
