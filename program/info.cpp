@@ -1,6 +1,7 @@
 #include "commands.hpp"
 #include "progress.hpp"
 #include "ranks.hpp"
+#include "self_test.hpp"
 
 #include <gart/core/error.hpp>
 #include <gart/core/version.hpp>
@@ -19,6 +20,7 @@
 
 #include <cstdio>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <thread>
@@ -112,7 +114,7 @@ void print_devices(std::vector<std::string> const& places) {
   std::printf("models     %s\n", formats.c_str());
 }
 
-int run_info() {
+int run_info(bool tests) {
   if (ranks::built) ranks::start(false);
   std::vector<std::string> const places = places_of_ranks();
   if (ranks::rank() > 0) return 0;
@@ -137,13 +139,17 @@ int run_info() {
   auto const best = gart::resolve({});
   std::printf("\nauto means %s, %s, %s here.\n", to_string(best.backend), to_string(best.tracer),
               best.backward.c_str());
-  return 0;
+  if (!tests) return 0;
+  std::puts("\nA small scene against its image and gradients by their definition, in double:");
+  return self_test() == 0 ? 0 : exit_failed;
 }
 
 }  // namespace
 
 void add_info(CLI::App& app, command& selected) {
+  auto tests = std::make_shared<bool>(false);
   CLI::App* info = app.add_subcommand("info", "Say what this build and this machine can do.");
+  info->add_flag("--self-test", *tests, "Try every configuration that runs here; exit code 1 where one is wrong");
   info->footer(
       "\nPrints the version, the devices found, and the configurations that were compiled: which backend, tracer and\n"
       "backward pass go together, for which degrees of spherical harmonics. Writes nothing. Of several GPUs it\n"
@@ -151,8 +157,9 @@ void add_info(CLI::App& app, command& selected) {
       "\nExamples:\n"
       "  gart info\n"
       "  gart info | grep cuda\n"
+      "  gart info --self-test                    after an installation: seconds\n"
       "  mpirun -n 4 gart info");
-  info->callback([&selected] { selected = run_info; });
+  info->callback([tests, &selected] { selected = [tests] { return run_info(*tests); }; });
 }
 
 }  // namespace gart_cli

@@ -10,12 +10,15 @@ trap 'fail "line $LINENO failed: $BASH_COMMAND"' ERR
 
 # What gart is built and tested with, by the names of Debian 12 and Ubuntu 24.04.
 packages=(cmake ninja-build g++ pkg-config git python3 libembree-dev libglm-dev libpng-dev libturbojpeg0-dev
-  libzstd-dev libwebp-dev nlohmann-json3-dev libcli11-dev libeigen3-dev doctest-dev libbenchmark-dev libopenmpi-dev openmpi-bin)
+  libzstd-dev libwebp-dev nlohmann-json3-dev libcli11-dev libeigen3-dev doctest-dev libbenchmark-dev libopenmpi-dev openmpi-bin
+  python3-dev python3-numpy pybind11-dev)
+
+is_installed() { [[ $(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null) == installed ]]; }
 
 missing_packages() {
   local package
   for package in "${packages[@]}"; do
-    [[ $(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null) == installed ]] || printf '%s ' "$package"
+    is_installed "$package" || printf '%s ' "$package"
   done
 }
 
@@ -39,16 +42,16 @@ install_packages() {
     fail "apt-get could not install $missing: see above"
 }
 
-# A command that a test is skipped without, and its package where that has another name. What apt knows of its packages may
+# A command or a package that a test is skipped without, and its package where that has another name. What apt knows of its packages may
 # be missing or old: it is asked again where it cannot.
 wish_for() {
   local command=$1 package=${2:-$1} root=() install
-  command -v "$command" >/dev/null && return
+  if command -v "$command" >/dev/null || is_installed "$package"; then return; fi
   say "packages: installing $package"
   [[ $(id -u) == 0 ]] || root=(sudo)
   install=("${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "$package")
   "${install[@]}" || { "${root[@]}" apt-get update -q && "${install[@]}"; } ||
-    say "no $command here: the test that needs it is skipped"
+    say "no $command here: what needs it is skipped"
 }
 
 # The options that both builds share; the compiler cache where there is one.

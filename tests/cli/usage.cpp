@@ -141,4 +141,7 @@ TEST_CASE("info names the version and the configurations") {
   CHECK(has(info.out, "serial   bvh     pixel"));
   CHECK(has(info.out, "openmp   bvh     pixel"));
   CHECK(has(info.out, "auto means "));
+  auto const tried = here.gart("info --self-test");
+  CHECK_MESSAGE(tried.code == 0, tried.out);
+  CHECK(has(tried.out, "configurations agree with the definition, 0 do not"));
 }

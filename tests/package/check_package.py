@@ -1,6 +1,7 @@
 """Installs gart, moves the prefix away from where it was installed, and builds and runs from there: a project of g++ alone
-that is allowed no package which only gart itself needs, with no nvcc on the path; every numbered example; the program; and
-one kernel compiled by nvcc where there is one. A component that is not there has to be refused by name.
+that is allowed no package which only gart itself needs, with no nvcc on the path; a plugin that a program without gart
+loads; every numbered example; the program; and one kernel compiled by nvcc where there is one. A component that is not
+there has to be refused by name.
 
 Then gart as part of another project, by add_subdirectory and by FetchContent, and the headers alone, on a machine that has
 none of the packages which only the libraries need.
@@ -91,6 +92,8 @@ with tempfile.TemporaryDirectory() as temporary:
     capture, model = folder / "capture", folder / "model.ply"
     expect(run(host / "use_headers"), f"version {a.version}")
     expect(run(host / "use_cpu", capture, model), "serial", "openmp")
+
+    expect(run(build(here / "downstream" / "shared") / "use_shared"), "hides the rest")
 
     for component in a.component:
         binary = build(here / "downstream" / component)

@@ -19,9 +19,12 @@ struct error : std::runtime_error {
 /// A file that cannot be read or written as asked. `where` is the path, with the field or line where one is known.
 struct io_error : error {
   /// The message names place, cause and remedy.
-  io_error(std::string where, std::string const& what, std::string const& remedy = {})
-      : error(where + ": " + what + (remedy.empty() ? "" : " (" + remedy + ")")), place(std::move(where)) {}
-  std::string place;  ///< the path, with the field or line
+  io_error(std::string where, std::string const& what, std::string advice = {})
+      : error(where + ": " + what + (advice.empty() ? "" : " (" + advice + ")")),
+        place(std::move(where)),
+        remedy(std::move(advice)) {}
+  std::string place,  ///< the path, with the field or line
+      remedy;         ///< what to do, or empty
 };
 
 /// A request that this build or this machine cannot serve: a camera model, a backend, a configuration that is not

@@ -33,6 +33,8 @@ class compiled_renderer final : public renderer {
         band_gradients_(exec_),
         color_(exec_),
         color_gradient_(exec_),
+        depth_(exec_),
+        transmittance_(exec_),
         pose_backward_(exec_) {
     if (degree_ < 0 || degree_ > sh_degree)
       throw invalid_argument("renderer: configuration_request.sh_degree is past what this configuration stores");
@@ -44,14 +46,14 @@ class compiled_renderer final : public renderer {
     differentiated_ = 0;
     degree_ == sh_degree ? model_.assign(model) : model_.assign(with_sh_degree(model, sh_degree));
     scene_ = std::as_const(model_).view();
-    bound_bands_ = nullptr;
+    bound_bands_ = nullptr, last_ = {};
   }
   void bind(gaussians_view<float const> parameters) override {
     require_degree(parameters.sh_degree);
     require_arrays(parameters, "renderer.bind");
     differentiated_ = 0;
     scene_ = parameters;
-    bound_bands_ = nullptr;
+    bound_bands_ = nullptr, last_ = {};
     if (degree_ == sh_degree) return;
     bound_bands_ = parameters.sh;
     bands_.resize(row_floats * parameters.count);
@@ -78,6 +80,7 @@ class compiled_renderer final : public renderer {
       throw invalid_argument("renderer: the colour's gradient must have three values for each pixel of the view");
     color_gradient_.assign(span<float const>(color_gradient.data.data(), color_gradient.data.size()));
     gradients_.resize_keep(scene_.count);
+<<<<<<< HEAD
     differentiated_ = 0;
     differentiate_rows(view, options, color_gradient_.data(), gradients_.view(), {});
     differentiated_ = frame_.preparation();
@@ -105,6 +108,33 @@ class compiled_renderer final : public renderer {
     if (scene_.count == 0)
       throw invalid_argument("renderer.differentiate_pose: the model has no Gaussians, and a pose no gradient by them");
     return pose_backward_(frame_, std::as_const(gradients_).view());
+=======
+    differentiate_rows(view, options, {color_gradient_.data()}, gradients_.view(), {});
+  }
+  void differentiate_into(camera const& view, render_options const& options, float const* color_gradient,
+                          gaussians_view<float> gradients, render_targets const& targets) override {
+    in_rows(gradients,
+            [&](gaussians_view<float> rows) { differentiate_rows(view, options, {color_gradient}, rows, targets); });
+  }
+  void record(camera const& view, render_options const& options, render_targets const& targets) override {
+    prepare(view, options);
+    if (!pass_.prepare(frame_)) throw pass_.out_of_memory_error();
+    image_targets images = images_of(targets, true);
+    if constexpr (has_depth<Strategy>) {
+      images.depth = or_own(images.depth, depth_, pixels_of(view));
+      images.transmittance = or_own(images.transmittance, transmittance_, pixels_of(view));
+    }
+    pass_.render(frame_, images);
+    if (targets.rgba) color_to_bytes(exec_, images.color, pixels_of(view), targets.rgba, 4);
+  }
+  void differentiate_recorded(pixel_gradients const& by, gaussians_view<float> gradients) override {
+    in_rows(gradients, [&](gaussians_view<float> rows) { differentiate_pass(by, rows); });
+  }
+  pose_gradient differentiate_pose() override {
+    if (last_.count != scene_.count || scene_.count == 0)
+      throw invalid_argument("renderer.differentiate_pose: call renderer.differentiate first");
+    return pose_backward_(frame_, last_);
+>>>>>>> heads/h-python
   }
   gaussian_model gradients() const override { return with_sh_degree(gradients_.to_host(), degree_); }
   void wait() override { exec_.synchronize(); }
@@ -128,26 +158,42 @@ class compiled_renderer final : public renderer {
     if (bound_bands_) copy_bands(exec_, bound_bands_, degree_, bands_.data(), sh_degree, scene_.count);
     frame_.prepare(scene_, view, options, degree_);
   }
-  // Into gradients in rows of sh_degree.
-  void differentiate_rows(camera const& view, render_options const& options, float const* color_gradient,
-                          gaussians_view<float> gradients, render_targets const& targets) {
+  // Calls f with gradients in rows of sh_degree, which become those that were given.
+  template <class F>
+  void in_rows(gaussians_view<float> gradients, F&& f) {
+    if (degree_ == sh_degree) return f(gradients);
+    require_degree(gradients.sh_degree);
+    gaussians_view<float> rows = gradients;
+    band_gradients_.resize(row_floats * gradients.count);
+    rows.sh = band_gradients_.data(), rows.sh_degree = sh_degree;
+    f(rows);
+    copy_bands(exec_, rows.sh, sh_degree, gradients.sh, degree_, gradients.count);
+  }
+  void differentiate_rows(camera const& view, render_options const& options, pixel_gradients const& by,
+                          gaussians_view<float> rows, render_targets const& targets) {
     stage_scope stage(exec_, "gradients");
-    prepare(view, options);
-    if (!pass_.prepare(frame_)) throw pass_.out_of_memory_error();
-    image_targets const images = images_of(targets, true);
-    pass_.render(frame_, images);
-    gart::differentiate(frame_, pass_, {color_gradient, std::size_t{3} * pixels_of(view)}, gradients);
-    if (targets.rgba) color_to_bytes(exec_, images.color, pixels_of(view), targets.rgba, 4);
+    record(view, options, targets);
+    differentiate_pass(by, rows);
+  }
+  void differentiate_pass(pixel_gradients const& by, gaussians_view<float> rows) {
+    std::size_t const pixels = pixels_of(frame_.view());
+    image_gradients image{{by.color, 3 * pixels}};
+    if (by.depth) image.depth = {by.depth, pixels};
+    if (by.transmittance) image.transmittance = {by.transmittance, pixels};
+    gart::differentiate(frame_, pass_, image, rows);
+    last_ = rows;
+  }
+  static float* or_own(float* given, buffer<float, E>& own, std::size_t n) {
+    if (given) return given;
+    own.resize(n);
+    return own.data();
   }
   // The colour that something else is made of needs room, where the caller wants none.
   image_targets images_of(render_targets const& targets, bool needs_color) {
     image_targets images;
     images.color = targets.color, images.transmittance = targets.transmittance;
     images.depth = targets.depth, images.hits = targets.hits;
-    if (needs_color && !images.color) {
-      color_.resize(std::size_t{3} * pixels_of(frame_.view()));
-      images.color = color_.data();
-    }
+    if (needs_color) images.color = or_own(images.color, color_, std::size_t{3} * pixels_of(frame_.view()));
     return images;
   }
 
@@ -161,7 +207,8 @@ class compiled_renderer final : public renderer {
   buffer<float, E> bands_, band_gradients_;
   float const* bound_bands_ = nullptr;
   gaussians_view<float const> scene_{.sh_degree = sh_degree};
-  buffer<float, E> color_, color_gradient_;
+  gaussians_view<float const> last_{};  // gradients, in rows of sh_degree
+  buffer<float, E> color_, color_gradient_, depth_, transmittance_;
   pose_differentiation<E> pose_backward_;
 };
 

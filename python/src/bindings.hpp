@@ -1,0 +1,70 @@
+#pragma once
+// What the parts of the module share: a file binds what its name says.
+
+#include "arrays.hpp"
+
+#include <gart/io/dataset.hpp>
+#include <gart/render/options.hpp>
+#include <gart/runtime/model_file.hpp>
+#include <gart/runtime/renderer.hpp>
+
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <memory>
+#include <mutex>
+#include <string>
+
+namespace gart_python {
+
+void bind_errors(py::module_& m);
+void bind_scene(py::module_& m);
+void bind_dataset(py::module_& m);
+void bind_options(py::module_& m);
+void bind_renderer(py::module_& m);
+void bind_session(py::module_& m);
+void bind_reference(py::module_& m);
+
+// The Gaussians of a model as numpy arrays that `owner` keeps, by the names of scene/parameter_table.hpp.
+py::object shown_parameter(gart::gaussian_model const& model, char const* name, py::handle owner);
+gart::gaussian_model model_of(py::handle mean, py::handle log_scale, py::handle quaternion, py::handle opacity,
+                              py::handle sh, char const* call);
+// The degree of that many coefficients a channel; invalid_argument where it is none.
+int degree_of(std::int64_t coefficients, char const* name);
+
+// A pinhole camera, or any by COLMAP's name of its model.
+gart::camera camera_of(int width, int height, double fx, double fy, std::optional<double> cx, std::optional<double> cy,
+                       py::object const& c2w, std::string const& model, py::kwargs const& lens);
+
+// The request that keyword arguments make. Errors: TypeError for another name.
+gart::configuration_request request_of(py::kwargs const& given, char const* call);
+py::dict as_dict(gart::configuration_info const& info);
+
+// Sets attributes by name: "rates.mean" is one of a member. Errors: TypeError for a name that there is not.
+void set_attributes(py::handle object, py::kwargs const& given);
+// `given` over the options, or over their defaults.
+gart::render_options options_of(py::handle options, py::kwargs const& given, gart::render_options const& otherwise);
+
+// One caller at a time, and other Python threads go on.
+template <class F>
+decltype(auto) without_gil(std::mutex& mutex, F&& f) {
+  py::gil_scoped_release released;
+  std::lock_guard<std::mutex> const one(mutex);
+  return f();
+}
+
+// A renderer and what it was lent.
+struct python_renderer {
+  std::unique_ptr<gart::renderer> it;
+  gart::configuration_request request;
+  place where;
+  gart::render_options usual;  // of the model that was set
+  std::int64_t count = 0;      // of Gaussians
+  std::vector<lent> bound;     // their arrays, where they are somebody else's
+  std::vector<lent> recorded;  // the images that the gradients are to be of
+  gart::camera recorded_view;
+  std::mutex mutex;
+};
+
+}  // namespace gart_python

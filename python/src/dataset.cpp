@@ -1,0 +1,179 @@
+// Captures.
+#include "bindings.hpp"
+
+#include <algorithm>
+
+namespace gart_python {
+
+namespace {
+
+using shared_dataset = std::shared_ptr<gart::dataset>;
+
+gart::image8 image_of(py::handle argument, char const* name) {
+  lent const pixels = lent::of<gart::u8>(argument, {name, {-1, -1, -1}});
+  auto const& s = pixels.shape();
+  gart::image8 out(static_cast<int>(s[1]), static_cast<int>(s[0]), static_cast<int>(s[2]));
+  std::copy_n(pixels.data<gart::u8>(), pixels.size(), out.data.data());
+  return out;
+}
+
+template <class T>
+py::object shown_image(gart::basic_image<T> const& image, py::handle owner) {
+  if (image.empty()) return py::none();
+  std::vector<py::ssize_t> shape{image.height, image.width};
+  if (image.channels != 1) shape.push_back(image.channels);
+  return shown_array(std::move(shape), image.data.data(), owner);
+}
+
+// 1.1 times the largest distance of a camera from their mean, as of a capture that is read.
+float extent_of(std::vector<gart::dataset_view> const& views) {
+  gart::vec3d mean(0.0);
+  for (auto const& v : views) mean += v.view.position / static_cast<double>(views.size());
+  double radius = 0;
+  for (auto const& v : views) radius = std::max(radius, glm::distance(v.view.position, mean));
+  return radius > 0 ? static_cast<float>(1.1 * radius) : 1.0f;
+}
+
+gart::dataset dataset_of(std::vector<gart::dataset_view> train, std::vector<gart::dataset_view> test,
+                         py::object const& points, py::object const& colors) {
+  gart::dataset out;
+  out.format = "arrays", out.split = "as given", out.resize_filter = "none";
+  out.train = std::move(train), out.test = std::move(test);
+  if (out.train.empty()) throw gart::invalid_argument("Dataset: train must have at least one view");
+  out.extent = extent_of(out.train);
+  for (auto const& v : out.train) out.alpha = out.alpha || v.image.channels == 4;
+  gart::vec3d lo = out.train[0].view.position, hi = lo;
+  for (auto const& v : out.train) lo = glm::min(lo, v.view.position), hi = glm::max(hi, v.view.position);
+  out.bounds_min = lo - static_cast<double>(out.extent), out.bounds_max = hi + static_cast<double>(out.extent);
+  if (!points.is_none()) {
+    lent const positions = lent::of<float>(points, {"Dataset: points", {-1, 3}});
+    out.points.position.assign(positions.data<float>(), positions.data<float>() + positions.size());
+    if (colors.is_none()) {
+      out.points.color.assign(positions.size(), 128);
+    } else {
+      lent const bytes = lent::of<gart::u8>(colors, {"Dataset: colors", {positions.shape()[0], 3}});
+      out.points.color.assign(bytes.data<gart::u8>(), bytes.data<gart::u8>() + bytes.size());
+    }
+  }
+  return out;
+}
+
+gart::dataset load(std::filesystem::path const& path, int downscale, int test_every, std::string const& test_split,
+                   std::optional<std::filesystem::path> const& photos, bool masks, bool load_images, bool depth,
+                   py::object const& progress) {
+  gart::dataset_options options;
+  options.downscale = downscale, options.test_every = test_every, options.masks = masks;
+  options.test_split = gart::from_string<gart::split_kind>(test_split);
+  if (photos) options.photos = *photos;
+  options.load_images = load_images, options.depth.load = depth;
+  if (!progress.is_none())
+    options.progress = [&progress](std::size_t done, std::size_t total) {
+      py::gil_scoped_acquire held;
+      progress(done, total);
+    };
+  py::gil_scoped_release released;
+  return gart::load_dataset(path, options);
+}
+
+char const load_text[] = R"(Reads a capture of COLMAP, Blender or nerfstudio from a folder, or by the file named.
+
+downscale    integer factor by which images shrink, by their blocks' mean
+test_every   each Nth view by name is kept for testing; 0: none; ignored where the files have their own split
+test_split   "nth", or "sector": as many views around one side
+photos       the folder of the photos, where it is not the capture's
+masks        whether to read masks
+load_images  False: cameras alone
+depth        whether to read depth maps of the training views
+progress     called as progress(done, total) from the loading threads, one at a time
+
+Raises IoError, Unsupported for a camera model that gart does not trace, InvalidArgument.)";
+
+}  // namespace
+
+void bind_dataset(py::module_& m) {
+  using view = gart::dataset_view;
+  py::class_<view, std::shared_ptr<view>>(m, "View", R"(A photograph and its camera: View(name, camera, image).
+
+image  uint8 [H, W, 3], or [H, W, 4] with straight alpha)")
+      .def(py::init([](std::string name, gart::camera const& camera, py::object const& image) {
+             auto out = std::make_shared<view>();
+             out->name = std::move(name), out->view = camera, out->image = image_of(image, "View: image");
+             if (out->image.width != camera.width || out->image.height != camera.height ||
+                 (out->image.channels != 3 && out->image.channels != 4))
+               throw gart::invalid_argument("View: image must be of the camera's size, [H, W, 3] or [H, W, 4]");
+             return out;
+           }),
+           py::arg("name"), py::arg("camera"), py::arg("image"))
+      .def_readonly("name", &view::name)
+      .def_property_readonly(
+          "camera", [](view const& v) { return v.view; }, "a copy")
+      .def_property_readonly(
+          "image", [](py::object const& s) { return shown_image(s.cast<view const&>().image, s); },
+          "uint8 [H, W, 3 or 4], the dataset's own memory; None where images were not loaded")
+      .def_property_readonly(
+          "mask", [](py::object const& s) { return shown_image(s.cast<view const&>().mask, s); },
+          "uint8 [H, W], 0 where pixels are ignored; None where there is no mask")
+      .def_property_readonly(
+          "depth", [](py::object const& s) { return shown_image(s.cast<view const&>().depth, s); },
+          "float32 [H, W], distance along the ray, 0 where not measured; None where not loaded")
+      .def("__repr__", [](view const& v) { return "gart.View('" + v.name + "')"; });
+
+  auto const views = [](std::vector<view> gart::dataset::*member) {
+    return [member](shared_dataset const& d) {
+      py::list out;
+      // Each keeps the dataset.
+      for (view& one : (*d).*member) out.append(std::shared_ptr<view>(d, &one));
+      return out;
+    };
+  };
+  py::class_<gart::dataset, shared_dataset>(
+      m, "Dataset", R"(A capture in host memory: Dataset(train, test=[], points=None, colors=None), or load_dataset.
+
+train, test  lists of View
+points       float32 [N, 3], where training starts; none: at random
+colors       uint8 [N, 3])")
+      .def(py::init(
+               [](std::vector<view> train, std::vector<view> test, py::object const& points, py::object const& colors) {
+                 return std::make_shared<gart::dataset>(dataset_of(std::move(train), std::move(test), points, colors));
+               }),
+           py::arg("train"), py::arg("test") = std::vector<view>{}, py::arg("points") = py::none(),
+           py::arg("colors") = py::none())
+      .def_property_readonly("train", views(&gart::dataset::train))
+      .def_property_readonly("test", views(&gart::dataset::test))
+      .def_readonly("format", &gart::dataset::format, "COLMAP, Blender, nerfstudio, or arrays")
+      .def_readonly("split", &gart::dataset::split, "how train and test were told apart")
+      .def_readonly("notes", &gart::dataset::notes, "what was skipped, scaled or assumed, a line each")
+      .def_readonly("extent", &gart::dataset::extent, "1.1 times the largest distance of a camera from their mean")
+      .def_readonly("alpha", &gart::dataset::alpha, "whether images carry alpha")
+      .def_property_readonly(
+          "points",
+          [](py::object const& s) {
+            auto const& p = s.cast<gart::dataset const&>().points;
+            return shown_array({static_cast<py::ssize_t>(p.size()), 3}, p.position.data(), s);
+          },
+          "float32 [N, 3]")
+      .def_property_readonly(
+          "colors",
+          [](py::object const& s) {
+            auto const& p = s.cast<gart::dataset const&>().points;
+            return shown_array({static_cast<py::ssize_t>(p.size()), 3}, p.color.data(), s);
+          },
+          "uint8 [N, 3]")
+      .def("__repr__", [](gart::dataset const& d) {
+        return "gart.Dataset(" + d.format + ", " + std::to_string(d.train.size()) + " training views, " +
+               std::to_string(d.test.size()) + " test views)";
+      });
+  m.def(
+      "load_dataset",
+      [](std::filesystem::path const& path, int downscale, int test_every, std::string const& test_split,
+         std::optional<std::filesystem::path> const& photos, bool masks, bool load_images, bool depth,
+         py::object const& progress) {
+        return std::make_shared<gart::dataset>(
+            load(path, downscale, test_every, test_split, photos, masks, load_images, depth, progress));
+      },
+      py::arg("path"), py::kw_only(), py::arg("downscale") = 1, py::arg("test_every") = 8,
+      py::arg("test_split") = "nth", py::arg("photos") = py::none(), py::arg("masks") = true,
+      py::arg("load_images") = true, py::arg("depth") = false, py::arg("progress") = py::none(), load_text);
+}
+
+}  // namespace gart_python

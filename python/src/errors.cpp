@@ -1,0 +1,39 @@
+// gart's errors as Python's, which gart/errors.py declares.
+#include "bindings.hpp"
+
+#include <gart/core/error.hpp>
+
+namespace gart_python {
+
+namespace {
+
+template <class... Attributes>
+void raise(char const* type, std::string const& message, Attributes const&... attributes) {
+  py::object const error = py::module_::import("gart.errors").attr(type)(message);
+  (py::setattr(error, attributes.first, py::cast(attributes.second)), ...);
+  PyErr_SetObject(py::type::of(error).ptr(), error.ptr());
+}
+
+}  // namespace
+
+void bind_errors(py::module_&) {
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (gart::io_error const& e) {
+      raise("IoError", e.what(), std::pair("place", e.place), std::pair("remedy", e.remedy));
+    } catch (gart::unsupported const& e) {
+      raise("Unsupported", e.what());
+    } catch (gart::invalid_argument const& e) {
+      raise("InvalidArgument", e.what());
+    } catch (gart::out_of_memory const& e) {
+      raise("OutOfMemory", e.what(), std::pair("asked", e.asked), std::pair("available", e.available));
+    } catch (gart::not_finite const& e) {
+      raise("NotFinite", e.what(), std::pair("group", e.group), std::pair("gaussian", e.gaussian));
+    } catch (gart::error const& e) {
+      raise("Error", e.what());
+    }
+  });
+}
+
+}  // namespace gart_python

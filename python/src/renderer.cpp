@@ -1,0 +1,370 @@
+// The renderer, and tracking by it.
+#include "bindings.hpp"
+
+#include <gart/runtime/track.hpp>
+
+#include <algorithm>
+
+namespace gart_python {
+
+namespace {
+
+using self = python_renderer;
+
+template <class E>
+E named(py::handle value) {
+  return gart::from_string<E>(value.cast<std::string>());
+}
+
+std::unique_ptr<self> make(py::object const& model, py::kwargs const& given) {
+  auto out = std::make_unique<self>();
+  out->request = request_of(given, "Renderer");
+  gart::model_file const* const file = model.is_none() ? nullptr : &model.cast<gart::model_file const&>();
+  if (file && !given.contains("sh_degree")) out->request.sh_degree = file->model.sh_degree;
+  if (file && !given.contains("kernel_degree")) out->request.kernel_degree = file->kernel_degree;
+  bool const on_device = gart::resolve(out->request).backend == gart::backend_kind::cuda;
+  // Without a stream of its own the caller has the legacy default one, which others' work is in order with.
+  if (on_device && !out->request.stream) out->request.stream = reinterpret_cast<void*>(std::uintptr_t{1});
+  out->where = {on_device, out->request.device, out->request.stream};
+  py::gil_scoped_release released;
+  out->it = gart::make_renderer(out->request);
+  if (file) out->it->set_model(file->model), out->usual = file->render, out->count = std::int64_t(file->model.size());
+  return out;
+}
+
+void set_model(self& r, gart::model_file const& file) {
+  without_gil(r.mutex, [&] { r.it->set_model(file.model); });
+  r.bound.clear(), r.recorded.clear();
+  r.usual = file.render, r.count = static_cast<std::int64_t>(file.model.size());
+}
+
+constexpr char const* parameter_names[] = {"mean", "log_scale", "quaternion", "opacity", "sh"};
+
+// Five arrays of one number of Gaussians, -1: any, with what keeps them.
+template <class T>
+gart::gaussians_view<T> parameters_of(std::array<py::object, 5> const& given, std::string const& call, std::int64_t n,
+                                      place const& where, std::vector<lent>& kept) {
+  bool const writable = !std::is_const_v<T>;
+  std::vector<std::int64_t> const shapes[] = {{-1, 3}, {-1, 3}, {-1, 4}, {-1}, {-1, -1, 3}};
+  kept.clear();
+  for (std::size_t k = 0; k < 5; ++k) {
+    std::string const name = call + ": " + parameter_names[k];
+    std::vector<std::int64_t> shape = shapes[k];
+    shape[0] = n;
+    kept.push_back(lent::of<float>(given[k], {name.c_str(), std::move(shape), writable}, where));
+    n = kept[0].shape()[0];
+  }
+  if (n > static_cast<std::int64_t>(gart::most_gaussians)) gart::require_count(static_cast<std::size_t>(n));
+  gart::gaussians_view<T> out{kept[0].data<float>(),
+                              kept[1].data<float>(),
+                              kept[2].data<float>(),
+                              kept[3].data<float>(),
+                              kept[4].data<float>(),
+                              static_cast<gart::index_t>(n),
+                              0};
+  out.sh_degree = degree_of(kept[4].shape()[1], (call + ": sh").c_str());
+  return out;
+}
+
+void bind(self& r, std::array<py::object, 5> const& arrays) {
+  std::vector<lent> kept;
+  auto const view = parameters_of<float const>(arrays, "Renderer.bind", -1, r.where, kept);
+  without_gil(r.mutex, [&] { r.it->bind(view); });
+  r.bound = std::move(kept), r.recorded.clear();
+  r.count = view.count;
+}
+
+gart::render_targets targets_of(self const& r, gart::camera const& view, std::string const& call,
+                                std::array<py::object, 5> const& given, std::vector<lent>& kept) {
+  std::int64_t const h = view.height, w = view.width;
+  auto const name = [&](char const* what) { return call + ": " + what; };
+  std::string const names[] = {name("color"), name("transmittance"), name("depth"), name("hits"), name("rgba")};
+  kept.clear();
+  kept.push_back(lent::if_given<float>(given[0], {names[0].c_str(), {h, w, 3}, true}, r.where));
+  kept.push_back(lent::if_given<float>(given[1], {names[1].c_str(), {h, w}, true}, r.where));
+  kept.push_back(lent::if_given<float>(given[2], {names[2].c_str(), {h, w}, true}, r.where));
+  kept.push_back(lent::if_given<gart::u32>(given[3], {names[3].c_str(), {h, w}, true}, r.where));
+  kept.push_back(lent::if_given<gart::u8>(given[4], {names[4].c_str(), {h, w, 4}, true}, r.where));
+  return {kept[0].data<float>(), kept[1].data<float>(), kept[2].data<float>(), kept[3].data<gart::u32>(),
+          kept[4].data<gart::u8>()};
+}
+
+py::dict render(self& r, gart::camera const& view, py::object const& options, py::kwargs const& given) {
+  gart::render_options const o = options_of(options, given, r.usual);
+  r.recorded.clear();
+  gart::rendered image = without_gil(r.mutex, [&] { return r.it->render(view, o); });
+  py::dict out;
+  out["color"] = image_array(std::move(image.color));
+  out["transmittance"] = image_array(std::move(image.transmittance));
+  out["depth"] = image_array(std::move(image.depth));
+  out["hits"] = image_array(std::move(image.hits));
+  return out;
+}
+
+py::object render_8bit(self& r, gart::camera const& view, py::object const& options, py::kwargs const& given) {
+  gart::render_options const o = options_of(options, given, r.usual);
+  r.recorded.clear();
+  return image_array(without_gil(r.mutex, [&] { return r.it->render_8bit(view, o); }));
+}
+
+void render_to(self& r, gart::camera const& view, py::object const& options, std::array<py::object, 5> const& targets,
+               bool record, py::kwargs const& given) {
+  gart::render_options const o = options_of(options, given, r.usual);
+  std::vector<lent> kept;
+  gart::render_targets const to = targets_of(r, view, record ? "Renderer.record" : "Renderer.render_to", targets, kept);
+  r.recorded.clear();
+  without_gil(r.mutex, [&] { record ? r.it->record(view, o, to) : r.it->render_to(view, o, to); });
+  if (record) r.recorded = std::move(kept), r.recorded_view = view;
+}
+
+// From memory to memory, of the view that was recorded.
+void backward_to(self& r, py::object const& color, py::object const& depth, py::object const& transmittance,
+                 std::array<py::object, 5> const& gradients) {
+  if (r.recorded.empty())
+    throw gart::invalid_argument("Renderer.backward_to: call Renderer.record first, with no other view in between");
+  std::int64_t const h = r.recorded_view.height, w = r.recorded_view.width;
+  char const* const call = "Renderer.backward_to";
+  lent const by_color = lent::of<float>(color, {"Renderer.backward_to: color_gradient", {h, w, 3}}, r.where);
+  lent const by_depth = lent::if_given<float>(depth, {"Renderer.backward_to: depth_gradient", {h, w}}, r.where);
+  lent const by_transmittance =
+      lent::if_given<float>(transmittance, {"Renderer.backward_to: transmittance_gradient", {h, w}}, r.where);
+  std::vector<lent> kept;
+  auto const to = parameters_of<float>(gradients, call, r.count, r.where, kept);
+  without_gil(r.mutex, [&] {
+    r.it->differentiate_recorded({by_color.data<float>(), by_depth.data<float>(), by_transmittance.data<float>()}, to);
+  });
+}
+
+py::dict as_arrays(gart::pose_gradient const& g) {
+  py::dict out;
+  out["translation"] = owned_array({3}, std::vector<double>{g.translation.x, g.translation.y, g.translation.z});
+  out["rotation"] = owned_array({3}, std::vector<double>{g.rotation.x, g.rotation.y, g.rotation.z});
+  return out;
+}
+
+// From an array of the host to numpy arrays.
+py::dict backward(self& r, gart::camera const& view, py::object const& color, py::object const& options, bool pose,
+                  py::kwargs const& given) {
+  gart::render_options const o = options_of(options, given, r.usual);
+  lent const by = lent::of<float>(color, {"Renderer.backward: color_gradient", {view.height, view.width, 3}});
+  r.recorded.clear();
+  gart::pose_gradient turned;
+  gart::gaussian_model got = without_gil(r.mutex, [&] {
+    gart::image_float gradient(view.width, view.height, 3);
+    std::copy_n(by.data<float>(), by.size(), gradient.data.data());
+    r.it->differentiate(view, o, gradient);
+    if (pose) turned = r.it->differentiate_pose();
+    return r.it->gradients();
+  });
+  py::dict out;
+  auto const n = static_cast<py::ssize_t>(got.size());
+  out["mean"] = owned_array({n, 3}, std::move(got.mean));
+  out["log_scale"] = owned_array({n, 3}, std::move(got.log_scale));
+  out["quaternion"] = owned_array({n, 4}, std::move(got.quaternion));
+  out["opacity"] = owned_array({n}, std::move(got.opacity));
+  out["sh"] = owned_array({n, gart::sh_coefficients(got.sh_degree), 3}, std::move(got.sh));
+  if (pose) out["pose"] = as_arrays(turned);
+  return out;
+}
+
+gart::image_float photo_of(py::handle photo, gart::camera const& view) {
+  std::int64_t const h = view.height, w = view.width;
+  gart::image_float out(view.width, view.height, 3);
+  if (PyObject_CheckBuffer(photo.ptr()) && py::isinstance<py::array_t<gart::u8>>(photo)) {
+    lent const bytes = lent::of<gart::u8>(photo, {"track: photo", {h, w, 3}});
+    for (std::size_t k = 0; k < bytes.size(); ++k) out.data[k] = static_cast<float>(bytes.data<gart::u8>()[k]) / 255.0f;
+  } else {
+    lent const values = lent::of<float>(photo, {"track: photo", {h, w, 3}});
+    std::copy_n(values.data<float>(), values.size(), out.data.data());
+  }
+  return out;
+}
+
+std::pair<gart::camera, std::vector<float>> track(self& r, py::object const& photo, gart::camera const& guess,
+                                                  py::object const& options, int steps, float blur,
+                                                  py::object const& mask, py::kwargs const& given) {
+  gart::track_options o;
+  o.render = options_of(options, given, r.usual), o.steps = steps, o.blur = blur;
+  gart::image_float const image = photo_of(photo, guess);
+  gart::image8 seen;
+  if (!mask.is_none()) {
+    lent const bytes = lent::of<gart::u8>(mask, {"track: mask", {guess.height, guess.width}});
+    seen = gart::image8(guess.width, guess.height, 1);
+    std::copy_n(bytes.data<gart::u8>(), bytes.size(), seen.data.data());
+  }
+  r.recorded.clear();
+  gart::track_result found = without_gil(r.mutex, [&] { return gart::track(*r.it, image, guess, o, seen); });
+  return {found.view, std::move(found.residuals)};
+}
+
+char const class_text[] = R"(Renders and differentiates views of one model.
+
+Renderer(model=None, *, backend="auto", tracer="auto", backward="auto", sh_degree=3, kernel_degree=2,
+         lt_format="auto", depth=False, threads=0, device=0, stream=None)
+
+The degrees are those of the model where one is given. depth=True gives gradients of depth and transmittance too.
+stream is a cudaStream_t as a number, as torch.cuda.Stream.cuda_stream; without one work goes to the legacy default
+stream.
+
+Memory "of the policy" is memory of the CUDA device for backend "cuda", else of the host. Such arrays are any objects
+with the buffer protocol or DLPack, and are never copied. On a device calls return before the work is done: what the
+caller puts into the same stream comes after it, or wait().
+
+Calls drop the interpreter's lock, and one renderer serves one thread at a time. RenderOptions may be given as options,
+or by name: render(camera, background=(1, 1, 1)); without them they are those that the model's file says.)";
+
+}  // namespace
+
+gart::configuration_request request_of(py::kwargs const& given, char const* call) {
+  gart::configuration_request out;
+  for (auto const& [key, value] : given) {
+    auto const name = key.cast<std::string>();
+    if (name == "backend")
+      out.backend = named<gart::backend_kind>(value);
+    else if (name == "tracer")
+      out.tracer = named<gart::tracer_kind>(value);
+    else if (name == "backward")
+      out.backward = value.cast<std::string>();
+    else if (name == "sh_degree")
+      out.sh_degree = value.cast<int>();
+    else if (name == "kernel_degree")
+      out.kernel_degree = value.cast<int>();
+    else if (name == "lt_format")
+      out.lt_format = named<gart::lt_format_kind>(value);
+    else if (name == "depth")
+      out.depth = value.cast<bool>();
+    else if (name == "threads")
+      out.threads = value.cast<int>();
+    else if (name == "device")
+      out.device = value.cast<int>();
+    else if (name == "stream")
+      // 0 is CUDA's legacy default stream, whose handle is 1.
+      out.stream = value.is_none() ? nullptr
+                                   : reinterpret_cast<void*>(std::max<std::uintptr_t>(1, value.cast<std::uintptr_t>()));
+    else
+      throw py::type_error(std::string(call) + ": no argument '" + name +
+                           "': there are backend, tracer, backward, sh_degree, kernel_degree, lt_format, depth, "
+                           "threads, device, stream");
+  }
+  return out;
+}
+
+py::dict as_dict(gart::configuration_info const& info) {
+  py::dict out;
+  out["backend"] = to_string(info.backend), out["tracer"] = to_string(info.tracer);
+  out["backward"] = info.backward, out["sh_degree"] = info.sh_degree, out["stored_degree"] = info.stored_degree;
+  out["kernel_degree"] = info.kernel_degree, out["lt_format"] = to_string(info.lt_format);
+  out["depth"] = info.depth, out["ranks"] = info.ranks, out["instruction_set"] = info.instruction_set;
+  return out;
+}
+
+void bind_renderer(py::module_& m) {
+  auto const none = py::none();
+  py::class_<self>(m, "Renderer", class_text)
+      .def(py::init(&make), py::arg("model") = none)
+      .def("set_model", &set_model, py::arg("model"), "Copies the model; arrays that were bound are let go.")
+      .def(
+          "bind",
+          [](self& r, py::object a, py::object b, py::object c, py::object d, py::object e) {
+            bind(r, {a, b, c, d, e});
+          },
+          py::arg("mean"), py::arg("log_scale"), py::arg("quaternion"), py::arg("opacity"), py::arg("sh"),
+          R"(Takes float32 arrays in memory of the policy, of Model's shapes, without a copy.
+
+They are kept until another model is set or bound. What is written to them between two views counts for the second.)")
+      .def("render", &render, py::arg("camera"), py::arg("options") = none,
+           R"(A view as a dictionary of new numpy arrays:
+
+color          float32 [H, W, 3], background composited
+transmittance  float32 [H, W]
+depth          float32 [H, W], sum of weight * distance along the ray
+hits           uint32 [H, W], Gaussians composited)")
+      .def("render_8bit", &render_8bit, py::arg("camera"), py::arg("options") = none,
+           "The colours of a view as a new numpy array, uint8 [H, W, 3].")
+      .def(
+          "render_to",
+          [](self& r, gart::camera const& view, py::object const& options, py::object a, py::object b, py::object c,
+             py::object d, py::object e, py::kwargs const& given) {
+            render_to(r, view, options, {a, b, c, d, e}, false, given);
+          },
+          py::arg("camera"), py::arg("options") = none, py::kw_only(), py::arg("color") = none,
+          py::arg("transmittance") = none, py::arg("depth") = none, py::arg("hits") = none, py::arg("rgba") = none,
+          "A view into memory of the policy, of render's shapes; rgba is uint8 [H, W, 4].")
+      .def(
+          "record",
+          [](self& r, gart::camera const& view, py::object const& options, py::object a, py::object b, py::object c,
+             py::object d, py::object e, py::kwargs const& given) {
+            render_to(r, view, options, {a, b, c, d, e}, true, given);
+          },
+          py::arg("camera"), py::arg("options") = none, py::kw_only(), py::arg("color") = none,
+          py::arg("transmittance") = none, py::arg("depth") = none, py::arg("hits") = none, py::arg("rgba") = none,
+          "As render_to, with what backward_to needs. Its arrays must stay unchanged until then.")
+      .def(
+          "backward_to",
+          [](self& r, py::object const& color, py::object a, py::object b, py::object c, py::object d, py::object e,
+             py::object const& depth, py::object const& transmittance) {
+            backward_to(r, color, depth, transmittance, {a, b, c, d, e});
+          },
+          py::arg("color_gradient"), py::arg("mean"), py::arg("log_scale"), py::arg("quaternion"), py::arg("opacity"),
+          py::arg("sh"), py::kw_only(), py::arg("depth_gradient") = none, py::arg("transmittance_gradient") = none,
+          R"(Gradients of the view that record made last, into memory of the policy, which is overwritten.
+
+color_gradient   float32 [H, W, 3], dL/dcolour; those of depth and transmittance, [H, W], need depth=True
+mean, ..., sh    float32, of Model's shapes: dL/d each)")
+      .def("backward", &backward, py::arg("camera"), py::arg("color_gradient"), py::arg("options") = none,
+           py::kw_only(), py::arg("pose") = false,
+           R"(Both passes of a view, for dL/dcolour as float32 [H, W, 3] on the host.
+
+A dictionary of new numpy arrays, dL/d mean, log_scale, quaternion, opacity and sh of Model's shapes; with pose=True
+also "pose", as pose_gradient has it.)")
+      .def(
+          "pose_gradient",
+          [](self& r) { return as_arrays(without_gil(r.mutex, [&] { return r.it->differentiate_pose(); })); },
+          R"(dL/d the pose of the view of the last gradients, which must still be where they went.
+
+translation  float64 [3], by the camera's position, world units
+rotation     float64 [3], by a small turn w of the camera about its position, world axes: a direction d becomes d + w x d)")
+      .def(
+          "wait", [](self& r) { without_gil(r.mutex, [&] { r.it->wait(); }); }, "Until all that was asked for is done.")
+      .def(
+          "profile",
+          [](self& r, bool enable) {
+            py::dict out;
+            gart::profiler& times = without_gil(r.mutex, [&]() -> gart::profiler& { return r.it->profile(); });
+            for (auto const& [label, time] : times.stages())
+              out[label.c_str()] = py::make_tuple(time.milliseconds, time.launches);
+            times.clear(), times.enable(enable);
+            return out;
+          },
+          py::arg("enable") = true,
+          "Times by stage since the last call, as (milliseconds, launches); from the first call on.")
+      .def_property_readonly("configuration", [](self const& r) { return as_dict(r.it->configuration()); })
+      .def_property_readonly(
+          "peak_bytes", [](self const& r) { return r.it->peak_bytes(); },
+          "Most bytes of the policy's memory that were in use at a time.")
+      .def("__len__", [](self const& r) { return r.count; });
+
+  m.def("track", &track, py::arg("renderer"), py::arg("photo"), py::arg("guess"), py::arg("options") = none,
+        py::kw_only(), py::arg("steps") = 60, py::arg("blur") = 0.05f, py::arg("mask") = none,
+        R"(Where a photograph was taken, from the renderer's model and a guess.
+
+photo  float32 [H, W, 3] in [0, 1], or uint8, of the guess's size
+mask   uint8 [H, W], 0 where it is not to be looked at
+steps  images at most
+blur   standard deviation of the first blur over the image's width; 0: none
+
+Returns the camera that was found, and the root mean squared error after each step.)");
+  m.def(
+      "resolve", [](py::kwargs const& given) { return as_dict(gart::resolve(request_of(given, "resolve"))); },
+      "The configuration that Renderer and Session would take for these arguments.");
+  m.def(
+      "configurations",
+      [] {
+        py::list out;
+        for (auto const& one : gart::compiled_configurations()) out.append(as_dict(one));
+        return out;
+      },
+      "All configurations that were compiled in.");
+}
+
+}  // namespace gart_python

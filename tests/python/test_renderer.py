@@ -1,0 +1,166 @@
+"""Images and gradients against their definition in double, cameras, files, errors, threads."""
+import pathlib
+import tempfile
+import threading
+import unittest
+
+import gart
+import numpy as np
+import scenes
+
+NAMES = ["mean", "log_scale", "quaternion", "opacity", "sh"]
+
+
+class Renderer(unittest.TestCase):
+    def test_image_is_the_reference(self):
+        model, view = scenes.model(n=60, degree=3), scenes.camera()
+        expected = gart.reference(model, view, background=(0.1, 0.2, 0.3))
+        for backend in ("serial", "openmp"):
+            got = gart.Renderer(model, backend=backend).render(view, background=(0.1, 0.2, 0.3))
+            self.assertEqual(got["color"].dtype, np.float32)
+            for name in ("color", "transmittance", "depth"):
+                np.testing.assert_allclose(got[name], expected[name], atol=2e-4)
+            self.assertEqual(got["hits"].dtype, np.uint32)
+            self.assertLess((got["hits"] != expected["hits"]).mean(), 0.01)
+
+    def test_gradients_are_the_reference(self):
+        model, view = scenes.model(n=60, degree=2), scenes.camera()
+        gradient = np.random.default_rng(3).normal(0, 1, (32, 40, 3))
+        expected = gart.reference(model, view, gradient, **scenes.SMOOTH)["gradients"]
+        got = gart.Renderer(model, backend="serial").backward(view, gradient.astype(np.float32), **scenes.SMOOTH)
+        for name in NAMES:
+            self.assertEqual(got[name].shape, getattr(model, name).shape)
+            np.testing.assert_allclose(got[name], expected[name], rtol=2e-3, atol=2e-3 * np.abs(expected[name]).max())
+
+    def test_gradients_in_two_calls_are_the_same(self):
+        arrays, view = scenes.parameters(degree=1), scenes.camera()
+        renderer = gart.Renderer(sh_degree=1, backend="serial")
+        renderer.bind(*arrays)
+        gradient = np.random.default_rng(3).normal(0, 1, (32, 40, 3)).astype(np.float32)
+        expected = renderer.backward(view, gradient, pose=True)
+        color, out = np.empty((32, 40, 3), np.float32), [np.full_like(a, np.nan) for a in arrays]
+        with self.assertRaisesRegex(gart.InvalidArgument, "call Renderer.record first"):
+            renderer.backward_to(gradient, *out)
+        renderer.record(view, color=color)
+        renderer.backward_to(gradient, *out)
+        for name, array in zip(NAMES, out):
+            np.testing.assert_array_equal(array, expected[name])
+        for name, array in renderer.pose_gradient().items():
+            np.testing.assert_array_equal(array, expected["pose"][name])
+        renderer.render(view)  # another view in between
+        with self.assertRaisesRegex(gart.InvalidArgument, "call Renderer.record first"):
+            renderer.backward_to(gradient, *out)
+
+    def test_depth_and_transmittance_have_gradients(self):
+        model, view = scenes.model(n=30, degree=0), scenes.camera()
+        random = np.random.default_rng(4)
+        by_color, by_depth = random.normal(0, 1, (32, 40, 3)), random.normal(0, 1, (32, 40))
+        expected = gart.reference(model, view, by_color, by_depth, **scenes.SMOOTH)["gradients"]
+        arrays = [getattr(model, name) for name in NAMES]
+        renderer = gart.Renderer(sh_degree=0, depth=True, backend="openmp")
+        renderer.bind(*arrays)
+        out = [np.empty_like(a) for a in arrays]
+        renderer.record(view, **scenes.SMOOTH)
+        renderer.backward_to(by_color.astype(np.float32), *out, depth_gradient=by_depth.astype(np.float32))
+        for name, array in zip(NAMES, out):
+            np.testing.assert_allclose(array, expected[name], rtol=2e-3, atol=2e-3 * np.abs(expected[name]).max())
+        plain = gart.Renderer(model, backend="openmp")
+        plain.record(view)
+        with self.assertRaisesRegex(gart.InvalidArgument, "no gradient of depth"):
+            plain.backward_to(by_color.astype(np.float32), *out, depth_gradient=by_depth.astype(np.float32))
+
+    def test_cameras(self):
+        view = gart.Camera(64, 48, 50, 51)
+        self.assertEqual((view.cx, view.cy, view.model), (32, 24, "PINHOLE"))
+        np.testing.assert_array_equal(view.c2w, np.eye(4))
+        view.c2w = scenes.C2W[:3]
+        np.testing.assert_allclose(view.c2w, scenes.C2W, atol=1e-7)
+        again = gart.Camera.from_json(view.json())
+        np.testing.assert_array_equal(again.c2w, view.c2w)
+        wide = gart.Camera(64, 48, 20, 20, model="OPENCV_FISHEYE", k1=0.1, k2=0.0, k3=0.0, k4=0.0, c2w=scenes.C2W)
+        self.assertEqual(wide.model, "OPENCV_FISHEYE")
+        self.assertAlmostEqual(wide.parameters["k1"], 0.1, 6)
+        image = gart.Renderer(scenes.model(), backend="openmp").render(wide)["color"]
+        np.testing.assert_allclose(image, gart.reference(scenes.model(), wide)["color"], atol=2e-4)
+        with self.assertRaises(gart.Error):
+            gart.Camera(64, 48, 20, 20, model="NO_SUCH")
+        with self.assertRaisesRegex(gart.InvalidArgument, "fx and fy must be positive"):
+            gart.Camera(64, 48, -1, 20)
+        with self.assertRaisesRegex(gart.InvalidArgument, "c2w must be a matrix"):
+            gart.Camera(64, 48, 20, 20, c2w=[1, 2, 3])
+
+    def test_models_go_to_files_and_back(self):
+        model = scenes.model(degree=3)
+        model.render = gart.RenderOptions(antialias=0.25, alpha_min=0.01)
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "model.ply"
+            gart.save_model(path, model)
+            again = gart.load_model(str(path))
+            for name in NAMES:
+                np.testing.assert_array_equal(getattr(again, name), getattr(model, name))
+            self.assertAlmostEqual(again.render.antialias, 0.25)
+            with self.assertRaises(gart.IoError) as caught:
+                gart.load_model(path.with_name("absent.ply"))
+        self.assertIsInstance(caught.exception, OSError)
+        self.assertTrue(caught.exception.file.endswith("absent.ply"))
+        self.assertTrue(caught.exception.remedy)
+
+    def test_errors_name_field_and_remedy(self):
+        renderer = gart.Renderer(scenes.model(), backend="serial")
+        with self.assertRaises(gart.InvalidArgument) as caught:
+            renderer.render(scenes.camera(), near=-1.0)
+        self.assertIsInstance(caught.exception, ValueError)
+        self.assertEqual(caught.exception.field, "render_options.near")
+        with self.assertRaisesRegex(gart.InvalidArgument, "'abacus' is none of auto, serial"):
+            gart.Renderer(backend="abacus")
+        with self.assertRaisesRegex(gart.Unsupported, "no compiled configuration"):
+            gart.Renderer(backend="serial", backward="abacus")
+        with self.assertRaisesRegex(TypeError, "no option 'nearr': there are .*near"):
+            renderer.render(scenes.camera(), nearr=1.0)
+        with self.assertRaisesRegex(TypeError, "no argument 'bakend'"):
+            gart.Renderer(bakend="serial")
+
+    def test_threads_share_a_renderer_and_the_lock_is_dropped(self):
+        renderer = gart.Renderer(scenes.model(n=400), backend="serial")
+        view, small = scenes.camera(400, 320), scenes.camera()
+        expected = [renderer.render(view)["color"], renderer.render(small)["color"]]
+        failures, ticks, done = [], [], threading.Event()
+
+        def work(which):
+            for _ in range(4):
+                got = renderer.render([view, small][which])["color"]
+                if not np.array_equal(got, expected[which]):
+                    failures.append(which)
+
+        def tick():
+            while not done.is_set():
+                ticks.append(1)
+                done.wait(1e-4)
+
+        threads = [threading.Thread(target=work, args=(k % 2,)) for k in range(4)]
+        ticking = threading.Thread(target=tick)
+        ticking.start()
+        for t in threads:
+            t.start()
+        for t in threads:
+            t.join()
+        done.set()
+        ticking.join()
+        self.assertEqual(failures, [])
+        self.assertGreater(len(ticks), 10)
+
+    def test_tracking_finds_the_camera(self):
+        model, truth = scenes.model(n=60), scenes.camera(80, 64)
+        renderer = gart.Renderer(model, backend="openmp")
+        photo = renderer.render(truth)["color"]
+        guess = gart.Camera.from_json(truth.json())
+        moved = guess.c2w
+        moved[:3, 3] += 0.05
+        guess.c2w = moved
+        found, residuals = gart.track(renderer, photo, guess)
+        self.assertLess(np.abs(found.c2w - truth.c2w).max(), 5e-3)
+        self.assertLess(residuals[-1], residuals[0])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,181 @@
+"""gart.torch against finite differences and against the renderer; skipped without torch."""
+import importlib.util
+import unittest
+
+import gart
+import numpy as np
+import scenes
+
+if importlib.util.find_spec("torch") is None:
+    raise unittest.SkipTest("no torch (python3-torch)")
+import gart.torch
+import torch
+
+
+
+def tensors(**kinds):
+    return [torch.from_numpy(a).requires_grad_() for a in scenes.parameters(**kinds)]
+
+
+def finite_differences(loss, values, step):
+    """d loss / d values, a float64 tensor, by central differences."""
+    out = torch.empty(values.shape, dtype=torch.float64)
+    flat, to = values.detach().clone().reshape(-1), out.reshape(-1)
+    for k in range(flat.numel()):
+        at = flat[k].item()
+        both = []
+        for sign in (1, -1):
+            flat[k] = at + sign * step
+            both.append((flat[k].double().item(), loss(flat.reshape(values.shape))))
+        flat[k] = at
+        to[k] = (both[0][1] - both[1][1]) / (both[0][0] - both[1][0])
+    return out
+
+
+class Torch(unittest.TestCase):
+    def assert_close(self, got, expected, share=0.02):
+        error = (got.double() - expected).abs().max().item()
+        self.assertLess(error, share * expected.abs().max().item())
+
+    def test_images_are_the_renderers(self):
+        arrays, view = tensors(), scenes.camera()
+        expected = gart.Renderer(scenes.model(), backend="openmp").render(view, background=(1, 0.5, 0))
+        color, transmittance, depth = gart.torch.render(*arrays, view, background=(1, 0.5, 0))
+        self.assertTrue(color.requires_grad)
+        np.testing.assert_array_equal(color.detach().numpy(), expected["color"])
+        np.testing.assert_array_equal(transmittance.detach().numpy(), expected["transmittance"])
+        np.testing.assert_array_equal(depth.detach().numpy(), expected["depth"])
+
+    def test_gradients_are_finite_differences(self):
+        """Of colour, transmittance and depth at once, by every input. The differences are of the definition in double."""
+        arrays, view = tensors(n=4, degree=1), scenes.camera(24, 20)
+        with torch.no_grad():  # behind each other: where two change places, gradients know nothing of the step
+            arrays[0][:, 2] = torch.tensor([2.0, -1.5, 0.5, 4.0])
+            arrays[1] -= 0.3
+        random = np.random.default_rng(5)
+        weights = [random.normal(0, 1, s) for s in ((20, 24, 3), (20, 24), (20, 24))]
+
+        def loss(images):
+            return sum((torch.from_numpy(w) * image.double()).sum() for w, image in zip(weights, images))
+
+        def by_definition(values, at, placed=view):
+            numbers = [a.detach() for a in arrays]
+            if at is not None:
+                numbers[at] = values
+            got = gart.reference(gart.Model(*numbers), placed, **scenes.SMOOTH)
+            return sum((w * got[name]).sum() for w, name in zip(weights, ("color", "transmittance", "depth")))
+
+        c2w = torch.from_numpy(scenes.C2W).requires_grad_()
+        loss(gart.torch.render(*arrays, view, c2w=c2w, **scenes.SMOOTH)).backward()
+        for k, array in enumerate(arrays):
+            self.assert_close(array.grad, finite_differences(lambda v: by_definition(v, k), array, 2e-3))
+
+        def moved(numbers):
+            w = numbers[3:]
+            cross = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+            placed, pose = gart.Camera.from_json(view.json()), scenes.C2W.copy()
+            pose[:3, :3] = (np.eye(3) + cross + cross @ cross / 2) @ pose[:3, :3]
+            pose[:3, 3] += numbers[:3]
+            placed.c2w = pose
+            return placed
+
+        six = finite_differences(lambda v: by_definition(None, None, moved(v.numpy())),
+                                 torch.zeros(6, dtype=torch.float64), 1e-3)
+        self.assert_close(c2w.grad[:3, 3], six[:3])
+        rows = c2w.grad[:3, :3] @ c2w.detach()[:3, :3].T  # dL/dw from the matrix's gradient
+        turned = torch.stack([rows[2, 1] - rows[1, 2], rows[0, 2] - rows[2, 0], rows[1, 0] - rows[0, 1]])
+        self.assert_close(turned, six[3:])
+
+    def test_views_in_between_change_no_gradient(self):
+        view, other = scenes.camera(), scenes.camera(24, 20)
+        weight = torch.from_numpy(np.random.default_rng(5).normal(0, 1, (32, 40, 3)).astype(np.float32))
+        alone, between = tensors(), tensors()
+        (weight * gart.torch.render(*alone, view)[0]).sum().backward()
+        image = gart.torch.render(*between, view)[0]
+        gart.torch.render(*tensors(seed=9), other)[0].sum().backward()
+        (weight * image).sum().backward()
+        for a, b in zip(alone, between):
+            np.testing.assert_allclose(a.grad, b.grad, rtol=1e-4, atol=1e-5 * float(a.grad.abs().max()))
+
+    def test_tensors_are_refused_by_name(self):
+        arrays = tensors()
+        with self.assertRaisesRegex(gart.InvalidArgument, "log_scale must be float32"):
+            gart.torch.render(arrays[0], arrays[1].double(), *arrays[2:], scenes.camera())
+
+    def test_rasterization_is_render(self):
+        mean, log_scale, quaternion, opacity, sh = tensors()
+        view = scenes.camera()
+        w2c = torch.from_numpy(np.linalg.inv(scenes.C2W)).float()[None].requires_grad_()
+        k = torch.tensor([[[view.fx, 0, view.cx], [0, view.fy, view.cy], [0, 0, 1]]])
+        colors, alphas, meta = gart.torch.rasterization(mean, quaternion, log_scale.exp(), torch.sigmoid(opacity), sh,
+                                                        w2c, k, 40, 32, sh_degree=1, render_mode="RGB+ED")
+        self.assertEqual((colors.shape, alphas.shape), ((1, 32, 40, 4), (1, 32, 40, 1)))
+        self.assertEqual(meta["width"], 40)
+        expected = gart.reference(scenes.model(), view)
+        np.testing.assert_allclose(colors[0, ..., :3].detach(), expected["color"], atol=5e-4)
+        np.testing.assert_allclose(alphas[0, ..., 0].detach(), 1 - expected["transmittance"], atol=5e-4)
+        colors.sum().backward()
+        for tensor in (mean, log_scale, quaternion, opacity, sh, w2c):
+            self.assertTrue(torch.isfinite(tensor.grad).all())
+            self.assertGreater(tensor.grad.abs().max(), 0)
+
+    def test_rasterization_of_plain_colours_and_features(self):
+        mean, log_scale, quaternion, opacity, _ = tensors()
+        features = torch.rand(40, 5, generator=torch.Generator().manual_seed(1)).requires_grad_()
+        backgrounds = torch.rand(2, 5, generator=torch.Generator().manual_seed(2)).requires_grad_()
+        view = scenes.camera()
+        w2c = torch.from_numpy(np.linalg.inv(scenes.C2W)).float().expand(2, 4, 4)
+        k = torch.tensor([[view.fx, 0, view.cx], [0, view.fy, view.cy], [0, 0, 1]]).expand(2, 3, 3)
+        gaussians = (mean, quaternion, log_scale.exp(), torch.sigmoid(opacity))
+        many, alphas, _ = gart.torch.rasterization(*gaussians, features, w2c, k, 40, 32, backgrounds=backgrounds)
+        self.assertEqual(many.shape, (2, 32, 40, 5))
+        last, _, _ = gart.torch.rasterization(*gaussians, features[:, 2:5], w2c, k, 40, 32,
+                                              backgrounds=backgrounds[:, 2:5])
+        np.testing.assert_allclose(many[..., 2:5].detach(), last.detach(), atol=2e-5)
+        many.sum().backward()
+        np.testing.assert_allclose(backgrounds.grad, (1 - alphas.detach()).sum((1, 2)).expand(2, 5), rtol=1e-4)
+        # A feature's gradient is the sum of its weights, alike for all of them.
+        np.testing.assert_allclose(features.grad[:, 0], features.grad[:, 4], rtol=1e-3, atol=1e-3)
+
+    def test_a_scene_is_learned_by_torch(self):
+        view = scenes.camera()
+        truth = gart.torch.render(*[a.detach() for a in tensors(degree=0)], view)[0]
+        arrays = tensors(degree=0)
+        with torch.no_grad():
+            arrays[4] += 0.5
+            arrays[0] += 0.05
+        adam = torch.optim.Adam(arrays, lr=0.02)
+        losses = []
+        for _ in range(60):
+            loss = (gart.torch.render(*arrays, view)[0] - truth).square().mean()
+            adam.zero_grad()
+            loss.backward()
+            adam.step()
+            losses.append(loss.item())
+        self.assertLess(losses[-1], losses[0] / 20)
+
+    def test_no_tensor_is_copied(self):
+        """The renderer is lent torch's own memory: it sees what is written there."""
+        arrays = [a.detach() for a in tensors()]
+        renderer = gart.Renderer(sh_degree=1, backend="serial")
+        renderer.bind(*arrays)
+        color = torch.empty(32, 40, 3)
+        renderer.render_to(scenes.camera(), color=color)
+        before = color.clone()
+        arrays[4].fill_(0.5)
+        renderer.render_to(scenes.camera(), color=color)
+        self.assertGreater((color - before).abs().max(), 0.05)
+
+    @unittest.skipUnless(hasattr(torch.library, "custom_op"), "torch has no custom_op: the operators are not there")
+    def test_operators_pass_torchs_own_check(self):
+        arrays, view = tensors(n=6, degree=0), scenes.camera(16, 12)
+        c2w = torch.from_numpy(scenes.C2W).requires_grad_()
+        numbers = [1 / 255, 1e-4, 0.01, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+        torch.library.opcheck(torch.ops.gart.render.default,
+                              (*arrays, c2w, view.json(), numbers, 2, True, view.height, view.width))
+        compiled = torch.compile(lambda *a: gart.torch.render(*a, view)[0])
+        torch.testing.assert_close(compiled(*arrays), gart.torch.render(*arrays, view)[0])
+
+
+if __name__ == "__main__":
+    unittest.main()
