@@ -11,6 +11,7 @@ import functools
 import threading
 
 import torch
+from torch.utils.dlpack import to_dlpack as _lend  # without __dlpack__'s waits: all work is in torch's current stream
 
 from . import _gart
 from .errors import InvalidArgument
@@ -73,10 +74,10 @@ def _forward(parameters, camera, options, kernel_degree, record):
     transmittance, depth = mean.new_empty(shape), mean.new_empty(shape)
     shared = _shared_of(mean, _degree_of(sh), kernel_degree)
     with shared.lock:
-        shared.renderer.bind(*parameters)
+        shared.renderer.bind(*map(_lend, parameters))
         go = shared.renderer.record if record else shared.renderer.render_to
         shared.recorded = None
-        go(camera, options, color=color, transmittance=transmittance, depth=depth)
+        go(camera, options, color=_lend(color), transmittance=_lend(transmittance), depth=_lend(depth))
         if record:
             shared.recorded = color.data_ptr()
     return color, transmittance, depth
@@ -91,16 +92,16 @@ def _backward(parameters, camera, options, kernel_degree, color, gradients, pose
     out = [torch.empty_like(p) for p in parameters]
     with shared.lock:
         if shared.recorded is None or shared.recorded != color.data_ptr():
-            shared.renderer.bind(*parameters)
+            shared.renderer.bind(*map(_lend, parameters))
             shared.recorded = None
             shared.renderer.record(camera, options)
-        by_color = torch.zeros_like(color) if by_color is None else by_color.contiguous()
+        by_color = torch.zeros_like(color) if by_color is None else by_color
         more = {}
         if by_transmittance is not None:
-            more["transmittance_gradient"] = by_transmittance.contiguous()
+            more["transmittance_gradient"] = _lend(by_transmittance.contiguous())
         if by_depth is not None:
-            more["depth_gradient"] = by_depth.contiguous()
-        shared.renderer.backward_to(by_color, *out, **more)
+            more["depth_gradient"] = _lend(by_depth.contiguous())
+        shared.renderer.backward_to(_lend(by_color.contiguous()), *map(_lend, out), **more)
         turned = shared.renderer.pose_gradient() if pose else None
     if turned is None:
         return (*out, None, None)

@@ -38,6 +38,18 @@ bool c_order(std::vector<std::int64_t> const& shape, Stride const* strides, std:
   return true;
 }
 
+// The capsule itself, as torch.utils.dlpack.to_dlpack makes it, where the caller keeps the order of work.
+py::object capsule_of(py::handle argument, wanted const& w, place const& where) {
+  if (PyCapsule_IsValid(argument.ptr(), "dltensor")) return py::reinterpret_borrow<py::object>(argument);
+  if (!py::hasattr(argument, "__dlpack__"))
+    throw gart::invalid_argument(std::string(w.name) +
+                                 " must be an array: an object with the buffer protocol or with " + "__dlpack__, not " +
+                                 std::string(py::str(py::type::of(argument))));
+  auto const device = argument.attr("__dlpack_device__")().cast<std::pair<int, int>>();
+  if (device.first != dl_cuda || !where.cuda) return argument.attr("__dlpack__")();
+  return argument.attr("__dlpack__")(py::arg("stream") = reinterpret_cast<std::intptr_t>(where.stream));
+}
+
 }  // namespace
 
 std::size_t lent::size() const {
@@ -68,15 +80,7 @@ lent lent::take(py::handle argument, wanted const& w, place const& where) {
     });
     return out;
   }
-  if (!py::hasattr(argument, "__dlpack__"))
-    throw gart::invalid_argument(std::string(w.name) +
-                                 " must be an array: an object with the buffer protocol or with " + "__dlpack__, not " +
-                                 std::string(py::str(py::type::of(argument))));
-  auto const device = argument.attr("__dlpack_device__")().cast<std::pair<int, int>>();
-  bool const on_device = device.first == dl_cuda;
-  auto capsule = on_device && where.cuda
-                     ? argument.attr("__dlpack__")(py::arg("stream") = reinterpret_cast<std::intptr_t>(where.stream))
-                     : argument.attr("__dlpack__")();
+  py::object const capsule = capsule_of(argument, w, where);
   auto* managed = static_cast<dl_managed_tensor*>(PyCapsule_GetPointer(capsule.ptr(), "dltensor"));
   if (!managed) throw py::error_already_set();
   PyCapsule_SetName(capsule.ptr(), "used_dltensor");
@@ -85,12 +89,17 @@ lent lent::take(py::handle argument, wanted const& w, place const& where) {
     if (m->deleter) m->deleter(m);
   });
   dl_tensor const& t = managed->tensor;
+  bool const on_device = t.device.type == dl_cuda || t.device.type == dl_cuda_managed;
+  if (!on_device && t.device.type != dl_cpu && t.device.type != dl_cuda_host)
+    throw gart::invalid_argument(std::string(w.name) +
+                                 " must be on the host or on a CUDA device, and lies on a device " +
+                                 "of DLPack's type " + std::to_string(t.device.type));
   out.data_ = static_cast<char*>(t.data) + t.byte_offset;
   out.shape_.assign(t.shape, t.shape + t.dimensions);
   out.type_ = {t.type.code, t.type.lanes == 1 ? t.type.bits : std::uint8_t{0}};
   out.in_order_ = c_order(out.shape_, t.strides, 1);
   out.writable_ = true;
-  out.where_.cuda = t.device.type == dl_cuda, out.where_.device = t.device.id;
+  out.where_.cuda = on_device, out.where_.device = t.device.id;
   return out;
 }
 
