@@ -3,8 +3,8 @@
 #include "progress.hpp"
 #include "train_fields.hpp"
 
-#include <gart/optim/error_growth.hpp>
 #include <gart/runtime/validation.hpp>
+#include <gart/train/densify/error_growth.hpp>
 #include <gart/train/resolution.hpp>
 
 #include <algorithm>
