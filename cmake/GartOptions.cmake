@@ -28,20 +28,13 @@ set(GART_CUDA AUTO CACHE STRING "CUDA policy: ON, OFF, or AUTO (where nvcc is fo
 set(GART_EMBREE AUTO CACHE STRING "Embree tracer: ON, OFF, or AUTO (where Embree is found)")
 set(GART_DISTRIBUTED AUTO CACHE STRING "Training on several ranks: ON, OFF, or AUTO (where MPI is found)")
 set(GART_NCCL AUTO CACHE STRING "Ranks with a GPU each: ON, OFF, or AUTO (where CUDA, MPI and NCCL are found)")
-<<<<<<< HEAD
-if(NOT GART_BUILD_BACKENDS)
-  foreach(_option IN ITEMS GART_BUILD_PROGRAM GART_VARIANTS GART_BUILD_EXAMPLES GART_BUILD_TESTS GART_BUILD_BENCH
-                           GART_BUILD_FUZZ GART_CUDA GART_EMBREE GART_DISTRIBUTED GART_NCCL)
-=======
-set(GART_VIEW AUTO CACHE STRING "The viewer's server: ON, OFF, or AUTO (where libwebsockets is found)")
 set(GART_PYTHON AUTO CACHE STRING "The Python module: ON, OFF, or AUTO (where Python's headers and pybind11 are found)")
 if((NOT PROJECT_IS_TOP_LEVEL OR GART_SANITIZE) AND GART_PYTHON STREQUAL "AUTO")
   set(GART_PYTHON OFF)
 endif()
 if(NOT GART_BUILD_BACKENDS)
   foreach(_option IN ITEMS GART_BUILD_PROGRAM GART_VARIANTS GART_BUILD_EXAMPLES GART_BUILD_TESTS GART_BUILD_BENCH
-                           GART_BUILD_FUZZ GART_CUDA GART_EMBREE GART_DISTRIBUTED GART_NCCL GART_VIEW GART_PYTHON)
->>>>>>> heads/h-python
+                           GART_BUILD_FUZZ GART_CUDA GART_EMBREE GART_DISTRIBUTED GART_NCCL GART_PYTHON)
     if(${_option} AND NOT "${${_option}}" STREQUAL "AUTO")
       message(FATAL_ERROR "${_option} is ${${_option}} and needs the libraries, which GART_BUILD_BACKENDS=OFF leaves out: "
                           "configure with -D${_option}=OFF, or with -DGART_BUILD_BACKENDS=ON")
@@ -51,11 +44,7 @@ if(NOT GART_BUILD_BACKENDS)
   set(GART_EMBREE OFF)
   set(GART_DISTRIBUTED OFF)
   set(GART_NCCL OFF)
-<<<<<<< HEAD
-=======
-  set(GART_VIEW OFF)
   set(GART_PYTHON OFF)
->>>>>>> heads/h-python
 endif()
 
 include(CheckLanguage)
@@ -148,16 +137,6 @@ elseif(NOT GART_CUDA OR NOT GART_DISTRIBUTED)
 else()
   find_package(NCCL REQUIRED)
 endif()
-<<<<<<< HEAD
-=======
-
-list(APPEND CMAKE_MODULE_PATH ${PROJECT_SOURCE_DIR}/backends/view)
-if(GART_VIEW STREQUAL "AUTO")
-  find_package(Libwebsockets QUIET)
-  set(GART_VIEW ${Libwebsockets_FOUND})
-elseif(GART_VIEW)
-  find_package(Libwebsockets REQUIRED)
-endif()
 
 # Of the interpreters that there are, the first that has numpy: Python's own are found without it.
 if(GART_PYTHON)
@@ -191,4 +170,3 @@ if(GART_PYTHON)
   endif()
   set(GART_PYTHON_FOLDER ${_folder} CACHE STRING "Where the Python module is installed, below the prefix")
 endif()
->>>>>>> heads/h-python

@@ -61,7 +61,7 @@ int run_bench(bench_arguments const& a) {
   options.densify = gart::densify_kind::none;
   options.iterations = 1;  // the full SH degree from the first step
   options.sh_every = 1;
-  options.render = file.render.approximations();
+  options.render = file.render;
   // Rates of zero keep the model as it is; Adam's work is the same.
   options.rates = {0, 0, 0, 0, 0, 0, 0};
 

@@ -3,8 +3,8 @@
 #include "progress.hpp"
 #include "train_fields.hpp"
 
-#include <gart/optim/error_growth.hpp>
 #include <gart/runtime/validation.hpp>
+#include <gart/train/densify/error_growth.hpp>
 #include <gart/train/resolution.hpp>
 
 #include <algorithm>
@@ -88,8 +88,8 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
         : start.value.random                      ? "the capture has no points: random ones"
         : start.value.count == data.points.size() ? "the capture's points"
                                                   : "a random subset of the capture's points");
-    say("--init-opacity", short_number(start.value.opacity), a.initial_opacity != 0 ? by_option : start.why);
-    say("--init-scale", short_number(start.value.scale), a.initial_scale != 0 ? by_option : start.why);
+    say("--init-opacity", short_number(start.value.opacity), a.options.initial_opacity != 0 ? by_option : start.why);
+    say("--init-scale", short_number(start.value.scale), a.options.initial_scale != 0 ? by_option : start.why);
   }
   gart::train_options const options = train_options_of(a);
   auto const budget = gart::choose_budget(data, options);

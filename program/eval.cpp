@@ -145,7 +145,7 @@ int run_eval(eval_arguments const& a) {
   metrics["kernel_degree"] = file.kernel_degree;
   metrics["backend"] = gart::to_string(configuration.backend),
   metrics["tracer"] = gart::to_string(configuration.tracer);
-  metrics["approximations"] = approximations_of(options.approximations(), configuration);
+  metrics["approximations"] = approximations_of(options, configuration);
   metrics["peak_bytes"] = most_bytes;
   write_json(a.out, metrics);
   say.clear();

@@ -1,9 +1,10 @@
 #include "field_names.hpp"
 
+#include "train_fields.hpp"
+
 #include <gart/io/dataset.hpp>
 #include <gart/render/options.hpp>
 #include <gart/runtime/session.hpp>
-#include <gart/train/options.hpp>
 #include <gart/view/server.hpp>
 
 namespace gart_cli {
@@ -13,29 +14,11 @@ namespace gart_cli {
 
 std::vector<field_name> const& field_names() {
   static std::vector<field_name> const names = {
-      {GART_CLI_FIELD(train_options, iterations), "--iterations"},
-      {GART_CLI_FIELD(train_options, max_gaussians), "--max-gaussians"},
-      {GART_CLI_FIELD(train_options, random_points), "--points"},
       {GART_CLI_FIELD(train_options, densify), "--densify"},
       {GART_CLI_FIELD(train_options, background), "--background"},
-      {GART_CLI_FIELD(train_options, initial_opacity), "--init-opacity"},
-      {GART_CLI_FIELD(train_options, initial_scale), "--init-scale"},
       {GART_CLI_FIELD(train_options, exposure), "--exposure"},
       {GART_CLI_FIELD(train_options, vignetting), "--vignetting"},
-      {GART_CLI_FIELD(train_options, depth_weight), "--depth-weight"},
-      {GART_CLI_FIELD(train_options, refine_poses), "--refine-poses"},
-      {GART_CLI_FIELD(train_options, refine_lens), "--refine-lens"},
       {GART_CLI_FIELD(train_options, lt_budget), "--lt-budget"},
-      {GART_CLI_FIELD(train_options, check_finite), "--check-finite"},
-      {GART_CLI_FIELD(train_options, batch), "--batch"},
-      {GART_CLI_FIELD(train_options, shard_block), "shard_block"},  // no option
-      {GART_CLI_FIELD(train_options, seed), "--seed"},
-      {GART_CLI_FIELD(train_options, dropout), "--set dropout"},
-      {GART_CLI_FIELD(train_options, dropout_until), "--set dropout_until"},
-      {GART_CLI_FIELD(resolution_options, quarter_until), "--set resolution.quarter_until"},
-      {GART_CLI_FIELD(resolution_options, half_until), "--set resolution.half_until"},
-      {GART_CLI_FIELD(resolution_options, least), "--set resolution.least"},
-      {GART_CLI_FIELD(resolution_options, long_run), "--set resolution.long_run"},
       {GART_CLI_FIELD(split_shape, share), "--set error.split.share"},
       {GART_CLI_FIELD(split_shape, opacity), "--set error.split.opacity"},
       {GART_CLI_FIELD(render_options, alpha_min), "--alpha-min"},
@@ -67,6 +50,15 @@ std::vector<field_name> const& field_names() {
 
 #undef GART_CLI_FIELD
 
+std::string option_of(std::string_view field) {
+  for (field_name const& n : field_names())
+    if (n.field == field) return std::string(n.option);
+  static constexpr std::string_view of_training = "train_options.";
+  if (field.substr(0, of_training.size()) != of_training) return "";
+  gart::option_field const* const found = gart::find_option_field(field.substr(of_training.size()));
+  return !found ? "" : flag_of(*found).empty() ? "--set " + std::string(found->name) : flag_of(*found);
+}
+
 std::string in_options(std::string_view message) {
   static constexpr std::string_view of_a_word = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.";
   static constexpr std::string_view equals = " = ";
@@ -81,12 +73,10 @@ std::string in_options(std::string_view message) {
     message.remove_prefix(word.size());
     // The point that ends a sentence is no part of a name.
     std::string_view const name = word.substr(0, word.find_last_not_of('.') + 1);
-    field_name const* found = nullptr;
-    for (field_name const& n : field_names())
-      if (n.field == name) found = &n;
-    shown += found ? found->option : name;
+    std::string const found = option_of(name);
+    shown += found.empty() ? name : std::string_view(found);
     shown += word.substr(name.size());
-    if (found && name == word && message.substr(0, equals.size()) == equals) {
+    if (!found.empty() && name == word && message.substr(0, equals.size()) == equals) {
       shown += ' ';
       message.remove_prefix(equals.size());
     }

@@ -13,7 +13,10 @@ struct field_name {
   std::string_view option;  // "--max-gaussians"
 };
 
+// Of fields that are not in the table of train/option_fields.hpp, which has its own.
 std::vector<field_name> const& field_names();
+// "train_options.seed" to "--seed"; empty where there is no such field.
+std::string option_of(std::string_view field);
 
 // A message of the library as the program shows it: each field as its option, `field = value` as `--option value`.
 std::string in_options(std::string_view message);

@@ -3,9 +3,11 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace gart_cli {
@@ -13,6 +15,31 @@ namespace gart_cli {
 class help_formatter : public CLI::Formatter {
  public:
   help_formatter() { column_width(34); }
+  // Of a command with many options: --help shows the common ones, --help-all all of them and `more`.
+  help_formatter(std::vector<std::string> common, std::string more)
+      : common_(std::move(common)), more_(std::move(more)) {
+    column_width(34);
+  }
+  std::string make_help(CLI::App const* app, std::string name, CLI::AppFormatMode mode) const override {
+    all_ = common_.empty() || mode == CLI::AppFormatMode::All;
+    std::string text = CLI::Formatter::make_help(app, name, mode);
+    // What groups without a common option leave.
+    for (std::size_t at; (at = text.find("\n\n\n")) != text.npos;) text.erase(at, 1);
+    return text;
+  }
+  std::string make_group(std::string group, bool positional, std::vector<CLI::Option const*> options) const override {
+    std::erase_if(options, [&](CLI::Option const* o) {
+      return !all_ && !positional &&
+             std::none_of(common_.begin(), common_.end(), [&](std::string const& name) { return o->check_name(name); });
+    });
+    return options.empty() ? "" : CLI::Formatter::make_group(group, positional, options);
+  }
+  std::string make_footer(CLI::App const* app) const override {
+    return (common_.empty() ? ""
+            : all_          ? more_
+                            : "\nThe other options: --help-all\n") +
+           CLI::Formatter::make_footer(app);
+  }
   std::string make_option_opts(CLI::Option const* option) const override {
     if (option->get_type_size() == 0) return "";
     return " " + option->get_type_name() + (option->get_required() ? " (required)" : "");
@@ -32,6 +59,11 @@ class help_formatter : public CLI::Formatter {
     }
     return usage + (app->get_subcommands({}).empty() ? " [options]\n" : " COMMAND [options]\n");
   }
+
+ private:
+  std::vector<std::string> common_;
+  std::string more_;
+  mutable bool all_ = true;
 };
 
 inline CLI::Validator one_of(std::vector<std::string> const& names) {

@@ -5,6 +5,7 @@
 #include "help.hpp"
 #include "printable.hpp"
 #include "ranks.hpp"
+#include "suggestion.hpp"
 #include "threads.hpp"
 
 #include <gart/core/version.hpp>
@@ -15,6 +16,7 @@
 #include <memory>
 #include <new>
 #include <string>
+#include <vector>
 
 namespace {
 
@@ -24,6 +26,19 @@ std::string not_understood(CLI::App const& app) {
   for (std::string const& word : app.remaining(true))
     if (word.size() > 1 && word[0] == '-') words += (words.empty() ? "" : " ") + word;
   return words.empty() ? words : "not understood: " + words + "; ";
+}
+
+// The options and commands that these are near to.
+std::string suggested(CLI::App const& app) {
+  CLI::App const* of = &app;
+  for (CLI::App const* sub : app.get_subcommands()) of = sub;
+  std::vector<std::string> names;
+  for (CLI::Option const* o : of->get_options()) names.push_back(o->get_name());
+  for (CLI::App const* sub : of->get_subcommands({})) names.push_back(sub->get_name());
+  std::string words;
+  for (std::string const& word : app.remaining(true))
+    words += gart_cli::did_you_mean(word.substr(0, word.find('=')), names);
+  return words;
 }
 
 // Output that did not reach its end is no success.
@@ -55,7 +70,7 @@ int main(int argc, char** argv) {
       "\nExamples:\n"
       "  gart synth --out capture                 a small capture to try things on\n"
       "  gart train capture --out run             train on it; run/report.html shows how it went\n"
-      "  gart train --help                        every option of a command\n"
+      "  gart train --help-all                    every option of a command\n"
       "\nExit codes: 0 done, 1 failed, 2 the command line is wrong, 130 stopped by Ctrl-C, SIGTERM or SIGHUP (train: "
       "saved, "
       "resumable).");
@@ -79,7 +94,7 @@ int main(int argc, char** argv) {
     std::string topic = "gart";
     for (CLI::App const* sub : app.get_subcommands()) topic += " " + sub->get_name();
     std::string const odd = dynamic_cast<CLI::RequiredError const*>(&e) ? not_understood(app) : std::string();
-    return fail(odd + e.what() + " (see " + topic + " --help)", exit_usage);
+    return fail(odd + e.what() + suggested(app) + " (see " + topic + " --help)", exit_usage);
   }
   if (!selected) {
     std::fputs(app.help().c_str(), stderr);

@@ -130,7 +130,7 @@ int run_render(render_arguments const& a) {
   nlohmann::json timings = {{"backend", gart::to_string(configuration.backend)},
                             {"tracer", gart::to_string(configuration.tracer)},
                             {"gaussians", file.model.size()},
-                            {"approximations", approximations_of(options.approximations(), configuration)},
+                            {"approximations", approximations_of(options, configuration)},
                             {"samples", a.samples},
                             {"stages_ms", nlohmann::json::object()},
                             {"views", nlohmann::json::array()}};

@@ -266,7 +266,7 @@ class tradeoff_run {
             {"backward", configuration.backward},
             {"sh_degree", configuration.sh_degree},
             {"kernel_degree", configuration.kernel_degree},
-            {"approximations", approximations_of(s.use.render.approximations(), configuration)},
+            {"approximations", approximations_of(s.use.render, configuration)},
             {"rebuild_every", s.use.render.rebuild_every},
             {"shrink", s.use.shrink},
             {"file_bytes", packed ? json(file_bytes_) : json()},

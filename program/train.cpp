@@ -1,5 +1,6 @@
 #include "commands.hpp"
 #include "train_arguments.hpp"
+#include "train_fields.hpp"
 #include "training_run.hpp"
 
 #include <memory>
@@ -11,6 +12,12 @@ void add_train(CLI::App& app, command& selected) {
   CLI::App* train = app.add_subcommand(
       "train", "Train Gaussians on the photographs of a capture, test them on held-out views, and report.");
   add_arguments(*train, *a);
+  train->set_help_all_flag("--help-all", "Print every option and rule, and exit");
+  train->formatter(std::make_shared<help_formatter>(
+      std::vector<std::string>{"--help", "--help-all", "--out", "--resume", "--quiet", "--iterations",
+                               "--max-gaussians", "--sh-degree", "--auto", "--seed", "--exposure", "--refine-poses",
+                               "--downscale", "--background", "--test-every", "--backend", "--preset", "--view"},
+      fields_in_help()));
   train->footer(
       "\nWrites into DIR:\n"
       "  model.ply         the Gaussians, as other viewers read them\n"

@@ -10,13 +10,42 @@
 #include <gart/io/file.hpp>
 #include <gart/runtime/choose.hpp>
 #include <gart/runtime/presets.hpp>
+#include <gart/train/option_fields.hpp>
 
 #include <cstdio>
-#include <limits>
 
 namespace gart_cli {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+// The option of a field that has one. Looking for what is not finite changes no result, and is not recorded.
+void add_field(CLI::App& train, train_arguments& a, gart::option_field const& field) {
+  std::string const flag = flag_of(field);
+  std::string const help =
+      std::string(field.help) + (flag == "--iterations"
+                                     ? ". With --resume it may be\nraised: rates, degrees and densification then "
+                                       "follow the new\nlength, so rates that had fallen rise again"
+                                     : "");
+  std::visit(
+      [&](auto at) {
+        auto& value = at(a.options);
+        using type = std::remove_reference_t<decltype(value)>;
+        CLI::Option* option = nullptr;
+        if constexpr (std::is_same_v<type, bool>) {
+          option = flag == "--check-finite" ? train.add_flag(flag, value, help)
+                                            : a.recorded.add_flag(train, flag, value, help);
+        } else {
+          option = a.recorded.add(train, flag, value, std::is_floating_point_v<type> ? "X" : "N", help);
+          option->check(std::is_same_v<type, gart::u64> ? whole_number() : between(field.low, field.high));
+        }
+        option->group(std::string(field.group));
+      },
+      field.of);
+}
+
+}  // namespace
 
 void add_arguments(CLI::App& train, train_arguments& a) {
   auto& r = a.recorded;
@@ -32,15 +61,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
 
   std::string group = "Training";
   auto const in_group = [&group](CLI::Option* option) { return option->group(group); };
-  in_group(
-      r.add(train, "--iterations", a.iterations, "N",
-            "Steps, one training view each. With --resume it may be\nraised: rates, degrees and densification then "
-            "follow the new\nlength, so rates that had fallen rise again"))
-      ->check(between(1, 1e9));
-  in_group(r.add(train, "--max-gaussians", a.max_gaussians, "N",
-                 "Gaussians at most; memory and time grow with them. Growth by\nerror ends at one for each 100 "
-                 "training pixels where that is\nless (and over 100,000)"))
-      ->check(between(1, static_cast<double>(std::numeric_limits<gart::index_t>::max())));
+  for (gart::option_field const& field : gart::option_fields)
+    if (!flag_of(field).empty()) add_field(train, a, field);
   in_group(r.add(train, "--time-budget", a.time_budget, "S",
                  "Seconds of training after which the run ends, where\n--iterations do not end it before, 0: no limit. "
                  "Rates, degrees\nand densification go by the larger of both shares. Such a run\ndepends on the "
@@ -57,17 +79,6 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                       "--no-auto: the literature's settings, the same for all"));
   in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3", "Degree of the spherical harmonics of colour"))
       ->check(between(0, 3));
-  in_group(r.add(train, "--points", a.points, "N",
-                 "Gaussians to start with where the capture has no points: at\nrandom, or where its depth maps are "
-                 "trained on, of these"))
-      ->check(between(1, 2147483647.0));
-  in_group(r.add(train, "--init-opacity", a.initial_opacity, "A",
-                 "Opacity of the first Gaussians, below 1; 0: 0.5 for random\npoints with error or mcmc, else 0.1"))
-      ->check(between(0, 0.99));
-  in_group(r.add(train, "--init-scale", a.initial_scale, "X",
-                 "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 for random points "
-                 "with\nerror or mcmc, else 1"))
-      ->check(between(0, 100));
   in_group(r.add(train, "--adam", a.adam, "NAME",
                  "all: each step moves every Gaussian; seen: only those that\nits view shows, as sparse Adam does; for "
                  "views that show a\nsmall part of a large scene"))
@@ -75,14 +86,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--set", a.set, "NAME=VALUE,...",
                  "Rules by name, for measuring them: error.fill=0.25,\nrates.opacity=0.05 and so on "
                  "(docs/training.md); a name that\nthere is not lists those there are"));
-  in_group(r.add(train, "--batch", a.batch, "N",
-                 "Views a step: the mean of their gradients, at rates times\nsqrt(N). What is counted in steps then "
-                 "counts images"))
-      ->check(between(1, 4096));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
-  in_group(r.add(train, "--seed", a.seed, "N",
-                 "Seed of everything random; on the serial backend the same\nseed gives the same bits"))
-      ->check(whole_number());
 
   in_group(r.add(train, "--kernel-degree", a.kernel_degree, "N",
                  "How Gaussians fall from their centres, exp(-4.5 (r / 3)^N):\n2, or 4, as 3DGRT has it"))
@@ -102,16 +106,9 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "on: learn by how much each lens darkens the corners of its\nphotographs, three numbers for all of "
                  "them, which test views\nhave too. auto: where --auto measures a gain"))
       ->check(one_of({"auto", "on", "off"}));
-  in_group(
-      r.add_flag(train, "--refine-poses", a.refine_poses,
-                 "Learn the pose of each training view with the Gaussians, for\ncaptures whose poses are a little off; "
-                 "test views are then\naligned to their photographs before they are scored"));
   in_group(r.add(train, "--poses", a.poses, "FILE",
                  "With --refine-poses: begin at the poses of this camera JSON,\nby the views' names, in place of the "
                  "capture's. The poses.json of\na run that found them makes a better scene, and better poses"));
-  in_group(r.add_flag(train, "--refine-lens", a.refine_lens,
-                      "Learn the focal length and the centre of each camera of the\ncapture with the Gaussians, for "
-                      "calibrations that are a little\noff; test views are scored through what was learned"));
   in_group(r.add(train, "--downscale", a.downscale, "N", "Shrink images by this whole factor"))->check(between(1, 64));
   in_group(r.add(
       train, "--photos", a.photos, "DIR",
@@ -133,11 +130,6 @@ void add_arguments(CLI::App& train, train_arguments& a) {
             "more of a scene"))
       ->check(name_of_a<gart::split_kind>());
 
-  in_group(r.add(train, "--depth-weight", a.depth_weight, "X",
-                 "Train by the capture's depth maps too: weight of their mean\nerror, in units of the scene's extent, "
-                 "beside the colours' loss;\n0: none. Maps are depths/NAME.png (16 bits) or NAME.npy\n(float32) beside "
-                 "images/, or what 'depth_file_path' of a\ntransforms.json names (docs/rendering.md)"))
-      ->check(between(0, 1e6));
   in_group(
       r.add(train, "--depth-kind", a.depth_kind, "NAME",
             "What the maps measure: z, along the camera's axis, or\ndistance, along the ray; auto: what the capture "
@@ -165,10 +157,6 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "quarter, and where\nthat is too much by pixel, which needs none. 0: half of what\nis free "
                  "at the start (deterministic: no limit)"))
       ->check(between(0, 1e6));
-  in_group(r.add(train, "--rebuild-every", a.rebuild_every, "N",
-                 "Steps between builds of the bvh tracer's tree, which is\nrefitted in between; the images are the "
-                 "same"))
-      ->check(between(1, 1e6));
   in_group(
       train.add_option("--parallel", a.parallel,
                        "How ranks share a step (mpirun -n 4 gart train ...,\ndocs/backends.md): strips of one view, "
@@ -190,14 +178,6 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "exact, or quick: " + std::to_string(gart::preset_named("quick").iterations) +
                      " steps, where --iterations is not given"))
       ->check(one_of(gart::preset_names()));
-  in_group(r.add(train, "--alpha-min", a.alpha_min, "A",
-                 "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as others have it"))
-      ->check(between(1e-6, 0.99));
-  in_group(
-      r.add(train, "--transmittance-min", a.transmittance_min, "T", "Transmittance below which a ray ends, 0 to 1"))
-      ->check(between(0, 0.99));
-  in_group(r.add(train, "--max-hits", a.max_hits, "N", "Hits after which a ray ends, 0: no cap"))
-      ->check(between(0, gart::max_hits_most));
 
   in_group(r.add(train, "--lt-format", a.lt_format, "NAME",
                  "What the forward pass leaves of a hit for primitive: float4,\nor half (half the memory, less exact "
@@ -213,9 +193,6 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->type_name("M")
       ->capture_default_str()
       ->check(between(0, 1e6));
-  in_group(train.add_flag("--check-finite", a.check_finite,
-                          "After each step look for numbers that are not finite in all\nparameters and Adam's moments, "
-                          "and stop at the first with exit\ncode 1; metrics.json says how many steps were checked"));
   in_group(train.add_option("--stop-at", a.stop_at,
                             "Stop after this step as Ctrl-C would, 0: do not; the run can\nthen be resumed"))
       ->type_name("N")
@@ -241,7 +218,7 @@ void fill_in(CLI::App const& train, train_arguments& a) {
   auto const set = [&](char const* option, auto& value, auto const& otherwise) {
     if (train.get_option(option)->count() == 0) value = otherwise;
   };
-  if (chosen.iterations) set("--iterations", a.iterations, chosen.iterations);
+  if (chosen.iterations) set("--iterations", a.options.iterations, chosen.iterations);
 }
 
 void continue_run(train_arguments& a) {
@@ -276,34 +253,22 @@ gart::configuration_request configuration_request_of(train_arguments const& a) {
   wanted.kernel_degree = a.kernel_degree;
   wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
   wanted.threads = a.threads;
-  wanted.depth = a.depth_weight > 0;
+  wanted.depth = a.options.depth_weight > 0;
   return wanted;
 }
 
 gart::train_options train_options_of(train_arguments const& a) {
-  gart::train_options o = a.defaults;
-  o.iterations = a.iterations;
-  o.max_gaussians = a.max_gaussians;
-  o.random_points = std::min(a.points, a.max_gaussians);
+  gart::train_options o = a.options;
+  o.random_points = std::min(o.random_points, o.max_gaussians);
   o.densify = gart::from_string(a.densify, o.densify);
-  o.initial_opacity = a.initial_opacity;
-  o.initial_scale = a.initial_scale;
   o.exposure = a.exposure == "on", o.vignetting = a.vignetting == "on";
-  o.depth_weight = a.depth_weight;
-  o.refine_poses = a.refine_poses, o.refine_lens = a.refine_lens;
   o.adam.sparse = a.adam == "seen";
   o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
   // Until it is settled it decides nothing.
   o.background = gart::from_string(a.background, gart::background_kind::black);
-  o.check_finite = a.check_finite;
-  o.batch = a.batch;
-  o.seed = a.seed;
-  o.render.alpha_min = a.alpha_min;
-  o.render.transmittance_min = a.transmittance_min;
-  o.render.max_hits = a.max_hits;
   o.render.antialias = a.antialias ? gart::default_antialias : 0;
   // The other tracers build no tree, and the images are the same.
-  o.render.rebuild_every = a.tracer == gart::to_string(gart::tracer_kind::bvh) ? a.rebuild_every : 1;
+  if (a.tracer != gart::to_string(gart::tracer_kind::bvh)) o.render.rebuild_every = 1;
   set_fields(o, a.set);
   return o;
 }

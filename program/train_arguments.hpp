@@ -18,7 +18,7 @@ namespace gart_cli {
 
 struct train_arguments {
   std::filesystem::path dataset, out;
-  bool resume = false, quiet = false, check_finite = false;
+  bool resume = false, quiet = false;
   int threads = 0, stop_at = 0;
   std::string parallel = "strips";
   int gpus = 1;
@@ -32,10 +32,8 @@ struct train_arguments {
   std::string backend = "auto", tracer = "auto", backward = "auto", densify = "auto", background = "auto", start, poses;
   std::string lt_format = "auto";
   std::string preset = "exact";
-  gart::train_options defaults;
-  int iterations = defaults.iterations, batch = defaults.batch;
-  double time_budget = 0;  // seconds of training; 0: none
-  gart::index_t max_gaussians = defaults.max_gaussians, points = defaults.random_points;
+  gart::train_options options;  // by the table of fields; what is "auto" here is open there
+  double time_budget = 0;       // seconds of training; 0: none
   int kernel_degree = 2;
   bool automatic = true;
   int sh_degree = 3;
@@ -43,17 +41,11 @@ struct train_arguments {
   std::string test_split = "nth";
   std::string photos;
   bool no_masks = false;
-  float depth_weight = defaults.depth_weight;
   std::string depth_kind = "auto";
   double depth_unit = 0;
-  float initial_opacity = defaults.initial_opacity, initial_scale = defaults.initial_scale;
   std::string exposure = "auto", vignetting = "auto", adam = "all", set;
-  float alpha_min = defaults.render.alpha_min, transmittance_min = defaults.render.transmittance_min;
-  gart::u32 max_hits = defaults.render.max_hits;
-  bool antialias = false, refine_poses = false, refine_lens = false;
-  int rebuild_every = defaults.render.rebuild_every;
+  bool antialias = false;
   double lt_budget_gb = 0;
-  gart::u64 seed = defaults.seed;
   recorded_options recorded;
 
   std::filesystem::path config_file() const { return out / "config.json"; }
@@ -62,16 +54,16 @@ struct train_arguments {
   std::filesystem::path model_file() const { return out / "model.ply"; }
   // The share of the run that is done.
   double progress(int step, double seconds) const {
-    double const by_steps = static_cast<double>(step) / iterations;
+    double const by_steps = static_cast<double>(step) / options.iterations;
     return std::min(1.0, time_budget > 0 ? std::max(by_steps, seconds / time_budget) : by_steps);
   }
   // The length that schedules go by: so many steps that `step` of them are the progress. A run is over where it has
   // come to it.
   int length(int step, double seconds) const {
-    double const by_steps = static_cast<double>(step) / iterations, share = progress(step, seconds);
-    return share > by_steps ? std::max(1, static_cast<int>(step / share)) : iterations;
+    double const by_steps = static_cast<double>(step) / options.iterations, share = progress(step, seconds);
+    return share > by_steps ? std::max(1, static_cast<int>(step / share)) : options.iterations;
   }
-  int steps_between_tests() const { return eval_every >= 0 ? eval_every : std::max(1, iterations / 5); }
+  int steps_between_tests() const { return eval_every >= 0 ? eval_every : std::max(1, options.iterations / 5); }
 };
 
 void add_arguments(CLI::App& train, train_arguments& a);

@@ -1,16 +1,19 @@
 #pragma once
-// Fields of train_options by name, for `gart train --set NAME=VALUE,...`: the rules of docs/training.md, which have no
-// option of their own.
+// Fields of train_options by name (train/option_fields.hpp), for `gart train --set NAME=VALUE,...`.
 
-#include <gart/train/options.hpp>
+#include <gart/train/option_fields.hpp>
 
 #include <string>
 
 namespace gart_cli {
 
-// "error.fill=0.25,rates.opacity=0.05". usage_error for a name that there is not, with those there are, and for a value
-// that is no finite number.
+// The option that a field has of its own; empty: it is set by --set.
+std::string flag_of(gart::option_field const& field);
+// "error.fill=0.25,rates.opacity=0.05". usage_error for a name that there is not, with the nearest that there is, and
+// for a value out of its range.
 void set_fields(gart::train_options& options, std::string const& settings);
+// Those that have no option of their own, with their defaults, as lines of the help.
+std::string fields_in_help();
 // Whether they name the field.
 bool sets_field(std::string const& settings, std::string const& name);
 // With this value in place of the one they may have.

@@ -111,14 +111,14 @@ void training_run::conclude() {
         say_.state("testing " + std::to_string(i + 1) + "/" + std::to_string(data_.test.size()),
                    static_cast<double>(i + 1) / static_cast<double>(data_.test.size()));
       },
-      a_.refine_poses ? aligned_to_photographs(aligned) : gart::place_view());
-  if (a_.refine_lens && !a_.refine_poses)
+      a_.options.refine_poses ? aligned_to_photographs(aligned) : gart::place_view());
+  if (a_.options.refine_lens && !a_.options.refine_poses)
     for (auto const& view : data_.test) aligned.push_back({view.name, session_->as_learned(view.view)});
   if (writes_ && !aligned.empty()) gart::write_cameras(a_.out / "poses_test.json", aligned);
   say_.state("testing on training views", 1);
   stopwatch const training_views;
   gart::scores const training = score(gart::evenly_spread(data_.train, data_.test.size()), {},
-                                      a_.refine_poses ? as_learned() : gart::place_view());
+                                      a_.options.refine_poses ? as_learned() : gart::place_view());
   test_seconds_ += training_views.seconds();
   report_cover cover = shown.cover();
   if (data_.test.empty())
@@ -135,7 +135,7 @@ void training_run::conclude() {
   gart::exposure_field const photographed = session_->exposures();
   for (auto const& lens : photographed.lenses())
     metrics["corner_gains"].push_back((lens.value.gain(0, 1) + lens.value.gain(1, 1) + lens.value.gain(2, 1)) / 3);
-  metrics["ranks"] = ranks::size(), metrics["batch"] = a_.batch;
+  metrics["ranks"] = ranks::size(), metrics["batch"] = a_.options.batch;
   metrics["peak_bytes"] = most_bytes, metrics["sent_bytes"] = most_sent;
   write_json(a_.out / "metrics.json", metrics);
   gart::write_file(a_.out / "report.html",
@@ -169,8 +169,9 @@ nlohmann::json training_run::metrics_of(gart::scores const& result, gart::scores
   m["psnr_over_seconds"] = course_.psnr_over_seconds();
   m["image_size"] = image_size(), m["notes"] = data_.notes;
   m["background"] = a_.background == "random" ? "random in training, black in testing" : a_.background;
-  m["exposure"] = a_.exposure == "on", m["vignetting"] = a_.vignetting == "on", m["refine_poses"] = a_.refine_poses;
-  m["refine_lens"] = a_.refine_lens;
+  m["exposure"] = a_.exposure == "on", m["vignetting"] = a_.vignetting == "on",
+  m["refine_poses"] = a_.options.refine_poses;
+  m["refine_lens"] = a_.options.refine_lens;
   m["iterations"] = session_->steps_done(), m["time_budget"] = a_.time_budget, m["raised"] = raised_;
   m["gaussians"] = gaussians_, m["sh_degree"] = session_->configuration().sh_degree;
   m["floats_per_gaussian"] = 11 + 3 * gart::sh_coefficients(session_->configuration().sh_degree);
@@ -181,7 +182,7 @@ nlohmann::json training_run::metrics_of(gart::scores const& result, gart::scores
   m["approximations"] = approximations_of(train_options_of(a_).render, configuration_);
   m["approximations"]["preset"] = a_.preset, m["approximations"]["adam"] = a_.adam;
   m["finite_steps"] = finite_steps_;
-  if (a_.check_finite) m["skipped_updates"] = skipped_updates_;
+  if (a_.options.check_finite) m["skipped_updates"] = skipped_updates_;
   m["seconds"] = course_.seconds;
   m["iterations_per_second"] = course_.seconds > 0 ? session_->steps_done() / course_.seconds : 0;
   m["wall_seconds"] = {{"loading", load_seconds_},

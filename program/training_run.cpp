@@ -75,9 +75,9 @@ void training_run::prepare() {
     }
     start_ = gart::with_sh_degree(std::move(file.model), configuration_.sh_degree);
     start_total_ = file.total;
-    if (file.total > a_.max_gaussians) {
+    if (file.total > a_.options.max_gaussians) {
       throw usage_error("--start " + a_.start + ": has " + with_commas(file.total) +
-                        " Gaussians, more than --max-gaussians " + std::to_string(a_.max_gaussians));
+                        " Gaussians, more than --max-gaussians " + std::to_string(a_.options.max_gaussians));
     }
   }
   if (writes_) {
@@ -99,7 +99,7 @@ void training_run::prepare() {
 // What is said of --poses; recorded as a whole path, since a run may be resumed from anywhere.
 void training_run::check_poses() {
   if (a_.poses.empty()) return;
-  if (!a_.refine_poses)
+  if (!a_.options.refine_poses)
     throw usage_error("--poses " + a_.poses +
                       ": needs --refine-poses, which also aligns the test views before they are scored");
   a_.poses = fs::absolute(a_.poses).lexically_normal().string();
@@ -111,12 +111,12 @@ void training_run::check_poses() {
 
 // A step among the ranks there are.
 void training_run::share_out() {
-  if (a_.parallel == "views" && a_.batch == 1 && !a_.resume) a_.batch = ranks::size();
-  ranks::start(a_.batch > 1);
+  if (a_.parallel == "views" && a_.options.batch == 1 && !a_.resume) a_.options.batch = ranks::size();
+  ranks::start(a_.options.batch > 1);
   if (ranks::size() == 1) return;
   if (a_.viewed) throw usage_error("--view shows the training of one rank: leave it out, or start one rank");
   say_.note(std::to_string(ranks::size()) + " ranks, each a part of the Gaussians and of every step: " +
-            (a_.batch == 1 ? "strips of a view" : "a batch of " + std::to_string(a_.batch) + " views"));
+            (a_.options.batch == 1 ? "strips of a view" : "a batch of " + std::to_string(a_.options.batch) + " views"));
 }
 
 gart::configuration_request training_run::request() const {
@@ -178,7 +178,7 @@ void training_run::load() {
   options.test_every = a_.test_every;
   options.test_split = gart::from_string<gart::split_kind>(a_.test_split);
   options.photos = a_.photos, options.masks = !a_.no_masks;
-  options.depth = {a_.depth_weight > 0, gart::from_string<gart::depth_kind>(a_.depth_kind), a_.depth_unit};
+  options.depth = {a_.options.depth_weight > 0, gart::from_string<gart::depth_kind>(a_.depth_kind), a_.depth_unit};
   options.progress = [&](std::size_t done, std::size_t total) {
     std::lock_guard const lock(mutex);
     say_.state("loading " + std::to_string(done) + "/" + std::to_string(total) + " images",

@@ -40,7 +40,7 @@ bool training_run::train(interrupt_guard const& interrupt) {
     int const before = session_->steps_done(), length = a_.length(before, course_.seconds);
     if (before >= length) return true;
     // The first steps load images and are no measure of the others.
-    session_->set_iterations(before < 100 ? a_.iterations : length);
+    session_->set_iterations(before < 100 ? a_.options.iterations : length);
     double const done_before = progress_at(before);
     if (ranks::agreed(interrupt.wanted()) || (a_.stop_at > 0 && before >= a_.stop_at)) return false;
     session_->profile().enable(before % profile_every == profile_every - 1);
@@ -60,7 +60,7 @@ bool training_run::train(interrupt_guard const& interrupt) {
                         ": the loss is not a number (the last checkpoint is whole: " + a_.checkpoint_file().string() +
                         ")");
     }
-    finite_steps_ += a_.check_finite, skipped_updates_ += report.skipped;
+    finite_steps_ += a_.options.check_finite, skipped_updates_ += report.skipped;
     ++steps_, step_seconds_ += seconds, course_.seconds += seconds, gaussians_ = report.gaussians;
     course_.add(report);
     recent.add(report, seconds, own);
@@ -72,7 +72,7 @@ bool training_run::train(interrupt_guard const& interrupt) {
     int const between = a_.steps_between_tests();
     bool const due = by_time && a_.eval_every < 0
                          ? passes(5)
-                         : between > 0 && report.step / between != (report.step - a_.batch) / between;
+                         : between > 0 && report.step / between != (report.step - a_.options.batch) / between;
     if (due && report.step < a_.length(report.step, course_.seconds)) {
       gart::scores const scores = test(report.step);
       show_curve();
@@ -100,7 +100,7 @@ void training_run::serve() {
 bool training_run::attend(interrupt_guard const& interrupt, double seconds, gart::step_report const& report,
                           recent_steps const& recent) {
   gart::view_status status;
-  status.step = report.step, status.of = a_.iterations, status.loss = recent.loss;
+  status.step = report.step, status.of = a_.options.iterations, status.loss = recent.loss;
   status.gaussians = report.gaussians, status.seconds = course_.seconds;
   status.steps_per_second = recent.seconds > 0 ? 1 / recent.seconds : 0;
   return view_->attend(seconds, status, interrupt, [this] {
@@ -122,7 +122,7 @@ void training_run::show_curve() {
 
 // Of a run that ends at a time, a point for each two hundredth of it, whatever the number of steps.
 history training_run::course_of(train_arguments const& a) {
-  return history(a.time_budget > 0 ? std::numeric_limits<int>::max() : a.iterations);
+  return history(a.time_budget > 0 ? std::numeric_limits<int>::max() : a.options.iterations);
 }
 
 gart::step_report training_run::checked_step() {
@@ -137,8 +137,8 @@ void training_run::show(gart::step_report const& report, recent_steps const& rec
   double const share = progress_at(report.step);
   if (!ranks::agreed(say_.due(share))) return;
   double const rate = recent.seconds > 0 ? 1 / recent.seconds : 0;
-  double const left = (a_.iterations - report.step) * recent.seconds;
-  say_.state(with_commas(report.step) + (a_.time_budget > 0 ? "" : "/" + with_commas(a_.iterations)) + "  " +
+  double const left = (a_.options.iterations - report.step) * recent.seconds;
+  say_.state(with_commas(report.step) + (a_.time_budget > 0 ? "" : "/" + with_commas(a_.options.iterations)) + "  " +
                  fixed(rate, rate < 10 ? 2 : 0) + " it/s  loss " + fixed(recent.loss, 4) + "  PSNR " +
                  fixed(recent.psnr, 2) + " dB  " + with_commas(report.gaussians) + " Gaussians  " +
                  as_duration(a_.time_budget > 0 ? std::min(left, a_.time_budget - course_.seconds) : left) + " left" +

@@ -107,11 +107,17 @@ std::vector<char> const& checkpoint_reader::find(std::string const& name, std::s
   return bytes;
 }
 
+std::vector<std::string> checkpoint_reader::names() const {
+  std::vector<std::string> all;
+  for (auto const& [name, array] : arrays_) all.push_back(name);
+  return all;
+}
+
 training_state without_rows(training_state const& state) {
   training_state out;
-  out.step = state.step, out.growth = state.growth, out.seed = state.seed;
-  out.exposures = state.exposures, out.vignetting = state.vignetting, out.poses = state.poses,
-  out.lenses = state.lenses;
+  out.step = state.step, out.seed = state.seed;
+  for (auto const& [name, values] : state.parts.bytes)
+    if (!of_gaussians(name)) out.parts.bytes[name] = values;
   return out;
 }
 

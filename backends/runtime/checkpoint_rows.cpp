@@ -142,16 +142,23 @@ checkpoint_rows_reader::checkpoint_rows_reader(std::filesystem::path const& path
   // All of a state, of which the names and the rows are wanted.
   training_state like;
   like.scene.sh_degree = like.first.sh_degree = like.second.sh_degree = degree[0];
+  for (auto const& [name, array] : arrays_)
+    if (of_gaussians(name)) like.parts.bytes[name];
   gaussians_ = find("opacity").bytes / sizeof(float);
   for_each_state_array(like, [&]<class T>(std::string const& name, std::vector<T> const&, std::size_t width) {
     auto const found = arrays_.find(name);
     if (width == 0 || found == arrays_.end()) return;
     found->second.row = width * sizeof(T);
     u64 const bytes = found->second.bytes;
-    bool const may_be_empty = width == 1 && name != "opacity" && name.find("/opacity") == std::string::npos;
-    if (bytes != gaussians_ * found->second.row && !(bytes == 0 && may_be_empty))
+    if (bytes != gaussians_ * found->second.row && !(bytes == 0 && of_gaussians(name)))
       fail("is damaged: its array " + name + " is not of its " + std::to_string(gaussians_) + " Gaussians");
   });
+}
+
+std::vector<std::string> checkpoint_rows_reader::names() const {
+  std::vector<std::string> all;
+  for (auto const& [name, array] : arrays_) all.push_back(name);
+  return all;
 }
 
 void checkpoint_rows_reader::fail(std::string const& what) const {

@@ -1,6 +1,6 @@
 #include <gart/camera/models.hpp>
-#include <gart/optim/error_growth.hpp>
 #include <gart/runtime/choose.hpp>
+#include <gart/train/densify/error_growth.hpp>
 
 #include <algorithm>
 #include <array>

@@ -1,10 +1,10 @@
 #include <gart/core/error.hpp>
 #include <gart/io/image_file.hpp>
-#include <gart/optim/error_growth.hpp>
 #include <gart/runtime/choose.hpp>
 #include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/session.hpp>
 #include <gart/runtime/validation.hpp>
+#include <gart/train/densify/error_growth.hpp>
 
 #include <algorithm>
 #include <atomic>

@@ -3,6 +3,7 @@
 #include "program.hpp"
 
 #include <field_names.hpp>
+#include <train_fields.hpp>
 
 #include <support/policies.hpp>
 
@@ -28,12 +29,18 @@ TEST_CASE("a message names options where the library names fields") {
 
 TEST_CASE("every option that a field is shown as is one of train or of view") {
   folder const here;
-  std::string const help = here.gart("train --help").out + here.gart("view --help").out;
+  std::string const help = here.gart("train --help-all").out + here.gart("view --help").out;
   for (auto const& [field, option] : gart_cli::field_names()) {
     CAPTURE(field);
     // "--set NAME" is of the option --set.
     std::string const shown(option.substr(0, option.find(' ')));
     if (shown.substr(0, 2) == "--") CHECK_MESSAGE(has(help, "  " + shown), option);
+  }
+  for (gart::option_field const& field : gart::option_fields) {
+    std::string const flag = gart_cli::flag_of(field), name(field.name);
+    CAPTURE(name);
+    CHECK(has(help, flag.empty() ? "  " + name + "=" : "  " + flag));
+    CHECK(gart_cli::option_of("train_options." + name) == (flag.empty() ? "--set " + name : flag));
   }
 }
 

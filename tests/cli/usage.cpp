@@ -26,8 +26,9 @@ TEST_CASE("every command's help teaches: a sentence, what it writes, two example
 
 TEST_CASE("train has every option that is promised, with its default") {
   folder const here;
-  auto const help = here.gart("train --help").out;
+  auto const help = here.gart("train --help-all").out;
   for (char const* option : {"--out DIR (required)",
+                             "error.split.share=0",
                              "--backend",
                              "--tracer",
                              "--backward",
@@ -58,6 +59,21 @@ TEST_CASE("train has every option that is promised, with its default") {
   }
 }
 
+TEST_CASE("train --help is short, and --help-all has the rest") {
+  folder const here;
+  auto const brief = here.gart("train --help").out, all = here.gart("train --help-all").out;
+  auto const options = [](std::string const& help) {
+    int count = 0;
+    for (std::size_t at = 0; (at = help.find("\n  --", at)) != help.npos; ++at) ++count;
+    return count;
+  };
+  CHECK(options(brief) <= 20);
+  CHECK(options(all) > 45);
+  CHECK(has(brief, "--iterations"));
+  CHECK_FALSE(has(brief, "--lt-budget"));
+  CHECK(has(brief, "--help-all"));
+}
+
 TEST_CASE("wrong command lines exit with 2, say what is wrong, and make nothing") {
   folder const here;
   struct line {
@@ -74,6 +90,10 @@ TEST_CASE("wrong command lines exit with 2, say what is wrong, and make nothing"
            line{"train x --out made --transmittance-min -1", "--transmittance-min"},
            line{"train x --out made --alpha-min nan", "--alpha-min"},
            line{"train x --out made --speed 9", "--speed"},
+           line{"train x --out made --iteration 9", "; did you mean --iterations?"},
+           line{"trian x --out made", "; did you mean train?"},
+           line{"train x --out made --set rates.opactiy=1", "; did you mean rates.opacity?"},
+           line{"train x --out made --set dropout=1", "a number from 0 to 0.999 belongs after dropout="},
            line{"train x --out made --seed -3", "--seed: '-3' is not a whole number from 0 to 18446744073709551615"},
            line{"train x --out made --max-gaussians 4294967296", "is not a number from 1 to 4294967295"},
            line{"train x --out made --gpus 0", "--gpus: '0' is not a number from 1 to 1024"},
@@ -114,7 +134,7 @@ TEST_CASE("rules are set by name, kept, and refused where there are none") {
   CHECK(text_of(here / "set/model.ply") != text_of(here / "plain/model.ply"));
   auto const unknown = here.gart(run + "none --set rates.speed=1");
   CHECK(unknown.code == 2);
-  CHECK_MESSAGE(has(unknown.err, "--set rates.speed=1: no such field; there are near, "), unknown.err);
+  CHECK_MESSAGE(has(unknown.err, "--set rates.speed=1: no such field (see "), unknown.err);
   auto const text = here.gart(run + "none --set near=far");
   CHECK(text.code == 2);
   CHECK_MESSAGE(has(text.err, "a finite number belongs after near="), text.err);

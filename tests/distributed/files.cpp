@@ -52,14 +52,15 @@ gaussian_model model_of(std::size_t n, int degree, float from) {
 training_state state_of(std::size_t n, int degree, bool statistics) {
   training_state s;
   s.scene = model_of(n, degree, 1), s.first = model_of(n, degree, -50), s.second = model_of(n, degree, 3000);
-  s.step = 77, s.growth = 1.5f, s.seed = 9;
+  s.step = 77, s.seed = 9;
   if (!statistics) return s;
-  for (std::size_t i = 0; i < n; ++i) {
-    s.error_sum.push_back(static_cast<float>(i) + 0.5f), s.gradient_sum.push_back(static_cast<float>(i) - 7);
-    s.touched.push_back(static_cast<u32>(3 * i));
-  }
-  s.exposures.value.assign(2 * exposure::floats, 0.25f), s.exposures.visits = {4, 5};
-  s.exposures.first = s.exposures.second = s.exposures.value;
+  std::vector<float> sum;
+  std::vector<u32> touched;
+  for (std::size_t i = 0; i < n; ++i)
+    sum.push_back(static_cast<float>(i) + 0.5f), touched.push_back(static_cast<u32>(3 * i));
+  s.parts.set("error_growth/error_sum", sum), s.parts.set("adc/touched", touched);
+  s.parts.set("gaussians/own", sum);
+  s.parts.set("exposure", std::vector<float>(24, 0.25f)), s.parts.set("exposure/visits", std::vector<u32>{4, 5});
   return s;
 }
 
@@ -74,8 +75,8 @@ training_state part_of(training_state const& all, row_owners const& owners) {
   training_state mine = without_rows(all);
   mine.scene = rows_of(all.scene, owners), mine.first = rows_of(all.first, owners);
   mine.second = rows_of(all.second, owners);
-  mine.error_sum = part_of(all.error_sum, owners), mine.gradient_sum = part_of(all.gradient_sum, owners);
-  mine.touched = part_of(all.touched, owners);
+  for (auto const& [name, values] : all.parts.bytes)
+    if (of_gaussians(name)) mine.parts.set(name, part_of(all.parts.get<u32>(name), owners));
   return mine;
 }
 
@@ -86,8 +87,7 @@ bool same(gaussian_model const& a, gaussian_model const& b) {
 }
 bool same(training_state const& a, training_state const& b) {
   return same(a.scene, b.scene) && same(a.first, b.first) && same(a.second, b.second) && a.step == b.step &&
-         a.growth == b.growth && a.seed == b.seed && a.error_sum == b.error_sum && a.gradient_sum == b.gradient_sum &&
-         a.touched == b.touched && a.exposures.value == b.exposures.value;
+         a.seed == b.seed && a.parts.bytes == b.parts.bytes;
 }
 
 std::vector<u32> sum_of(std::vector<std::vector<u32>> const& shares) {

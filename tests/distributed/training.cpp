@@ -200,21 +200,21 @@ TEST_CASE("exposures and poses are learned as by one rank, bit by bit") {
     shared all(exec, options, data, start, every_rank());
     while (all.steps_done() < options.iterations) REQUIRE(one.step().loss == all.step().loss);
     training_state const a = one.state(), b = all.state();
-    CHECK(a.poses.value == b.poses.value);
-    CHECK(a.poses.metric == b.poses.metric);
-    CHECK(a.poses.visits == b.poses.visits);
-    CHECK(same(a.exposures.value, b.exposures.value));
-    CHECK(same(a.vignetting.value, b.vignetting.value));
-    CHECK(b.vignetting.visits == std::vector<u32>{120});
+    CHECK(gart_test::doubles(a, "pose") == gart_test::doubles(b, "pose"));
+    CHECK(gart_test::doubles(a, "pose/metric") == gart_test::doubles(b, "pose/metric"));
+    CHECK(gart_test::words(a, "pose/visits") == gart_test::words(b, "pose/visits"));
+    CHECK(same(gart_test::floats(a, "exposure"), gart_test::floats(b, "exposure")));
+    CHECK(same(gart_test::floats(a, "vignetting"), gart_test::floats(b, "vignetting")));
+    CHECK(gart_test::words(b, "vignetting/visits") == std::vector<u32>{120});
     double moved = 0;
-    for (double const x : b.poses.value) moved = std::max(moved, std::fabs(x));
+    for (double const x : gart_test::doubles(b, "pose")) moved = std::max(moved, std::fabs(x));
     CHECK(moved > 1e-4);
     CHECK(same(one.model(), all.model()));
     if (batch > 1) continue;
     plain usual(exec, options, data, start);
     while (usual.steps_done() < options.iterations) usual.step();
-    CHECK(usual.state().poses.value == b.poses.value);
-    CHECK(same(usual.state().exposures.value, b.exposures.value));
+    CHECK(gart_test::doubles(usual.state(), "pose") == gart_test::doubles(b, "pose"));
+    CHECK(same(gart_test::floats(usual.state(), "exposure"), gart_test::floats(b, "exposure")));
     CHECK(same(usual.model(), all.model()));
   }
 }
@@ -237,12 +237,12 @@ TEST_CASE("depth and lenses are learned as by one rank, bit by bit") {
     trainer_of<deep, rank_comm> all(exec, options, data, start, every_rank());
     while (all.steps_done() < options.iterations) REQUIRE(one.step().loss == all.step().loss);
     training_state const a = one.state(), b = all.state();
-    CHECK(a.lenses.value == b.lenses.value);
-    CHECK(a.lenses.visits == b.lenses.visits);
-    CHECK(a.poses.value == b.poses.value);
-    CHECK(a.poses.metric == b.poses.metric);
+    CHECK(gart_test::doubles(a, "lens") == gart_test::doubles(b, "lens"));
+    CHECK(gart_test::words(a, "lens/visits") == gart_test::words(b, "lens/visits"));
+    CHECK(gart_test::doubles(a, "pose") == gart_test::doubles(b, "pose"));
+    CHECK(gart_test::doubles(a, "pose/metric") == gart_test::doubles(b, "pose/metric"));
     double changed = 0;
-    for (double const x : b.lenses.value) changed = std::max(changed, std::fabs(x));
+    for (double const x : gart_test::doubles(b, "lens")) changed = std::max(changed, std::fabs(x));
     CHECK(changed > 1e-4);
     CHECK(same(one.model(), all.model()));
     if (batch > 1) continue;
@@ -255,8 +255,8 @@ TEST_CASE("depth and lenses are learned as by one rank, bit by bit") {
         }(),
         data, start);
     while (usual.steps_done() < options.iterations) usual.step(), colours.step();
-    CHECK(usual.state().lenses.value == b.lenses.value);
-    CHECK(usual.state().poses.value == b.poses.value);
+    CHECK(gart_test::doubles(usual.state(), "lens") == gart_test::doubles(b, "lens"));
+    CHECK(gart_test::doubles(usual.state(), "pose") == gart_test::doubles(b, "pose"));
     CHECK(same(usual.model(), all.model()));
     CHECK(!same(usual.model(), colours.model()));
   }

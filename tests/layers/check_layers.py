@@ -16,6 +16,7 @@ STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
 OPTION = re.compile(r"""^"--|(?<![^\s(`"'])--[a-z"]""")
 FIELD = re.compile(r"\b(?:train_options|render_options|dataset_options|configuration_request)\.[a-z_]+")
 FIELD_TABLE = "program/field_names.cpp"
+TRAIN_TABLE = "include/gart/train/option_fields.hpp"  # whose fields all have an option, or are set by name
 SUFFIXES = {".hpp", ".cuh", ".cpp", ".cu", ".h"}
 
 
@@ -40,8 +41,9 @@ def opens_gart(path):
 
 
 def fields_of(table):
-    """What the program has an option for: its lines GART_CLI_FIELD(struct, field)."""
-    return {f"{struct}.{field}" for struct, field in re.findall(r"GART_CLI_FIELD\((\w+), (\w+)\),", table)}
+    """What the program has an option for: its lines GART_CLI_FIELD(struct, field), and those of the table of fields."""
+    own = {f"{struct}.{field}" for struct, field in re.findall(r"GART_CLI_FIELD\((\w+), (\w+)\),", table)}
+    return own | {f"train_options.{field}" for field in re.findall(r"GART_FIELD\((\w+)", table)}
 
 
 def wrong_words(line, fields):
@@ -59,7 +61,7 @@ def violations(root, layers, interface):
     found = [f"{root / 'include' / 'gart' / name}: is in cmake/interface.txt, and does not open namespace gart"
              for name in sorted(interface) if not opens_gart(root / "include" / "gart" / name)]
     headers = root / "include" / "gart"
-    fields = fields_of((root / FIELD_TABLE).read_text())
+    fields = fields_of("".join((root / t).read_text() for t in (FIELD_TABLE, TRAIN_TABLE) if (root / t).exists()))
     for path in sorted([*headers.rglob("*"), *(root / "backends").rglob("*")]):
         if path.suffix not in SUFFIXES:
             continue

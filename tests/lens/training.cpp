@@ -75,17 +75,17 @@ TEST_CASE_TEMPLATE("a state carries lenses, and what has none is refused by name
   run_of<E> run(exec, options, data, cloud(seed + 1, 0.6f));
   for (int i = 0; i < 9; ++i) run.step();
   auto const state = run.state();
-  CHECK(state.lenses.visits.size() == 2);
-  CHECK(state.lenses.visits[0] + state.lenses.visits[1] == 9);
+  CHECK(words(state, "lens/visits").size() == 2);
+  CHECK(words(state, "lens/visits")[0] + words(state, "lens/visits")[1] == 9);
   run_of<E> other(exec, options, data, cloud(seed + 1, 0.6f));
   other.set_state(state);
-  CHECK(other.state().lenses.value == state.lenses.value);
+  CHECK(doubles(other.state(), "lens") == doubles(state, "lens"));
   float const next = run.step().loss, again = other.step().loss;
   CHECK(again == doctest::Approx(next).epsilon(1e-4));
   auto fewer = data;
   fewer.train.pop_back();
   run_of<E> one(exec, options, fewer, cloud(seed + 1, 0.6f));
-  CHECK_THROWS_WITH_AS(one.set_state(state), doctest::Contains("another number of cameras"), gart::invalid_argument);
+  CHECK_THROWS_WITH_AS(one.set_state(state), doctest::Contains("array lens has"), gart::invalid_argument);
   auto const refused = [&](gart::dataset const& of, char const* what) {
     CHECK_THROWS_WITH_AS(run_of<E>(exec, options, of, cloud(seed, 0.6f)), doctest::Contains(what),
                          gart::invalid_argument);

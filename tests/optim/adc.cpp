@@ -1,6 +1,6 @@
 #include <support/policies.hpp>
 
-#include <gart/optim/adc.hpp>
+#include <gart/train/densify/adc.hpp>
 
 #include "models.hpp"
 
@@ -21,27 +21,17 @@ gaussian_model plain(index_t n, std::mt19937_64& random) {
 }
 
 template <class E>
-struct training {
-  E exec;
-  gaussians<E> model;
-  optimizer_state<E> state;
+struct training : gart_test::with_moments<E> {
   adaptive_density<E> density;
 
   explicit training(gaussian_model const& m, index_t most = 1000, adc_options const& options = {})
-      : model(exec, m),
-        state(exec, static_cast<index_t>(m.size()), m.sh_degree),
-        density(exec, options, most, 30000, 1.0f, 5) {
-    gaussian_model ones = m;
-    for (auto* v : {&ones.mean, &ones.log_scale, &ones.quaternion, &ones.opacity, &ones.sh})
-      std::fill(v->begin(), v->end(), 1.0f);
-    state.first.assign(ones), state.second.assign(ones);
-  }
+      : gart_test::with_moments<E>(m), density(this->exec, options, most, 30000, 1.0f, 5) {}
   void statistic(std::vector<float> const& mean_gradient) {
     density.gradient_sum.assign(mean_gradient);
     density.touched.assign(std::vector<u32>(mean_gradient.size(), 1));
   }
   std::vector<int> tags() {
-    gaussian_model const m = model.to_host();
+    gaussian_model const m = this->model.to_host();
     std::vector<int> out;
     for (std::size_t i = 0; i < m.size(); ++i) out.push_back(static_cast<int>(m.sh[i * 12]));
     return out;
@@ -88,11 +78,11 @@ TEST_CASE_TEMPLATE("the statistic is the gradient in the projected mean", E, GAR
     expected[i] = std::sqrt(a * a + b * b);
   }
   gaussians<E> gradient(t.exec, g);
-  t.density.accumulate(t.model, gradient, view);
-  t.density.accumulate(t.model, gradient, view);
+  t.density.observe(t.model, gradient, view);
+  t.density.observe(t.model, gradient, view);
   g.mean[0] = NAN;
   gradient.assign(g);
-  t.density.accumulate(t.model, gradient, view);
+  t.density.observe(t.model, gradient, view);
   auto const sum = t.density.gradient_sum.to_host();
   auto const touched = t.density.touched.to_host();
   for (index_t i = 0; i < n; ++i) {
@@ -105,7 +95,7 @@ TEST_CASE_TEMPLATE("the statistic is the gradient in the projected mean", E, GAR
   gaussian_model behind = m;
   for (index_t i = 0; i < n; ++i) behind.mean[3 * i + 2] = -1;
   t.model.assign(behind);
-  t.density.accumulate(t.model, gradient, view);
+  t.density.observe(t.model, gradient, view);
   CHECK(t.density.gradient_sum.to_host() == sum);
 }
 
@@ -120,11 +110,11 @@ TEST_CASE_TEMPLATE("keep, clone, split and prune", E, GART_TEST_POLICIES) {
   m.log_scale[3 * 6] = std::log(0.5f);
   training<E> t(m);
   t.statistic({1e-4f, 3e-4f, 3e-4f, 0, 1, 1, 0, 2e-4f});
-  density_change const change = t.density.densify(t.model, t.state, 600);
+  density_change const change = t.density.densify(t, {600});
   CHECK(change.added == 3);
   CHECK(change.removed == 3);
   CHECK(t.tags() == std::vector<int>{0, 1, 1, 2, 2, 6, 7, 7});
-  gaussian_model got = t.model.to_host(), first = t.state.first.to_host(), second = t.state.second.to_host();
+  gaussian_model got = t.model.to_host(), first = t.moments.first.to_host(), second = t.moments.second.to_host();
   bool const fresh[] = {false, false, true, true, true, false, false, true};
   for (index_t i = 0; i < 8; ++i) {
     CHECK(gart_test::all_zero(gart_test::row(first, i)) == fresh[i]);
@@ -156,7 +146,7 @@ TEST_CASE_TEMPLATE("halves of a split are draws from the Gaussian", E, GART_TEST
   }
   training<E> t(m, 2 * n);
   t.statistic(std::vector<float>(n, 1.0f));
-  t.density.densify(t.model, t.state, 600);
+  t.density.densify(t, {600});
   gaussian_model const got = t.model.to_host();
   REQUIRE(got.size() == 2 * n);
   double square[3] = {}, sum[3] = {};
@@ -177,9 +167,9 @@ TEST_CASE_TEMPLATE("oversized ones go after the first reset of opacities", E, GA
   m.log_scale[0] = std::log(0.2f), m.log_scale[3] = std::log(0.15f);  // 0 grows: its halves are 0.125; 1: kept size
   training<E> early(m), late(m);
   early.statistic({1, 0, 0}), late.statistic({1, 0, 0});
-  early.density.densify(early.model, early.state, 3000);
+  early.density.densify(early, {3000});
   CHECK(early.tags() == std::vector<int>{0, 0, 1, 2});
-  late.density.densify(late.model, late.state, 3100);
+  late.density.densify(late, {3100});
   CHECK(late.tags() == std::vector<int>{2});
 }
 
@@ -187,12 +177,12 @@ TEST_CASE_TEMPLATE("at the budget the largest statistics grow", E, GART_TEST_POL
   std::mt19937_64 random(1);
   training<E> t(plain(6, random), 8);
   t.statistic({0.5f, 0.1f, 0.9f, 0, 0.7f, 0.3f});
-  CHECK(t.density.densify(t.model, t.state, 600).added == 2);
+  CHECK(t.density.densify(t, {600}).added == 2);
   CHECK(t.tags() == std::vector<int>{0, 1, 2, 2, 3, 4, 4, 5});
 
   training<E> full(plain(6, random), 4);
   full.statistic(std::vector<float>(6, 1.0f));
-  CHECK(!full.density.densify(full.model, full.state, 600).any());
+  CHECK(!full.density.densify(full, {600}).any());
   CHECK(full.model.size() == 6);
 }
 
@@ -201,16 +191,16 @@ TEST_CASE_TEMPLATE("opacities are reset, with their moments", E, GART_TEST_POLIC
   gaussian_model m = plain(3, random);
   m.opacity = {2.0f, static_cast<float>(logit(0.006)), static_cast<float>(logit(0.02))};
   training<E> t(m);
-  CHECK(!t.density.after_step(t.model, t.state, 2999).any());
+  CHECK(!t.density.step(t, {2999}).any());
   CHECK(t.model.to_host().opacity == m.opacity);
-  t.density.after_step(t.model, t.state, 3000);
+  t.density.step(t, {3000});
   gaussian_model const got = t.model.to_host();
   CHECK(gart_test::sigmoid(got.opacity[0]) == doctest::Approx(0.01));
   CHECK(got.opacity[1] == m.opacity[1]);
   CHECK(gart_test::sigmoid(got.opacity[2]) == doctest::Approx(0.01));
-  CHECK(t.state.first.to_host().opacity == std::vector<float>(3, 0.0f));
-  CHECK(t.state.second.to_host().opacity == std::vector<float>(3, 0.0f));
-  CHECK(t.state.first.to_host().mean == std::vector<float>(9, 1.0f));
+  CHECK(t.moments.first.to_host().opacity == std::vector<float>(3, 0.0f));
+  CHECK(t.moments.second.to_host().opacity == std::vector<float>(3, 0.0f));
+  CHECK(t.moments.first.to_host().mean == std::vector<float>(9, 1.0f));
 }
 
 TEST_CASE_TEMPLATE("a reset leaves every Gaussian above what is pruned", E, GART_TEST_POLICIES) {
@@ -220,18 +210,18 @@ TEST_CASE_TEMPLATE("a reset leaves every Gaussian above what is pruned", E, GART
   adc_options options;
   options.prune_opacity = 0.06f;
   training<E> t(m, 1000, options);
-  t.density.after_step(t.model, t.state, 3000);
+  t.density.step(t, {3000});
   gaussian_model const got = t.model.to_host();
   CHECK(gart_test::sigmoid(got.opacity[0]) == doctest::Approx(0.12));
   CHECK(got.opacity[1] == m.opacity[1]);
   CHECK(gart_test::sigmoid(got.opacity[2]) == doctest::Approx(0.12));
-  CHECK(t.density.densify(t.model, t.state, 3001).removed == 0);
+  CHECK(t.density.densify(t, {3001}).removed == 0);
 
   // However much is pruned, no opacity is 1.
   options.prune_opacity = 0.6f;
   m.opacity[1] = 20;
   training<E> most(m, 1000, options);
-  most.density.after_step(most.model, most.state, 3000);
+  most.density.step(most, {3000});
   CHECK(gart_test::sigmoid(most.model.to_host().opacity[1]) == doctest::Approx(0.99));
 }
 
@@ -246,11 +236,11 @@ TEST_CASE_TEMPLATE("all may go, and none may be there", E, GART_TEST_POLICIES) {
   gaussian_model m = plain(100, random);
   std::fill(m.opacity.begin(), m.opacity.end(), NAN);
   training<E> t(m);
-  CHECK(t.density.densify(t.model, t.state, 600).removed == 100);
+  CHECK(t.density.densify(t, {600}).removed == 100);
   CHECK(t.model.size() == 0);
-  CHECK(t.state.first.size() == 0);
-  CHECK(!t.density.after_step(t.model, t.state, 3000).any());
-  t.density.accumulate(t.model, t.model, camera{});
+  CHECK(t.moments.first.size() == 0);
+  CHECK(!t.density.step(t, {3000}).any());
+  t.density.observe(t.model, t.model, camera{});
   CHECK(!t.density.due(500));
   CHECK(t.density.due(14900));
   CHECK(!t.density.due(15000));

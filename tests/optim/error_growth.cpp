@@ -1,7 +1,7 @@
 // Densification by error, and the split along the long axis.
 #include <support/policies.hpp>
 
-#include <gart/optim/error_growth.hpp>
+#include <gart/train/densify/error_growth.hpp>
 
 #include "models.hpp"
 
@@ -105,10 +105,10 @@ TEST_CASE_TEMPLATE("the dead give their rows to halves of those that the error i
 
   training<E> t(start);
   auto densifier = t.densifier(most, error);
-  density_change const change = densifier.densify(t.model, t.state, 1500);  // the count is full by then
+  density_change const change = densifier.densify(t, {1500});  // the count is full by then
   CHECK(change.relocated == dead.size());
   CHECK(change.added == most - n);
-  gaussian_model got = t.model.to_host(), first = t.state.first.to_host(), second = t.state.second.to_host();
+  gaussian_model got = t.model.to_host(), first = t.moments.first.to_host(), second = t.moments.second.to_host();
   REQUIRE(got.size() == most);
   REQUIRE(first.size() == most);
 
@@ -159,7 +159,7 @@ TEST_CASE_TEMPLATE("sources are drawn in proportion to the error seen through th
   }
   training<E> t(start);
   auto densifier = t.densifier(n + drawn, error, gart_test::seed());
-  REQUIRE(densifier.densify(t.model, t.state, 1500).added == drawn);
+  REQUIRE(densifier.densify(t, {1500}).added == drawn);
   gaussian_model const got = t.model.to_host();
   double count[kinds] = {}, chi_square = 0, all = 0;
   for (index_t i = n; i < n + drawn; ++i) ++count[tag_of(got, i) % kinds];
@@ -186,9 +186,9 @@ TEST_CASE_TEMPLATE("the count follows its curve and at most doubles", E, GART_TE
 
   training<E> t(tagged(300, random));
   auto densifier = t.densifier(10000, std::vector<float>(300, 1.0f));
-  CHECK(densifier.densify(t.model, t.state, 700).added == 300);
+  CHECK(densifier.densify(t, {700}).added == 300);
   REQUIRE(t.model.size() == 600);
-  CHECK(!densifier.densify(t.model, t.state, 800).any());  // no error has been seen since
+  CHECK(!densifier.densify(t, {800}).any());  // no error has been seen since
 }
 
 TEST_CASE_TEMPLATE("nothing to draw from", E, GART_TEST_POLICIES) {
@@ -198,15 +198,15 @@ TEST_CASE_TEMPLATE("nothing to draw from", E, GART_TEST_POLICIES) {
     std::fill(start.opacity.begin(), start.opacity.end(), opacity);
     training<E> t(start);
     auto densifier = t.densifier(200, std::vector<float>(100, 1.0f));
-    CHECK(!densifier.densify(t.model, t.state, 600).any());
+    CHECK(!densifier.densify(t, {600}).any());
     CHECK(t.model.size() == 100);
   }
   gaussian_model none;
   none.resize(0, 0);
   training<E> t(none);
   auto densifier = t.densifier(200, {});
-  CHECK(!densifier.after_step(t.model, t.state, 600).any());
-  densifier.accumulate(t.model, {}, t.model);
+  CHECK(!densifier.step(t, {600}).any());
+  densifier.penalty(t, 0);
 }
 
 TEST_CASE_TEMPLATE("the statistic adds up steps, and the penalty is that of the mean opacity", E, GART_TEST_POLICIES) {
@@ -215,14 +215,14 @@ TEST_CASE_TEMPLATE("the statistic adds up steps, and the penalty is that of the 
   index_t const n = 50;
   gaussian_model const m = gart_test::random_model(n, 0, random), g = gart_test::random_model(n, 0, random);
   training<E> t(m);
-  gaussians<E> gradient(t.exec, g);
+  t.gradients.assign(g);
   std::vector<float> moments(std::size_t{moment_stride} * n);
   gart_test::fill(moments, random, 0, 1);
   buffer<float, E> const on_policy(t.exec, moments);
   error_growth<E> densifier(t.exec, usual(), n, 1000, 1);
-  for (int i = 0; i < 3; ++i) densifier.accumulate(t.model, on_policy, gradient);
+  for (int i = 0; i < 3; ++i) add_errors(t.exec, on_policy, densifier.error_sums(n)), densifier.penalty(t, n);
   auto const sum = densifier.error_sum.to_host();
-  gaussian_model const got = gradient.to_host();
+  gaussian_model const got = t.gradients.to_host();
   double const h = 1e-5;
   for (index_t i = 0; i < n; ++i) {
     CHECK(sum[i] == doctest::Approx(3 * moments[std::size_t{moment_stride} * i + error_place]));

@@ -1,6 +1,6 @@
 #include <support/policies.hpp>
 
-#include <gart/optim/mcmc.hpp>
+#include <gart/train/densify/mcmc.hpp>
 
 #include "models.hpp"
 
@@ -19,7 +19,7 @@ struct training : gart_test::with_moments<E> {
     gaussian_model numbers = this->ones_like(m);
     for (std::size_t i = 0; i < m.size(); ++i)
       for (int c = 0; c < 3; ++c) numbers.mean[3 * i + c] = numbers.log_scale[3 * i + c] = static_cast<float>(i + 1);
-    this->state.second.assign(numbers);
+    this->moments.second.assign(numbers);
   }
   mcmc<E> densifier(index_t most, float growth = 1.05f, u64 seed = 1, int iterations = 1000) {
     mcmc_options options;
@@ -76,10 +76,10 @@ TEST_CASE_TEMPLATE("every dead Gaussian moves onto a live one, which shares with
   {
     training<E> t(start);
     auto densifier = t.densifier(n);
-    density_change const change = densifier.densify(t.model, t.state, 600);
+    density_change const change = densifier.densify(t, {600});
     CHECK(change.relocated == static_cast<index_t>(std::count(dead.begin(), dead.end(), true)));
     CHECK(change.added == 0);
-    gaussian_model got = t.model.to_host(), first = t.state.first.to_host(), second = t.state.second.to_host();
+    gaussian_model got = t.model.to_host(), first = t.moments.first.to_host(), second = t.moments.second.to_host();
     REQUIRE(got.size() == n);
 
     std::vector<u32> copies(n);
@@ -132,7 +132,7 @@ TEST_CASE_TEMPLATE("sources are drawn in proportion to opacity", E, GART_TEST_PO
   tag(start);
   training<E> t(start);
   auto densifier = t.densifier(n, 1.05f, gart_test::seed());
-  CHECK(densifier.densify(t.model, t.state, 600).relocated == n - alive);
+  CHECK(densifier.densify(t, {600}).relocated == n - alive);
   gaussian_model const got = t.model.to_host();
   std::vector<double> count(alive);
   for (index_t i = 0; i < n; ++i) {
@@ -183,22 +183,22 @@ TEST_CASE_TEMPLATE("growth reaches the budget exactly and stops", E, GART_TEST_P
   tag(start);
   training<E> t(start);
   auto densifier = t.densifier(1100);
-  CHECK(densifier.densify(t.model, t.state, 600).added == 50);
-  gaussian_model got = t.model.to_host(), first = t.state.first.to_host();
+  CHECK(densifier.densify(t, {600}).added == 50);
+  gaussian_model got = t.model.to_host(), first = t.moments.first.to_host();
   REQUIRE(got.size() == 1050);
-  REQUIRE(t.state.second.size() == 1050);
+  REQUIRE(t.moments.second.size() == 1050);
   for (index_t i = 0; i < 1050; ++i) {
     REQUIRE(gart_test::row(got, i) == gart_test::row(got, static_cast<index_t>(tag_of(got, i))));
     REQUIRE(gart_test::all_zero(gart_test::row(first, i)) == (i >= 1000));
   }
-  CHECK(densifier.densify(t.model, t.state, 700).added == 50);
+  CHECK(densifier.densify(t, {700}).added == 50);
   CHECK(t.model.size() == 1100);
-  CHECK(!densifier.densify(t.model, t.state, 800).any());
+  CHECK(!densifier.densify(t, {800}).any());
   CHECK(t.model.size() == 1100);
 
   training<E> one(gart_test::random_model(1, 0, random));
   auto small = one.densifier(5);
-  for (int i = 0; i < 6; ++i) small.densify(one.model, one.state, 600 + i);
+  for (int i = 0; i < 6; ++i) small.densify(one, {600 + i});
   CHECK(one.model.size() == 5);
 }
 
@@ -210,15 +210,15 @@ TEST_CASE_TEMPLATE("nothing alive, nothing at all, and weights that are no numbe
     std::fill(start.opacity.begin(), start.opacity.end(), opacity);
     training<E> t(start);
     auto densifier = t.densifier(200);
-    CHECK(!densifier.densify(t.model, t.state, 600).any());
+    CHECK(!densifier.densify(t, {600}).any());
     CHECK(t.model.size() == 100);
   }
   gaussian_model none;
   none.resize(0, 0);
   training<E> t(none);
   auto densifier = t.densifier(200);
-  CHECK(!densifier.after_step(t.model, t.state, 600, 1e-4f).any());
-  densifier.add_penalties(t.model, t.model);
+  CHECK(!densifier.step(t, {600, 1e-4f}).any());
+  densifier.penalty(t, 0);
 }
 
 TEST_CASE_TEMPLATE("densification runs between its limits", E, GART_TEST_POLICIES) {
@@ -325,10 +325,10 @@ TEST_CASE_TEMPLATE("penalties add their own gradient", E, GART_TEST_POLICIES) {
   index_t const n = 40;
   gaussian_model const m = gart_test::random_model(n, 0, random), g = gart_test::random_model(n, 0, random);
   training<E> t(m);
-  gaussians<E> gradient(t.exec, g);
+  t.gradients.assign(g);
   double const extent = 2;
-  mcmc<E>(t.exec, {}, n, 1000, static_cast<float>(extent), 1).add_penalties(t.model, gradient);
-  gaussian_model const got = gradient.to_host();
+  mcmc<E>(t.exec, {}, n, 1000, static_cast<float>(extent), 1).penalty(t, n);
+  gaussian_model const got = t.gradients.to_host();
   double const h = 1e-5;
   for (index_t i = 0; i < n; ++i) {
     double const o = m.opacity[i];
@@ -350,7 +350,7 @@ TEST_CASE_TEMPLATE("the same seed and step give the same model", E, GART_TEST_PO
   for (int i = 0; i < 3; ++i) {
     training<E> t(start);
     auto densifier = t.densifier(2500, 1.05f, i < 2 ? 9 : 10);
-    densifier.after_step(t.model, t.state, 600, 1e-4f);
+    densifier.step(t, {600, 1e-4f});
     results[i] = t.model.to_host();
   }
   CHECK(results[0].mean == results[1].mean);

@@ -1,8 +1,7 @@
 #pragma once
 // Random models for the optimizer's tests.
 
-#include <gart/optim/adam.hpp>
-#include <gart/optim/rows.hpp>
+#include <gart/optim/trained_gaussians.hpp>
 #include <gart/scene/gaussians.hpp>
 
 #include <algorithm>
@@ -27,15 +26,15 @@ inline gart::gaussian_model random_model(gart::index_t n, int degree, std::mt199
 
 // A model in a policy's memory, with moments of one.
 template <class E>
-struct with_moments {
+struct own_policy {
   E exec;
-  gart::gaussians<E> model;
-  gart::optimizer_state<E> state;
-
+};
+template <class E>
+struct with_moments : own_policy<E>, gart::trained_gaussians<E> {
   explicit with_moments(gart::gaussian_model const& m)
-      : model(exec, m), state(exec, static_cast<gart::index_t>(m.size()), m.sh_degree) {
+      : gart::trained_gaussians<E>(own_policy<E>::exec, m, m.sh_degree) {
     gart::gaussian_model const ones = ones_like(m);
-    state.first.assign(ones), state.second.assign(ones);
+    this->moments.first.assign(ones), this->moments.second.assign(ones);
   }
   static gart::gaussian_model ones_like(gart::gaussian_model m) {
     for (auto* v : {&m.mean, &m.log_scale, &m.quaternion, &m.opacity, &m.sh}) std::fill(v->begin(), v->end(), 1.0f);

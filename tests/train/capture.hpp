@@ -5,6 +5,7 @@
 #include <support/scene_by_kind.hpp>
 
 #include <gart/io/dataset.hpp>
+#include <gart/train/state.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +14,33 @@
 #include <utility>
 
 namespace gart_test {
+
+// An array of what is learned besides the Gaussians.
+inline std::vector<float> floats(gart::training_state const& s, char const* name) { return s.parts.get<float>(name); }
+inline std::vector<double> doubles(gart::training_state const& s, char const* name) {
+  return s.parts.get<double>(name);
+}
+inline std::vector<gart::u32> words(gart::training_state const& s, char const* name) {
+  return s.parts.get<gart::u32>(name);
+}
+
+// The rows of an adam_table (exposure/adam_table.hpp).
+struct table_state {
+  std::vector<float> value, first, second;
+  std::vector<gart::u32> visits;
+  template <class Table>
+  void put_into(Table& table) const {
+    gart::named_arrays all;
+    all.set("", value), all.set("/first", first), all.set("/second", second), all.set("/visits", visits);
+    table.load(all, "");
+  }
+};
+template <class Table>
+table_state state_of(Table const& table) {
+  gart::named_arrays all;
+  table.save(all, "");
+  return {all.get<float>(""), all.get<float>("/first"), all.get<float>("/second"), all.get<gart::u32>("/visits")};
+}
 
 inline gart::gaussian_model cloud(std::uint64_t seed, float spread) {
   std::mt19937_64 engine(seed);

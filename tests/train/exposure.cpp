@@ -9,7 +9,7 @@ using namespace gart_test;
 
 namespace {
 
-gart::exposure_state some_state(std::mt19937_64& random, std::size_t views) {
+table_state some_state(std::mt19937_64& random, std::size_t views) {
   std::size_t const n = views * gart::exposure::floats;
   return {values(random, n), std::vector<float>(n), std::vector<float>(n), std::vector<gart::u32>(views)};
 }
@@ -32,7 +32,7 @@ TEST_CASE_TEMPLATE("the exposed image and both gradients are what the matrix say
     CAPTURE(pixels);
     gart::exposure_training<E> training(exec, 3);
     auto const start = some_state(random, 3);
-    training.set_state(start);
+    start.put_into(training);
     auto const image = values(random, 3 * pixels), weights = values(random, 3 * pixels);
     gart::buffer<float, E> const x(exec, image), g(exec, weights);
 
@@ -41,7 +41,7 @@ TEST_CASE_TEMPLATE("the exposed image and both gradients are what the matrix say
     exec.copy_out(shown.data(), exposed.data(), shown.size() * sizeof(float));
     training.step(1, x, g, 0.01f);
     auto const turned = g.to_host();
-    auto const state = training.state();
+    auto const state = state_of(training);
 
     float const* const m = start.value.data() + gart::exposure::floats;
     double by_matrix[gart::exposure::floats] = {}, size[gart::exposure::floats] = {};
@@ -80,7 +80,7 @@ TEST_CASE_TEMPLATE("a gradient that is not finite leaves its number of the expos
   gart::buffer<float, E> const x(exec, std::vector<float>{0.5f, 0.25f, 0.75f});
   gart::buffer<float, E> const g(exec, std::vector<float>{std::numeric_limits<float>::quiet_NaN(), 1, 1});
   training.step(0, x, g, 0.1f);
-  auto const state = training.state();
+  auto const state = state_of(training);
   gart::exposure const identity;
   for (int k = 0; k < 4; ++k) CHECK(state.value[k] == identity.m[k]);
   for (int k = 4; k < gart::exposure::floats; ++k)
@@ -121,18 +121,17 @@ TEST_CASE_TEMPLATE("a state carries exposures, and one of another number of view
   run_of<E> run(exec, options, data, cloud(seed + 1, 0.6f));
   for (int i = 0; i < 9; ++i) run.step();
   auto const state = run.state();
-  CHECK(state.exposures.visits.size() == 4);
+  CHECK(words(state, "exposure/visits").size() == 4);
   run_of<E> other(exec, options, data, cloud(seed + 1, 0.6f));
   other.set_state(state);
-  CHECK(other.state().exposures.value == state.exposures.value);
-  CHECK(other.state().exposures.second == state.exposures.second);
+  CHECK(floats(other.state(), "exposure") == floats(state, "exposure"));
+  CHECK(floats(other.state(), "exposure/second") == floats(state, "exposure/second"));
   float const next = run.step().loss, again = other.step().loss;
   CHECK(again == doctest::Approx(next).epsilon(1e-5));
 
   data.train.pop_back();
   run_of<E> fewer(exec, options, data, cloud(seed + 1, 0.6f));
-  CHECK_THROWS_WITH_AS(fewer.set_state(state), doctest::Contains("another number of training views"),
-                       gart::invalid_argument);
+  CHECK_THROWS_WITH_AS(fewer.set_state(state), doctest::Contains("array exposure has"), gart::invalid_argument);
 
   // A view that is held out is not visited, and has no exposure of its own.
   data = capture(exec, seed);

@@ -20,7 +20,8 @@ gart::train_options growing() {
 }
 
 bool same_state(gart::training_state const& a, gart::training_state const& b) {
-  return same(a.scene, b.scene) && same(a.first, b.first) && same(a.second, b.second) && a.error_sum == b.error_sum;
+  return same(a.scene, b.scene) && same(a.first, b.first) && same(a.second, b.second) &&
+         floats(a, "error_growth/error_sum") == floats(b, "error_growth/error_sum");
 }
 
 }  // namespace

@@ -92,11 +92,11 @@ TEST_CASE_TEMPLATE("a step by smaller images is one of a capture of that size, b
     for (int i = 0; i < 14; ++i) REQUIRE(shrunk.step().loss == taken.step().loss);
     CHECK(same(shrunk.model(), taken.model()));
     gart::training_state const a = shrunk.state(), b = taken.state();
-    CHECK(a.exposures.value == b.exposures.value);
-    CHECK(a.vignetting.value == b.vignetting.value);
-    CHECK(a.poses.value == b.poses.value);
-    CHECK(a.lenses.value == b.lenses.value);
-    CHECK(a.lenses.value.empty() == with_alpha);
+    CHECK(floats(a, "exposure") == floats(b, "exposure"));
+    CHECK(floats(a, "vignetting") == floats(b, "vignetting"));
+    CHECK(doubles(a, "pose") == doubles(b, "pose"));
+    CHECK(doubles(a, "lens") == doubles(b, "lens"));
+    CHECK(doubles(a, "lens").empty() == with_alpha);
   }
 }
 
@@ -177,9 +177,9 @@ TEST_CASE_TEMPLATE("sizes that are none are refused", E, GART_TEST_POLICIES) {
     options.resolution = resolution;
     CHECK_THROWS_WITH_AS(run<E>(exec, options, data, cloud(2, 0.7f)), why, gart::invalid_argument);
   };
-  refused(sizes(-0.5f, 1), "resolution_options.quarter_until is -0.500000: a share of the run, from 0 to 1");
-  refused(sizes(0.25f, 1.5f), "resolution_options.half_until is 1.500000: a share of the run, from 0 to 1");
-  refused(sizes(0, std::nanf("")), "resolution_options.half_until is nan: a share of the run, from 0 to 1");
-  refused({0, 0, 0}, "resolution_options.least is 0: at least 1 pixel");
-  refused({0, 0, 1, 0}, "resolution_options.long_run is 0: at least 1 step");
+  refused(sizes(-0.5f, 1), "train_options.resolution.quarter_until is -0.5: from 0 to 1");
+  refused(sizes(0.25f, 1.5f), "train_options.resolution.half_until is 1.5: from 0 to 1");
+  refused(sizes(0, std::nanf("")), "train_options.resolution.half_until is nan: from 0 to 1");
+  refused({0, 0, 0}, "train_options.resolution.least is 0: from 1 to 1000000");
+  refused({0, 0, 1, 0}, "train_options.resolution.long_run is 0: from 1 to 1e+09");
 }

@@ -62,8 +62,8 @@ TEST_CASE_TEMPLATE("the shaded image and both gradients are what the polynomial 
     auto const views = some_views(width, height);
     gart::vignetting_training<E> training(exec, views);
     REQUIRE(training.lenses().size() == 2);
-    gart::vignetting_state const start{values(random, 18), std::vector<float>(18), std::vector<float>(18), {0, 0}};
-    training.set_state(start);
+    table_state const start{values(random, 18), std::vector<float>(18), std::vector<float>(18), {0, 0}};
+    start.put_into(training);
     std::size_t const pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
     auto const image = values(random, 3 * pixels), weights = values(random, 3 * pixels);
     gart::buffer<float, E> const x(exec, image), g(exec, weights);
@@ -73,7 +73,7 @@ TEST_CASE_TEMPLATE("the shaded image and both gradients are what the polynomial 
     exec.copy_out(shown.data(), shaded.data(), shown.size() * sizeof(float));
     training.step(3, views[3].view, x, g, 0.01f);
     auto const turned = g.to_host();
-    auto const state = training.state();
+    auto const state = state_of(training);
 
     float const* const k = start.value.data() + 9;
     double by_falloff[9] = {}, size[9] = {}, worst_image = 0, worst_gradient = 0;
@@ -107,7 +107,7 @@ TEST_CASE_TEMPLATE("a gradient that is not finite leaves a falloff as it is", E,
   gart::buffer<float, E> const x(exec, std::vector<float>{0.5f, 0.25f, 0.75f});
   gart::buffer<float, E> const g(exec, std::vector<float>{std::numeric_limits<float>::quiet_NaN(), 1, 1});
   training.step(0, views[0].view, x, g, 0.1f);
-  auto const state = training.state();
+  auto const state = state_of(training);
   for (std::size_t j = 0; j < 3; ++j) {
     CHECK(state.value[j] == 0);
     CHECK(state.value[3 + j] != 0);
@@ -169,18 +169,18 @@ TEST_CASE_TEMPLATE("a state carries falloffs, and one of another number of lense
   run_of<E> run(exec, options, data, cloud(seed + 1, 0.6f));
   for (int i = 0; i < 9; ++i) run.step();
   auto const state = run.state();
-  CHECK(state.vignetting.visits == std::vector<gart::u32>{9});
+  CHECK(words(state, "vignetting/visits") == std::vector<gart::u32>{9});
   run_of<E> other(exec, options, data, cloud(seed + 1, 0.6f));
   other.set_state(state);
-  CHECK(other.state().vignetting.value == state.vignetting.value);
-  CHECK(other.state().vignetting.second == state.vignetting.second);
+  CHECK(floats(other.state(), "vignetting") == floats(state, "vignetting"));
+  CHECK(floats(other.state(), "vignetting/second") == floats(state, "vignetting/second"));
   float const next = run.step().loss, again = other.step().loss;
   CHECK(again == doctest::Approx(next).epsilon(1e-5));
 
   data.train[1].view.fx *= 1.05f;  // calibrated anew
   data.train[2].view.fx *= 1.5f;
   run_of<E> more(exec, options, data, cloud(seed + 1, 0.6f));
-  CHECK_THROWS_WITH_AS(more.set_state(state), doctest::Contains("another number of lenses"), gart::invalid_argument);
+  CHECK_THROWS_WITH_AS(more.set_state(state), doctest::Contains("array vignetting has"), gart::invalid_argument);
   options.held_out = {2};
   run_of<E> held(exec, options, data, cloud(seed + 1, 0.6f));
   for (int i = 0; i < 9; ++i) held.step();
@@ -206,8 +206,9 @@ TEST_CASE_TEMPLATE("an exposure is of what the lens let through, and the falloff
   options.exposure = true;
   run_of<E> run(exec, options, data, cloud(seed + 1, 0.6f));
   auto state = run.state();
-  for (int c = 0; c < 3; ++c) state.vignetting.value[static_cast<std::size_t>(3 * c)] = -0.5f - 0.1f * c;
-  auto const falloff = state.vignetting.value;
+  auto falloff = floats(state, "vignetting");
+  for (int c = 0; c < 3; ++c) falloff[static_cast<std::size_t>(3 * c)] = -0.5f - 0.1f * c;
+  state.parts.set("vignetting", falloff);
   run.set_state(state);
   std::vector<float> shown;
   run.step([&](gart::loss_input<E> const& in) {
@@ -228,10 +229,11 @@ TEST_CASE_TEMPLATE("an exposure is of what the lens let through, and the falloff
   }
   state = run.state();
   std::size_t view = 0;
-  while (state.exposures.visits[view] == 0) ++view;
+  while (words(state, "exposure/visits")[view] == 0) ++view;
   for (std::size_t c = 0; c < 3; ++c)
     for (std::size_t k = 0; k < 3; ++k)
-      CHECK(10 * state.exposures.first[12 * view + 4 * c + k] == doctest::Approx(by_exposure[k]).epsilon(1e-4));
+      CHECK(10 * floats(state, "exposure/first")[12 * view + 4 * c + k] ==
+            doctest::Approx(by_exposure[k]).epsilon(1e-4));
   for (std::size_t j = 0; j < 9; ++j)
-    CHECK(10 * state.vignetting.first[j] == doctest::Approx(by_falloff[j]).epsilon(1e-4));
+    CHECK(10 * floats(state, "vignetting/first")[j] == doctest::Approx(by_falloff[j]).epsilon(1e-4));
 }

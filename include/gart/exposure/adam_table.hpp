@@ -8,10 +8,12 @@
 /// stays as it is.
 
 #include <gart/algorithm/segmented_reduce.hpp>
+#include <gart/core/named_arrays.hpp>
 #include <gart/exec/buffer.hpp>
 #include <gart/math/arith.hpp>
 #include <gart/optim/adam.hpp>
 
+#include <string>
 #include <vector>
 
 namespace gart::inline GART_ISA {
@@ -35,8 +37,8 @@ struct row_adam_kernel {
 
 }  // namespace detail
 
-/// Rows of so many floats, and Adam's moments of them. State: a struct of value, first, second and visits.
-template <execution E, int Floats, class State>
+/// Rows of so many floats, and Adam's moments of them.
+template <execution E, int Floats>
 class adam_table {
  public:
   /// [rows][Floats] to begin with.
@@ -70,11 +72,24 @@ class adam_table {
     move(row, rate);
   }
 
-  /// For a checkpoint.
-  State state() const { return {value_.to_host(), first_.to_host(), second_.to_host(), visits_}; }
-  /// From a checkpoint.
-  void set_state(State const& s) {
-    value_.assign(s.value), first_.assign(s.first), second_.assign(s.second), visits_ = s.visits;
+  /// For a checkpoint: [rows][Floats] each, and how many steps moved a row.
+  void save(named_arrays& to, std::string const& name) const {
+    to.set(name, value_.to_host()), to.set(name + "/first", first_.to_host());
+    to.set(name + "/second", second_.to_host()), to.set(name + "/visits", visits_);
+  }
+  /// From a checkpoint of as many rows.
+  void load(named_arrays const& from, std::string const& name) {
+    std::vector<float> value(value_.size()), first(value_.size()), second(value_.size());
+    from.take(name, value), from.take(name + "/first", first), from.take(name + "/second", second);
+    from.take(name + "/visits", visits_);
+    value_.assign(value), first_.assign(first), second_.assign(second);
+  }
+  /// f(row, its numbers in host memory) for each row that a step has moved.
+  template <class F>
+  void for_each_learned(F const& f) const {
+    std::vector<float> const value = value_.to_host();
+    for (std::size_t row = 0; row < visits_.size(); ++row)
+      if (visits_[row]) f(row, value.data() + row * Floats);
   }
 
  protected:

@@ -8,8 +8,6 @@
 #include <gart/core/types.hpp>
 #include <gart/math/arith.hpp>
 
-#include <vector>
-
 namespace gart {
 
 /// An affine map of colours.
@@ -21,12 +19,6 @@ struct exposure {
   GART_HD GART_INLINE float channel(int c, float r, float g, float b) const {
     return fma(m[4 * c], r, fma(m[4 * c + 1], g, fma(m[4 * c + 2], b, m[4 * c + 3])));
   }
-};
-
-/// The exposures of all training views and their moments, as a checkpoint holds them.
-struct exposure_state {
-  std::vector<float> value, first, second;  ///< [views][12]; empty: no exposures are learned
-  std::vector<u32> visits;                  ///< [views] steps taken; a view without any has no exposure
 };
 
 }  // namespace gart

@@ -56,7 +56,7 @@ struct exposure_gradient_kernel {
 
 /// The exposures of a run, and Adam's moments of them.
 template <execution E>
-class exposure_training : public adam_table<E, exposure::floats, exposure_state> {
+class exposure_training : public adam_table<E, exposure::floats> {
  public:
   /// As many identities as there are views.
   exposure_training(E& exec, std::size_t views) : base(exec, identities(views)), exec_(&exec), exposed_(exec) {}
@@ -83,7 +83,7 @@ class exposure_training : public adam_table<E, exposure::floats, exposure_state>
   }
 
  private:
-  using base = adam_table<E, exposure::floats, exposure_state>;
+  using base = adam_table<E, exposure::floats>;
   static std::vector<float> identities(std::size_t views) {
     exposure const identity;
     std::vector<float> all;

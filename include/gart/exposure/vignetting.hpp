@@ -12,7 +12,6 @@
 #include <gart/scene/camera.hpp>
 
 #include <cmath>
-#include <vector>
 
 namespace gart {
 
@@ -43,12 +42,6 @@ struct image_circle {
     float const dx = x + 0.5f - cx, dy = y + 0.5f - cy;
     return fma(dx, dx, dy * dy) * scale;
   }
-};
-
-/// The falloffs of a capture's lenses and Adam's moments of them, as a checkpoint holds them.
-struct vignetting_state {
-  std::vector<float> value, first, second;  ///< [lenses][9]; empty: none are learned
-  std::vector<u32> visits;                  ///< [lenses] steps taken
 };
 
 }  // namespace gart

@@ -63,7 +63,7 @@ struct vignetting_gradient_kernel {
 
 /// The falloffs of a run, and Adam's moments of them.
 template <execution E>
-class vignetting_training : public adam_table<E, vignetting::floats, vignetting_state> {
+class vignetting_training : public adam_table<E, vignetting::floats> {
  public:
   /// Of these views' lenses, no falloff at first. Errors: invalid_argument, naming the view, for a camera that has no
   /// principal point.
@@ -106,7 +106,7 @@ class vignetting_training : public adam_table<E, vignetting::floats, vignetting_
   std::vector<camera> const& lenses() const { return lenses_; }
 
  private:
-  using base = adam_table<E, vignetting::floats, vignetting_state>;
+  using base = adam_table<E, vignetting::floats>;
 
   vignetting_training(E& exec, std::vector<camera> lenses, std::vector<named_camera> const& views)
       : base(exec, std::vector<float>(vignetting::floats * lenses.size())),

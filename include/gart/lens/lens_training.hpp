@@ -6,6 +6,7 @@
 /// A gradient that is not finite moves nothing. Each number stays within half of the focal length, either way, so that
 /// it stays positive: what is farther off is no calibration to refine. Cost: none that shows beside the gradient's.
 
+#include <gart/core/named_arrays.hpp>
 #include <gart/lens/differentiate_lens.hpp>
 #include <gart/lens/lens_state.hpp>
 #include <gart/lens/options.hpp>
@@ -13,6 +14,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace gart::inline GART_ISA {
 
@@ -68,11 +70,23 @@ class lens_training {
   }
 
   /// For a checkpoint.
+  void save(named_arrays& to) const {
+    for_each_array(state_, [&](char const* name, auto const& values) { to.set(name, values); });
+  }
+  /// The same in memory.
   lens_state const& state() const { return state_; }
-  /// From a checkpoint.
-  void set_state(lens_state const& s) { state_ = s; }
+  /// From a checkpoint of as many.
+  void load(named_arrays const& from) {
+    lens_state taken = state_;
+    for_each_array(taken, [&](char const* name, auto& values) { from.take(name, values); });
+    state_ = std::move(taken);
+  }
 
  private:
+  template <class State, class F>
+  static void for_each_array(State& s, F const& f) {
+    f("lens", s.value), f("lens/first", s.first), f("lens/second", s.second), f("lens/visits", s.visits);
+  }
   int warm_up(int iterations) const {
     return std::min(500, static_cast<int>(options_.warm_up * static_cast<float>(iterations)));
   }

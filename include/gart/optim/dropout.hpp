@@ -12,13 +12,11 @@
 /// it.
 
 #include <gart/comm/row_owners.hpp>
-#include <gart/core/error.hpp>
 #include <gart/exec/buffer.hpp>
 #include <gart/math/logit.hpp>
 #include <gart/optim/random.hpp>
 #include <gart/scene/gaussians.hpp>
 
-#include <string>
 #include <utility>
 
 namespace gart::inline GART_ISA {
@@ -47,16 +45,9 @@ struct dropout_kernel {
 template <execution E>
 class dropout {
  public:
-  /// For a share of the Gaussians, until a share of the run. Errors: invalid_argument for what is out of its range.
+  /// For a share of the Gaussians, less than 1, until a share of the run.
   dropout(E& exec, float share, float until, u64 seed)
-      : exec_(&exec), share_(share), until_(until), seed_(seed), shown_(exec) {
-    if (!(share >= 0 && share < 1))
-      throw invalid_argument("train_options.dropout is " + std::to_string(share) + ": at least 0, less than 1");
-    if (!(until >= 0 && until <= 1))
-      throw invalid_argument("train_options.dropout_until is " + std::to_string(until) +
-                             ": a share of the run, from 0 to 1");
-  }
-
+      : exec_(&exec), share_(share), until_(until), seed_(seed), shown_(exec) {}
   /// Makes room for so many Gaussians.
   void reserve(u64 count) {
     if (share_ > 0) shown_.reserve(count);

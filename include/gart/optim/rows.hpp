@@ -11,6 +11,8 @@
 #include <gart/optim/adam.hpp>
 #include <gart/scene/gaussians.hpp>
 
+#include <vector>
+
 namespace gart::inline GART_ISA {
 
 /// mean, log_scale and quaternion: what places and shapes a Gaussian, and comes first in a row.
@@ -150,28 +152,39 @@ void clear_moments(E& exec, optimizer_state<E>& state, span<u32 const> rows, row
 }
 
 /// Where the rows of a scene are, as densification asks: here, all of them. Several ranks have another
-/// (shard/sharded_rows.hpp), with the same members, which all ranks call together.
+/// (shard/sharded_rows.hpp), whose members all ranks call together.
+template <execution E>
 class all_rows {
  public:
-  row_owners owners() const { return {}; }             ///< this rank has all
-  index_t total(index_t here) const { return here; }   ///< Gaussians of the scene, of which `here` are here
-  index_t here(index_t total) const { return total; }  ///< of so many, those that are here
+  virtual ~all_rows() = default;
+  virtual row_owners owners() const { return {}; }             ///< this rank has all
+  virtual bool spread() const { return false; }                ///< whether other ranks have some
+  virtual index_t total(index_t here) { return here; }         ///< Gaussians of the scene, of which `here` are here
+  virtual index_t here(index_t total) const { return total; }  ///< of so many, those that are here
   /// An element of each row that is here becomes one of each Gaussian, by number.
-  template <execution E>
-  void gather(E&, buffer<u32, E>&) const {}
+  virtual void gather(E&, buffer<u32, E>&) {}
   /// Gaussian to[k] becomes a copy of from[k], by numbers; `from` and `to` have none in common.
-  template <execution E>
-  void copy(E& exec, gaussians<E>& model, span<u32 const> from, span<u32 const> to) const {
+  virtual void copy(E& exec, gaussians<E>& model, span<u32 const> from, span<u32 const> to) {
     for_each_element(exec, "copy_rows", static_cast<index_t>(from.size()), model.sh_degree(),
                      detail::copy_row_body{model.view(), from.data(), to.data()});
   }
   /// Gaussian g of `to` becomes origin[g] of `from`, by numbers; `to` has as many as `origin`.
-  template <execution E>
-  void take(E& exec, gaussians<E> const& from, gaussians<E>& to, span<u32 const> origin) const {
+  virtual void take(E& exec, gaussians<E> const& from, gaussians<E>& to, span<u32 const> origin) {
     for_each_element(exec, "take_rows", static_cast<index_t>(origin.size()), from.sh_degree(),
                      detail::take_row_body{from.view(), to.view(), origin.data()});
   }
+  /// `width` sums of each run of so many Gaussians, in host memory: those of all ranks, in order.
+  virtual std::vector<double> sums_of_runs(std::vector<double> const& mine, index_t /*run*/, std::size_t /*width*/) {
+    return mine;
+  }
 };
+
+/// The rows of one rank by itself.
+template <execution E>
+all_rows<E>& whole_scene() {
+  static all_rows<E> rows;
+  return rows;
+}
 
 /// What a densification did. Where the count changed, gradients and other per-Gaussian buffers have a new size.
 struct density_change {

@@ -18,7 +18,7 @@
 ///
 /// Gaussians whose mean and first band have no gradient were not seen and cost their reads alone; numbers that are not
 /// finite are left out. Sums: in double past a lane's own, in an order that depends on the number of Gaussians only.
-/// Where they are spread over ranks each sums runs of its own (sum_runs), and a total of all runs has, on hosts, the
+/// Where they are spread over ranks each sums runs of its own (of_rows), and a total of all runs has, on hosts, the
 /// bits of one that has all. Cost: one read of the gradients, and of the parameters of what was seen: 464 bytes a
 /// Gaussian of degree 3 at most. Memory: 48 bytes for each of at most 1024 sums; on hosts one for 64 Gaussians.
 
@@ -26,6 +26,7 @@
 #include <gart/exec/buffer.hpp>
 #include <gart/exec/stage.hpp>
 #include <gart/math/sh_turn.hpp>
+#include <gart/optim/rows.hpp>
 #include <gart/pose/pose.hpp>
 #include <gart/scene/parameters.hpp>
 
@@ -167,31 +168,29 @@ class pose_differentiation {
           "differentiate_pose: the gradients must have the number and the SH degree of the Gaussians");
     if (out.size() < pose_gradient::floats)
       throw invalid_argument("differentiate_pose: the gradient of a pose has six numbers");
-    stage_scope stage(*exec_, "pose");
-    index_t const runs = runs_of(scene.count);
-    index_t const teams = E::device ? std::min(runs, most_teams) : runs;
-    sum<Frame::sh_degree>(scene, gradients, frame.view().position, teams);
-    total(sums_, out);
+    of_rows<Frame::sh_degree>(scene, gradients, frame.view().position, whole_scene<E>(), out);
   }
 
   /// Gaussians that are summed together.
   static constexpr index_t run = pose_kernels::sum_gaussians<0>::run;
-  /// Runs of so many Gaussians.
-  static constexpr index_t runs_of(index_t count) { return (count + run - 1) / run; }
-  /// Six sums of each run of these Gaussians, in double; for total(), with those of other ranks between them.
+  /// The same from the Gaussians of a scene, wherever its rows are. Over ranks the sums of runs travel, in double.
   template <int Degree>
-  span<double const> sum_runs(gaussians_view<float const> scene, gaussians_view<float const> gradients,
-                              vec3d const& position) {
+  void of_rows(gaussians_view<float const> scene, gaussians_view<float const> gradients, vec3d const& position,
+               all_rows<E>& rows, span<float> out) {
     stage_scope stage(*exec_, "pose");
-    sum<Degree>(scene, gradients, position, runs_of(scene.count));
-    return sums_;
+    index_t const runs = (scene.count + run - 1) / run;
+    index_t const teams = E::device && !rows.spread() ? std::min(runs, most_teams) : runs;
+    using kernel = pose_kernels::sum_gaussians<Degree>;
+    sums_.resize(std::size_t{pose_gradient::floats} * teams);
+    parallel_for(*exec_, "pose/sum", tile_range{teams, kernel::block_size},
+                 kernel{scene, gradients, position, teams, sums_.data()});
+    if (rows.spread()) sums_.assign(rows.sums_of_runs(sums_.to_host(), run, pose_gradient::floats));
+    parallel_for(
+        *exec_, "pose/total", tile_range{1, 192},
+        pose_kernels::sum_teams{sums_.data(), static_cast<index_t>(sums_.size() / pose_gradient::floats), out.data()});
   }
-  /// The gradient from sums of all runs, [runs][6] in host memory.
-  pose_gradient total(std::vector<double> const& runs) {
-    sums_.assign(runs), out_.resize(pose_gradient::floats);
-    total(sums_, out_.view());
-    return pose_gradient(out_.to_host().data());
-  }
+  /// The policy.
+  E& exec() const { return *exec_; }
 
   /// To the host; waits for it.
   template <class Frame>
@@ -203,20 +202,6 @@ class pose_differentiation {
 
  private:
   static constexpr index_t most_teams = 1024;
-
-  template <int Degree>
-  void sum(gaussians_view<float const> scene, gaussians_view<float const> gradients, vec3d const& position,
-           index_t teams) {
-    using kernel = pose_kernels::sum_gaussians<Degree>;
-    sums_.resize(std::size_t{pose_gradient::floats} * teams);
-    parallel_for(*exec_, "pose/sum", tile_range{teams, kernel::block_size},
-                 kernel{scene, gradients, position, teams, sums_.data()});
-  }
-  void total(span<double const> sums, span<float> out) {
-    parallel_for(
-        *exec_, "pose/total", tile_range{1, 192},
-        pose_kernels::sum_teams{sums.data(), static_cast<index_t>(sums.size() / pose_gradient::floats), out.data()});
-  }
 
   E* exec_;
   buffer<double, E> sums_;

@@ -12,6 +12,7 @@
 ///
 /// A gradient that is not finite moves nothing. Cost: none that shows; memory: 440 bytes a view.
 
+#include <gart/core/named_arrays.hpp>
 #include <gart/optim/options.hpp>
 #include <gart/optim/schedule.hpp>
 #include <gart/pose/options.hpp>
@@ -84,11 +85,27 @@ class pose_training {
   }
 
   /// For a checkpoint.
+  void save(named_arrays& to) const {
+    for_each_array(state_, [&](char const* name, auto const& values) { to.set(name, values); });
+  }
+  ///@{
+  /// The same in memory.
   pose_state const& state() const { return state_; }
-  /// From a checkpoint.
   void set_state(pose_state const& s) { state_ = s; }
+  ///@}
+  /// From a checkpoint of as many.
+  void load(named_arrays const& from) {
+    pose_state taken = state_;
+    for_each_array(taken, [&](char const* name, auto& values) { from.take(name, values); });
+    state_ = std::move(taken);
+  }
 
  private:
+  template <class State, class F>
+  static void for_each_array(State& s, F const& f) {
+    f("pose", s.value), f("pose/first", s.first), f("pose/second", s.second), f("pose/visits", s.visits);
+    f("pose/metric", s.metric);
+  }
   int warm_up(int iterations) const {
     return std::min(500, static_cast<int>(options_.warm_up * static_cast<float>(iterations)));
   }

@@ -25,24 +25,12 @@ struct approximation_options {
 };
 
 /// How one view is rendered.
-struct render_options {
-  float alpha_min = approximation_options{}.alpha_min;  ///< a Gaussian is hit where sigma * rho >= alpha_min
-  /// A ray ends after the hit that brings T below this.
-  float transmittance_min = approximation_options{}.transmittance_min;
-  float near = 0.01f;                               ///< hits lie at t > near, world units along the ray
-  u32 max_hits = approximation_options{}.max_hits;  ///< a ray ends after so many hits; 0: no cap
-  /// Standard deviation of the pixels' filter, in pixels; 0: none.
-  float antialias = approximation_options{}.antialias;
-  int rebuild_every = approximation_options{}.rebuild_every;  ///< views between two builds of the bvh tracer's tree
-  vec3 background{0.0f};                                      ///< linear RGB behind the last hit
+struct render_options : approximation_options {
+  float near = 0.01f;     ///< hits lie at t > near, world units along the ray
+  vec3 background{0.0f};  ///< linear RGB behind the last hit
   /// What is traced of the image; whole rows of tiles. Pixels of other rows are left as they are, or written without
   /// a hit.
   image_rows rows = {};
-
-  /// Those of the options that trade exactness for time.
-  approximation_options approximations() const {
-    return {alpha_min, transmittance_min, max_hits, antialias, rebuild_every};
-  }
 };
 
 /// The filter of models that are antialiased: a square pixel has a standard deviation of 0.29.

@@ -54,6 +54,8 @@ class checkpoint_reader {
   }
   /// Whether there is an array of that name.
   bool has(std::string const& name) const { return arrays_.count(name) != 0; }
+  /// All of them, in order.
+  std::vector<std::string> names() const;
   /// Throws io_error with the path before `what`.
   [[noreturn]] void fail(std::string const& what) const;
 

@@ -40,17 +40,6 @@ class compiled_session final : public session {
   void save_model(std::filesystem::path const& path, splat_traits const& traits) const override {
     trainer_.save_model(path, traits);
   }
-  training_state part() const override { return trainer_.part(); }
-  void set_part(training_state const& mine) override { trainer_.set_part(mine); }
-  training_state whole_of(training_state const& mine) const override { return trainer_.whole_of(mine); }
-  void write_part(std::filesystem::path const& path, training_state const& mine) const override {
-    trainer_.write_part(path, mine);
-  }
-  void write_part(std::filesystem::path const& path, gaussian_model const& mine,
-                  splat_traits const& traits) const override {
-    trainer_.write_part(path, mine, traits);
-  }
-  training_state read_part(std::filesystem::path const& path) const override { return trainer_.read_part(path); }
   exposure_field exposures() const override { return trainer_.exposures(); }
   std::vector<named_camera> poses() const override { return trainer_.poses(); }
   camera as_learned(camera const& view) const override { return trainer_.as_learned(view); }
@@ -60,12 +49,7 @@ class compiled_session final : public session {
   }
   std::size_t peak_bytes() const override { return exec_.memory.peak; }
   std::size_t lt_bytes() const override { return trainer_.lt_bytes(); }
-  u64 sent_bytes() const override {
-    if constexpr (Comm::alone)
-      return 0;
-    else
-      return trainer_.sent_bytes();
-  }
+  u64 sent_bytes() const override { return trainer_.sent_bytes(); }
   configuration_info configuration() const override {
     return configuration_of<E, Traits, Tracer, Strategy, Comm>(trainer_.degree());
   }

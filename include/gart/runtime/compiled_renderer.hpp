@@ -80,39 +80,13 @@ class compiled_renderer final : public renderer {
       throw invalid_argument("renderer: the colour's gradient must have three values for each pixel of the view");
     color_gradient_.assign(span<float const>(color_gradient.data.data(), color_gradient.data.size()));
     gradients_.resize_keep(scene_.count);
-<<<<<<< HEAD
-    differentiated_ = 0;
-    differentiate_rows(view, options, color_gradient_.data(), gradients_.view(), {});
-    differentiated_ = frame_.preparation();
+    differentiate_rows(view, options, {color_gradient_.data()}, gradients_.view(), {});
   }
   void differentiate_into(camera const& view, render_options const& options, float const* color_gradient,
                           gaussians_view<float> gradients, render_targets const& targets) override {
     if (!color_gradient && view.width > 0)
       throw invalid_argument("renderer.differentiate_into: color_gradient is null; give dL/dcolour of the view");
     require_arrays(gradients, "renderer.differentiate_into");
-    if (degree_ == sh_degree) return differentiate_rows(view, options, color_gradient, gradients, targets);
-    require_degree(gradients.sh_degree);
-    gaussians_view<float> rows = gradients;
-    band_gradients_.resize(row_floats * gradients.count);
-    rows.sh = band_gradients_.data(), rows.sh_degree = sh_degree;
-    differentiate_rows(view, options, color_gradient, rows, targets);
-    copy_bands(exec_, rows.sh, sh_degree, gradients.sh, degree_, gradients.count);
-  }
-  pose_gradient differentiate_pose() override {
-    if (!differentiated_) throw invalid_argument("renderer.differentiate_pose: call renderer.differentiate first");
-    if (differentiated_ != frame_.preparation())
-      throw invalid_argument(
-          "renderer.differentiate_pose: another view was rendered since renderer.differentiate; ask for the pose "
-          "first, "
-          "or differentiate again");
-    if (scene_.count == 0)
-      throw invalid_argument("renderer.differentiate_pose: the model has no Gaussians, and a pose no gradient by them");
-    return pose_backward_(frame_, std::as_const(gradients_).view());
-=======
-    differentiate_rows(view, options, {color_gradient_.data()}, gradients_.view(), {});
-  }
-  void differentiate_into(camera const& view, render_options const& options, float const* color_gradient,
-                          gaussians_view<float> gradients, render_targets const& targets) override {
     in_rows(gradients,
             [&](gaussians_view<float> rows) { differentiate_rows(view, options, {color_gradient}, rows, targets); });
   }
@@ -128,13 +102,18 @@ class compiled_renderer final : public renderer {
     if (targets.rgba) color_to_bytes(exec_, images.color, pixels_of(view), targets.rgba, 4);
   }
   void differentiate_recorded(pixel_gradients const& by, gaussians_view<float> gradients) override {
+    require_arrays(gradients, "renderer.differentiate_recorded");
     in_rows(gradients, [&](gaussians_view<float> rows) { differentiate_pass(by, rows); });
   }
   pose_gradient differentiate_pose() override {
-    if (last_.count != scene_.count || scene_.count == 0)
-      throw invalid_argument("renderer.differentiate_pose: call renderer.differentiate first");
+    if (!differentiated_) throw invalid_argument("renderer.differentiate_pose: call renderer.differentiate first");
+    if (differentiated_ != frame_.preparation())
+      throw invalid_argument(
+          "renderer.differentiate_pose: another view was rendered since the gradients; ask for the pose first, or "
+          "differentiate again");
+    if (scene_.count == 0)
+      throw invalid_argument("renderer.differentiate_pose: the model has no Gaussians, and a pose no gradient by them");
     return pose_backward_(frame_, last_);
->>>>>>> heads/h-python
   }
   gaussian_model gradients() const override { return with_sh_degree(gradients_.to_host(), degree_); }
   void wait() override { exec_.synchronize(); }
@@ -180,8 +159,9 @@ class compiled_renderer final : public renderer {
     image_gradients image{{by.color, 3 * pixels}};
     if (by.depth) image.depth = {by.depth, pixels};
     if (by.transmittance) image.transmittance = {by.transmittance, pixels};
+    differentiated_ = 0;
     gart::differentiate(frame_, pass_, image, rows);
-    last_ = rows;
+    last_ = rows, differentiated_ = frame_.preparation();
   }
   static float* or_own(float* given, buffer<float, E>& own, std::size_t n) {
     if (given) return given;
@@ -198,7 +178,7 @@ class compiled_renderer final : public renderer {
   }
 
   int degree_;              // of the model
-  u64 differentiated_ = 0;  // the frame's preparation that gradients_ are of; 0: they are of none
+  u64 differentiated_ = 0;  // the frame's preparation that last_ is of; 0: they are of none
   E exec_;
   frame<E, Traits, Tracer> frame_;
   backward_pass<frame<E, Traits, Tracer>, Strategy> pass_;

@@ -71,19 +71,15 @@ class renderer {
   /// the Gaussians, which are overwritten. `targets` takes the view besides.
   virtual void differentiate_into(camera const& view, render_options const& options, float const* color_gradient,
                                   gaussians_view<float> gradients, render_targets const& targets = {}) = 0;
-<<<<<<< HEAD
-  /// dL/d the pose of the view of the last differentiate. Waits for it. Errors: invalid_argument before that, after
-  /// another view was rendered or another model set or bound, and for a model without Gaussians.
-=======
   /// A view with what its gradients need, for a gradient that follows from the image. The targets must stay until
   /// differentiate_recorded, and no other view may come before it.
   virtual void record(camera const& view, render_options const& options, render_targets const& targets) = 0;
   /// The gradients of the view that was recorded last. Errors: invalid_argument where there is none, and for gradients
   /// that the configuration has not.
   virtual void differentiate_recorded(pixel_gradients const& by, gaussians_view<float> gradients) = 0;
-  /// dL/d the pose of the view of the last gradients, which must still be where they went, while the model is the one
-  /// that it was of. Waits for it. Errors: invalid_argument before that.
->>>>>>> heads/h-python
+  /// dL/d the pose of the view of the last gradients, which must still be where they went. Waits for it. Errors:
+  /// invalid_argument before that, after another view was rendered or another model set or bound, and for a model
+  /// without Gaussians.
   virtual pose_gradient differentiate_pose() = 0;
   virtual void wait() = 0;  ///< until all that was asked for is done
 

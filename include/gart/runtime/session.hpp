@@ -60,19 +60,6 @@ class session {
   /// Takes up the run that the state is of.
   virtual void set_state(training_state const& state) = 0;
 
-  /// What this rank has of the run: its rows of all that is of each Gaussian (comm/row_owners.hpp), and the rest
-  /// whole; of a session by itself the state. All ranks call this and the next five together, and none comes to hold
-  /// what others have, but by whole_of.
-  virtual training_state part() const = 0;
-  virtual void set_part(training_state const& mine) = 0;                  ///< as set_state, of such a part
-  virtual training_state whole_of(training_state const& mine) const = 0;  ///< of all parts, on all ranks
-  /// The parts of all ranks as one checkpoint, of any degree.
-  virtual void write_part(std::filesystem::path const& checkpoint, training_state const& mine) const = 0;
-  /// This rank's part of one.
-  virtual training_state read_part(std::filesystem::path const& checkpoint) const = 0;
-  /// The rows of all ranks as one model file, as save_model has it.
-  virtual void write_part(std::filesystem::path const& model, gaussian_model const& mine,
-                          splat_traits const& traits) const = 0;
   /// Of the training views so far and their lenses; empty where none are learned. render() shows the scene's own
   /// colours.
   virtual exposure_field exposures() const { return {}; }

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// The rows of a scene that is spread over ranks (comm/row_owners.hpp), as densification asks for them
-/// (optim/rows.hpp: all_rows has the same members), and the way of whole models to the ranks and back.
+/// (all_rows in optim/rows.hpp), and the way of whole models to the ranks and back.
 ///
 /// What is drawn must not depend on the number of ranks: a word of each Gaussian goes to all, every rank draws as one
 /// alone would, and only the rows that are copied travel. Memory while it does: 4 bytes of each Gaussian of the scene
@@ -10,6 +10,7 @@
 #include <gart/comm/communicator.hpp>
 #include <gart/optim/rows.hpp>
 
+#include <algorithm>
 #include <numeric>
 #include <vector>
 
@@ -62,7 +63,7 @@ inline std::vector<message> messages_of(std::vector<u64> const& counts, void* da
 /// Comm: a communicator for E.
 template <execution E, class Comm>
 requires communicator<Comm, E>
-class sharded_rows {
+class sharded_rows final : public all_rows<E> {
  public:
   /// `block`: Gaussians that stay together.
   sharded_rows(E& exec, Comm comm, index_t block)
@@ -73,19 +74,21 @@ class sharded_rows {
         arrived_(exec) {}
 
   /// Who has which.
-  row_owners owners() const { return owners_; }
+  row_owners owners() const override { return owners_; }
+  /// They are.
+  bool spread() const override { return true; }
   /// Gaussians in all.
-  index_t total(index_t here) {
+  index_t total(index_t here) override {
     u64 sum = here;
     comm_.all_reduce(span<u64>(&sum, 1));
     require_count(sum);
     return static_cast<index_t>(sum);
   }
   /// Of so many, those of this rank.
-  index_t here(index_t total) const { return owners_.owned(total); }
+  index_t here(index_t total) const override { return owners_.owned(total); }
 
   /// An element of each row that is here becomes one of each Gaussian, by number.
-  void gather(E& exec, buffer<u32, E>& words) {
+  void gather(E& exec, buffer<u32, E>& words) override {
     index_t const total = this->total(static_cast<index_t>(words.size()));
     std::vector<u64> const counts = counts_of(total);
     std::vector<u64> begin(counts.size());
@@ -103,18 +106,23 @@ class sharded_rows {
   }
 
   /// Gaussian to[k] becomes a copy of from[k], by numbers, wherever they are; from[] and to[] have none in common.
-  void copy(E& exec, gaussians<E>& model, span<u32 const> from, span<u32 const> to) {
+  void copy(E& exec, gaussians<E>& model, span<u32 const> from, span<u32 const> to) override {
     std::vector<u32> sources(from.size()), targets(to.size());
     exec.copy_out(sources.data(), from.data(), from.size() * sizeof(u32));
     exec.copy_out(targets.data(), to.data(), to.size() * sizeof(u32));
     send_rows(exec, model, sources, model, targets);
   }
   /// Gaussian g of `to` becomes origin[g] of `from`, by numbers; `to` has its rows of as many as `origin` has.
-  void take(E& exec, gaussians<E> const& from, gaussians<E>& to, span<u32 const> origin) {
+  void take(E& exec, gaussians<E> const& from, gaussians<E>& to, span<u32 const> origin) override {
     std::vector<u32> sources(origin.size()), targets(origin.size());
     exec.copy_out(sources.data(), origin.data(), origin.size() * sizeof(u32));
     std::iota(targets.begin(), targets.end(), u32{0});
     send_rows(exec, from, sources, to, targets);
+  }
+
+  /// Runs must be as many Gaussians as make whole blocks.
+  std::vector<double> sums_of_runs(std::vector<double> const& mine, index_t run, std::size_t width) override {
+    return sharded_rows(gathered_.exec(), comm_, std::max<index_t>(owners_.block / run, 1)).whole_of(mine, width);
   }
 
   /// Rows leave[r] of `from` become rows arrive[s] of `to`: of each pair of ranks as many, in one order.

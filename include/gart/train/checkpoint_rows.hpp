@@ -66,6 +66,8 @@ class checkpoint_rows_reader {
   std::vector<T> get(std::string const& name, u32 newest_version = 1) const;
   /// Whether there is an array of that name.
   bool has(std::string const& name) const { return arrays_.count(name) != 0; }
+  /// All of them, in order.
+  std::vector<std::string> names() const;
   /// Throws io_error with the path before `what`.
   [[noreturn]] void fail(std::string const& what) const;
 

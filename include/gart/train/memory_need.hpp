@@ -14,9 +14,9 @@
 #include <gart/core/error.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/math/hit_gradient.hpp>
-#include <gart/optim/error_growth.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/shard/row_exchange_kernels.hpp>
+#include <gart/train/densify/error_growth.hpp>
 #include <gart/train/options.hpp>
 
 #include <algorithm>
@@ -37,9 +37,7 @@ inline u64 gaussians_at_end(train_options const& options, dataset const& data, u
 }
 
 /// Which Gaussians the first rank has, which has most.
-inline row_owners owners_of(train_options const& options, int ranks) {
-  return {ranks, 0, std::max<index_t>(options.shard_block, 1)};
-}
+inline row_owners owners_of(train_options const& options, int ranks) { return {ranks, 0, options.shard_block}; }
 
 /// Bytes of a Gaussian on the rank that has it, of so many ranks.
 inline u64 bytes_of_gaussian(train_options const& options, int sh_degree, int ranks) {

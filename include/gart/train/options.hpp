@@ -90,9 +90,7 @@ struct train_options {
 
 /// What a scene of that extent is traced with.
 inline render_options render_options_of(train_options const& options, float extent, vec3 background = vec3(0.0f)) {
-  approximation_options const& a = options.render;
-  return {a.alpha_min,     a.transmittance_min, options.near * extent, a.max_hits, a.antialias,
-          a.rebuild_every, background};
+  return {options.render, options.near * extent, background};
 }
 
 }  // namespace gart

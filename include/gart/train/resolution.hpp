@@ -5,13 +5,10 @@
 /// full size (as Chen et al., DashGaussian, CVPR 2025, let size and number grow together). The sizes are halves of each
 /// other, so that a pixel is the mean of a block of the photograph's.
 
-#include <gart/core/error.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/train/options.hpp>
 
 #include <algorithm>
-#include <string>
-#include <utility>
 
 namespace gart::inline GART_ISA {
 
@@ -36,19 +33,6 @@ inline int shrink_of(camera const& c, int shrink, resolution_options const& opti
   };
   while (shrink > 1 && !fits(shrink)) shrink /= 2;
   return shrink;
-}
-
-/// Errors: invalid_argument for what is out of its range.
-inline void require_resolution(resolution_options const& options) {
-  for (auto const& [name, share] :
-       {std::pair{"quarter_until", options.quarter_until}, {"half_until", options.half_until}})
-    if (!(share >= 0 && share <= 1))
-      throw invalid_argument(std::string("resolution_options.") + name + " is " + std::to_string(share) +
-                             ": a share of the run, from 0 to 1");
-  if (options.least < 1)
-    throw invalid_argument("resolution_options.least is " + std::to_string(options.least) + ": at least 1 pixel");
-  if (options.long_run < 1)
-    throw invalid_argument("resolution_options.long_run is " + std::to_string(options.long_run) + ": at least 1 step");
 }
 
 }  // namespace gart::inline GART_ISA

@@ -5,33 +5,29 @@
 ///
 /// Errors: read_checkpoint throws io_error naming the file and the array that is missing, truncated or of another size.
 
-#include <gart/exposure/exposure.hpp>
-#include <gart/exposure/vignetting.hpp>
-#include <gart/lens/lens_state.hpp>
-#include <gart/pose/pose.hpp>
+#include <gart/core/named_arrays.hpp>
 #include <gart/scene/gaussians.hpp>
 
 #include <filesystem>
-#include <vector>
+#include <string>
 
 namespace gart {
 
 /// A run between two steps.
 struct training_state {
-  gaussian_model scene,             ///< the parameters
-      first,                        ///< Adam's first moment of each
-      second;                       ///< and its second
-  int step = 0;                     ///< steps done
-  float growth = 1;                 ///< of MCMC, a densification
-  u64 seed = 1;                     ///< of all numbers drawn at random
-  std::vector<float> error_sum;     ///< growth by error's statistic since it last densified: [N], or empty
-  std::vector<float> gradient_sum;  ///< adaptive density's statistic since it last densified: [N], or empty
-  std::vector<u32> touched;         ///< how many gradients each Gaussian had since it last densified: [N], or empty
-  exposure_state exposures;         ///< learned, or empty
-  vignetting_state vignetting;      ///< learned, or empty
-  pose_state poses;                 ///< learned, or empty
-  lens_state lenses;                ///< learned, or empty
+  gaussian_model scene,  ///< the parameters
+      first,             ///< Adam's first moment of each
+      second;            ///< and its second
+  int step = 0;          ///< steps done
+  u64 seed = 1;          ///< of all numbers drawn at random
+  named_arrays parts;    ///< of the densifier, and of what is learned besides the Gaussians
 };
+
+/// Whether the array of a part has a number of 4 bytes for each Gaussian, or none: those whose names begin with
+/// "gaussians/", and three that are older than this rule. All others are of the run.
+inline bool of_gaussians(std::string const& name) {
+  return name.starts_with("gaussians/") || name == "error_growth/error_sum" || name.starts_with("adc/");
+}
 
 /// What of a state is not of each Gaussian.
 training_state without_rows(training_state const& state);

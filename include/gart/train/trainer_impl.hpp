@@ -1,13 +1,12 @@
 #pragma once
 /// \file
-/// Template bodies of trainer.hpp.
+/// Template bodies of trainer.hpp: how a run is made, a step, and the views that it renders.
 
 #include <gart/io/image_file.hpp>
 #include <gart/train/trainer.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace gart::inline GART_ISA {
 
@@ -16,243 +15,271 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
                                                                 dataset const& data, start_model const& start,
                                                                 Comm comm)
     : exec_(exec),
-      options_(with_room(exec, comm, options, data, start)),
+      options_(checked(exec, comm, options, data, start)),
       data_(data),
-      degree_(start.rows.sh_degree),
       comm_(std::move(comm)),
-      shards_(exec, comm_, std::max<index_t>(options.shard_block, 1)),
-      scene_(in_rows(part_of(start))),
-      gradients_(exec, scene_.size(), sh_degree),
-      state_(exec, scene_.size(), sh_degree),
-      frame_(exec),
-      passes_(exec),
-      loss_(exec),
-      images_(exec, data),
-      order_(data.train.size(), options.held_out, options.seed),
-      dropout_(exec, options.dropout, options.dropout_until, options.seed),
-      min_pixel_filter_(exec),
-      error_(exec, error_options_of(options, data),
-             growth_budget(options.error, options.max_gaussians, data.training_pixels()), options.iterations,
-             options.seed),
-      error_map_(exec),
-      mcmc_(exec, mcmc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed,
-            Traits::response::degree),
-      adc_(exec, adc_options_of(options), options.max_gaussians, options.iterations, data.extent, options.seed),
-      color_(exec),
-      color_gradient_(exec),
-      value_(exec, 2 + pose_gradient::floats + lens_gradient::floats),
-      supervision_(exec, data, options.depth_weight),
-      depth_(exec),
-      transmittance_(exec),
-      pose_backward_(exec),
-      lens_backward_(exec),
-      started_with_(static_cast<index_t>(total_of(comm_, start))),
-      total_(started_with_) {
-  require_ranks();
-  require_resolution(options.resolution);
-  if (degree_ > sh_degree)
-    throw invalid_argument("trainer: the model to start from has a higher SH degree than the trainer's traits");
+      plans_{{}, {exec, comm_, options.shard_block}},
+      gaussians_(exec, part_of(start), sh_degree),
+      tracing_{frame_type(exec), backward_passes<frame_type, Strategy>(exec)},
+      views_{{exec, data}, {data.train.size(), options.held_out, options.seed}, min_pixel_filter<E>(exec)},
+      image_(exec),
+      dropout_(exec, options.dropout, options.dropout_until, options.seed) {
+  gaussians_.total = static_cast<index_t>(total_of(comm_, start));
   make_room();
-  if (order_.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
-  if (options.depth_weight > 0) {
-    bool mapped = false;
-    for (dataset_view const& v : data.train) mapped = mapped || !v.depth.empty();
-    if (!mapped)
-      throw invalid_argument("train_options.depth_weight: no training view has a depth map (dataset_options.depth)");
-  }
-  if constexpr (Comm::alone) {
-    if (options.check_finite) finite_.emplace(exec);
-  } else {
-    if (options.check_finite) finite_.emplace(exec, shards_.rows.owners());
+  if (views_.order.empty()) throw invalid_argument("trainer: there are no training views, or all are held out");
+  if (options.check_finite) {
+    if constexpr (Comm::alone)
+      finite_.emplace(exec);
+    else
+      finite_.emplace(exec, plans_.ranks.rows().owners());
   }
   // Sums in a fixed order were asked for: no budget of our own takes them away.
   if (options.lt_budget == 0 && !Strategy::ordered)
     options_.lt_budget = exec.free_bytes() / 2 / static_cast<u64>(comm_.sharers());
-  if (options.exposure) exposures_.emplace(exec, data.train.size());
-  if (options.vignetting) {
-    std::vector<named_camera> captured;
-    for (dataset_view const& view : data.train) captured.push_back({view.name, view.view});
-    vignetting_.emplace(exec, captured);
-  }
-  if (options.refine_poses) {
-    std::vector<camera> captured;
-    for (dataset_view const& view : data.train) captured.push_back(view.view);
-    poses_.emplace(options.poses, std::move(captured), data.extent);
-  }
-  if (options.refine_lens) {
-    if (options.render.antialias > 0)
-      throw invalid_argument(
-          "train_options.refine_lens: the filter of the pixels has no gradient by the focal length; set "
-          "render_options.antialias to 0");
-    std::vector<named_camera> captured;
-    for (dataset_view const& view : data.train) captured.push_back({view.name, view.view});
-    lenses_.emplace(options.lens, captured);
-  }
-  growth_ = growth_for(options.mcmc, started_with_, options.max_gaussians, options.iterations);
-  mcmc_.set_growth(growth_);
-  error_.set_batch(options.batch), mcmc_.set_batch(options.batch), adc_.set_batch(options.batch);
+  parts_ = make_learned_parts<frame_type, has_depth<Strategy>>(exec, options, data, in_ranks());
+  densify_by(make_densifier(exec, density_setup{options, data, gaussians_.total, Traits::response::degree}));
 }
 
-// For all that the run is to grow to, at once: growth neither takes slack nor has an array twice while it copies it.
+// For all that the run is to grow to, at once.
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::make_room() {
-  u64 const all = gaussians_at_end(options_, data_, started_with_);
-  u64 here = all;
-  if constexpr (!Comm::alone) here = shards_.rows.owners().owned(all);
-  for (gaussians<E>* each : {&scene_, &gradients_, &state_.first, &state_.second}) each->reserve(here);
+  u64 here = gaussians_at_end(options_, data_, gaussians_.total);
+  if constexpr (!Comm::alone) here = plans_.ranks.rows().owners().owned(here);
+  gaussians_.reserve(here);
   dropout_.reserve(here);
-  if (options_.render.antialias > 0) min_pixel_filter_.reserve(here);
+  if (options_.render.antialias > 0) views_.filter.reserve(here);
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::densify_by(std::unique_ptr<densifier<E>> own) {
+  densifier_ = std::move(own);
+  densifier_->set_batch(options_.batch);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_iterations(int iterations) {
   if (iterations == options_.iterations) return;
   options_.iterations = iterations;
-  error_.set_iterations(iterations), mcmc_.set_iterations(iterations), adc_.set_iterations(iterations);
-  growth_ = growth_for(options_.mcmc, started_with_, options_.max_gaussians, iterations);
-  mcmc_.set_growth(growth_);
+  densifier_->set_iterations(iterations);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step() {
-  return step_by(nullptr);
-}
-
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::evaluate(loss_function<E> const* loss, loss_input<E> const& in) {
-  if (loss) return (*loss)(in);
-  loss_.evaluate(in.image, in.truth, in.width, in.height, options_.ssim_weight, in.gradient, in.value);
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::resize(index_t total) {
+  index_t const before = gaussians_.size();
+  index_t here = total;
+  if constexpr (!Comm::alone) here = plans_.ranks.rows().here(total), plans_.ranks.end_step(true);
+  gaussians_.resize(here), gaussians_.total = total;
+  gaussians_.clear_from(exec_, before);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_function<E> const* loss) {
-  if constexpr (!Comm::alone)
-    if (in_ranks()) return step_in_ranks(loss);
-  std::size_t const index = order_.at(step_);
-  dataset_view const& view = data_.train[index];
-  shrink_ = shrink_at(options_.resolution, step_, options_.iterations);
-  camera const seen = traced(index);
-  int const degree = sh_degree_at(step_, degree_, options_.sh_every, options_.iterations);
-  learning_rates const rates = rates_of_step();
-  render_options const render = render_options_of(options_, data_.extent, background_of(step_));
-  std::size_t const floats = std::size_t{3} * seen.width * seen.height;
-  color_.resize(floats), color_gradient_.resize(floats);
-
-  auto shown = dropout_.leave_out(scene_, step_, options_.iterations, all_rows().owners());
-  frame_.prepare(std::as_const(scene_).view(), seen, render, degree);
-  span<float const> moments;
-  char const* used = nullptr;
-  // With less memory where the LT buffer would pass its budget or the numbers of its slots, and then with none.
-  passes_.with_room(frame_, options_.lt_budget, [&]<class Pass>(Pass& pass) {
-    differentiate_by(pass, loss, index, rates);
-    moments = pass.moments(), lt_bytes_ = pass.lt_bytes(), used = Pass::strategy_type::name;
-  });
-  bool const learn_poses = learns_poses(), learn_lenses = learns_lenses();
-  if (learn_poses)
-    pose_backward_(frame_, std::as_const(gradients_).view(), value_.view().subspan(2, pose_gradient::floats));
-  ++step_;
-  if (grows_by_error()) error_.add_errors(scene_, moments);
-  if (options_.densify == densify_kind::adc) adc_.accumulate(scene_, gradients_, seen);
-  shown.end();
-  optimize(rates, degree, all_rows());
-
-  step_report report;
-  if (finite_) report.skipped = (*finite_)(scene_, state_, "step " + std::to_string(step_) + ", view " + view.name);
-  report.step = step_;
-  report.gaussians = total_;
-  report.view = view.name;
-  report.backward = used;
-  std::vector<float> const value = value_.to_host();
-  if (learn_poses) poses_->step(index, pose_gradient(value.data() + 2), step_ - 1, options_.iterations);
-  if (learn_lenses)
-    lenses_->step(index, lens_gradient(value.data() + 2 + pose_gradient::floats, shrink_of_view(index)), step_ - 1,
-                  options_.iterations);
-  report.loss = value[0];
-  if constexpr (has_depth<Strategy>) report.loss += supervision_.value();
-  report.psnr = value[1] > 0 ? -10.0f * std::log10(value[1]) : 99.0f;
+  step_report const report = [&] {
+    if constexpr (!Comm::alone)
+      if (in_ranks()) return step_on(plans_.ranks, loss);
+    return step_on(plans_.whole, loss);
+  }();
+  if (progress_.hooks.after_step) progress_.hooks.after_step(report);
   return report;
 }
 
+// A step over options.batch views, in as many rounds as it takes all ranks to trace them.
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-template <class Pass>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::differentiate_by(Pass& pass, loss_function<E> const* loss,
-                                                                        std::size_t index,
-                                                                        learning_rates const& rates) {
-  dataset_view const& view = data_.train[index];
-  image_targets targets;
-  targets.color = color_.data();
-  bool const measures = learns_poses() && poses_->wants_metric(index);
-  if constexpr (has_depth<Strategy>) {
-    supervision_.begin(targets, color_.size() / 3);
-  } else if (measures) {
-    depth_.resize(color_.size() / 3), transmittance_.resize(color_.size() / 3);
-    targets.depth = depth_.data(), targets.transmittance = transmittance_.data();
+template <class Plan>
+step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_on(Plan& plan, loss_function<E> const* loss) {
+  int const before = progress_.step, batch = options_.batch, iterations = options_.iterations;
+  int const degree = sh_degree_at(before, gaussians_.degree, options_.sh_every, iterations);
+  learning_rates rates = rates_at(options_.rates, data_.extent, before, iterations);
+  if (progress_.hooks.rates) progress_.hooks.rates(rates, before);
+  step_report report;
+  progress_.lt_bytes = 0;
+  plan.begin_step();
+  std::size_t const width = numbers(parts_.size());
+  image_.numbers.resize(width * static_cast<std::size_t>(batch)), image_.numbers.zero();
+  std::vector<float> found(image_.numbers.size());  // a row for each image
+  std::vector<step_view> images;
+  for (int k = 0; k < batch; ++k) images.push_back(view_of(before, k));
+  auto const row = [&](auto&& rows, int image) { return rows.subspan(static_cast<std::size_t>(image) * width, width); };
+  int mine = 0;  // this rank's image of the round
+  auto const collect = [&](int first) {
+    span<float> const device = row(image_.numbers.view(), mine), host = row(span<float>(found), mine);
+    plan.finish_loss(image_, device.subspan(0, 2));
+    exec_.copy_out(host.data(), device.data(), width * sizeof(float));
+    for (std::size_t i = 0; i < parts_.size(); ++i)
+      parts_[i]->found(images[static_cast<std::size_t>(mine)], numbers_of(host, i));
+    plan.collect(found, width, first);
+  };
+
+  auto shown = dropout_.leave_out(gaussians_.model, before, iterations, plan.rows().owners());
+  int last = 0;
+  for (int done = 0; done < batch;) {
+    int const views = std::min(batch - done, plan.views());
+    std::vector<camera> cameras;
+    std::vector<std::size_t> names;
+    part_needs round;
+    for (int v = 0; v < views; ++v) {
+      step_view const& view = images[static_cast<std::size_t>(done + v)];
+      cameras.push_back(view.seen);
+      // What a view costs is remembered of each size of its image.
+      names.push_back(view.index + data_.train.size() * static_cast<std::size_t>(view.shrink));
+      for (auto const& part : parts_) round.gradients |= part->needs(view.index, before, iterations).gradients;
+    }
+    // Near distance and the like are those of any view; the background is the view's own.
+    render_options const options = render_options_of(options_, data_.extent);
+    plan.fetch(std::as_const(gaussians_.model).view(), cameras, names, options);
+    mine = done + plan.unit().view;
+    trace(plan, loss, images[static_cast<std::size_t>(mine)], mine, degree, report);
+    plan.take(exec_, gaussians_, cameras, done, batch, options, *densifier_, round.gradients,
+              [&](int v, gaussians<E> const& by_view) {
+                camera const& seen = cameras[static_cast<std::size_t>(v)];
+                if (densifier_->by_gradient()) densifier_->observe(gaussians_.model, by_view, seen);
+                if (!round.gradients) return;
+                for (std::size_t i = 0; i < parts_.size(); ++i)
+                  if (parts_[i]->needs(images[static_cast<std::size_t>(done + v)].index, before, iterations).gradients)
+                    parts_[i]->after_gradients(std::as_const(gaussians_.model).view(), by_view.view(), seen,
+                                               plan.rows(), numbers_of(row(image_.numbers.view(), done + v), i));
+              });
+    last = done, done += views;
+    if (done < batch) collect(last);
   }
-  pass.render(frame_, targets);
-  {
+  if constexpr (requires { plan.take_traffic(); }) progress_.sent += plan.take_traffic();
+  progress_.step += batch;
+  learning_rates scaled_rates = rates;
+  if (batch > 1)
+    for (float* rate : {&scaled_rates.mean, &scaled_rates.log_scale, &scaled_rates.quaternion, &scaled_rates.opacity,
+                        &scaled_rates.sh_dc, &scaled_rates.sh_rest})
+      *rate *= std::sqrt(static_cast<float>(batch));
+  shown.end();
+  optimize(plan, scaled_rates, degree);
+  // Read when all is queued: a device that waits for its host to read has nothing to do.
+  collect(last);
+
+  report.step = progress_.step, report.gaussians = gaussians_.total;
+  report.view = data_.train[images.back().index].name;
+  if (finite_)
+    report.skipped = plan.sum((*finite_)(gaussians_.model, gaussians_.moments,
+                                         "step " + std::to_string(report.step) + ", view " + report.view));
+  double sum = 0, square = 0;
+  // From what each image said of what the step began with, whoever traced it.
+  for (int k = 0; k < batch; ++k) {
+    span<float> const of_image = row(span<float>(found), k);
+    step_view const& view = images[static_cast<std::size_t>(k)];
+    float loss_of_image = of_image.data()[0];
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      span<float const> const said = numbers_of(of_image, i);
+      loss_of_image += parts_[i]->loss(said);
+      parts_[i]->step(view.index, view.shrink, said, before + k, iterations, rates);
+    }
+    sum += double{loss_of_image}, square += double{of_image.data()[1]};
+  }
+  report.loss = static_cast<float>(sum / batch);
+  float const mean_square = static_cast<float>(square / batch);
+  report.psnr = mean_square > 0 ? -10.0f * std::log10(mean_square) : 99.0f;
+  return report;
+}
+
+// An image of the step that begins after `before` images.
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
+step_view basic_trainer<E, Traits, Tracer, Strategy, Comm>::view_of(int before, int image) {
+  step_view v;
+  v.index = views_.order.at(before + image);
+  v.step = before, v.iterations = options_.iterations;
+  dataset_view const& view = data_.train[v.index];
+  v.shrink = shrink_of(view.view, shrink_at(options_.resolution, before, options_.iterations), options_.resolution);
+  auto const at_size = [&](camera const& c) { return v.shrink == 1 ? c : downscaled(c, v.shrink, view.name); };
+  v.seen = at_size(seen_by(v.index)), v.captured = at_size(view.view);
+  return v;
+}
+
+// This rank's unit of a round: its rows of the image, the loss of the whole, its sums of the gradients.
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
+template <class Plan>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace(Plan& plan, loss_function<E> const* loss, step_view& v,
+                                                             int image, int degree, step_report& report) {
+  part_needs needs;
+  for (auto const& part : parts_) {
+    part_needs const of = part->needs(v.index, v.step, v.iterations);
+    needs.image |= of.image, needs.depth |= of.depth;
+  }
+  std::size_t const width = numbers(parts_.size());
+  span<float> const row = image_.numbers.view().subspan(static_cast<std::size_t>(image) * width, width);
+  image_targets const targets =
+      image_.begin(static_cast<std::size_t>(v.seen.width) * v.seen.height, needs.depth, has_depth<Strategy>);
+  v.color = image_.color, v.depth = image_.depth(), v.by_image = image_.gradients();
+  v.share = [&](float* plane) { plan.share(plane, v.seen, sizeof(float)); };
+  vec3 const background = background_of(v.step + image);
+  bool const divides_loss = plan.divides_loss(!loss && !needs.image && !needs.depth);
+  auto const differentiate_loss = [&] {
     stage_scope stage(exec_, "loss");
-    span<float const> const image = photographed(index);
-    int const shrink = shrink_of_view(index);
-    truth_view const truth = images_.get(index, frame_.options().background, shrink);
-    depth_pixels depth;
-    if constexpr (has_depth<Strategy>) supervision_.evaluate(index, truth, shrink), depth = supervision_.pixels();
-    evaluate(loss, {exec_, view, truth, frame_.view().width, frame_.view().height, image, color_gradient_,
-                    value_.view().subspan(0, 2), depth});
-    if (grows_by_error()) error_map(exec_, image, truth, error_map_);
-    if (exposures_) exposures_->step(index, through_lens(), color_gradient_, rates.exposure);
-    if (vignetting_) vignetting_->step(index, captured(index), color_, color_gradient_, rates.vignetting);
-  }
-  image_gradients image{color_gradient_};
-  depth_and_transmittance more;
-  if constexpr (has_depth<Strategy>) {
-    image = supervision_.gradients(color_gradient_);
-    more = {supervision_.pixels().depth.data(), supervision_.pixels().transmittance.data()};
-  }
-  differentiate(frame_, pass, image, gradients_, error_map_);
-  if (learns_lenses())
-    lens_backward_(frame_, color_, image, value_.view().subspan(2 + pose_gradient::floats, lens_gradient::floats),
-                   more);
-  if (measures) {
-    std::vector<float> depth, transmittance;
-    if constexpr (has_depth<Strategy>)
-      depth = supervision_.depth(), transmittance = supervision_.transmittance();
+    v.truth = views_.photos.get(v.index, background, v.shrink);
+    if (divides_loss)
+      return plan.differentiate_loss(image_, v.truth, v.seen, options_.ssim_weight, densifier_->by_error());
+    plan.share(image_.color.data(), v.seen, 3 * sizeof(float));
+    if (targets.depth) v.share(targets.depth), v.share(targets.transmittance);
+    span<float const> photo = v.color;
+    for (std::size_t i = 0; i < parts_.size(); ++i) photo = parts_[i]->before_loss(v, photo, numbers_of(row, i));
+    if (loss)
+      (*loss)({exec_, data_.train[v.index], v.truth, v.seen.width, v.seen.height, photo, image_.by_color,
+               row.subspan(0, 2), has_depth<Strategy> ? v.depth : depth_pixels{}});
     else
-      depth = depth_.to_host(), transmittance = transmittance_.to_host();
-    poses_->set_metric(index, pose_metric_of(index, depth, transmittance));
+      image_.loss.evaluate(photo, v.truth, v.seen.width, v.seen.height, options_.ssim_weight, image_.by_color,
+                           row.subspan(0, 2));
+    if (densifier_->by_error()) error_map(exec_, photo, v.truth, image_.error);
+    for (std::size_t i = parts_.size(); i-- > 0;) parts_[i]->after_loss(v, image_.by_color, numbers_of(row, i));
+  };
+  auto const after_backward = [&](frame_type* frame) {
+    for (std::size_t i = 0; i < parts_.size(); ++i) parts_[i]->after_backward(frame, v, numbers_of(row, i));
+  };
+  if (plan.unit().empty()) {
+    plan.finish_fetch();
+    differentiate_loss();
+    after_backward(nullptr);
+    return plan.give_nothing_back();
   }
+  render_options render = render_options_of(options_, data_.extent, background);
+  render.rows = plan.unit().rows;
+  frame_type& frame = tracing_.frame;
+  frame.prepare(plan.scene(), v.seen, render, degree);
+  plan.finish_fetch();
+  // With less memory where the LT buffer would pass its budget or the numbers of its slots, and then with none.
+  tracing_.passes.with_room(frame, options_.lt_budget, [&]<class Pass>(Pass& pass) {
+    plan.require(pass);
+    pass.render(frame, targets);
+    differentiate_loss();
+    plan.sum(frame, pass, image_, gaussians_.gradients);
+    after_backward(&frame);
+    plan.give_back(frame, pass, render.antialias);
+    progress_.lt_bytes = std::max(progress_.lt_bytes, pass.lt_bytes()), report.backward = Pass::strategy_type::name;
+  });
 }
 
 // The optimizer's step and what grows, moves and prunes the Gaussians.
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-template <class Rows>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(learning_rates const& rates, int degree, Rows&& rows) {
-  bool const use_mcmc = options_.densify == densify_kind::mcmc, use_adc = options_.densify == densify_kind::adc;
-  if (grows_by_error()) error_.add_penalty(scene_, gradients_, total_);
-  if (use_mcmc) mcmc_.add_penalties(scene_, gradients_, total_);
-  adam_pass<E> const adam(scene_, gradients_, state_, rates, step_, degree, finite_ ? finite_->skipped() : span<u64>{},
-                          options_.adam, options_.batch);
-  if constexpr (Comm::alone)
-    adam.all(exec_);
-  else
-    move_parameters(adam);
+template <class Plan>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(Plan& plan, learning_rates const& rates, int degree) {
+  trained_gaussians<E>& g = gaussians_;
+  int const step = progress_.step;
+  densifier_->penalty(g, g.total);
+  if (progress_.hooks.before_optimizer) {
+    plan.sum_arrived(g.gradients);
+    progress_.hooks.before_optimizer(std::as_const(g.model).view(), g.gradients.view(), step - options_.batch);
+  }
+  plan.move(exec_,
+            adam_pass<E>(g.model, g.gradients, g.moments, rates, step, degree,
+                         finite_ ? finite_->skipped() : span<u64>{}, options_.adam, options_.batch),
+            g.gradients);
   span<float const> filter;
-  bool const densifies = grows_by_error() ? error_.due(step_)
-                         : use_mcmc       ? mcmc_.due(step_)
-                                          : use_adc && adc_.due(step_);
-  if (options_.render.antialias > 0 && densifies) {
+  if (options_.render.antialias > 0 && densifier_->due(step)) {
     std::vector<std::size_t> const views = views_trained_on(data_.train.size(), options_.held_out);
-    filter = min_pixel_filter_.of(
-        exec_, scene_.view(), views.size(), [&](std::size_t k) { return seen_by(views[k]); },
+    filter = views_.filter.of(
+        exec_, g.model.view(), views.size(), [&](std::size_t k) { return seen_by(views[k]); },
         options_.render.antialias);
   }
-  density_change change;
-  if (grows_by_error()) change = error_.after_step(scene_, state_, step_, rows, filter);
-  if (use_mcmc) change = mcmc_.after_step(scene_, state_, step_, rates.mean, rows, filter);
-  if (use_adc) change = adc_.after_step(scene_, state_, step_, rows, filter);
-  total_ += change.added - change.removed;
-  if (!change.added && !change.removed) return;
-  gradients_.resize_keep(scene_.size());
-  if constexpr (!Comm::alone) shards_.arrived.reset();
+  density_change const change = densifier_->step(g, {step, rates.mean, plan.rows(), filter});
+  g.total += change.added - change.removed;
+  if (g.moments.first.size() != g.size() || g.moments.second.size() != g.size() || g.gradients.size() != g.size())
+    throw invalid_argument("densifier: it has resized the Gaussians without their moments: call its argument's resize");
+  plan.end_step(change.added || change.removed);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
@@ -271,48 +298,20 @@ vec3 basic_trainer<E, Traits, Tracer, Strategy, Comm>::background_of(int step) c
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& view, vec3 background) {
+  render_options const options = render_options_of(options_, data_.extent, background);
   if constexpr (!Comm::alone)
-    if (in_ranks()) return render_in_ranks(view, background);
-  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background), degree_);
-  return render_image(frame_);
+    if (in_ranks()) return plans_.ranks.render(tracing_.frame, gaussians_, view, options, gaussians_.degree);
+  tracing_.frame.prepare(std::as_const(gaussians_.model).view(), view, options, gaussians_.degree);
+  return render_image(tracing_.frame);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 image8 basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_8bit(camera const& view, vec3 background) {
   if constexpr (!Comm::alone)
-    if (in_ranks()) return to_8bit(render_in_ranks(view, background).color);
-  frame_.prepare(std::as_const(scene_).view(), view, render_options_of(options_, data_.extent, background), degree_);
-  return render_image_8bit(frame_);
-}
-
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-exposure_field basic_trainer<E, Traits, Tracer, Strategy, Comm>::exposures() const {
-  std::vector<view_exposure> views;
-  exposure_state const learned = exposures_ ? exposures_->state() : exposure_state{};
-  for (std::size_t i = 0; i < learned.visits.size(); ++i) {
-    if (learned.visits[i] == 0) continue;
-    dataset_view const& v = data_.train[i];
-    view_exposure e{v.name, v.view.position, v.view.rotation[2], {}};
-    std::copy_n(learned.value.data() + i * exposure::floats, exposure::floats, e.value.m);
-    views.push_back(std::move(e));
-  }
-  std::vector<lens_falloff> lenses;
-  vignetting_state const falloffs = vignetting_ ? vignetting_->state() : vignetting_state{};
-  for (std::size_t i = 0; i < falloffs.visits.size(); ++i) {
-    if (falloffs.visits[i] == 0) continue;
-    vignetting v;
-    std::copy_n(falloffs.value.data() + i * vignetting::floats, vignetting::floats, v.k);
-    lenses.emplace_back(vignetting_->lenses()[i], v);
-  }
-  return exposure_field(std::move(views), std::move(lenses));
-}
-
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-std::vector<named_camera> basic_trainer<E, Traits, Tracer, Strategy, Comm>::poses() const {
-  std::vector<named_camera> out;
-  for (std::size_t i = 0; (poses_ || lenses_) && i < data_.train.size(); ++i)
-    out.push_back({data_.train[i].name, seen_by(i)});
-  return out;
+    if (in_ranks()) return to_8bit(render(view, background).color);
+  tracing_.frame.prepare(std::as_const(gaussians_.model).view(), view,
+                         render_options_of(options_, data_.extent, background), gaussians_.degree);
+  return render_image_8bit(tracing_.frame);
 }
 
 }  // namespace gart::inline GART_ISA

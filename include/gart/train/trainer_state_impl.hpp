@@ -8,116 +8,134 @@
 namespace gart::inline GART_ISA {
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::part() const {
+train_options const& basic_trainer<E, Traits, Tracer, Strategy, Comm>::checked(E& exec, Comm& comm,
+                                                                               train_options const& options,
+                                                                               dataset const& data,
+                                                                               start_model const& start) {
+  require_options(options);
+  if (Comm::alone && options.batch > 1)
+    throw invalid_argument("train_options.batch needs a trainer that has a communicator");
+  require_room(exec, comm, options, data, sh_degree, total_of(comm, start));
+  return options;
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
+u64 basic_trainer<E, Traits, Tracer, Strategy, Comm>::total_of(Comm& comm, start_model const& start) {
+  if (start.rows.sh_degree > sh_degree)
+    throw invalid_argument("trainer: the model to start from has a higher SH degree than the trainer's traits");
+  u64 total = start.rows.size();
+  if (start.is_part) comm.all_reduce(span<u64>(&total, 1));
+  return total;
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
+gaussian_model basic_trainer<E, Traits, Tracer, Strategy, Comm>::whole_of(gaussian_model mine, int root) const {
+  if constexpr (Comm::alone)
+    return mine;
+  else
+    return plans_.ranks.rows().whole_of(mine, root);
+}
+
+// This rank's rows, and what all ranks have of the rest.
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
+training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::here() const {
   training_state s;
-  s.scene = model_part();
-  s.first = with_sh_degree(state_.first.to_host(), degree_);
-  s.second = with_sh_degree(state_.second.to_host(), degree_);
-  s.step = step_, s.growth = growth_, s.seed = options_.seed;
-  if (exposures_) s.exposures = exposures_->state();
-  if (vignetting_) s.vignetting = vignetting_->state();
-  if (poses_) s.poses = poses_->state();
-  if (lenses_) s.lenses = lenses_->state();
-  s.error_sum = error_.error_sum.to_host();
-  s.gradient_sum = adc_.gradient_sum.to_host(), s.touched = adc_.touched.to_host();
+  s.scene = gaussians_.to_host(gaussians_.model);
+  s.first = gaussians_.to_host(gaussians_.moments.first), s.second = gaussians_.to_host(gaussians_.moments.second);
+  s.step = progress_.step, s.seed = options_.seed;
+  densifier_->save(s.parts);
+  for (auto const& part : parts_) part->save(s.parts);
   return s;
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::whole_of(training_state const& mine) const {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_up(training_state const& s) {
+  if (s.scene.sh_degree != gaussians_.degree) throw invalid_argument("trainer: the state has another SH degree");
+  for (auto const& part : parts_) part->load(s.parts);
+  gaussians_.assign(s.scene, s.first, s.second);
+  gaussians_.total = static_cast<index_t>(total_of(comm_, {s.scene, true}));
+  densifier_->load(s.parts);
+  options_.seed = s.seed;
+  views_.order = view_order(data_.train.size(), options_.held_out, options_.seed);
+  progress_.step = s.step;
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
+training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::state() const {
+  training_state s = here();
+  if constexpr (!Comm::alone) {
+    for (gaussian_model* each : {&s.scene, &s.first, &s.second}) *each = whole_of(std::move(*each));
+    for (auto& [name, values] : s.parts.bytes)
+      if (of_gaussians(name)) values = plans_.ranks.rows().whole_of(values, sizeof(u32));
+  }
+  return s;
+}
+
+template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_state(training_state const& all) {
   if constexpr (Comm::alone) {
-    return mine;
+    take_up(all);
   } else {
-    training_state all = without_rows(mine);
-    all.scene = whole_of(mine.scene), all.first = whole_of(mine.first), all.second = whole_of(mine.second);
-    all.error_sum = shards_.rows.whole_of(mine.error_sum, 1);
-    all.gradient_sum = shards_.rows.whole_of(mine.gradient_sum, 1);
-    all.touched = shards_.rows.whole_of(mine.touched, 1);
-    return all;
+    training_state mine = all;
+    for (gaussian_model* each : {&mine.scene, &mine.first, &mine.second}) *each = plans_.ranks.rows().part_of(*each);
+    for (auto& [name, values] : mine.parts.bytes)
+      if (of_gaussians(name)) values = plans_.ranks.rows().part_of(values, sizeof(u32));
+    take_up(mine);
   }
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesystem::path const& path,
-                                                                  training_state const& mine) const {
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::save(std::filesystem::path const& path) const {
   if constexpr (Comm::alone)
-    write_checkpoint(path, mine);
+    write_checkpoint(path, here());
   else
-    write_checkpoint_collectively(comm_, shards_.rows.owners(), path, mine);
+    write_checkpoint_collectively(comm_, plans_.ranks.rows().owners(), path, here());
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_part(std::filesystem::path const& path) const {
-  if constexpr (Comm::alone)
-    return read_checkpoint(path);
-  else
-    return read_checkpoint_collectively(comm_, shards_.rows.owners(), path);
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::load(std::filesystem::path const& path) {
+  training_state const mine = [&] {
+    if constexpr (Comm::alone)
+      return read_checkpoint(path);
+    else
+      return read_checkpoint_collectively(comm_, plans_.ranks.rows().owners(), path);
+  }();
+  require_degree(path, mine, gaussians_.degree);
+  take_up(mine);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesystem::path const& path,
-                                                                  gaussian_model const& mine,
+void basic_trainer<E, Traits, Tracer, Strategy, Comm>::save_model(std::filesystem::path const& path,
                                                                   splat_traits const& traits) const {
+  gaussian_model const mine = gaussians_.to_host(gaussians_.model);
   if constexpr (!Comm::alone) {
-    if (comm_.size() > 1 && is_splat_ply(path)) {
-      u64 total = mine.size();
-      comm_.all_reduce(span<u64>(&total, 1));
-      write_collectively(comm_, path, [&](shared_file& file) {
-        write_splat_ply_rows(file, path, mine, shards_.rows.owners(), total, traits);
+    if (comm_.size() > 1 && is_splat_ply(path))
+      return write_collectively(comm_, path, [&](shared_file& file) {
+        write_splat_ply_rows(file, path, mine, plans_.ranks.rows().owners(), gaussians_.total, traits);
       });
-      return;
-    }
     if (comm_.size() > 1) {
       gaussian_model const all = whole_of(mine, 0);
-      together(comm_, path, [&] {
+      return together(comm_, path, [&] {
         if (comm_.rank() == 0) write_splats(path, all, traits);
       });
-      return;
     }
   }
   write_splats(path, mine, traits);
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::load(std::filesystem::path const& path) {
-  training_state const mine = read_part(path);
-  require_degree(path, mine, degree_);
-  set_part(mine);
+exposure_field basic_trainer<E, Traits, Tracer, Strategy, Comm>::exposures() const {
+  learned_colors all;
+  for (auto const& part : parts_) part->tell(all);
+  return exposure_field(std::move(all.views), std::move(all.falloffs));
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_part(training_state const& s) {
-  if (s.scene.sh_degree != degree_) throw invalid_argument("trainer: the state has another SH degree");
-  assign_rows(scene_, s.scene), assign_rows(state_.first, s.first), assign_rows(state_.second, s.second);
-  total_ = static_cast<index_t>(total_of(comm_, {s.scene, true}));
-  gradients_.resize_keep(scene_.size());
-  error_.error_sum.assign(s.error_sum);
-  adc_.gradient_sum.assign(s.gradient_sum), adc_.touched.assign(s.touched);
-  if (exposures_) {
-    if (s.exposures.visits.size() != data_.train.size())
-      throw invalid_argument("trainer: the state has exposures of another number of training views");
-    exposures_->set_state(s.exposures);
-  }
-  if (vignetting_) {
-    if (s.vignetting.visits.size() != vignetting_->lenses().size())
-      throw invalid_argument("trainer: the state has falloffs of another number of lenses");
-    vignetting_->set_state(s.vignetting);
-  }
-  if (poses_) {
-    if (s.poses.visits.size() != data_.train.size())
-      throw invalid_argument("trainer: the state has poses of another number of training views");
-    poses_->set_state(s.poses);
-  }
-  if (lenses_) {
-    if (s.lenses.visits.size() != lenses_->state().visits.size())
-      throw invalid_argument("trainer: the state has lenses of another number of cameras");
-    lenses_->set_state(s.lenses);
-  }
-  options_.seed = s.seed;
-  order_ = view_order(data_.train.size(), options_.held_out, options_.seed);
-  step_ = s.step;
-  growth_ = s.growth;
-  mcmc_.set_growth(growth_);
+std::vector<named_camera> basic_trainer<E, Traits, Tracer, Strategy, Comm>::poses() const {
+  std::vector<named_camera> out;
+  bool const moved = std::any_of(parts_.begin(), parts_.end(), [](auto const& part) { return part->moves_cameras(); });
+  for (std::size_t i = 0; moved && i < data_.train.size(); ++i) out.push_back({data_.train[i].name, seen_by(i)});
+  return out;
 }
 
 }  // namespace gart::inline GART_ISA

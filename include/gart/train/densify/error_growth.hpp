@@ -27,14 +27,13 @@
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>
 #include <gart/core/error.hpp>
-#include <gart/math/hit_gradient.hpp>
 #include <gart/math/logit.hpp>
-#include <gart/optim/adam.hpp>
 #include <gart/optim/long_axis_split.hpp>
 #include <gart/optim/options.hpp>
 #include <gart/optim/random.hpp>
-#include <gart/optim/rows.hpp>
-#include <gart/optim/schedule.hpp>
+#include <gart/train/densify/densifier.hpp>
+#include <gart/train/foreground_fraction.hpp>
+#include <gart/train/view_order.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -43,12 +42,6 @@
 namespace gart::inline GART_ISA {
 
 namespace detail {
-
-struct error_sum_kernel {
-  float const* moments;
-  float* sum;
-  GART_KERNEL void operator()(index_t i) const { sum[i] += moments[std::size_t{moment_stride} * i + error_place]; }
-};
 
 struct error_penalty_kernel {
   float const* opacity;
@@ -136,7 +129,7 @@ inline float split_share(error_growth_options const& options, index_t most, u64 
 
 /// Steps count from 1.
 template <execution E>
-class error_growth {
+class error_growth final : public densifier<E> {
  public:
   /// The error seen through each Gaussian since the last densification, [N]: what a checkpoint must hold.
   buffer<float, E> error_sum;
@@ -144,11 +137,11 @@ class error_growth {
   /// For a run of so many steps, up to so many Gaussians (growth_budget), with the split's share given (split_share).
   /// Errors: invalid_argument for a split that leaves no halves.
   error_growth(E& exec, error_growth_options const& options, index_t max_gaussians, int iterations, u64 seed)
-      : error_sum(exec),
+      : densifier<E>({options.from, options.every, options.until}, iterations),
+        error_sum(exec),
         exec_(&exec),
         options_(options),
         max_gaussians_(max_gaussians),
-        iterations_(iterations),
         seed_(seed),
         dead_(exec),
         drawable_(exec),
@@ -163,76 +156,54 @@ class error_growth {
     if (!(split.opacity > 0 && split.opacity <= 1))
       throw invalid_argument("split_shape.opacity is " + std::to_string(split.opacity) + ": more than 0, at most 1");
   }
+  /// Of a run.
+  error_growth(E& exec, density_setup const& run)
+      : error_growth(exec, options_of(run.options, run.data),
+                     growth_budget(run.options.error, run.options.max_gaussians, run.data.training_pixels()),
+                     run.options.iterations, run.options.seed) {}
 
-  /// Every step, with the moments that the step's backward pass left ([N][moment_stride]), before the optimizer's step:
-  /// adds to the statistic, and to `gradient` that of the penalty.
-  void accumulate(gaussians<E> const& model, span<float const> moments, gaussians<E>& gradient) {
-    add_errors(model, moments);
-    add_penalty(model, gradient, model.size());
-  }
-  /// The first part of it: the errors of one of a step's views.
-  void add_errors(gaussians<E> const& model, span<float const> moments) {
-    if (index_t const n = model.size())
-      parallel_for(*exec_, "error_sum", n, detail::error_sum_kernel{moments.data(), statistic_of(n).data()});
-  }
-  /// And the second; `total`: Gaussians of the scene, where `model` are not all.
-  void add_penalty(gaussians<E> const& model, gaussians<E>& gradient, index_t total) {
-    if (model.size() && options_.opacity_penalty > 0)
-      parallel_for(*exec_, "error_penalty", model.size(),
-                   detail::error_penalty_kernel{model.opacity.data(), gradient.opacity.data(),
-                                                options_.opacity_penalty / static_cast<float>(total)});
-  }
-
-  /// The statistic of so many, for who adds to it; of another count than before it is zero.
-  span<float> statistic_of(index_t n) {
+  bool by_error() const override { return true; }
+  /// Of another count than before it is zero.
+  span<float> error_sums(index_t n) override {
     if (error_sum.size() != n) error_sum.resize(n), error_sum.zero();
     return error_sum.view();
   }
-
-  /// From the next step on the schedules are those of a run of so many steps.
-  void set_iterations(int iterations) { iterations_ = iterations; }
-  /// Steps are counted in images, of which each has so many.
-  void set_batch(int images) { batch_ = images; }
-
-  /// Whether the step densifies.
-  bool due(int step) const {
-    return step > options_.from && is_multiple(step, options_.every, batch_) &&
-           static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
+  void penalty(trained_gaussians<E>& g, index_t total) override {
+    if (g.size() && options_.opacity_penalty > 0)
+      parallel_for(*exec_, "error_penalty", g.size(),
+                   detail::error_penalty_kernel{g.model.opacity.data(), g.gradients.opacity.data(),
+                                                options_.opacity_penalty / static_cast<float>(total)});
   }
+  density_change step(trained_gaussians<E>& g, density_step<E> const& now) override {
+    return this->due(now.step) ? densify(g, now) : density_change{};
+  }
+  void save(named_arrays& state) const override { state.set("error_growth/error_sum", error_sum.to_host()); }
+  void load(named_arrays const& state) override { error_sum.assign(state.get<float>("error_growth/error_sum")); }
 
   /// The count that a run is to have after a step.
   index_t budget_at(int step) const {
-    double const filled = static_cast<double>(options_.fill) * iterations_ - options_.from;
+    double const filled = static_cast<double>(options_.fill) * this->iterations_ - options_.from;
     double const share = filled > 0 ? std::clamp((step - options_.from) / filled, 0.0, 1.0) : 1.0;
     return static_cast<index_t>(std::sqrt(share) * max_gaussians_);
   }
 
-  /// After the optimizer's step.
-  template <class Rows = all_rows>
-  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {},
-                            span<float const> filter = {}) {
-    return due(step) ? densify(model, state, step, rows, filter) : density_change{};
-  }
-
-  /// Splits those with the most error, and moves the dead. `rows`: all_rows, or as it; `filter`: as opacity_shown has
-  /// it.
-  template <class Rows = all_rows>
-  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {},
-                         span<float const> filter = {}) {
+  /// Splits those with the most error, and moves the dead.
+  density_change densify(trained_gaussians<E>& g, density_step<E> const& now) {
     stage_scope stage(*exec_, "densify");
     density_change change;
-    index_t const here = model.size(), n = rows.total(here);
+    all_rows<E>& rows = now.rows;
+    index_t const here = g.size(), n = rows.total(here);
     row_owners const owners = rows.owners();
     if (n == 0) return change;
-    float const* const errors = statistic_of(here).data();
+    float const* const errors = error_sums(here).data();
     dead_.resize(here), drawable_.resize(here), key_.resize(here), id_.resize(here), place_.resize(n);
     parallel_for(*exec_, "error_keys", here,
-                 detail::error_key_kernel{std::as_const(model).view(),
+                 detail::error_key_kernel{std::as_const(g.model).view(),
                                           owners,
                                           errors,
                                           options_.dead_opacity,
-                                          filter.data(),
-                                          {seed_, static_cast<u32>(step), random_use::growth},
+                                          now.filter.data(),
+                                          {seed_, static_cast<u32>(now.step), random_use::growth},
                                           dead_.data(),
                                           drawable_.data(),
                                           key_.data(),
@@ -245,7 +216,7 @@ class error_growth {
     index_t const drawable = static_cast<index_t>(totals[0]), dead = static_cast<index_t>(totals[1]);
 
     change.relocated = std::min(dead, drawable);
-    index_t const goal = std::min(budget_at(step), max_gaussians_);
+    index_t const goal = std::min(budget_at(now.step), max_gaussians_);
     change.added = std::min(goal > n ? goal - n : 0, drawable - change.relocated);
     if (change.any()) {
       sort_pairs(*exec_, key_.view(), id_.view(), 32);
@@ -256,25 +227,33 @@ class error_growth {
                      detail::error_target_kernel{dead_.data(), place_.data(), target_.data()});
       // Past the dead, the rows that are new.
       parallel_for(*exec_, "error_append", change.added, detail::number_rows{target_.data() + change.relocated, n});
-      index_t const next = rows.here(n + change.added);
-      model.resize_keep(next), state.first.resize_keep(next), state.second.resize_keep(next);
+      g.resize(rows.here(n + change.added));
       span<u32 const> const from(id_.data(), draws), to(target_.data(), draws);
-      rows.copy(*exec_, model, from, to);
-      clear_moments(*exec_, state, to, owners);
+      rows.copy(*exec_, g.model, from, to);
+      clear_moments(*exec_, g.moments, to, owners);
       for (bool const second : {false, true})
         parallel_for(*exec_, "error_split", draws,
-                     detail::error_split_kernel{model.view(), (second ? to : from).data(), owners, options_.split,
+                     detail::error_split_kernel{g.model.view(), (second ? to : from).data(), owners, options_.split,
                                                 second, 1.01f * options_.dead_opacity});
     }
-    error_sum.resize(model.size()), error_sum.zero();
+    error_sum.resize(g.size()), error_sum.zero();
     return change;
   }
 
  private:
+  static error_growth_options options_of(train_options const& options, dataset const& data) {
+    error_growth_options e = options.error;
+    if (e.opacity_penalty > 0)
+      e.opacity_penalty *= penalty_scale(
+          foreground_fraction(data, views_trained_on(data.train.size(), options.held_out), options.background));
+    e.split.share = split_share(e, options.max_gaussians, data.training_pixels());
+    e.dead_opacity = least_opacity(e.dead_opacity, options.render.alpha_min);
+    return e;
+  }
+
   E* exec_;
   error_growth_options options_;
   index_t max_gaussians_;
-  int iterations_, batch_ = 1;
   u64 seed_;
   buffer<u32, E> dead_, drawable_, key_, id_, target_;
   buffer<u64, E> place_, totals_;

@@ -24,11 +24,9 @@
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/math/logit.hpp>
 #include <gart/math/quaternion.hpp>
-#include <gart/optim/adam.hpp>
 #include <gart/optim/options.hpp>
 #include <gart/optim/random.hpp>
-#include <gart/optim/rows.hpp>
-#include <gart/optim/schedule.hpp>
+#include <gart/train/densify/densifier.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -176,18 +174,19 @@ inline float growth_for(mcmc_options const& options, index_t count, index_t max_
   return static_cast<float>(needed < given ? given : needed > limit ? limit : needed);
 }
 
-/// It has no state: what it draws depends on the seed and the step only. Steps count from 1.
+/// What it draws depends on the seed and the step only. Steps count from 1.
 template <execution E>
-class mcmc {
+class mcmc final : public densifier<E> {
  public:
   /// `extent` is the scene's, in world units.
   mcmc(E& exec, mcmc_options const& options, index_t max_gaussians, int iterations, float extent, u64 seed,
        int kernel_degree = 2)
-      : exec_(&exec),
+      : densifier<E>({options.from, options.every, options.until}, iterations),
+        exec_(&exec),
         options_(options),
+        growth_(options.growth),
         kernel_degree_(kernel_degree),
         max_gaussians_(max_gaussians),
-        iterations_(iterations),
         extent_(extent),
         seed_(seed),
         weight_(exec),
@@ -197,50 +196,47 @@ class mcmc {
         before_(exec),
         dead_before_(exec),
         totals_(exec, 2) {}
+  /// Of a run.
+  mcmc(E& exec, density_setup const& run)
+      : mcmc(exec, options_of(run.options), run.options.max_gaussians, run.options.iterations, run.data.extent,
+             run.options.seed, run.kernel_degree) {
+    started_with_ = run.start;
+    set_iterations(run.options.iterations);
+  }
 
-  /// Growth of each densification from the next on.
-  void set_growth(float growth) { options_.growth = growth; }
-  /// From the next step on the schedules are those of a run of so many steps.
-  void set_iterations(int iterations) { iterations_ = iterations; }
-  /// Steps are counted in images, of which each has so many.
-  void set_batch(int images) { batch_ = images; }
-
-  /// Adds the gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale) / extent; before the
-  /// optimizer's step. `total`: Gaussians of the scene, where `model` are not all; 0: they are.
-  void add_penalties(gaussians<E> const& model, gaussians<E>& gradient, index_t total = 0) {
-    if (model.size() == 0) return;
-    float const n = static_cast<float>(total ? total : model.size());
-    parallel_for(*exec_, "mcmc_penalties", model.size(),
-                 detail::mcmc_penalty_kernel{model.view(), gradient.view(), options_.opacity_penalty / n,
+  void set_iterations(int iterations) override {
+    densifier<E>::set_iterations(iterations);
+    growth_ = growth_for(options_, started_with_, max_gaussians_, iterations);
+  }
+  /// The gradient of opacity_penalty * mean(opacity) + scale_penalty * mean(scale) / extent.
+  void penalty(trained_gaussians<E>& g, index_t total) override {
+    if (g.size() == 0) return;
+    float const n = static_cast<float>(total);
+    parallel_for(*exec_, "mcmc_penalties", g.size(),
+                 detail::mcmc_penalty_kernel{g.model.view(), g.gradients.view(), options_.opacity_penalty / n,
                                              options_.scale_penalty / (3 * n * extent_)});
   }
-
-  /// Whether the step densifies.
-  bool due(int step) const {
-    return step > options_.from && is_multiple(step, options_.every, batch_) &&
-           static_cast<float>(step) < options_.until * static_cast<float>(iterations_);
-  }
-
-  /// After the optimizer's step: relocation and growth where they are due, and the noise. `mean_rate` is the rate the
-  /// means had in this step.
-  template <class Rows = all_rows>
-  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, float mean_rate, Rows&& rows = {},
-                            span<float const> filter = {}) {
+  /// Relocation and growth where they are due, and the noise.
+  density_change step(trained_gaussians<E>& g, density_step<E> const& now) override {
     density_change change;
-    if (due(step)) change = densify(model, state, step, rows, filter);
-    add_noise(model, step, mean_rate, rows.owners());
+    if (this->due(now.step)) change = densify(g, now);
+    add_noise(g.model, now.step, now.mean_rate, now.rows.owners());
     return change;
   }
+  void save(named_arrays& state) const override { state.set("growth", std::vector<float>{growth_}); }
+  void load(named_arrays const& state) override {
+    if (auto const growth = state.get<float>("growth"); growth.size() == 1) growth_ = growth[0];
+  }
 
-  /// Relocates and grows. `rows`: all_rows, or as it; `filter`: as opacity_shown has it.
-  template <class Rows = all_rows>
-  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {},
-                         span<float const> filter = {}) {
+  /// Relocates and grows.
+  density_change densify(trained_gaussians<E>& g, density_step<E> const& now) {
     stage_scope stage(*exec_, "densify");
     density_change change;
-    index_t const n = rows.total(model.size());
+    all_rows<E>& rows = now.rows;
+    index_t const n = rows.total(g.size());
+    u32 const step = static_cast<u32>(now.step);
     if (n == 0) return change;
-    weigh(model, options_.dead_opacity, filter.data(), rows);
+    weigh(g.model, options_.dead_opacity, now.filter.data(), rows);
     u64 totals[2];
     exec_->copy_out(totals, totals_.data(), sizeof totals);
     if (totals[0] == 0) return change;
@@ -249,20 +245,19 @@ class mcmc {
     if (change.relocated) {
       target_.resize(change.relocated);
       parallel_for(*exec_, "mcmc_list", n, detail::mcmc_list_kernel{dead_.data(), dead_before_.data(), target_.data()});
-      draw(model, state, n, change.relocated, {seed_, static_cast<u32>(step), random_use::relocation}, rows);
+      draw(g, n, change.relocated, {seed_, step, random_use::relocation}, rows);
     }
 
-    double const wanted = std::ceil(static_cast<double>(options_.growth) * n);
+    double const wanted = std::ceil(static_cast<double>(growth_) * n);
     index_t const goal = wanted < max_gaussians_ ? static_cast<index_t>(wanted) : max_gaussians_;
     if (goal > n) {
       change.added = goal - n;
       // Relocation may have left Gaussians at the opacity that counts as dead; all but broken ones may be drawn here.
-      weigh(model, 0, nullptr, rows);
-      index_t const next = rows.here(goal);
-      model.resize_keep(next), state.first.resize_keep(next), state.second.resize_keep(next);
+      weigh(g.model, 0, nullptr, rows);
+      g.resize(rows.here(goal));
       target_.resize(change.added);
       parallel_for(*exec_, "mcmc_append", change.added, detail::number_rows{target_.data(), n});
-      draw(model, state, n, change.added, {seed_, static_cast<u32>(step), random_use::growth}, rows);
+      draw(g, n, change.added, {seed_, step, random_use::growth}, rows);
     }
     return change;
   }
@@ -279,8 +274,13 @@ class mcmc {
   }
 
  private:
-  template <class Rows>
-  void weigh(gaussians<E> const& model, float dead_opacity, float const* filter, Rows& rows) {
+  static mcmc_options options_of(train_options const& options) {
+    mcmc_options m = options.mcmc;
+    m.dead_opacity = least_opacity(m.dead_opacity, options.render.alpha_min);
+    return m;
+  }
+
+  void weigh(gaussians<E> const& model, float dead_opacity, float const* filter, all_rows<E>& rows) {
     index_t const here = model.size(), n = rows.total(here);
     weight_.resize(here), dead_.resize(here), before_.resize(n), dead_before_.resize(n);
     parallel_for(*exec_, "mcmc_weights", here,
@@ -291,26 +291,25 @@ class mcmc {
   }
 
   // `draws` copies of Gaussians among the first n, by weight, into the rows of target_.
-  template <class Rows>
-  void draw(gaussians<E>& model, optimizer_state<E>& state, index_t n, index_t draws, random_source const& random,
-            Rows& rows) {
+  void draw(trained_gaussians<E>& g, index_t n, index_t draws, random_source const& random, all_rows<E>& rows) {
     buffer<u32, E>& copies = dead_;
     source_.resize(draws);
     copies.zero();
     parallel_for(*exec_, "mcmc_draw", draws,
                  detail::mcmc_draw_kernel<E>{before_.data(), totals_.data(), n, random, source_.data(), copies.data()});
     parallel_for(
-        *exec_, "mcmc_share", std::min(model.size(), rows.here(n)),
-        detail::mcmc_share_kernel{model.view(), copies.data(), rows.owners(), options_.dead_opacity, kernel_degree_});
-    rows.copy(*exec_, model, source_, target_);
-    clear_moments(*exec_, state, random.use == random_use::growth ? target_ : source_, rows.owners());
+        *exec_, "mcmc_share", std::min(g.size(), rows.here(n)),
+        detail::mcmc_share_kernel{g.model.view(), copies.data(), rows.owners(), options_.dead_opacity, kernel_degree_});
+    rows.copy(*exec_, g.model, source_, target_);
+    clear_moments(*exec_, g.moments, random.use == random_use::growth ? target_ : source_, rows.owners());
   }
 
   E* exec_;
   mcmc_options options_;
+  float growth_;  // of each densification
+  index_t started_with_ = 0;
   int kernel_degree_;  // of the Gaussians that are relocated
   index_t max_gaussians_;
-  int iterations_, batch_ = 1;
   float extent_;
   u64 seed_;
   buffer<u32, E> weight_, dead_, target_, source_;

@@ -21,12 +21,10 @@
 #include <gart/algorithm/sort_pairs.hpp>
 #include <gart/math/logit.hpp>
 #include <gart/math/quaternion.hpp>
-#include <gart/optim/adam.hpp>
 #include <gart/optim/options.hpp>
 #include <gart/optim/random.hpp>
-#include <gart/optim/rows.hpp>
-#include <gart/optim/schedule.hpp>
 #include <gart/scene/camera.hpp>
+#include <gart/train/densify/densifier.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -176,7 +174,7 @@ struct adc_reset_kernel {
 
 /// Steps count from 1.
 template <execution E>
-class adaptive_density {
+class adaptive_density final : public densifier<E> {
  public:
   /// The statistic since the last densification: what a checkpoint must hold. [N] each.
   buffer<float, E> gradient_sum;
@@ -184,12 +182,12 @@ class adaptive_density {
 
   /// `extent` is the scene's, in world units.
   adaptive_density(E& exec, adc_options const& options, index_t max_gaussians, int iterations, float extent, u64 seed)
-      : gradient_sum(exec),
+      : densifier<E>({options.from, options.every, options.until}, iterations),
+        gradient_sum(exec),
         touched(exec),
         exec_(&exec),
         options_(options),
         max_gaussians_(max_gaussians),
-        iterations_(iterations),
         extent_(extent),
         seed_(seed),
         outcome_(exec),
@@ -198,14 +196,13 @@ class adaptive_density {
         origin_(exec),
         offset_(exec),
         totals_(exec, 2) {}
+  /// Of a run.
+  adaptive_density(E& exec, density_setup const& run)
+      : adaptive_density(exec, options_of(run.options), run.options.max_gaussians, run.options.iterations,
+                         run.data.extent, run.options.seed) {}
 
-  /// From the next step on the schedules are those of a run of so many steps.
-  void set_iterations(int iterations) { iterations_ = iterations; }
-  /// Steps are counted in images, of which each has so many.
-  void set_batch(int images) { batch_ = images; }
-
-  /// Every step, with the gradient of each of its views.
-  void accumulate(gaussians<E> const& model, gaussians<E> const& gradient, camera const& view) {
+  bool by_gradient() const override { return true; }
+  void observe(gaussians<E> const& model, gaussians<E> const& gradient, camera const& view) override {
     if (touched.size() != model.size()) clear_statistic(model.size());
     parallel_for(*exec_, "adc_accumulate", model.size(),
                  detail::adc_accumulate_kernel{model.view(), gradient.view(), view.rotation[0], view.rotation[1],
@@ -214,42 +211,40 @@ class adaptive_density {
                                                0.5f * static_cast<float>(view.height) / pixels_per_radian(view).y,
                                                gradient_sum.data(), touched.data()});
   }
-
-  /// Whether the step densifies.
-  bool due(int step) const {
-    return step > options_.from && running(step) && is_multiple(step, options_.every, batch_);
-  }
-
-  /// After the optimizer's step: densification and the reset of opacities, where they are due.
-  template <class Rows = all_rows>
-  density_change after_step(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {},
-                            span<float const> filter = {}) {
+  /// Densification and the reset of opacities, where they are due.
+  density_change step(trained_gaussians<E>& g, density_step<E> const& now) override {
     density_change change;
-    if (due(step)) change = densify(model, state, step, rows, filter);
-    if (running(step) && is_multiple(step, options_.opacity_reset_every, batch_)) reset_opacity(model, state);
+    if (this->due(now.step)) change = densify(g, now);
+    if (this->running(now.step) && is_multiple(now.step, options_.opacity_reset_every, this->batch_)) reset_opacity(g);
     return change;
   }
+  void save(named_arrays& state) const override {
+    state.set("adc/gradient_sum", gradient_sum.to_host()), state.set("adc/touched", touched.to_host());
+  }
+  void load(named_arrays const& state) override {
+    gradient_sum.assign(state.get<float>("adc/gradient_sum")), touched.assign(state.get<u32>("adc/touched"));
+    if (gradient_sum.size() != touched.size()) clear_statistic(0);
+  }
 
-  /// Clones, splits and prunes. `rows`: all_rows, or as it; `filter`: as opacity_shown has it.
-  template <class Rows = all_rows>
-  density_change densify(gaussians<E>& model, optimizer_state<E>& state, int step, Rows&& rows = {},
-                         span<float const> filter = {}) {
+  /// Clones, splits and prunes.
+  density_change densify(trained_gaussians<E>& g, density_step<E> const& now) {
     stage_scope stage(*exec_, "densify");
     density_change change;
-    index_t const here = model.size(), n = rows.total(here);
+    all_rows<E>& rows = now.rows;
+    index_t const here = g.size(), n = rows.total(here);
     row_owners const owners = rows.owners();
     if (n == 0) return change;
     if (touched.size() != here) clear_statistic(here);
 
-    bool const was_reset = options_.opacity_reset_every > 0 && step > options_.opacity_reset_every;
-    detail::adc_rule const rule{std::as_const(model).view(),
+    bool const was_reset = options_.opacity_reset_every > 0 && now.step > options_.opacity_reset_every;
+    detail::adc_rule const rule{std::as_const(g.model).view(),
                                 gradient_sum.data(),
                                 touched.data(),
                                 options_.gradient,
                                 options_.prune_opacity,
                                 options_.dense * extent_,
                                 was_reset ? options_.prune_scale * extent_ : INFINITY,
-                                filter.data()};
+                                now.filter.data()};
     outcome_.resize(here);
     parallel_for(*exec_, "adc_plan", here, detail::adc_plan_kernel{rule, outcome_.data()});
     rows.gather(*exec_, outcome_);
@@ -280,36 +275,36 @@ class adaptive_density {
     change.added = static_cast<index_t>(growing);
     change.removed = static_cast<index_t>(n - kept);
     if (change.any()) {
-      index_t const next = static_cast<index_t>(total), next_here = rows.here(next);
+      index_t const next = static_cast<index_t>(total);
       buffer<u32, E>& made = grows_;
       origin_.resize(next), made.resize(next);
       parallel_for(*exec_, "adc_place", n,
                    detail::adc_place_kernel{outcome_.data(), offset_.data(), origin_.data(), made.data()});
-      for (gaussians<E>* each : {&model, &state.first, &state.second}) {
-        gaussians<E> taken(*exec_, next_here, each->sh_degree());
-        rows.take(*exec_, *each, taken, span<u32 const>(origin_));
-        *each = std::move(taken);
-      }
-      for_each_element(*exec_, "adc_clear", next_here, model.sh_degree(),
-                       detail::adc_clear_body{state.first.view(), state.second.view(), made.data(), owners});
-      parallel_for(*exec_, "adc_split", next_here,
+      g.take(*exec_, rows, span<u32 const>(origin_));
+      for_each_element(*exec_, "adc_clear", g.size(), g.model.sh_degree(),
+                       detail::adc_clear_body{g.moments.first.view(), g.moments.second.view(), made.data(), owners});
+      parallel_for(*exec_, "adc_split", g.size(),
                    detail::adc_split_kernel{
-                       model.view(), made.data(), owners, {seed_, static_cast<u32>(step), random_use::split}});
+                       g.model.view(), made.data(), owners, {seed_, static_cast<u32>(now.step), random_use::split}});
     }
-    clear_statistic(model.size());
+    clear_statistic(g.size());
     return change;
   }
 
   /// Opacities above twice prune_opacity become that.
-  void reset_opacity(gaussians<E>& model, optimizer_state<E>& state) {
+  void reset_opacity(trained_gaussians<E>& g) {
     double const ceiling = std::min(2.0 * static_cast<double>(options_.prune_opacity), 0.99);
-    parallel_for(*exec_, "adc_reset", model.size(),
-                 detail::adc_reset_kernel{model.opacity.data(), static_cast<float>(logit_in_double(ceiling))});
-    state.first.opacity.zero(), state.second.opacity.zero();
+    parallel_for(*exec_, "adc_reset", g.size(),
+                 detail::adc_reset_kernel{g.model.opacity.data(), static_cast<float>(logit_in_double(ceiling))});
+    g.moments.first.opacity.zero(), g.moments.second.opacity.zero();
   }
 
  private:
-  bool running(int step) const { return static_cast<float>(step) < options_.until * static_cast<float>(iterations_); }
+  static adc_options options_of(train_options const& options) {
+    adc_options a = options.adc;
+    a.prune_opacity = least_opacity(a.prune_opacity, options.render.alpha_min);
+    return a;
+  }
 
   void clear_statistic(index_t n) {
     gradient_sum.resize(n), touched.resize(n);
@@ -319,7 +314,6 @@ class adaptive_density {
   E* exec_;
   adc_options options_;
   index_t max_gaussians_;
-  int iterations_, batch_ = 1;
   float extent_;
   u64 seed_;
   buffer<u32, E> outcome_, copies_, grows_, origin_;
