@@ -72,13 +72,6 @@ foreach(component IN ITEMS headers io runtime reference cpu embree distributed c
     target_link_options(${target} INTERFACE $<INSTALL_INTERFACE:-fsanitize=address,undefined>)
   endif()
 
-  get_target_property(type ${target} TYPE)
-  if(type STREQUAL "SHARED_LIBRARY")
-    # Symbols carry the library's name and version, so that two versions of gart may be in one process.
-    set_target_properties(${target} PROPERTIES VERSION ${PROJECT_VERSION} DEFINE_SYMBOL ""
-                          SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
-    target_link_options(${target} PRIVATE $<$<PLATFORM_ID:Linux>:-Wl,--default-symver>)
-  endif()
   install(TARGETS ${target} EXPORT gart_${component} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
           LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(EXPORT gart_${component} FILE gart-${component}.cmake NAMESPACE gart:: DESTINATION ${_package_dir})

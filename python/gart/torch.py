@@ -121,9 +121,8 @@ def _by_c2w(c2w, translation, rotation):
 
 class _Render(torch.autograd.Function):
     @staticmethod
-    def forward(ctx, mean, log_scale, quaternion, opacity, sh, c2w, camera, options, kernel_degree):
+    def forward(ctx, mean, log_scale, quaternion, opacity, sh, c2w, camera, options, kernel_degree, record):
         parameters = [p.detach() for p in (mean, log_scale, quaternion, opacity, sh)]
-        record = any(ctx.needs_input_grad[:6])
         images = _forward(parameters, camera, options, kernel_degree, record)
         if record:
             ctx.save_for_backward(mean, log_scale, quaternion, opacity, sh, c2w, images[0])
@@ -140,7 +139,7 @@ class _Render(torch.autograd.Function):
         *out, translation, rotation = _backward(parameters, ctx.camera, ctx.options, ctx.kernel_degree, color,
                                                 gradients, pose)
         by_pose = _by_c2w(c2w, translation, rotation) if pose else None
-        return (*out, by_pose, None, None, None)
+        return (*out, by_pose, None, None, None, None)
 
 
 def _checked(parameters):
@@ -163,9 +162,10 @@ def render(mean, log_scale, quaternion, opacity, sh, camera, *, c2w=None, option
     options = _gart.RenderOptions(**settings) if options is None else options
     if c2w is not None:
         camera = _placed(camera, c2w)
-    if _operators is not None:
-        return _operators(parameters, c2w, camera, options, kernel_degree)
-    return _Render.apply(*parameters, c2w, camera, options, kernel_degree)
+    record = torch.is_grad_enabled() and any(t is not None and t.requires_grad for t in (*parameters, c2w))
+    # The operators are for compilers: by hand the autograd function costs less a call.
+    call = _operators if _operators is not None and torch.compiler.is_compiling() else _Render.apply
+    return call(*parameters, c2w, camera, options, kernel_degree, record)
 
 
 def _placed(camera, c2w):
@@ -207,11 +207,9 @@ def rasterization(means, quats, scales, opacities, colors, viewmats, Ks, width, 
         raise InvalidArgument(f"gart.torch.rasterization: camera_model '{camera_model}' is none of {', '.join(_MODELS)}")
     n, views = means.shape[0], viewmats.shape[0]
     log_scale, opacity = scales.log(), torch.logit(opacities, eps=1e-7)
-    # A world-to-camera matrix is turned about in double: a pose may lie far from the origin.
-    rotation = viewmats[:, :3, :3].double().transpose(1, 2)
-    position = -(rotation @ viewmats[:, :3, 3:].double())
-    last = torch.tensor([0.0, 0.0, 0.0, 1.0], dtype=torch.float64, device=viewmats.device).expand(views, 1, 4)
-    c2w = torch.cat((torch.cat((rotation, position), 2), last), 1)
+    # Poses that nobody learns are looked at on the host alone.
+    of_views = viewmats if viewmats.requires_grad else viewmats.detach().cpu()
+    poses = _inverted(of_views)
     numbers = Ks.detach()[:, (0, 1, 0, 1), (0, 1, 2, 2)].cpu().tolist()
     behind = [(0.0, 0.0, 0.0)] * views if backgrounds is None else backgrounds.detach().cpu().tolist()
     filter_width = eps2d ** 0.5 if rasterize_mode == "antialiased" else 0.0
@@ -219,12 +217,15 @@ def rasterization(means, quats, scales, opacities, colors, viewmats, Ks, width, 
     for view in range(views):
         fx, fy, cx, cy = numbers[view]
         camera = _gart.Camera(width, height, fx, fy, cx, cy, model=_MODELS[camera_model], **lens)
+        learned = poses[view] if viewmats.requires_grad else None
+        if learned is None:
+            camera.c2w = poses[view].numpy()
         color, channels = _coefficients(colors, view, n, sh_degree)
         parts = []
         for first in range(0, channels, 3):
             wide = min(3, channels - first)
             back = [*behind[view][first:first + wide], 0.0, 0.0][:3]
-            image, transmittance, depth = render(means, log_scale, quats, opacity, color(first), camera, c2w=c2w[view],
+            image, transmittance, depth = render(means, log_scale, quats, opacity, color(first), camera, c2w=learned,
                                                  near=near_plane, antialias=filter_width, background=back)
             image = image[..., :wide]
             if backgrounds is not None and backgrounds.requires_grad:
@@ -242,6 +243,14 @@ def rasterization(means, quats, scales, opacities, colors, viewmats, Ks, width, 
         alphas.append(alpha)
     meta = {"width": width, "height": height, "n_cameras": views}
     return torch.stack(images), torch.stack(alphas), meta
+
+
+def _inverted(viewmats):
+    """World to camera, [C, 4, 4], as camera to world; in double, since a pose may lie far from the origin."""
+    rotation = viewmats[:, :3, :3].double().transpose(1, 2)
+    position = -(rotation @ viewmats[:, :3, 3:].double())
+    last = torch.tensor([0.0, 0.0, 0.0, 1.0], dtype=torch.float64, device=viewmats.device).expand(len(viewmats), 1, 4)
+    return torch.cat((torch.cat((rotation, position), 2), last), 1)
 
 
 def _coefficients(colors, view, n, sh_degree):
@@ -327,12 +336,11 @@ def _make_operators():
 
     op.register_autograd(backward, setup_context=setup_context)
 
-    def call(parameters, c2w, camera, options, kernel_degree):
-        record = torch.is_grad_enabled() and any(
-            t is not None and t.requires_grad for t in (*parameters, c2w))
+    def call(mean, log_scale, quaternion, opacity, sh, c2w, camera, options, kernel_degree, record):
         c2w = torch.from_numpy(camera.c2w) if c2w is None else c2w
         numbers = [float(getattr(options, name)) for name in fields] + [float(b) for b in options.background]
-        return op(*parameters, c2w, camera.json(), numbers, kernel_degree, record, camera.height, camera.width)
+        return op(mean, log_scale, quaternion, opacity, sh, c2w, camera.json(), numbers, kernel_degree, record,
+                  camera.height, camera.width)
     return call
 
 
