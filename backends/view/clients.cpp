@@ -223,7 +223,8 @@ bool clients::waited_for(job const& j) const {
   std::lock_guard const lock(mutex_);
   auto const found = clients_.find(j.client);
   if (found == clients_.end()) return false;
-  return !std::holds_alternative<view_message>(j.wanted) || found->second.serial == j.serial;
+  // One that moves is always followed by another: without it nothing would be seen.
+  return !j.still || found->second.serial == j.serial;
 }
 
 double clients::expected_ms(double pixels) const {

@@ -46,7 +46,7 @@ class clients {
 
   // The thread that renders.
   std::optional<job> next_job(double now, double wait_seconds);
-  // Whether its client is there, and has asked for no newer view.
+  // Whether its client is there, and of a view at rest has asked for no newer one.
   bool waited_for(job const& j) const;
   // Milliseconds that so many pixels of a view are expected to take; 0 where nothing is known.
   double expected_ms(double pixels) const;

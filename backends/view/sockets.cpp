@@ -240,7 +240,7 @@ struct sockets::state {
   void message(connection& c, ws::message const& m) {
     using kind = ws::message;
     if (m.is == kind::wrong) return close(c, m.code, m.payload);
-    if (m.is == kind::ping) return put(c, ws::frame_head(ws::pong, m.payload.size()) + m.payload);
+    if (m.is == kind::ping && c.out.empty()) put(c, ws::frame_head(ws::pong, m.payload.size()) + m.payload);
     if (m.is == kind::close) return take_leave(c, ws::normal, "");
     if (m.is != kind::text) return;
     c.said = seconds_now();
@@ -345,14 +345,16 @@ struct sockets::state {
 
   void serve() {
     while (!ends) turn(tick_ms);
-    // What is left to say is given a moment, where anyone takes it.
+    // What is left to say is given a moment, where anyone takes it, and so is the answer to a close: with that unread
+    // the system would take back the last word.
     all.send_all(bye_text(all.why_it_ends()));
-    double const until = seconds_now() + 0.3;
+    double const until = seconds_now() + close_seconds;
     bool told = false;
     while (seconds_now() < until) {
-      bool const waits = all.has_output() || std::any_of(connections.begin(), connections.end(), [](auto const& c) {
-                           return c.now == connection::closing || (c.client && !c.out.empty());
-                         });
+      bool const waits =
+          all.has_output() || std::any_of(connections.begin(), connections.end(), [](auto const& c) {
+            return c.now == connection::closing || c.now == connection::lingering || (c.client && !c.out.empty());
+          });
       if (!waits && told) return;
       if (!waits) {
         told = true;

@@ -65,8 +65,10 @@ export async function openPage(browser, address, options = {}) {
       assert.deepEqual(faults, [], 'the browser reported faults');
     },
   };
-  await self.message('hello');
-  await self.atRest();
+  // What trains is asked for again and again, and at rest for a moment only.
+  const {training} = await self.message('hello');
+  if (training) await until('a frame', () => frames.some(({header}) => header.still));
+  else await self.atRest();
   return self;
 }
 

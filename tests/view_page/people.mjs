@@ -34,6 +34,37 @@ export const people = {
     await page.close();
   },
 
+  async 'a host that is allowed serves the page, another name does not'({browser, gart}) {
+    const server = await gart.serve('view', 'run/model.ply', '--backend', 'openmp', '--allow-host', 'viewer.test');
+    const p = await openPage(browser, server.control.replace('127.0.0.1', 'viewer.test'));
+    assert.equal(p.received[0].right, 'control');
+    await p.close();
+    const page = await browser.newPage();
+    assert.equal((await page.goto(server.control.replace('127.0.0.1', 'other.test'))).status(), 403);
+    await page.close();
+    server.child.kill('SIGINT');
+    assert.equal(await server.ended, 0);
+    assert.match(server.text(), /for the host 'other.test:\d+' from the origin '' \(--allow-host NAME lets a host in\)/);
+  },
+
+  async 'a page whose place another one took says so, and comes back when it is asked to'({browser, server}) {
+    const page = await browser.newPage();
+    let tries = 0;
+    await page.routeWebSocket(/\/socket$/, (socket) => {
+      ++tries;
+      socket.close({code: 1013, reason: 'another page took the place of this one'});
+    });
+    await page.goto(server.control);
+    await page.waitForSelector('#lost:visible');
+    assert.equal(await page.textContent('#lost span'), 'another page took the place of this one');
+    await page.waitForTimeout(1500);
+    assert.equal(tries, 1, 'it came back by itself');
+    await page.click('#again');
+    for (let i = 0; i < 200 && tries < 2; ++i) await page.waitForTimeout(50);
+    assert.equal(tries, 2, 'it did not try again');
+    await page.close();
+  },
+
   async 'every control has a name, and no two have the same id'({browser, server}) {
     const p = await openPage(browser, server.control);
     const nameless = await p.page.locator('button, input, select, [role=tab], [role=slider], [role=img], img').evaluateAll((all) =>

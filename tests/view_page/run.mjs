@@ -32,7 +32,7 @@ console.log(`${seconds()} s  a capture and a model`);
 
 const browser = await chromium.launch({
   executablePath,
-  args: ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+  args: ['--headless', '--no-sandbox', '--host-resolver-rules=MAP *.test 127.0.0.1', '--disable-gpu', '--disable-quic', '--no-first-run',
     '--disable-background-networking', '--disable-component-update', '--disable-sync'],
 });
 const server = await gart.serve('view', 'run/model.ply', 'capture', '--backend', 'openmp');
