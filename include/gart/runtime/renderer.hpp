@@ -9,6 +9,9 @@
 ///
 /// Memory "of the policy" is device memory of the request's device for cuda, host memory for the others.
 ///
+/// Any rays are traced besides views, whatever the tracer (rays/ray_batch.hpp). forward() keeps what the gradient of a
+/// view or of a batch needs, and any number of contexts may wait for theirs.
+///
 /// Errors: unsupported, naming the configurations there are and how to compile one, for a configuration that is not;
 /// invalid_argument for Gaussians of another SH degree or whose arrays disagree in size, for options that no view can
 /// be rendered by, and for options.rebuild_every where the tracer builds no tree; out_of_memory; whatever the policy
@@ -18,6 +21,7 @@
 #include <gart/pose/pose.hpp>
 #include <gart/render/options.hpp>
 #include <gart/render/rendered.hpp>
+#include <gart/runtime/forward_context.hpp>
 #include <gart/runtime/request.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -67,6 +71,25 @@ class renderer {
   /// dL/d the pose of the view of the last differentiate. Waits for it. Errors: invalid_argument before that, after
   /// another view was rendered or another model set or bound, and for a model without Gaussians.
   virtual pose_gradient differentiate_pose() = 0;
+
+  /// A view to memory of the policy, as render_to, and what its gradients need.
+  virtual std::unique_ptr<forward_context> forward(camera const& view, render_options const& options,
+                                                   render_targets const& targets) = 0;
+  /// A batch in memory of the policy, as trace_to, and what its gradients need.
+  virtual std::unique_ptr<forward_context> forward(ray_batch const& rays, render_options const& options,
+                                                   batch_targets const& targets,
+                                                   gradient_form form = gradient_form::primitive) = 0;
+
+  /// What rays see, from and to host memory. options.antialias must be 0. The tree is built for the first batch of a
+  /// model, and of bound arrays again where they have changed. Errors: unsupported where batches are not compiled for
+  /// the backend and the kernel degree.
+  virtual traced_rays trace(ray_batch const& rays, render_options const& options) = 0;
+  /// The same in memory of the policy. Waits for it to check the rays.
+  virtual void trace_to(ray_batch const& rays, render_options const& options, batch_targets const& targets) = 0;
+  /// All hits of rays in order, up to where options end a ray: transmittance_min = 0 lists every one. From and to host
+  /// memory.
+  virtual hit_lists list_hits(ray_batch const& rays, render_options const& options) = 0;
+
   virtual void wait() = 0;  ///< until all that was asked for is done
 
   /// Times of stages; waits for the policy.
