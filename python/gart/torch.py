@@ -101,11 +101,11 @@ def _backward(parameters, camera, options, kernel_degree, color, gradients, pose
             more["transmittance_gradient"] = _lend(by_transmittance.contiguous())
         if by_depth is not None:
             more["depth_gradient"] = _lend(by_depth.contiguous())
+        turned = mean.new_empty(6) if pose else None
+        if pose:
+            more["pose"] = _lend(turned)
         shared.renderer.backward_to(_lend(by_color.contiguous()), *map(_lend, out), **more)
-        turned = shared.renderer.pose_gradient() if pose else None
-    if turned is None:
-        return (*out, None, None)
-    return (*out, torch.from_numpy(turned["translation"]), torch.from_numpy(turned["rotation"]))
+    return (*out, turned[:3], turned[3:]) if pose else (*out, None, None)
 
 
 def _by_c2w(c2w, translation, rotation):

@@ -64,6 +64,9 @@ struct python_renderer {
   std::vector<lent> bound;     // their arrays, where they are somebody else's
   std::vector<lent> recorded;  // the images that the gradients are to be of
   gart::camera recorded_view;
+  std::unique_ptr<gart::forward_context> context;  // of that view; goes before the renderer
+
+  void forget() { context.reset(), recorded.clear(); }
   std::mutex mutex;
 };
 

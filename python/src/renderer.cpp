@@ -33,8 +33,9 @@ std::unique_ptr<self> make(py::object const& model, py::kwargs const& given) {
 }
 
 void set_model(self& r, gart::model_file const& file) {
+  r.forget();
   without_gil(r.mutex, [&] { r.it->set_model(file.model); });
-  r.bound.clear(), r.recorded.clear();
+  r.bound.clear();
   r.usual = file.render, r.count = static_cast<std::int64_t>(file.model.size());
 }
 
@@ -69,8 +70,9 @@ gart::gaussians_view<T> parameters_of(std::array<py::object, 5> const& given, st
 void bind(self& r, std::array<py::object, 5> const& arrays) {
   std::vector<lent> kept;
   auto const view = parameters_of<float const>(arrays, "Renderer.bind", -1, r.where, kept);
+  r.forget();
   without_gil(r.mutex, [&] { r.it->bind(view); });
-  r.bound = std::move(kept), r.recorded.clear();
+  r.bound = std::move(kept);
   r.count = view.count;
 }
 
@@ -91,7 +93,7 @@ gart::render_targets targets_of(self const& r, gart::camera const& view, std::st
 
 py::dict render(self& r, gart::camera const& view, py::object const& options, py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r.usual);
-  r.recorded.clear();
+  r.forget();
   gart::rendered image = without_gil(r.mutex, [&] { return r.it->render(view, o); });
   py::dict out;
   out["color"] = image_array(std::move(image.color));
@@ -103,7 +105,7 @@ py::dict render(self& r, gart::camera const& view, py::object const& options, py
 
 py::object render_8bit(self& r, gart::camera const& view, py::object const& options, py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r.usual);
-  r.recorded.clear();
+  r.forget();
   return image_array(without_gil(r.mutex, [&] { return r.it->render_8bit(view, o); }));
 }
 
@@ -112,15 +114,19 @@ void render_to(self& r, gart::camera const& view, py::object const& options, std
   gart::render_options const o = options_of(options, given, r.usual);
   std::vector<lent> kept;
   gart::render_targets const to = targets_of(r, view, record ? "Renderer.record" : "Renderer.render_to", targets, kept);
-  r.recorded.clear();
-  without_gil(r.mutex, [&] { record ? r.it->record(view, o, to) : r.it->render_to(view, o, to); });
-  if (record) r.recorded = std::move(kept), r.recorded_view = view;
+  r.forget();
+  if (record) {
+    r.context = without_gil(r.mutex, [&] { return r.it->forward(view, o, to); });
+    r.recorded = std::move(kept), r.recorded_view = view;
+  } else {
+    without_gil(r.mutex, [&] { r.it->render_to(view, o, to); });
+  }
 }
 
 // From memory to memory, of the view that was recorded.
 void backward_to(self& r, py::object const& color, py::object const& depth, py::object const& transmittance,
-                 std::array<py::object, 5> const& gradients) {
-  if (r.recorded.empty())
+                 py::object const& pose, std::array<py::object, 5> const& gradients) {
+  if (!r.context)
     throw gart::invalid_argument("Renderer.backward_to: call Renderer.record first, with no other view in between");
   std::int64_t const h = r.recorded_view.height, w = r.recorded_view.width;
   char const* const call = "Renderer.backward_to";
@@ -128,10 +134,17 @@ void backward_to(self& r, py::object const& color, py::object const& depth, py::
   lent const by_depth = lent::if_given<float>(depth, {"Renderer.backward_to: depth_gradient", {h, w}}, r.where);
   lent const by_transmittance =
       lent::if_given<float>(transmittance, {"Renderer.backward_to: transmittance_gradient", {h, w}}, r.where);
+  lent const by_pose =
+      lent::if_given<float>(pose, {"Renderer.backward_to: pose", {gart::pose_gradient::floats}, true}, r.where);
   std::vector<lent> kept;
   auto const to = parameters_of<float>(gradients, call, r.count, r.where, kept);
+  auto const span_of = [&](lent const& given, std::int64_t each) {
+    auto const* const data = given.data<float>();
+    return gart::span<float const>(data, data ? static_cast<std::size_t>(h * w * each) : 0);
+  };
   without_gil(r.mutex, [&] {
-    r.it->differentiate_recorded({by_color.data<float>(), by_depth.data<float>(), by_transmittance.data<float>()}, to);
+    r.context->backward({span_of(by_color, 3), span_of(by_depth, 1), span_of(by_transmittance, 1)},
+                        {.gaussians = to, .pose = by_pose.data<float>()});
   });
 }
 
@@ -147,7 +160,7 @@ py::dict backward(self& r, gart::camera const& view, py::object const& color, py
                   py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r.usual);
   lent const by = lent::of<float>(color, {"Renderer.backward: color_gradient", {view.height, view.width, 3}});
-  r.recorded.clear();
+  r.forget();
   gart::pose_gradient turned;
   gart::gaussian_model got = without_gil(r.mutex, [&] {
     gart::image_float gradient(view.width, view.height, 3);
@@ -192,7 +205,7 @@ std::pair<gart::camera, std::vector<float>> track(self& r, py::object const& pho
     seen = gart::image8(guess.width, guess.height, 1);
     std::copy_n(bytes.data<gart::u8>(), bytes.size(), seen.data.data());
   }
-  r.recorded.clear();
+  r.forget();
   gart::track_result found = without_gil(r.mutex, [&] { return gart::track(*r.it, image, guess, o, seen); });
   return {found.view, std::move(found.residuals)};
 }
@@ -302,15 +315,17 @@ hits           uint32 [H, W], Gaussians composited)")
       .def(
           "backward_to",
           [](self& r, py::object const& color, py::object a, py::object b, py::object c, py::object d, py::object e,
-             py::object const& depth, py::object const& transmittance) {
-            backward_to(r, color, depth, transmittance, {a, b, c, d, e});
+             py::object const& depth, py::object const& transmittance, py::object const& pose) {
+            backward_to(r, color, depth, transmittance, pose, {a, b, c, d, e});
           },
           py::arg("color_gradient"), py::arg("mean"), py::arg("log_scale"), py::arg("quaternion"), py::arg("opacity"),
           py::arg("sh"), py::kw_only(), py::arg("depth_gradient") = none, py::arg("transmittance_gradient") = none,
+          py::arg("pose") = none,
           R"(Gradients of the view that record made last, into memory of the policy, which is overwritten.
 
 color_gradient   float32 [H, W, 3], dL/dcolour; those of depth and transmittance, [H, W], need depth=True
-mean, ..., sh    float32, of Model's shapes: dL/d each)")
+mean, ..., sh    float32, of Model's shapes: dL/d each
+pose             float32 [6], dL/d the pose: translation and rotation, as pose_gradient has them)")
       .def("backward", &backward, py::arg("camera"), py::arg("color_gradient"), py::arg("options") = none,
            py::kw_only(), py::arg("pose") = false,
            R"(Both passes of a view, for dL/dcolour as float32 [H, W, 3] on the host.
@@ -320,7 +335,7 @@ also "pose", as pose_gradient has it.)")
       .def(
           "pose_gradient",
           [](self& r) { return as_arrays(without_gil(r.mutex, [&] { return r.it->differentiate_pose(); })); },
-          R"(dL/d the pose of the view of the last gradients, which must still be where they went.
+          R"(dL/d the pose of the view of the last backward.
 
 translation  float64 [3], by the camera's position, world units
 rotation     float64 [3], by a small turn w of the camera about its position, world axes: a direction d becomes d + w x d)")

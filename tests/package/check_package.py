@@ -111,6 +111,9 @@ with tempfile.TemporaryDirectory() as temporary:
         run(examples[name.split("/")[0]] / name.split("/")[1], capture, trained, 3)
         assert trained.read_bytes().startswith(b"ply\n")
     expect(run(examples["4_bvh_query"] / "bvh_query", 1000), "1000 boxes")
+    points = folder / "points.ply"
+    expect(run(examples["6_lidar_scan"] / "lidar_scan", model, 0, 0, 0, points), "65536 rays")
+    assert points.read_bytes().startswith(b"ply\n")
     own = folder / "own.ply"
     expect(run(examples["5_own_configuration"] / "own_configuration", capture, own, 3), "openmp, tiles, primitive: kernel degree 4")
     expect(own.read_bytes()[:400].decode("latin-1"), "comment gart kernel_degree 4\n")

@@ -86,7 +86,6 @@ TEST_CASE_TEMPLATE("hit lists are complete and say what rays see", E, GART_TEST_
 
   // All that any ray meets, one by one.
   std::vector<gart::ray_gaussian> prepared;
-  gart::gaussians<gart::serial_exec> host;
   for (std::size_t i = 0; i < model.size(); ++i) {
     gart::gaussian_parameters const p{{model.mean[3 * i], model.mean[3 * i + 1], model.mean[3 * i + 2]},
                                       {model.log_scale[3 * i], model.log_scale[3 * i + 1], model.log_scale[3 * i + 2]},

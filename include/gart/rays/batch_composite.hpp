@@ -19,7 +19,7 @@ struct color_rows {
   int stored_degree = 0;          ///< of the rows
   int active_degree = 0;          ///< bands above it are not evaluated
 
-  /// Of a scene.
+  /// The colour of a Gaussian along a direction, before the clamp.
   GART_HD GART_INLINE vec3 unclamped(sh_basis<most> const& basis, u32 id) const {
     float const* const row = sh + static_cast<std::size_t>(3 * sh_coefficients(stored_degree)) * id;
     // Whole rows lie on 16 bytes and are read so.

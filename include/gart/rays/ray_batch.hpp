@@ -31,6 +31,15 @@ struct ray_batch {
   index_t count() const { return static_cast<index_t>(directions.size() / 3); }
 };
 
+/// Rays that own their memory, on the host.
+struct ray_list {
+  vec3d frame{0.0};                               ///< that origins are relative to
+  std::vector<float> origins, directions, t_max;  ///< as ray_batch has them
+
+  /// While this is.
+  ray_batch batch() const { return {frame, origins, directions, t_max}; }
+};
+
 /// In place of a Gaussian, where a ray has none.
 inline constexpr u32 no_gaussian = 0xffffffffu;
 /// In place of a distance, where a ray has no such hit.

@@ -39,7 +39,8 @@ struct batch_context {
   ray_batch rays;                                ///< that were traced
   render_options options;                        ///< by which
   gradient_form form = gradient_form::scatter;   ///< how gradients of Gaussians are summed
-  u64 scene = 0;                                 ///< ray_tracer's number of the scene that it is of
+  void const* tracer = nullptr;                  ///< whose it is
+  u64 scene = 0;                                 ///< its number of the scene
   buffer<float, E> color, transmittance, depth;  ///< what was seen
   kept_batch<E> kept;                            ///< hits, of gradient_form::primitive
 };
@@ -118,7 +119,8 @@ class ray_tracer {
                            gradient_form form = gradient_form::primitive) {
     prepare(rays, options);
     batch_context<E> context(*exec_);
-    context.rays = rays, context.options = options, context.form = form, context.scene = number_;
+    context.rays = rays, context.options = options, context.form = form;
+    context.tracer = this, context.scene = number_;
     index_t const n = rays.count();
     context.color.resize(std::size_t{3} * n), context.transmittance.resize(n), context.depth.resize(n);
     batch_targets seen = out;
@@ -141,7 +143,8 @@ class ray_tracer {
   void backward(batch_context<E>& context, output_gradients const& by, gaussians_view<float> gradients,
                 ray_gradient_targets const& of_rays = {}) {
     stage_scope stage(*exec_, "rays backward");
-    if (context.scene != number_ || number_ == 0)
+    if (context.tracer != this) throw invalid_argument("ray_tracer.backward: the context is of another tracer");
+    if (context.scene != number_)
       throw invalid_argument("ray_tracer.backward: the Gaussians have changed since forward(); call it again");
     index_t const n = context.rays.count();
     require_gradients(by, n, "ray_tracer.backward");

@@ -106,7 +106,8 @@ template <class Response, execution E, ray_program P>
 void trace_batch(E& exec, char const* label, world_view const& index, traced_scene const& scene, index_t rays,
                  P const& program) {
   static_assert(std::same_as<typename P::ray_type, ray>);
-  constexpr int window = 16;  // hits of a ray that are kept at a time
+  // Hits of a ray that are kept at a time: in registers of a device; on hosts so many that few rays are walked twice.
+  constexpr int window = E::device ? 16 : 64;
   parallel_for(exec, label, rays, ray_kernels::walk_batch<Response, window, P>{index, scene, program});
 }
 

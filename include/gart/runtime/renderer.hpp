@@ -9,6 +9,9 @@
 ///
 /// Memory "of the policy" is device memory of the request's device for cuda, host memory for the others.
 ///
+/// Any rays are traced besides views, whatever the tracer (rays/ray_batch.hpp). forward() keeps what the gradient of a
+/// view or of a batch needs, and any number of contexts may wait for theirs.
+///
 /// Errors: unsupported, naming the configurations there are and how to compile one, for a configuration that is not;
 /// invalid_argument for Gaussians of another SH degree or whose arrays disagree in size, for options that no view can
 /// be rendered by, and for options.rebuild_every where the tracer builds no tree; out_of_memory; whatever the policy
@@ -18,6 +21,7 @@
 #include <gart/pose/pose.hpp>
 #include <gart/render/options.hpp>
 #include <gart/render/rendered.hpp>
+#include <gart/runtime/forward_context.hpp>
 #include <gart/runtime/request.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -33,13 +37,6 @@ struct render_targets {
   float* depth = nullptr;          ///< [H][W]: sum of weight * t
   u32* hits = nullptr;             ///< [H][W]: hits composited
   u8* rgba = nullptr;              ///< [H][W][4]: the colour in 8 bits a channel, for a screen or an encoder
-};
-
-/// dL/d an image, in memory of the policy. Those of depth and transmittance need configuration_request.depth.
-struct pixel_gradients {
-  float const* color = nullptr;          ///< [H][W][3]
-  float const* depth = nullptr;          ///< [H][W]; null: zero
-  float const* transmittance = nullptr;  ///< [H][W]; null: zero
 };
 
 /// Renders and differentiates views of one model.
@@ -71,16 +68,28 @@ class renderer {
   /// the Gaussians, which are overwritten. `targets` takes the view besides.
   virtual void differentiate_into(camera const& view, render_options const& options, float const* color_gradient,
                                   gaussians_view<float> gradients, render_targets const& targets = {}) = 0;
-  /// A view with what its gradients need, for a gradient that follows from the image. The targets must stay until
-  /// differentiate_recorded, and no other view may come before it.
-  virtual void record(camera const& view, render_options const& options, render_targets const& targets) = 0;
-  /// The gradients of the view that was recorded last. Errors: invalid_argument where there is none, and for gradients
-  /// that the configuration has not.
-  virtual void differentiate_recorded(pixel_gradients const& by, gaussians_view<float> gradients) = 0;
-  /// dL/d the pose of the view of the last gradients, which must still be where they went. Waits for it. Errors:
-  /// invalid_argument before that, after another view was rendered or another model set or bound, and for a model
-  /// without Gaussians.
+  /// dL/d the pose of the view of the last differentiate. Waits for it. Errors: invalid_argument before that, after
+  /// another view was rendered or another model set or bound, and for a model without Gaussians.
   virtual pose_gradient differentiate_pose() = 0;
+
+  /// A view to memory of the policy, as render_to, and what its gradients need.
+  virtual std::unique_ptr<forward_context> forward(camera const& view, render_options const& options,
+                                                   render_targets const& targets) = 0;
+  /// A batch in memory of the policy, as trace_to, and what its gradients need.
+  virtual std::unique_ptr<forward_context> forward(ray_batch const& rays, render_options const& options,
+                                                   batch_targets const& targets,
+                                                   gradient_form form = gradient_form::primitive) = 0;
+
+  /// What rays see, from and to host memory. options.antialias must be 0. The tree is built for the first batch of a
+  /// model, and of bound arrays again where they have changed. Errors: unsupported where batches are not compiled for
+  /// the backend and the kernel degree.
+  virtual traced_rays trace(ray_batch const& rays, render_options const& options) = 0;
+  /// The same in memory of the policy. Waits for it to check the rays.
+  virtual void trace_to(ray_batch const& rays, render_options const& options, batch_targets const& targets) = 0;
+  /// All hits of rays in order, up to where options end a ray: transmittance_min = 0 lists every one. From and to host
+  /// memory.
+  virtual hit_lists list_hits(ray_batch const& rays, render_options const& options) = 0;
+
   virtual void wait() = 0;  ///< until all that was asked for is done
 
   /// Times of stages; waits for the policy.

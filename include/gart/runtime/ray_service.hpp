@@ -1,0 +1,43 @@
+#pragma once
+/// \file
+/// Batches of rays behind the renderers: one compiled service for each policy and response serves the renderers of all
+/// tracers, strategies and SH degrees. A library that compiles one registers it when it is loaded; a program does so
+/// for a response of its own by register_rays (runtime/compiled_rays.hpp).
+
+#include <gart/render/options.hpp>
+#include <gart/runtime/forward_context.hpp>
+#include <gart/runtime/request.hpp>
+
+#include <memory>
+
+namespace gart {
+
+/// Traces batches for a renderer; as its calls of the same names (runtime/renderer.hpp).
+class ray_service {
+ public:
+  /// The policy's memory goes with it.
+  virtual ~ray_service() = default;
+  /// The Gaussians, whose arrays must stay; again where they may have changed. Waits for the policy.
+  virtual void set_scene(gaussians_view<float const> scene, int active_degree) = 0;
+  /// From and to host memory.
+  virtual traced_rays trace(ray_batch const& rays, render_options const& options) = 0;
+  /// From and to host memory.
+  virtual hit_lists list_hits(ray_batch const& rays, render_options const& options) = 0;
+  /// In memory of the policy.
+  virtual void trace_to(ray_batch const& rays, render_options const& options, batch_targets const& targets) = 0;
+  /// In memory of the policy.
+  virtual std::unique_ptr<forward_context> forward(ray_batch const& rays, render_options const& options,
+                                                   batch_targets const& targets, gradient_form form) = 0;
+  virtual void wait() = 0;                     ///< until all that was asked for is done
+  virtual std::size_t peak_bytes() const = 0;  ///< most bytes in use at a time
+};
+
+/// Makes the service that a request asks for.
+using ray_service_maker = std::unique_ptr<ray_service> (*)(configuration_request const&);
+/// Adds one to the table; before main, from static initialisers.
+void register_ray_service(backend_kind backend, int kernel_degree, ray_service_maker make);
+/// For the backend, the kernel degree, the device, the stream and the threads of a request. Errors: unsupported, naming
+/// those there are.
+std::unique_ptr<ray_service> make_ray_service(configuration_request const& request);
+
+}  // namespace gart
