@@ -9,7 +9,6 @@
 #include <gart/io/crc32c.hpp>
 #include <gart/io/file.hpp>
 #include <gart/runtime/choose.hpp>
-#include <gart/runtime/presets.hpp>
 #include <gart/train/option_fields.hpp>
 
 #include <cstdio>
@@ -175,9 +174,9 @@ void add_arguments(CLI::App& train, train_arguments& a) {
 
   group = "Accuracy";
   in_group(r.add(train, "--preset", a.preset, "NAME",
-                 "exact, or quick: " + std::to_string(gart::preset_named("quick").iterations) +
+                 "exact, or quick: " + std::to_string(quick_iterations) +
                      " steps, where --iterations is not given"))
-      ->check(one_of(gart::preset_names()));
+      ->check(one_of({"exact", "quick"}));
 
   in_group(r.add(train, "--lt-format", a.lt_format, "NAME",
                  "What the forward pass leaves of a hit for primitive: float4,\nor half (half the memory, less exact "
@@ -214,11 +213,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
 }
 
 void fill_in(CLI::App const& train, train_arguments& a) {
-  gart::preset const& chosen = gart::preset_named(a.preset);
-  auto const set = [&](char const* option, auto& value, auto const& otherwise) {
-    if (train.get_option(option)->count() == 0) value = otherwise;
-  };
-  if (chosen.iterations) set("--iterations", a.options.iterations, chosen.iterations);
+  if (a.preset == "quick" && train.get_option("--iterations")->count() == 0) a.options.iterations = quick_iterations;
 }
 
 void continue_run(train_arguments& a) {
