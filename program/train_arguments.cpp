@@ -174,8 +174,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
 
   group = "Accuracy";
   in_group(r.add(train, "--preset", a.preset, "NAME",
-                 "exact, or quick: " + std::to_string(quick_iterations) +
-                     " steps, where --iterations is not given"))
+                 "exact, or quick: " + std::to_string(quick_iterations) + " steps, where --iterations is not given"))
       ->check(one_of({"exact", "quick"}));
 
   in_group(r.add(train, "--lt-format", a.lt_format, "NAME",
@@ -230,6 +229,7 @@ void continue_run(train_arguments& a) {
   nlohmann::json options = config["options"];
   // Earlier runs call it t-min.
   if (options.contains("t-min")) options.emplace("transmittance-min", options["t-min"]);
+  if (options.contains("set") && options["set"].is_string()) options["set"] = with_new_names(options["set"]);
   a.raised = a.recorded.continue_from(options, a.config_file(), {"iterations", "time-budget"});
   if (a.dataset.empty()) {
     if (!config.contains("dataset") || !config["dataset"].is_string()) {

@@ -17,14 +17,14 @@ struct learning_rates {
   float sh_dc = 2.5e-3f;       ///< of the first band
   float sh_rest = 1.25e-4f;    ///< of the bands above the first: a twentieth, as in 3DGS
   /// All rates but those of the means, exposures and lenses stay as they are for a share of the run, then decay
-  /// exponentially to `settled` of it.
-  float settled = 0.1f;                       ///< share of a rate that is left at the end
-  static constexpr float settle_from = 0.5f;  ///< share of the run before the decay
+  /// exponentially to `final_scale` of it.
+  float final_scale = 0.1f;                   ///< share of a rate that is left at the end
+  static constexpr float decay_start = 0.5f;  ///< share of the run before the decay
   /// The rates are those of a run of at least so many steps. A shorter one has less time to go as far: its rates of
   /// mean, scale and opacity are sqrt(long_run / steps) times as large, at most four times, and it settles the later
-  /// the shorter it is, up to settle_late of the run.
+  /// the shorter it is, up to decay_start_short of the run.
   int long_run = 15000;
-  float settle_late = 0.9f;                            ///< the share
+  float decay_start_short = 0.9f;                      ///< the share
   float exposure = 0.05f;                              ///< a visit of the view; decays like the means'
   static constexpr float exposure_final = 0.005f;      ///< where it ends
   float vignetting = 1e-2f, vignetting_final = 1e-4f;  ///< a visit of the lens; likewise

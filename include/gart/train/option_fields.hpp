@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The numbers and switches of train_options, once: each with its name, its place, its range and what it is. A program's
-/// options, what it records of them, and the checks of a run come from this table.
-/// Errors: require_options throws invalid_argument, naming the field, its value and its range.
+/// The numbers and switches of train_options, once: each with its name, its place, its range and what it is. A
+/// program's options, what it records of them, and the checks of a run come from this table. Errors: require_options
+/// throws invalid_argument, naming the field, its value and its range.
 
 #include <gart/core/error.hpp>
 #include <gart/train/options.hpp>
@@ -95,8 +95,8 @@ inline constexpr option_field option_fields[] = {
     {GART_FIELD(rates.opacity), 0, 1e6, "Rules", "Adam's rate of opacities' logits"},
     {GART_FIELD(rates.sh_dc), 0, 1e6, "Rules", "Adam's rate of colour's first band"},
     {GART_FIELD(rates.sh_rest), 0, 1e6, "Rules", "Adam's rate of the bands above it"},
-    {GART_FIELD(rates.settled), 0, 1, "Rules", "share of the rates that is left at the end"},
-    {GART_FIELD(rates.settle_late), 0, 1, "Rules", "share of the shortest runs before rates fall"},
+    {GART_FIELD(rates.final_scale), 0, 1, "Rules", "share of the rates that is left at the end"},
+    {GART_FIELD(rates.decay_start_short), 0, 1, "Rules", "share of the shortest runs before rates fall"},
     {GART_FIELD(rates.long_run), 1, 1e9, "Rules", "steps of a run whose rates are not raised"},
     {GART_FIELD(rates.exposure), 0, 1e6, "Rules", "Adam's rate of exposures, a visit"},
     {GART_FIELD(rates.vignetting), 0, 1e6, "Rules", "Adam's rate of falloffs, a visit"},
