@@ -25,8 +25,8 @@ LONG_PARTS = ("finite", "seeds", "deterministic")
 
 # Rules of training (docs/training.md): what each line changes of the defaults, by `gart train`.
 RULES = (("all", []),
-         ("drawn later: full at three quarters", ["--set", "error.fill=0.75"]),
-         ("full at a quarter of the run", ["--set", "error.fill=0.25"]),
+         ("drawn later: full at three quarters", ["--set", "error.growth_end=0.75"]),
+         ("full at a quarter of the run", ["--set", "error.growth_end=0.25"]),
          ("no penalty on opacity", ["--set", "error.opacity_penalty=0"]),
          ("penalty x 3", ["--set", "error.opacity_penalty=0.009"]),
          ("halves farther apart, q = 0.4", ["--set", "error.split.share=0.4"]),

@@ -83,7 +83,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "views that show a\nsmall part of a large scene"))
       ->check(one_of({"all", "seen"}));
   in_group(r.add(train, "--set", a.set, "NAME=VALUE,...",
-                 "Rules by name, for measuring them: error.fill=0.25,\nrates.opacity=0.05 and so on "
+                 "Rules by name, for measuring them: error.growth_end=0.25,\nrates.opacity=0.05 and so on "
                  "(docs/training.md); a name that\nthere is not lists those there are"));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
 

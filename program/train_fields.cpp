@@ -40,6 +40,7 @@ namespace {
 // Names that runs of before have in their config.json.
 constexpr std::pair<std::string_view, std::string_view> renamed[] = {
     // old, new
+    {"error.fill", "error.growth_end"},
     {"rates.settle_late", "rates.decay_start_short"},
     {"rates.settled", "rates.final_scale"},
     {"", ""}};

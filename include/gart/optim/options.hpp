@@ -61,7 +61,7 @@ struct split_shape {
 /// Of growth by error (optim/error_growth.hpp).
 struct error_growth_options {
   int from = 500, every = 100;     ///< steps: the first, and from one to the next
-  float fill = 0.5f;               ///< share of the run at which the count has reached its budget
+  float growth_end = 0.5f;         ///< share of the run at which the count has reached its budget
   float until = 5.0f / 6;          ///< share of the run after which the dead stay where they are
   float dead_opacity = 0.005f;     ///< as least_opacity has it for the alpha_min traced with
   float opacity_penalty = 0.003f;  ///< times the mean opacity (and train/foreground_fraction.hpp)

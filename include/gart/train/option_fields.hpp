@@ -114,7 +114,7 @@ inline constexpr option_field option_fields[] = {
     {GART_FIELD(lens.rate_final), 0, 1e6, "Rules", "the same at the end"},
     {GART_FIELD(error.from), 0, 1e9, "Rules", "first step of growth by error"},
     {GART_FIELD(error.every), 0, 1e9, "Rules", "steps between its densifications"},
-    {GART_FIELD(error.fill), 0, 1, "Rules", "share of the run at which growth ends"},
+    {GART_FIELD(error.growth_end), 0, 1, "Rules", "share of the run at which growth ends"},
     {GART_FIELD(error.until), 0, 1, "Rules", "share of the run after which the dead stay"},
     {GART_FIELD(error.dead_opacity), 0, 0.99, "Rules", "opacity below which a Gaussian is dead"},
     {GART_FIELD(error.opacity_penalty), 0, 1e6, "Rules", "weight of the mean opacity in the loss"},

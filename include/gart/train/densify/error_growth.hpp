@@ -11,10 +11,10 @@
 /// A densification draws Gaussians without replacement, in proportion to their share times their opacity (Efraimidis
 /// and Spirakis 2006: the least of -ln(u) / weight, u uniform), and splits each along its long axis
 /// (long_axis_split.hpp). As many are drawn as there are dead Gaussians, whose rows the second halves take, and as the
-/// count is to grow. It grows on a square-root curve, early, to the budget at the share `fill` of the run, and at most
-/// doubles at a time. The budget follows the capture's pixels where they are few (growth_budget): a Gaussian that
+/// count is to grow. It grows on a square-root curve, early, to the budget at the share `growth_end` of the run, and at
+/// most doubles at a time. The budget follows the capture's pixels where they are few (growth_budget): a Gaussian that
 /// covers a pixel or two of each photograph learns its noise, and what is wrong with its pose. First halves keep Adam's
-/// moments, second ones start with none. After `fill` only the dead are replaced, after `until` nothing moves.
+/// moments, second ones start with none. After `growth_end` only the dead are replaced, after `until` nothing moves.
 ///
 /// A small penalty on the mean opacity, paid by all Gaussians, takes those that no view needs; they fade until they are
 /// dead. A Gaussian whose opacity or geometry is not finite counts as dead. Where no error is attributed, or none is
@@ -182,7 +182,7 @@ class error_growth final : public densifier<E> {
 
   /// The count that a run is to have after a step.
   index_t budget_at(int step) const {
-    double const filled = static_cast<double>(options_.fill) * this->iterations_ - options_.from;
+    double const filled = static_cast<double>(options_.growth_end) * this->iterations_ - options_.from;
     double const share = filled > 0 ? std::clamp((step - options_.from) / filled, 0.0, 1.0) : 1.0;
     return static_cast<index_t>(std::sqrt(share) * max_gaussians_);
   }
