@@ -40,6 +40,8 @@ namespace {
 // Names that runs of before have in their config.json.
 constexpr std::pair<std::string_view, std::string_view> renamed[] = {
     // old, new
+    {"error.least_budget", "error.min_gaussians"},
+    {"error.pixels_each", "error.pixels_per_gaussian"},
     {"error.fill", "error.growth_end"},
     {"rates.settle_late", "rates.decay_start_short"},
     {"rates.settled", "rates.final_scale"},

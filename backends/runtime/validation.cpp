@@ -65,7 +65,7 @@ train_options of_trial(train_options options, validation_plan const& plan) {
   options.iterations = plan.steps, options.batch = 1;
   options.refine_poses = options.refine_lens = false, options.depth_weight = 0;
   options.max_gaussians = std::max<index_t>(options.max_gaussians / static_cast<index_t>(area), 1);
-  options.error.least_budget = options.error.least_budget / area;
+  options.error.min_gaussians = options.error.min_gaussians / area;
   options.random_points = std::min(options.random_points, options.max_gaussians);
   sooner(options.adc.opacity_reset_every);
   float& rest = options.rates.sh_rest;

@@ -255,10 +255,10 @@ TEST_CASE("growth ends where the capture has too few pixels for more") {
   CHECK(budget(1'000'000, 108'732'000) == 1'000'000);  // 255 of 800 x 533
   CHECK(budget(1'000'000, 912'384) == 100'000);        // no capture is too small for so many
   CHECK(budget(20'000, 912'384) == 20'000);
-  options.least_budget = 0;
+  options.min_gaussians = 0;
   CHECK(budget(1'000'000, 912'384) == 9'123);
   CHECK(budget(1'000'000, 0) == 0);
-  options.pixels_each = 0;
+  options.pixels_per_gaussian = 0;
   CHECK(budget(1'000'000, 912'384) == 1'000'000);
 }
 
@@ -269,8 +269,8 @@ TEST_CASE("halves are nearer where the capture has pixels for all of the Gaussia
   CHECK(share(228'097, 22'809'600) == 0.4f);
   CHECK(share(228'096, 22'809'600) == 0.35f);
   CHECK(share(1'000'000, 108'732'000) == 0.35f);
-  options.pixels_each = 0;
+  options.pixels_per_gaussian = 0;
   CHECK(share(1'000'000, 22'809'600) == 0.35f);
-  options.pixels_each = 100, options.split.share = 0.25f;
+  options.pixels_per_gaussian = 100, options.split.share = 0.25f;
   CHECK(share(1'000'000, 22'809'600) == 0.25f);
 }

@@ -68,8 +68,8 @@ struct error_growth_options {
   split_shape split;               ///< how one becomes two
   /// The count ends at one Gaussian for so many pixels of the training views: more would learn them by heart. 0: at
   /// max_gaussians, whatever the capture.
-  float pixels_each = 100;
-  int least_budget = 100'000;  ///< that pixels_each leaves to the smallest capture
+  float pixels_per_gaussian = 100;
+  int min_gaussians = 100'000;  ///< that pixels_per_gaussian leaves to the smallest capture
 };
 
 /// Of adaptive density control (optim/adc.hpp).

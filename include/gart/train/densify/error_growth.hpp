@@ -111,11 +111,12 @@ struct error_split_kernel {
 
 }  // namespace detail
 
-/// The count that growth ends at, in a capture of so many training pixels: `most`, or what options.pixels_each leaves.
+/// The count that growth ends at, in a capture of so many training pixels: `most`, or what options.pixels_per_gaussian
+/// leaves.
 inline index_t growth_budget(error_growth_options const& options, index_t most, u64 pixels) {
-  if (!(options.pixels_each > 0)) return most;
-  double const fit = static_cast<double>(pixels) / static_cast<double>(options.pixels_each);
-  double const limit = most, least = std::min(limit, static_cast<double>(std::max(options.least_budget, 0)));
+  if (!(options.pixels_per_gaussian > 0)) return most;
+  double const fit = static_cast<double>(pixels) / static_cast<double>(options.pixels_per_gaussian);
+  double const limit = most, least = std::min(limit, static_cast<double>(std::max(options.min_gaussians, 0)));
   return static_cast<index_t>(std::clamp(fit, least, limit));
 }
 
