@@ -40,6 +40,7 @@ namespace {
 // Names that runs of before have in their config.json.
 constexpr std::pair<std::string_view, std::string_view> renamed[] = {
     // old, new
+    {"error.split.share", "error.split.offset"},
     {"error.least_budget", "error.min_gaussians"},
     {"error.pixels_each", "error.pixels_per_gaussian"},
     {"error.fill", "error.growth_end"},

@@ -16,7 +16,7 @@ namespace {
 
 error_growth_options usual() {
   error_growth_options options;
-  options.split.share = 0.4f;
+  options.split.offset = 0.4f;
   return options;
 }
 
@@ -81,7 +81,7 @@ TEST_CASE("halves end where the whole ended, and are as thick in their middles a
       if (k != longest)
         CHECK(std::exp(double{half.log_scale[k]} - log_scale[k]) ==
               doctest::Approx(std::sqrt(1 - q3 * q3)).epsilon(1e-4));
-    CHECK(q3 == doctest::Approx(double{shape.share}).epsilon(1e-4));
+    CHECK(q3 == doctest::Approx(double{shape.offset}).epsilon(1e-4));
     CHECK(half.opacity == doctest::Approx(0.5 * double{shape.opacity}));
   }
 }
@@ -242,7 +242,7 @@ TEST_CASE_TEMPLATE("a split that leaves no halves is refused by field", E, GART_
   };
   made(0.5f, 1.0f);
   for (float const bad : {0.0f, 1.0f, -0.5f, NAN}) {
-    CHECK_THROWS_WITH_AS(made(bad, 0.5f), doctest::Contains("split_shape.share"), gart::invalid_argument);
+    CHECK_THROWS_WITH_AS(made(bad, 0.5f), doctest::Contains("split_shape.offset"), gart::invalid_argument);
     if (bad != 1.0f)
       CHECK_THROWS_WITH_AS(made(0.5f, bad), doctest::Contains("split_shape.opacity"), gart::invalid_argument);
   }
@@ -264,13 +264,13 @@ TEST_CASE("growth ends where the capture has too few pixels for more") {
 
 TEST_CASE("halves are nearer where the capture has pixels for all of the Gaussians, or as the options say") {
   gart::error_growth_options options;
-  auto const share = [&](gart::index_t most, gart::u64 pixels) { return gart::split_share(options, most, pixels); };
+  auto const share = [&](gart::index_t most, gart::u64 pixels) { return gart::split_offset(options, most, pixels); };
   CHECK(share(1'000'000, 22'809'600) == 0.4f);
   CHECK(share(228'097, 22'809'600) == 0.4f);
   CHECK(share(228'096, 22'809'600) == 0.35f);
   CHECK(share(1'000'000, 108'732'000) == 0.35f);
   options.pixels_per_gaussian = 0;
   CHECK(share(1'000'000, 22'809'600) == 0.35f);
-  options.pixels_per_gaussian = 100, options.split.share = 0.25f;
+  options.pixels_per_gaussian = 100, options.split.offset = 0.25f;
   CHECK(share(1'000'000, 22'809'600) == 0.25f);
 }

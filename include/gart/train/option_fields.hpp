@@ -118,7 +118,7 @@ inline constexpr option_field option_fields[] = {
     {GART_FIELD(error.until), 0, 1, "Rules", "share of the run after which the dead stay"},
     {GART_FIELD(error.dead_opacity), 0, 0.99, "Rules", "opacity below which a Gaussian is dead"},
     {GART_FIELD(error.opacity_penalty), 0, 1e6, "Rules", "weight of the mean opacity in the loss"},
-    {GART_FIELD(error.split.share), 0, 0.999, "Rules", "distance of split Gaussians; 0: by the capture's pixels"},
+    {GART_FIELD(error.split.offset), 0, 0.999, "Rules", "distance of split Gaussians; 0: by the capture's pixels"},
     {GART_FIELD(error.split.opacity), 1e-6, 1, "Rules", "what a split multiplies opacity by"},
     {GART_FIELD(error.pixels_per_gaussian), 0, 1e9, "Rules", "training pixels to a Gaussian at least; 0: any"},
     {GART_FIELD(error.min_gaussians), 0, 2147483647.0, "Rules", "Gaussians that the smallest capture may have"},

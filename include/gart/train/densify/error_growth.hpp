@@ -120,11 +120,11 @@ inline index_t growth_budget(error_growth_options const& options, index_t most, 
   return static_cast<index_t>(std::clamp(fit, least, limit));
 }
 
-/// The q that halves are made by, in a capture of so many training pixels: options.split.share, or what suits it.
+/// The q that halves are made by, in a capture of so many training pixels: options.split.offset, or what suits it.
 /// Nearer halves overlap, and fit better what they share; where pixels end growth the overlap of large Gaussians takes
 /// more memory than it is worth.
-inline float split_share(error_growth_options const& options, index_t most, u64 pixels) {
-  if (options.split.share != 0) return options.split.share;
+inline float split_offset(error_growth_options const& options, index_t most, u64 pixels) {
+  if (options.split.offset != 0) return options.split.offset;
   return growth_budget(options, most, pixels) < most ? 0.4f : 0.35f;
 }
 
@@ -135,7 +135,7 @@ class error_growth final : public densifier<E> {
   /// The error seen through each Gaussian since the last densification, [N]: what a checkpoint must hold.
   buffer<float, E> error_sum;
 
-  /// For a run of so many steps, up to so many Gaussians (growth_budget), with the split's share given (split_share).
+  /// For a run of so many steps, up to so many Gaussians (growth_budget), with the split's share given (split_offset).
   /// Errors: invalid_argument for a split that leaves no halves.
   error_growth(E& exec, error_growth_options const& options, index_t max_gaussians, int iterations, u64 seed)
       : densifier<E>({options.from, options.every, options.until}, iterations),
@@ -152,8 +152,8 @@ class error_growth final : public densifier<E> {
         place_(exec),
         totals_(exec, 2) {
     split_shape const& split = options.split;
-    if (!(split.share > 0 && split.share < 1))
-      throw invalid_argument("split_shape.share is " + std::to_string(split.share) + ": more than 0, less than 1");
+    if (!(split.offset > 0 && split.offset < 1))
+      throw invalid_argument("split_shape.offset is " + std::to_string(split.offset) + ": more than 0, less than 1");
     if (!(split.opacity > 0 && split.opacity <= 1))
       throw invalid_argument("split_shape.opacity is " + std::to_string(split.opacity) + ": more than 0, at most 1");
   }
@@ -247,7 +247,7 @@ class error_growth final : public densifier<E> {
     if (e.opacity_penalty > 0)
       e.opacity_penalty *= penalty_scale(
           foreground_fraction(data, views_trained_on(data.train.size(), options.held_out), options.background));
-    e.split.share = split_share(e, options.max_gaussians, data.training_pixels());
+    e.split.offset = split_offset(e, options.max_gaussians, data.training_pixels());
     e.dead_opacity = least_opacity(e.dead_opacity, options.render.alpha_min);
     return e;
   }
