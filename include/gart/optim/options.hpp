@@ -52,7 +52,7 @@ struct mcmc_options {
 
 /// How one Gaussian becomes two along its longest axis (optim/long_axis_split.hpp).
 struct split_shape {
-  /// q, in (0, 1): the halves' centres lie at +-q 3 s, and they are 1 - q times as long. 0: by the capture's pixels
+  /// q, in (0, 1): the children' centres lie at +-q 3 s, and they are 1 - q times as long. 0: by the capture's pixels
   /// (split_offset).
   float offset = 0;
   float opacity = 0.6f;  ///< what opacity is multiplied by

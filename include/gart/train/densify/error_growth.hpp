@@ -10,11 +10,12 @@
 ///
 /// A densification draws Gaussians without replacement, in proportion to their share times their opacity (Efraimidis
 /// and Spirakis 2006: the least of -ln(u) / weight, u uniform), and splits each along its long axis
-/// (long_axis_split.hpp). As many are drawn as there are dead Gaussians, whose rows the second halves take, and as the
-/// count is to grow. It grows on a square-root curve, early, to the budget at the share `growth_end` of the run, and at
-/// most doubles at a time. The budget follows the capture's pixels where they are few (growth_budget): a Gaussian that
-/// covers a pixel or two of each photograph learns its noise, and what is wrong with its pose. First halves keep Adam's
-/// moments, second ones start with none. After `growth_end` only the dead are replaced, after `until` nothing moves.
+/// (long_axis_split.hpp). As many are drawn as there are dead Gaussians, whose rows the second children take, and as
+/// the count is to grow. It grows on a square-root curve, early, to the budget at the share `growth_end` of the run,
+/// and at most doubles at a time. The budget follows the capture's pixels where they are few (growth_budget): a
+/// Gaussian that covers a pixel or two of each photograph learns its noise, and what is wrong with its pose. First
+/// children keep Adam's moments, second ones start with none. After `growth_end` only the dead are replaced, after
+/// `until` nothing moves.
 ///
 /// A small penalty on the mean opacity, paid by all Gaussians, takes those that no view needs; they fade until they are
 /// dead. A Gaussian whose opacity or geometry is not finite counts as dead. Where no error is attributed, or none is
@@ -85,13 +86,13 @@ struct error_target_kernel {
   }
 };
 
-// Row k becomes a half of what it is.
+// Row k becomes a child of what it is.
 struct error_split_kernel {
   gaussians_view<float> model;
   u32 const* rows;
   row_owners owners;
   split_shape shape;
-  bool second;  // of the halves
+  bool second;  // of the children
   float least_opacity;
   GART_KERNEL void operator()(index_t k) const {
     if (!owners.owns(rows[k])) return;
@@ -100,11 +101,11 @@ struct error_split_kernel {
     float* const m = model.mean + 3 * row;
     float* const s = model.log_scale + 3 * row;
     vec3 const mean(m[0], m[1], m[2]);
-    split_half const half =
+    split_child const child =
         split_long_axis(shape, vec3(s[0], s[1], s[2]), {q[0], q[1], q[2], q[3]}, sigmoid(model.opacity[row]));
-    float const opacity = half.opacity > least_opacity ? half.opacity : least_opacity;
-    vec3 const center = second ? mean - half.offset : mean + half.offset;
-    for (int c = 0; c < 3; ++c) m[c] = center[c], s[c] = half.log_scale[c];
+    float const opacity = child.opacity > least_opacity ? child.opacity : least_opacity;
+    vec3 const center = second ? mean - child.offset : mean + child.offset;
+    for (int c = 0; c < 3; ++c) m[c] = center[c], s[c] = child.log_scale[c];
     model.opacity[row] = logit(opacity);
   }
 };
@@ -120,9 +121,9 @@ inline index_t growth_budget(error_growth_options const& options, index_t most, 
   return static_cast<index_t>(std::clamp(fit, least, limit));
 }
 
-/// The q that halves are made by, in a capture of so many training pixels: options.split.offset, or what suits it.
-/// Nearer halves overlap, and fit better what they share; where pixels end growth the overlap of large Gaussians takes
-/// more memory than it is worth.
+/// The q that children are made by, in a capture of so many training pixels: options.split.offset, or what suits it.
+/// Nearer children overlap, and fit better what they share; where pixels end growth the overlap of large Gaussians
+/// takes more memory than it is worth.
 inline float split_offset(error_growth_options const& options, index_t most, u64 pixels) {
   if (options.split.offset != 0) return options.split.offset;
   return growth_budget(options, most, pixels) < most ? 0.4f : 0.35f;
@@ -136,7 +137,7 @@ class error_growth final : public densifier<E> {
   buffer<float, E> error_sum;
 
   /// For a run of so many steps, up to so many Gaussians (growth_budget), with the split's share given (split_offset).
-  /// Errors: invalid_argument for a split that leaves no halves.
+  /// Errors: invalid_argument for a split that leaves no children.
   error_growth(E& exec, error_growth_options const& options, index_t max_gaussians, int iterations, u64 seed)
       : densifier<E>({options.from, options.every, options.until}, iterations),
         error_sum(exec),
