@@ -96,9 +96,9 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   if (options.densify != gart::densify_kind::none) say("budget", with_commas(budget.value), budget.why);
   auto const [sizes, why_sizes] = sizes_in_words(data, options);
   say("images", sizes, why_sizes);
-  if (options.densify == gart::densify_kind::error && !sets_field(a.set, "error.split.share")) {
-    float const share = gart::split_share(options.error, options.max_gaussians, traits.pixels);
-    say("--set error.split.share", short_number(share),
+  if (options.densify == gart::densify_kind::error && !sets_field(a.set, "error.split.offset")) {
+    float const share = gart::split_offset(options.error, options.max_gaussians, traits.pixels);
+    say("--set error.split.offset", short_number(share),
         budget.value < options.max_gaussians ? "their pixels end growth, and nearer halves take more memory"
                                              : "near halves fit what they share");
   }

@@ -9,7 +9,6 @@
 #include <gart/io/crc32c.hpp>
 #include <gart/io/file.hpp>
 #include <gart/runtime/choose.hpp>
-#include <gart/runtime/presets.hpp>
 #include <gart/train/option_fields.hpp>
 
 #include <cstdio>
@@ -84,7 +83,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "views that show a\nsmall part of a large scene"))
       ->check(one_of({"all", "seen"}));
   in_group(r.add(train, "--set", a.set, "NAME=VALUE,...",
-                 "Rules by name, for measuring them: error.fill=0.25,\nrates.opacity=0.05 and so on "
+                 "Rules by name, for measuring them: error.growth_end=0.25,\nrates.opacity=0.05 and so on "
                  "(docs/training.md); a name that\nthere is not lists those there are"));
   in_group(r.add(train, "--start", a.start, "MODEL.ply", "Start from these Gaussians instead"));
 
@@ -175,9 +174,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
 
   group = "Accuracy";
   in_group(r.add(train, "--preset", a.preset, "NAME",
-                 "exact, or quick: " + std::to_string(gart::preset_named("quick").iterations) +
-                     " steps, where --iterations is not given"))
-      ->check(one_of(gart::preset_names()));
+                 "exact, or quick: " + std::to_string(quick_iterations) + " steps, where --iterations is not given"))
+      ->check(one_of({"exact", "quick"}));
 
   in_group(r.add(train, "--lt-format", a.lt_format, "NAME",
                  "What the forward pass leaves of a hit for primitive: float4,\nor half (half the memory, less exact "
@@ -214,11 +212,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
 }
 
 void fill_in(CLI::App const& train, train_arguments& a) {
-  gart::preset const& chosen = gart::preset_named(a.preset);
-  auto const set = [&](char const* option, auto& value, auto const& otherwise) {
-    if (train.get_option(option)->count() == 0) value = otherwise;
-  };
-  if (chosen.iterations) set("--iterations", a.options.iterations, chosen.iterations);
+  if (a.preset == "quick" && train.get_option("--iterations")->count() == 0) a.options.iterations = quick_iterations;
 }
 
 void continue_run(train_arguments& a) {
@@ -235,6 +229,7 @@ void continue_run(train_arguments& a) {
   nlohmann::json options = config["options"];
   // Earlier runs call it t-min.
   if (options.contains("t-min")) options.emplace("transmittance-min", options["t-min"]);
+  if (options.contains("set") && options["set"].is_string()) options["set"] = with_new_names(options["set"]);
   a.raised = a.recorded.continue_from(options, a.config_file(), {"iterations", "time-budget"});
   if (a.dataset.empty()) {
     if (!config.contains("dataset") || !config["dataset"].is_string()) {

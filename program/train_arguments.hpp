@@ -16,6 +16,8 @@
 
 namespace gart_cli {
 
+inline constexpr int quick_iterations = 13000;  // of --preset quick
+
 struct train_arguments {
   std::filesystem::path dataset, out;
   bool resume = false, quiet = false;

@@ -35,6 +35,36 @@ std::string flag_of(gart::option_field const& field) {
   return "";
 }
 
+namespace {
+
+// Names that runs of before have in their config.json.
+constexpr std::pair<std::string_view, std::string_view> renamed[] = {
+    // old, new
+    {"error.split.share", "error.split.offset"},
+    {"error.least_budget", "error.min_gaussians"},
+    {"error.pixels_each", "error.pixels_per_gaussian"},
+    {"error.fill", "error.growth_end"},
+    {"rates.settle_late", "rates.decay_start_short"},
+    {"rates.settled", "rates.final_scale"},
+    {"", ""}};
+
+}  // namespace
+
+std::string with_new_names(std::string const& settings) {
+  std::string text;
+  std::istringstream list(settings);
+  for (std::string one; std::getline(list, one, ',');) {
+    std::size_t const end = one.find('=');
+    for (auto const& [old, now] : renamed)
+      if (end != one.npos && one.substr(0, end) == old) {
+        one.replace(0, end, now);
+        break;
+      }
+    text += (text.empty() ? "" : ",") + one;
+  }
+  return text;
+}
+
 void set_fields(gart::train_options& o, std::string const& settings) {
   std::istringstream list(settings);
   for (std::string one; std::getline(list, one, ',');) {

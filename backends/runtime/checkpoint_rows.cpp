@@ -1,18 +1,35 @@
 // One rank's rows of a checkpoint.
-#include "checkpoint_arrays.hpp"
-
 #include <gart/core/error.hpp>
 #include <gart/io/crc32c.hpp>
 #include <gart/train/checkpoint_rows.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <limits>
+#include <set>
 
 namespace gart {
 
-using namespace io::checkpoint;
-
 namespace {
+
+constexpr char magic[] = "gart checkpoint 2\n", plain_magic[] = "gart checkpoint 1\n";
+constexpr std::size_t magic_size = sizeof magic - 1;
+constexpr u64 longest_name = 256;
+
+// f(name, values, elements of a Gaussian; 0: of the run) for each array of a state.
+template <class F>
+void for_each_state_array(training_state const& state, F const& f) {
+  auto const model = [&](std::string const& prefix, gaussian_model const& m) {
+    for_each_array(
+        [&](parameter_array const& a, auto const& values) { f(prefix + a.name, values, a.width(m.sh_degree)); }, m);
+  };
+  model("", state.scene), model("first/", state.first), model("second/", state.second);
+  f("step", std::vector<int>{state.step}, 0);
+  f("sh_degree", std::vector<int>{state.scene.sh_degree}, 0);
+  f("seed", std::vector<u64>{state.seed}, 0);
+  for (auto const& [name, values] : state.parts.bytes) f(name, values, of_gaussians(name) ? sizeof(u32) : 0);
+}
 
 template <class T>
 void append(std::string& out, T value) {
@@ -28,6 +45,8 @@ std::string head_of(std::string const& name, u32 version, u64 bytes) {
 }
 
 constexpr u64 checksum_bytes = sizeof(u32);
+
+u32 checksum_of(std::string const& bytes) { return crc32c(bytes.data(), bytes.size()); }
 
 }  // namespace
 
@@ -103,7 +122,7 @@ void checkpoint_rows::write(shared_file& file, std::vector<u32> const& checksums
   }
   if (!first) return;
   std::string last = head_of("end", 1, 0);
-  append<u32>(last, crc32c(last.data(), last.size()));
+  append<u32>(last, checksum_of(last));
   file.write(end, last.data(), last.size());
 }
 
@@ -132,6 +151,8 @@ checkpoint_rows_reader::checkpoint_rows_reader(std::filesystem::path const& path
     at += a.bytes;
     if (checked_) take(&a.checksum, sizeof a.checksum);
     if (name == "end") {
+      if (checked_ && a.checksum != checksum_of(head_of(name, a.version, a.bytes)))
+        fail("is damaged: the checksum of its end is another");
       if (checked_ && at != size_) fail("is damaged: there is more after its end");
       break;
     }
@@ -207,7 +228,38 @@ std::vector<T> checkpoint_rows_reader::get(std::string const& name, u32 newest_v
   return values;
 }
 
-training_state checkpoint_rows_reader::state() const { return state_of(*this); }
+training_state checkpoint_rows_reader::state() const {
+  training_state s;
+  std::vector<int> const degree = get<int>("sh_degree"), step = get<int>("step");
+  std::vector<u64> const seed = get<u64>("seed");
+  if (degree.size() != 1 || step.size() != 1 || seed.size() != 1) fail("a counter is not one number");
+  if (degree[0] < 0 || degree[0] > 3) fail("is damaged: it is of SH degree " + std::to_string(degree[0]));
+  if (step[0] < 0 || step[0] == std::numeric_limits<int>::max())
+    fail("is damaged: it was saved after step " + std::to_string(step[0]));
+  auto const model = [&](std::string const& prefix) {
+    gaussian_model m;
+    m.sh_degree = degree[0];
+    for_each_array([&](parameter_array const& a, auto& values) { values = get<float>(prefix + a.name); }, m);
+    if (!m.arrays_agree()) fail("its arrays " + prefix + "* differ in length");
+    return m;
+  };
+  s.scene = model(""), s.first = model("first/"), s.second = model("second/");
+  if (s.first.size() != s.scene.size() || s.second.size() != s.scene.size())
+    fail("its moments differ in number from its Gaussians");
+  s.step = step[0], s.seed = seed[0];
+  std::set<std::string> own;
+  for_each_state_array(s, [&](std::string const& name, auto const&, std::size_t) { own.insert(name); });
+  for (std::string const& name : names()) {
+    if (own.count(name)) continue;
+    std::vector<char> const& values = s.parts.bytes[name] = get<char>(name);
+    if (of_gaussians(name) && !values.empty() && values.size() != sizeof(u32) * s.scene.size())
+      fail("its array " + name + " is not of its " + std::to_string(s.scene.size()) + " Gaussians");
+  }
+  std::vector<float> const growth = s.parts.get<float>("growth");
+  if (growth.size() > 1 || (growth.size() == 1 && !(growth[0] > 0 && std::isfinite(growth[0]))))
+    fail("is damaged: its growth is no factor");
+  return s;
+}
 
 void checkpoint_rows_reader::require(std::vector<u32> const& checksums) const {
   for (std::size_t i = 0; i < checksums.size(); ++i)

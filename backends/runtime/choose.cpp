@@ -148,7 +148,7 @@ chosen<index_t> choose_budget(dataset const& data, train_options const& options)
   if (budget == most) return {most, "as many as there may be; the photographs have pixels for them"};
   char text[128];
   std::snprintf(text, sizeof text, "one for %g training pixels, and at least %d: more would overfit them",
-                static_cast<double>(options.error.pixels_each), options.error.least_budget);
+                static_cast<double>(options.error.pixels_per_gaussian), options.error.min_gaussians);
   return {budget, text};
 }
 

@@ -111,7 +111,7 @@ train_options of_trial(train_options options, validation_plan const& plan) {
   options.iterations = plan.steps, options.batch = 1;
   options.refine_poses = options.refine_lens = false, options.depth_weight = 0;
   options.max_gaussians = std::max<index_t>(options.max_gaussians / static_cast<index_t>(area), 1);
-  options.error.least_budget = options.error.least_budget / area;
+  options.error.min_gaussians = options.error.min_gaussians / area;
   options.random_points = std::min(options.random_points, options.max_gaussians);
   sooner(options.adc.opacity_reset_every);
   float& rest = options.rates.sh_rest;
@@ -131,11 +131,11 @@ std::vector<candidate> usual_candidates(capture_traits const& traits, train_opti
   if (!traits.panoramas) all.push_back({"vignetting", "on", [](train_options& o) { o.vignetting = true; }});
   all.push_back({"rates.sh_rest", "0.0025", [](train_options& o) { o.rates.sh_rest = 0.0025f; }});
   error_growth_options more = options.error;
-  more.pixels_each = 100;
+  more.pixels_per_gaussian = 100;
   index_t const most = options.max_gaussians;
   if (options.densify == densify_kind::error &&
       growth_budget(more, most, traits.pixels) > growth_budget(options.error, most, traits.pixels))
-    all.push_back({"error.pixels_each", "100", [](train_options& o) { o.error.pixels_each = 100; }});
+    all.push_back({"error.pixels_per_gaussian", "100", [](train_options& o) { o.error.pixels_per_gaussian = 100; }});
   return all;
 }
 

@@ -28,7 +28,6 @@
 #include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/initial.hpp>
 #include <gart/runtime/model_file.hpp>
-#include <gart/runtime/presets.hpp>
 #include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
 #include <gart/runtime/track.hpp>

@@ -4,7 +4,7 @@
 
 #include <support/policies.hpp>
 
-#include <gart/runtime/presets.hpp>
+#include <train_arguments.hpp>
 
 #include <random>
 
@@ -176,7 +176,7 @@ TEST_CASE("a preset sets what the command line does not, and the run says so") {
   write_capture(here / "capture");
   std::string const tiny = " --backend serial --max-gaussians 60 --sh-degree 1 --quiet --no-auto --stop-at 1";
   REQUIRE(here.gart("train capture --out half --preset quick" + tiny).code == 130);
-  CHECK(here.json("half/config.json")["options"]["iterations"] == gart::preset_named("quick").iterations);
+  CHECK(here.json("half/config.json")["options"]["iterations"] == gart_cli::quick_iterations);
   auto const other = here.gart("train --resume --out half --preset exact");
   CHECK(other.code == 2);
   CHECK_MESSAGE(has(other.err, "--preset \"exact\": the run to be resumed has \"quick\""), other.err);

@@ -28,7 +28,7 @@ TEST_CASE("train has every option that is promised, with its default") {
   folder const here;
   auto const help = here.gart("train --help-all").out;
   for (char const* option : {"--out DIR (required)",
-                             "error.split.share=0",
+                             "error.split.offset=0",
                              "--backend",
                              "--tracer",
                              "--backward",

@@ -134,7 +134,7 @@ TEST_CASE_TEMPLATE("keep, clone, split and prune", E, GART_TEST_POLICIES) {
   CHECK(t.density.gradient_sum.to_host() == std::vector<float>(8, 0.0f));
 }
 
-TEST_CASE_TEMPLATE("halves of a split are draws from the Gaussian", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("children of a split are draws from the Gaussian", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   index_t const n = 20000;
@@ -164,7 +164,7 @@ TEST_CASE_TEMPLATE("halves of a split are draws from the Gaussian", E, GART_TEST
 TEST_CASE_TEMPLATE("oversized ones go after the first reset of opacities", E, GART_TEST_POLICIES) {
   std::mt19937_64 random(1);
   gaussian_model m = plain(3, random);
-  m.log_scale[0] = std::log(0.2f), m.log_scale[3] = std::log(0.15f);  // 0 grows: its halves are 0.125; 1: kept size
+  m.log_scale[0] = std::log(0.2f), m.log_scale[3] = std::log(0.15f);  // 0 grows: its children are 0.125; 1: kept size
   training<E> early(m), late(m);
   early.statistic({1, 0, 0}), late.statistic({1, 0, 0});
   early.density.densify(early, {3000});

@@ -16,7 +16,7 @@ namespace {
 
 error_growth_options usual() {
   error_growth_options options;
-  options.split.share = 0.4f;
+  options.split.offset = 0.4f;
   return options;
 }
 
@@ -30,7 +30,7 @@ struct training : gart_test::with_moments<E> {
   }
 };
 
-// Each row's second colour coefficient is its number: halves carry their source's.
+// Each row's second colour coefficient is its number: children carry their source's.
 gaussian_model tagged(index_t n, std::mt19937_64& random) {
   gaussian_model m = gart_test::random_model(n, 1, random);
   for (index_t i = 0; i < n; ++i) m.sh[std::size_t{12} * i + 1] = static_cast<float>(i);
@@ -40,7 +40,7 @@ index_t tag_of(gaussian_model const& m, index_t i) { return static_cast<index_t>
 
 }  // namespace
 
-TEST_CASE("halves end where the whole ended, and are as thick in their middles as it was there") {
+TEST_CASE("children end where the whole ended, and are as thick in their middles as it was there") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   std::uniform_real_distribution<float> uniform(-1, 1);
@@ -48,12 +48,12 @@ TEST_CASE("halves end where the whole ended, and are as thick in their middles a
     split_shape const shape{i % 3 == 0 ? 0.4f : i % 3 == 1 ? 0.35f : 0.25f, i % 2 ? 0.5f : 0.6f};
     vec3 const log_scale(3 * uniform(random), 3 * uniform(random), 3 * uniform(random));
     quaternion const q{uniform(random), uniform(random), uniform(random), uniform(random)};
-    split_half const half = split_long_axis(shape, log_scale, q, 0.5f);
+    split_child const child = split_long_axis(shape, log_scale, q, 0.5f);
     double const norm = std::sqrt(double{q.w} * q.w + double{q.x} * q.x + double{q.y} * q.y + double{q.z} * q.z);
     if (norm < 1e-2) continue;
     // The offset in the body's axes, by q^-1 v q.
     double const w = q.w / norm, u[3] = {-q.x / norm, -q.y / norm, -q.z / norm};
-    double const v[3] = {half.offset.x, half.offset.y, half.offset.z};
+    double const v[3] = {child.offset.x, child.offset.y, child.offset.z};
     double const t[3] = {2 * (u[1] * v[2] - u[2] * v[1]), 2 * (u[2] * v[0] - u[0] * v[2]),
                          2 * (u[0] * v[1] - u[1] * v[0])};
     double const body[3] = {v[0] + w * t[0] + u[1] * t[2] - u[2] * t[1], v[1] + w * t[1] + u[2] * t[0] - u[0] * t[2],
@@ -62,31 +62,31 @@ TEST_CASE("halves end where the whole ended, and are as thick in their middles a
     for (int k = 1; k < 3; ++k)
       if (log_scale[k] > log_scale[longest]) longest = k;
     double const reach = 3 * std::exp(double{log_scale[longest]});
-    double worst = 0;  // the largest |p|^2 of the half's surface at 3 standard deviations, in the old one's
+    double worst = 0;  // the largest |p|^2 of the child's surface at 3 standard deviations, in the old one's
     for (int k = 0; k < 3; ++k) {
       if (k != longest) CHECK(std::abs(body[k]) < 1e-5 * reach);
-      CHECK(half.log_scale[k] < log_scale[k]);
+      CHECK(child.log_scale[k] < log_scale[k]);
     }
     for (double a = 0; a <= 3.1416; a += 0.01) {
-      double const along = std::abs(body[longest]) + std::cos(a) * 3 * std::exp(double{half.log_scale[longest]});
+      double const along = std::abs(body[longest]) + std::cos(a) * 3 * std::exp(double{child.log_scale[longest]});
       int const other = (longest + 1) % 3;
-      double const across = std::sin(a) * 3 * std::exp(double{half.log_scale[other]} - log_scale[other]);
+      double const across = std::sin(a) * 3 * std::exp(double{child.log_scale[other]} - log_scale[other]);
       worst = std::max(worst, along * along / (reach * reach) * 9 + across * across);
     }
-    CHECK(std::abs(body[longest]) + 3 * std::exp(double{half.log_scale[longest]}) ==
+    CHECK(std::abs(body[longest]) + 3 * std::exp(double{child.log_scale[longest]}) ==
           doctest::Approx(reach).epsilon(1e-4));
     CHECK(worst < 9 * 1.06 * 1.06 * 1.001);
     double const q3 = std::abs(body[longest]) / reach;
     for (int k = 0; k < 3; ++k)
       if (k != longest)
-        CHECK(std::exp(double{half.log_scale[k]} - log_scale[k]) ==
+        CHECK(std::exp(double{child.log_scale[k]} - log_scale[k]) ==
               doctest::Approx(std::sqrt(1 - q3 * q3)).epsilon(1e-4));
-    CHECK(q3 == doctest::Approx(double{shape.share}).epsilon(1e-4));
-    CHECK(half.opacity == doctest::Approx(0.5 * double{shape.opacity}));
+    CHECK(q3 == doctest::Approx(double{shape.offset}).epsilon(1e-4));
+    CHECK(child.opacity == doctest::Approx(0.5 * double{shape.opacity}));
   }
 }
 
-TEST_CASE_TEMPLATE("the dead give their rows to halves of those that the error is seen through", E,
+TEST_CASE_TEMPLATE("the dead give their rows to children of those that the error is seen through", E,
                    GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
@@ -233,7 +233,7 @@ TEST_CASE_TEMPLATE("the statistic adds up steps, and the penalty is that of the 
   CHECK(got.mean == g.mean);
 }
 
-TEST_CASE_TEMPLATE("a split that leaves no halves is refused by field", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a split that leaves no children is refused by field", E, GART_TEST_POLICIES) {
   E exec;
   auto const made = [&](float share, float opacity) {
     gart::error_growth_options options;
@@ -242,7 +242,7 @@ TEST_CASE_TEMPLATE("a split that leaves no halves is refused by field", E, GART_
   };
   made(0.5f, 1.0f);
   for (float const bad : {0.0f, 1.0f, -0.5f, NAN}) {
-    CHECK_THROWS_WITH_AS(made(bad, 0.5f), doctest::Contains("split_shape.share"), gart::invalid_argument);
+    CHECK_THROWS_WITH_AS(made(bad, 0.5f), doctest::Contains("split_shape.offset"), gart::invalid_argument);
     if (bad != 1.0f)
       CHECK_THROWS_WITH_AS(made(0.5f, bad), doctest::Contains("split_shape.opacity"), gart::invalid_argument);
   }
@@ -255,22 +255,22 @@ TEST_CASE("growth ends where the capture has too few pixels for more") {
   CHECK(budget(1'000'000, 217'464'000) == 1'000'000);  // 510 of 800 x 533
   CHECK(budget(1'000'000, 912'384) == 100'000);        // no capture is too small for so many
   CHECK(budget(20'000, 912'384) == 20'000);
-  options.least_budget = 0;
+  options.min_gaussians = 0;
   CHECK(budget(1'000'000, 912'384) == 4'561);
   CHECK(budget(1'000'000, 0) == 0);
-  options.pixels_each = 0;
+  options.pixels_per_gaussian = 0;
   CHECK(budget(1'000'000, 912'384) == 1'000'000);
 }
 
-TEST_CASE("halves are nearer where the capture has pixels for all of the Gaussians, or as the options say") {
+TEST_CASE("children are nearer where the capture has pixels for all of the Gaussians, or as the options say") {
   gart::error_growth_options options;
-  auto const share = [&](gart::index_t most, gart::u64 pixels) { return gart::split_share(options, most, pixels); };
+  auto const share = [&](gart::index_t most, gart::u64 pixels) { return gart::split_offset(options, most, pixels); };
   CHECK(share(1'000'000, 22'809'600) == 0.4f);
   CHECK(share(114'049, 22'809'600) == 0.4f);
   CHECK(share(114'048, 22'809'600) == 0.35f);
   CHECK(share(1'000'000, 217'464'000) == 0.35f);
-  options.pixels_each = 0;
+  options.pixels_per_gaussian = 0;
   CHECK(share(1'000'000, 22'809'600) == 0.35f);
-  options.pixels_each = 200, options.split.share = 0.25f;
+  options.pixels_per_gaussian = 200, options.split.offset = 0.25f;
   CHECK(share(1'000'000, 22'809'600) == 0.25f);
 }

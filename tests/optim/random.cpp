@@ -82,7 +82,7 @@ TEST_CASE("the rate of the means decays exponentially") {
   CHECK(rates_at(usual, 3.0f, quarter * 9 / 10, quarter).log_scale ==
         doctest::Approx(2 * usual.log_scale * std::sqrt(0.1)).epsilon(1e-2));
   CHECK(rates_at(usual, 3.0f, quarter, quarter).log_scale == doctest::Approx(0.2 * usual.log_scale));
-  usual.settle_late = 0;  // never before settle_from
+  usual.decay_start_short = 0;  // never before decay_start
   CHECK(rates_at(usual, 3.0f, quarter / 2, quarter).sh_dc == usual.sh_dc);
   CHECK(rates_at(usual, 3.0f, 0, quarter).sh_rest == usual.sh_rest);
   CHECK(rates_at(usual, 3.0f, 0, 10).opacity == doctest::Approx(4 * usual.opacity));

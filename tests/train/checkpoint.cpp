@@ -3,7 +3,6 @@
 
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
-#include <gart/runtime/checkpoint.hpp>
 #include <gart/train/state.hpp>
 
 #include <unistd.h>
@@ -134,13 +133,11 @@ TEST_CASE("one flipped bit anywhere in a checkpoint is found, and so is what is 
 }
 
 TEST_CASE("an array of a later version is refused by its name") {
+  std::mt19937_64 random(1);
   scratch_file const file;
-  checkpoint_writer writer;
-  writer.add("old", std::vector<int>{1, 2});
-  writer.add("new", std::vector<int>{3}, 2);
-  writer.write(file.path());
-  checkpoint_reader const reader(file.path());
-  CHECK(reader.get<int>("old") == std::vector<int>{1, 2});
-  CHECK(reader.get<int>("new", 2) == std::vector<int>{3});
-  CHECK_THROWS_WITH_AS(reader.get<int>("new"), doctest::Contains("array new is of version 2"), io_error);
+  write_checkpoint(file.path(), some_state(random));
+  std::string bytes = file.bytes();
+  bytes[bytes.find("seed") + 4] = 2;
+  file.put(bytes);
+  CHECK_THROWS_WITH_AS(read_checkpoint(file.path()), doctest::Contains("array seed is of version 2"), io_error);
 }

@@ -177,12 +177,12 @@ TEST_CASE("what changes nothing of a run is no candidate") {
   };
   CHECK(has("exposure"));
   CHECK(has("vignetting"));
-  CHECK(!has("error.pixels_each"));  // max_gaussians ends growth
+  CHECK(!has("error.pixels_per_gaussian"));  // max_gaussians ends growth
   traits.panoramas = 1, traits.pixels = 100'000'000;
   CHECK(!has("vignetting"));
-  CHECK(has("error.pixels_each"));
+  CHECK(has("error.pixels_per_gaussian"));
   of.densify = gart::densify_kind::mcmc;
-  CHECK(!has("error.pixels_each"));
+  CHECK(!has("error.pixels_per_gaussian"));
   for (auto const& c : gart::usual_candidates({}, {})) c.take(of);
   CHECK(of.exposure);
   CHECK(of.vignetting);

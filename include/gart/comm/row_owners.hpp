@@ -13,9 +13,9 @@ namespace gart {
 
 /// Which rows one rank owns. By default it is the only rank and owns all.
 struct row_owners {
-  static constexpr index_t usual_block = 4096;  ///< rows
-  int ranks = 1, rank = 0;                      ///< in all, and which one this is
-  index_t block = usual_block;                  ///< rows that stay together
+  static constexpr index_t default_block = 4096;  ///< rows
+  int ranks = 1, rank = 0;                        ///< in all, and which one this is
+  index_t block = default_block;                  ///< rows that stay together
 
   /// Who has Gaussian g.
   GART_HD constexpr int owner(u64 g) const { return static_cast<int>(g / block % static_cast<u64>(ranks)); }

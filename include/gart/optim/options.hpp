@@ -17,14 +17,14 @@ struct learning_rates {
   float sh_dc = 2.5e-3f;       ///< of the first band
   float sh_rest = 1.25e-4f;    ///< of the bands above the first: a twentieth, as in 3DGS
   /// All rates but those of the means, exposures and lenses stay as they are for a share of the run, then decay
-  /// exponentially to `settled` of it.
-  float settled = 0.1f;                       ///< share of a rate that is left at the end
-  static constexpr float settle_from = 0.5f;  ///< share of the run before the decay
+  /// exponentially to `final_scale` of it.
+  float final_scale = 0.1f;                   ///< share of a rate that is left at the end
+  static constexpr float decay_start = 0.5f;  ///< share of the run before the decay
   /// The rates are those of a run of at least so many steps. A shorter one has less time to go as far: its rates of
   /// mean, scale and opacity are sqrt(long_run / steps) times as large, at most four times, and it settles the later
-  /// the shorter it is, up to settle_late of the run.
+  /// the shorter it is, up to decay_start_short of the run.
   int long_run = 15000;
-  float settle_late = 0.9f;                            ///< the share
+  float decay_start_short = 0.9f;                      ///< the share
   float exposure = 0.05f;                              ///< a visit of the view; decays like the means'
   static constexpr float exposure_final = 0.005f;      ///< where it ends
   float vignetting = 1e-2f, vignetting_final = 1e-4f;  ///< a visit of the lens; likewise
@@ -52,24 +52,24 @@ struct mcmc_options {
 
 /// How one Gaussian becomes two along its longest axis (optim/long_axis_split.hpp).
 struct split_shape {
-  /// q, in (0, 1): the halves' centres lie at +-q 3 s, and they are 1 - q times as long. 0: by the capture's pixels
-  /// (split_share).
-  float share = 0;
+  /// q, in (0, 1): the children' centres lie at +-q 3 s, and they are 1 - q times as long. 0: by the capture's pixels
+  /// (split_offset).
+  float offset = 0;
   float opacity = 0.6f;  ///< what opacity is multiplied by
 };
 
 /// Of growth by error (optim/error_growth.hpp).
 struct error_growth_options {
   int from = 500, every = 100;     ///< steps: the first, and from one to the next
-  float fill = 0.5f;               ///< share of the run at which the count has reached its budget
+  float growth_end = 0.5f;         ///< share of the run at which the count has reached its budget
   float until = 5.0f / 6;          ///< share of the run after which the dead stay where they are
   float dead_opacity = 0.005f;     ///< as least_opacity has it for the alpha_min traced with
   float opacity_penalty = 0.003f;  ///< times the mean opacity (and train/foreground_fraction.hpp)
   split_shape split;               ///< how one becomes two
   /// The count ends at one Gaussian for so many pixels of the training views: more would overfit them, and take
   /// time and memory. 0: at max_gaussians, whatever the capture.
-  float pixels_each = 200;
-  int least_budget = 100'000;  ///< that pixels_each leaves to the smallest capture
+  float pixels_per_gaussian = 200;
+  int min_gaussians = 100'000;  ///< that pixels_per_gaussian leaves to the smallest capture
 };
 
 /// Of adaptive density control (optim/adc.hpp).

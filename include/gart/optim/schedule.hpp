@@ -26,9 +26,9 @@ inline learning_rates rates_at(learning_rates rates, float extent, int step, int
   rates.mean = exponential_decay(rates.mean, rates.mean_final, step, steps) * extent;
   rates.exposure = exponential_decay(rates.exposure, rates.exposure_final, step, steps);
   rates.vignetting = exponential_decay(rates.vignetting, rates.vignetting_final, step, steps);
-  double const late = std::max(0.0f, rates.settle_late - rates.settle_from) * std::max(0.0, 1 - length);
-  int const from = static_cast<int>((static_cast<double>(rates.settle_from) + late) * steps);
-  float const share = exponential_decay(1.0f, rates.settled, step - from, steps - from);
+  double const late = std::max(0.0f, rates.decay_start_short - rates.decay_start) * std::max(0.0, 1 - length);
+  int const from = static_cast<int>((static_cast<double>(rates.decay_start) + late) * steps);
+  float const share = exponential_decay(1.0f, rates.final_scale, step - from, steps - from);
   for (float* rate : {&rates.log_scale, &rates.quaternion, &rates.opacity, &rates.sh_dc, &rates.sh_rest})
     *rate *= share;
   return rates;

@@ -1,9 +1,16 @@
 #pragma once
 /// \file
-/// One rank's rows of a checkpoint: where they lie in the file, and what they add to its checksums. The ranks agree by
-/// train/checkpoint_part.hpp.
+/// The file of a checkpoint, and one rank's rows of it: where they lie, and what they add to its checksums. The ranks
+/// agree by train/checkpoint_part.hpp; one rank by itself has all rows.
 ///
-/// Errors: as read_checkpoint (train/state.hpp).
+/// The file is "gart checkpoint 2\\n", then named arrays, the last one named "end", and nothing after it. An array is,
+/// little endian:
+///   u64 length of the name, the name, u32 version of what the array holds, u64 bytes, the bytes, u32 checksum
+/// with CRC-32C (io/crc32c.hpp) over all of the array before it, so that one flipped bit is found. Files that begin
+/// with "gart checkpoint 1\\n", whose arrays have neither version nor checksum, are read too.
+///
+/// Errors: io_error naming the file and the array that is missing, truncated, damaged, of another size, or of a version
+/// that is newer than the reader.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/comm/shared_file.hpp>
@@ -61,11 +68,9 @@ class checkpoint_rows_reader {
   /// io_error where these are not the checksums of the file.
   void require(std::vector<u32> const& checksums) const;
 
-  /// What state() asks of it, as of a checkpoint_reader (runtime/checkpoint.hpp).
+  /// An array's values: of rows this rank's.
   template <class T>
   std::vector<T> get(std::string const& name, u32 newest_version = 1) const;
-  /// Whether there is an array of that name.
-  bool has(std::string const& name) const { return arrays_.count(name) != 0; }
   /// All of them, in order.
   std::vector<std::string> names() const;
   /// Throws io_error with the path before `what`.

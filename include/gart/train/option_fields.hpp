@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The numbers and switches of train_options, once: each with its name, its place, its range and what it is. A program's
-/// options, what it records of them, and the checks of a run come from this table.
-/// Errors: require_options throws invalid_argument, naming the field, its value and its range.
+/// The numbers and switches of train_options, once: each with its name, its place, its range and what it is. A
+/// program's options, what it records of them, and the checks of a run come from this table. Errors: require_options
+/// throws invalid_argument, naming the field, its value and its range.
 
 #include <gart/core/error.hpp>
 #include <gart/train/options.hpp>
@@ -95,8 +95,8 @@ inline constexpr option_field option_fields[] = {
     {GART_FIELD(rates.opacity), 0, 1e6, "Rules", "Adam's rate of opacities' logits"},
     {GART_FIELD(rates.sh_dc), 0, 1e6, "Rules", "Adam's rate of colour's first band"},
     {GART_FIELD(rates.sh_rest), 0, 1e6, "Rules", "Adam's rate of the bands above it"},
-    {GART_FIELD(rates.settled), 0, 1, "Rules", "share of the rates that is left at the end"},
-    {GART_FIELD(rates.settle_late), 0, 1, "Rules", "share of the shortest runs before rates fall"},
+    {GART_FIELD(rates.final_scale), 0, 1, "Rules", "share of the rates that is left at the end"},
+    {GART_FIELD(rates.decay_start_short), 0, 1, "Rules", "share of the shortest runs before rates fall"},
     {GART_FIELD(rates.long_run), 1, 1e9, "Rules", "steps of a run whose rates are not raised"},
     {GART_FIELD(rates.exposure), 0, 1e6, "Rules", "Adam's rate of exposures, a visit"},
     {GART_FIELD(rates.vignetting), 0, 1e6, "Rules", "Adam's rate of falloffs, a visit"},
@@ -114,14 +114,14 @@ inline constexpr option_field option_fields[] = {
     {GART_FIELD(lens.rate_final), 0, 1e6, "Rules", "the same at the end"},
     {GART_FIELD(error.from), 0, 1e9, "Rules", "first step of growth by error"},
     {GART_FIELD(error.every), 0, 1e9, "Rules", "steps between its densifications"},
-    {GART_FIELD(error.fill), 0, 1, "Rules", "share of the run at which growth ends"},
+    {GART_FIELD(error.growth_end), 0, 1, "Rules", "share of the run at which growth ends"},
     {GART_FIELD(error.until), 0, 1, "Rules", "share of the run after which the dead stay"},
     {GART_FIELD(error.dead_opacity), 0, 0.99, "Rules", "opacity below which a Gaussian is dead"},
     {GART_FIELD(error.opacity_penalty), 0, 1e6, "Rules", "weight of the mean opacity in the loss"},
-    {GART_FIELD(error.split.share), 0, 0.999, "Rules", "distance of split Gaussians; 0: by the capture's pixels"},
+    {GART_FIELD(error.split.offset), 0, 0.999, "Rules", "distance of split Gaussians; 0: by the capture's pixels"},
     {GART_FIELD(error.split.opacity), 1e-6, 1, "Rules", "what a split multiplies opacity by"},
-    {GART_FIELD(error.pixels_each), 0, 1e9, "Rules", "training pixels to a Gaussian at least; 0: any"},
-    {GART_FIELD(error.least_budget), 0, 2147483647.0, "Rules", "Gaussians that the smallest capture may have"},
+    {GART_FIELD(error.pixels_per_gaussian), 0, 1e9, "Rules", "training pixels to a Gaussian at least; 0: any"},
+    {GART_FIELD(error.min_gaussians), 0, 2147483647.0, "Rules", "Gaussians that the smallest capture may have"},
     {GART_FIELD(mcmc.growth), 0, 10, "Rules", "growth a densification of mcmc"},
     {GART_FIELD(mcmc.noise), 0, 1e12, "Rules", "random steps of mcmc, times the rate of means"},
     {GART_FIELD(mcmc.opacity_penalty), 0, 1e6, "Rules", "weight of the mean opacity in the loss"},

@@ -74,18 +74,18 @@ struct train_options {
   /// Views a step: the mean of their gradients, by rates times sqrt(batch) (optim/adam.hpp). All that is counted in
   /// steps, `iterations` too, then counts images. Needs a trainer with a communicator.
   int batch = 1;
-  index_t shard_block = row_owners::usual_block;  ///< Gaussians in a row that one of several ranks has
-  u64 seed = 1;                                   ///< of all numbers drawn at random
-  float near = 0.002f;                            ///< hits lie at t > near, times the scene's extent
-  resolution_options resolution = {};             ///< of a step's images
-  approximation_options render = {};              ///< what is traded for time
-  learning_rates rates = {};                      ///< of Adam, by group of parameters
-  adam_options adam = {};                         ///< of Adam
-  pose_options poses = {};                        ///< of learned poses
-  lens_options lens = {};                         ///< of learned lenses
-  error_growth_options error = {};                ///< of growth by error
-  mcmc_options mcmc = {};                         ///< of growth by MCMC
-  adc_options adc = {};                           ///< of adaptive density control
+  index_t shard_block = row_owners::default_block;  ///< Gaussians in a row that one of several ranks has
+  u64 seed = 1;                                     ///< of all numbers drawn at random
+  float near = 0.002f;                              ///< hits lie at t > near, times the scene's extent
+  resolution_options resolution = {};               ///< of a step's images
+  approximation_options render = {};                ///< what is traded for time
+  learning_rates rates = {};                        ///< of Adam, by group of parameters
+  adam_options adam = {};                           ///< of Adam
+  pose_options poses = {};                          ///< of learned poses
+  lens_options lens = {};                           ///< of learned lenses
+  error_growth_options error = {};                  ///< of growth by error
+  mcmc_options mcmc = {};                           ///< of growth by MCMC
+  adc_options adc = {};                             ///< of adaptive density control
 };
 
 /// What a scene of that extent is traced with.

@@ -12,8 +12,8 @@
 /// threshold as in 3DGS. A Gaussian whose mean is behind the camera adds nothing in that step.
 ///
 /// Past the budget the largest statistics grow and the rest stay as they are. New Gaussians begin with zero moments.
-/// Gaussians that are not finite are removed. A split moves its halves by draws from itself. What is removed closes the
-/// ranks of those behind it: every number may change, and where rows are spread over ranks they move with their
+/// Gaussians that are not finite are removed. A split moves its children by draws from itself. What is removed closes
+/// the ranks of those behind it: every number may change, and where rows are spread over ranks they move with their
 /// numbers. Cost: one small launch a step; a densification is O(N) with one host read, and holds a second copy of the
 /// parameters while it runs.
 

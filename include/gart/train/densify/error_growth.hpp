@@ -10,11 +10,12 @@
 ///
 /// A densification draws Gaussians without replacement, in proportion to their share times their opacity (Efraimidis
 /// and Spirakis 2006: the least of -ln(u) / weight, u uniform), and splits each along its long axis
-/// (long_axis_split.hpp). As many are drawn as there are dead Gaussians, whose rows the second halves take, and as the
-/// count is to grow. It grows on a square-root curve, early, to the budget at the share `fill` of the run, and at most
-/// doubles at a time. The budget follows the capture's pixels where they are few (growth_budget): a Gaussian that
-/// covers a pixel or two of each photograph learns its noise, and what is wrong with its pose. First halves keep Adam's
-/// moments, second ones start with none. After `fill` only the dead are replaced, after `until` nothing moves.
+/// (long_axis_split.hpp). As many are drawn as there are dead Gaussians, whose rows the second children take, and as
+/// the count is to grow. It grows on a square-root curve, early, to the budget at the share `growth_end` of the run,
+/// and at most doubles at a time. The budget follows the capture's pixels where they are few (growth_budget): a
+/// Gaussian that covers a pixel or two of each photograph learns its noise, and what is wrong with its pose. First
+/// children keep Adam's moments, second ones start with none. After `growth_end` only the dead are replaced, after
+/// `until` nothing moves.
 ///
 /// A small penalty on the mean opacity, paid by all Gaussians, takes those that no view needs; they fade until they are
 /// dead. A Gaussian whose opacity or geometry is not finite counts as dead. Where no error is attributed, or none is
@@ -85,13 +86,13 @@ struct error_target_kernel {
   }
 };
 
-// Row k becomes a half of what it is.
+// Row k becomes a child of what it is.
 struct error_split_kernel {
   gaussians_view<float> model;
   u32 const* rows;
   row_owners owners;
   split_shape shape;
-  bool second;  // of the halves
+  bool second;  // of the children
   float least_opacity;
   GART_KERNEL void operator()(index_t k) const {
     if (!owners.owns(rows[k])) return;
@@ -100,30 +101,31 @@ struct error_split_kernel {
     float* const m = model.mean + 3 * row;
     float* const s = model.log_scale + 3 * row;
     vec3 const mean(m[0], m[1], m[2]);
-    split_half const half =
+    split_child const child =
         split_long_axis(shape, vec3(s[0], s[1], s[2]), {q[0], q[1], q[2], q[3]}, sigmoid(model.opacity[row]));
-    float const opacity = half.opacity > least_opacity ? half.opacity : least_opacity;
-    vec3 const center = second ? mean - half.offset : mean + half.offset;
-    for (int c = 0; c < 3; ++c) m[c] = center[c], s[c] = half.log_scale[c];
+    float const opacity = child.opacity > least_opacity ? child.opacity : least_opacity;
+    vec3 const center = second ? mean - child.offset : mean + child.offset;
+    for (int c = 0; c < 3; ++c) m[c] = center[c], s[c] = child.log_scale[c];
     model.opacity[row] = logit(opacity);
   }
 };
 
 }  // namespace detail
 
-/// The count that growth ends at, in a capture of so many training pixels: `most`, or what options.pixels_each leaves.
+/// The count that growth ends at, in a capture of so many training pixels: `most`, or what options.pixels_per_gaussian
+/// leaves.
 inline index_t growth_budget(error_growth_options const& options, index_t most, u64 pixels) {
-  if (!(options.pixels_each > 0)) return most;
-  double const fit = static_cast<double>(pixels) / static_cast<double>(options.pixels_each);
-  double const limit = most, least = std::min(limit, static_cast<double>(std::max(options.least_budget, 0)));
+  if (!(options.pixels_per_gaussian > 0)) return most;
+  double const fit = static_cast<double>(pixels) / static_cast<double>(options.pixels_per_gaussian);
+  double const limit = most, least = std::min(limit, static_cast<double>(std::max(options.min_gaussians, 0)));
   return static_cast<index_t>(std::clamp(fit, least, limit));
 }
 
-/// The q that halves are made by, in a capture of so many training pixels: options.split.share, or what suits it.
-/// Nearer halves overlap, and fit better what they share; where pixels end growth the overlap of large Gaussians takes
-/// more memory than it is worth.
-inline float split_share(error_growth_options const& options, index_t most, u64 pixels) {
-  if (options.split.share != 0) return options.split.share;
+/// The q that children are made by, in a capture of so many training pixels: options.split.offset, or what suits it.
+/// Nearer children overlap, and fit better what they share; where pixels end growth the overlap of large Gaussians
+/// takes more memory than it is worth.
+inline float split_offset(error_growth_options const& options, index_t most, u64 pixels) {
+  if (options.split.offset != 0) return options.split.offset;
   return growth_budget(options, most, pixels) < most ? 0.4f : 0.35f;
 }
 
@@ -134,8 +136,8 @@ class error_growth final : public densifier<E> {
   /// The error seen through each Gaussian since the last densification, [N]: what a checkpoint must hold.
   buffer<float, E> error_sum;
 
-  /// For a run of so many steps, up to so many Gaussians (growth_budget), with the split's share given (split_share).
-  /// Errors: invalid_argument for a split that leaves no halves.
+  /// For a run of so many steps, up to so many Gaussians (growth_budget), with the split's share given (split_offset).
+  /// Errors: invalid_argument for a split that leaves no children.
   error_growth(E& exec, error_growth_options const& options, index_t max_gaussians, int iterations, u64 seed)
       : densifier<E>({options.from, options.every, options.until}, iterations),
         error_sum(exec),
@@ -151,8 +153,8 @@ class error_growth final : public densifier<E> {
         place_(exec),
         totals_(exec, 2) {
     split_shape const& split = options.split;
-    if (!(split.share > 0 && split.share < 1))
-      throw invalid_argument("split_shape.share is " + std::to_string(split.share) + ": more than 0, less than 1");
+    if (!(split.offset > 0 && split.offset < 1))
+      throw invalid_argument("split_shape.offset is " + std::to_string(split.offset) + ": more than 0, less than 1");
     if (!(split.opacity > 0 && split.opacity <= 1))
       throw invalid_argument("split_shape.opacity is " + std::to_string(split.opacity) + ": more than 0, at most 1");
   }
@@ -182,7 +184,7 @@ class error_growth final : public densifier<E> {
 
   /// The count that a run is to have after a step.
   index_t budget_at(int step) const {
-    double const filled = static_cast<double>(options_.fill) * this->iterations_ - options_.from;
+    double const filled = static_cast<double>(options_.growth_end) * this->iterations_ - options_.from;
     double const share = filled > 0 ? std::clamp((step - options_.from) / filled, 0.0, 1.0) : 1.0;
     return static_cast<index_t>(std::sqrt(share) * max_gaussians_);
   }
@@ -246,7 +248,7 @@ class error_growth final : public densifier<E> {
     if (e.opacity_penalty > 0)
       e.opacity_penalty *= penalty_scale(
           foreground_fraction(data, views_trained_on(data.train.size(), options.held_out), options.background));
-    e.split.share = split_share(e, options.max_gaussians, data.training_pixels());
+    e.split.offset = split_offset(e, options.max_gaussians, data.training_pixels());
     e.dead_opacity = least_opacity(e.dead_opacity, options.render.alpha_min);
     return e;
   }
