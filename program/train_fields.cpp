@@ -40,13 +40,9 @@ namespace {
 // Names that runs of before have in their config.json.
 constexpr std::pair<std::string_view, std::string_view> renamed[] = {
     // old, new
-    {"error.split.share", "error.split.offset"},
-    {"error.least_budget", "error.min_gaussians"},
-    {"error.pixels_each", "error.pixels_per_gaussian"},
-    {"error.fill", "error.growth_end"},
-    {"rates.settle_late", "rates.decay_start_short"},
-    {"rates.settled", "rates.final_scale"},
-    {"", ""}};
+    {"error.split.share", "error.split.offset"},        {"error.least_budget", "error.min_gaussians"},
+    {"error.pixels_each", "error.pixels_per_gaussian"}, {"error.fill", "error.growth_end"},
+    {"rates.settle_late", "rates.decay_start_short"},   {"rates.settled", "rates.final_scale"}};
 
 }  // namespace
 
@@ -74,7 +70,9 @@ void set_fields(gart::train_options& o, std::string const& settings) {
     if (!field) {
       std::vector<std::string> names;
       for (gart::option_field const& f : gart::option_fields) names.emplace_back(f.name);
-      throw usage_error("--set " + one + ": no such field" + did_you_mean(name, names) +
+      std::string const now = with_new_names(one);
+      throw usage_error("--set " + one + ": no such field" +
+                        (now != one ? "; it is " + now + " now" : did_you_mean(name, names)) +
                         " (see gart train --help-all)");
     }
     char* end = nullptr;

@@ -93,6 +93,7 @@ TEST_CASE("wrong command lines exit with 2, say what is wrong, and make nothing"
            line{"train x --out made --iteration 9", "; did you mean --iterations?"},
            line{"trian x --out made", "; did you mean train?"},
            line{"train x --out made --set rates.opactiy=1", "; did you mean rates.opacity?"},
+           line{"train x --out made --set error.fill=0.3", "; it is error.growth_end=0.3 now"},
            line{"train x --out made --set dropout=1", "a number from 0 to 0.999 belongs after dropout="},
            line{"train x --out made --seed -3", "--seed: '-3' is not a whole number from 0 to 18446744073709551615"},
            line{"train x --out made --max-gaussians 4294967296", "is not a number from 1 to 4294967295"},

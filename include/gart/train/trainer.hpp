@@ -20,8 +20,7 @@
 ///   mpi_comm ranks;
 ///   trainer<openmp_exec, traits, tracer, deterministic_strategy, mpi_comm> run(exec, options, data, start, ranks);
 ///
-/// The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step),
-/// so a state holds parameters, moments and counters only.
+/// The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step).
 
 #include <gart/backward/fallback.hpp>
 #include <gart/comm/self_comm.hpp>
@@ -199,7 +198,6 @@ class basic_trainer {
   void take_up(training_state const& mine);
   gaussian_model whole_of(gaussian_model mine, int root = -1) const;
 
-  // In the order in which they are made; what a step needs besides is in its image, its views and its plan.
   struct no_ranks {
     no_ranks(E&, Comm const&, index_t) {}
   };

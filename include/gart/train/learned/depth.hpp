@@ -7,19 +7,21 @@
 #include <gart/train/learned/part.hpp>
 #include <gart/train/smaller_photo.hpp>
 
+#include <algorithm>
+
 namespace gart::inline GART_ISA {
 
 /// Errors: invalid_argument where a weight asks for what the strategy or the dataset does not have.
 template <bool Depth>
 void require_depth(train_options const& options, dataset const& data) {
   if (!(options.depth_weight > 0)) return;
+  bool const mapped = std::any_of(data.train.begin(), data.train.end(), [](auto const& v) { return !v.depth.empty(); });
   if (!Depth)
     throw invalid_argument(
         "train_options.depth_weight needs gradients of depth: set configuration_request.depth, or train by "
         "with_depth<strategy>");
-  for (dataset_view const& v : data.train)
-    if (!v.depth.empty()) return;
-  throw invalid_argument("train_options.depth_weight: no training view has a depth map (dataset_options.depth)");
+  if (!mapped)
+    throw invalid_argument("train_options.depth_weight: no training view has a depth map (dataset_options.depth)");
 }
 
 /// The depth of a run's images.
