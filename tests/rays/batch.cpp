@@ -208,6 +208,39 @@ TEST_CASE_TEMPLATE("one tree serves rays of any frame with the same bits", E, GA
   }
 }
 
+TEST_CASE_TEMPLATE("rays that meet nothing see the background", E, GART_TEST_POLICIES) {
+  E exec;
+  gart::render_options options;
+  options.background = gart::vec3(0.25f, 0.5f, 0.75f);
+  batch_memory<E> const batch(exec, {}, {}, {0, 0, 1, 0, 1, 0});
+  gart::gaussian_model behind = cloud(3, 1, 1);
+  behind.mean = {-5, -50, -50};
+  for (gart::gaussian_model const& model : {gart::with_sh_degree({}, 1), behind}) {
+    CAPTURE(model.size());
+    gart::gaussians<E> const scene(exec, model);
+    gart::ray_tracer<E> tracer(exec);
+    tracer.set_scene(scene.view(), 1);
+    auto const seen = trace_all(exec, tracer, batch.rays(), options);
+    CHECK(seen.color == std::vector<float>{0.25f, 0.5f, 0.75f, 0.25f, 0.5f, 0.75f});
+    CHECK(seen.transmittance == std::vector<float>{1, 1});
+    CHECK(seen.first == std::vector<float>{gart::no_hit, gart::no_hit});
+    CHECK(seen.median_id == std::vector<u32>{gart::no_gaussian, gart::no_gaussian});
+    gart::hit_lists const lists = tracer.list(batch.rays(), options).to_host();
+    CHECK(lists.offsets == std::vector<gart::u64>{0, 0, 0});
+    CHECK(lists.ids.empty());
+    gart::gaussians<E> gradients(exec, scene.size(), 1);
+    gart::buffer<float, E> const by(exec, std::vector<float>(6, 1.0f));
+    gart::buffer<float, E> directions(exec, 6);
+    for (auto const form : {gart::gradient_form::scatter, gart::gradient_form::primitive}) {
+      auto context = tracer.forward(batch.rays(), options, {}, form);
+      tracer.backward(context, {by}, gradients.view(), {nullptr, directions.data()});
+      for (float const g : gradients.to_host().mean) CHECK(g == 0);
+      for (float const g : gradients.to_host().sh) CHECK(g == 0);
+      for (float const g : directions.to_host()) CHECK(g == 0);
+    }
+  }
+}
+
 TEST_CASE_TEMPLATE("directions of any length are one ray", E, GART_TEST_POLICIES) {
   E exec;
   gart::gaussians<E> const scene(exec, cloud(3, 0, 200));

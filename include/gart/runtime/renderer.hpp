@@ -72,7 +72,8 @@ class renderer {
   /// another view was rendered or another model set or bound, and for a model without Gaussians.
   virtual pose_gradient differentiate_pose() = 0;
 
-  /// A view to memory of the policy, as render_to, and what its gradients need.
+  /// A view to memory of the policy, as render_to, and what its gradients need: a frame and a hit buffer for each
+  /// context that waits, which the renderer keeps for the next.
   virtual std::unique_ptr<forward_context> forward(camera const& view, render_options const& options,
                                                    render_targets const& targets) = 0;
   /// A batch in memory of the policy, as trace_to, and what its gradients need.
