@@ -50,6 +50,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(dataset_options, test_split), "--test-split"},
       {GART_CLI_FIELD(dataset_options, photos), "--photos"},
       {GART_CLI_FIELD(dataset_options, masks), "--no-masks"},
+      {GART_CLI_FIELD(dataset_options, origin), "origin"},  // no option: it is the model's
       {GART_CLI_FIELD(dataset_options, depth), "--depth-weight"},
       {GART_CLI_FIELD(configuration_request, backend), "--backend"},
       {GART_CLI_FIELD(configuration_request, tracer), "--tracer"},
@@ -66,7 +67,7 @@ std::vector<field_name> const& field_names() {
 
 #undef GART_CLI_FIELD
 
-std::string in_options(std::string_view message) {
+std::string in_options(std::string_view message, std::function<bool(std::string const&)> const& has) {
   static constexpr std::string_view of_a_word = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.";
   static constexpr std::string_view equals = " = ";
   std::string shown;
@@ -83,6 +84,9 @@ std::string in_options(std::string_view message) {
     field_name const* found = nullptr;
     for (field_name const& n : field_names())
       if (n.field == name) found = &n;
+    bool const foreign = found && has && found->option.starts_with("--") &&
+                         !has(std::string(found->option.substr(0, found->option.find(' '))));
+    if (foreign) shown += "gart train ";
     shown += found ? found->option : name;
     shown += word.substr(name.size());
     if (found && name == word && message.substr(0, equals.size()) == equals) {

@@ -2,6 +2,7 @@
 // The library's errors name settings by their fields (core/error.hpp), the program's user knows options: the one table
 // between them.
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,7 +16,8 @@ struct field_name {
 
 std::vector<field_name> const& field_names();
 
-// A message of the library as the program shows it: each field as its option, `field = value` as `--option value`.
-std::string in_options(std::string_view message);
+// A message of the library as the program shows it: each field as its option, `field = value` as `--option value`. One
+// that the command has not, by has("--option"), is shown as of gart train, which left the model.
+std::string in_options(std::string_view message, std::function<bool(std::string const&)> const& has = {});
 
 }  // namespace gart_cli

@@ -10,7 +10,8 @@ trap 'fail "line $LINENO failed: $BASH_COMMAND"' ERR
 
 # What gart is built and tested with, by the names of Debian 12 and Ubuntu 24.04.
 packages=(cmake ninja-build g++ pkg-config git python3 libembree-dev libglm-dev libpng-dev libturbojpeg0-dev
-  libzstd-dev libwebp-dev libwebsockets-dev nlohmann-json3-dev libcli11-dev libeigen3-dev doctest-dev libbenchmark-dev libopenmpi-dev openmpi-bin)
+  libzstd-dev libwebp-dev libwebsockets-dev nlohmann-json3-dev libcli11-dev libeigen3-dev doctest-dev libbenchmark-dev libopenmpi-dev openmpi-bin
+  libopenvdb-dev libboost-dev)
 
 missing_packages() {
   local package

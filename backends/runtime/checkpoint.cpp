@@ -109,7 +109,7 @@ std::vector<char> const& checkpoint_reader::find(std::string const& name, std::s
 
 training_state without_rows(training_state const& state) {
   training_state out;
-  out.step = state.step, out.growth = state.growth, out.seed = state.seed;
+  out.origin = state.origin, out.step = state.step, out.growth = state.growth, out.seed = state.seed;
   out.exposures = state.exposures, out.vignetting = state.vignetting, out.poses = state.poses,
   out.lenses = state.lenses;
   return out;

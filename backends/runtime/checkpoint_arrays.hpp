@@ -26,6 +26,7 @@ void for_each_state_array(training_state const& state, F const& f) {
   f("sh_degree", std::vector<int>{state.scene.sh_degree}, 0);
   f("growth", std::vector<float>{state.growth}, 0);
   f("seed", std::vector<u64>{state.seed}, 0);
+  if (vec3d const& o = state.origin; o != vec3d(0.0)) f("origin", std::vector<double>{o.x, o.y, o.z}, 0);
   f("error_growth/error_sum", state.error_sum, 1);
   f("adc/gradient_sum", state.gradient_sum, 1), f("adc/touched", state.touched, 1);
   // Rows with Adam's moments, where any are learned.
@@ -64,6 +65,11 @@ training_state state_of(Reader const& in) {
   if (s.first.size() != s.scene.size() || s.second.size() != s.scene.size())
     in.fail("its moments differ in number from its Gaussians");
   s.step = step[0], s.growth = growth[0], s.seed = seed[0];
+  if (in.has("origin")) {
+    std::vector<double> const origin = in.template get<double>("origin");
+    if (origin.size() != 3) in.fail("its array origin is not three numbers");
+    s.origin = {origin[0], origin[1], origin[2]};
+  }
   if (in.has("error_growth/error_sum")) s.error_sum = in.template get<float>("error_growth/error_sum");
   s.gradient_sum = in.template get<float>("adc/gradient_sum"), s.touched = in.template get<u32>("adc/touched");
   if (s.gradient_sum.size() != s.touched.size()) in.fail("its arrays adc/* differ in length");

@@ -91,7 +91,7 @@ dataset shrunk(dataset const& data, int shrink) {
   dataset small;
   small.format = data.format, small.split = data.split, small.points = data.points;
   small.extent = data.extent, small.alpha = data.alpha;
-  small.bounds_min = data.bounds_min, small.bounds_max = data.bounds_max;
+  small.origin = data.origin, small.bounds_min = data.bounds_min, small.bounds_max = data.bounds_max;
   small.train.resize(data.train.size());
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t i = 0; i < data.train.size(); ++i) {

@@ -23,6 +23,7 @@ struct training_state {
       second;                       ///< and its second
   int step = 0;                     ///< steps done
   float growth = 1;                 ///< of MCMC, a densification
+  vec3d origin{0.0};                ///< of the coordinates (io/origin.hpp)
   u64 seed = 1;                     ///< of all numbers drawn at random
   std::vector<float> error_sum;     ///< growth by error's statistic since it last densified: [N], or empty
   std::vector<float> gradient_sum;  ///< adaptive density's statistic since it last densified: [N], or empty

@@ -25,6 +25,7 @@
 #include <gart/exposure/exposure_training.hpp>
 #include <gart/exposure/vignetting_training.hpp>
 #include <gart/io/dataset.hpp>
+#include <gart/io/origin.hpp>
 #include <gart/io/ply.hpp>
 #include <gart/io/splat_file.hpp>
 #include <gart/lens/lens_training.hpp>

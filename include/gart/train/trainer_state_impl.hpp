@@ -13,7 +13,7 @@ training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::part() const {
   s.scene = model_part();
   s.first = with_sh_degree(state_.first.to_host(), degree_);
   s.second = with_sh_degree(state_.second.to_host(), degree_);
-  s.step = step_, s.growth = growth_, s.seed = options_.seed;
+  s.step = step_, s.growth = growth_, s.seed = options_.seed, s.origin = data_.origin;
   if (exposures_) s.exposures = exposures_->state();
   if (vignetting_) s.vignetting = vignetting_->state();
   if (poses_) s.poses = poses_->state();
@@ -57,7 +57,8 @@ training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::read_part(std::
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::write_part(std::filesystem::path const& path,
                                                                   gaussian_model const& mine,
-                                                                  splat_traits const& traits) const {
+                                                                  splat_traits const& given) const {
+  splat_traits const traits = with_origin(given, data_.origin);
   if constexpr (!Comm::alone) {
     if (comm_.size() > 1 && is_splat_ply(path)) {
       u64 total = mine.size();
@@ -88,6 +89,9 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::load(std::filesystem::pat
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_part(training_state const& s) {
   if (s.scene.sh_degree != degree_) throw invalid_argument("trainer: the state has another SH degree");
+  if (s.origin != data_.origin)
+    throw invalid_argument("trainer: the state is from the origin " + to_text(s.origin) + ", the capture from " +
+                           to_text(data_.origin) + " (dataset_options.origin holds it from that)");
   assign_rows(scene_, s.scene), assign_rows(state_.first, s.first), assign_rows(state_.second, s.second);
   total_ = static_cast<index_t>(total_of(comm_, {s.scene, true}));
   gradients_.resize_keep(scene_.size());
