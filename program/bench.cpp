@@ -50,6 +50,7 @@ gart::dataset noise_capture(gart::named_camera const& camera) {
 int run_bench(bench_arguments const& a) {
   gart::model_file const file = gart::load_model(a.model);
   auto cameras = gart::load_cameras(a.cameras);
+  for (auto& [name, view] : cameras) view.position -= file.origin;
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   if (static_cast<int>(cameras.size()) > a.views) cameras.resize(static_cast<std::size_t>(a.views));
   if (!a.json.empty()) prepare_file(a.json);

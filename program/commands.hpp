@@ -42,6 +42,7 @@ void add_bench(CLI::App& app, command& selected);
 void add_tradeoff(CLI::App& app, command& selected);
 void add_compare(CLI::App& app, command& selected);
 void add_convert(CLI::App& app, command& selected);
+void add_mesh(CLI::App& app, command& selected);
 void add_info(CLI::App& app, command& selected);
 
 }  // namespace gart_cli

@@ -5,7 +5,7 @@
 #include "progress.hpp"
 
 #include <gart/core/error.hpp>
-#include <gart/io/splat_file.hpp>
+#include <gart/io/origin.hpp>
 #include <gart/math/logit.hpp>
 #include <gart/scene/similarity.hpp>
 
@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 struct convert_arguments {
   fs::path in, out;
-  std::string crop, transform, sh_bits;
+  std::string crop, transform, sh_bits, origin;
   double prune = 0;
   int sh_degree = 3;
   gart::splat_packing packing;
@@ -96,11 +96,15 @@ int run_convert(convert_arguments const& a) {
       throw usage_error("--sh-bits: two numbers from 1 to 8 belong there, as in 5,5");
     packing.sh1_bits = static_cast<int>(bits[0]), packing.sh_bits = static_cast<int>(bits[1]);
   }
+  std::vector<double> const origin = a.origin.empty() ? std::vector<double>() : numbers("--origin", a.origin);
+  if (!origin.empty() && origin.size() != 3)
+    throw usage_error("--origin: " + std::to_string(origin.size()) + " numbers, not the 3 of a place");
   prepare_file(a.out);
 
   gart::splat_traits traits;
   std::vector<std::string> notes;
   gart::gaussian_model model = gart::read_splats(a.in, &traits, &notes);
+  if (!origin.empty()) traits = gart::with_origin(traits, {origin[0], origin[1], origin[2]});
   std::size_t const read = model.size();
   if (!box.empty())
     model = kept(model, [&](std::size_t i) {
@@ -126,11 +130,16 @@ int run_convert(convert_arguments const& a) {
                    ", which no format holds");
   gart::write_splats(a.out, model, traits, packing);
   if (a.quiet) return 0;
+  if (gart::vec3d const from = gart::origin_of(traits, a.in.string()); from != gart::vec3d(0.0) && !packing.world)
+    notes.push_back("coordinates are from the origin " + gart::to_text(from));
   for (std::string const& note : notes) std::printf("%s\n", printable(note).c_str());
   for (std::string const& what : lost) std::printf("left out: %s\n", what.c_str());
-  auto const before = static_cast<double>(fs::file_size(a.in)), after = static_cast<double>(fs::file_size(a.out));
-  std::printf("%s: %zu of %zu Gaussians, SH degree %d, %s, %.3f of %s\n", a.out.string().c_str(), model.size(), read,
-              model.sh_degree, as_bytes(after).c_str(), after / before, a.in.filename().string().c_str());
+  auto const after = static_cast<double>(fs::file_size(a.out));
+  std::printf("%s: %zu of %zu Gaussians, SH degree %d, %s", a.out.string().c_str(), model.size(), read, model.sh_degree,
+              as_bytes(after).c_str());
+  if (fs::is_regular_file(a.in))
+    std::printf(", %.3f of %s", after / static_cast<double>(fs::file_size(a.in)), a.in.filename().string().c_str());
+  std::puts("");
   return 0;
 }
 
@@ -160,6 +169,12 @@ void add_convert(CLI::App& app, command& selected) {
                    "Turn, scale and move: a 4x4 matrix row by row, or a quaternion and\na translation "
                    "w,x,y,z,X,Y,Z, and a scale after them where it is not 1")
       ->type_name("NUMBERS");
+  convert
+      ->add_option("--origin", a->origin,
+                   "What IN's coordinates are from, in those of the capture, where IN\ndoes not say it")
+      ->type_name("X,Y,Z");
+  convert->add_flag("--world", a->packing.world,
+                    "PLY and GLB: in the coordinates of the capture, in double, and not\nfrom an origin");
   convert
       ->add_option("--sh-bits", a->sh_bits,
                    "SPZ: bits of a coefficient of degree 1, and of those above, 1 to 8\n(default: 6,6)")

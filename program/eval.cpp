@@ -89,6 +89,7 @@ int run_eval(eval_arguments const& a) {
   load.test_split = gart::from_string<gart::split_kind>(a.test_split);
   a.photos.set(load);
   load.host = ranks::on_host();
+  load.origin = file.origin;
   gart::dataset const data = gart::load_dataset(a.dataset, load);
   if (data.test.empty()) {
     throw gart::io_error(a.dataset.string(), "has no test views (" + data.split + ")",
@@ -102,7 +103,7 @@ int run_eval(eval_arguments const& a) {
   renderer->set_model(file.model);
 
   gart::exposure_field const exposures =
-      a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures);
+      a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures, file.origin);
 
   fs::path const beside = a.model.parent_path() / "exposures.json";
   if (a.exposures.empty() && fs::exists(beside) && speaks && !a.quiet)

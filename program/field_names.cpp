@@ -33,6 +33,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(dataset_options, test_split), "--test-split"},
       {GART_CLI_FIELD(dataset_options, photos), "--photos"},
       {GART_CLI_FIELD(dataset_options, masks), "--no-masks"},
+      {GART_CLI_FIELD(dataset_options, origin), "origin"},  // no option: it is the model's
       {GART_CLI_FIELD(dataset_options, depth), "--depth-weight"},
       {GART_CLI_FIELD(configuration_request, backend), "--backend"},
       {GART_CLI_FIELD(configuration_request, tracer), "--tracer"},
@@ -59,7 +60,7 @@ std::string option_of(std::string_view field) {
   return !found ? "" : flag_of(*found).empty() ? "--set " + std::string(found->name) : flag_of(*found);
 }
 
-std::string in_options(std::string_view message) {
+std::string in_options(std::string_view message, std::function<bool(std::string const&)> const& has) {
   static constexpr std::string_view of_a_word = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.";
   static constexpr std::string_view equals = " = ";
   std::string shown;
@@ -74,6 +75,7 @@ std::string in_options(std::string_view message) {
     // The point that ends a sentence is no part of a name.
     std::string_view const name = word.substr(0, word.find_last_not_of('.') + 1);
     std::string const found = option_of(name);
+    if (found.starts_with("--") && has && !has(found.substr(0, found.find(' ')))) shown += "gart train ";
     shown += found.empty() ? name : std::string_view(found);
     shown += word.substr(name.size());
     if (!found.empty() && name == word && message.substr(0, equals.size()) == equals) {

@@ -1,10 +1,13 @@
 #include "commands.hpp"
+#include "printable.hpp"
 #include "progress.hpp"
 #include "ranks.hpp"
 #include "self_test.hpp"
 
 #include <gart/core/error.hpp>
 #include <gart/core/version.hpp>
+#include <gart/io/dataset.hpp>
+#include <gart/io/origin.hpp>
 #include <gart/io/splat_file.hpp>
 #include <gart/runtime/session.hpp>
 
@@ -18,7 +21,9 @@
 #include <gart/comm/mpi_comm.hpp>
 #endif
 
+#include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <set>
@@ -114,6 +119,61 @@ void print_devices(std::vector<std::string> const& places) {
   std::printf("models     %s\n", formats.c_str());
 }
 
+// From the least to the greatest of all but a hundredth, an axis.
+void print_box(gart::gaussian_model const& model) {
+  std::size_t const n = model.size(), out = n / 200;
+  std::vector<float> values(n);
+  for (std::size_t c = 0; c < 3 && n > 0; ++c) {
+    for (std::size_t i = 0; i < n; ++i) values[i] = model.mean[3 * i + c];
+    std::sort(values.begin(), values.end());
+    std::printf("%-10s %.6g to %.6g, 99 of 100 of them\n", std::string(1, "xyz"[c]).c_str(),
+                static_cast<double>(values[out]), static_cast<double>(values[n - 1 - out]));
+  }
+}
+
+void print_origin(gart::vec3d const& origin) {
+  if (origin == gart::vec3d(0.0))
+    std::puts("origin     none: coordinates are those of the files");
+  else
+    std::printf("origin     %s\n", gart::to_text(origin).c_str());
+}
+
+int print_model(std::filesystem::path const& path) {
+  gart::splat_traits traits;
+  std::vector<std::string> notes;
+  gart::gaussian_model const model = gart::read_splats(path, &traits, &notes);
+  std::printf("model      %s\n", printable(path.string()).c_str());
+  std::printf("Gaussians  %s, SH degree %d\n", with_commas(model.size()).c_str(), model.sh_degree);
+  print_origin(gart::origin_of(traits, path.string()));
+  print_box(model);
+  for (auto const& [key, value] : traits)
+    if (key != "origin") std::printf("%-10s %s\n", printable(key).c_str(), printable(value).c_str());
+  for (auto const& note : notes) std::printf("%s\n", printable(note).c_str());
+  return 0;
+}
+
+int print_capture(std::filesystem::path const& path) {
+  gart::dataset_options options;
+  options.load_images = false;
+  gart::dataset const data = gart::load_dataset(path, options);
+  std::printf("capture    %s, %s\n", printable(path.string()).c_str(), data.format.c_str());
+  std::printf("views      %zu to train on, %zu to test on: %s\n", data.train.size(), data.test.size(),
+              printable(data.split).c_str());
+  std::printf("points     %s\n", with_commas(data.points.size()).c_str());
+  print_origin(data.origin);
+  std::printf("extent     %.6g\n", static_cast<double>(data.extent));
+  for (auto const& note : data.notes) std::printf("%s\n", printable(note).c_str());
+  return 0;
+}
+
+// A folder is a capture, and so are the files that captures are named by.
+bool names_capture(std::filesystem::path const& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) return !std::filesystem::exists(path / "meta.json", ignored);
+  std::string const extension = path.extension().string();
+  return extension == ".json" || extension == ".bin" || extension == ".txt";
+}
+
 int run_info(bool tests) {
   if (ranks::built) ranks::start(false);
   std::vector<std::string> const places = places_of_ranks();
@@ -154,12 +214,20 @@ void add_info(CLI::App& app, command& selected) {
       "\nPrints the version, the devices found, and the configurations that were compiled: which backend, tracer and\n"
       "backward pass go together, for which degrees of spherical harmonics. Writes nothing. Of several GPUs it\n"
       "says how they reach each other's memory, and of several ranks where each is and what it would train on.\n"
+      "Of a file of Gaussians, or a capture, it says what is in it, and which origin its coordinates are from.\n"
       "\nExamples:\n"
       "  gart info\n"
+      "  gart info run/model.ply\n"
       "  gart info | grep cuda\n"
       "  gart info --self-test                    after an installation: seconds\n"
       "  mpirun -n 4 gart info");
-  info->callback([tests, &selected] { selected = [tests] { return run_info(*tests); }; });
+  auto path = std::make_shared<std::filesystem::path>();
+  info->add_option("PATH", *path, "Of this model or capture instead: what is in it")->type_name("");
+  info->callback([tests, path, &selected] {
+    selected = [tests, path] {
+      return path->empty() ? run_info(*tests) : names_capture(*path) ? print_capture(*path) : print_model(*path);
+    };
+  });
 }
 
 }  // namespace gart_cli

@@ -84,6 +84,7 @@ int main(int argc, char** argv) {
   add_compare(app, selected);
   add_synth(app, selected);
   add_convert(app, selected);
+  add_mesh(app, selected);
   add_info(app, selected);
 
   try {
@@ -104,6 +105,8 @@ int main(int argc, char** argv) {
   bool const shares =
       ranks::built && (app.got_subcommand("render") || app.got_subcommand("eval") || app.got_subcommand("info"));
   if (ranks::launched_rank() > 0 && !shares && !app.got_subcommand("train")) return 0;
+  CLI::App const& command_app = *app.get_subcommands().front();
+  auto const has_option = [&](std::string const& option) { return command_app.get_option_no_throw(option) != nullptr; };
   try {
     if (app.got_subcommand("train"))
       ranks::launch_on(app.get_subcommand("train")->get_option("--gpus")->as<int>(), argv);
@@ -111,8 +114,11 @@ int main(int argc, char** argv) {
   } catch (usage_error const& e) {
     return fail(e.what(), exit_usage);
   } catch (std::bad_alloc const&) {
-    return fail("out of host memory (lower --max-gaussians, or raise --downscale)", exit_failed);
+    return fail("out of host memory (" +
+                    in_options("lower train_options.max_gaussians, or raise dataset_options.downscale", has_option) +
+                    ")",
+                exit_failed);
   } catch (std::exception const& e) {
-    return fail(in_options(e.what()), exit_failed);
+    return fail(in_options(e.what(), has_option), exit_failed);
   }
 }

@@ -109,6 +109,7 @@ int run_render(render_arguments const& a) {
     throw usage_error("--images hits: a mean over --samples counts no hits (leave one of them out)");
   auto cameras = cameras_of(a);
   gart::model_file file = gart::load_model(a.model);
+  for (auto& [name, view] : cameras) view.position -= file.origin;
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   prepare_folder(a.out);
   if (!a.json.empty() && speaks) prepare_file(a.json);
@@ -122,7 +123,7 @@ int run_render(render_arguments const& a) {
   if (a.max_hits >= 0) options.max_hits = static_cast<gart::u32>(a.max_hits);
 
   gart::exposure_field const exposures =
-      a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures);
+      a.exposures.empty() ? gart::exposure_field() : gart::read_exposures(a.exposures, file.origin);
 
   progress say(a.quiet || !speaks);
   say.notes(file.notes);

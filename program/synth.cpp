@@ -86,9 +86,12 @@ void add_synth(CLI::App& app, command& selected) {
                    "and travels")
       ->type_name("DEGREES")
       ->capture_default_str();
+  synth->add_option("--origin", options->origin, "Add this to all coordinates, as of a survey: 500000,4000000,100")
+      ->type_name("X,Y,Z");
   synth->add_flag("--depth", options->depth,
                   "Also a depth map of each view, r_N_depth.png: distances along\nthe rays, for gart train "
                   "--depth-weight");
+  synth->add_flag("--mesh", options->mesh, "Also the scene itself, mesh.ply, for gart mesh --against");
   synth->add_flag("--quiet", *quiet, "Print nothing but errors");
   synth->footer(
       "Writes DIR/transforms_train.json and DIR/transforms_test.json (Blender's layout), DIR/train/r_N.png and\n"

@@ -9,6 +9,8 @@
 #include <gart/io/depth_file.hpp>
 #include <gart/io/file.hpp>
 #include <gart/io/image_file.hpp>
+#include <gart/io/mesh_file.hpp>
+#include <gart/io/origin.hpp>
 #include <gart/io/ply.hpp>
 
 #include <cmath>
@@ -86,8 +88,10 @@ std::string pose_text(gart::camera const& view) {
   return out + "[0, 0, 0, 1]]";
 }
 
-std::string transforms_json(std::vector<gart::camera> const& cameras, std::string const& split, bool depth) {
+std::string transforms_json(std::vector<gart::camera> cameras, std::string const& split, bool depth,
+                            gart::vec3d const& origin) {
   char text[256];
+  for (gart::camera& c : cameras) c.position += origin;
   gart::camera const& first = cameras.front();
   std::string json = std::string("{\n  ") + mark + ",\n";
   bool const rolls = first.shutter != gart::shutter_kind::global;
@@ -130,6 +134,21 @@ std::string transforms_json(std::vector<gart::camera> const& cameras, std::strin
 
 }  // namespace
 
+namespace {
+
+gart::triangle_mesh mesh_of(synth_scene const& scene) {
+  gart::triangle_mesh all;
+  for (synth_mesh const& part : scene) {
+    u32 const before = static_cast<u32>(all.position.size());
+    all.position.insert(all.position.end(), part.position.begin(), part.position.end());
+    for (std::size_t i = 0; i + 2 < part.index.size(); i += 3)
+      all.triangle.push_back({before + part.index[i], before + part.index[i + 1], before + part.index[i + 2]});
+  }
+  return all;
+}
+
+}  // namespace
+
 std::vector<gart::camera> synth_cameras(int count, int size, bool test) {
   double const golden = std::numbers::pi * (3 - std::sqrt(5.0));
   std::vector<gart::camera> cameras;
@@ -162,6 +181,8 @@ void write_synth_capture(synth_options const& options, std::function<void(int do
   if (!(options.rolling >= 0 && options.rolling <= 90))
     throw gart::invalid_argument("--rolling " + std::to_string(options.rolling) + ": give 0 to 90 degrees");
 
+  gart::vec3d origin(0.0);
+  if (!options.origin.empty()) origin = gart::origin_of({{"origin", options.origin}}, "--origin");
   auto train = synth_cameras(options.train, options.size, false);
   auto test = synth_cameras(options.test, options.size, true);
   for (auto* cameras : {&train, &test})
@@ -188,9 +209,10 @@ void write_synth_capture(synth_options const& options, std::function<void(int do
       if (progress) progress(done, total);
     }
   }
-  gart::write_point_ply(options.out / "points3d.ply", renderer.points(train, options.points, options.seed));
-  gart::write_file(options.out / "transforms_test.json", transforms_json(test, "test", options.depth));
-  gart::write_file(options.out / "transforms_train.json", transforms_json(train, "train", options.depth));
+  gart::write_point_ply(options.out / "points3d.ply", renderer.points(train, options.points, options.seed), origin);
+  if (options.mesh) gart::write_mesh_ply(options.out / "mesh.ply", mesh_of(make_synth_scene(options.seed)), origin);
+  gart::write_file(options.out / "transforms_test.json", transforms_json(test, "test", options.depth, origin));
+  gart::write_file(options.out / "transforms_train.json", transforms_json(train, "train", options.depth, origin));
   std::error_code ignored;
   fs::remove(options.out / ".gart-synth", ignored);
 }

@@ -3,7 +3,9 @@
 //   DIR/transforms_train.json, DIR/transforms_test.json   camera_angle_x; camera to world, OpenGL axes
 //   DIR/train/r_N.png, DIR/test/r_N.png                   RGBA, straight alpha
 //   DIR/train/r_N_depth.png and so on                     where asked for: distances along the rays, 16 bits
-//   DIR/points3d.ply                                      starting points on the surfaces, coloured
+//   DIR/points3d.ply                                      starting points on the surfaces, coloured; in double where
+//                                                         an origin is added to all coordinates
+//   DIR/mesh.ply                                          where asked for: the scene itself, as triangles
 // A training view through a rolling shutter has the poses of its first and last row. Through another camera than a
 // pinhole the transforms name its model and parameters in place of camera_angle_x. The transforms are written last,
 // each file whole: a capture that was interrupted is not taken for one.
@@ -27,6 +29,8 @@ struct synth_options {
   int points = 10000;
   std::string camera;  // as gart::seen_through has it; empty: a pinhole
   bool depth = false;  // depth maps too
+  bool mesh = false;   // the scene's own mesh too
+  std::string origin;  // "x,y,z", added to all coordinates
   double rolling = 0;  // degrees that the camera turns by while a training view is read; 0: it stands still
   u64 seed = 1;
   int threads = 0;  // 0: all

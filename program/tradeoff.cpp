@@ -122,7 +122,7 @@ class tradeoff_run {
     settings_ = selected_settings(settings_of(exact), a_.settings);
 
     say_.state("reading views", 0);
-    set_ = load_views(a_.cameras, a_.views);
+    set_ = load_views(a_.cameras, a_.views, file_.origin);
     background_ = a_.background != "auto" ? a_.background : set_.background;
     for (setting& s : settings_) s.use.render.background = background_color(background_);
     prepare_folder(a_.out);

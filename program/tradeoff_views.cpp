@@ -76,12 +76,13 @@ void each_tap(int small_width, int small_height, int width, int height, F const&
 
 }  // namespace
 
-view_set load_views(fs::path const& cameras, view_choice const& choice) {
+view_set load_views(fs::path const& cameras, view_choice const& choice, gart::vec3d const& origin) {
   view_set out;
   if (is_camera_list(cameras)) {
     auto all = gart::load_cameras(cameras);
     double farthest = 0;
     for (auto& [name, view] : all) {
+      view.position -= origin;
       if (choice.downscale > 1) {
         view = gart::resized(view, std::max(1, view.width / choice.downscale),
                              std::max(1, view.height / choice.downscale));
@@ -95,7 +96,7 @@ view_set load_views(fs::path const& cameras, view_choice const& choice) {
     }
   } else {
     gart::dataset_options options;
-    options.downscale = choice.downscale;
+    options.downscale = choice.downscale, options.origin = origin;
     gart::dataset data = gart::load_dataset(cameras, options);
     out.background = background_for(gart::inspect(data)).value, out.extent = data.extent;
     for (std::size_t const i : evenly_spread(data.train.size(), choice.count)) {

@@ -24,7 +24,7 @@ struct tradeoff_view {
 };
 
 // `count` views, evenly spread over the training views of a capture or the cameras of a camera JSON, and at most
-// `pixels` pixels of each, at random (always the same ones).
+// `pixels` pixels of each, at random (always the same ones); from the model's origin.
 struct view_choice {
   int count = 2, pixels = 4096, downscale = 1;
 };
@@ -33,7 +33,7 @@ struct view_set {
   std::string background = "black";  // what suits the photographs
   float extent = 1;                  // of the scene: what Adam's steps of the means are measured in
 };
-view_set load_views(std::filesystem::path const& cameras, view_choice const& choice);
+view_set load_views(std::filesystem::path const& cameras, view_choice const& choice, gart::vec3d const& origin);
 
 // Sets color_gradient: of the training loss of `image`, which shows all of the view, against the photograph; without
 // one, random numbers.

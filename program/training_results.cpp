@@ -72,6 +72,11 @@ gart::scores training_run::test(int step, gart::keep_view const& keep, gart::pla
   return result;
 }
 
+std::vector<gart::named_camera> training_run::from_zero(std::vector<gart::named_camera> cameras) const {
+  for (gart::named_camera& c : cameras) c.view.position += data_.origin;
+  return cameras;
+}
+
 void training_run::save_checkpoint() {
   course_.close_point();
   session_->save(a_.checkpoint_file());
@@ -84,9 +89,9 @@ void training_run::save() {
   session_->save_model(a_.model_file(), gart::traits_of(gart::render_options_of(train_options_of(a_), data_.extent),
                                                         configuration_.kernel_degree));
   if (auto const exposures = session_->exposures(); writes_ && !exposures.empty())
-    gart::write_exposures(a_.out / "exposures.json", exposures);
+    gart::write_exposures(a_.out / "exposures.json", exposures, data_.origin);
   if (auto const poses = session_->poses(); writes_ && !poses.empty())
-    gart::write_cameras(a_.out / "poses.json", poses);
+    gart::write_cameras(a_.out / "poses.json", from_zero(poses));
   try {
     save_checkpoint();
   } catch (gart::io_error const& e) {
@@ -114,7 +119,7 @@ void training_run::conclude() {
       a_.options.refine_poses ? aligned_to_photographs(aligned) : gart::place_view());
   if (a_.options.refine_lens && !a_.options.refine_poses)
     for (auto const& view : data_.test) aligned.push_back({view.name, session_->as_learned(view.view)});
-  if (writes_ && !aligned.empty()) gart::write_cameras(a_.out / "poses_test.json", aligned);
+  if (writes_ && !aligned.empty()) gart::write_cameras(a_.out / "poses_test.json", from_zero(aligned));
   say_.state("testing on training views", 1);
   stopwatch const training_views;
   gart::scores const training = score(gart::evenly_spread(data_.train, data_.test.size()), {},

@@ -73,6 +73,7 @@ void training_run::prepare() {
                         ", the run of " + std::to_string(a_.kernel_degree) + " (give --kernel-degree " +
                         std::to_string(file.kernel_degree) + ")");
     }
+    gart::move_origin(file.model, file.origin, data_.origin);
     start_ = gart::with_sh_degree(std::move(file.model), configuration_.sh_degree);
     start_total_ = file.total;
     if (file.total > a_.options.max_gaussians) {

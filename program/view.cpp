@@ -62,6 +62,7 @@ int run_view(view_arguments const& a) {
   if (!a.capture.empty()) {
     gart::dataset_options options;
     options.downscale = a.downscale, options.test_every = a.test_every;
+    options.origin = file.origin;
     a.photos.set(options);
     data = gart::load_dataset(a.capture, options);
     progress(false).notes(data.notes);

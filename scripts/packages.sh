@@ -11,7 +11,7 @@ trap 'fail "line $LINENO failed: $BASH_COMMAND"' ERR
 # What gart is built and tested with, by the names of Debian 12 and Ubuntu 24.04.
 packages=(cmake ninja-build g++ pkg-config git python3 libembree-dev libglm-dev libpng-dev libturbojpeg0-dev
   libzstd-dev libwebp-dev nlohmann-json3-dev libcli11-dev libeigen3-dev doctest-dev libbenchmark-dev libopenmpi-dev openmpi-bin
-  python3-dev python3-numpy pybind11-dev)
+  libopenvdb-dev libboost-dev python3-dev python3-numpy pybind11-dev)
 
 is_installed() { [[ $(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null) == installed ]]; }
 

@@ -136,6 +136,18 @@ void read_position_and_rotation(record const& r, camera& view) {
   read_pose({whole, nullptr, r.where}, "rotation", false, view);
 }
 
+vec3d read_origin(record const& r) {
+  json const& list = r.at("origin");
+  vec3d origin(0.0);
+  for (int k = 0; k < 3; ++k) {
+    bool const there = list.is_array() && list.size() == 3 && list[static_cast<std::size_t>(k)].is_number();
+    if (there) origin[k] = list[static_cast<std::size_t>(k)].get<double>();
+    if (!there || !(std::abs(origin[k]) <= 1e18))
+      throw io_error(r.where, "'origin' is not a list of 3 numbers", "write [x, y, z], what c2w is from");
+  }
+  return origin;
+}
+
 named_camera camera_of(record const& r) {
   named_camera c;
   c.view.width = r.size("width"), c.view.height = r.size("height");
@@ -152,6 +164,7 @@ named_camera camera_of(record const& r) {
   else
     read_pose(r, "c2w", false, c.view);
   read_shutter(r, "c2w_end", false, c.view);
+  if (r.has("origin")) c.view.position += read_origin(r);
   check_camera(c.view, r.where);
   return c;
 }

@@ -91,7 +91,7 @@ void make_file_names(std::vector<std::string*> const& names) {
     std::replace(path.begin(), path.end(), '\\', '/');
     fs::path parts = fs::path(path).relative_path().lexically_normal();
     std::string const extension = parts.extension().string();
-    for (char const* known : {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
+    for (char const* known : {".png", ".jpg", ".jpeg", ".webp", ".PNG", ".JPG", ".JPEG", ".WEBP"}) {
       if (extension == known) parts.replace_extension();
     }
     bool first = true;

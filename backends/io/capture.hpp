@@ -30,13 +30,22 @@ struct frame {
   void set_size(int width, int height);
 };
 
+// Points as files have them.
+struct exact_points {
+  std::vector<double> position;  // [N][3]
+  std::vector<u8> color;         // [N][3], or empty
+  std::size_t size() const { return position.size() / 3; }
+};
+// read_point_ply, in double.
+exact_points read_exact_points(std::filesystem::path const& path, std::vector<std::string>* notes);
+
 struct capture {
   std::filesystem::path source;  // what errors name
   std::string format;
   std::string own_split;         // in words; empty: every nth view by name is a test view
   std::filesystem::path photos;  // the folder that the frames' names are in
   std::vector<frame> frames;
-  point_cloud points;
+  exact_points points;
   std::vector<std::string> notes;
   bool synthetic_bounds = false;  // Blender's box, not one around the cameras
 };

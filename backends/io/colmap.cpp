@@ -9,7 +9,6 @@
 
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
-#include <gart/io/ply.hpp>
 
 #include <algorithm>
 #include <array>
@@ -41,7 +40,7 @@ struct model_files {
 
 // Points of a file, and those that are not finite.
 struct model_points {
-  point_cloud cloud;
+  exact_points cloud;
   std::size_t read = 0;
   unusable bad;
 
@@ -50,7 +49,7 @@ struct model_points {
     for (double v : position) finite = finite && std::isfinite(static_cast<float>(v));
     if (!finite) bad.add(read, [&] { return "point " + std::to_string(id) + " is not finite"; });
     if (finite) {
-      for (double v : position) cloud.position.push_back(static_cast<float>(v));
+      for (double v : position) cloud.position.push_back(v);
       cloud.color.insert(cloud.color.end(), color.begin(), color.end());
     }
     ++read;
@@ -241,7 +240,7 @@ fs::path photo_folder_of(fs::path const& model, std::vector<pose> const& poses) 
 }
 
 // The points of a model: beside it as its own format, as the other, or as the PLY that other programs leave.
-point_cloud points_of(fs::path const& folder, bool text, std::vector<std::string>& notes) {
+exact_points points_of(fs::path const& folder, bool text, std::vector<std::string>& notes) {
   std::error_code ignored;
   for (bool const kind : {text, !text}) {
     fs::path const file = file_of(folder, "points3D", kind);
@@ -256,7 +255,7 @@ point_cloud points_of(fs::path const& folder, bool text, std::vector<std::string
   fs::path const ply = folder / "points3D.ply";
   if (fs::exists(ply, ignored)) {
     notes.push_back("the points are those of " + ply.string());
-    return read_point_ply(ply, &notes);
+    return read_exact_points(ply, &notes);
   }
   fs::path const own = file_of(folder, "points3D", text);
   notes.push_back(own.string() + (fs::exists(own, ignored) ? " has no point" : " is not there") +

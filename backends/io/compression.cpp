@@ -70,6 +70,7 @@ std::vector<u8> zstd_compressed(std::vector<u8> const& bytes, std::string const&
   std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> const context(ZSTD_createCCtx(), ZSTD_freeCCtx);
   std::vector<u8> out(ZSTD_compressBound(bytes.size()));
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
   // A library built without threads refuses these and compresses on one.
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_nbWorkers, static_cast<int>(std::thread::hardware_concurrency()));
   std::size_t const size = ZSTD_compress2(context.get(), out.data(), out.size(), bytes.data(), bytes.size());

@@ -1,5 +1,6 @@
 #include "capture.hpp"
 #include "codec.hpp"
+#include "exif.hpp"
 #include "file_names.hpp"
 #include "host_images.hpp"
 #include "test_split.hpp"
@@ -7,7 +8,9 @@
 
 #include <gart/core/error.hpp>
 #include <gart/io/dataset.hpp>
+#include <gart/io/file.hpp>
 #include <gart/io/image_file.hpp>
+#include <gart/io/origin.hpp>
 
 #include <algorithm>
 #include <atomic>
@@ -52,6 +55,15 @@ void for_each_parallel(std::size_t n, F const& f) {
   if (failure) std::rethrow_exception(failure);
 }
 
+// Where its EXIF says that the photo is to be turned by a quarter, that.
+std::string turned_by_exif(fs::path const& photo) {
+  std::vector<u8> const bytes = read_file(photo);
+  int const orientation = is_jpeg(bytes) ? exif_orientation(bytes) : 1;
+  if (orientation < 5) return {};
+  return ", the same turned: its EXIF says to show it turned by a quarter (orientation " + std::to_string(orientation) +
+         "), and gart takes pixels as they are stored";
+}
+
 // Makes the camera fit the photo's real size; true where that meant scaling it.
 bool fit_to_photo(frame& f, image_size size) {
   camera const& c = f.view;
@@ -64,10 +76,15 @@ bool fit_to_photo(frame& f, image_size size) {
   double const sx = static_cast<double>(size.width) / c.width, sy = static_cast<double>(size.height) / c.height;
   bool const within_rounding = std::abs(c.height * sx - size.height) <= 1 || std::abs(c.width * sy - size.width) <= 1;
   if (std::abs(sx / sy - 1) > 0.01 && !within_rounding) {
+    bool const turned = std::abs(static_cast<double>(size.height) * c.height / c.width - size.width) <= 1;
+    std::string const exif = turned ? turned_by_exif(f.photo) : std::string();
     throw io_error(f.photo.string(),
                    "is " + std::to_string(size.width) + " x " + std::to_string(size.height) +
-                       " pixels, but its camera is for " + std::to_string(c.width) + " x " + std::to_string(c.height),
-                   "use the photos that were calibrated, or copies scaled alike in both directions");
+                       " pixels, but its camera is for " + std::to_string(c.width) + " x " + std::to_string(c.height) +
+                       exif,
+                   exif.empty() ? "use the photos that were calibrated, or copies scaled alike in both directions"
+                                : "turn the pixels themselves, as exiftran -a does, or use the photos that were "
+                                  "calibrated");
   }
   f.view = resized(c, size.width, size.height);
   check_camera(f.view, f.photo.string());
@@ -270,14 +287,35 @@ std::vector<dataset_view> load_views(capture& c, dataset_options const& options,
   return views;
 }
 
+// Cameras and points from the origin; what it is.
+vec3d set_origin(capture& c, dataset_options const& options) {
+  vec3d origin(0.0);
+  if (options.origin) {
+    origin = *options.origin;
+  } else {
+    std::vector<vec3d> centers;
+    for (frame const& f : c.frames) centers.push_back(f.view.position);
+    origin = origin_for(centers, c.points.position);
+    if (origin != vec3d(0.0))
+      c.notes.push_back("coordinates are held from the origin " + to_text(origin) +
+                        ", near which floats keep what they have");
+  }
+  if (origin == vec3d(0.0)) return origin;
+  for (frame& f : c.frames) f.view.position -= origin;
+  for (std::size_t i = 0; i < c.points.position.size(); ++i) c.points.position[i] -= origin[static_cast<int>(i % 3)];
+  return origin;
+}
+
 dataset load(fs::path const& path, dataset_options const& options) {
   if (options.downscale < 1) throw invalid_argument("dataset_options.downscale must be at least 1");
   if (options.test_every < 0) throw invalid_argument("dataset_options.test_every must be 0 (no test views) or more");
   if (!(options.depth.unit >= 0)) throw invalid_argument("dataset_options.depth: its unit must not be negative");
   capture c = read_capture(path, options);
+  vec3d const origin = set_origin(c, options);
   drop_frames_without_photo(c, options.load_images);
   dataset data;
   data.format = c.format;
+  data.origin = origin;
   data.split = assign_roles(c, options);
   data.resize_filter = options.downscale == 1 ? "none" : "box (1/" + std::to_string(options.downscale) + ")";
   std::size_t scaled = 0;
@@ -308,12 +346,12 @@ dataset load(fs::path const& path, dataset_options const& options) {
                    "no view is left to train on, all " + counted(data.test.size(), "view") + " are test views",
                    "ask for fewer: test_every 0 keeps every view for training");
   }
-  data.points = std::move(c.points);
+  data.points = {{c.points.position.begin(), c.points.position.end()}, std::move(c.points.color)};
   if (data.points.color.size() != data.points.position.size())
     data.points.color.assign(data.points.position.size(), 128);
   if (!data.train.empty()) measure_extent(data);
   drop_points_in_cameras(data);
-  if (!c.synthetic_bounds) measure_bounds(data);
+  if (!c.synthetic_bounds || origin != vec3d(0.0)) measure_bounds(data);
   return data;
 }
 
@@ -343,7 +381,7 @@ std::vector<named_camera> load_cameras(std::filesystem::path const& path) {
     return io::read_camera_json(path);
   }
   dataset_options options;
-  options.load_images = false;
+  options.load_images = false, options.origin = vec3d(0.0);
   dataset const data = load_dataset(path, options);
   std::vector<named_camera> cameras;
   for (auto const* views : {&data.test, &data.train}) {

@@ -34,11 +34,12 @@ void read_numbers(json const& view, char const* key, std::size_t count, T* to, s
 
 }  // namespace
 
-void write_exposures(std::filesystem::path const& path, exposure_field const& field) {
+void write_exposures(std::filesystem::path const& path, exposure_field const& field, vec3d const& origin) {
   json views = json::array();
   for (view_exposure const& v : field.views()) {
+    vec3d const position = v.position + origin;
     views.push_back({{"name", v.name},
-                     {"position", {v.position.x, v.position.y, v.position.z}},
+                     {"position", {position.x, position.y, position.z}},
                      {"direction", {v.direction.x, v.direction.y, v.direction.z}},
                      {"matrix", v.value.m}});
   }
@@ -50,7 +51,7 @@ void write_exposures(std::filesystem::path const& path, exposure_field const& fi
                        "\n");
 }
 
-exposure_field read_exposures(std::filesystem::path const& path) {
+exposure_field read_exposures(std::filesystem::path const& path, vec3d const& origin) {
   std::vector<u8> const bytes = io::with_words_quoted(read_file(path));
   json const file = json::parse(bytes.begin(), bytes.end(), nullptr, false);
   auto const list = [&](char const* key) {
@@ -73,6 +74,7 @@ exposure_field read_exposures(std::filesystem::path const& path) {
     view_exposure v;
     if (auto const name = view.find("name"); name != view.end() && name->is_string()) v.name = name->get<std::string>();
     read_numbers(view, "position", 3, &v.position.x, where);
+    v.position -= origin;
     read_numbers(view, "direction", 3, &v.direction.x, where);
     read_numbers(view, "matrix", exposure::floats, v.value.m, where);
     all.push_back(std::move(v));

@@ -22,7 +22,7 @@ class file_names {
  public:
   // Files below a folder. Those of these extensions are found by names that differ from theirs.
   explicit file_names(std::filesystem::path folder,
-                      std::initializer_list<std::string_view> extensions = {".png", ".jpg", ".jpeg"})
+                      std::initializer_list<std::string_view> extensions = {".png", ".jpg", ".jpeg", ".webp"})
       : folder_(std::move(folder)), extensions_(extensions) {}
 
   struct match {

@@ -1,12 +1,15 @@
-// GLB with KHR_gaussian_splatting: a glTF mesh of points whose attributes are Gaussians', unpacked. Axes: x left, y up,
-// z forward. Read with the transforms of the nodes above, as far as Gaussians can be turned by them; written as floats.
+// GLB with KHR_gaussian_splatting: a glTF mesh of points whose attributes are Gaussians', unpacked, or packed as SPZ
+// (KHR_gaussian_splatting_compression_spz_2). Axes: x left, y up, z forward. Read with the transforms of the nodes
+// above, as far as Gaussians can be turned by them; written as floats.
 // https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_gaussian_splatting
 
 #include "bytes.hpp"
 #include "packing.hpp"
+#include "spz.hpp"
 
 #include <gart/core/version.hpp>
 #include <gart/io/file.hpp>
+#include <gart/io/origin.hpp>
 #include <gart/io/splat_file.hpp>
 #include <gart/math/logit.hpp>
 #include <gart/scene/similarity.hpp>
@@ -25,7 +28,7 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr u32 magic = 0x46546c67, json_chunk = 0x4e4f534a, binary_chunk = 0x004e4942;
-constexpr char const* extension = "KHR_gaussian_splatting";
+constexpr char const *extension = "KHR_gaussian_splatting", *spz_extension = "KHR_gaussian_splatting_compression_spz_2";
 constexpr int up_axis = 2;  // half a turn about z is from a splat file's axes to glTF's
 constexpr int array_buffer = 34962;
 constexpr int deepest_node = 64;
@@ -40,6 +43,9 @@ std::string coefficient_name(int k) {
   while (k >= (degree + 1) * (degree + 1)) ++degree;
   return attribute("SH_DEGREE_" + std::to_string(degree) + "_COEF_" + std::to_string(k - degree * degree));
 }
+
+// The half turn of a place.
+vec3d turned(vec3d const& p) { return {-p.x, -p.y, p.z}; }
 
 class glb_reader {
  public:
@@ -81,10 +87,11 @@ class glb_reader {
     document_ = &document;
     if (document.contains("extensionsRequired"))
       for (auto const& needed : document["extensionsRequired"])
-        if (needed != extension)
+        if (needed != extension && needed != spz_extension)
           refuse("requires the extension " + needed.get<std::string>(),
-                 std::string("gart reads ") + extension + " alone: export it without compression");
+                 std::string("gart reads ") + extension + ", and SPZ within it: export it without other compression");
     gaussian_model all;
+    notes_ = notes, traits_ = traits;
     if (document.contains("scenes")) {
       auto const& scene = document["scenes"].at(document.value("scene", std::size_t{0}));
       if (scene.contains("nodes"))
@@ -97,6 +104,7 @@ class glb_reader {
     json const asset = document.value("asset", json::object());
     if (traits && asset.contains("extras") && asset["extras"].contains("gart"))
       for (auto const& [key, value] : asset["extras"]["gart"].items()) (*traits)[key] = value.get<std::string>();
+    if (traits && origin_ != vec3d(0.0)) *traits = with_origin(*traits, origin_of(*traits, name_) + turned(origin_));
     return all;
   }
 
@@ -141,14 +149,19 @@ class glb_reader {
   }
 
   void add(json const& primitive, json const& how, similarity const& placed, gaussian_model& all) {
-    if (how.value("kernel", "") != "ellipse")
+    // Drafts had neither, and meant these.
+    bool const draft = how.contains("extensions") && how["extensions"].contains(spz_extension);
+    if (how.value("kernel", draft ? "ellipse" : "") != "ellipse")
       refuse("has Gaussians of the kernel '" + how.value("kernel", "") + "'", "gart reads 'ellipse'");
-    if (how.value("colorSpace", "") != "srgb_rec709_display")
+    if (how.value("colorSpace", draft ? "srgb_rec709_display" : "") != "srgb_rec709_display")
       refuse("has colours in the space '" + how.value("colorSpace", "") + "'",
              "gart composites what is displayed, 'srgb_rec709_display': convert it");
-    if (how.contains("extensions") && !how["extensions"].empty())
+    if (how.contains("extensions") && !how["extensions"].empty()) {
+      if (how["extensions"].contains(spz_extension))
+        return append(of_spz(how["extensions"][spz_extension]), placed, all);
       refuse("has Gaussians by the extension " + how["extensions"].begin().key(),
-             std::string("gart reads ") + extension + " alone: export it without compression");
+             std::string("gart reads ") + extension + ", and SPZ within it: export it without other compression");
+    }
     auto const& attributes = primitive.at("attributes");
     int degree = 0;
     while (degree < 3 && attributes.contains(coefficient_name((degree + 1) * (degree + 1)))) ++degree;
@@ -175,14 +188,46 @@ class glb_reader {
     for (std::size_t j = 0; j < k; ++j)
       values(coefficient_name(static_cast<int>(j)), 3,
              [&](std::size_t i, std::size_t c, double v) { part.sh[3 * (k * i + j) + c] = static_cast<float>(v); });
-    apply_placement(placed, part);
+    append(std::move(part), placed, all);
+  }
+
+  // SPZ is decoded into glTF's axes, as its own library does that is asked for them.
+  gaussian_model of_spz(json const& packed) {
+    json const& view = document_->at("bufferViews").at(packed.at("bufferView").get<std::size_t>());
+    u64 const start = view.value("byteOffset", u64{0}), size = view.at("byteLength").get<u64>();
+    if (view.value("buffer", 0) != 0 || !binary_ || start > binary_size_ || size > binary_size_ - start)
+      refuse("its SPZ reaches past the end of the file's buffer", "the file is truncated: copy or export it again");
+    gaussian_model part = read_spz({binary_ + start, binary_ + start + size}, name_ + ": SPZ", traits_, notes_);
+    half_turn(part, up_axis);
+    return part;
+  }
+
+  void append(gaussian_model part, similarity const& placed, gaussian_model& all) {
+    int const degree = part.sh_degree;
+    require_plausible(name_, part.size() + all.size(), std::max(degree, all.sh_degree), bytes_.size());
+    apply_placement(from_origin(placed, part), part);
+    seen_ = true;
+    if (all.size() == 0) return void(all = std::move(part));
     // Of several meshes with other degrees, the highest holds all.
     int const most = std::max(degree, all.sh_degree);
     part = with_sh_degree(std::move(part), most), all = with_sh_degree(std::move(all), most);
     for_each_array(
         [](parameter_array const&, auto& to, auto const& from) { to.insert(to.end(), from.begin(), from.end()); }, all,
         part);
-    seen_ = true;
+  }
+
+  // Where a node puts its Gaussians so far from zero that floats would lose what they have, it is the origin.
+  similarity from_origin(similarity placed, gaussian_model const& part) {
+    if (!seen_ && placed.translation != vec3d(0.0)) {
+      std::vector<vec3d> places;
+      for (std::size_t i = 0; i < part.size(); ++i) {
+        vec3d const p(part.mean[3 * i], part.mean[3 * i + 1], part.mean[3 * i + 2]);
+        if (std::isfinite(p.x + p.y + p.z)) places.push_back(placed(p));
+      }
+      origin_ = origin_for(places);
+    }
+    placed.translation -= origin_;
+    return placed;
   }
 
   // What stands where it is keeps its bits.
@@ -257,7 +302,10 @@ class glb_reader {
   std::size_t binary_size_ = 0;
   json const* document_ = nullptr;
   std::vector<bool> visited_;
+  splat_traits* traits_ = nullptr;
+  std::vector<std::string>* notes_ = nullptr;
   bool seen_ = false;
+  vec3d origin_{0.0};  // in glTF's axes
 };
 
 // Attributes one after the other: their bytes, and what glTF says of them.
@@ -283,7 +331,8 @@ struct glb_buffer {
 // glTF's fallback colours are linear light, a Gaussian's are as displayed.
 double linear_light(double c) { return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4); }
 
-void write_glb(fs::path const& path, gaussian_model const& given, splat_traits const& traits, splat_packing const&) {
+void write_glb(fs::path const& path, gaussian_model const& given, splat_traits const& all_traits,
+               splat_packing const& packing) {
   require_packable(path, given);
   if (given.size() == 0) throw io_error(path.string(), "glTF has no mesh without a point", "keep some Gaussians");
   gaussian_model m = given;
@@ -318,7 +367,11 @@ void write_glb(fs::path const& path, gaussian_model const& given, splat_traits c
     out.add<float>(coefficient_name(static_cast<int>(j)), n, 3, f32,
                    [&](std::size_t i, std::size_t c) { return m.sh[3 * (k * i + j) + c]; });
   json asset = {{"version", "2.0"}, {"generator", std::string("gart ") + version}};
+  splat_traits const traits = packing.world ? with_origin(all_traits, vec3d(0.0)) : all_traits;
   if (!traits.empty()) asset["extras"]["gart"] = traits;
+  json node = {{"mesh", 0}};
+  if (vec3d const place = turned(origin_of(all_traits, path.string())); packing.world && place != vec3d(0.0))
+    node["translation"] = {place.x, place.y, place.z};
   json const how = {{"kernel", "ellipse"},
                     {"colorSpace", "srgb_rec709_display"},
                     {"projection", "perspective"},
@@ -328,7 +381,7 @@ void write_glb(fs::path const& path, gaussian_model const& given, splat_traits c
       {"extensionsUsed", {extension}},
       {"scene", 0},
       {"scenes", {{{"nodes", {0}}}}},
-      {"nodes", {{{"mesh", 0}}}},
+      {"nodes", json::array({node})},
       {"buffers", {{{"byteLength", out.bytes.size()}}}},
       {"bufferViews", out.views},
       {"accessors", out.accessors},
@@ -354,7 +407,7 @@ void write_glb(fs::path const& path, gaussian_model const& given, splat_traits c
 extern splat_format const glb_format;
 splat_format const glb_format = {"GLB",
                                  ".glb",
-                                 {.traits = true},
+                                 {.traits = true, .world = true},
                                  [](std::string_view first) { return first.starts_with("glTF"); },
                                  [](fs::path const& path, splat_traits* traits, std::vector<std::string>* notes) {
                                    return glb_reader(path).read(traits, notes);

@@ -1,4 +1,5 @@
 #include "codec.hpp"
+#include "webp.hpp"
 
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
@@ -12,7 +13,7 @@ namespace gart {
 namespace {
 
 [[noreturn]] void refuse_kind(std::filesystem::path const& path) {
-  throw io_error(path.string(), "is neither PNG nor JPEG", "convert it to one of them");
+  throw io_error(path.string(), "is neither PNG, JPEG nor WebP", "convert it to one of them");
 }
 
 }  // namespace
@@ -21,6 +22,7 @@ image8 read_image(std::filesystem::path const& path) {
   std::vector<u8> const bytes = read_file(path);
   if (io::is_png(bytes)) return io::decode_png(bytes, path.string());
   if (io::is_jpeg(bytes)) return io::decode_jpeg(bytes, path.string());
+  if (io::is_webp(bytes)) return io::decode_webp_photo(bytes, path.string());
   refuse_kind(path);
 }
 
@@ -28,6 +30,7 @@ io::image_size io::read_image_size(std::filesystem::path const& path) {
   std::vector<u8> const bytes = read_file(path);
   if (is_png(bytes)) return png_size(bytes, path.string());
   if (is_jpeg(bytes)) return jpeg_size(bytes, path.string());
+  if (is_webp(bytes)) return webp_size(bytes, path.string());
   refuse_kind(path);
 }
 

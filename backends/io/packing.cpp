@@ -16,8 +16,9 @@ namespace gart::io {
 
 namespace {
 
-// Of the floats of a model over the bytes of its file; and what is little memory, however small the file.
-constexpr u64 most_growth = 48, small_model = u64{1} << 20;
+// Of the floats of a model over the bytes of its file, so that with a copy of it they are 64 times these; and what is
+// little memory, however small the file.
+constexpr u64 most_growth = 30, small_model = u64{1} << 20;
 constexpr float least_log_scale = -69;  // of a scale of about 1e-30
 constexpr double sh_0 = 0.28209479177387814;
 
@@ -154,9 +155,21 @@ void require_plausible(std::string const& file, u64 gaussians, int sh_degree, u6
 float settled_opacity(float logit) { return std::isinf(logit) ? opacity_logit(logit > 0 ? 1.0 : 0.0) : logit; }
 float settled_scale(float log_scale) { return std::isinf(log_scale) && log_scale < 0 ? least_log_scale : log_scale; }
 
+void settle_rotation(float* q) {
+  // Squares of these are what float has no digits or no room for (math/quaternion.hpp).
+  constexpr double shortest = 2e-4, longest = 1e18;
+  double norm = 0;
+  for (int k = 0; k < 4; ++k) norm += static_cast<double>(q[k]) * static_cast<double>(q[k]);
+  norm = std::sqrt(norm);
+  if (!(norm > 0) || !std::isfinite(norm) || (norm >= shortest && norm <= longest)) return;
+  auto const u = unit(q);
+  for (std::size_t k = 0; k < 4; ++k) q[k] = static_cast<float>(u[k]);
+}
+
 void keep_usable(std::string const& file, gaussian_model& model, std::vector<std::string>* notes) {
   for (float& v : model.opacity) v = settled_opacity(v);
   for (float& v : model.log_scale) v = settled_scale(v);
+  for (std::size_t i = 0; i < model.size(); ++i) settle_rotation(&model.quaternion[4 * i]);
   unusable bad;
   for (std::size_t i = 0; i < model.size(); ++i) {
     auto const named = [&] { return "Gaussian " + std::to_string(i) + ", "; };

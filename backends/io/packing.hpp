@@ -68,7 +68,10 @@ void require_plausible(std::string const& file, u64 gaussians, int sh_degree, u6
 // A logit without end is an opacity of all or nothing, and the logarithm of nothing a scale: finite ones for these.
 float settled_opacity(float logit);
 float settled_scale(float log_scale);
-// Settles them, and leaves out the Gaussians with other numbers that are not finite, or rotations of no direction.
+// A quaternion too short, or too long, to be drawn: the same rotation, of length 1. Others keep their bits.
+void settle_rotation(float* q);
+// Settles all of them, and leaves out the Gaussians with other numbers that are not finite, or rotations of no
+// direction.
 void keep_usable(std::string const& file, gaussian_model& model, std::vector<std::string>* notes);
 // Refuses to write numbers that are not finite: packed they would be others.
 void require_packable(std::filesystem::path const& path, gaussian_model const& model);

@@ -19,7 +19,7 @@ void place_training_views(dataset& data, std::filesystem::path const& cameras) {
       throw io_error(cameras.string() + ", camera '" + view.name + "'",
                      "has shutter_type " + shutter_type_of(pose) + ", the capture " + shutter_type_of(view.view),
                      "give the poses.json of a run on this capture");
-    view.view.position = pose.position, view.view.rotation = pose.rotation;
+    view.view.position = pose.position - data.origin, view.view.rotation = pose.rotation;
     view.view.travel = pose.travel, view.view.turn = pose.turn;
   }
 }

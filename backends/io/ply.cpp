@@ -6,7 +6,9 @@
 
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
+#include <gart/io/origin.hpp>
 #include <gart/io/ply.hpp>
+#include <gart/math/logit.hpp>
 
 namespace gart {
 namespace {
@@ -32,6 +34,8 @@ std::vector<std::string> splat_columns(int degree, bool normals) {
 // Puts column c of vertex i, in the order of splat_columns(degree, false), into its array.
 struct splat_store {
   gaussian_model& model;
+  std::vector<double>* exact = nullptr;   // where means go in double
+  std::vector<double>* filter = nullptr;  // and mip-splatting's filter_3D, behind all columns
 
   // By the reader of every format (packing.hpp).
   double settled(std::size_t c, double value) const {
@@ -40,11 +44,16 @@ struct splat_store {
     float const v = static_cast<float>(value);
     return static_cast<double>(c == opacity ? io::settled_opacity(v) : c < opacity + 4 ? io::settled_scale(v) : v);
   }
-  void resize(std::size_t n) const { model.resize(n, model.sh_degree); }
+  void resize(std::size_t n) const {
+    model.resize(n, model.sh_degree);
+    if (exact) exact->resize(3 * n);
+    if (filter) filter->resize(n);
+  }
   void operator()(std::size_t c, std::size_t i, double value) const {
     float const v = static_cast<float>(value);
     std::size_t const k = static_cast<std::size_t>(sh_coefficients(model.sh_degree)), rest = k - 1;
     if (c < 3) {
+      if (exact) (*exact)[3 * i + c] = value;
       model.mean[3 * i + c] = v;
       return;
     }
@@ -68,11 +77,45 @@ struct splat_store {
       model.log_scale[3 * i + c] = v;
       return;
     }
-    model.quaternion[4 * i + c - 3] = v;
+    c -= 3;
+    if (c < 4)
+      model.quaternion[4 * i + c] = v;
+    else
+      (*filter)[i] = value;
   }
 };
 
-gaussian_model splats_of(ply_file const& file, std::vector<std::string>* notes) {
+// Means in double are from an origin of their own, where floats would lose what they have.
+vec3d set_exact_means(gaussian_model& model, std::vector<double> const& exact) {
+  std::vector<vec3d> places;
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    vec3d const p(exact[3 * i], exact[3 * i + 1], exact[3 * i + 2]);
+    if (std::abs(p.x) <= 1e18 && std::abs(p.y) <= 1e18 && std::abs(p.z) <= 1e18) places.push_back(p);
+  }
+  vec3d const origin = origin_for(places);
+  for (std::size_t i = 0; i < exact.size(); ++i)
+    model.mean[i] = static_cast<float>(exact[i] - origin[static_cast<int>(i % 3)]);
+  return origin;
+}
+
+// Mip-splatting's Gaussians as it draws them: s^2 becomes s^2 + f^2 along each axis, and the opacity is less by what
+// the density loses. https://github.com/autonomousvision/mip-splatting
+void fuse_filter(gaussian_model& model, std::vector<double> const& filter) {
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    if (!(filter[i] > 0) || !std::isfinite(filter[i])) continue;
+    double logit = static_cast<double>(model.opacity[i]), log_density = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      float& log_scale = model.log_scale[3 * i + c];
+      double const ratio = filter[i] / std::exp(static_cast<double>(log_scale));
+      double const wider = ratio < 1e150 ? 0.5 * std::log1p(ratio * ratio) : std::log(ratio);
+      log_scale = static_cast<float>(static_cast<double>(log_scale) + wider), log_density -= wider;
+    }
+    model.opacity[i] = io::opacity_logit(sigmoid_in_double(logit) * std::exp(log_density));
+  }
+}
+
+// `origin`: what is added to that of the traits.
+gaussian_model splats_of(ply_file const& file, std::vector<std::string>* notes, vec3d& origin) {
   element const& e = vertices(file);
   if (!find(e, "f_dc_0") && (find(e, "red") || !find(e, "opacity"))) {
     file.refuse("property 'f_dc_0' is missing: these are points, not Gaussians", "name the model.ply of a training");
@@ -92,7 +135,21 @@ gaussian_model splats_of(ply_file const& file, std::vector<std::string>* notes) 
   std::vector<std::string> const columns = splat_columns(model.sh_degree, false);
   require_columns(file, e, columns, "export the model with every property of the INRIA layout");
   io::unusable bad;
-  read_vertices(file, columns, splat_store{model}, bad);
+  std::vector<double> exact;
+  std::vector<double> filter;
+  bool const in_double = find(e, "x")->type == scalar::f64, filtered = find(e, "filter_3D") != nullptr;
+  std::vector<std::string> read = columns;
+  if (filtered) read.push_back("filter_3D");
+  read_vertices(file, read, splat_store{model, in_double ? &exact : nullptr, filtered ? &filter : nullptr}, bad);
+  if (in_double) origin = set_exact_means(model, exact);
+  if (filtered) {
+    fuse_filter(model, filter);
+    if (notes)
+      notes->push_back(file.name +
+                       " is of mip-splatting: its filter_3D is taken into scales and opacities, its filter "
+                       "of pixels is antialias");
+  }
+  for (std::size_t i = 0; i < model.size(); ++i) io::settle_rotation(&model.quaternion[4 * i]);
   for (std::size_t i = 0; i < model.size(); ++i)
     if (io::no_rotation(&model.quaternion[4 * i]))
       bad.add(i, [&] {
@@ -105,17 +162,23 @@ gaussian_model splats_of(ply_file const& file, std::vector<std::string>* notes) 
   return io::in_order(model, bad.others(model.size(), "Gaussian", file.name, notes));
 }
 
-std::string header_of(std::filesystem::path const& path, int sh_degree, u64 count, splat_traits const& traits) {
-  std::string text = header_start(path, traits);
+std::string header_of(std::filesystem::path const& path, int sh_degree, u64 count, splat_traits const& traits,
+                      bool world = false) {
+  std::string text = header_start(path, world ? with_origin(traits, vec3d(0.0)) : traits);
   text += "element vertex " + std::to_string(count) + "\n";
-  for (std::string const& name : splat_columns(sh_degree, true)) text += "property float " + name + "\n";
+  std::string const type = world ? "property double " : "property float ";
+  for (std::string const& name : splat_columns(sh_degree, true))
+    text += (name.size() == 1 ? type : "property float ") + name + "\n";
   return text + "end_header\n";
 }
 
-// Gaussian i, as a vertex.
-void put_vertex(std::string& text, gaussian_model const& model, std::size_t i) {
+// Gaussian i, as a vertex; from zero where there is an origin.
+void put_vertex(std::string& text, gaussian_model const& model, std::size_t i, vec3d const* origin = nullptr) {
   std::size_t const k = static_cast<std::size_t>(sh_coefficients(model.sh_degree));
-  for (std::size_t c = 0; c < 3; ++c) put(text, model.mean[3 * i + c]);
+  for (std::size_t c = 0; c < 3; ++c) {
+    float const mean = model.mean[3 * i + c];
+    origin ? put(text, static_cast<double>(mean) + (*origin)[static_cast<int>(c)]) : put(text, mean);
+  }
   for (int c = 0; c < 3; ++c) put(text, 0.0f);
   float const* sh = model.sh.data() + 3 * k * i;
   for (std::size_t c = 0; c < 3; ++c) put(text, sh[c]);
@@ -132,36 +195,50 @@ void require_agreement(std::filesystem::path const& path, gaussian_model const& 
     throw invalid_argument("the arrays of the model to write to " + path.string() + " do not agree in size");
 }
 
+void write_ply(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits, bool world) {
+  require_agreement(path, model);
+  vec3d const origin = origin_of(traits, path.string());
+  std::string text = header_of(path, model.sh_degree, model.size(), traits, world);
+  write_file(path, [&](std::ostream& out) {
+    for (std::size_t i = 0; i < model.size(); ++i) {
+      put_vertex(text, model, i, world ? &origin : nullptr);
+      drain(out, text, chunk);
+    }
+    drain(out, text, 0);
+  });
+}
+
+splat_traits traits_of(ply_file const& file, vec3d const& origin) {
+  splat_traits traits = file.head.traits;
+  if (find(vertices(file), "filter_3D")) traits.try_emplace("antialias", "");
+  if (origin != vec3d(0.0)) traits = with_origin(traits, origin + origin_of(traits, file.name));
+  return traits;
+}
+
 }  // namespace
 
 gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* traits,
                               std::vector<std::string>* notes) {
   ply_file const file = open(path);
-  gaussian_model model = splats_of(file, notes);
-  if (traits) *traits = file.head.traits;
+  vec3d origin(0.0);
+  gaussian_model model = splats_of(file, notes, origin);
+  if (traits) *traits = traits_of(file, origin);
   return model;
 }
 
 gaussian_model read_splat_ply_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
                                    splat_traits* traits) {
   ply_file const file = open_rows(path, owners, total);
-  gaussian_model model = splats_of(file, nullptr);
-  if (traits) *traits = file.head.traits;
+  vec3d origin(0.0);
+  gaussian_model model = splats_of(file, nullptr, origin);
+  if (traits) *traits = traits_of(file, origin);
   if (file.owners.ranks == owners.ranks) return model;
   total = model.size();
   return rows_of(model, owners);
 }
 
 void write_splat_ply(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits) {
-  require_agreement(path, model);
-  std::string text = header_of(path, model.sh_degree, model.size(), traits);
-  write_file(path, [&](std::ostream& out) {
-    for (std::size_t i = 0; i < model.size(); ++i) {
-      put_vertex(text, model, i);
-      drain(out, text, chunk);
-    }
-    drain(out, text, 0);
-  });
+  write_ply(path, model, traits, false);
 }
 
 void write_splat_ply_rows(shared_file& file, std::filesystem::path const& path, gaussian_model const& mine,
@@ -187,10 +264,10 @@ extern splat_format const ply_format;
 splat_format const ply_format = {
     "PLY",
     ".ply",
-    {.traits = true, .kernel = true},
+    {.traits = true, .kernel = true, .world = true},
     [](std::string_view first) { return first.starts_with("ply\n") || first.starts_with("ply\r"); },
     read_splat_ply,
     [](std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits,
-       splat_packing const&) { write_splat_ply(path, model, traits); }};
+       splat_packing const& packing) { write_ply(path, model, traits, packing.world); }};
 
 }  // namespace gart

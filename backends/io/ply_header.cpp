@@ -118,7 +118,8 @@ ply_file open_rows(std::filesystem::path const& path, row_owners const& owners, 
   bool whole = file.head.format == encoding::ascii;
   auto vertices = file.head.elements.begin();
   for (; vertices != file.head.elements.end(); ++vertices) {
-    for (property const& p : vertices->properties) whole = whole || p.list;
+    // Means in double have an origin by all of them.
+    for (property const& p : vertices->properties) whole = whole || p.list || (p.name == "x" && p.type == scalar::f64);
     record = vertices->smallest(file.head.format);
     if (vertices->name == "vertex") break;
     whole = whole || (record != 0 && vertices->count > size / record);

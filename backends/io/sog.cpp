@@ -1,5 +1,5 @@
-// SOG, version 2: a zip file of lossless WebP textures, a pixel a Gaussian, and meta.json that says what their bytes
-// mean. Scales and colours are numbers of a codebook, spherical harmonics rows of a palette.
+// SOG, version 2: a zip file, or a folder, of lossless WebP textures, a pixel a Gaussian, and meta.json that says what
+// their bytes mean. Scales and colours are numbers of a codebook, spherical harmonics rows of a palette.
 // https://developer.playcanvas.com/user-manual/gaussian-splatting/formats/sog/
 
 #include "bulk.hpp"
@@ -12,6 +12,8 @@
 #include <gart/io/splat_file.hpp>
 
 #include <nlohmann/json.hpp>
+
+#include <optional>
 
 namespace gart {
 namespace {
@@ -52,13 +54,64 @@ bool unpack_rotation(u8 const* rgba, float* wxyz) {
   return true;
 }
 
+// The entries of a SOG: of a zip file, or of the folder that a path is, or that its meta.json is in.
+class sog_entries {
+ public:
+  explicit sog_entries(fs::path const& path) : name_(path.string()) {
+    std::error_code ignored;
+    if (fs::is_directory(path, ignored)) {
+      folder_ = path;
+    } else if (path.filename() == "meta.json") {
+      folder_ = path.has_parent_path() ? path.parent_path() : fs::path(".");
+    } else {
+      bytes_ = read_file(path), size_ = bytes_.size();
+      zip_.emplace(bytes_, name_);
+      return;
+    }
+    for (fs::directory_iterator at(folder_, ignored), end; !ignored && at != end; at.increment(ignored))
+      if (std::error_code code; at->is_regular_file(code)) size_ += at->file_size(code);
+  }
+  u64 size() const { return size_; }
+
+  std::vector<u8> get(std::string const& entry, std::size_t most) const {
+    if (zip_) return zip_->get(entry, most);
+    if (fs::path(entry).filename().string() != entry)
+      throw io_error(name_ + ": meta.json", "names the file " + entry + ", which is not beside it", "export it again");
+    std::error_code code;
+    if (fs::file_size(folder_ / entry, code) > most && !code)
+      throw io_error((folder_ / entry).string(), "is larger than belongs there", "export it again");
+    return read_file(folder_ / entry);
+  }
+
+  // What the zip file is around, where it is no SOG.
+  void require_meta() const {
+    if (!zip_) return;
+    std::string models;
+    for (std::string const& entry : zip_->names()) {
+      if (entry == "meta.json" || entry.ends_with("/meta.json")) return;
+      for (auto const* format : splat_formats())
+        if (models.empty() && entry.ends_with(format->extension)) models = entry;
+    }
+    if (!models.empty()) throw io_error(name_, "is a zip file around " + models, "unpack it, and name " + models);
+    throw io_error(name_, "is a zip file without the meta.json of SOG", "name a file of Gaussians");
+  }
+
+ private:
+  std::string name_;
+  fs::path folder_;
+  std::vector<u8> bytes_;
+  u64 size_ = 0;
+  std::optional<zip_reader> zip_;
+};
+
 class sog_reader {
  public:
-  explicit sog_reader(fs::path const& path) : name_(path.string()), bytes_(read_file(path)), zip_(bytes_, name_) {}
+  explicit sog_reader(fs::path const& path) : name_(path.string()), entries_(path) {}
 
   gaussian_model read(splat_traits* traits, std::vector<std::string>* notes) {
+    entries_.require_meta();
     try {
-      return from(json::parse(zip_.get("meta.json", bytes_.size() + (1 << 16))), traits, notes);
+      return from(json::parse(entries_.get("meta.json", entries_.size() + (1 << 16))), traits, notes);
     } catch (json::exception const& e) {
       throw io_error(name_ + ": meta.json", e.what(), "export it again");
     }
@@ -71,7 +124,7 @@ class sog_reader {
 
   texture image(json const& of, std::size_t number, std::size_t least, std::size_t most) const {
     auto const entry = of.at("files").at(number).get<std::string>();
-    texture t = decode_webp(zip_.get(entry, bytes_.size() * 4 + (1 << 20)), most, name_, entry);
+    texture t = decode_webp(entries_.get(entry, entries_.size() * 4 + (1 << 20)), most, name_, entry);
     if (t.pixels() < least)
       throw io_error(name_, "the entry " + entry + " has fewer pixels than there are Gaussians", "export it again");
     return t;
@@ -92,7 +145,7 @@ class sog_reader {
     bool const colored = meta.contains("shN") && !meta["shN"].is_null();
     int const degree = colored ? meta["shN"].at("bands").get<int>() : 0;
     if (degree < 0 || degree > 3) refuse("shN.bands is " + std::to_string(degree) + ", not 0 to 3");
-    require_plausible(name_, n, degree, bytes_.size());
+    require_plausible(name_, n, degree, entries_.size());
     // A texture has a pixel a Gaussian, and what fills its last rows.
     std::size_t const most = n + n / 4 + (std::size_t{1} << 16);
     gaussian_model m;
@@ -156,8 +209,7 @@ class sog_reader {
   }
 
   std::string name_;
-  std::vector<u8> bytes_;
-  zip_reader zip_;
+  sog_entries entries_;
 };
 
 class sog_writer {

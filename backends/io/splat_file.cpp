@@ -39,6 +39,10 @@ splat_format const* by_name(std::filesystem::path const& path) {
 
 // The name decides where the bytes say nothing, so that a damaged file is refused by its own format's reader.
 splat_format const* format_of(std::filesystem::path const& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored))
+    return std::filesystem::exists(path / "meta.json", ignored) ? &sog_format : nullptr;
+  if (path.filename() == "meta.json") return &sog_format;
   std::ifstream file(path, std::ios::binary);
   char first[4096] = {};
   file.read(first, sizeof first);
@@ -59,7 +63,8 @@ splat_format const& written_as(std::filesystem::path const& path) {
 
 // Whether the trait stays, whole or as a mark.
 bool keeps(splat_room const& room, std::string const& trait) {
-  return room.traits || (room.kernel && trait == "kernel_degree") || (room.antialias && trait == "antialias");
+  return room.traits || (room.kernel && trait == "kernel_degree") || (room.antialias && trait == "antialias") ||
+         (room.origin && trait == "origin");
 }
 
 bool another_kernel(splat_traits const& traits) {
@@ -115,6 +120,9 @@ void write_splats(std::filesystem::path const& path, gaussian_model const& model
                    std::string(format.name) + " has no word for the kernel degree " + traits.at("kernel_degree") +
                        " that the model was trained with, and would show Gaussians",
                    "write a .ply or a .compressed.ply, or train with kernel degree 2");
+  if (packing.world && !format.room.world)
+    throw io_error(path.string(), std::string(format.name) + " has no room for coordinates in double",
+                   "write a .ply or a .glb in the capture's coordinates, or keep the origin");
   splat_traits kept;
   for (auto const& trait : traits)
     if (keeps(format.room, trait.first)) kept.insert(trait);

@@ -2,12 +2,14 @@
 // a gzip file, the fourth each in a frame of zstd. Axes: x right, y up, z back.
 // https://github.com/nianticlabs/spz
 
+#include "spz.hpp"
 #include "bulk.hpp"
 #include "bytes.hpp"
 #include "compression.hpp"
 #include "packing.hpp"
 
 #include <gart/io/file.hpp>
+#include <gart/io/origin.hpp>
 #include <gart/io/splat_file.hpp>
 
 #include <ostream>
@@ -21,6 +23,7 @@ namespace fs = std::filesystem;
 constexpr u32 magic = 0x5053474e;  // "NGSP"
 constexpr u8 flag_antialiased = 1, flag_extensions = 2;
 constexpr u32 coordinates_extension = 0xadbe0003;
+constexpr u32 origin_extension = 0x67610001;  // gart's own: three doubles, in a splat file's axes
 constexpr u32 right_up_back = 4;
 constexpr double color_scale = 0.15;
 constexpr double half_root = 0.70710678118654752440;
@@ -125,7 +128,7 @@ gaussian_model unpacked(header const& h, std::array<u8 const*, streams> const& s
 
 class spz_reader {
  public:
-  explicit spz_reader(fs::path const& path) : name_(path.string()), bytes_(read_file(path)) {}
+  spz_reader(std::vector<u8> bytes, std::string name) : name_(std::move(name)), bytes_(std::move(bytes)) {}
 
   gaussian_model read(splat_traits* traits, std::vector<std::string>* notes) {
     bool const gzip = bytes_.size() >= 2 && bytes_[0] == 0x1f && bytes_[1] == 0x8b;
@@ -133,6 +136,7 @@ class spz_reader {
     keep_usable(name_, m, notes);
     half_turn(m, 0);
     if (traits && head_.flags & flag_antialiased) (*traits)["antialias"] = "";
+    if (traits) *traits = with_origin(std::move(*traits), origin_);
     return m;
   }
 
@@ -214,7 +218,7 @@ class spz_reader {
 
   // Records of a type, a length and as many bytes. One that says that the axes are others is refused, the rest is not
   // about the Gaussians.
-  void read_extensions(std::vector<u8> const& records) const {
+  void read_extensions(std::vector<u8> const& records) {
     byte_reader in(records, name_);
     while (in.remaining() >= 8) {
       u32 const type = in.get<u32>("an extension"), size = in.get<u32>("an extension");
@@ -225,6 +229,9 @@ class spz_reader {
                      std::to_string(axes) + ")",
                  "export it without that extension");
         in.skip(size - 4, "an extension");
+      } else if (type == origin_extension && size == 24 && in.remaining() >= 24) {
+        for (int k = 0; k < 3; ++k) origin_[k] = in.get<double>("the origin");
+        if (!(glm::length(origin_) <= 1e18)) refuse("has an origin that is not finite", "export it again");
       } else {
         in.skip(std::min<u64>(size, in.remaining()), "an extension");
       }
@@ -234,6 +241,7 @@ class spz_reader {
   std::string name_;
   std::vector<u8> bytes_;
   header head_;
+  vec3d origin_{0.0};
 };
 
 // The most bits of fraction, up to 20, with which every position is in the 24 there are.
@@ -290,7 +298,13 @@ void write_spz(fs::path const& path, gaussian_model const& given, splat_traits c
   });
 
   std::vector<std::vector<u8>> frames;
-  std::string contents, head;
+  std::string contents, head, extensions;
+  if (vec3d const origin = origin_of(traits, path.string()); origin != vec3d(0.0)) {
+    h.flags |= flag_extensions;
+    put(extensions, origin_extension);
+    put(extensions, u32{24});
+    for (int k = 0; k < 3; ++k) put(extensions, origin[k]);
+  }
   for (auto const& stream : s) {
     if (stream.empty()) continue;
     frames.push_back(zstd_compressed(stream, path.string()));
@@ -301,8 +315,9 @@ void write_spz(fs::path const& path, gaussian_model const& given, splat_traits c
   put(head, h.version);
   put(head, h.count);
   for (u8 const byte : {h.degree, h.fraction, h.flags, static_cast<u8>(frames.size())}) put(head, byte);
-  put(head, u32{32});
+  put(head, static_cast<u32>(32 + extensions.size()));
   head.resize(32, '\0');
+  head += extensions;
   write_file(path, [&](std::ostream& out) {
     out << head << contents;
     for (auto const& frame : frames)
@@ -312,14 +327,19 @@ void write_spz(fs::path const& path, gaussian_model const& given, splat_traits c
 
 }  // namespace
 
+gaussian_model io::read_spz(std::vector<u8> bytes, std::string const& name, splat_traits* traits,
+                            std::vector<std::string>* notes) {
+  return spz_reader(std::move(bytes), name).read(traits, notes);
+}
+
 extern splat_format const spz_format;
 splat_format const spz_format = {
     "SPZ",
     ".spz",
-    {.strays = false, .antialias = true},
+    {.strays = false, .antialias = true, .origin = true},
     [](std::string_view first) { return first.starts_with("NGSP") || first.starts_with("\x1f\x8b\x08"); },
     [](fs::path const& path, splat_traits* traits, std::vector<std::string>* notes) {
-      return spz_reader(path).read(traits, notes);
+      return read_spz(read_file(path), path.string(), traits, notes);
     },
     write_spz};
 

@@ -7,8 +7,6 @@
 #include "file_names.hpp"
 #include "json_record.hpp"
 
-#include <gart/io/ply.hpp>
-
 #include <algorithm>
 #include <set>
 
@@ -130,7 +128,7 @@ void read_frames(fs::path const& file, part role, capture& result) {
   }
   if (!bad.records().empty()) bad.others(frames.size(), "frame", file.string(), &result.notes);
   if (top.has("ply_file_path") && result.points.size() == 0)
-    result.points = read_point_ply(from_text(folder, top.text("ply_file_path")), &result.notes);
+    result.points = read_exact_points(from_text(folder, top.text("ply_file_path")), &result.notes);
 }
 
 }  // namespace
@@ -152,7 +150,8 @@ capture read_blender(fs::path const& folder) {
   }
   // Where the INRIA reference keeps the points of a Blender scene.
   fs::path const points = folder / "points3d.ply";
-  if (result.points.size() == 0 && fs::exists(points, ignored)) result.points = read_point_ply(points, &result.notes);
+  if (result.points.size() == 0 && fs::exists(points, ignored))
+    result.points = read_exact_points(points, &result.notes);
   return result;
 }
 

@@ -7,9 +7,14 @@
 #include <webp/encode.h>
 #endif
 
+#include <cstring>
 #include <memory>
 
 namespace gart::io {
+
+bool is_webp(std::vector<u8> const& bytes) {
+  return bytes.size() >= 12 && std::memcmp(bytes.data(), "RIFF", 4) == 0 && std::memcmp(&bytes[8], "WEBP", 4) == 0;
+}
 
 #if defined(GART_WITH_WEBP)
 
@@ -49,7 +54,46 @@ texture decode_webp(std::vector<u8> const& bytes, std::size_t most, std::string 
   return image;
 }
 
+namespace {
+
+// Even what is all of one colour: 16 million pixels, or a thousand a byte.
+constexpr u64 most_pixels = u64{1} << 24, pixels_a_byte = 1024;
+
+WebPBitstreamFeatures features_of(std::vector<u8> const& bytes, std::string const& where) {
+  WebPBitstreamFeatures f;
+  if (WebPGetFeatures(bytes.data(), bytes.size(), &f) != VP8_STATUS_OK)
+    throw io_error(where, "is not a readable WebP", "replace the file");
+  if (f.has_animation) throw io_error(where, "is a WebP of several images", "save one of them alone");
+  u64 const pixels = static_cast<u64>(f.width) * static_cast<u64>(f.height);
+  if (pixels > most_pixels && pixels > pixels_a_byte * bytes.size())
+    throw io_error(where, "the size in its header is larger than its data can hold", "replace the file");
+  return f;
+}
+
+}  // namespace
+
+image_size webp_size(std::vector<u8> const& bytes, std::string const& where) {
+  WebPBitstreamFeatures const f = features_of(bytes, where);
+  return {f.width, f.height};
+}
+
+image8 decode_webp_photo(std::vector<u8> const& bytes, std::string const& where) {
+  WebPBitstreamFeatures const f = features_of(bytes, where);
+  image8 image(f.width, f.height, f.has_alpha ? 4 : 3);
+  auto const decode = f.has_alpha ? WebPDecodeRGBAInto : WebPDecodeRGBInto;
+  if (!decode(bytes.data(), bytes.size(), image.data.data(), image.data.size(), f.width * image.channels))
+    throw io_error(where, "is not a readable WebP", "replace the file");
+  return image;
+}
+
 #else
+
+image_size webp_size(std::vector<u8> const&, std::string const& where) {
+  refuse_without(where, "a WebP photograph", "libwebp", "libwebp-dev");
+}
+image8 decode_webp_photo(std::vector<u8> const&, std::string const& where) {
+  refuse_without(where, "a WebP photograph", "libwebp", "libwebp-dev");
+}
 
 std::vector<u8> encode_webp(texture const&, std::string const& file) {
   refuse_without(file, "SOG", "libwebp", "libwebp-dev");

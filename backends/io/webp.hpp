@@ -1,5 +1,7 @@
 #pragma once
-// Lossless WebP: four bytes a pixel there and back, whatever the fourth is.
+// WebP: lossless textures, four bytes a pixel there and back, whatever the fourth is; and photographs.
+
+#include "codec.hpp"
 
 #include <gart/core/types.hpp>
 
@@ -20,5 +22,10 @@ struct texture {
 // io_error naming the package, where gart was built without libwebp; for more than `most` pixels; for what is none.
 std::vector<u8> encode_webp(texture const& image, std::string const& file);
 texture decode_webp(std::vector<u8> const& bytes, std::size_t most, std::string const& file, std::string const& entry);
+
+bool is_webp(std::vector<u8> const& bytes);
+// 3 channels, or 4 with straight alpha; `where` names the file in errors.
+image8 decode_webp_photo(std::vector<u8> const& bytes, std::string const& where);
+image_size webp_size(std::vector<u8> const& bytes, std::string const& where);
 
 }  // namespace gart::io

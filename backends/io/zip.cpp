@@ -88,6 +88,12 @@ std::vector<u8> zip_reader::get(std::string const& name, std::size_t most) const
   throw io_error(file_, "has no entry " + name, "export it again");
 }
 
+std::vector<std::string> zip_reader::names() const {
+  std::vector<std::string> all;
+  for (auto const& entry : entries_) all.push_back(entry.first);
+  return all;
+}
+
 std::string zip_of(std::vector<std::pair<std::string, std::vector<u8>>> const& entries, std::string const& file) {
   std::string out, directory;
   for (auto const& [name, bytes] : entries) {

@@ -17,6 +17,8 @@ class zip_reader {
   zip_reader(std::vector<u8> const& bytes, std::string file);
   // An entry, wherever in the archive's folders a name that ends so stands; at most `most` bytes, else io_error.
   std::vector<u8> get(std::string const& name, std::size_t most) const;
+  // Of all entries, in order.
+  std::vector<std::string> names() const;
 
  private:
   struct entry {

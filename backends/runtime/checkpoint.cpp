@@ -26,7 +26,7 @@ class stream_file final : public shared_file {
 
 training_state without_rows(training_state const& state) {
   training_state out;
-  out.step = state.step, out.seed = state.seed;
+  out.origin = state.origin, out.step = state.step, out.seed = state.seed;
   for (auto const& [name, values] : state.parts.bytes)
     if (!of_gaussians(name)) out.parts.bytes[name] = values;
   return out;

@@ -28,6 +28,7 @@ void for_each_state_array(training_state const& state, F const& f) {
   f("step", std::vector<int>{state.step}, 0);
   f("sh_degree", std::vector<int>{state.scene.sh_degree}, 0);
   f("seed", std::vector<u64>{state.seed}, 0);
+  if (vec3d const& o = state.origin; o != vec3d(0.0)) f("origin", std::vector<double>{o.x, o.y, o.z}, 0);
   for (auto const& [name, values] : state.parts.bytes) f(name, values, of_gaussians(name) ? sizeof(u32) : 0);
 }
 
@@ -247,9 +248,15 @@ training_state checkpoint_rows_reader::state() const {
   if (s.first.size() != s.scene.size() || s.second.size() != s.scene.size())
     fail("its moments differ in number from its Gaussians");
   s.step = step[0], s.seed = seed[0];
+  std::vector<std::string> const all = names();
+  if (std::find(all.begin(), all.end(), "origin") != all.end()) {
+    std::vector<double> const origin = get<double>("origin");
+    if (origin.size() != 3) fail("its array origin is not three numbers");
+    s.origin = {origin[0], origin[1], origin[2]};
+  }
   std::set<std::string> own;
   for_each_state_array(s, [&](std::string const& name, auto const&, std::size_t) { own.insert(name); });
-  for (std::string const& name : names()) {
+  for (std::string const& name : all) {
     if (own.count(name)) continue;
     std::vector<char> const& values = s.parts.bytes[name] = get<char>(name);
     if (of_gaussians(name) && !values.empty() && values.size() != sizeof(u32) * s.scene.size())

@@ -25,6 +25,7 @@ model_file load_model(std::filesystem::path const& path, row_owners const& owner
     }
     file.kernel_degree = std::atoi(kernel->second.c_str());
   }
+  file.origin = origin_of(traits, path.string());
   auto const number = [&](char const* key, float& value, float most = 1) {
     auto const found = traits.find(key);
     if (found == traits.end()) return;
@@ -75,7 +76,7 @@ splat_traits traits_of(render_options const& render, int kernel_degree) {
 }
 
 void save_model(std::filesystem::path const& path, model_file const& file) {
-  write_splats(path, file.model, traits_of(file.render, file.kernel_degree));
+  write_splats(path, file.model, with_origin(traits_of(file.render, file.kernel_degree), file.origin));
 }
 
 }  // namespace gart

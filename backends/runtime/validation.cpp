@@ -143,7 +143,7 @@ dataset shrunk(dataset const& data, int shrink) {
   dataset small;
   small.format = data.format, small.split = data.split, small.points = data.points;
   small.extent = data.extent, small.alpha = data.alpha;
-  small.bounds_min = data.bounds_min, small.bounds_max = data.bounds_max;
+  small.origin = data.origin, small.bounds_min = data.bounds_min, small.bounds_max = data.bounds_max;
   small.train.resize(data.train.size());
 #if defined(_OPENMP)
 #pragma omp parallel for schedule(dynamic)

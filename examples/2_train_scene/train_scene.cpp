@@ -24,7 +24,7 @@ int main(int argc, char** argv) try {
     if (done.step % 100 == 0)
       std::printf("%5d  loss %.4f  psnr %.2f dB  %u Gaussians\n", done.step, done.loss, done.psnr, done.gaussians);
   }
-  gart::save_model(argv[2], {training->model(), gart::render_options_of(use.options, data.extent)});
+  training->save_model(argv[2], gart::traits_of(gart::render_options_of(use.options, data.extent), 2));
   return 0;
 } catch (std::exception const& e) {
   return std::fprintf(stderr, "train_scene: %s\n", e.what()), 1;

@@ -15,6 +15,8 @@
 #include <gart/io/camera_file.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/image_file.hpp>
+#include <gart/io/mesh_file.hpp>
+#include <gart/io/origin.hpp>
 #include <gart/io/ply.hpp>
 #include <gart/io/splat_file.hpp>
 #include <gart/lens/differentiate_lens.hpp>

@@ -19,6 +19,12 @@ TEST_CASE("a message names options where the library names fields") {
   CHECK(in_options("render_options.transmittance_min") == "--transmittance-min");
   // A field at the end of a sentence, and a value that is not this field's.
   CHECK(in_options("raise dataset_options.downscale. = 3") == "raise --downscale. = 3");
+  // What the command has not is an option of gart train.
+  auto const has_none = [](std::string const& option) { return option != "--downscale"; };
+  CHECK(in_options("use train_options.seed = 4, raise dataset_options.downscale = 2.", has_none) ==
+        "use --seed 4, raise gart train --downscale 2.");
+  CHECK(in_options("(near is render_options.near, dataset_options.downscale)", has_none) ==
+        "(near is near, gart train --downscale)");
   // What only looks like a field, in a path for one, stays.
   for (std::string const text : {"", "...", "my_train_options.seed", "train_options.seeds", "train_options.seed.png",
                                  "train_options", "a = b"}) {

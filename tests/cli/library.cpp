@@ -23,7 +23,7 @@ gart::recommendation train(fs::path const& capture, gart::train_options const& o
   gart::recommendation const use = gart::recommended(options, data, request);
   auto const training = gart::make_session(use.request, use.options, data);
   while (training->steps_done() < use.options.iterations) training->step();
-  gart::save_model(model, {training->model(), gart::render_options_of(use.options, data.extent)});
+  training->save_model(model, gart::traits_of(gart::render_options_of(use.options, data.extent), 2));
   return use;
 }
 

@@ -6,6 +6,7 @@
 #include <gart/io/depth_file.hpp>
 #include <gart/io/exposure_file.hpp>
 #include <gart/io/image_file.hpp>
+#include <gart/io/mesh_file.hpp>
 #include <gart/io/ply.hpp>
 
 #include <algorithm>
@@ -250,6 +251,26 @@ bool png(std::string_view input) {
 bool jpeg(std::string_view input) {
   static scratch_folder const folder("jpeg");
   return read_image(folder, "image.jpg", input, {1, 3});
+}
+
+bool webp(std::string_view input) {
+  static scratch_folder const folder("webp");
+  return read_image(folder, "image.webp", input, {1, 3, 4});
+}
+
+bool mesh_ply(std::string_view input) {
+  static scratch_folder const folder("mesh_ply");
+  fs::path const file = folder.put("mesh.ply", input), again = folder.path() / "again.ply";
+  return accepted(folder, [&] {
+    gart::triangle_mesh const mesh = gart::read_mesh_ply(file);
+    for (auto const& t : mesh.triangle)
+      for (gart::u32 const corner : t) promise(corner < mesh.position.size(), "a corner that is no vertex");
+    for (gart::vec3 const& p : mesh.position) promise(finite(gart::vec3d(p)), "a vertex that is not finite");
+    gart::write_mesh_ply(again, mesh);
+    gart::triangle_mesh const back = gart::read_mesh_ply(again);
+    promise(back.position == mesh.position && back.triangle == mesh.triangle,
+            "a mesh that is another when written and read again");
+  });
 }
 
 }  // namespace gart_fuzz

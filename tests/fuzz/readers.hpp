@@ -27,6 +27,8 @@ bool depth(std::string_view input);         // and written again as .npy
 bool view_message(std::string_view input);  // what a viewer's client may send; refused by the field's name
 bool png(std::string_view input);
 bool jpeg(std::string_view input);
+bool webp(std::string_view input);
+bool mesh_ply(std::string_view input);        // and written again, which must give the same mesh
 bool checkpoint(std::string_view input);      // loaded by a session, which then takes a step
 bool resume_config(std::string_view input);   // config.json, as --resume reads it
 bool resume_history(std::string_view input);  // history.json, likewise

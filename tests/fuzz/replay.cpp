@@ -42,6 +42,8 @@ constexpr reader readers[] = {
     {"view_message", gart_fuzz::view_message},
     {"png", gart_fuzz::png},
     {"jpeg", gart_fuzz::jpeg},
+    {"webp", gart_fuzz::webp},
+    {"mesh_ply", gart_fuzz::mesh_ply},
     {"checkpoint", gart_fuzz::checkpoint},
 #if defined(GART_FUZZ_RESUME)
     {"resume_config", gart_fuzz::resume_config},

@@ -116,7 +116,7 @@ TEST_CASE("damaged images are refused and never crash") {
     fs::path const path = folder.path / "photo.img";
     maltreat(path, {bytes->begin(), bytes->end()}, true, [&] { gart::read_image(path); });
   }
-  CHECK(holds(error_of([&] { gart::read_image(folder.put("text.png", "hello")); }), "neither PNG nor JPEG"));
+  CHECK(holds(error_of([&] { gart::read_image(folder.put("text.png", "hello")); }), "neither PNG, JPEG nor WebP"));
 }
 
 TEST_CASE("a size that the data cannot hold is refused before it is allocated") {

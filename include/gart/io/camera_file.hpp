@@ -5,8 +5,9 @@
 ///   [{"name", "width", "height", "fx", "fy", "cx", "cy", "c2w": 4 rows of 4}, ...]
 /// in pixels, c2w camera to world in OpenCV axes; with "camera_model" by COLMAP's name, and the parameters of its lens,
 /// where it is no pinhole. With a rolling shutter "shutter_type" has the way it goes, as "ROLLING_TOP_TO_BOTTOM", c2w
-/// is the pose of the first line that is read and "c2w_end" that of the last. Written whole or not at all, with every
-/// digit. Errors: io_error; unsupported for a lens with terms that no one model has.
+/// is the pose of the first line that is read and "c2w_end" that of the last. An "origin" of three numbers is added to
+/// positions as they are read. Written whole or not at all, with every digit. Errors: io_error; unsupported for a lens
+/// with terms that no one model has.
 
 #include <gart/scene/camera.hpp>
 

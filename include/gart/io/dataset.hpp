@@ -6,7 +6,8 @@
 /// same below colmap, or the folder itself, .bin before .txt; photos in images/, images_N/ or input/), Blender
 /// (transforms_train.json and transforms_test.json, points3d.ply where it is there), nerfstudio / instant-ngp
 /// (transforms.json). A folder that holds COLMAP and transforms.json is read as COLMAP. Photos are found by names that
-/// differ in case, slashes, extension or folders, masks in a folder masks beside them (docs/formats.md). Images are
+/// differ in case, slashes, extension or folders, masks in a folder masks beside them (docs/formats.md). Survey
+/// coordinates are held from an origin among the cameras (io/origin.hpp). Images are
 /// decoded in parallel and kept as 8 bits: width * height * channels bytes each. Frames without a photo, or with a pose
 /// that is none, points in a camera's centre and points that are not finite are left out, with a note. Errors: io_error
 /// naming the file, the field and the remedy; unsupported for a camera model that gart does not trace, by its name;
@@ -20,6 +21,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -50,6 +52,7 @@ struct dataset {
   std::vector<dataset_view> train, test;  ///< views
   point_cloud points;                     ///< empty: start at random
   std::vector<std::string> notes;         ///< one line each: what was skipped, scaled or assumed
+  vec3d origin{0.0};                      ///< what cameras and points are from, in the capture's coordinates
   float extent = 1;                       ///< 1.1 x the largest distance of a training camera from their mean
   bool alpha = false;                     ///< images carry alpha: composited over the background chosen
   std::size_t decoded = 0;  ///< photographs that this process has decoded: where ranks share them, its part
@@ -91,6 +94,7 @@ struct dataset_options {
   int test_every = 8;  ///< 0: no test views; ignored where the files have their own split
   split_kind test_split = split_kind::nth;  ///< which of them; likewise
   std::filesystem::path photos = {};  ///< the folder that the photos' names are in; empty: where the capture has them
+  std::optional<vec3d> origin = {};   ///< to hold the capture from, as a model's; none: its own (io/origin.hpp)
   bool masks = true;                  ///< those that the files name, else those in a folder masks beside the photos'
   bool load_images = true;       ///< false: cameras alone, for which photos may all be absent if the files state sizes
   depth_map_options depth = {};  ///< maps of depth
@@ -111,7 +115,8 @@ camera downscaled(camera const& c, int factor, std::string const& where);
 
 /// The cameras alone: a dataset (all its views, test views first) or a camera JSON, a list of
 /// {"name","width","height","fx","fy","cx","cy","c2w"} with c2w camera-to-world in OpenCV axes, and "camera_model" by
-/// COLMAP's name, with the parameters of its lens, where it is no pinhole; EQUIRECTANGULAR has no fx to cy.
+/// COLMAP's name, with the parameters of its lens, where it is no pinhole; EQUIRECTANGULAR has no fx to cy. Positions
+/// are in the coordinates of the capture, from no origin.
 std::vector<named_camera> load_cameras(std::filesystem::path const& path);
 
 }  // namespace gart

@@ -43,7 +43,7 @@ gaussian_model read_splat_ply_rows(std::filesystem::path const& path, row_owners
 /// A plain point cloud: x y z, and red green blue where present (else grey). Points that are not finite are left out,
 /// which `notes`, where it is not null, says.
 point_cloud read_point_ply(std::filesystem::path const& path, std::vector<std::string>* notes = nullptr);
-/// Writes x y z and red green blue, binary.
-void write_point_ply(std::filesystem::path const& path, point_cloud const& points);
+/// Writes x y z and red green blue, binary; in double, the origin added, where there is one.
+void write_point_ply(std::filesystem::path const& path, point_cloud const& points, vec3d const& origin = vec3d(0.0));
 
 }  // namespace gart

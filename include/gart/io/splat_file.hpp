@@ -29,9 +29,10 @@ using splat_traits = std::map<std::string, std::string>;
 
 /// How the formats that pack their numbers are written.
 struct splat_packing {
-  int sh1_bits = 6;  ///< SPZ: of a coefficient of degree 1, 1 to 8
-  int sh_bits = 6;   ///< SPZ: of a coefficient of degree 2 or 3, 1 to 8
-  int palette = 0;   ///< SOG: rows of coefficients that all Gaussians share, to 65,536; 0: by their number
+  int sh1_bits = 6;    ///< SPZ: of a coefficient of degree 1, 1 to 8
+  int sh_bits = 6;     ///< SPZ: of a coefficient of degree 2 or 3, 1 to 8
+  int palette = 0;     ///< SOG: rows of coefficients that all Gaussians share, to 65,536; 0: by their number
+  bool world = false;  ///< PLY, GLB: in the capture's own coordinates, in double (io/origin.hpp)
 };
 
 /// What a format has room for, besides means, scales, rotations, opacities and a colour.
@@ -41,6 +42,8 @@ struct splat_room {
   bool traits = false;     ///< keys and values
   bool kernel = false;     ///< another kernel than the Gaussian, said by the trait kernel_degree
   bool antialias = false;  ///< a mark for the trait antialias, without its width
+  bool origin = false;     ///< the trait origin (io/origin.hpp)
+  bool world = false;      ///< coordinates in double, for splat_packing.world
 };
 
 /// A format of files of Gaussians.
@@ -62,7 +65,8 @@ span<splat_format const* const> splat_formats();
 /// Reads a file of Gaussians; its traits into `traits`, where that is not null. A Gaussian with a number that is not
 /// finite, or a rotation of zeros, is left out: `notes`, where it is not null, says how many, and what is wrong with
 /// the first. A file of no other is refused. An opacity whose logit is infinite is 1 or 0, a scale whose logarithm is
-/// -inf nothing: the model has finite numbers for these.
+/// -inf nothing: the model has finite numbers for these. A quaternion too short or too long to be drawn gets the length
+/// 1. Of SOG `path` may be a folder, or the meta.json in it.
 gaussian_model read_splats(std::filesystem::path const& path, splat_traits* traits = nullptr,
                            std::vector<std::string>* notes = nullptr);
 /// Of a whole model the rows of a rank.

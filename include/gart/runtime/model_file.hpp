@@ -2,13 +2,13 @@
 /// \file
 /// A model with what it was trained with, as its file says it, in any format of io/splat_file.hpp. A splat PLY's header
 /// carries, in lines "comment gart KEY VALUE", what is not as everywhere: alpha_min, t_min, near, max_hits, antialias,
-/// kernel_degree. A model of ordinary Gaussians is byte for byte an ordinary file, and one of another program is read
-/// with the defaults.
+/// kernel_degree, origin. A model of ordinary Gaussians is byte for byte an ordinary file, and one of another program
+/// is read with the defaults.
 ///
 /// Errors: load_model throws io_error for what is no splat file, or one whose header says what cannot be, naming the
 /// file, the key and the remedy; save_model as write_splats (io/splat_file.hpp).
 
-#include <gart/io/splat_file.hpp>
+#include <gart/io/origin.hpp>
 #include <gart/render/options.hpp>
 #include <gart/scene/gaussians.hpp>
 
@@ -23,6 +23,7 @@ struct model_file {
   gaussian_model model;                 ///< the Gaussians, or a rank's rows of them
   render_options render;                ///< the background is in no file
   int kernel_degree = 2;                ///< of the response (math/response.hpp)
+  vec3d origin{0.0};                    ///< of its coordinates (io/origin.hpp)
   u64 total = 0;                        ///< Gaussians in the file that was read
   std::vector<std::string> notes = {};  ///< a line each: which of them were left out (io/splat_file.hpp)
 };

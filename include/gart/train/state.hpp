@@ -19,6 +19,7 @@ struct training_state {
       first,             ///< Adam's first moment of each
       second;            ///< and its second
   int step = 0;          ///< steps done
+  vec3d origin{0.0};     ///< of the coordinates (io/origin.hpp)
   u64 seed = 1;          ///< of all numbers drawn at random
   named_arrays parts;    ///< of the densifier, and of what is learned besides the Gaussians
 };

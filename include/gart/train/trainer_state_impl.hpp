@@ -42,7 +42,7 @@ training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::here() const {
   training_state s;
   s.scene = gaussians_.to_host(gaussians_.model);
   s.first = gaussians_.to_host(gaussians_.moments.first), s.second = gaussians_.to_host(gaussians_.moments.second);
-  s.step = progress_.step, s.seed = options_.seed;
+  s.step = progress_.step, s.seed = options_.seed, s.origin = data_.origin;
   densifier_->save(s.parts);
   for (auto const& part : parts_) part->save(s.parts);
   return s;
@@ -51,6 +51,9 @@ training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::here() const {
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_up(training_state const& s) {
   if (s.scene.sh_degree != gaussians_.degree) throw invalid_argument("trainer: the state has another SH degree");
+  if (s.origin != data_.origin)
+    throw invalid_argument("trainer: the state is from the origin " + to_text(s.origin) + ", the capture from " +
+                           to_text(data_.origin) + " (dataset_options.origin holds it from that)");
   for (auto const& part : parts_) part->load(s.parts);
   gaussians_.assign(s.scene, s.first, s.second);
   gaussians_.total = static_cast<index_t>(total_of(comm_, {s.scene, true}));
@@ -106,7 +109,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::load(std::filesystem::pat
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::save_model(std::filesystem::path const& path,
-                                                                  splat_traits const& traits) const {
+                                                                  splat_traits const& given) const {
+  splat_traits const traits = with_origin(given, data_.origin);
   gaussian_model const mine = gaussians_.to_host(gaussians_.model);
   if constexpr (!Comm::alone) {
     if (comm_.size() > 1 && is_splat_ply(path))

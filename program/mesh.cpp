@@ -1,0 +1,162 @@
+#include "commands.hpp"
+#include "help.hpp"
+#include "mesh_distance.hpp"
+#include "mesh_fusion.hpp"
+#include "output.hpp"
+#include "printable.hpp"
+#include "progress.hpp"
+
+#include <gart/io/dataset.hpp>
+#include <gart/runtime/model_file.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+
+namespace gart_cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct mesh_arguments {
+  fs::path model, cameras, out, against, json;
+  fusion_options fusion{.smallest = 100};
+  int downscale = 1;
+  double threshold = 0;
+  bool quiet = false;
+};
+
+// 1.1 times the largest distance of a camera from their mean, as of captures.
+double extent_of(std::vector<gart::named_camera> const& cameras) {
+  gart::vec3d mean(0.0);
+  for (auto const& c : cameras) mean += c.view.position / static_cast<double>(cameras.size());
+  double most = 0;
+  for (auto const& c : cameras) most = std::max(most, glm::length(c.view.position - mean));
+  return most > 0 ? 1.1 * most : 1;
+}
+
+// The width of a pixel where rays of the view meet the scene, in the middle of all.
+double pixel_width(std::vector<met_ray> const& rays, gart::camera const& view) {
+  std::vector<float> t;
+  for (met_ray const& r : rays)
+    if (r.t > 0) t.push_back(r.t);
+  if (t.empty()) return 0;
+  std::nth_element(t.begin(), t.begin() + static_cast<std::ptrdiff_t>(t.size() / 2), t.end());
+  gart::vec2 const pixels = gart::pixels_per_radian(view);
+  double const distance = view.kind == gart::camera_kind::orthographic ? 1 : static_cast<double>(t[t.size() / 2]);
+  return distance / static_cast<double>(std::min(pixels.x, pixels.y));
+}
+
+void print_score(mesh_score const& s, double extent, double threshold) {
+  auto const part = [&](double distance) { return fixed(100 * distance / extent, 3) + " %"; };
+  std::printf(
+      "mean distance %.6g, %s of the extent %.6g: %s from the mesh to the reference, %s from what is seen of it\n",
+      s.mean, part(s.mean).c_str(), extent, part(s.to_reference).c_str(), part(s.to_mesh).c_str());
+  std::printf("F-score %s at %.6g: precision %s, recall %s\n", fixed(s.f_score, 4).c_str(), threshold,
+              fixed(s.precision, 4).c_str(), fixed(s.recall, 4).c_str());
+}
+
+int run_mesh(mesh_arguments const& a) {
+  gart::model_file file = gart::load_model(a.model);
+  if (file.kernel_degree != 2)
+    throw gart::unsupported(a.model.string() + ": is of kernel degree " + std::to_string(file.kernel_degree) +
+                            "; gart mesh traces Gaussians (2)");
+  auto cameras = gart::load_cameras(a.cameras);
+  if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
+  prepare_file(a.out);
+  if (!a.json.empty()) prepare_file(a.json);
+  for (auto& [name, view] : cameras) {
+    view.position -= file.origin;
+    if (a.downscale > 1) view = gart::downscaled(view, a.downscale, "the camera " + name);
+  }
+  gart::triangle_mesh const reference =
+      a.against.empty() ? gart::triangle_mesh() : gart::read_mesh_ply(a.against, file.origin);
+  progress say(a.quiet);
+  say.notes(file.notes);
+
+  median_depths depths(std::move(file.model), file.render);
+  fusion_options options = a.fusion;
+  if (options.voxel == 0) options.voxel = pixel_width(depths.of(cameras[0].view), cameras[0].view);
+  if (!(options.voxel > 0))
+    throw gart::invalid_argument("the first camera sees no surface to take the size of voxels from (give --voxel)");
+  fusion fused(options);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    fused.add(depths.of(cameras[i].view));
+    say.state("fused " + std::to_string(i + 1) + "/" + std::to_string(cameras.size()) + " views",
+              static_cast<double>(i + 1) / static_cast<double>(cameras.size()));
+  }
+  gart::triangle_mesh const mesh = fused.mesh();
+  if (mesh.triangle.empty())
+    throw gart::invalid_argument("there is no surface that the cameras see (give larger voxels, or other cameras)");
+  gart::write_mesh_ply(a.out, mesh, file.origin);
+  say.clear();
+  if (!a.quiet)
+    std::printf("%s: %s triangles from %zu views, voxels of %.4g\n", printable(a.out.string()).c_str(),
+                with_commas(mesh.triangle.size()).c_str(), cameras.size(), options.voxel);
+  nlohmann::json scores = {{"triangles", mesh.triangle.size()}, {"voxel", options.voxel}};
+  if (!a.against.empty()) {
+    double const extent = extent_of(cameras), threshold = a.threshold > 0 ? a.threshold : 0.005 * extent;
+    mesh_score const s = score_mesh(mesh, reference, cameras, threshold);
+    if (!a.quiet) print_score(s, extent, threshold);
+    scores["mean_distance"] = s.mean, scores["to_reference"] = s.to_reference, scores["to_mesh"] = s.to_mesh;
+    scores["extent"] = extent, scores["threshold"] = threshold;
+    scores["precision"] = s.precision, scores["recall"] = s.recall, scores["f_score"] = s.f_score;
+  }
+  if (!a.json.empty()) write_json(a.json, scores);
+  return 0;
+}
+
+}  // namespace
+
+void add_mesh(CLI::App& app, command& selected) {
+  auto a = std::make_shared<mesh_arguments>();
+  CLI::App* mesh = app.add_subcommand("mesh", "Make a mesh of the surfaces that a model shows to the cameras.");
+  mesh->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")
+      ->type_name("")
+      ->required();
+  mesh->add_option("CAMERAS", a->cameras, "A dataset (all its views), or a camera JSON, as for gart render")
+      ->type_name("")
+      ->required();
+  mesh->add_option("--out", a->out, "Where the mesh goes, a PLY of triangles")->type_name("MESH.ply")->required();
+  mesh->add_option(
+          "--voxel", a->fusion.voxel,
+          "Side of a voxel, in the capture's units (default: a pixel's width\nwhere the first camera meets the "
+          "scene)")
+      ->type_name("U")
+      ->check(between(1e-9, 1e9));
+  mesh->add_option("--truncation", a->fusion.truncation, "Voxels on both sides of a surface that a ray tells of")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 64));
+  mesh->add_option("--least-part", a->fusion.smallest, "Leave out parts of fewer triangles that hang together")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(whole_number());
+  mesh->add_option("--downscale", a->downscale, "Shrink the cameras' images by this whole factor")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(between(1, 64));
+  mesh->add_option("--against", a->against,
+                   "Say how far it is from this mesh, both ways, and from what the\ncameras see of it; gart synth "
+                   "--mesh writes the one of its scene")
+      ->type_name("REFERENCE.ply");
+  mesh->add_option("--threshold", a->threshold,
+                   "Distance within which the F-score takes a point for right\n(default: 0.005 of the extent of the "
+                   "cameras)")
+      ->type_name("U")
+      ->check(between(1e-12, 1e12));
+  mesh->add_option("--json", a->json, "Write these scores")->type_name("FILE");
+  mesh->add_flag("--quiet", a->quiet, "Say nothing but errors");
+  mesh->footer(
+      "\nEach ray meets the scene at the hit behind which less than half of its light is left, in the exact order of\n"
+      "hits. Distances are averaged a voxel, and the mesh is where they are zero. Runs on the CPU; needs OpenVDB.\n"
+      "\nExamples:\n"
+      "  gart mesh run/model.ply capture --out mesh.ply\n"
+      "  gart synth --out still --mesh\n"
+      "  gart mesh run/model.ply still --out mesh.ply --against still/mesh.ply");
+  mesh->callback([a, &selected] { selected = [a] { return run_mesh(*a); }; });
+}
+
+}  // namespace gart_cli

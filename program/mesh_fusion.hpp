@@ -1,0 +1,37 @@
+#pragma once
+// Depth maps to a mesh: a truncated signed distance, averaged a voxel over the rays that pass it (Curless and Levoy, "A
+// volumetric method for building complex models from range images", SIGGRAPH 1996), in a sparse grid of OpenVDB, and
+// the surface where it is zero. Behind a surface, where others may see another, a ray counts the less the farther it
+// goes. What no ray has passed has no surface.
+
+#include "mesh_depth.hpp"
+
+#include <gart/io/mesh_file.hpp>
+
+#include <memory>
+#include <vector>
+
+namespace gart_cli {
+
+struct fusion_options {
+  double voxel = 0;          // world units
+  double truncation = 4;     // voxels, on both sides of a surface
+  float least_weight = 2;    // rays that a voxel must have been passed by
+  std::size_t smallest = 0;  // connected parts of fewer triangles are left out
+};
+
+class fusion {
+ public:
+  // Errors: unsupported without OpenVDB, naming the package; invalid_argument for options out of range.
+  explicit fusion(fusion_options const& options);
+  ~fusion();
+  void add(std::vector<met_ray> const& rays);
+  gart::triangle_mesh mesh() const;
+
+ private:
+  struct grids;
+  fusion_options options_;
+  std::unique_ptr<grids> grids_;
+};
+
+}  // namespace gart_cli
