@@ -107,6 +107,8 @@ TEST_CASE_TEMPLATE("Gaussians and moments change their number together", E, GART
     CHECK(state.second.size() == n);
     if (n != 40) CHECK(state.scene.log_scale.back() == 0);
     if (n != 40) CHECK(state.second.mean.back() == 0);
+    exec.zero(run.edit().mean, 3 * sizeof(float));
+    CHECK(run.scene().mean.front() == 0);
     CHECK(run.step().gaussians == n);
     CHECK(run.gradients().size() == n);
   }

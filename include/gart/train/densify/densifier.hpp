@@ -25,10 +25,10 @@ struct density_schedule {
 
 /// What a densifier of a run is made from.
 struct density_setup {
-  train_options const& options;
-  dataset const& data;
-  index_t start;      ///< Gaussians that the run starts with
-  int kernel_degree;  ///< of their response
+  train_options const& options;  ///< of the run
+  dataset const& data;           ///< its capture
+  index_t start;                 ///< Gaussians that the run starts with
+  int kernel_degree;             ///< of their response
 };
 
 /// What a step tells a densifier.

@@ -15,6 +15,8 @@ namespace gart::inline GART_ISA {
 template <execution E>
 class whole_view {
  public:
+  ///@{
+  /// As rank_units.
   int views() const { return 1; }
   all_rows<E>& rows() { return whole_scene<E>(); }
   void begin_step() {}
@@ -50,6 +52,7 @@ class whole_view {
   void end_step(bool) {}
   void collect(std::vector<float>&, std::size_t, int) {}
   u64 sum(u64 mine) { return mine; }
+  ///@}
 
  private:
   gaussians_view<float const> scene_;
