@@ -248,15 +248,14 @@ training_state checkpoint_rows_reader::state() const {
   if (s.first.size() != s.scene.size() || s.second.size() != s.scene.size())
     fail("its moments differ in number from its Gaussians");
   s.step = step[0], s.seed = seed[0];
-  std::vector<std::string> const all = names();
-  if (std::find(all.begin(), all.end(), "origin") != all.end()) {
+  if (arrays_.count("origin")) {
     std::vector<double> const origin = get<double>("origin");
     if (origin.size() != 3) fail("its array origin is not three numbers");
     s.origin = {origin[0], origin[1], origin[2]};
   }
   std::set<std::string> own;
   for_each_state_array(s, [&](std::string const& name, auto const&, std::size_t) { own.insert(name); });
-  for (std::string const& name : all) {
+  for (std::string const& name : names()) {
     if (own.count(name)) continue;
     std::vector<char> const& values = s.parts.bytes[name] = get<char>(name);
     if (of_gaussians(name) && !values.empty() && values.size() != sizeof(u32) * s.scene.size())
