@@ -187,7 +187,8 @@ void add_eval(CLI::App& app, command& selected) {
       ->type_name("N")
       ->capture_default_str()
       ->check(between(1, 1e6));
-  eval->add_option("--test-split", a->test_split, "Which views are for testing: nth or sector (see gart train --help-all)")
+  eval->add_option("--test-split", a->test_split,
+                   "Which views are for testing: nth or sector (see gart train --help-all)")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(name_of_a<gart::split_kind>());

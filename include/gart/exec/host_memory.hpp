@@ -18,7 +18,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The base of a host's policy: all but its threads and atomics.
 class host_memory {
@@ -119,4 +119,4 @@ class host_memory {
   std::size_t workspace_bytes_ = 0;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -12,7 +12,7 @@
 
 #include <utility>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A renderer of one configuration.
 template <execution E, class Traits, class Tracer, strategy Strategy>
@@ -148,4 +148,4 @@ class compiled_renderer final : public renderer {
   pose_differentiation<E> pose_backward_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
