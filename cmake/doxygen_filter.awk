@@ -34,5 +34,10 @@ function show(next_line) {
   line = next_line
 }
 
-{ sub(/namespace gart::inline GART_ISA/, "namespace gart"); show(each_its_comment($0)) }
+{
+  sub(/inline namespace GART_ISA \{ ?/, "");
+  if (!sub(/^\}\}  \/\/ namespace gart::GART_ISA.*/, "}"))
+    sub(/^\}\}\}  \/\/ namespace gart::GART_ISA.*/, "}}");
+  show(each_its_comment($0))
+}
 END { NR++; show("") }

@@ -8,7 +8,7 @@
 
 #include <string>
 
-namespace gart::inline GART_ISA::detail {
+namespace gart { inline namespace GART_ISA { namespace detail {
 
 inline std::string describe(cudaError_t code) {
   return std::string(cudaGetErrorString(code)) + " (" + cudaGetErrorName(code) + ")";
@@ -22,4 +22,4 @@ inline void check_cuda(cudaError_t code, char const* what) {
               "; if a kernel before it failed, GART_CUDA_SYNC=1 in the environment names that kernel");
 }
 
-}  // namespace gart::inline GART_ISA::detail
+}}}  // namespace gart::GART_ISA::detail

@@ -110,7 +110,7 @@ def self_check(host, folder):
         "good.hpp": ("#pragma once\n#include <cstddef>\ninline std::size_t good() { return 0; }\n", True),
         "alone.hpp": ("#pragma once\ninline std::size_t alone() { return 0; }\n", False),
         "twice.hpp": ("struct twice {};\n", False),
-        "name.hpp": ("#pragma once\nnamespace gart::inline GART_ISA {}\n", False),
+        "name.hpp": ("#pragma once\nnamespace gart { inline namespace GART_ISA {}}\n", False),
         "converts.hpp": ("#pragma once\ninline float converts(int x) { return static_cast<float>(x) + x; }\n", False),
         "shadows.hpp": ("#pragma once\ninline int shadowed;\ninline int shadows(int shadowed) { return shadowed; }\n",
                         False),

@@ -30,7 +30,7 @@ void exclusive_scan(cuda_exec& exec, span<u32 const> in, span<T> out, span<std::
 
 }  // namespace gart
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -75,4 +75,4 @@ void exclusive_scan(E& exec, span<u32 const> in, span<T> out, span<std::type_ide
   if (!total.empty()) total[0] = sums[blocks - 1];
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <cstddef>
 
-namespace gart::inline GART_ISA::detail {
+namespace gart { inline namespace GART_ISA { namespace detail {
 
 template <host_execution E>
 std::size_t host_blocks(E& exec, std::size_t n) {
@@ -31,4 +31,4 @@ void for_blocks([[maybe_unused]] E& exec, std::size_t blocks, F const& f) {
   for (std::size_t b = 0; b < blocks; ++b) f(b);
 }
 
-}  // namespace gart::inline GART_ISA::detail
+}}}  // namespace gart::GART_ISA::detail

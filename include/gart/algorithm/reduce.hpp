@@ -27,7 +27,7 @@ void reduce(cuda_exec& exec, span<std::type_identity_t<T> const> in, span<T> out
 
 }  // namespace gart
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -100,4 +100,4 @@ void reduce(E& exec, span<std::type_identity_t<T> const> in, span<T> out, reduct
   }
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

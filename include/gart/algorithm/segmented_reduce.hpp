@@ -20,7 +20,7 @@ void segmented_reduce(cuda_exec& exec, span<float const> rows, u32 columns, span
 
 }  // namespace gart
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -68,4 +68,4 @@ void segmented_reduce(E& exec, span<float const> rows, u32 columns, span<u64 con
   detail::segmented_reduce(exec, rows, columns, offsets, sums);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

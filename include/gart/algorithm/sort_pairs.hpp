@@ -27,7 +27,7 @@ void sort_pairs(cuda_exec& exec, span<K> keys, span<u32> values, int key_bits);
 
 }  // namespace gart
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -94,4 +94,4 @@ void sort_pairs(E& exec, span<K> keys, span<u32> values, int key_bits) {
   }
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

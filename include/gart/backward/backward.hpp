@@ -28,7 +28,7 @@
 
 #include <string>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// dL/d an image: [H][W][3] by colour, and where wanted [H][W] by depth and by transmittance.
 struct image_gradients {
@@ -295,4 +295,4 @@ void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, span<floa
 }
 ///@}
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -10,7 +10,7 @@
 
 #include <cstddef>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Depth and transmittance of an image and the gradients by them, as kernels read them: [H][W] each, null where there
 /// is no such gradient.
@@ -78,4 +78,4 @@ struct record_with_depth : Record {
 #endif
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

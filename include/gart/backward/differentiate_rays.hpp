@@ -20,7 +20,7 @@
 #include <gart/backward/backward.hpp>
 #include <gart/math/sh_turn.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Where gradients of rays go, [H][W][3] each in the policy's memory, in world axes; zero where no ray was traced.
 struct ray_targets {
@@ -174,4 +174,4 @@ void differentiate_rays(Frame& frame, span<float const> color, image_gradients c
                       out});
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

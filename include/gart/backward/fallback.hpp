@@ -7,7 +7,7 @@
 
 #include <gart/backward/backward.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The passes of Strategy, of its fallback, of that one's and so on.
 template <class Frame, strategy Strategy>
@@ -43,4 +43,4 @@ class backward_passes {
   typename std::conditional_t<is_last, std::type_identity<none>, rest_of<fallback>>::type rest_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -11,7 +11,7 @@
 #include <gart/scene/gaussians.hpp>
 #include <gart/scene/parameters.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace backward_kernels {
 
@@ -68,4 +68,4 @@ void finish_gradients(E& exec, gaussians_view<float const> scene, span<ray_gauss
     finish(backward_kernels::no_filter{});
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -19,7 +19,7 @@
 #include <gart/scene/gaussians.hpp>
 #include <gart/tiles/tile_map.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A row of the ordered sums: SH gradient, padded to quads, then moments.
 template <int ShDegree>
@@ -333,4 +333,4 @@ struct sum_pairs {
   }
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

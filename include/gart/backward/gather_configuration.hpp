@@ -22,7 +22,7 @@
 
 #include <concepts>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Where a lane's sums go: added to the Gaussian atomically, or kept as one row a (primitive, tile) pair, in
 /// primitive-major order, for sum_pairs to add up in that order: the same bits in every run.
@@ -63,4 +63,4 @@ struct strategy_gather {
   using rays = Rays;  ///< of the view's pixels
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

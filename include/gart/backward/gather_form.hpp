@@ -8,7 +8,7 @@
 
 #include <type_traits>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -29,4 +29,4 @@ constexpr auto gather_form() {
 template <gather_configuration C>
 using gather_of = typename decltype(detail::gather_form<C>())::type;
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -10,7 +10,7 @@
 
 #include <cstring>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Slots of the box before tile cell `cell` (the box cut by the tile): whole rows of cells above, cells to the left.
 GART_HD constexpr u32 tile_offset(footprint_slots const& range, pixel_box const& cell) {
@@ -72,4 +72,4 @@ GART_HD constexpr u64 lt_index(footprint_slots const& range, u32 x, u32 y) {
   return range.offset + tile_offset(range, cell) + pixel_offset(cell, x, y);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

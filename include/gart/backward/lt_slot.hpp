@@ -18,7 +18,7 @@
 #include <gart/math/glm.hpp>
 #include <gart/math/sh.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -113,4 +113,4 @@ struct weight_entry {
   GART_HD GART_INLINE bool clamped(int channel) const { return float_to_bits(w) >> channel & 1; }
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -20,7 +20,7 @@
 #include <cuda_pipeline.h>
 #endif
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -245,4 +245,4 @@ struct matrix_gather : gather_kernel<detail::without_color<C>> {
 
 #endif
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -6,7 +6,7 @@
 #include <gart/backward/gather.hpp>
 #include <gart/backward/packet_slots.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 #if defined(__CUDACC__)
 
@@ -211,4 +211,4 @@ struct packet_gather {
 
 #endif
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -11,7 +11,7 @@
 
 #if !defined(__CUDACC__)
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What the slots of a packet hold.
 struct packet_entries {
@@ -155,6 +155,6 @@ class packet_slots {
   std::ptrdiff_t first_;  // of the packet's first pixel: before the cell where that pixel lies outside of it
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #endif

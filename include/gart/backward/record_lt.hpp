@@ -8,7 +8,7 @@
 #include <gart/backward/packet_slots.hpp>
 #include <gart/render/record.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The record of an LT buffer with slots of Entry, of tiles of Size pixels a side.
 template <class Entry, int Size>
@@ -52,4 +52,4 @@ struct record_lt {
 };
 static_assert(hit_record<record_lt<lt_entry, 8>>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

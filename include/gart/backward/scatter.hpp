@@ -13,7 +13,7 @@
 #include <gart/scene/gaussians.hpp>
 #include <gart/trace/ray_program.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The ray program of the backward pass by pixel (trace/ray_program.hpp).
 template <int ShDegree, class Response, class Terms, execution E, rays_of_pixels Rays = pixel_rays>
@@ -120,4 +120,4 @@ struct scatter_program : ray_program_base {
   GART_HD void end(index_t, state const&) const {}
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Nothing recorded; every ray is traced again and scatters.
 struct pixel_strategy : strategy_base {
@@ -118,4 +118,4 @@ inline std::vector<std::string> strategy_names() { return {strategies::names.beg
 
 static_assert(strategy<primitive_strategy_in<lt_half_entry>>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

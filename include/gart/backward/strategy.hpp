@@ -9,7 +9,7 @@
 
 #include <concepts>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// How a slot of the LT buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN before
 /// every forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held against the
@@ -44,4 +44,4 @@ concept strategy = requires {
   requires S::gather::any == S::template record<8>::any;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

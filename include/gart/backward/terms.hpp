@@ -7,7 +7,7 @@
 
 #include <type_traits>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Stands for the 3 K floats of SH.
 struct color {};
@@ -29,4 +29,4 @@ struct terms {
   using with_depth = std::conditional_t<geometry, terms<T..., gart::depth>, terms>;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

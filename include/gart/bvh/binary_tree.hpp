@@ -10,7 +10,7 @@
 #include <gart/core/span.hpp>
 #include <gart/exec/concepts.hpp>
 
-namespace gart::inline GART_ISA::bvh_kernels {
+namespace gart { inline namespace GART_ISA { namespace bvh_kernels {
 
 // Both children's boxes lie in their parent.
 struct alignas(16) binary_node {
@@ -217,4 +217,4 @@ struct fit {
   }
 };
 
-}  // namespace gart::inline GART_ISA::bvh_kernels
+}}}  // namespace gart::GART_ISA::bvh_kernels

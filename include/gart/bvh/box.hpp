@@ -13,7 +13,7 @@ struct box {
 
 }  // namespace gart
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 inline constexpr float infinity = 3.402823466e38f;  ///< a finite one: no rounding or product makes it a NaN
 
@@ -52,4 +52,4 @@ GART_HD GART_INLINE box ellipsoid_box(gaussian_parameters const& g, vec3d const&
   return {center - half - pad, center + half + pad};
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -12,7 +12,7 @@
 #include <gart/bvh/binary_tree.hpp>
 #include <gart/exec/buffer.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The tree as kernels hold it.
 struct bvh_view {
@@ -61,6 +61,6 @@ class bvh {
   index_t count_ = 0;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #include <gart/bvh/bvh_impl.hpp>

@@ -7,7 +7,7 @@
 #include <gart/bvh/bvh.hpp>
 #include <gart/bvh/collapse.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 template <execution E>
 void bvh<E>::build(E& exec, span<box const> boxes) {
@@ -48,4 +48,4 @@ void bvh<E>::refit(E& exec, span<box const> boxes) {
   parallel_for(exec, "bvh/collapse", inner, bvh_kernels::collapse{binary_, is_wide_, place_, nodes_});
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

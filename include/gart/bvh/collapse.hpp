@@ -4,7 +4,7 @@
 
 #include <gart/bvh/binary_tree.hpp>
 
-namespace gart::inline GART_ISA::bvh_kernels {
+namespace gart { inline namespace GART_ISA { namespace bvh_kernels {
 
 // Up to the root, then down again with the node's share of the children: no thread waits for another.
 struct choose_wide {
@@ -101,4 +101,4 @@ struct collapse {
   }
 };
 
-}  // namespace gart::inline GART_ISA::bvh_kernels
+}}}  // namespace gart::GART_ISA::bvh_kernels

@@ -8,7 +8,7 @@
 #include <immintrin.h>
 #endif
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A finite inverse of every direction, so that 0 * inf never makes a slab test lie.
 GART_HD GART_INLINE float slab_inverse(float d) {
@@ -165,4 +165,4 @@ GART_HD GART_INLINE float enter_child(bvh_node const& n, int c, slab_ray const& 
   return from;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

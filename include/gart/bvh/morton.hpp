@@ -4,7 +4,7 @@
 
 #include <gart/bvh/box.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Of a code: 21 an axis.
 inline constexpr int morton_bits = 63;
@@ -33,4 +33,4 @@ GART_HD GART_INLINE u64 morton_code(vec3 const& p, box const& bounds) {
   return code;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -13,7 +13,7 @@
 
 #include <bit>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 inline constexpr int bvh_width = 8;  ///< children of a node, at most
 
@@ -105,4 +105,4 @@ GART_HD GART_INLINE u32 plane_above(bvh_axis const& a, float hi) {
   return q < 255.0f ? static_cast<u32>(q) : 255;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

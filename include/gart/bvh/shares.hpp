@@ -7,7 +7,7 @@
 
 #include <gart/bvh/node.hpp>
 
-namespace gart::inline GART_ISA::bvh_kernels {
+namespace gart { inline namespace GART_ISA { namespace bvh_kernels {
 
 // of[k]: the least area of wide nodes in a subtree that hands k or fewer children on. A leaf costs nothing: every leaf
 // is the child of one wide node, whichever it is.
@@ -63,4 +63,4 @@ GART_HD GART_INLINE wide_costs costs_of(float area, wide_costs const& a, wide_co
   return out;
 }
 
-}  // namespace gart::inline GART_ISA::bvh_kernels
+}}}  // namespace gart::GART_ISA::bvh_kernels

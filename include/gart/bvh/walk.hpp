@@ -10,7 +10,7 @@
 #include <gart/bvh/bvh.hpp>
 #include <gart/bvh/cross.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The place of the lowest bit that is set; of a word that is not zero.
 GART_HD GART_INLINE int lowest_bit(u32 bits) {
@@ -98,4 +98,4 @@ GART_HD GART_INLINE void walk(bvh_view const& tree, Ray const& r, Visitor& visit
   }
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

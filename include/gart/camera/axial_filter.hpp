@@ -9,7 +9,7 @@
 
 #include <gart/math/widened.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Where it stands, and how wide it is there.
 class axial_filter {
@@ -70,4 +70,4 @@ class axial_filter {
   float square_[nodes + 1] = {};
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -10,7 +10,7 @@
 
 #include <gart/camera/radial_lens.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Boxes of ellipsoids on the sphere.
 struct equirectangular_bounds {
@@ -99,4 +99,4 @@ struct equirectangular : camera_base {
 
 static_assert(central_camera<equirectangular>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

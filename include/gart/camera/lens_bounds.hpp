@@ -25,7 +25,7 @@
 #include <map>
 #include <mutex>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A lens with what its boxes need. Host side made, trivially copyable.
 class lens_bounds : public lens_image {
@@ -262,4 +262,4 @@ inline lens_bounds tabulated_bounds(camera_kind kind, distortion const& l, float
   return known.emplace(key, lens_bounds({kind, l}, fx, fy, cx, cy, width, height)).first->second;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

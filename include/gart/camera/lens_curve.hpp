@@ -19,7 +19,7 @@
 #include <gart/math/fixed_double.hpp>
 #include <gart/scene/camera.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A direction in the plane of the axis, of any length.
 template <class F>
@@ -246,4 +246,4 @@ class lens_curve {
   double p1_ = 0, p2_ = 0, s_[4] = {};
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

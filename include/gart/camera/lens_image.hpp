@@ -9,7 +9,7 @@
 
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Host side made, trivially copyable; in double, in units of the focal lengths where no pixels are said.
 class lens_image {
@@ -217,4 +217,4 @@ class lens_image {
   float first_[cells] = {}, bend_[cells] = {}, twist_[cells] = {}, beside_[cells] = {};
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -14,7 +14,7 @@
 #include <gart/camera/model.hpp>
 #include <gart/camera/shutter.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Focal lengths and principal point, pixels; of a camera of parallel rays pixels a world unit.
 struct intrinsics {
@@ -80,4 +80,4 @@ class lens_slopes {
   vec3d turn_{0.0};
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

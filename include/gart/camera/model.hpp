@@ -47,7 +47,7 @@
 #include <string>
 #include <type_traits>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What all models have.
 struct camera_base {
@@ -192,4 +192,4 @@ GART_HD GART_INLINE primary_ray_of<F> each_lane(F u, F v, One const& one) {
     return {one(u, v)};
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -12,7 +12,7 @@
 #include <gart/camera/radial_lens.hpp>
 #include <gart/camera/rolling_shutter.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Calls f with the model that the camera is of, and returns what f does. A rolling shutter has one lens for all that
 /// project slopes and for fisheyes.
@@ -52,4 +52,4 @@ inline ray ray_through(camera const& c, float u, float v) {
 /// Its direction alone.
 inline vec3 ray_direction(camera const& c, float u, float v) { return ray_through(c, u, v).direction; }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

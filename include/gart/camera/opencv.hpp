@@ -16,7 +16,7 @@
 
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Boxes of ellipsoids through the lens.
 class opencv_bounds {
@@ -200,4 +200,4 @@ struct opencv : camera_base {
 
 static_assert(central_camera<opencv> && focal_camera<opencv>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -10,7 +10,7 @@
 #include <gart/camera/lens_slopes.hpp>
 #include <gart/camera/model.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Boxes of ellipsoids.
 struct orthographic_bounds {
@@ -136,4 +136,4 @@ struct orthographic : camera_base {
 
 static_assert(focal_camera<orthographic> && !central_camera<orthographic>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -8,7 +8,7 @@
 #include <gart/camera/seen_slopes.hpp>
 #include <gart/camera/slope_filter.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Boxes of ellipsoids, perspective-correct.
 struct pinhole_bounds {
@@ -84,4 +84,4 @@ struct pinhole : camera_base {
 
 static_assert(central_camera<pinhole> && focal_camera<pinhole>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -9,7 +9,7 @@
 #include <gart/exec/buffer.hpp>
 #include <gart/exec/stage.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Trivially copyable: kernels hold one by value.
 struct pixel_rays {
@@ -134,4 +134,4 @@ class camera_rays {
   origin_rays from_origins_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

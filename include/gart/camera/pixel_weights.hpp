@@ -8,7 +8,7 @@
 
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -53,4 +53,4 @@ inline image8 pixel_weights(camera const& c) {
   return out;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

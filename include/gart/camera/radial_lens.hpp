@@ -14,7 +14,7 @@
 
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A direction in a camera's axes, of any length.
 struct fixed_direction {
@@ -165,4 +165,4 @@ struct radial_lens : camera_base {
 
 static_assert(central_camera<radial_lens> && focal_camera<radial_lens>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -8,7 +8,7 @@
 #include <gart/core/macros.hpp>
 #include <gart/math/glm.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What depth is measured along.
 struct ray_depth {
@@ -23,4 +23,4 @@ struct ray_depth {
   }
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -14,7 +14,7 @@
 #include <gart/camera/equirectangular.hpp>
 #include <gart/camera/shutter.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Boxes of ellipsoids. Bounds: of the lens that stands still.
 template <class Bounds>
@@ -185,4 +185,4 @@ struct rolling_shutter : camera_base {
 
 static_assert(focal_camera<rolling_shutter<radial_lens>> && camera_model<rolling_shutter<equirectangular>>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -8,7 +8,7 @@
 
 #include <gart/math/footprint.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Six numbers of a symmetric matrix.
 struct covariance {
@@ -165,4 +165,4 @@ GART_HD inline axial_range angles_about_z(seen_ellipsoid const& e, double least)
   return out;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -8,7 +8,7 @@
 
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The rectangle.
 struct seen_slopes {
@@ -44,4 +44,4 @@ seen_slopes slopes_seen(View const& c) {
   return slopes_seen(c, [](vec2 const& p) { return p; });
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

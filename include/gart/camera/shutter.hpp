@@ -10,7 +10,7 @@
 #include <gart/math/turn.hpp>
 #include <gart/scene/camera.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The camera's axes, orthonormal in double: floats are off by their roundings.
 inline mat3d axes_of(camera const& view) {
@@ -96,4 +96,4 @@ inline camera cropped(camera c, int width, int height) {
   return c;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

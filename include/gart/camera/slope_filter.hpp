@@ -13,7 +13,7 @@
 
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Of the image by the slopes, symmetric.
 struct lens_jacobian {
@@ -117,4 +117,4 @@ GART_HD GART_INLINE gaussian_parameters filtered(gaussian_parameters const& g, F
   return widened(g, mean, filter.sigma_at(mean));
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

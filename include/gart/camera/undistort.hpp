@@ -6,7 +6,7 @@
 #include <gart/math/lanes.hpp>
 #include <gart/scene/camera.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The image point, in units of the focal length about the principal point, of the slopes x = X/Z and y = Y/Z.
 GART_HD inline void distort(distortion const& lens, double x, double y, double& u, double& v) {
@@ -51,4 +51,4 @@ GART_HD inline vec2 undistort(distortion const& lens, vec2 distorted) {
   return p;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -23,7 +23,7 @@
 
 #include <unistd.h>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -120,4 +120,4 @@ std::vector<u32> checksums_of(Comm& comm, std::vector<u32> const& shares) {
   return sums;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A value of each.
 template <class Comm, class T>
@@ -33,4 +33,4 @@ std::vector<std::string> gathered(Comm& comm, std::string const& mine) {
   return all;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

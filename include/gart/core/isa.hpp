@@ -6,7 +6,7 @@
 /// and an inline function, a template or a type of one name is shared among them: all would run it, or lay it out, as
 /// one of them has it. With the instruction set in the name there are as many as are needed.
 ///
-///   namespace gart::inline GART_ISA {   // formulas, kernels, host policies, tracers, trainers
+///   namespace gart { inline namespace GART_ISA {   // formulas, kernels, host policies, tracers, trainers
 ///   namespace gart {                    // what the compiled libraries define and take, and link by
 ///
 /// In the second lie sessions, renderers, data sets, cameras, models, options, errors, files and cuda_exec
@@ -43,11 +43,11 @@
 /// The macro's value, as text; undefined below.
 #define GART_TEXT(macro) GART_TEXT_OF(macro)
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 inline constexpr char const* instruction_set = &GART_TEXT(GART_ISA)[sizeof "isa"];  ///< "avx2_fma"
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #undef GART_TEXT
 #undef GART_TEXT_OF

@@ -17,7 +17,7 @@
 #error "gart needs a GPU of compute capability 8.0 or later: set CMAKE_CUDA_ARCHITECTURES to 80 or more"
 #endif
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -100,4 +100,4 @@ void parallel_for(cuda_exec& exec, char const* label, tile_range range, K const&
   exec.check_launch(label);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -22,7 +22,7 @@
 #include <unistd.h>
 #endif
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The base of a host's policy: all but its threads and atomics.
 class host_memory {
@@ -126,4 +126,4 @@ class host_memory {
   std::size_t workspace_bytes_ = 0;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

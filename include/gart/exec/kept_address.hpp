@@ -8,7 +8,7 @@
 
 #if defined(__CUDACC__)
 
-namespace gart::inline GART_ISA::detail {
+namespace gart { inline namespace GART_ISA { namespace detail {
 
 template <class T>
 __device__ GART_INLINE T& kept_address(void* shared) {
@@ -19,6 +19,6 @@ __device__ GART_INLINE T& kept_address(void* shared) {
   return *static_cast<T*>(kept);
 }
 
-}  // namespace gart::inline GART_ISA::detail
+}}}  // namespace gart::GART_ISA::detail
 
 #endif

@@ -9,7 +9,7 @@
 #include <omp.h>
 #endif
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A policy: all cores.
 class openmp_exec : public host_memory {
@@ -65,4 +65,4 @@ class openmp_exec : public host_memory {
 };
 static_assert(host_execution<openmp_exec>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -16,7 +16,7 @@
 #include <algorithm>
 #include <memory>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The team of a tile on a host: one lane.
 template <class Scratch>
@@ -98,4 +98,4 @@ void parallel_for(openmp_exec& exec, char const* label, tile_range range, K cons
 }
 ///@}
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -4,7 +4,7 @@
 
 #include <gart/exec/host_memory.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A policy: one thread.
 class serial_exec : public host_memory {
@@ -35,4 +35,4 @@ class serial_exec : public host_memory {
 };
 static_assert(host_execution<serial_exec>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -122,4 +122,4 @@ class adam_table {
   buffer<u32, E> ends_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -12,7 +12,7 @@
 #include <gart/exposure/adam_table.hpp>
 #include <gart/exposure/exposure.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -96,4 +96,4 @@ class exposure_training : public adam_table<E, exposure::floats> {
   buffer<float, E> exposed_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -23,7 +23,7 @@ struct photo_response {
 
 }  // namespace gart
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Of every pixel of an image of three channels.
 inline void apply(photo_response const& response, image_float& image) {
@@ -37,4 +37,4 @@ inline void apply(photo_response const& response, image_float& image) {
   }
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

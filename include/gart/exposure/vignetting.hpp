@@ -46,7 +46,7 @@ struct image_circle {
 
 }  // namespace gart
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Whether two views are taken to be through one lens: of the same model and size, and focal lengths that differ by a
 /// tenth at most. A lens that was calibrated for each photograph anew has another focal length in each.
@@ -55,4 +55,4 @@ inline bool one_lens(camera const& a, camera const& b) {
   return a.kind == b.kind && a.width == b.width && a.height == b.height && near(a.fx, b.fx) && near(a.fy, b.fy);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

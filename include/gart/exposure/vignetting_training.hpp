@@ -13,7 +13,7 @@
 
 #include <algorithm>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -138,4 +138,4 @@ class vignetting_training : public adam_table<E, vignetting::floats> {
   buffer<float, E> shaded_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -20,7 +20,7 @@
 #include <gart/backward/differentiate_rays.hpp>
 #include <gart/camera/models.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// dL/d focal lengths and principal point, in pixels.
 struct lens_gradient {
@@ -142,4 +142,4 @@ lens_gradient differentiate_lens(Frame& frame, span<float const> color, image_gr
   return lens_differentiation<typename Frame::execution_type>(frame.exec())(frame, color, image, more);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -26,7 +26,7 @@ struct lens_state {
 
 }  // namespace gart
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The camera with its lens changed: all else stays.
 inline camera through(camera view, lens_numbers const& by) {
@@ -48,4 +48,4 @@ inline bool same_lens(camera const& a, camera const& b) {
   return a.kind == b.kind && a.width == b.width && a.height == b.height && all(a) == all(b);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -16,7 +16,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The lenses of a run.
 class lens_training {
@@ -105,4 +105,4 @@ class lens_training {
   lens_state state_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

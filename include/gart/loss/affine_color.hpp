@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The map: matrix and offset, of colours in [0, 1].
 struct affine_color {
@@ -125,4 +125,4 @@ inline double psnr_affine_color(image_float const& render, image_float const& tr
   return sums[0] > 0 ? -10 * std::log10(sums[0] / sums[1]) : std::numeric_limits<double>::infinity();
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

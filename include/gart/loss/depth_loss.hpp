@@ -15,7 +15,7 @@
 #include <gart/exec/parallel.hpp>
 #include <gart/loss/image_loss.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// An image's depth, and where the gradients by it go: [H][W] each.
 struct depth_pixels {
@@ -72,4 +72,4 @@ class depth_loss {
   buffer<float, E> pixels_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -6,7 +6,7 @@
 
 #include <gart/loss/image_loss.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -40,4 +40,4 @@ void error_map(E& exec, span<float const> image, truth_view const& truth, buffer
   error_map(exec, image, truth, error, {0, static_cast<int>(image.size() / 3)}, 1);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -22,7 +22,7 @@
 #include <gart/loss/loss_tiles.hpp>
 #include <gart/math/glm.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The truth in the policy's memory, 8 bits a channel, row-major.
 struct truth_view {
@@ -283,4 +283,4 @@ class image_loss {
   buffer<float, E> planes_, partials_, sums_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

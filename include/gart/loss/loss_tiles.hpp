@@ -10,7 +10,7 @@
 
 #include <algorithm>
 
-namespace gart::inline GART_ISA::detail {
+namespace gart { inline namespace GART_ISA { namespace detail {
 
 // Planes are [3][H][W]: one a channel.
 struct loss_image {
@@ -157,4 +157,4 @@ struct loss_tiles {
   }
 };
 
-}  // namespace gart::inline GART_ISA::detail
+}}}  // namespace gart::GART_ISA::detail

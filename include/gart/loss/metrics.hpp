@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -144,4 +144,4 @@ inline double ssim(image_float const& render, image_float const& truth) {
   return sum / (static_cast<double>(plane) * channels);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

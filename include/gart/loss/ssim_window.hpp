@@ -7,7 +7,7 @@
 #include <gart/core/macros.hpp>
 
 /// The window of SSIM.
-namespace gart::inline GART_ISA::ssim_window {
+namespace gart { inline namespace GART_ISA { namespace ssim_window {
 
 inline constexpr int radius = 5;                             ///< pixels
 inline constexpr int taps = 2 * radius + 1;                  ///< of a row or column of the window
@@ -20,4 +20,4 @@ GART_HD constexpr double weight(int k) {
   return half[k <= radius ? k : 2 * radius - k];
 }
 
-}  // namespace gart::inline GART_ISA::ssim_window
+}}}  // namespace gart::GART_ISA::ssim_window

@@ -15,7 +15,7 @@
 #include <cmath>
 #include <cstring>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// a * b, rounded once.
 GART_HD GART_INLINE float mul(float a, float b) {
@@ -196,4 +196,4 @@ GART_HD GART_INLINE float logarithm(float x) {
   return fma(e, 0.693359375f, add(f, y));
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -5,7 +5,7 @@
 #include <gart/core/macros.hpp>
 #include <gart/math/glm.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Adds a hit of colour c to a ray, or to one a lane; returns its weight T alpha.
 template <class F>
@@ -30,4 +30,4 @@ GART_HD GART_INLINE F opaque_depth(F t, F depth, F transmittance) {
   return depth + transmittance * t;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

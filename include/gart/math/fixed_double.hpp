@@ -8,7 +8,7 @@
 
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A double that compilers do not contract.
 struct fixed_double {
@@ -95,4 +95,4 @@ GART_HD inline sine_cosine sine_cosine_of(fixed_double x) {
   return turned(small_sine_cosine(rest), quarters);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -18,7 +18,7 @@
 
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Half-open: pixels x0 <= x < x1, y0 <= y < y1. Images go to 65535 a side.
 struct pixel_box {
@@ -192,4 +192,4 @@ GART_HD inline pixel_box pixels_of(footprint_view const& v, slope_box const& s) 
   return out.empty() ? pixel_box{} : out;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -27,7 +27,7 @@
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/math/sh.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy; then the error that is seen through the
 /// Gaussian, the sum over its hits of w times the pixel's error, by which densification finds where more are needed;
@@ -176,4 +176,4 @@ GART_HD GART_INLINE vec3 color_gradient_of(vec3 unclamped, vec3 g, float weight)
           shows(unclamped.z) ? weight * g.z : 0.0f};
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

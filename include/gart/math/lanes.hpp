@@ -18,7 +18,7 @@
 #include <immintrin.h>
 #endif
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 #if defined(GART_LANES_AVX512)
 inline constexpr int lane_count = 16;
@@ -339,6 +339,6 @@ GART_INLINE lanes scale_by_power(lanes x, lanes biased) {
 /// exp(x), lane by lane.
 GART_INLINE lanes exponential(lanes x) { return exponential_of(x); }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #endif

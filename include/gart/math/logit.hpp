@@ -8,7 +8,7 @@
 
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// 1 / (1 + exp(-x)).
 GART_HD GART_INLINE float sigmoid(float x) {
@@ -24,4 +24,4 @@ GART_HD inline double sigmoid_in_double(double x) { return 1 / (1 + exp(-x)); }
 /// ln(p / (1 - p)).
 GART_HD inline double logit_in_double(double p) { return log(p / (1 - p)); }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -14,7 +14,7 @@
 
 #if defined(__CUDACC__)
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A lane's N elements of a matrix.
 template <int N>
@@ -51,6 +51,6 @@ __device__ GART_INLINE void multiply_add(float (&d)[4], matrix_part<4> const& a,
   add(a.low, b.high), add(a.high, b.low), add(a.high, b.high);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #endif

@@ -5,7 +5,7 @@
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A rotation; of any norm.
 struct quaternion {
@@ -42,4 +42,4 @@ GART_HD GART_INLINE quaternion pull_back(quaternion const& q, vec3 body) {
           s * (q.w * body.y + q.z * body.x - q.x * body.z), s * (q.w * body.z + q.x * body.y - q.y * body.x)};
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

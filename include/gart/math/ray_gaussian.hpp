@@ -25,7 +25,7 @@
 
 #include <type_traits>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The largest alpha of a hit: above it alpha is clamped.
 inline constexpr float alpha_max = 0.99f;
@@ -237,4 +237,4 @@ GART_HD GART_INLINE F hit_alpha(ray_gaussian const& g, F d2) {
   return select(a < F(alpha_max), a, F(alpha_max));
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

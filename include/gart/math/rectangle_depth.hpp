@@ -16,7 +16,7 @@
 
 #include <gart/math/ray_gaussian.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The bound, of one Gaussian.
 class rectangle_depth {
@@ -107,4 +107,4 @@ class moving_rectangle_depth : rectangle_depth {
   float moved_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

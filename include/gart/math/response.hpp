@@ -23,7 +23,7 @@
 
 #include <concepts>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What takes the place of generalized_gaussian wherever a Response is asked for.
 template <class R>
@@ -113,4 +113,4 @@ struct generalized_gaussian {
 };
 static_assert(response_function<generalized_gaussian<>>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -10,7 +10,7 @@
 #include <gart/math/glm.hpp>
 #include <gart/math/lanes.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Of one direction, or of one a lane.
 template <int Degree, class F = float>
@@ -105,4 +105,4 @@ GART_HD GART_INLINE vec3_of<F> clamped_color(vec3_of<F> const& c) {
   return {select(shows(c.x), c.x, zero), select(shows(c.y), c.y, zero), select(shows(c.z), c.z, zero)};
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

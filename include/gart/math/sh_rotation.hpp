@@ -10,7 +10,7 @@
 
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A rotation of functions of degree 3 or less.
 class sh_rotation {
@@ -55,4 +55,4 @@ class sh_rotation {
   double band_[4][7][7] = {};  // of degree l: [to][from]
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -11,7 +11,7 @@
 #include <gart/core/macros.hpp>
 #include <gart/math/glm.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// dL/dw of one Gaussian: its coefficients c and their gradient g, [size][Channels] each, of bands up to Degree.
 template <int Degree, int Channels = 3>
@@ -46,4 +46,4 @@ GART_HD GART_INLINE vec3 sh_turn(float const* c, float const* g) {
   return out;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

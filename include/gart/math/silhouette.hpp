@@ -14,7 +14,7 @@
 
 #include <gart/math/footprint.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// An ellipse on a plane of rays.
 class silhouette {
@@ -88,4 +88,4 @@ class silhouette {
   float inverse_x_ = 0, inverse_y_ = 0;  // 1 / l_xx and 1 / l_yy
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -9,7 +9,7 @@
 
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// v turned about a unit axis by an angle of that sine and cosine: Rodrigues' formula. F: double, or where bits count
 /// fixed_double.
@@ -46,4 +46,4 @@ inline vec3d angles_of(mat3d const& r) {
   return column * (angle / std::sqrt(column.x * column.x + column.y * column.y + column.z * column.z));
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -15,7 +15,7 @@
 
 #include <gart/math/hit_gradient.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The filter where a Gaussian is: its standard deviation, in world units, and how that changes with the mean.
 struct filter_at {
@@ -126,4 +126,4 @@ GART_HD GART_INLINE geometry_gradient pull_back_widened(geometry_gradient const&
   return out;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -21,7 +21,7 @@
 #include <iterator>
 #include <type_traits>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Adam's moments, of the parameters' shape.
 template <execution E>
@@ -327,4 +327,4 @@ void adam_step(E& exec, gaussians<E>& model, gaussians<E> const& gradient, optim
   adam_pass<E>(model, gradient, state, rates, step, active_sh_degree, skipped, options, batch).all(exec);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -19,7 +19,7 @@
 
 #include <utility>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -92,4 +92,4 @@ class dropout {
   buffer<float, E> shown_;  // outside of a scope; in one, the scene's own
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

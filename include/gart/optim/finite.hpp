@@ -22,7 +22,7 @@
 #include <string>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -134,4 +134,4 @@ class finite_check {
   buffer<u64, E> counts_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

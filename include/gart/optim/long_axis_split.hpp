@@ -13,7 +13,7 @@
 
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What the two children are.
 struct split_child {
@@ -36,4 +36,4 @@ GART_HD inline split_child split_long_axis(split_shape const& shape, vec3 const&
   return out;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -10,7 +10,7 @@
 
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What a number is drawn for: draws for different purposes are independent.
 enum class random_use : u32 { relocation = 1, growth, noise, split, dropout, user = 0x10000 };
@@ -71,4 +71,4 @@ GART_HD inline random_normals normals(random_words const& words) {
   return out;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -13,7 +13,7 @@
 
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// mean, log_scale and quaternion: what places and shapes a Gaussian, and comes first in a row.
 inline constexpr index_t geometry_columns = 10;
@@ -193,4 +193,4 @@ struct density_change {
   bool any() const { return relocated || added || removed; }
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

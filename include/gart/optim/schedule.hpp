@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// from * (to / from)^(step / steps): log-linear, `to` at and after `steps`. Both must be positive; where one is not,
 /// the rate stays at `from`.
@@ -45,4 +45,4 @@ inline int sh_degree_at(int step, int degree, int every, int steps) {
   return degree <= 0 ? 0 : std::min(degree, step / sh_interval(degree, every, steps));
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

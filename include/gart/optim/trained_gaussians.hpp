@@ -10,7 +10,7 @@
 #include <array>
 #include <utility>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What an optimizer moves, in a policy's memory.
 template <execution E>
@@ -78,4 +78,4 @@ struct trained_gaussians {
   std::array<gaussians<E>*, 4> all() { return {&model, &gradients, &moments.first, &moments.second}; }
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

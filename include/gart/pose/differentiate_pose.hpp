@@ -32,7 +32,7 @@
 
 #include <algorithm>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace pose_kernels {
 
@@ -214,4 +214,4 @@ pose_gradient differentiate_pose(Frame const& frame, gaussians_view<float const>
   return pose_differentiation<typename Frame::execution_type>(frame.exec())(frame, gradients);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -43,7 +43,7 @@ struct pose_state {
 
 }  // namespace gart
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The camera with the pose changed: all else stays.
 inline camera moved(camera view, pose_numbers const& by, double unit) {
@@ -73,4 +73,4 @@ inline pose_numbers pull_back(camera const& from, pose_numbers const& at, double
   return {t.x, t.y, t.z, r.x, r.y, r.z};
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -16,7 +16,7 @@
 
 #include <algorithm>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The metric's root, lower triangular: metric = root root^T.
 class metric_root {
@@ -87,4 +87,4 @@ inline std::array<double, 36> pose_metric(camera const& view, span<float const> 
   return h;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -23,7 +23,7 @@
 #include <array>
 #include <utility>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The poses of a run.
 class pose_training {
@@ -168,4 +168,4 @@ class pose_training {
   pose_state state_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -15,7 +15,7 @@
 #include <gart/exec/stage.hpp>
 #include <gart/scene/parameters.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace render_kernels {
 
@@ -61,4 +61,4 @@ class antialiased {
   buffer<float, E> log_scale_, opacity_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -8,7 +8,7 @@
 #include <gart/core/types.hpp>
 #include <gart/exec/concepts.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace render_kernels {
 
@@ -35,4 +35,4 @@ void color_to_bytes(E& exec, float const* color, index_t pixels, u8* bytes, int 
   parallel_for(exec, "8 bits", pixels, render_kernels::color_to_bytes{color, bytes, channels});
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

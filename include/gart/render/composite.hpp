@@ -14,7 +14,7 @@
 
 #include <type_traits>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The last hit of a ray; t = -1 where the ray has none. A place stands for an id: the places of a pixel's hits have
 /// the order of their Gaussians.
@@ -155,4 +155,4 @@ struct composite : ray_program_base {
 };
 static_assert(warp_program<composite<3, record_none>>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -22,7 +22,7 @@
 #include <optional>
 #include <string>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace render_kernels {
 
@@ -144,4 +144,4 @@ class frame {
   u64 preparations_ = 0;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

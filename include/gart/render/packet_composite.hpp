@@ -7,7 +7,7 @@
 
 #if !defined(__CUDACC__)
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The packet program of composite (trace/packet_program.hpp).
 template <int ShDegree, hit_record Record>
@@ -91,6 +91,6 @@ packet_composite<ShDegree, Record> packets_of(composite<ShDegree, Record> const&
   return {program};
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #endif

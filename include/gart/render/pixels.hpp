@@ -6,7 +6,7 @@
 #include <gart/trace/packet_block.hpp>
 #include <gart/trace/pixel_order.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The ray of a pixel of the view that `rays` was made for, in its frame.
 template <rays_of_pixels Rays>
@@ -33,4 +33,4 @@ inline vec3_of<lanes> pixel_directions(pixel_rays const& rays, packet_block cons
 }
 #endif
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

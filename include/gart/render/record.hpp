@@ -12,7 +12,7 @@
 #include <concepts>
 #include <type_traits>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -80,4 +80,4 @@ struct record_none {
 };
 static_assert(hit_record<record_none>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -6,7 +6,7 @@
 #include <gart/render/frame.hpp>
 #include <gart/render/rendered.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Of what a view of that size was rendered to.
 template <execution E>
@@ -51,4 +51,4 @@ image8 render_image_8bit(Frame& frame) {
   return out;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -13,7 +13,7 @@
 #include <gart/runtime/registry.hpp>
 #include <gart/train/trainer.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A session of one configuration.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
@@ -96,4 +96,4 @@ void register_strategies(int first_rank, bool (*available)(std::string*) = alway
   });
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

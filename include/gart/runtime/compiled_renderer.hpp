@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A renderer of one configuration.
 template <execution E, class Traits, class Tracer, strategy Strategy>
@@ -313,4 +313,4 @@ class compiled_renderer final : public renderer {
   u64 rays_model_ = 0;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

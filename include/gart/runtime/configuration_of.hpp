@@ -10,7 +10,7 @@
 
 #include <type_traits>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What the templates are called at run time, for a model of a degree up to theirs.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
@@ -54,4 +54,4 @@ Comm comm_of(configuration_request const& request) {
     return *request.ranks;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

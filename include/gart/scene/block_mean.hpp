@@ -6,7 +6,7 @@
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Where the blocks of an image lie.
 struct pixel_blocks {
@@ -43,4 +43,4 @@ GART_HD GART_INLINE u8 block_mean(u8 const* image, int channels, u8 const* mask,
   return static_cast<u8>(counted && !mean ? 1 : mean);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -76,7 +76,7 @@ struct camera_fault {
 
 }  // namespace gart
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Across and down, in the middle of the image: the focal lengths, or what the sphere has in their place. Of parallel
 /// rays pixels a world unit.
@@ -94,4 +94,4 @@ inline camera resized(camera c, int width, int height) {
   return c;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -5,7 +5,7 @@
 #include <gart/exec/concepts.hpp>
 #include <gart/scene/parameter_table.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -29,4 +29,4 @@ void copy_bands(E& exec, float const* from, int from_degree, float* to, int to_d
                detail::copy_bands_kernel{from, to, 3 * sh_coefficients(from_degree), 3 * sh_coefficients(to_degree)});
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -5,7 +5,7 @@
 #include <gart/math/ray_gaussian.hpp>
 #include <gart/scene/gaussians.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Gaussian i.
 GART_HD GART_INLINE gaussian_parameters load_parameters(gaussians_view<float const> const& g, index_t i) {
@@ -15,4 +15,4 @@ GART_HD GART_INLINE gaussian_parameters load_parameters(gaussians_view<float con
   return {vec3(m[0], m[1], m[2]), vec3(s[0], s[1], s[2]), {q[0], q[1], q[2], q[3]}, g.opacity[i]};
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -14,7 +14,7 @@
 #include <array>
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// p -> scale rotation p + translation.
 struct similarity {
@@ -104,4 +104,4 @@ inline void apply(similarity const& s, gaussian_model& model) {
   }
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

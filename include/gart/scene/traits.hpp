@@ -6,7 +6,7 @@
 
 #include <gart/math/response.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What traits must have.
 template <class T>
@@ -25,4 +25,4 @@ struct scene_traits {
 };
 static_assert(scene_requirements<scene_traits<>>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -9,7 +9,7 @@
 #include <gart/exec/buffer.hpp>
 #include <gart/shard/row_exchange_kernels.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -79,4 +79,4 @@ class arrival_order {
   buffer<u32, E> order_, runs_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -13,7 +13,7 @@
 #include <initializer_list>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The messages of one rank: to whom and from whom rows go.
 struct strip_messages {
@@ -72,4 +72,4 @@ requires communicator<Comm, E> u64 begin_sharing_rows(E& exec, Comm& comm, std::
   return all.bytes;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

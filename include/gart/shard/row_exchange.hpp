@@ -34,7 +34,7 @@
 #include <gart/shard/view_costs.hpp>
 #include <gart/shard/work_units.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Size: side of a tile. Response: of the Gaussians.
 template <execution E, class Comm, int Size, int ShDegree, class Response>
@@ -395,4 +395,4 @@ class row_exchange {
   u64 traffic_ = 0;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -10,7 +10,7 @@
 
 #include <type_traits>
 
-namespace gart::inline GART_ISA::detail {
+namespace gart { inline namespace GART_ISA { namespace detail {
 
 // The box of a row in a view; cost is, by rows of tiles, by how much their pairs are more than those of the row above.
 // One row in `every` is counted, for all of them, and with 0 none: many atomic additions to few addresses are slow.
@@ -337,4 +337,4 @@ struct add_finished_body {
   }
 };
 
-}  // namespace gart::inline GART_ISA::detail
+}}}  // namespace gart::GART_ISA::detail

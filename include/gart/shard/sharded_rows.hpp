@@ -14,7 +14,7 @@
 #include <numeric>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -227,4 +227,4 @@ class sharded_rows final : public all_rows<E> {
   buffer<float, E> packed_, arrived_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

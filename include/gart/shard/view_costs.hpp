@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// By a number of each view that its user chooses. Size: side of a tile.
 template <int Size>
@@ -65,4 +65,4 @@ class view_costs {
   std::map<std::size_t, std::vector<u64>> costs_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

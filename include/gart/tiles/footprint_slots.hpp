@@ -5,7 +5,7 @@
 
 #include <gart/tiles/grid.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// One 16-byte word.
 struct alignas(16) footprint_slots {
@@ -41,4 +41,4 @@ GART_HD constexpr pixel_box tiles_of(footprint_slots const& range) {
   return out;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

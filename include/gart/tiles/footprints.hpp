@@ -12,7 +12,7 @@
 #include <gart/scene/parameters.hpp>
 #include <gart/tiles/footprint_slots.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace tile_kernels {
 
@@ -149,4 +149,4 @@ class footprints {
   u64 slots_ = 0, pairs_ = 0;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

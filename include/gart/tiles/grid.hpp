@@ -4,7 +4,7 @@
 
 #include <gart/math/footprint.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The tiles of an image.
 template <int Size>
@@ -45,4 +45,4 @@ GART_HD constexpr pixel_box intersect(pixel_box const& a, pixel_box const& b) {
   return {a.x0 > b.x0 ? a.x0 : b.x0, a.y0 > b.y0 ? a.y0 : b.y0, a.x1 < b.x1 ? a.x1 : b.x1, a.y1 < b.y1 ? a.y1 : b.y1};
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

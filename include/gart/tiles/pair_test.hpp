@@ -14,7 +14,7 @@
 #include <concepts>
 #include <type_traits>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A test: it has the members that are listed above.
 template <class T>
@@ -96,4 +96,4 @@ inline every_pair pair_test_of(camera_base const&, ray_gaussian const*) { return
 
 static_assert(pair_test<every_pair> && pair_test<silhouette_pairs>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

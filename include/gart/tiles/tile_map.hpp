@@ -12,7 +12,7 @@
 #include <gart/tiles/pair_test.hpp>
 #include <gart/tiles/tile_order.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The map as kernels hold it.
 struct tile_map_view {
@@ -192,4 +192,4 @@ class tile_map {
   int order_bits_ = 0, depth_shift_ = 0;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

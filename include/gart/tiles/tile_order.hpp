@@ -15,7 +15,7 @@
 #include <concepts>
 #include <type_traits>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// An order: it has the members that are listed above.
 template <class O>
@@ -282,4 +282,4 @@ struct number_order {
 };
 static_assert(tile_order<depth_order> && tile_order<number_order>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -11,7 +11,7 @@
 #include <gart/camera/pixel_rays.hpp>
 #include <gart/tiles/grid.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A part of a tile's grid, in pixels counted from the tile's.
 struct tile_rectangle {
@@ -102,4 +102,4 @@ struct tile_planes {
   }
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

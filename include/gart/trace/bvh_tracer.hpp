@@ -11,7 +11,7 @@
 #include <gart/trace/k_buffer_visitor.hpp>
 #include <gart/trace/tracer.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace trace_kernels {
 
@@ -92,4 +92,4 @@ class bvh_tracer : public tracer_base {
   int age_ = 0;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

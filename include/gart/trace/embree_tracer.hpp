@@ -44,7 +44,7 @@ class embree_scene {
 
 }  // namespace gart
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace trace_kernels {
 
@@ -113,4 +113,4 @@ class embree_tracer : public tracer_base {
   traced_scene scene_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -5,7 +5,7 @@
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What a ray program is given of a hit.
 struct hit {
@@ -20,4 +20,4 @@ GART_HD constexpr bool before(float t_a, u32 id_a, float t_b, u32 id_b) {
   return t_a < t_b || (t_a == t_b && id_a < id_b);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -6,7 +6,7 @@
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A hit that waits for its turn.
 struct pending_hit {
@@ -66,4 +66,4 @@ class hit_ring {
   u32 head_ = 0, count_ = 0;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

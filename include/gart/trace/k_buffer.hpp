@@ -8,7 +8,7 @@
 #include <gart/math/glm.hpp>
 #include <gart/trace/hit.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A sorted window of hits.
 template <int Capacity>
@@ -62,4 +62,4 @@ class k_buffer {
   int count_ = 0;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -6,7 +6,7 @@
 #include <gart/trace/k_buffer.hpp>
 #include <gart/trace/tracer.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Takes the candidates of one ray from a traversal and keeps those that are its next hits.
 template <int Capacity, class Ray, class Response = generalized_gaussian<>>
@@ -60,4 +60,4 @@ GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& progr
   program.end(i, state);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -6,7 +6,7 @@
 
 #if !defined(__CUDACC__)
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The pixels of a packet: 4 wide, as high as there are lanes for.
 struct packet_block {
@@ -31,6 +31,6 @@ struct packet_block {
   }
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #endif

@@ -9,7 +9,7 @@
 
 #if !defined(__CUDACC__)
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A Gaussian's box in a tile.
 struct packet_cell {
@@ -34,6 +34,6 @@ struct packet_cell {
   }
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #endif

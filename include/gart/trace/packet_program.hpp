@@ -9,7 +9,7 @@
 
 #if !defined(__CUDACC__)
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A ray program for packets.
 template <class P>
@@ -32,6 +32,6 @@ concept packet_program = requires(P const& p, typename P::state& s, packet_block
   requires std::constructible_from<typename P::cell, u32, footprint_slots const&, pixel_box const&>;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #endif

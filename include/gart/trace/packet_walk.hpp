@@ -16,7 +16,7 @@
 
 #if !defined(__CUDACC__)
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A packet keeps 32 times the hits of a ray traced alone, in groups: what runs over is traced again from the start,
 /// not resumed.
@@ -215,6 +215,6 @@ class packet_walk {
   hits found_[batch];
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #endif

@@ -10,7 +10,7 @@
 
 #include <cstddef>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A pixel, (0, 0) at the upper left.
 struct pixel {
@@ -50,4 +50,4 @@ struct pixel_order {
   GART_HD std::size_t address(pixel p) const { return static_cast<std::size_t>(p.y) * width + p.x; }
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -11,7 +11,7 @@
 #include <concepts>
 #include <type_traits>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What a ray program is unless it says otherwise.
 struct ray_program_base {
@@ -43,4 +43,4 @@ concept pixel_program = ray_program<P> && requires(P const& p, index_t i) {
   { p.order } -> std::convertible_to<pixel_order const&>;  // ray i is the i-th in it
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

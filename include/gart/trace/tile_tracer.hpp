@@ -21,7 +21,7 @@
 #include <gart/trace/tracer.hpp>
 #include <gart/trace/warp_walk.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace trace_kernels {
 
@@ -215,4 +215,4 @@ class tile_tracer : public tracer_base {
   ray_depth depth_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

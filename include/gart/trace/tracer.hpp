@@ -13,7 +13,7 @@
 #include <gart/tiles/tile_map.hpp>
 #include <gart/trace/ray_program.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What a tracer is told of the way to trace.
 struct trace_options {
@@ -81,4 +81,4 @@ concept footprint_tracer = tracer<T, E> && requires(T const& t) {
   { t.map() } -> std::same_as<tile_map_view>;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

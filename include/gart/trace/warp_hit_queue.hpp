@@ -16,7 +16,7 @@
 
 #if defined(__CUDACC__)
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// A hit that waits for its turn.
 struct waiting_hit {
@@ -261,6 +261,6 @@ class warp_hit_queue {
   u32 lost_key_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #endif

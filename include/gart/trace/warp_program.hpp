@@ -8,7 +8,7 @@
 #include <gart/tiles/footprint_slots.hpp>
 #include <gart/trace/ray_program.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The cell of a program whose hits have no places: a word, so that what lies beside it in shared memory is aligned as
 /// it is beside others.
@@ -32,4 +32,4 @@ concept warp_program = pixel_program<P> &&
   requires !P::places_hits || std::constructible_from<typename P::cell, footprint_slots const&, pixel_box const&>;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -21,7 +21,7 @@
 
 #include <cuda_pipeline.h>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The tile kernel of the walk.
 template <class Response, int Size, warp_program P>
@@ -338,6 +338,6 @@ class walk_tile_warps {
   };
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #endif

@@ -10,7 +10,7 @@
 #include <gart/comm/collective_io.hpp>
 #include <gart/train/checkpoint_rows.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// `mine`: this rank's rows of the Gaussians, and what all ranks have of the rest. All ranks call it.
 template <class Comm>
@@ -37,4 +37,4 @@ training_state read_checkpoint_collectively(Comm& comm, row_owners const& owners
   return mine;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -14,7 +14,7 @@
 #include <cstdlib>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The share of the pixels of data.train's `views`, by index, that count in the loss and are not as the background, at
 /// least a thousandth. Those looked at are evenly spread over the views. Before a random background only transparent
@@ -46,4 +46,4 @@ inline double foreground_fraction(dataset const& data, std::vector<std::size_t> 
 /// What a penalty is multiplied by in a capture that fills such a share of its images.
 inline float penalty_scale(double share) { return static_cast<float>(std::min(1.0, 4 * share)); }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

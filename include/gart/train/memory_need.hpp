@@ -22,7 +22,7 @@
 #include <algorithm>
 #include <string>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The Gaussians that a run may come to, which starts with so many: as many as it is to grow to.
 inline u64 gaussians_at_end(train_options const& options, dataset const& data, u64 start) {
@@ -78,4 +78,4 @@ void require_room(E& exec, Comm& comm, train_options const& options, dataset con
                           std::to_string(fit) + ", or the degree, or take more ranks");
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

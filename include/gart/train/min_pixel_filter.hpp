@@ -12,7 +12,7 @@
 #include <gart/exec/buffer.hpp>
 #include <gart/scene/parameters.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -59,4 +59,4 @@ class min_pixel_filter {
   buffer<float, E> least_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

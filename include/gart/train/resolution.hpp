@@ -10,7 +10,7 @@
 
 #include <algorithm>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Pixels of a photograph, across and down, to one of the image of step `step`: 1, 2 or 4.
 inline int shrink_at(resolution_options const& options, int step, int iterations) {
@@ -35,4 +35,4 @@ inline int shrink_of(camera const& c, int shrink, resolution_options const& opti
   return shrink;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

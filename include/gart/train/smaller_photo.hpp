@@ -8,7 +8,7 @@
 #include <gart/loss/image_loss.hpp>
 #include <gart/scene/block_mean.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -79,4 +79,4 @@ class smaller_photo {
   buffer<float, E> map_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

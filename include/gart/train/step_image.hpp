@@ -8,7 +8,7 @@
 #include <gart/loss/error_map.hpp>
 #include <gart/loss/image_loss.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// An image in a policy's memory, and the loss that it is given to.
 template <execution E>
@@ -50,4 +50,4 @@ struct step_image {
   buffer<float, E> depth_, transmittance_, by_depth_, by_transmittance_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

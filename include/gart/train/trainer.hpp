@@ -47,7 +47,7 @@
 #include <gart/train/training_images.hpp>
 #include <gart/train/view_order.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What a loss sees: the rendered image and its view, in the policy's memory. It writes dL/d image and, into
 /// value[0..1], the loss and the mean squared error.
@@ -243,7 +243,7 @@ class basic_trainer {
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
 using trainer = basic_trainer<E, Traits, Tracer, Strategy, Comm>;
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
 
 #include <gart/train/trainer_impl.hpp>
 #include <gart/train/trainer_state_impl.hpp>

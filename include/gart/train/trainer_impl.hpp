@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_options const& options,
@@ -314,4 +314,4 @@ image8 basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_8bit(camera cons
   return render_image_8bit(tracing_.frame);
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -5,7 +5,7 @@
 
 #include <gart/train/trainer.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 train_options const& basic_trainer<E, Traits, Tracer, Strategy, Comm>::checked(E& exec, Comm& comm,
@@ -142,4 +142,4 @@ std::vector<named_camera> basic_trainer<E, Traits, Tracer, Strategy, Comm>::pose
   return out;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

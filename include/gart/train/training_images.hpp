@@ -14,7 +14,7 @@
 
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The photographs of a dataset's training views, in a policy's memory.
 template <execution E>
@@ -81,4 +81,4 @@ class training_images {
   smaller_photo<E> smaller_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

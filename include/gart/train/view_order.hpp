@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The views that are trained on, by index: of `views`, those not held out.
 inline std::vector<std::size_t> views_trained_on(std::size_t views, std::vector<std::size_t> const& held_out) {
@@ -51,4 +51,4 @@ class view_order {
   int epoch_ = -1;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Sizes of views that are rendered within a time, by the milliseconds a pixel that the last ones took. A view's own
 /// fixed cost is taken for one of its pixels, so that sizes come down to where the time is met, and stay there.
@@ -76,4 +76,4 @@ class time_share {
   bool after_view_ = false;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

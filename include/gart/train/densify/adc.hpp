@@ -30,7 +30,7 @@
 #include <cmath>
 #include <utility>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -320,4 +320,4 @@ class adaptive_density final : public densifier<E> {
   buffer<u64, E> offset_, totals_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

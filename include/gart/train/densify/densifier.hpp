@@ -15,7 +15,7 @@
 #include <gart/optim/trained_gaussians.hpp>
 #include <gart/train/options.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// When a run densifies.
 struct density_schedule {
@@ -100,4 +100,4 @@ void add_errors(E& exec, span<float const> moments, span<float> sums) {
                detail::error_sum_kernel{moments.data(), sums.data()});
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

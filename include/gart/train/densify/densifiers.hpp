@@ -9,7 +9,7 @@
 
 #include <memory>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// That of a run.
 template <execution E>
@@ -27,4 +27,4 @@ std::unique_ptr<densifier<E>> make_densifier(E& exec, density_setup const& run) 
   return std::make_unique<densifier<E>>();
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

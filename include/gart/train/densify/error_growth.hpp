@@ -40,7 +40,7 @@
 #include <cmath>
 #include <string>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
@@ -261,4 +261,4 @@ class error_growth final : public densifier<E> {
   buffer<u64, E> place_, totals_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -31,7 +31,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// o', and scale' / scale.
 struct relocated_shape {
@@ -316,4 +316,4 @@ class mcmc final : public densifier<E> {
   buffer<u64, E> before_, dead_before_, totals_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -9,7 +9,7 @@
 
 #include <algorithm>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Errors: invalid_argument where a weight asks for what the strategy or the dataset does not have.
 template <bool Depth>
@@ -66,4 +66,4 @@ class learned_depth final : public learned_part<Frame> {
   smaller_photo<E> smaller_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -6,7 +6,7 @@
 #include <gart/lens/lens_training.hpp>
 #include <gart/train/learned/part.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Where options.refine_lens asks for them.
 template <class Frame>
@@ -50,4 +50,4 @@ class learned_lenses final : public learned_part<Frame> {
   lens_differentiation<E> differentiate_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

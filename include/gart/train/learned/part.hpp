@@ -23,7 +23,7 @@
 #include <functional>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// One of a step's images, where it is traced.
 struct step_view {
@@ -100,4 +100,4 @@ class learned_part {
   virtual void tell(learned_colors&) const {}  ///< what it has learned, for files
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -10,7 +10,7 @@
 
 #include <memory>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The parts of a run.
 template <class Frame>
@@ -31,4 +31,4 @@ learned_parts<Frame> make_learned_parts(typename Frame::execution_type& exec, tr
   return all;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

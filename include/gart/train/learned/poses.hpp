@@ -10,7 +10,7 @@
 #include <array>
 #include <cstring>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Where options.refine_poses asks for them.
 template <class Frame>
@@ -74,4 +74,4 @@ class learned_poses final : public learned_part<Frame> {
   pose_differentiation<E> differentiate_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

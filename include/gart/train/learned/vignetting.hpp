@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Where options.vignetting asks for them.
 template <class Frame>
@@ -46,4 +46,4 @@ class learned_vignetting final : public learned_part<Frame> {
   span<float const> image_;  // before it was shaded
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -13,7 +13,7 @@
 #include <optional>
 #include <utility>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace train_kernels {
 
@@ -229,4 +229,4 @@ class rank_units {
   std::optional<arrived_colors> arrived_;  // of the last step, where Adam took them as they came
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -9,7 +9,7 @@
 #include <gart/train/densify/densifier.hpp>
 #include <gart/train/step_image.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// As rank_units.
 template <execution E>
@@ -59,4 +59,4 @@ class whole_view {
   span<float const> moments_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA
