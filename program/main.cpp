@@ -73,7 +73,7 @@ int main(int argc, char** argv) {
       "  gart train --help-all                    every option of a command\n"
       "\nExit codes: 0 done, 1 failed, 2 the command line is wrong, 130 stopped by Ctrl-C, SIGTERM or SIGHUP (train: "
       "saved, "
-      "resumable).");
+      "resumable; view: 0).");
   command selected;
   add_train(app, selected);
   add_render(app, selected);

@@ -111,7 +111,9 @@ std::string note_text(std::string_view what) { return text_of({{"type", "note"},
 std::string refused_text(std::string_view what, std::string_view why) {
   return text_of({{"type", "refused"}, {"what", what}, {"why", why}});
 }
-std::string error_text(std::string_view what) { return text_of({{"type", "error"}, {"what", what}}); }
+std::string error_text(std::string_view what, std::string_view of, u64 id) {
+  return text_of({{"type", "error"}, {"what", what}, {"of", of}, {"id", id}});
+}
 std::string bye_text(std::string_view why) { return text_of({{"type", "bye"}, {"why", why}}); }
 
 std::vector<u8> frame_bytes(frame_header const& h, std::vector<u8> const& image) {

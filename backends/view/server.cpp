@@ -25,6 +25,11 @@ double seconds_now() { return std::chrono::duration<double>(clock::now().time_si
 
 constexpr int quality_moving = 80, quality_still = 95;
 
+char const* type_of(view_message const&) { return "view"; }
+char const* type_of(image_message const&) { return "image"; }
+char const* type_of(pick_message const&) { return "pick"; }
+char const* type_of(path_message const&) { return "path"; }
+
 // A camera whose middle pixel is the image point, and the pixel that it lies in. The sphere has no such part: all of
 // it, small.
 struct pick_place {
@@ -130,7 +135,9 @@ double view_server::render_next(view_render const& render, double wait_seconds) 
   try {
     std::visit([&](auto const& message) { state_->answer(*job, message, render); }, job->wanted);
   } catch (std::exception const& e) {
-    state_->all.send(job->client, error_text(e.what()));
+    std::visit(
+        [&](auto const& message) { state_->all.send(job->client, error_text(e.what(), type_of(message), message.id)); },
+        job->wanted);
   }
   return seconds_now() - start;
 }

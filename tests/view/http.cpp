@@ -5,6 +5,8 @@
 
 #include <doctest/doctest.h>
 
+#include <random>
+
 namespace {
 
 using gart::view::access;
@@ -53,6 +55,26 @@ TEST_CASE("what is no request is wrong") {
   }
   CHECK(read(std::string(gart::view::request_head_most + 1, 'x')) == head_state::wrong);
   CHECK(read("GET / HTTP/1.1\r\nCookie: " + std::string(20000, 'c') + "\r\n\r\n") == head_state::whole);
+}
+
+TEST_CASE("a request that is damaged anywhere is taken, refused or waited for") {
+  std::string const good =
+      "GET /0123456789abcdef0123456789abcdef/socket HTTP/1.1\r\nHost: 127.0.0.1:8765\r\nOrigin: a\r\n\r\n";
+  std::mt19937 engine(7);
+  for (int round = 0; round < 4000; ++round) {
+    std::string text = good.substr(0, engine() % (good.size() + 1));
+    for (unsigned i = engine() % 4; i > 0 && !text.empty(); --i)
+      text[engine() % text.size()] = static_cast<char>(engine());
+    std::string rest = text;
+    http_request r;
+    head_state const is = gart::view::take_request(rest, r);
+    CHECK((is == head_state::whole || rest == text || rest.size() < text.size()));
+    if (is == head_state::whole) {
+      CHECK(r.path.front() == '/');
+      CHECK(r.path.find('\n') == std::string::npos);
+      for (auto const& [name, value] : r.headers) CHECK((name + value).find('\r') == std::string::npos);
+    }
+  }
 }
 
 TEST_CASE("hosts and origins: the server's own, and those of proxies that are allowed") {

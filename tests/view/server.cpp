@@ -266,6 +266,8 @@ TEST_CASE("points, paths, errors") {
   json const failed = json::parse(c->hear().payload);
   CHECK(failed["type"] == "error");
   CHECK(failed["what"] == "thirteen");
+  CHECK(failed["of"] == "view");
+  CHECK(failed["id"] == 1);
   c->say(view_text(view, false));
   CHECK(c->hear().opcode == 2);
 }
@@ -379,8 +381,8 @@ TEST_CASE("connections that say nothing, or half of it, lock nobody out") {
   CHECK(comes->hear().opcode == 2);
   watches->say(view_text(camera_at({0, 0, 0}), false));
   CHECK(watches->hear().opcode == 2);
-  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(5));
   CHECK(silent.front()->receive(1).empty());  // it made room
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(8));
 }
 
 TEST_CASE("an image is a PNG of the size that is asked for") {

@@ -1,6 +1,7 @@
 // The page: what the reader sees and touches, tied to the view and to gart.
 
 import {connect} from './connection.js';
+import {questions} from './ask.js';
 import {View} from './view.js';
 import {frameShower, rateMeter} from './frames.js';
 import {penFor} from './overlay.js';
@@ -33,22 +34,11 @@ const stage = $('stage'), lines = $('lines'), frame = $('frame');
 const {say, aloud} = notes($('say'), $('note'));
 const count = (n) => n.toLocaleString('en');
 
-let cameras = [], frusta = [], tips = [], pointed = null, shown = null, hello = null, asked = 0;
-const answers = new Map(), waiting = [];
+let cameras = [], frusta = [], tips = [], pointed = null, shown = null, hello = null;
+const waiting = [];
 const meter = rateMeter();
 
-// What gart answers by the number of the question.
-const ask = (question, seconds) => new Promise((resolve, reject) => {
-  const id = ++asked;
-  if (!connection.send({...question, id})) return reject(new Error('There is no connection.'));
-  const late = setTimeout(() => answers.delete(id) && reject(new Error('gart did not answer.')), 1000 * seconds);
-  answers.set(id, (message) => (clearTimeout(late), resolve(message)));
-});
-const answer = (message) => {
-  answers.get(message.id)?.(message);
-  answers.delete(message.id);
-};
-
+const {ask, answer, failed, lost: unanswered} = questions((message) => connection.send(message));
 const connection = connect({
   hello: welcome,
   frame: frameShower(frame, frameShown),
@@ -64,13 +54,15 @@ const connection = connect({
   scores: ({psnr}) => list.scores(psnr),
   note: ({what}) => say(what),
   refused: ({what, why}) => say(`Refused: ${what}, ${why}`),
-  error: ({what}) => say(what),
+  // A question that failed is told where it was asked.
+  error: (message) => (message.of === 'view' ? say(message.what) : failed(message)),
   closed(seconds, why) {
     lost(`The connection is lost${why ? ` (${why})` : ''}. Trying again in ${seconds} s.`);
   },
   ended: (why) => lost(why === 'gart ends' ? 'gart has ended.' : why),
 });
 function lost(text) {
+  unanswered();
   $('lost').firstElementChild.textContent = text;
   $('lost').hidden = false;
   $('state').textContent = 'Not connected';

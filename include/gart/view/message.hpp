@@ -114,8 +114,8 @@ std::string scores_text(std::vector<std::pair<int, double>> const& scores);
 std::string note_text(std::string_view what);
 /// A message was not allowed, and why.
 std::string refused_text(std::string_view what, std::string_view why);
-/// Something failed.
-std::string error_text(std::string_view what);
+/// A message of the type `of` failed.
+std::string error_text(std::string_view what, std::string_view of, u64 id);
 /// The server ends.
 std::string bye_text(std::string_view why);
 
