@@ -143,126 +143,21 @@ class RenderOptions:
     background: Rgb
     def __init__(self, **fields: Any) -> None: ...
 
-class ApproximationOptions:
-    alpha_min: float
-    transmittance_min: float
-    max_hits: int
-    antialias: float
-    rebuild_every: int
-    def __init__(self, **fields: Any) -> None: ...
-
-class ResolutionOptions:
-    quarter_until: float
-    half_until: float
-    least: int
-    long_run: int
-    def __init__(self, **fields: Any) -> None: ...
-
-class LearningRates:
-    mean: float
-    mean_final: float
-    log_scale: float
-    quaternion: float
-    opacity: float
-    sh_dc: float
-    sh_rest: float
-    settled: float
-    long_run: int
-    settle_late: float
-    exposure: float
-    vignetting: float
-    vignetting_final: float
-    def __init__(self, **fields: Any) -> None: ...
-
-class AdamOptions:
-    sparse: bool
-    def __init__(self, **fields: Any) -> None: ...
-
-class PoseOptions:
-    warm_up: float
-    until: float
-    rate: float
-    rate_final: float
-    damping: float
-    damping_final: float
-    prior: float
-    def __init__(self, **fields: Any) -> None: ...
-
-class LensOptions:
-    warm_up: float
-    until: float
-    rate: float
-    rate_final: float
-    def __init__(self, **fields: Any) -> None: ...
-
-class SplitShape:
-    share: float
-    opacity: float
-    def __init__(self, **fields: Any) -> None: ...
-
-class ErrorGrowthOptions:
-    every: int
-    fill: float
-    until: float
-    dead_opacity: float
-    opacity_penalty: float
-    split: SplitShape
-    pixels_each: float
-    least_budget: int
-    def __init__(self, **fields: Any) -> None: ...
-
-class McmcOptions:
-    every: int
-    until: float
-    growth: float
-    dead_opacity: float
-    noise: float
-    opacity_penalty: float
-    scale_penalty: float
-    def __init__(self, **fields: Any) -> None: ...
-
-class AdcOptions:
-    every: int
-    opacity_reset_every: int
-    until: float
-    gradient: float
-    dense: float
-    prune_opacity: float
-    def __init__(self, **fields: Any) -> None: ...
+class OptionGroup:
+    def __getattr__(self, name: str) -> Any: ...
+    def __setattr__(self, name: str, value: Any) -> None: ...
 
 class TrainOptions:
-    iterations: int
-    max_gaussians: int
-    random_points: int
     densify: str  # "error", "mcmc", "adc", "none"
-    sh_every: int
-    held_out: List[int]
     background: str  # "white", "black", "random"
-    initial_opacity: float
-    initial_scale: float
-    ssim_weight: float
-    dropout: float
-    dropout_until: float
-    depth_weight: float
+    held_out: List[int]
     exposure: bool
     vignetting: bool
-    refine_poses: bool
-    refine_lens: bool
-    lt_budget: int
-    check_finite: bool
-    batch: int
-    seed: int
-    near: float
-    resolution: ResolutionOptions
-    render: ApproximationOptions
-    rates: LearningRates
-    adam: AdamOptions
-    poses: PoseOptions
-    lens: LensOptions
-    error: ErrorGrowthOptions
-    mcmc: McmcOptions
-    adc: AdcOptions
     def __init__(self, **fields: Any) -> None: ...
+    def __getattr__(self, name: str) -> Any: ...
+    def __setattr__(self, name: str, value: Any) -> None: ...
+    @staticmethod
+    def fields() -> Dict[str, Tuple[float, float, str]]: ...
 
 class Renderer:
     def __init__(self, model: Optional[Model] = None, *, backend: str = "auto", tracer: str = "auto",
@@ -277,21 +172,34 @@ class Renderer:
     def render_to(self, camera: Camera, options: Optional[RenderOptions] = None, *, color: Optional[Array] = None,
                   transmittance: Optional[Array] = None, depth: Optional[Array] = None, hits: Optional[Array] = None,
                   rgba: Optional[Array] = None, **settings: Any) -> None: ...
-    def record(self, camera: Camera, options: Optional[RenderOptions] = None, *, color: Optional[Array] = None,
-               transmittance: Optional[Array] = None, depth: Optional[Array] = None, hits: Optional[Array] = None,
-               rgba: Optional[Array] = None, **settings: Any) -> None: ...
-    def backward_to(self, color_gradient: Array, mean: Array, log_scale: Array, quaternion: Array, opacity: Array,
-                    sh: Array, *, depth_gradient: Optional[Array] = None,
-                    transmittance_gradient: Optional[Array] = None, pose: Optional[Array] = None) -> None: ...
+    def forward(self, camera: Camera, options: Optional[RenderOptions] = None, *, color: Optional[Array] = None,
+                transmittance: Optional[Array] = None, depth: Optional[Array] = None, hits: Optional[Array] = None,
+                rgba: Optional[Array] = None, **settings: Any) -> Context: ...
+    def forward_rays(self, directions: Array, origins: Optional[Array] = None, t_max: Optional[Array] = None,
+                     frame: Sequence[float] = ..., *, color: Optional[Array] = None,
+                     transmittance: Optional[Array] = None, depth: Optional[Array] = None,
+                     options: Optional[RenderOptions] = None, **settings: Any) -> Context: ...
+    def trace(self, directions: Array, origins: Optional[Array] = None, t_max: Optional[Array] = None,
+              frame: Sequence[float] = ..., options: Optional[RenderOptions] = None,
+              **settings: Any) -> Dict[str, NDArray[Any]]: ...
+    def list_hits(self, directions: Array, origins: Optional[Array] = None, t_max: Optional[Array] = None,
+                  frame: Sequence[float] = ..., options: Optional[RenderOptions] = None,
+                  **settings: Any) -> Dict[str, NDArray[Any]]: ...
     def backward(self, camera: Camera, color_gradient: Array, options: Optional[RenderOptions] = None, *,
                  pose: bool = False, **settings: Any) -> Gradients: ...
-    def pose_gradient(self) -> PoseGradient: ...
     def wait(self) -> None: ...
     def profile(self, enable: bool = True) -> Dict[str, Tuple[float, int]]: ...
     @property
     def configuration(self) -> Dict[str, Any]: ...
     @property
     def peak_bytes(self) -> int: ...
+
+class Context:
+    def backward(self, color_gradient: Optional[Array] = None, *, depth_gradient: Optional[Array] = None,
+                 transmittance_gradient: Optional[Array] = None, mean: Optional[Array] = None,
+                 log_scale: Optional[Array] = None, quaternion: Optional[Array] = None,
+                 opacity: Optional[Array] = None, sh: Optional[Array] = None, pose: Optional[Array] = None,
+                 origins: Optional[Array] = None, directions: Optional[Array] = None) -> None: ...
 
 class StepReport:
     step: int

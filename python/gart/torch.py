@@ -1,11 +1,12 @@
 """gart as an operator of torch, on the CPU and on CUDA devices.
 
-``rasterization`` has gsplat's names, so that a program changes one import; ``render`` is one view by gart's own. Both are
-differentiable by the Gaussians and by the pose. Tensors are float32 and are not copied; work goes to torch's current
-stream. torch is imported with this module, and gart is linked to no torch: any version from 1.12 on will do.
+``rasterization`` has gsplat's names, so that a program changes one import; ``render`` is one view by gart's own, ``trace``
+rays that no image has. All are differentiable by the Gaussians, and by the pose or the rays. Tensors are float32 and are
+not copied; work goes to torch's current stream. torch is imported with this module, and gart is linked to no torch: any
+version from 1.12 on will do.
 
-A forward pass leaves what its gradients need in a renderer that calls share. Where another view comes in between, the
-backward pass renders its own again: gradients are the same, the step takes one forward pass more.
+A forward pass keeps what its gradients need until its graph goes. Where other Gaussians were rendered in between, the
+backward pass makes it again: gradients are the same, the step takes one forward pass more.
 """
 import functools
 import threading
@@ -21,13 +22,21 @@ _PARAMETERS = ("mean", "log_scale", "quaternion", "opacity", "sh")
 
 
 class _Shared:
-    """A renderer, and which image it holds what gradients need of."""
+    """A renderer, and which Gaussians it has."""
 
     def __init__(self, depth, request):
         self.renderer = _gart.Renderer(depth=depth, **request)
         self.depth = depth
-        self.recorded = None
+        self.bound = None
         self.lock = threading.RLock()
+
+    def bind(self, parameters):
+        # Memory that is bound is kept, so that its address is of nothing else.
+        key = [(p.data_ptr(), p.shape) for p in parameters]
+        if key != self.bound:
+            self.bound = None
+            self.renderer.bind(*map(_lend, parameters))
+            self.bound = key
 
 
 _shared = {}
@@ -66,56 +75,70 @@ def _degree_of(sh):
     return int(round(sh.shape[1] ** 0.5)) - 1
 
 
-def _forward(parameters, camera, options, kernel_degree, record):
-    """Colour, transmittance and depth of a view, recorded where gradients will be asked for."""
-    mean, sh = parameters[0], parameters[4]
-    shape = (camera.height, camera.width)
-    color = mean.new_empty((*shape, 3))
-    transmittance, depth = mean.new_empty(shape), mean.new_empty(shape)
-    shared = _shared_of(mean, _degree_of(sh), kernel_degree)
+def _shared_for(parameters, kernel_degree, depth=False):
+    return _shared_of(parameters[0], _degree_of(parameters[4]), kernel_degree, depth)
+
+
+def _pass(shared, parameters, seen, options, **images):
+    """A forward pass of a camera or of rays, into images where they are given: its context."""
+    lent = {name: _lend(image) for name, image in images.items()}
+    shared.bind(parameters)
+    if isinstance(seen, _gart.Camera):
+        return shared.renderer.forward(seen, options, **lent)
+    directions, origins, t_max = (None if r is None else _lend(r) for r in seen)
+    return shared.renderer.forward_rays(directions, origins, t_max, options=options, **lent)
+
+
+def _forward(parameters, seen, options, kernel_degree, record):
+    """Colour, transmittance and depth, and a context where gradients will be asked for."""
+    mean = parameters[0]
+    shape = (seen.height, seen.width) if isinstance(seen, _gart.Camera) else (seen[0].shape[0],)
+    images = {"color": mean.new_empty((*shape, 3)), "transmittance": mean.new_empty(shape), "depth": mean.new_empty(shape)}
+    shared = _shared_for(parameters, kernel_degree)
     with shared.lock:
-        shared.renderer.bind(*map(_lend, parameters))
-        go = shared.renderer.record if record else shared.renderer.render_to
-        shared.recorded = None
-        go(camera, options, color=_lend(color), transmittance=_lend(transmittance), depth=_lend(depth))
-        if record:
-            shared.recorded = color.data_ptr()
-    return color, transmittance, depth
+        if record or not isinstance(seen, _gart.Camera):
+            context = _pass(shared, parameters, seen, options, **images)
+        else:
+            context = None
+            shared.bind(parameters)
+            shared.renderer.render_to(seen, options, **{name: _lend(image) for name, image in images.items()})
+    return tuple(images.values()), (shared, context)
 
 
-def _backward(parameters, camera, options, kernel_degree, color, gradients, pose):
-    """dL/d the parameters, and by the pose where it is asked for: its position, and a small turn about it."""
-    by_color, by_transmittance, by_depth = gradients
-    of_depth = by_transmittance is not None or by_depth is not None
-    mean, sh = parameters[0], parameters[4]
-    shared = _shared_of(mean, _degree_of(sh), kernel_degree, of_depth)
+def _backward(parameters, seen, options, kernel_degree, kept, gradients, pose=False, rays=(False, False)):
+    """dL/d the parameters; the six numbers of the pose, and the rays' directions and origins, where they are asked for."""
+    names = ("color_gradient", "transmittance_gradient", "depth_gradient")
+    by = {name: g.contiguous() for name, g in zip(names, gradients) if g is not None}
+    shared, context = kept
+    depth = isinstance(seen, _gart.Camera) and len(by) > ("color_gradient" in by)
+    if shared is None or (depth and not shared.depth):
+        shared, context = _shared_for(parameters, kernel_degree, depth), None
     out = [torch.empty_like(p) for p in parameters]
+    turned = parameters[0].new_empty(6) if pose else None
+    by_rays = [torch.empty_like(r) if wanted else None for r, wanted in zip(seen, rays)] if any(rays) else [None, None]
+    to = dict(zip((*_PARAMETERS, "pose", "directions", "origins"), (*out, turned, *by_rays)))
+
+    def go(context):
+        context.backward(**{name: _lend(t) for name, t in {**by, **to}.items() if t is not None})
+
     with shared.lock:
-        if shared.recorded is None or shared.recorded != color.data_ptr():
-            shared.renderer.bind(*map(_lend, parameters))
-            shared.recorded = None
-            shared.renderer.record(camera, options)
-        by_color = torch.zeros_like(color) if by_color is None else by_color
-        more = {}
-        if by_transmittance is not None:
-            more["transmittance_gradient"] = _lend(by_transmittance.contiguous())
-        if by_depth is not None:
-            more["depth_gradient"] = _lend(by_depth.contiguous())
-        turned = mean.new_empty(6) if pose else None
-        if pose:
-            more["pose"] = _lend(turned)
-        shared.renderer.backward_to(_lend(by_color.contiguous()), *map(_lend, out), **more)
-    return (*out, turned[:3], turned[3:]) if pose else (*out, None, None)
+        try:
+            go(context or _pass(shared, parameters, seen, options))
+        except InvalidArgument:
+            if context is None:
+                raise
+            go(_pass(shared, parameters, seen, options))  # the renderer has had other Gaussians since
+    return out, turned, by_rays
 
 
-def _by_c2w(c2w, translation, rotation):
+def _by_c2w(c2w, turned):
     """dL/d a matrix [4, 4] whose turns by a small w have dL/dw: of all those the one that lies along turns."""
-    g = rotation.to(c2w)
+    turned = turned.to(c2w)
     cross = torch.zeros_like(c2w[:3, :3])
-    cross[0, 1], cross[0, 2], cross[1, 2] = -g[2], g[1], -g[0]
+    cross[0, 1], cross[0, 2], cross[1, 2] = -turned[5], turned[4], -turned[3]
     out = torch.zeros_like(c2w)
     out[:3, :3] = 0.5 * (cross - cross.T) @ c2w[:3, :3]
-    out[:3, 3] = translation.to(c2w)
+    out[:3, 3] = turned[:3]
     return out
 
 
@@ -123,23 +146,40 @@ class _Render(torch.autograd.Function):
     @staticmethod
     def forward(ctx, mean, log_scale, quaternion, opacity, sh, c2w, camera, options, kernel_degree, record):
         parameters = [p.detach() for p in (mean, log_scale, quaternion, opacity, sh)]
-        images = _forward(parameters, camera, options, kernel_degree, record)
+        images, kept = _forward(parameters, camera, options, kernel_degree, record)
         if record:
-            ctx.save_for_backward(mean, log_scale, quaternion, opacity, sh, c2w, images[0])
-            ctx.camera, ctx.options, ctx.kernel_degree = camera, options, kernel_degree
+            ctx.save_for_backward(mean, log_scale, quaternion, opacity, sh, c2w)
+            ctx.arguments = camera, options, kernel_degree, kept
             ctx.set_materialize_grads(False)
         return images
 
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx, *gradients):
-        *parameters, c2w, color = ctx.saved_tensors
+        *parameters, c2w = ctx.saved_tensors
         pose = ctx.needs_input_grad[5]
-        parameters = [p.detach() for p in parameters]
-        *out, translation, rotation = _backward(parameters, ctx.camera, ctx.options, ctx.kernel_degree, color,
-                                                gradients, pose)
-        by_pose = _by_c2w(c2w, translation, rotation) if pose else None
-        return (*out, by_pose, None, None, None, None)
+        out, turned, _ = _backward([p.detach() for p in parameters], *ctx.arguments, gradients, pose)
+        return (*out, _by_c2w(c2w, turned) if pose else None, None, None, None, None)
+
+
+class _Trace(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx, mean, log_scale, quaternion, opacity, sh, directions, origins, t_max, options, kernel_degree):
+        tensors = (mean, log_scale, quaternion, opacity, sh, directions, origins, t_max)
+        *parameters, directions_, origins_, t_max_ = (None if t is None else t.detach() for t in tensors)
+        images, kept = _forward(parameters, (directions_, origins_, t_max_), options, kernel_degree, True)
+        ctx.save_for_backward(*tensors)
+        ctx.arguments = options, kernel_degree, kept
+        ctx.set_materialize_grads(False)
+        return images
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx, *gradients):
+        *parameters, directions, origins, t_max = (None if t is None else t.detach() for t in ctx.saved_tensors)
+        out, _, by_rays = _backward(parameters, (directions, origins, t_max), *ctx.arguments, gradients,
+                                    rays=ctx.needs_input_grad[5:7])
+        return (*out, *by_rays, None, None, None)
 
 
 def _checked(parameters):
@@ -166,6 +206,21 @@ def render(mean, log_scale, quaternion, opacity, sh, camera, *, c2w=None, option
     # The operators are for compilers: by hand the autograd function costs less a call.
     call = _operators if _operators is not None and torch.compiler.is_compiling() else _Render.apply
     return call(*parameters, c2w, camera, options, kernel_degree, record)
+
+
+def trace(mean, log_scale, quaternion, opacity, sh, directions, origins=None, t_max=None, *, options=None,
+          kernel_degree=2, **settings):
+    """What rays see that no image has, differentiable by the Gaussians and by the rays.
+
+    Gaussians as of render; directions [R, 3], of any length but 0; origins [R, 3], world units, or None: all rays begin
+    at the origin; t_max [R], where rays end, or None. options and settings as of render, with antialias 0.
+
+    Returns colour [R, 3], transmittance [R], and depth [R] as the sum of weight * distance along the ray.
+    """
+    parameters = _checked((mean, log_scale, quaternion, opacity, sh))
+    options = _gart.RenderOptions(**settings) if options is None else options
+    rays = [None if r is None else r.contiguous() for r in (directions, origins, t_max)]
+    return _Trace.apply(*parameters, *rays, options, kernel_degree)
 
 
 def _placed(camera, c2w):
@@ -213,19 +268,24 @@ def rasterization(means, quats, scales, opacities, colors, viewmats, Ks, width, 
     numbers = Ks.detach()[:, (0, 1, 0, 1), (0, 1, 2, 2)].cpu().tolist()
     behind = [(0.0, 0.0, 0.0)] * views if backgrounds is None else backgrounds.detach().cpu().tolist()
     filter_width = eps2d ** 0.5 if rasterize_mode == "antialiased" else 0.0
-    images, alphas = [], []
+    images, alphas, known = [], [], {}
     for view in range(views):
         fx, fy, cx, cy = numbers[view]
         camera = _gart.Camera(width, height, fx, fy, cx, cy, model=_MODELS[camera_model], **lens)
         learned = poses[view] if viewmats.requires_grad else None
         if learned is None:
             camera.c2w = poses[view].numpy()
-        color, channels = _coefficients(colors, view, n, sh_degree)
+        channels = _channels(colors, n, sh_degree)
         parts = []
         for first in range(0, channels, 3):
             wide = min(3, channels - first)
             back = [*behind[view][first:first + wide], 0.0, 0.0][:3]
-            image, transmittance, depth = render(means, log_scale, quats, opacity, color(first), camera, c2w=learned,
+            # The same coefficients for all views are one tensor, which the renderer knows again.
+            of_view = view if colors.dim() > (3 if sh_degree is not None else 2) else 0
+            if (of_view, first) not in known:
+                known[of_view, first] = _coefficients(colors, view, first, sh_degree)
+            sh = known[of_view, first]
+            image, transmittance, depth = render(means, log_scale, quats, opacity, sh, camera, c2w=learned,
                                                  near=near_plane, antialias=filter_width, background=back)
             image = image[..., :wide]
             if backgrounds is not None and backgrounds.requires_grad:
@@ -253,23 +313,24 @@ def _inverted(viewmats):
     return torch.cat((torch.cat((rotation, position), 2), last), 1)
 
 
-def _coefficients(colors, view, n, sh_degree):
-    """Coefficients of three channels, by the first of them, and how many channels there are."""
+def _channels(colors, n, sh_degree):
+    """How many channels an image has."""
+    if colors.shape[-2 if sh_degree is None else -3] != n:
+        raise InvalidArgument("gart.torch.rasterization: colors must be [N, D] or [C, N, D]; [N, K, 3] needs sh_degree")
+    channels = colors.shape[-1]
+    if channels != 3 and bool((colors < 0).any()):
+        raise InvalidArgument("gart.torch.rasterization: features must be at least 0: shift them")
+    return channels
+
+
+def _coefficients(colors, view, first, sh_degree):
+    """Spherical harmonics of three channels from the first on."""
     if sh_degree is not None:
         of_view = colors if colors.dim() == 3 else colors[view]
-        return (lambda first: of_view[:, :(sh_degree + 1) ** 2]), 3
-    of_view = colors if colors.dim() == 2 else colors[view]
-    if of_view.shape[0] != n:
-        raise InvalidArgument("gart.torch.rasterization: colors must be [N, D] or [C, N, D]; [N, K, 3] needs sh_degree")
-    channels = of_view.shape[1]
-    if channels != 3 and bool((of_view < 0).any()):
-        raise InvalidArgument("gart.torch.rasterization: features must be at least 0: shift them")
-
-    def three(first):
-        part = of_view[:, first:first + 3]
-        part = torch.nn.functional.pad(part, (0, 3 - part.shape[1])) if part.shape[1] < 3 else part
-        return ((part - 0.5) / _SH0).unsqueeze(1)
-    return three, channels
+        return of_view[:, :(sh_degree + 1) ** 2].contiguous()
+    part = (colors if colors.dim() == 2 else colors[view])[:, first:first + 3]
+    part = torch.nn.functional.pad(part, (0, 3 - part.shape[1])) if part.shape[1] < 3 else part
+    return ((part - 0.5) / _SH0).unsqueeze(1)
 
 
 def _z_of_rays(camera, camera_model, like):
@@ -298,49 +359,47 @@ def _make_operators():
 
     @torch.library.custom_op("gart::render", mutates_args=())
     def op(mean: Tensor, log_scale: Tensor, quaternion: Tensor, opacity: Tensor, sh: Tensor, c2w: Tensor, camera: str,
-           options: List[float], kernel_degree: int, record: bool, height: int,
-           width: int) -> Tuple[Tensor, Tensor, Tensor]:
-        return _forward([mean, log_scale, quaternion, opacity, sh], _camera_of(camera), unpacked(options),
-                        kernel_degree, record)
+           options: List[float], kernel_degree: int, height: int, width: int) -> Tuple[Tensor, Tensor, Tensor]:
+        images, _ = _forward([mean, log_scale, quaternion, opacity, sh], _camera_of(camera), unpacked(options),
+                             kernel_degree, False)
+        return images
 
     @op.register_fake
-    def _(mean, log_scale, quaternion, opacity, sh, c2w, camera, options, kernel_degree, record, height, width):
+    def _(mean, log_scale, quaternion, opacity, sh, c2w, camera, options, kernel_degree, height, width):
         return mean.new_empty((height, width, 3)), mean.new_empty((height, width)), mean.new_empty((height, width))
 
     @torch.library.custom_op("gart::render_backward", mutates_args=())
     def back(mean: Tensor, log_scale: Tensor, quaternion: Tensor, opacity: Tensor, sh: Tensor, c2w: Tensor, camera: str,
-             options: List[float], kernel_degree: int, color: Tensor, by_color: Tensor, by_transmittance: Tensor,
-             by_depth: Tensor, pose: bool) -> Tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor]:
+             options: List[float], kernel_degree: int, by_color: Tensor, by_transmittance: Tensor, by_depth: Tensor,
+             pose: bool) -> Tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor]:
         gradients = [g if g.numel() else None for g in (by_color, by_transmittance, by_depth)]
-        *out, translation, rotation = _backward([mean, log_scale, quaternion, opacity, sh], _camera_of(camera),
-                                                unpacked(options), kernel_degree, color, gradients, pose)
-        return (*out, _by_c2w(c2w, translation, rotation) if pose else torch.zeros_like(c2w))
+        out, turned, _ = _backward([mean, log_scale, quaternion, opacity, sh], _camera_of(camera), unpacked(options),
+                                   kernel_degree, (None, None), gradients, pose)
+        return (*out, _by_c2w(c2w, turned) if pose else torch.zeros_like(c2w))
 
     @back.register_fake
-    def _(mean, log_scale, quaternion, opacity, sh, c2w, camera, options, kernel_degree, color, by_color,
-          by_transmittance, by_depth, pose):
+    def _(mean, log_scale, quaternion, opacity, sh, c2w, camera, options, kernel_degree, by_color, by_transmittance,
+          by_depth, pose):
         return tuple(torch.empty_like(p) for p in (mean, log_scale, quaternion, opacity, sh, c2w))
 
     def setup_context(ctx, inputs, output):
-        *tensors, camera, options, kernel_degree, _, _, _ = inputs
-        ctx.save_for_backward(*tensors, output[0])
+        *tensors, camera, options, kernel_degree, _, _ = inputs
+        ctx.save_for_backward(*tensors)
         ctx.arguments = camera, options, kernel_degree
         ctx.set_materialize_grads(False)
 
-    def backward(ctx, by_color, by_transmittance, by_depth):
-        *tensors, color = ctx.saved_tensors
-        none = color.new_empty((0,))
-        given = [none if g is None else g for g in (by_color, by_transmittance, by_depth)]
-        out = back(*tensors, *ctx.arguments, color, *given, ctx.needs_input_grad[5])
-        return (*out, None, None, None, None, None, None)
+    def backward(ctx, *gradients):
+        none = ctx.saved_tensors[0].new_empty((0,))
+        given = [none if g is None else g for g in gradients]
+        return (*back(*ctx.saved_tensors, *ctx.arguments, *given, ctx.needs_input_grad[5]), None, None, None, None, None)
 
     op.register_autograd(backward, setup_context=setup_context)
 
     def call(mean, log_scale, quaternion, opacity, sh, c2w, camera, options, kernel_degree, record):
         c2w = torch.from_numpy(camera.c2w) if c2w is None else c2w
         numbers = [float(getattr(options, name)) for name in fields] + [float(b) for b in options.background]
-        return op(mean, log_scale, quaternion, opacity, sh, c2w, camera.json(), numbers, kernel_degree, record,
-                  camera.height, camera.width)
+        return op(mean, log_scale, quaternion, opacity, sh, c2w, camera.json(), numbers, kernel_degree, camera.height,
+                  camera.width)
     return call
 
 

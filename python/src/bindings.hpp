@@ -23,6 +23,7 @@ void bind_scene(py::module_& m);
 void bind_dataset(py::module_& m);
 void bind_options(py::module_& m);
 void bind_renderer(py::module_& m);
+void bind_contexts(py::module_& m);
 void bind_session(py::module_& m);
 void bind_reference(py::module_& m);
 
@@ -62,12 +63,34 @@ struct python_renderer {
   gart::render_options usual;  // of the model that was set
   std::int64_t count = 0;      // of Gaussians
   std::vector<lent> bound;     // their arrays, where they are somebody else's
-  std::vector<lent> recorded;  // the images that the gradients are to be of
-  gart::camera recorded_view;
-  std::unique_ptr<gart::forward_context> context;  // of that view; goes before the renderer
-
-  void forget() { context.reset(), recorded.clear(); }
   std::mutex mutex;
 };
+
+constexpr char const* parameter_names[] = {"mean", "log_scale", "quaternion", "opacity", "sh"};
+
+// The arrays of Model, of one number of Gaussians (-1: any), with what keeps them.
+template <class T>
+gart::gaussians_view<T> parameters_of(std::array<py::object, 5> const& given, std::string const& call, std::int64_t n,
+                                      place const& where, std::vector<lent>& kept) {
+  std::vector<std::int64_t> const shapes[] = {{-1, 3}, {-1, 3}, {-1, 4}, {-1}, {-1, -1, 3}};
+  kept.clear();
+  for (std::size_t k = 0; k < 5; ++k) {
+    std::string const name = call + ": " + parameter_names[k];
+    std::vector<std::int64_t> shape = shapes[k];
+    shape[0] = n;
+    kept.push_back(lent::of<float>(given[k], {name.c_str(), std::move(shape), !std::is_const_v<T>}, where));
+    n = kept[0].shape()[0];
+  }
+  gart::require_count(static_cast<std::size_t>(n));
+  gart::gaussians_view<T> out;
+  out.mean = kept[0].data<float>(), out.log_scale = kept[1].data<float>(), out.quaternion = kept[2].data<float>();
+  out.opacity = kept[3].data<float>(), out.sh = kept[4].data<float>();
+  out.count = static_cast<gart::index_t>(n), out.sh_degree = degree_of(kept[4].shape()[1], (call + ": sh").c_str());
+  return out;
+}
+
+// Images of a view in memory of the policy: colour, transmittance, depth, hits, rgba; each may be None.
+gart::render_targets targets_of(python_renderer const& r, gart::camera const& view, std::string const& call,
+                                std::array<py::object, 5> const& given, std::vector<lent>& kept);
 
 }  // namespace gart_python

@@ -11,6 +11,7 @@ PYBIND11_MODULE(_gart, m) {
   gart_python::bind_scene(m);
   gart_python::bind_dataset(m);
   gart_python::bind_renderer(m);
+  gart_python::bind_contexts(m);
   gart_python::bind_session(m);
   gart_python::bind_reference(m);
 }

@@ -1,7 +1,10 @@
 // Options, as classes whose attributes are the library's fields.
 #include "bindings.hpp"
 
-#include <gart/train/options.hpp>
+#include <gart/train/option_fields.hpp>
+
+#include <string_view>
+#include <variant>
 
 namespace gart_python {
 
@@ -25,36 +28,49 @@ std::string fields_of_class(py::handle object) {
 
 // An enumeration by its names.
 template <class C, class Owner, class E>
-void named_field(C& c, char const* name, E Owner::*member) {
+void named_field(C& c, char const* name, E Owner::*member, char const* text) {
   c.def_property(
       name, [member](Owner const& o) { return to_string(o.*member); },
-      [member](Owner& o, std::string const& value) { o.*member = gart::from_string<E>(value); });
+      [member](Owner& o, std::string const& value) { o.*member = gart::from_string<E>(value); }, text);
 }
 
-template <class T>
-py::class_<T> options_class(py::module_& m, char const* name, char const* text) {
-  py::class_<T> c(m, name, text);
-  c.def(py::init([](py::kwargs const& given) {
-    py::object made = py::cast(T{});
-    set_attributes(made, given);
-    return made.cast<T>();
-  }));
-  c.def("__repr__", [name](py::object const& self) {
-    std::string out = std::string("gart.") + name + "(";
-    bool first = true;
-    for (auto const& one : py::module_::import("builtins").attr("dir")(py::type::of(self))) {
-      auto const field = one.cast<std::string>();
-      if (!has_field(self, field)) continue;
-      out += (first ? "" : ", ") + field + "=" + std::string(py::repr(self.attr(field.c_str())));
-      first = false;
-    }
-    return out + ")";
-  });
-  return c;
+// What a train_options has by the table of its fields: those whose names begin so, as attributes.
+struct option_group {
+  py::object owner;    // keeps the options
+  std::string prefix;  // "rates."
+
+  gart::train_options& options() const { return owner.cast<gart::train_options&>(); }
+};
+
+bool begins(std::string_view name, std::string_view prefix) { return name.substr(0, prefix.size()) == prefix; }
+
+std::string field_names(std::string const& prefix) {
+  std::string out;
+  for (gart::option_field const& f : gart::option_fields)
+    if (begins(f.name, prefix)) out += (out.empty() ? "" : ", ") + std::string(f.name.substr(prefix.size()));
+  return out;
 }
 
-#define GART_FIELDS_1(c, T, f) c.def_readwrite(#f, &gart::T::f);
-#define GART_FIELD(f) GART_FIELDS_1(c, GART_OWNER, f)
+py::object get_field(option_group const& group, std::string const& name) {
+  std::string const full = group.prefix + name;
+  if (gart::option_field const* const f = gart::find_option_field(full)) {
+    return std::visit([&](auto at) -> py::object { return py::cast(at(group.options())); }, f->of);
+  }
+  for (gart::option_field const& f : gart::option_fields)
+    if (begins(f.name, full + ".")) return py::cast(option_group{group.owner, full + "."});
+  throw py::attribute_error("no option '" + full + "': there are " + field_names(group.prefix));
+}
+
+bool set_field(option_group const& group, std::string const& name, py::handle value) {
+  gart::option_field const* const f = gart::find_option_field(group.prefix + name);
+  if (!f) return false;
+  auto const number = value.cast<double>();
+  if (!(number >= f->low && number <= f->high))
+    throw gart::invalid_argument("train_options." + std::string(f->name) + " is " + gart::short_number(number) +
+                                 ": from " + gart::short_number(f->low) + " to " + gart::short_number(f->high));
+  f->set(group.options(), number);
+  return true;
+}
 
 }  // namespace
 
@@ -81,8 +97,9 @@ gart::render_options options_of(py::handle options, py::kwargs const& given, gar
 }
 
 void bind_options(py::module_& m) {
-  {
-    auto c = options_class<gart::render_options>(m, "RenderOptions", R"(How one view is rendered.
+  using render = gart::render_options;
+  using triple = std::array<float, 3>;
+  py::class_<render>(m, "RenderOptions", R"(How one view is rendered: RenderOptions(near=0.1) sets what is named.
 
 alpha_min          a Gaussian is hit where its alpha is at least this (1/255)
 transmittance_min  a ray ends after the hit that brings the transmittance below this (1e-4)
@@ -90,113 +107,74 @@ near               hits lie beyond this distance along the ray, world units (0.0
 max_hits           a ray ends after so many hits; 0: no cap
 antialias          standard deviation of the pixels' filter, in pixels; 0: none
 rebuild_every      views between two builds of the bvh tracer's tree
-background         three numbers behind the last hit)");
-#define GART_OWNER render_options
-    GART_FIELD(alpha_min)
-    GART_FIELD(transmittance_min)
-    GART_FIELD(near) GART_FIELD(max_hits) GART_FIELD(antialias) GART_FIELD(rebuild_every)
-#undef GART_OWNER
-        using triple = std::array<float, 3>;
-    c.def_property(
-        "background",
-        [](gart::render_options const& o) {
-          return triple{o.background.x, o.background.y, o.background.z};
-        },
-        [](gart::render_options& o, triple const& b) { o.background = gart::vec3(b[0], b[1], b[2]); });
-  }
-  {
-    auto c = options_class<gart::resolution_options>(m, "ResolutionOptions", "The size of a step's images.");
-#define GART_OWNER resolution_options
-    GART_FIELD(quarter_until) GART_FIELD(half_until) GART_FIELD(least) GART_FIELD(long_run)
-#undef GART_OWNER
-  }
-  {
-    auto c = options_class<gart::approximation_options>(m, "ApproximationOptions", "What trades exactness for time.");
-#define GART_OWNER approximation_options
-    GART_FIELD(alpha_min)
-    GART_FIELD(transmittance_min) GART_FIELD(max_hits) GART_FIELD(antialias) GART_FIELD(rebuild_every)
-#undef GART_OWNER
-  }
-  {
-    auto c = options_class<gart::learning_rates>(m, "LearningRates", "Adam's rates, by parameter.");
-#define GART_OWNER learning_rates
-    GART_FIELD(mean)
-    GART_FIELD(mean_final)
-    GART_FIELD(log_scale) GART_FIELD(quaternion) GART_FIELD(opacity) GART_FIELD(sh_dc) GART_FIELD(sh_rest)
-        GART_FIELD(settled) GART_FIELD(long_run) GART_FIELD(settle_late) GART_FIELD(exposure) GART_FIELD(vignetting)
-            GART_FIELD(vignetting_final)
-#undef GART_OWNER
-  }
-  {
-    auto c = options_class<gart::adam_options>(m, "AdamOptions", "Adam's constants.");
-#define GART_OWNER adam_options
-    GART_FIELD(sparse)
-#undef GART_OWNER
-  }
-  {
-    auto c = options_class<gart::pose_options>(m, "PoseOptions", "How poses of training views are learned.");
-#define GART_OWNER pose_options
-    GART_FIELD(warm_up)
-    GART_FIELD(until)
-    GART_FIELD(rate) GART_FIELD(rate_final) GART_FIELD(damping) GART_FIELD(damping_final) GART_FIELD(prior)
-#undef GART_OWNER
-  }
-  {
-    auto c = options_class<gart::lens_options>(m, "LensOptions", "How the lenses of a capture are learned.");
-#define GART_OWNER lens_options
-    GART_FIELD(warm_up) GART_FIELD(until) GART_FIELD(rate) GART_FIELD(rate_final)
-#undef GART_OWNER
-  }
-  {
-    auto c = options_class<gart::split_shape>(m, "SplitShape", "How one Gaussian becomes two along its longest axis.");
-#define GART_OWNER split_shape
-    GART_FIELD(share) GART_FIELD(opacity)
-#undef GART_OWNER
-  }
-  {
-    auto c = options_class<gart::error_growth_options>(m, "ErrorGrowthOptions", "Growth where the image's error is.");
-#define GART_OWNER error_growth_options
-    GART_FIELD(from)
-    GART_FIELD(every)
-    GART_FIELD(fill) GART_FIELD(until) GART_FIELD(dead_opacity) GART_FIELD(opacity_penalty) GART_FIELD(split)
-        GART_FIELD(pixels_each) GART_FIELD(least_budget)
-#undef GART_OWNER
-  }
-  {
-    auto c = options_class<gart::mcmc_options>(m, "McmcOptions", "Growth by Markov chain Monte Carlo.");
-#define GART_OWNER mcmc_options
-    GART_FIELD(from)
-    GART_FIELD(every)
-    GART_FIELD(until) GART_FIELD(growth) GART_FIELD(dead_opacity) GART_FIELD(noise) GART_FIELD(opacity_penalty)
-        GART_FIELD(scale_penalty)
-#undef GART_OWNER
-  }
-  {
-    auto c = options_class<gart::adc_options>(m, "AdcOptions", "Adaptive density control.");
-#define GART_OWNER adc_options
-    GART_FIELD(from)
-    GART_FIELD(every)
-    GART_FIELD(opacity_reset_every) GART_FIELD(until) GART_FIELD(gradient) GART_FIELD(dense) GART_FIELD(prune_opacity)
-#undef GART_OWNER
-  }
-  {
-    auto c = options_class<gart::train_options>(m, "TrainOptions", R"(The options of a run; docs/training.md has each.
+background         three numbers behind the last hit)")
+      .def(py::init([](py::kwargs const& given) { return options_of(py::none(), given, {}); }))
+      .def_readwrite("alpha_min", &render::alpha_min)
+      .def_readwrite("transmittance_min", &render::transmittance_min)
+      .def_readwrite("near", &render::near)
+      .def_readwrite("max_hits", &render::max_hits)
+      .def_readwrite("antialias", &render::antialias)
+      .def_readwrite("rebuild_every", &render::rebuild_every)
+      .def_property(
+          "background",
+          [](render const& o) {
+            return triple{o.background.x, o.background.y, o.background.z};
+          },
+          [](render& o, triple const& b) { o.background = gart::vec3(b[0], b[1], b[2]); });
 
-TrainOptions(iterations=2000, densify="mcmc", **{"rates.opacity": 0.05}) sets those that are named.)");
-#define GART_OWNER train_options
-    GART_FIELD(iterations)
-    GART_FIELD(max_gaussians)
-    GART_FIELD(random_points) GART_FIELD(sh_every) GART_FIELD(held_out) GART_FIELD(initial_opacity)
-        GART_FIELD(initial_scale) GART_FIELD(ssim_weight) GART_FIELD(dropout) GART_FIELD(dropout_until)
-            GART_FIELD(depth_weight) GART_FIELD(exposure) GART_FIELD(vignetting) GART_FIELD(refine_poses)
-                GART_FIELD(refine_lens) GART_FIELD(lt_budget) GART_FIELD(check_finite) GART_FIELD(batch)
-                    GART_FIELD(seed) GART_FIELD(near) GART_FIELD(resolution) GART_FIELD(render) GART_FIELD(rates)
-                        GART_FIELD(adam) GART_FIELD(poses) GART_FIELD(lens) GART_FIELD(error) GART_FIELD(mcmc)
-                            GART_FIELD(adc)
-#undef GART_OWNER
-                                named_field(c, "densify", &gart::train_options::densify);
-    named_field(c, "background", &gart::train_options::background);
-  }
+  using train = gart::train_options;
+  py::class_<option_group>(m, "OptionGroup", "Some options of TrainOptions: options.rates has options.rates.mean.")
+      .def("__getattr__", &get_field)
+      .def("__setattr__",
+           [](option_group const& g, std::string const& name, py::handle value) {
+             if (!set_field(g, name, value))
+               throw py::attribute_error("no option '" + g.prefix + name + "': there are " + field_names(g.prefix));
+           })
+      .def("__dir__", [](option_group const& g) {
+        py::list out;
+        for (gart::option_field const& f : gart::option_fields)
+          if (begins(f.name, g.prefix)) out.append(std::string(f.name.substr(g.prefix.size())));
+        return out;
+      });
+  py::class_<train> c(m, "TrainOptions", R"(The options of a run, by the names of `gart train --set`; fields() has each.
+
+TrainOptions(iterations=2000, densify="mcmc", **{"rates.opacity": 0.05}) sets those that are named; so does
+options.rates.opacity = 0.05.)");
+  c.def(py::init([](py::kwargs const& given) {
+     py::object const made = py::cast(train{});
+     for (auto const& [key, value] : given) {
+       auto const name = key.cast<std::string>();
+       if (set_field({made, ""}, name, value)) continue;
+       if (!has_field(made, name))
+         throw py::type_error("no option '" + name + "': there are " + fields_of_class(made) + ", " + field_names(""));
+       py::setattr(made, name.c_str(), value);
+     }
+     return made.cast<train>();
+   }))
+      .def("__getattr__",
+           [](py::object const& self, std::string const& name) {
+             return get_field({self, ""}, name);
+           })
+      .def("__setattr__",
+           [](py::object const& self, std::string const& name, py::object const& value) {
+             if (set_field({self, ""}, name, value)) return;
+             if (PyObject_GenericSetAttr(self.ptr(), py::str(name).ptr(), value.ptr()) != 0)
+               throw py::error_already_set();
+           })
+      .def_static(
+          "fields",
+          [] {
+            py::dict out;
+            for (gart::option_field const& f : gart::option_fields)
+              out[py::str(std::string(f.name))] = py::make_tuple(f.low, f.high, std::string(f.help));
+            return out;
+          },
+          "Name: (least, most, what it is), of all numbers and switches.")
+      .def_readwrite("held_out", &train::held_out, "training views, by index, that are not trained on");
+  named_field(c, "densify", &train::densify, "error, mcmc, adc or none: how the number of Gaussians grows");
+  named_field(c, "background", &train::background, "white, black or random: what is behind the scene");
+  c.def_readwrite("exposure", &train::exposure, "learn an exposure of each training view");
+  c.def_readwrite("vignetting", &train::vignetting, "learn the falloff of each lens");
 }
 
 }  // namespace gart_python

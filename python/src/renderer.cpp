@@ -16,8 +16,8 @@ E named(py::handle value) {
   return gart::from_string<E>(value.cast<std::string>());
 }
 
-std::unique_ptr<self> make(py::object const& model, py::kwargs const& given) {
-  auto out = std::make_unique<self>();
+std::shared_ptr<self> make(py::object const& model, py::kwargs const& given) {
+  auto out = std::make_shared<self>();
   out->request = request_of(given, "Renderer");
   gart::model_file const* const file = model.is_none() ? nullptr : &model.cast<gart::model_file const&>();
   if (file && !given.contains("sh_degree")) out->request.sh_degree = file->model.sh_degree;
@@ -33,67 +33,21 @@ std::unique_ptr<self> make(py::object const& model, py::kwargs const& given) {
 }
 
 void set_model(self& r, gart::model_file const& file) {
-  r.forget();
   without_gil(r.mutex, [&] { r.it->set_model(file.model); });
   r.bound.clear();
   r.usual = file.render, r.count = static_cast<std::int64_t>(file.model.size());
 }
 
-constexpr char const* parameter_names[] = {"mean", "log_scale", "quaternion", "opacity", "sh"};
-
-// Five arrays of one number of Gaussians, -1: any, with what keeps them.
-template <class T>
-gart::gaussians_view<T> parameters_of(std::array<py::object, 5> const& given, std::string const& call, std::int64_t n,
-                                      place const& where, std::vector<lent>& kept) {
-  bool const writable = !std::is_const_v<T>;
-  std::vector<std::int64_t> const shapes[] = {{-1, 3}, {-1, 3}, {-1, 4}, {-1}, {-1, -1, 3}};
-  kept.clear();
-  for (std::size_t k = 0; k < 5; ++k) {
-    std::string const name = call + ": " + parameter_names[k];
-    std::vector<std::int64_t> shape = shapes[k];
-    shape[0] = n;
-    kept.push_back(lent::of<float>(given[k], {name.c_str(), std::move(shape), writable}, where));
-    n = kept[0].shape()[0];
-  }
-  if (n > static_cast<std::int64_t>(gart::most_gaussians)) gart::require_count(static_cast<std::size_t>(n));
-  gart::gaussians_view<T> out{kept[0].data<float>(),
-                              kept[1].data<float>(),
-                              kept[2].data<float>(),
-                              kept[3].data<float>(),
-                              kept[4].data<float>(),
-                              static_cast<gart::index_t>(n),
-                              0};
-  out.sh_degree = degree_of(kept[4].shape()[1], (call + ": sh").c_str());
-  return out;
-}
-
 void bind(self& r, std::array<py::object, 5> const& arrays) {
   std::vector<lent> kept;
   auto const view = parameters_of<float const>(arrays, "Renderer.bind", -1, r.where, kept);
-  r.forget();
   without_gil(r.mutex, [&] { r.it->bind(view); });
   r.bound = std::move(kept);
   r.count = view.count;
 }
 
-gart::render_targets targets_of(self const& r, gart::camera const& view, std::string const& call,
-                                std::array<py::object, 5> const& given, std::vector<lent>& kept) {
-  std::int64_t const h = view.height, w = view.width;
-  auto const name = [&](char const* what) { return call + ": " + what; };
-  std::string const names[] = {name("color"), name("transmittance"), name("depth"), name("hits"), name("rgba")};
-  kept.clear();
-  kept.push_back(lent::if_given<float>(given[0], {names[0].c_str(), {h, w, 3}, true}, r.where));
-  kept.push_back(lent::if_given<float>(given[1], {names[1].c_str(), {h, w}, true}, r.where));
-  kept.push_back(lent::if_given<float>(given[2], {names[2].c_str(), {h, w}, true}, r.where));
-  kept.push_back(lent::if_given<gart::u32>(given[3], {names[3].c_str(), {h, w}, true}, r.where));
-  kept.push_back(lent::if_given<gart::u8>(given[4], {names[4].c_str(), {h, w, 4}, true}, r.where));
-  return {kept[0].data<float>(), kept[1].data<float>(), kept[2].data<float>(), kept[3].data<gart::u32>(),
-          kept[4].data<gart::u8>()};
-}
-
 py::dict render(self& r, gart::camera const& view, py::object const& options, py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r.usual);
-  r.forget();
   gart::rendered image = without_gil(r.mutex, [&] { return r.it->render(view, o); });
   py::dict out;
   out["color"] = image_array(std::move(image.color));
@@ -105,47 +59,15 @@ py::dict render(self& r, gart::camera const& view, py::object const& options, py
 
 py::object render_8bit(self& r, gart::camera const& view, py::object const& options, py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r.usual);
-  r.forget();
   return image_array(without_gil(r.mutex, [&] { return r.it->render_8bit(view, o); }));
 }
 
 void render_to(self& r, gart::camera const& view, py::object const& options, std::array<py::object, 5> const& targets,
-               bool record, py::kwargs const& given) {
+               py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r.usual);
   std::vector<lent> kept;
-  gart::render_targets const to = targets_of(r, view, record ? "Renderer.record" : "Renderer.render_to", targets, kept);
-  r.forget();
-  if (record) {
-    r.context = without_gil(r.mutex, [&] { return r.it->forward(view, o, to); });
-    r.recorded = std::move(kept), r.recorded_view = view;
-  } else {
-    without_gil(r.mutex, [&] { r.it->render_to(view, o, to); });
-  }
-}
-
-// From memory to memory, of the view that was recorded.
-void backward_to(self& r, py::object const& color, py::object const& depth, py::object const& transmittance,
-                 py::object const& pose, std::array<py::object, 5> const& gradients) {
-  if (!r.context)
-    throw gart::invalid_argument("Renderer.backward_to: call Renderer.record first, with no other view in between");
-  std::int64_t const h = r.recorded_view.height, w = r.recorded_view.width;
-  char const* const call = "Renderer.backward_to";
-  lent const by_color = lent::of<float>(color, {"Renderer.backward_to: color_gradient", {h, w, 3}}, r.where);
-  lent const by_depth = lent::if_given<float>(depth, {"Renderer.backward_to: depth_gradient", {h, w}}, r.where);
-  lent const by_transmittance =
-      lent::if_given<float>(transmittance, {"Renderer.backward_to: transmittance_gradient", {h, w}}, r.where);
-  lent const by_pose =
-      lent::if_given<float>(pose, {"Renderer.backward_to: pose", {gart::pose_gradient::floats}, true}, r.where);
-  std::vector<lent> kept;
-  auto const to = parameters_of<float>(gradients, call, r.count, r.where, kept);
-  auto const span_of = [&](lent const& given, std::int64_t each) {
-    auto const* const data = given.data<float>();
-    return gart::span<float const>(data, data ? static_cast<std::size_t>(h * w * each) : 0);
-  };
-  without_gil(r.mutex, [&] {
-    r.context->backward({span_of(by_color, 3), span_of(by_depth, 1), span_of(by_transmittance, 1)},
-                        {.gaussians = to, .pose = by_pose.data<float>()});
-  });
+  gart::render_targets const to = targets_of(r, view, "Renderer.render_to", targets, kept);
+  without_gil(r.mutex, [&] { r.it->render_to(view, o, to); });
 }
 
 py::dict as_arrays(gart::pose_gradient const& g) {
@@ -160,7 +82,6 @@ py::dict backward(self& r, gart::camera const& view, py::object const& color, py
                   py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r.usual);
   lent const by = lent::of<float>(color, {"Renderer.backward: color_gradient", {view.height, view.width, 3}});
-  r.forget();
   gart::pose_gradient turned;
   gart::gaussian_model got = without_gil(r.mutex, [&] {
     gart::image_float gradient(view.width, view.height, 3);
@@ -205,7 +126,6 @@ std::pair<gart::camera, std::vector<float>> track(self& r, py::object const& pho
     seen = gart::image8(guess.width, guess.height, 1);
     std::copy_n(bytes.data<gart::u8>(), bytes.size(), seen.data.data());
   }
-  r.forget();
   gart::track_result found = without_gil(r.mutex, [&] { return gart::track(*r.it, image, guess, o, seen); });
   return {found.view, std::move(found.residuals)};
 }
@@ -227,6 +147,21 @@ Calls drop the interpreter's lock, and one renderer serves one thread at a time.
 or by name: render(camera, background=(1, 1, 1)); without them they are those that the model's file says.)";
 
 }  // namespace
+
+gart::render_targets targets_of(python_renderer const& r, gart::camera const& view, std::string const& call,
+                                std::array<py::object, 5> const& given, std::vector<lent>& kept) {
+  std::int64_t const h = view.height, w = view.width;
+  auto const name = [&](char const* what) { return call + ": " + what; };
+  std::string const names[] = {name("color"), name("transmittance"), name("depth"), name("hits"), name("rgba")};
+  kept.clear();
+  kept.push_back(lent::if_given<float>(given[0], {names[0].c_str(), {h, w, 3}, true}, r.where));
+  kept.push_back(lent::if_given<float>(given[1], {names[1].c_str(), {h, w}, true}, r.where));
+  kept.push_back(lent::if_given<float>(given[2], {names[2].c_str(), {h, w}, true}, r.where));
+  kept.push_back(lent::if_given<gart::u32>(given[3], {names[3].c_str(), {h, w}, true}, r.where));
+  kept.push_back(lent::if_given<gart::u8>(given[4], {names[4].c_str(), {h, w, 4}, true}, r.where));
+  return {kept[0].data<float>(), kept[1].data<float>(), kept[2].data<float>(), kept[3].data<gart::u32>(),
+          kept[4].data<gart::u8>()};
+}
 
 gart::configuration_request request_of(py::kwargs const& given, char const* call) {
   gart::configuration_request out;
@@ -273,7 +208,7 @@ py::dict as_dict(gart::configuration_info const& info) {
 
 void bind_renderer(py::module_& m) {
   auto const none = py::none();
-  py::class_<self>(m, "Renderer", class_text)
+  py::class_<self, std::shared_ptr<self>>(m, "Renderer", class_text)
       .def(py::init(&make), py::arg("model") = none)
       .def("set_model", &set_model, py::arg("model"), "Copies the model; arrays that were bound are let go.")
       .def(
@@ -298,47 +233,18 @@ hits           uint32 [H, W], Gaussians composited)")
           "render_to",
           [](self& r, gart::camera const& view, py::object const& options, py::object a, py::object b, py::object c,
              py::object d, py::object e, py::kwargs const& given) {
-            render_to(r, view, options, {a, b, c, d, e}, false, given);
+            render_to(r, view, options, {a, b, c, d, e}, given);
           },
           py::arg("camera"), py::arg("options") = none, py::kw_only(), py::arg("color") = none,
           py::arg("transmittance") = none, py::arg("depth") = none, py::arg("hits") = none, py::arg("rgba") = none,
           "A view into memory of the policy, of render's shapes; rgba is uint8 [H, W, 4].")
-      .def(
-          "record",
-          [](self& r, gart::camera const& view, py::object const& options, py::object a, py::object b, py::object c,
-             py::object d, py::object e, py::kwargs const& given) {
-            render_to(r, view, options, {a, b, c, d, e}, true, given);
-          },
-          py::arg("camera"), py::arg("options") = none, py::kw_only(), py::arg("color") = none,
-          py::arg("transmittance") = none, py::arg("depth") = none, py::arg("hits") = none, py::arg("rgba") = none,
-          "As render_to, with what backward_to needs. Its arrays must stay unchanged until then.")
-      .def(
-          "backward_to",
-          [](self& r, py::object const& color, py::object a, py::object b, py::object c, py::object d, py::object e,
-             py::object const& depth, py::object const& transmittance, py::object const& pose) {
-            backward_to(r, color, depth, transmittance, pose, {a, b, c, d, e});
-          },
-          py::arg("color_gradient"), py::arg("mean"), py::arg("log_scale"), py::arg("quaternion"), py::arg("opacity"),
-          py::arg("sh"), py::kw_only(), py::arg("depth_gradient") = none, py::arg("transmittance_gradient") = none,
-          py::arg("pose") = none,
-          R"(Gradients of the view that record made last, into memory of the policy, which is overwritten.
-
-color_gradient   float32 [H, W, 3], dL/dcolour; those of depth and transmittance, [H, W], need depth=True
-mean, ..., sh    float32, of Model's shapes: dL/d each
-pose             float32 [6], dL/d the pose: translation and rotation, as pose_gradient has them)")
       .def("backward", &backward, py::arg("camera"), py::arg("color_gradient"), py::arg("options") = none,
            py::kw_only(), py::arg("pose") = false,
            R"(Both passes of a view, for dL/dcolour as float32 [H, W, 3] on the host.
 
 A dictionary of new numpy arrays, dL/d mean, log_scale, quaternion, opacity and sh of Model's shapes; with pose=True
-also "pose", as pose_gradient has it.)")
-      .def(
-          "pose_gradient",
-          [](self& r) { return as_arrays(without_gil(r.mutex, [&] { return r.it->differentiate_pose(); })); },
-          R"(dL/d the pose of the view of the last backward.
-
-translation  float64 [3], by the camera's position, world units
-rotation     float64 [3], by a small turn w of the camera about its position, world axes: a direction d becomes d + w x d)")
+also "pose", a dictionary of float64 [3]: "translation", by the camera's position, world units, and "rotation", by a
+small turn w of the camera about its position, world axes: a direction d becomes d + w x d.)")
       .def(
           "wait", [](self& r) { without_gil(r.mutex, [&] { r.it->wait(); }); }, "Until all that was asked for is done.")
       .def(

@@ -82,7 +82,6 @@ py::dict evaluate_renderer(python_renderer& r, std::vector<std::shared_ptr<gart:
   gart::render_options const o = options_of(options, given, r.usual);
   gart::some_views all;
   for (auto const& v : views) all.push_back(v.get());
-  r.recorded.clear();
   gart::scores const found = without_gil(r.mutex, [&] {
     return gart::evaluate(all, o.background, {}, [&](gart::camera const& view) { return r.it->render(view, o); });
   });

@@ -114,13 +114,14 @@ class Arrays(unittest.TestCase):
         renderer = gart.Renderer(sh_degree=1, backend="serial")
         view = scenes.camera(8, 8)
         color = np.empty((8, 8, 3), np.float32)
-        gradient, out = np.ones_like(color), [np.empty_like(a) for a in arrays]
+        gradient = np.ones_like(color)
+        names = ("mean", "log_scale", "quaternion", "opacity", "sh")
+        out = {name: np.empty_like(a) for name, a in zip(names, arrays)}
 
         def calls(n):
             for _ in range(n):
                 renderer.bind(*arrays)
-                renderer.record(view, color=color)
-                renderer.backward_to(gradient, *out)
+                renderer.forward(view, color=color).backward(gradient, **out)
                 renderer.render(view)
             gc.collect()
             return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

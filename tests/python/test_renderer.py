@@ -32,43 +32,68 @@ class Renderer(unittest.TestCase):
             self.assertEqual(got[name].shape, getattr(model, name).shape)
             np.testing.assert_allclose(got[name], expected[name], rtol=2e-3, atol=2e-3 * np.abs(expected[name]).max())
 
-    def test_gradients_in_two_calls_are_the_same(self):
+    def test_contexts_give_the_same_gradients(self):
         arrays, view = scenes.parameters(degree=1), scenes.camera()
         renderer = gart.Renderer(sh_degree=1, backend="serial")
         renderer.bind(*arrays)
         gradient = np.random.default_rng(3).normal(0, 1, (32, 40, 3)).astype(np.float32)
         expected = renderer.backward(view, gradient, pose=True)
-        color, out = np.empty((32, 40, 3), np.float32), [np.full_like(a, np.nan) for a in arrays]
-        with self.assertRaisesRegex(gart.InvalidArgument, "call Renderer.record first"):
-            renderer.backward_to(gradient, *out)
-        renderer.record(view, color=color)
+        color = np.empty((32, 40, 3), np.float32)
+        out = dict(zip(NAMES, [np.full_like(a, np.nan) for a in arrays]))
         pose = np.empty(6, np.float32)
-        renderer.backward_to(gradient, *out, pose=pose)
-        for name, array in zip(NAMES, out):
-            np.testing.assert_array_equal(array, expected[name])
-        for name, array in (("translation", pose[:3]), ("rotation", pose[3:])):
-            np.testing.assert_array_equal(array, expected["pose"][name])
-        renderer.render(view)  # another view in between
-        with self.assertRaisesRegex(gart.InvalidArgument, "call Renderer.record first"):
-            renderer.backward_to(gradient, *out)
+        context = renderer.forward(view, color=color)
+        other = renderer.forward(scenes.camera(16, 12))  # another view in between
+        np.testing.assert_array_equal(color, renderer.render(view)["color"])
+        context.backward(gradient, **out, pose=pose)
+        for name in NAMES:
+            np.testing.assert_array_equal(out[name], expected[name])
+        np.testing.assert_allclose(pose[:3], expected["pose"]["translation"], rtol=1e-5)
+        np.testing.assert_allclose(pose[3:], expected["pose"]["rotation"], rtol=1e-5)
+        del other
+        context.backward(gradient, **out)  # again
+        np.testing.assert_array_equal(out["sh"], expected["sh"])
+        with self.assertRaisesRegex(gart.InvalidArgument, "Context.backward: color_gradient must be .*32, 40, 3"):
+            context.backward(gradient[:-1], **out)
+        renderer.bind(*scenes.parameters(degree=1, seed=2))
+        with self.assertRaisesRegex(gart.InvalidArgument, "another model was set or bound"):
+            context.backward(gradient, **out)
 
     def test_depth_and_transmittance_have_gradients(self):
         model, view = scenes.model(n=30, degree=0), scenes.camera()
         random = np.random.default_rng(4)
         by_color, by_depth = random.normal(0, 1, (32, 40, 3)), random.normal(0, 1, (32, 40))
         expected = gart.reference(model, view, by_color, by_depth, **scenes.SMOOTH)["gradients"]
-        arrays = [getattr(model, name) for name in NAMES]
-        renderer = gart.Renderer(sh_degree=0, depth=True, backend="openmp")
-        renderer.bind(*arrays)
-        out = [np.empty_like(a) for a in arrays]
-        renderer.record(view, **scenes.SMOOTH)
-        renderer.backward_to(by_color.astype(np.float32), *out, depth_gradient=by_depth.astype(np.float32))
-        for name, array in zip(NAMES, out):
+        renderer = gart.Renderer(model, depth=True, backend="openmp")
+        out = {name: np.empty_like(getattr(model, name)) for name in NAMES}
+        context = renderer.forward(view, **scenes.SMOOTH)
+        context.backward(by_color.astype(np.float32), depth_gradient=by_depth.astype(np.float32), **out)
+        for name, array in out.items():
             np.testing.assert_allclose(array, expected[name], rtol=2e-3, atol=2e-3 * np.abs(expected[name]).max())
-        plain = gart.Renderer(model, backend="openmp")
-        plain.record(view)
-        with self.assertRaisesRegex(gart.InvalidArgument, "need configuration_request.depth"):
-            plain.backward_to(by_color.astype(np.float32), *out, depth_gradient=by_depth.astype(np.float32))
+        plain = gart.Renderer(model, backend="openmp").forward(view)
+        with self.assertRaisesRegex(gart.InvalidArgument, "configuration_request.depth"):
+            plain.backward(by_color.astype(np.float32), depth_gradient=by_depth.astype(np.float32), **out)
+
+    def rays_of(self, view):
+        """The directions of a view's pixels, and where they begin."""
+        y, x = np.mgrid[:view.height, :view.width] + 0.5
+        of_pixels = np.stack([(x - view.cx) / view.fx, (y - view.cy) / view.fy, np.ones_like(x)], -1)
+        directions = of_pixels.reshape(-1, 3) @ view.c2w[:3, :3].T
+        return np.ascontiguousarray(directions, np.float32), tuple(view.c2w[:3, 3])
+
+    def test_rays_of_a_view_see_the_view(self):
+        view, renderer = scenes.camera(), gart.Renderer(scenes.model(), backend="openmp")
+        directions, frame = self.rays_of(view)
+        image, seen = renderer.render(view), renderer.trace(directions, frame=frame)
+        np.testing.assert_allclose(seen["color"].reshape(32, 40, 3), image["color"], atol=1e-4)
+        np.testing.assert_allclose(seen["depth"].reshape(32, 40), image["depth"], atol=1e-3)
+        hits = renderer.list_hits(directions, frame=frame)
+        np.testing.assert_array_equal(np.diff(hits["offsets"]), seen["hits"])
+        some = int(np.argmax(seen["hits"]))
+        of_ray = slice(int(hits["offsets"][some]), int(hits["offsets"][some + 1]))
+        self.assertEqual(hits["ids"][of_ray][0], seen["first_id"][some])
+        self.assertAlmostEqual(float((hits["weight"] * hits["t"])[of_ray].sum()), float(seen["depth"][some]), 3)
+        with self.assertRaisesRegex(gart.InvalidArgument, "Renderer.trace: origins must"):
+            renderer.trace(directions, origins=directions[:-1])
 
     def test_cameras(self):
         view = gart.Camera(64, 48, 50, 51)

@@ -97,6 +97,29 @@ class Torch(unittest.TestCase):
         for a, b in zip(alone, between):
             np.testing.assert_allclose(a.grad, b.grad, rtol=1e-4, atol=1e-5 * float(a.grad.abs().max()))
 
+    def test_gradients_of_rays_are_finite_differences(self):
+        """Of a batch that no image has, by its directions and origins."""
+        arrays = tensors(n=4, degree=1)
+        with torch.no_grad():
+            arrays[0][:, 2] = torch.tensor([2.0, -1.5, 0.5, 4.0])
+            arrays[1] += 0.5  # wide, so that numbers of a float tell the differences
+        random = np.random.default_rng(6)
+        origins = torch.tensor(random.normal(0, 0.3, (12, 3)) - [0, 0, 5], dtype=torch.float32)
+        directions = torch.tensor(random.normal(0, 0.1, (12, 3)) + [0, 0, 1.3], dtype=torch.float32)
+        weight = torch.from_numpy(random.normal(0, 1, (12, 3)))
+
+        def loss(directions, origins):
+            return (weight * gart.torch.trace(*arrays, directions, origins, **scenes.SMOOTH)[0].double()).sum()
+
+        rays = [directions.requires_grad_(), origins.requires_grad_()]
+        loss(*rays).backward()
+        self.assertGreater(arrays[0].grad.abs().max(), 0)
+        for k in range(2):
+            def moved(values):
+                with torch.no_grad():
+                    return loss(*[values if j == k else r.detach() for j, r in enumerate(rays)]).item()
+            self.assert_close(rays[k].grad, finite_differences(moved, rays[k], 5e-3), 0.05)
+
     def test_tensors_are_refused_by_name(self):
         arrays = tensors()
         with self.assertRaisesRegex(gart.InvalidArgument, "log_scale must be float32"):
@@ -172,7 +195,7 @@ class Torch(unittest.TestCase):
         c2w = torch.from_numpy(scenes.C2W).requires_grad_()
         numbers = [1 / 255, 1e-4, 0.01, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
         torch.library.opcheck(torch.ops.gart.render.default,
-                              (*arrays, c2w, view.json(), numbers, 2, True, view.height, view.width))
+                              (*arrays, c2w, view.json(), numbers, 2, view.height, view.width))
         compiled = torch.compile(lambda *a: gart.torch.render(*a, view)[0])
         torch.testing.assert_close(compiled(*arrays), gart.torch.render(*arrays, view)[0])
 

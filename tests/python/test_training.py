@@ -82,12 +82,20 @@ class Training(unittest.TestCase):
         np.testing.assert_array_equal(session.model().sh, start.sh)
 
     def test_options_by_name(self):
-        options = gart.TrainOptions(densify="mcmc", **{"rates.mean": 0.5, "error.split.share": 0.25})
-        self.assertEqual((options.densify, options.rates.mean, options.error.split.share), ("mcmc", 0.5, 0.25))
+        options = gart.TrainOptions(densify="mcmc", **{"rates.mean": 0.5, "poses.rate": 0.25})
+        self.assertEqual((options.densify, options.rates.mean, options.poses.rate), ("mcmc", 0.5, 0.25))
         options.rates.opacity = 0.125
-        self.assertEqual(options.rates.opacity, 0.125)
-        with self.assertRaisesRegex(TypeError, "no option 'rates.meen': there are .*mean"):
+        options.iterations = 77
+        self.assertEqual((options.rates.opacity, options.iterations), (0.125, 77))
+        self.assertIn("rates.mean", gart.TrainOptions.fields())
+        with self.assertRaisesRegex(TypeError, "no option 'rates.meen': there are .*rates.mean"):
             gart.TrainOptions(**{"rates.meen": 1})
+        with self.assertRaisesRegex(AttributeError, "no option 'rates.meen': there are .*mean"):
+            options.rates.meen = 1
+        with self.assertRaises(AttributeError):
+            options.iteration = 1
+        with self.assertRaisesRegex(gart.InvalidArgument, "train_options.iterations is -1: from 1 to"):
+            options.iterations = -1
         with self.assertRaisesRegex(gart.InvalidArgument, "is none of error, mcmc"):
             gart.TrainOptions(densify="more")
 
