@@ -317,20 +317,22 @@ TEST_CASE_TEMPLATE("one box far away leaves the others their order", E, GART_TES
     }
     return sum;
   };
+  // Planes of the codes now cut the scene at other places, which is half as much again at the most; in any order it is
+  // over ten times as much.
   double const without = sizes(boxes);
   for (vec3 const& far : {vec3(1e7f, 0, 0), vec3(-1e7f, 1e6f, 1e30f)}) {
     auto strayed = boxes;
     strayed[1234] = {far, far};
-    CHECK(sizes(strayed) < 1.2 * without);
+    CHECK(sizes(strayed) < 2 * without);
   }
   // One in 400 of them, and a scene of few.
   auto strayed = boxes;
   for (std::size_t i = 0; i < strayed.size(); i += 400) strayed[i] = {vec3(1e8f), vec3(1e8f)};
-  CHECK(sizes(strayed) < 1.2 * without);
+  CHECK(sizes(strayed) < 2 * without);
   boxes.resize(40);
   strayed = boxes;
   strayed[7] = {vec3(1e8f), vec3(1e8f)};
-  CHECK(sizes(strayed) < 1.5 * sizes(boxes));
+  CHECK(sizes(strayed) < 2 * sizes(boxes));
 }
 
 TEST_CASE_TEMPLATE("a box without an end is met wherever the ray goes", E, GART_TEST_POLICIES) {

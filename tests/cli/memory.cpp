@@ -90,7 +90,7 @@ std::string shared_glb(std::size_t gaussians, std::size_t meshes) {
                  R"({"bufferView":0,"componentType":5121,"normalized":true,"count":)" + n + R"(,"type":")" + type +
                  "\"}";
   std::string const bytes = std::to_string(8 * gaussians);
-  return glb_of(R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[)" + (meshes > 1 ? "0,1" : "0") +
+  return glb_of(R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[)" + std::string(meshes > 1 ? "0,1" : "0") +
                     R"(]}],"nodes":[{"mesh":0},{"mesh":0}],"meshes":)"
                     R"([{"primitives":[{"attributes":{)" +
                     attributes +
