@@ -5,6 +5,7 @@
 
 #include <gart/core/error.hpp>
 #include <gart/optim/dropout.hpp>
+#include <gart/train/option_fields.hpp>
 
 #include <limits>
 
@@ -83,7 +84,7 @@ TEST_CASE_TEMPLATE("ranks leave out what one does", E, GART_TEST_POLICIES) {
   }
 }
 
-TEST_CASE_TEMPLATE("a scope ends once, without a share there is none, and a share that is none is refused", E,
+TEST_CASE_TEMPLATE("a scope of dropout ends once, a wrong share is refused", E,
                    GART_TEST_POLICIES) {
   std::mt19937_64 random(1);
   gart::gaussian_model const model = random_model(100, 0, random);
@@ -98,8 +99,11 @@ TEST_CASE_TEMPLATE("a scope ends once, without a share there is none, and a shar
   }
   CHECK(scene.opacity.to_host() == model.opacity);
   CHECK(shown_of(nothing, scene, 0) == model.opacity);
-  for (float const share : {-0.1f, 1.0f, std::numeric_limits<float>::quiet_NaN()})
-    CHECK_THROWS_AS(gart::dropout<E>(exec, share, 1, 1), gart::invalid_argument);
+  for (float const share : {-0.1f, 1.0f, std::numeric_limits<float>::quiet_NaN()}) {
+    gart::train_options wrong;
+    wrong.dropout = share;
+    CHECK_THROWS_AS(gart::require_options(wrong), gart::invalid_argument);
+  }
 }
 
 TEST_CASE_TEMPLATE("the last steps of a run show the whole scene", E, GART_TEST_POLICIES) {
@@ -121,6 +125,9 @@ TEST_CASE_TEMPLATE("the last steps of a run show the whole scene", E, GART_TEST_
   CHECK(steps_without(0.75f) == 25);
   CHECK(steps_without(0.95f) == 5);
   CHECK(steps_without(0) == iterations);
-  for (float const until : {-0.1f, 1.01f, std::numeric_limits<float>::quiet_NaN()})
-    CHECK_THROWS_AS(gart::dropout<E>(exec, 0.5f, until, 1), gart::invalid_argument);
+  for (float const until : {-0.1f, 1.01f, std::numeric_limits<float>::quiet_NaN()}) {
+    gart::train_options wrong;
+    wrong.dropout_until = until;
+    CHECK_THROWS_AS(gart::require_options(wrong), gart::invalid_argument);
+  }
 }

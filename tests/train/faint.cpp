@@ -23,7 +23,7 @@ gart::gaussian_model densified(E& exec, gart::densify_kind densify, gart::gaussi
   options.densify = densify;
   options.error.from = options.mcmc.from = options.adc.from = 0;
   options.error.every = options.mcmc.every = options.adc.every = 1;
-  options.adc.gradient = 1e30f;
+  options.adc.gradient = 1e6f;
   options.render = render;
   run_of<E> run(exec, options, data, start);
   run.step();

@@ -121,8 +121,10 @@ class walk_tile_warps {
       at_ = {corner.x + lane_ % block_width, corner.y + lane_ / block_width};
       index_ = k.program.order.index(at_);
       alive_ = k.program.order.inside(at_);
-      state_ = k.program.begin(index_);
-      ray_ = k.program.ray_of(index_, state_);
+      // A lane outside of the image has the corner's ray, which is in the tables that rays are read from.
+      index_t const seen = alive_ ? index_ : k.program.order.index(corner);
+      state_ = k.program.begin(seen);
+      ray_ = k.program.ray_of(seen, state_);
       depth_of_t_ = k.depth.per_distance(ray_.direction);
       last_t_ = k.scene.near;
       for (int w = lane_; w < 2 * group * row_words; w += lanes)

@@ -6,6 +6,7 @@
 /// Errors: read_checkpoint throws io_error naming the file and the array that is missing, truncated or of another size.
 
 #include <gart/core/named_arrays.hpp>
+#include <gart/math/glm.hpp>
 #include <gart/scene/gaussians.hpp>
 
 #include <filesystem>
