@@ -44,9 +44,15 @@ struct opened_model {
   gart::view_scene scene;
 };
 
-opened_model open_model(view_arguments const& a, fs::path const& path, gart::dataset const& data) {
-  gart::model_file file = gart::load_model(path);
+// From the origin that the capture's cameras are held from.
+opened_model open_model(view_arguments const& a, fs::path const& path, gart::model_file file,
+                        gart::dataset const& data) {
   progress(false).notes(file.notes);
+  if (!a.capture.empty() && file.origin != data.origin)
+    throw gart::io_error(
+        path.string(),
+        "is from the origin " + gart::to_text(file.origin) + ", the capture from " + gart::to_text(data.origin),
+        "view it without the capture");
   opened_model out;
   out.by = gart::make_renderer(configuration_request_for(file, path, a.configuration.request()));
   gart::render_options options = file.render;
@@ -58,11 +64,12 @@ opened_model open_model(view_arguments const& a, fs::path const& path, gart::dat
 }
 
 int run_view(view_arguments const& a) {
+  gart::model_file first = gart::load_model(a.model);
   gart::dataset data;
   if (!a.capture.empty()) {
     gart::dataset_options options;
     options.downscale = a.downscale, options.test_every = a.test_every;
-    options.origin = file.origin;
+    options.origin = first.origin;
     a.photos.set(options);
     data = gart::load_dataset(a.capture, options);
     progress(false).notes(data.notes);
@@ -72,7 +79,7 @@ int run_view(view_arguments const& a) {
     scene.models = models.names(), scene.model = which;
     return scene;
   };
-  opened_model shown = open_model(a, a.model, data);
+  opened_model shown = open_model(a, a.model, std::move(first), data);
   interrupt_guard const interrupt;
   gart::view_server server(named(std::move(shown.scene), models.first()), server_options_of(a.view, data));
   server.set_scores(scores_of_run(a.model, data));
@@ -84,7 +91,7 @@ int run_view(view_arguments const& a) {
     if (auto const wanted = server.next_model()) {
       fs::path const path = models.path(*wanted);
       try {
-        opened_model next = open_model(a, path, data);
+        opened_model next = open_model(a, path, gart::load_model(path), data);
         shown = std::move(next);
         server.set_scene(named(std::move(shown.scene), *wanted));
         server.set_scores(scores_of_run(path, data));
