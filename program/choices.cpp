@@ -45,10 +45,7 @@ gart::chosen<std::string> sizes_in_words(gart::dataset const& data, gart::train_
 
 // Of a setting that has an option of its own; null for those of --set.
 std::string* option_of(train_arguments& a, std::string const& setting) {
-  return setting == "exposure"     ? &a.exposure
-         : setting == "vignetting" ? &a.vignetting
-         : setting == "densify"    ? &a.densify
-                                   : nullptr;
+  return setting == "exposure" ? &a.exposure : setting == "vignetting" ? &a.vignetting : nullptr;
 }
 
 }  // namespace

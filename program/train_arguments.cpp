@@ -70,7 +70,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--densify", a.densify, "NAME",
                  "How Gaussians are added: error (those split through which\nthe image's error is seen, up to "
                  "--max-gaussians), mcmc\n(copies by opacity, random steps), adc (clones and splits by\ngradient) or "
-                 "none;\nauto: error, or what --auto measures"))
+                 "none;\nauto: error"))
       ->check(one_of({"auto", "error", "mcmc", "adc", "none"}));
   in_group(r.add_flag(train, "--auto,!--no-auto", a.automatic,
                       "Measure what the capture asks for before the run: settings\nleft open are tried in short "

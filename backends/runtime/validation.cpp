@@ -10,6 +10,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <future>
 #include <limits>
 #include <memory>
@@ -66,6 +67,15 @@ double standard_error(std::vector<double> const& values) {
   return std::sqrt(squares / (n - 1) / n);
 }
 
+// Where one trial throws, the others end.
+struct end_all_on_failure {
+  std::atomic<bool>& ended;
+  int before = std::uncaught_exceptions();
+  ~end_all_on_failure() {
+    if (std::uncaught_exceptions() > before) ended = true;
+  }
+};
+
 // Calls run(i, go_on) for each trial: in turn, or beside each other in threads. go_on() counts a step, and is false
 // from when `progress` ended it all.
 template <class Run>
@@ -88,12 +98,14 @@ void run_trials(validation_plan const& plan, validation_progress const& progress
   std::vector<std::future<void>> trials;
   for (std::size_t i = 0; i < plan.trials; ++i) {
     trials.push_back(std::async(std::launch::async, [&, i] {
+      end_all_on_failure const guard{ended};
       run(i, [&] {
         ++asked;
         return !ended;
       });
     }));
   }
+  end_all_on_failure const guard{ended};
   for (std::future<void>& t : trials)
     while (t.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) report();
   for (std::future<void>& t : trials) t.get();  // throws what a trial threw
@@ -106,7 +118,9 @@ void run_trials(validation_plan const& plan, validation_progress const& progress
 train_options of_trial(train_options options, validation_plan const& plan) {
   int const area = plan.shrink * plan.shrink;
   double const shorter = static_cast<double>(plan.steps) / options.iterations;
-  auto const sooner = [&](int& steps) { steps = std::max(1, static_cast<int>(std::lround(steps * shorter))); };
+  auto const sooner = [&](int& steps) {
+    if (steps > 0) steps = std::max(1, static_cast<int>(std::lround(steps * shorter)));
+  };
   options.held_out.insert(options.held_out.end(), plan.held_out.begin(), plan.held_out.end());
   options.iterations = plan.steps, options.batch = 1;
   options.refine_poses = options.refine_lens = false, options.depth_weight = 0;
@@ -119,7 +133,7 @@ train_options of_trial(train_options options, validation_plan const& plan) {
   for (int* from : {&options.error.from, &options.mcmc.from, &options.adc.from})
     *from = std::min(*from, plan.steps / 20);
   for (int* every : {&options.error.every, &options.mcmc.every, &options.adc.every})
-    *every = std::clamp(plan.steps / 40, 1, *every);
+    if (*every > 0) *every = std::clamp(plan.steps / 40, 1, *every);
   return options;
 }
 
@@ -195,13 +209,21 @@ validation validate(configuration_request const& request, train_options const& o
   configuration_request alone = request;
   alone.ranks = nullptr, alone.depth = false;
   std::vector<std::vector<double>> psnr(plan.trials);  // of each view held out; none where a trial was ended
-  run_trials(plan, progress, [&](std::size_t i, auto const& go_on) {
+  auto const run = [&](std::size_t i, auto const& go_on) {
     train_options changed = options;
     if (i > 0) candidates[i - 1].take(changed);
     std::unique_ptr<session> const training = make_session(alone, of_trial(changed, plan), small);
     while (go_on() && training->steps_done() < plan.steps) training->step();
     if (training->steps_done() == plan.steps) psnr[i] = psnr_of(*training, small, plan, options.background);
-  });
+  };
+  try {
+    run_trials(plan, progress, run);
+  } catch (out_of_memory const&) {
+    if (!plan.beside) throw;
+    result.plan.beside = false;  // one at a time may have room
+    psnr.assign(plan.trials, {});
+    run_trials(plan, progress, run);
+  }
   for (std::size_t i = 0; i < plan.trials && !psnr[0].empty(); ++i) {
     if (psnr[i].empty()) continue;
     trial tried;

@@ -7,9 +7,7 @@
 #include <string>
 #include <string_view>
 
-namespace gart::view {
-
-namespace ws {
+namespace gart::view { namespace ws {
 
 enum opcode : u8 { continued = 0, text = 1, binary = 2, close = 8, ping = 9, pong = 10 };
 

@@ -60,11 +60,12 @@ gart::dataset dataset_of(std::vector<gart::dataset_view> train, std::vector<gart
 
 gart::dataset load(std::filesystem::path const& path, int downscale, int test_every, std::string const& test_split,
                    std::optional<std::filesystem::path> const& photos, bool masks, bool load_images, bool depth,
-                   py::object const& progress) {
+                   std::optional<std::array<double, 3>> const& origin, py::object const& progress) {
   gart::dataset_options options;
   options.downscale = downscale, options.test_every = test_every, options.masks = masks;
   options.test_split = gart::from_string<gart::split_kind>(test_split);
   if (photos) options.photos = *photos;
+  if (origin) options.origin = gart::vec3d((*origin)[0], (*origin)[1], (*origin)[2]);
   options.load_images = load_images, options.depth.load = depth;
   if (!progress.is_none())
     options.progress = [&progress](std::size_t done, std::size_t total) {
@@ -84,6 +85,7 @@ photos       the folder of the photos, where it is not the capture's
 masks        whether to read masks
 load_images  False: cameras alone
 depth        whether to read depth maps of the training views
+origin       what coordinates are relative to, as of a Model; None: the capture's own, far from zero alone
 progress     called as progress(done, total) from the loading threads, one at a time
 
 Raises IoError, Unsupported for a camera model that gart does not trace, InvalidArgument.)";
@@ -144,6 +146,12 @@ colors       uint8 [N, 3])")
       .def_readonly("split", &gart::dataset::split, "how train and test were told apart")
       .def_readonly("notes", &gart::dataset::notes, "what was skipped, scaled or assumed, a line each")
       .def_readonly("extent", &gart::dataset::extent, "1.1 times the largest distance of a camera from their mean")
+      .def_property_readonly(
+          "origin",
+          [](gart::dataset const& d) {
+            return std::array{d.origin.x, d.origin.y, d.origin.z};
+          },
+          "what coordinates are relative to")
       .def_readonly("alpha", &gart::dataset::alpha, "whether images carry alpha")
       .def_property_readonly(
           "points",
@@ -167,13 +175,14 @@ colors       uint8 [N, 3])")
       "load_dataset",
       [](std::filesystem::path const& path, int downscale, int test_every, std::string const& test_split,
          std::optional<std::filesystem::path> const& photos, bool masks, bool load_images, bool depth,
-         py::object const& progress) {
+         std::optional<std::array<double, 3>> const& origin, py::object const& progress) {
         return std::make_shared<gart::dataset>(
-            load(path, downscale, test_every, test_split, photos, masks, load_images, depth, progress));
+            load(path, downscale, test_every, test_split, photos, masks, load_images, depth, origin, progress));
       },
       py::arg("path"), py::kw_only(), py::arg("downscale") = 1, py::arg("test_every") = 8,
       py::arg("test_split") = "nth", py::arg("photos") = py::none(), py::arg("masks") = true,
-      py::arg("load_images") = true, py::arg("depth") = false, py::arg("progress") = py::none(), load_text);
+      py::arg("load_images") = true, py::arg("depth") = false, py::arg("origin") = py::none(),
+      py::arg("progress") = py::none(), load_text);
 }
 
 }  // namespace gart_python

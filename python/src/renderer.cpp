@@ -33,17 +33,22 @@ std::shared_ptr<self> make(py::object const& model, py::kwargs const& given) {
 }
 
 void set_model(self& r, gart::model_file const& file) {
-  without_gil(r.mutex, [&] { r.it->set_model(file.model); });
-  r.bound.clear();
-  r.usual = file.render, r.count = static_cast<std::int64_t>(file.model.size());
+  std::vector<lent> let_go;
+  without_gil(r.mutex, [&] {
+    r.it->set_model(file.model);
+    std::swap(r.bound, let_go);
+    r.usual = file.render, r.count = static_cast<std::int64_t>(file.model.size());
+  });
 }
 
 void bind(self& r, std::array<py::object, 5> const& arrays) {
   std::vector<lent> kept;
   auto const view = parameters_of<float const>(arrays, "Renderer.bind", -1, r.where, kept);
-  without_gil(r.mutex, [&] { r.it->bind(view); });
-  r.bound = std::move(kept);
-  r.count = view.count;
+  without_gil(r.mutex, [&] {
+    r.it->bind(view);
+    std::swap(r.bound, kept);  // what was bound goes with the interpreter's lock held
+    r.count = view.count;
+  });
 }
 
 py::dict render(self& r, gart::camera const& view, py::object const& options, py::kwargs const& given) {

@@ -192,6 +192,12 @@ void bind_scene(py::module_& m) {
       .def("__len__", [](file const& f) { return f.model.size(); })
       .def_property_readonly("sh_degree", [](file const& f) { return f.model.sh_degree; })
       .def_readonly("kernel_degree", &file::kernel_degree, "2: Gaussians")
+      .def_property_readonly(
+          "origin",
+          [](file const& f) {
+            return std::array{f.origin.x, f.origin.y, f.origin.z};
+          },
+          "what coordinates are relative to")
       .def_readwrite("render", &file::render, "what the model was trained to be rendered with")
       .def_readonly("notes", &file::notes, "a line for each kind of Gaussian that was left out of the file")
       .def(

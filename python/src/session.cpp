@@ -32,7 +32,9 @@ std::unique_ptr<self> make(shared_dataset const& data, py::object const& options
   if (file && !given.contains("sh_degree")) request.sh_degree = file->model.sh_degree;
   out->kernel_degree = request.kernel_degree;
   py::gil_scoped_release released;
-  out->it = gart::make_session(request, out->options, *data, file ? &file->model : nullptr);
+  gart::gaussian_model from;  // where the capture is
+  if (file) from = file->model, gart::move_origin(from, file->origin, data->origin);
+  out->it = gart::make_session(request, out->options, *data, file ? &from : nullptr);
   return out;
 }
 
@@ -48,7 +50,7 @@ std::shared_ptr<gart::model_file> model(self& s) {
   auto out = std::make_shared<gart::model_file>();
   without_gil(s.mutex, [&] { out->model = s.it->model(); });
   out->render = gart::render_options_of(s.options, s.data->extent), out->kernel_degree = s.kernel_degree;
-  out->total = out->model.size();
+  out->total = out->model.size(), out->origin = s.data->origin;
   return out;
 }
 
@@ -98,6 +100,7 @@ std::pair<gart::train_options, py::dict> recommended(shared_dataset const& data,
     found = gart::recommended(base, *data, request);
   }
   py::dict out;
+  for (auto const& [key, value] : given) out[key] = value;
   out["backend"] = to_string(found.request.backend), out["tracer"] = to_string(found.request.tracer);
   out["backward"] = found.request.backward, out["sh_degree"] = found.request.sh_degree;
   return {found.options, out};

@@ -84,8 +84,7 @@ TEST_CASE_TEMPLATE("ranks leave out what one does", E, GART_TEST_POLICIES) {
   }
 }
 
-TEST_CASE_TEMPLATE("a scope of dropout ends once, a wrong share is refused", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a scope of dropout ends once, a wrong share is refused", E, GART_TEST_POLICIES) {
   std::mt19937_64 random(1);
   gart::gaussian_model const model = random_model(100, 0, random);
   E exec;

@@ -40,7 +40,7 @@ struct adam_options {
 /// What is fainter than alpha_min is never hit and gets no gradient, so that it would stay as it is for good.
 inline float least_opacity(float usual, float alpha_min) { return std::max(usual, 255 * usual * alpha_min); }
 
-/// Of Markov chain Monte Carlo (optim/mcmc.hpp).
+/// Of Markov chain Monte Carlo (train/densify/mcmc.hpp).
 struct mcmc_options {
   int from = 500, every = 100;  ///< steps: the first, and from one to the next
   float until = 5.0f / 6;       ///< share of the run
@@ -58,7 +58,7 @@ struct split_shape {
   float opacity = 0.6f;  ///< what opacity is multiplied by
 };
 
-/// Of growth by error (optim/error_growth.hpp).
+/// Of growth by error (train/densify/error_growth.hpp).
 struct error_growth_options {
   int from = 500, every = 100;     ///< steps: the first, and from one to the next
   float growth_end = 0.5f;         ///< share of the run at which the count has reached its budget
@@ -72,7 +72,7 @@ struct error_growth_options {
   int min_gaussians = 100'000;  ///< that pixels_per_gaussian leaves to the smallest capture
 };
 
-/// Of adaptive density control (optim/adc.hpp).
+/// Of adaptive density control (train/densify/adc.hpp).
 struct adc_options {
   int from = 500, every = 100, opacity_reset_every = 3000;  ///< steps: the first, and from one to the next
   float until = 0.5f;                                       ///< share of the run

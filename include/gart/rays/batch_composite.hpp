@@ -10,7 +10,7 @@
 #include <gart/rays/batch_rays.hpp>
 #include <gart/render/composite.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The coefficients of all Gaussians, of any degree.
 struct color_rows {
@@ -190,4 +190,4 @@ struct batch_list : ray_program_base {
 };
 static_assert(ray_program<batch_list>);
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

@@ -15,7 +15,7 @@
 
 #include <bit>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The hits of a batch, as the forward pass kept them or sorted.
 template <execution E>
@@ -213,4 +213,4 @@ class batch_gather {
   buffer<quad, E> rows_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

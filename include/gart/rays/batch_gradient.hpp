@@ -9,7 +9,7 @@
 #include <gart/math/sh_turn.hpp>
 #include <gart/rays/batch_composite.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What gradients need of a ray, read 16 bytes at a time.
 struct alignas(16) differentiated_ray {
@@ -170,4 +170,4 @@ struct batch_scatter : ray_program_base {
   }
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

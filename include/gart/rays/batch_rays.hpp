@@ -9,7 +9,7 @@
 #include <gart/exec/parallel.hpp>
 #include <gart/rays/ray_batch.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Trivially copyable: kernels hold one by value.
 struct batch_rays {
@@ -116,4 +116,4 @@ void require_rays(E& exec, ray_batch const& rays, float near) {
   }
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

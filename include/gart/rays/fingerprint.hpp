@@ -9,7 +9,7 @@
 #include <gart/math/arith.hpp>
 #include <gart/scene/gaussians.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 namespace ray_kernels {
 
@@ -52,4 +52,4 @@ class fingerprint {
   buffer<u64, E> prints_, sum_;
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

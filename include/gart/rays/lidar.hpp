@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// Where a sensor is, and how it moves during a sweep.
 struct sensor_pose {
@@ -92,4 +92,4 @@ inline ray_list rays_of(lidar_pattern const& pattern, sensor_pose const& pose, f
   return out;
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

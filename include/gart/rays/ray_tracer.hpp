@@ -28,7 +28,7 @@
 
 #include <algorithm>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// What a forward pass leaves for its backward pass. The rays are read again: their memory must stay.
 template <execution E>
@@ -247,7 +247,7 @@ class ray_tracer {
     constexpr u64 run = keep_hits<E>::run;
     kept.ray_bits = std::max(1, static_cast<int>(std::bit_width(n - (n > 0))));
     kept.used.resize(1);
-    u64 room = std::max(expected_, run);
+    u64 room = std::max<u64>(static_cast<u64>(per_ray_ * n * 1.125) / run * run + run, run);
     for (;;) {
       kept.keys.resize(room), kept.entries.resize(room), kept.depths.resize(room);
       kept.used.zero();
@@ -262,7 +262,7 @@ class ray_tracer {
       if (kept.count <= room) break;
       room = kept.count;
     }
-    expected_ = std::max<u64>(expected_, (kept.count + kept.count / 8 + run - 1) / run * run);
+    if (n > 0) per_ray_ = static_cast<double>(kept.count) / n;
   }
 
   E* exec_;
@@ -282,7 +282,7 @@ class ray_tracer {
   buffer<differentiated_ray, E> differentiated_;
   batch_gather<E, Response> gather_;
   buffer<u32, E> counts_;
-  u64 expected_ = 0;  // places of a batch's hits
+  double per_ray_ = 0;  // hits that the last batch kept
 };
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

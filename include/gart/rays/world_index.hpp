@@ -10,7 +10,7 @@
 #include <gart/bvh/walk.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The tree as kernels hold it, and the way from its frame to that of the rays.
 struct world_view {
@@ -111,4 +111,4 @@ void trace_batch(E& exec, char const* label, world_view const& index, traced_sce
   parallel_for(exec, label, rays, ray_kernels::walk_batch<Response, window, P>{index, scene, program});
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

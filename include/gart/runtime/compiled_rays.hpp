@@ -9,7 +9,7 @@
 #include <gart/runtime/ray_service.hpp>
 #include <gart/runtime/registry.hpp>
 
-namespace gart::inline GART_ISA {
+namespace gart { inline namespace GART_ISA {
 
 /// The service of a policy and a response.
 template <execution E, class Response>
@@ -85,4 +85,4 @@ void register_rays() {
                        });
 }
 
-}  // namespace gart::inline GART_ISA
+}}  // namespace gart::GART_ISA

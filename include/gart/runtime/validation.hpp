@@ -17,8 +17,8 @@
 /// Cost: trials have a fixed number of steps, so that the same capture and options give the same choice on the serial
 /// policy whatever the machine's load: together about a tenth of a run's time (plan_validation), more where the run's
 /// own images are small. On a GPU the trials run beside each other, one thread and stream each; with a stream of the
-/// caller's, in turn. Memory: the training views once more, shrunk, and a small session for each trial at a time.
-/// Errors: as make_session.
+/// caller's, or where memory ends, in turn. Memory: the training views once more, shrunk, and a session for each trial
+/// that runs. Ranks are left out: let one rank measure and tell the others. Errors: as make_session.
 
 #include <gart/io/dataset.hpp>
 #include <gart/runtime/request.hpp>

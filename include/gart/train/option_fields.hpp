@@ -44,7 +44,7 @@ struct option_field {
 inline constexpr option_field option_fields[] = {
     {GART_FIELD(iterations), 1, 1e9, "Training", "Steps, one training view each"},
     {GART_FIELD(max_gaussians), 1, 4294967295.0, "Training",
-     "Gaussians at most; memory and time grow with them. Growth by\nerror ends at one for each 100 training pixels "
+     "Gaussians at most; memory and time grow with them. Growth by\nerror ends at one for each 200 training pixels "
      "where that is\nless (and over 100,000)"},
     {GART_FIELD(random_points), 1, 2147483647.0, "Training",
      "Gaussians to start with where the capture has no points: at\nrandom, or where its depth maps are trained on, of "

@@ -16,8 +16,8 @@
 
 namespace gart {
 
-/// How the number of Gaussians grows: not at all, where the image's error is (optim/error_growth.hpp), by MCMC
-/// (optim/mcmc.hpp), by adaptive density control (optim/adc.hpp).
+/// How the number of Gaussians grows: not at all, where the image's error is (train/densify/error_growth.hpp), by MCMC
+/// (train/densify/mcmc.hpp), by adaptive density control (train/densify/adc.hpp).
 enum class densify_kind { none, error, mcmc, adc };
 /// Their names.
 constexpr auto names_of(densify_kind) {

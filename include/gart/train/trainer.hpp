@@ -106,7 +106,10 @@ class basic_trainer {
   /// Takes the place of the options' densifier.
   void densify_by(std::unique_ptr<densifier<E>> own);
   /// Is learned too, from the next step on; sees images after what is learned already.
-  void learn(std::unique_ptr<learned_part<frame_type>> part) { parts_.push_back(std::move(part)); }
+  void learn(std::unique_ptr<learned_part<frame_type>> part) {
+    if (!part) throw invalid_argument("trainer.learn: there is no part");
+    parts_.push_back(std::move(part));
+  }
 
   /// Of the run's model; bands above it are zero in the policy's memory.
   int degree() const { return gaussians_.degree; }

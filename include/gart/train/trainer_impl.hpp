@@ -52,6 +52,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::make_room() {
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::densify_by(std::unique_ptr<densifier<E>> own) {
+  if (!own) throw invalid_argument("trainer.densify_by: there is no densifier; give one that does nothing");
   densifier_ = std::move(own);
   densifier_->set_batch(options_.batch);
 }

@@ -3,9 +3,10 @@
 /// Densification: which Gaussians a training adds, moves and removes. A densifier is a class on densifier<E>; what it
 /// does not override, it does not do, and the base itself changes nothing. Those of the library are listed in
 /// densifiers.hpp, and a program gives its own to trainer::densify_by. In the order of a step:
-///   observe     once for each view of the step, with that view's gradients; or error_sums, which the backward pass
-///   adds to penalty     adds to the gradients, before the optimizer step        after the optimizer: may change the
-///   Gaussians, their moments and their number
+///   1. observe: once for each view of the step, with that view's gradients; or error_sums, which the backward pass
+///   adds.
+///   2. penalty: adds to the gradients, before the optimizer.
+///   3. step: after the optimizer; it may change the Gaussians, their moments and their number.
 /// All is called on all ranks alike. What a step draws must depend on the seed and the step only, or be in the state.
 
 #include <gart/core/named_arrays.hpp>
