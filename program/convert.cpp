@@ -104,7 +104,12 @@ int run_convert(convert_arguments const& a) {
   gart::splat_traits traits;
   std::vector<std::string> notes;
   gart::gaussian_model model = gart::read_splats(a.in, &traits, &notes);
-  if (!origin.empty()) traits = gart::with_origin(traits, {origin[0], origin[1], origin[2]});
+  if (!origin.empty()) {
+    if (gart::vec3d const own = gart::origin_of(traits, a.in.string()); own != gart::vec3d(0.0))
+      throw usage_error("--origin " + a.origin + ": " + a.in.string() + " says that it is from the origin " +
+                        gart::to_text(own) + " (leave --origin out)");
+    traits = gart::with_origin(traits, {origin[0], origin[1], origin[2]});
+  }
   std::size_t const read = model.size();
   if (!box.empty())
     model = kept(model, [&](std::size_t i) {

@@ -11,6 +11,7 @@
 #include <gart/runtime/choose.hpp>
 #include <gart/train/option_fields.hpp>
 
+#include <cmath>
 #include <cstdio>
 
 namespace gart_cli {
@@ -42,6 +43,22 @@ void add_field(CLI::App& train, train_arguments& a, gart::option_field const& fi
         option->group(std::string(field.group));
       },
       field.of);
+}
+
+// Runs of a gart that wrote none are from zero.
+gart::vec3d origin_in(nlohmann::json const& config, fs::path const& file) {
+  gart::vec3d origin(0.0);
+  if (!config.contains("origin")) return origin;
+  nlohmann::json const& list = config["origin"];
+  for (std::size_t k = 0; k < 3; ++k) {
+    bool const there = list.is_array() && list.size() == 3 && list[k].is_number();
+    double const v = there ? list[k].get<double>() : 0;
+    if (!there || !(std::abs(v) <= 1e18))
+      throw gart::io_error(file.string(), "'origin' is not a list of 3 numbers",
+                           "write that of the run's model.ply, or start anew without --resume");
+    origin[static_cast<int>(k)] = v;
+  }
+  return origin;
 }
 
 }  // namespace
@@ -231,6 +248,7 @@ void continue_run(train_arguments& a) {
   if (options.contains("t-min")) options.emplace("transmittance-min", options["t-min"]);
   if (options.contains("set") && options["set"].is_string()) options["set"] = with_new_names(options["set"]);
   a.raised = a.recorded.continue_from(options, a.config_file(), {"iterations", "time-budget"});
+  a.origin = origin_in(config, a.config_file());
   if (a.dataset.empty()) {
     if (!config.contains("dataset") || !config["dataset"].is_string()) {
       throw gart::io_error(a.config_file().string(), "has no \"dataset\"", "name the dataset on the command line");
@@ -274,6 +292,7 @@ nlohmann::json config_of(train_arguments const& a, gart::dataset const& data) {
                         {"train_views", data.train.size()},
                         {"test_views", data.test.size()},
                         {"checksums", checksums_of(data)},
+                        {"origin", {data.origin.x, data.origin.y, data.origin.z}},
                         {"options", a.recorded.values()}};
   // A run that goes on must begin at the same: what it has learned is from there.
   if (!a.poses.empty()) {

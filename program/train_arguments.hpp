@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 namespace gart_cli {
@@ -21,6 +22,7 @@ inline constexpr int quick_iterations = 13000;  // of --preset quick
 struct train_arguments {
   std::filesystem::path dataset, out;
   bool resume = false, quiet = false;
+  std::optional<gart::vec3d> origin;  // of the run to be resumed
   int threads = 0, stop_at = 0;
   std::string parallel = "strips";
   int gpus = 1;
@@ -71,7 +73,8 @@ struct train_arguments {
 void add_arguments(CLI::App& train, train_arguments& a);
 // Sets what the command line leaves open and the preset says.
 void fill_in(CLI::App const& train, train_arguments& a);
-// Takes the options of the run in `out`, and its dataset where none was named. io_error where there is no such run.
+// Takes the options and the origin of the run in `out`, and its dataset where none was named. io_error where there is
+// no such run.
 void continue_run(train_arguments& a);
 gart::configuration_request configuration_request_of(train_arguments const& a);
 // `background` is a colour's name or "random".

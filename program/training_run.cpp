@@ -185,6 +185,7 @@ void training_run::load() {
     say_.state("loading " + std::to_string(done) + "/" + std::to_string(total) + " images",
                static_cast<double>(done) / static_cast<double>(std::max<std::size_t>(total, 1)));
   };
+  options.origin = a_.origin;
   options.host = ranks::on_host();
   data_ = gart::load_dataset(a_.dataset, options);
   if (data_.train.empty()) {

@@ -14,7 +14,7 @@ gart::view_scene scene_of(train_arguments const& a, gart::session& session, gart
                           gart::vec3 background) {
   gart::view_scene scene = gart::scene_of(a.out.filename().empty() ? a.out.string() : a.out.filename().string(),
                                           session.model(), a.kernel_degree, view_cameras_of(data));
-  scene.training = true, scene.background = background;
+  scene.training = true, scene.background = background, scene.origin = data.origin;
   return scene;
 }
 

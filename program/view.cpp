@@ -58,7 +58,7 @@ opened_model open_model(view_arguments const& a, fs::path const& path, gart::mod
   gart::render_options options = file.render;
   options.background = background_color(background_of(a, path, data));
   out.scene = gart::scene_of(path.filename().string(), file.model, file.kernel_degree, view_cameras_of(data));
-  out.scene.background = options.background;
+  out.scene.background = options.background, out.scene.origin = file.origin;
   out.render = gart::render_of(*out.by, std::move(file.model), options);
   return out;
 }

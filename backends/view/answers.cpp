@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-json list_of(vec3 v) { return {v[0], v[1], v[2]}; }
+json list_of(auto const& v) { return {v[0], v[1], v[2]}; }
 
 json object_of(camera const& view, std::string const& name) { return json::parse(camera_json({name, view})); }
 
@@ -58,6 +58,7 @@ std::string hello_text(view_scene const& scene, bool control) {
                     {"max", list_of(high)},
                     {"center", list_of(low + half)},
                     {"up", list_of(scene.up)},
+                    {"origin", list_of(scene.origin)},
                     {"extent", extent_of(scene)}}},
                   {"cameras", cameras},
                   {"modes", modes},

@@ -1,5 +1,5 @@
 // A lidar in a model: the points that a spinning sensor of 64 beams measures from a place, as a point cloud.
-// lidar_scan MODEL.ply X Y Z OUT.ply
+// lidar_scan MODEL.ply X Y Z OUT.ply, X Y Z and the points in the capture's own coordinates
 #include <gart/core/error.hpp>
 #include <gart/rays/lidar.hpp>
 #include <gart/runtime/model_file.hpp>
@@ -22,6 +22,7 @@ int main(int argc, char** argv) try {
   // while it looks about.
   gart::sensor_pose pose{.rotation = gart::mat3(0, 0, 1, -1, 0, 0, 0, -1, 0)};
   for (int k = 0; k < 3; ++k) pose.position[k] = std::atof(argv[2 + k]);
+  pose.position -= file.origin;  // what the model's coordinates are from
   pose.travel.x = 0.5f;
   gart::ray_list const rays = gart::rays_of(gart::spinning_lidar(elevations, 1024), pose);
 
@@ -39,12 +40,15 @@ int main(int argc, char** argv) try {
   std::ofstream out(argv[5]);
   out << "ply\nformat ascii 1.0\nelement vertex " << returns << "\nproperty double x\nproperty double y\n"
       << "property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
-  out.precision(10);
+  out.precision(12);
   for (std::size_t i = 0; i < n; ++i) {
     if (seen.median[i] == gart::no_hit) continue;
-    for (std::size_t k = 0; k < 3; ++k)
-      out << rays.frame[static_cast<int>(k)] + rays.origins[3 * i + k] + seen.median[i] * rays.directions[3 * i + k]
+    for (std::size_t k = 0; k < 3; ++k) {
+      int const axis = static_cast<int>(k);
+      out << file.origin[axis] +
+                 (rays.frame[axis] + rays.origins[3 * i + k] + seen.median[i] * rays.directions[3 * i + k])
           << ' ';
+    }
     for (std::size_t c = 0; c < 3; ++c)
       out << static_cast<int>(255 * std::clamp(seen.color[3 * i + c], 0.0f, 1.0f)) << (c < 2 ? ' ' : '\n');
   }

@@ -75,6 +75,11 @@ TEST_CASE("survey coordinates train as those near zero, in all formats") {
   CHECK(has(run("convert run_far/model.ply m.splat"), "left out: origin 500000,4000000,100"));
   run("convert m.splat told.ply --origin 500000,4000000,100");
   CHECK(std::abs(eval("told.ply") - eval("m.splat")) > 1);
+  auto const twice = here.gart("convert told.ply twice.ply --origin 1,2,3");
+  CHECK(twice.code == 2);
+  CHECK_MESSAGE(has(twice.err, "--origin 1,2,3: told.ply says that it is from the origin 500000,4000000,100"),
+                twice.err);
+  CHECK_FALSE(fs::exists(here / "twice.ply"));
   run("convert world.ply back.ply");
   CHECK(gart::read_splat_ply(here / "back.ply").mean.size() ==
         gart::read_splat_ply(here / "run_far/model.ply").mean.size());
@@ -103,4 +108,16 @@ TEST_CASE("survey coordinates train as those near zero, in all formats") {
   auto const other = here.gart("train --resume --out run_far --iterations 420 --quiet");
   CHECK(other.code == 1);
   CHECK(has(other.err, "the state is from the origin 0,0,0, the capture from 500000,4000000,100"));
+
+  // The run says its origin. One of an earlier gart says none, and is from zero, as that checkpoint is.
+  auto config = here.json("run_far/config.json");
+  CHECK(config["origin"] == nlohmann::json({5e5, 4e6, 100.0}));
+  config["origin"] = {1, 2};
+  gart::write_file(here / "run_far/config.json", config.dump());
+  auto const wrong = here.gart("train --resume --out run_far --iterations 420 --quiet");
+  CHECK(wrong.code == 1);
+  CHECK_MESSAGE(has(wrong.err, "config.json: 'origin' is not a list of 3 numbers"), wrong.err);
+  config.erase("origin"), config.erase("checksums");
+  gart::write_file(here / "run_far/config.json", config.dump());
+  run("train --resume --out run_far --iterations 420 --quiet");
 }

@@ -68,6 +68,13 @@ TEST_CASE("hello names the mode error only where there are photographs") {
   CHECK(gart::hello_text(scene, false).find(R"("right":"view")") != std::string::npos);
 }
 
+TEST_CASE("hello has every digit of the origin") {
+  gart::view_scene scene = gart::scene_of("row", row_of(5), 2);
+  CHECK(gart::hello_text(scene, false).find(R"("origin":[0.0,0.0,0.0])") != std::string::npos);
+  scene.origin = {500000.125, 4000000.0625, -100};
+  CHECK(gart::hello_text(scene, false).find(R"("origin":[500000.125,4000000.0625,-100.0])") != std::string::npos);
+}
+
 TEST_CASE("each mode shows what it is of") {
   gart::camera const view = gart_test::camera_at({0, 0, 0}, 0, 4, 3);
   gart::rendered r{gart::image_float(4, 3, 3, 0.25f), gart::image_float(4, 3, 1, 0.25f),

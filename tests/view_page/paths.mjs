@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import path from 'node:path';
-import {openPage} from './browser.mjs';
+import {openPage, psnr} from './browser.mjs';
 import {apart, isRotation, placeOf} from './geometry.mjs';
 
 const read = async (download) => JSON.parse(fs.readFileSync(await download.path(), 'utf8'));
@@ -72,6 +72,38 @@ export const paths = {
     }
     assert.equal(await p.page.locator('#keys li').count(), 3, 'a bad file changes nothing');
     await p.close();
+  },
+
+  async 'keyframes of a model from an origin are the capture\'s own'({browser, gart, work}) {
+    const origin = [500000, 4000000, 100];
+    await gart.run('convert', 'run/model.ply', 'far.ply', '--origin', origin.join(), '--quiet');
+    const server = await gart.serve('view', 'far.ply', '--backend', 'openmp');
+    const p = await openPage(browser, server.control, {viewport: {width: 800, height: 420}});
+    await p.tab('path');
+    const {camera} = (await p.rest()).view;
+    assert.equal(camera.origin, undefined, 'gart is told of places from the origin');
+    await p.page.click('#add-key');
+    const [saved] = await read(await p.saved(() => p.page.click('#save-keys')));
+    assert.deepEqual(saved.origin, origin);
+    assert.ok(apart(placeOf(saved), placeOf(camera)) < 1e-9);
+    // As poses.json has it: the whole place in the pose.
+    const {origin: _, ...whole} = {...saved, c2w: saved.c2w.map((row, i) => (i < 3 ? [...row.slice(0, 3), row[3] + origin[i]] : row))};
+    for (const [i, one] of [saved, whole].entries()) {
+      await p.drag([200, 200], [60, 0]);
+      await p.page.setInputFiles('#load-keys', {name: `own${i}.json`, mimeType: 'application/json', buffer: Buffer.from(JSON.stringify([one]))});
+      await p.until('the keyframe', async () => (await p.page.textContent('#say')).includes(`1 keyframes from own${i}.json`));
+      await p.page.click('#keys li:first-child .wide');
+      await p.until('its place', () => apart(placeOf(p.last().camera), placeOf(camera)) < 1e-6);
+    }
+    await p.close();
+    for (const [model, out, one] of [['far.ply', 'far', saved], ['run/model.ply', 'near', camera]]) {
+      fs.writeFileSync(path.join(work, 'keys.json'), JSON.stringify([{...one, name: 'key'}]));
+      await gart.run('render', model, 'keys.json', '--out', out, '--background', 'black', '--backend', 'openmp', '--quiet');
+    }
+    const [far, near] = ['far', 'near'].map((out) => fs.readFileSync(path.join(work, out, 'key.png'))), alike = await psnr(browser, far, near);
+    assert.ok(alike > 50, `${alike} dB`);
+    server.child.kill('SIGINT');
+    await server.ended;
   },
 
   async 'a video of the path is recorded'({browser, server}) {

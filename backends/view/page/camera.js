@@ -2,6 +2,7 @@
 
 import {kindOf} from './lens.js';
 import {toRows, fromRows} from './pose.js';
+import {sub} from './vector.js';
 
 export const largestSide = 4096;
 
@@ -63,8 +64,11 @@ export function lensLike(camera, stage) {
 
 export const poseOf = (camera) => fromRows(camera.c2w);
 
-// The cameras of a file; an Error that names the camera and the field where it is none.
-export function readCameras(text) {
+// What a file has of cameras that are from the scene's origin.
+export const fromOrigin = (cameras, origin) => (origin.some((x) => x !== 0) ? cameras.map((camera) => ({...camera, origin})) : cameras);
+
+// The cameras of a file, from the scene's origin; an Error that names the camera and the field where it is none.
+export function readCameras(text, origin) {
   let list;
   try {
     list = JSON.parse(text);
@@ -72,6 +76,7 @@ export function readCameras(text) {
     throw new Error(`The file is not JSON: ${fault.message}`);
   }
   if (!Array.isArray(list) || list.length === 0) throw new Error('The file holds no list of cameras.');
+  const poses = ['c2w', 'c2w_end'];
   const numbers = (values, n) => Array.isArray(values) && values.length === n && values.every(Number.isFinite);
   list.forEach((camera, i) => {
     const fail = (what) => {
@@ -80,11 +85,20 @@ export function readCameras(text) {
     if (typeof camera !== 'object' || camera === null) fail('is not an object');
     for (const key of ['width', 'height'])
       if (!Number.isInteger(camera[key]) || camera[key] < 1) fail(`${key} is no whole number above 0`);
-    const rows = camera.c2w;
-    if (!Array.isArray(rows) || rows.length < 3 || !rows.slice(0, 3).every((row) => numbers(row, 4)))
-      fail('c2w is not rows of 4 numbers');
+    for (const key of poses) {
+      const rows = camera[key];
+      if (key !== 'c2w' && rows === undefined) continue;
+      if (!Array.isArray(rows) || rows.length < 3 || !rows.slice(0, 3).every((row) => numbers(row, 4)))
+        fail(`${key} is not rows of 4 numbers`);
+    }
+    if (camera.origin !== undefined && !numbers(camera.origin, 3)) fail('origin is not a list of 3 numbers');
     const needed = camera.camera_model === 'EQUIRECTANGULAR' ? [] : ['fx', 'fy', 'cx', 'cy'];
     for (const key of needed) if (!Number.isFinite(camera[key])) fail(`${key} is no number`);
   });
-  return list;
+  return list.map(({origin: own = [0, 0, 0], ...camera}) => {
+    const shift = sub(own, origin);  // by origins first: what is alike in both then leaves no rounding
+    const moved = (rows) => rows.map((row, i) => (i < 3 ? [...row.slice(0, 3), row[3] + shift[i]] : row));
+    for (const key of poses) if (camera[key]) camera[key] = moved(camera[key]);
+    return camera;
+  });
 }

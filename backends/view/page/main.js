@@ -7,7 +7,7 @@ import {frameShower, rateMeter} from './frames.js';
 import {penFor} from './overlay.js';
 import {drawFrusta, frustaOf, pointedAt} from './frusta.js';
 import {listenTo} from './gestures.js';
-import {poseOf} from './camera.js';
+import {fromOrigin, poseOf} from './camera.js';
 import {styles} from './navigation.js';
 import {modes, showLegend} from './legend.js';
 import {lensPanel} from './lenspanel.js';
@@ -101,6 +101,7 @@ function welcome(message) {
   begin(kept(modelKey()));
   if (hello.training && !narrow()) panel.choose('training');
 }
+const origin = () => hello?.model.origin ?? [0, 0, 0];
 const modelKey = () => `${hello.open} ${hello.model.name}`;
 
 // A model that is new to the page, or that it was on before it was loaded again.
@@ -286,7 +287,7 @@ const models = modelList({part: $('open-model'), list: $('models')}, (index, nam
 });
 $('reset').addEventListener('click', () => (path.stop(), view.home(), lens.write(), aloud('Home')));
 $('level').addEventListener('click', () => view.level());
-$('save-pose').addEventListener('click', () => saveFile('camera.json', [view.camera()]));
+$('save-pose').addEventListener('click', () => saveFile('camera.json', fromOrigin([view.camera()], origin())));
 $('help-button').addEventListener('click', () => $('help').showModal());
 $('show-frusta').addEventListener('change', draw);
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => (training.draw(), draw()));
@@ -327,6 +328,7 @@ const path = keyframes({
   rest: () => view.changed(),
   ask: async (all, frames, closed, times) => (await ask({type: 'path', keyframes: all, frames, closed, times}, 120)).cameras,
   say,
+  origin,
 });
 recorder($('record'), frame, {play: path.play, whole: atRest}, say);
 

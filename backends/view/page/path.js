@@ -1,6 +1,6 @@
 // Keyframes, the smooth path that gart lays through them, its replay, and camera JSON in and out.
 
-import {poseOf, readCameras} from './camera.js';
+import {fromOrigin, poseOf, readCameras} from './camera.js';
 import {saveFile} from './files.js';
 import {keyRows} from './keylist.js';
 import {drawPath} from './pathline.js';
@@ -10,7 +10,7 @@ const lineSteps = 24;      // pieces of the drawn line between two keyframes
 const drawnAfter = 200;    // milliseconds without a change
 
 // page: camera() the camera now, resized(camera) for the stage, show(camera) one of the path, rest() when it ends,
-// ask(keyframes, frames, closed, times) -> a promise of the path's cameras, redraw(), say(text).
+// ask(keyframes, frames, closed, times) -> a promise of the path's cameras, redraw(), say(text), origin() of the scene.
 export function keyframes(ui, page) {
   let keys = [], path = null, playing = null, line = [], drawing = 0, asked = Promise.resolve();
 
@@ -140,13 +140,13 @@ export function keyframes(ui, page) {
     if (ui.timed.checked) spread();
     changed();
   });
-  ui.savePath.addEventListener('click', orSay(async () => saveFile('path.json', await whole())));
+  ui.savePath.addEventListener('click', orSay(async () => saveFile('path.json', fromOrigin(await whole(), page.origin()))));
   ui.saveKeys.addEventListener('click', () =>
-    saveFile('keyframes.json', sameSize().map((camera, i) => (ui.timed.checked ? {...camera, time: keys[i].time} : camera))));
+    saveFile('keyframes.json', fromOrigin(sameSize(), page.origin()).map((camera, i) => (ui.timed.checked ? {...camera, time: keys[i].time} : camera))));
   ui.load.addEventListener('change', orSay(async () => {
     const [file] = ui.load.files;
     if (!file) return;
-    const read = readCameras(await file.text());
+    const read = readCameras(await file.text(), page.origin());
     read.forEach(poseOf);
     const timed = read.every(({time}, i) => Number.isFinite(time) && (i === 0 || time > read[i - 1].time));
     keys = read.map(({time, ...camera}) => ({camera, time: timed ? time : 0}));

@@ -84,6 +84,7 @@ struct view_scene {
   int kernel_degree = 2;             ///< of their response
   view_box bounds;                   ///< from the 1st to the 99th hundredth of the means, along each axis
   vec3 up{0.0f, -1.0f, 0.0f};        ///< away from the ground
+  vec3d origin{0.0};                 ///< of all coordinates (io/origin.hpp)
   std::vector<view_camera> cameras;  ///< of the capture
   std::vector<std::string> models;   ///< what else may be opened, and this one; for clients with the right of control
   int model = 0;                     ///< which of them this is
