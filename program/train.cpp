@@ -37,7 +37,10 @@ void add_train(CLI::App& app, command& selected) {
       "  gart train --resume --out run");
   train->callback([a, train, &selected] {
     fill_in(*train, *a);
-    selected = [a] { return training_run(*a).run(); };
+    selected = [a] {
+      train_options_of(*a);  // says what is wrong with a setting before anything is read
+      return training_run(*a).run();
+    };
   });
 }
 

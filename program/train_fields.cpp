@@ -40,9 +40,13 @@ namespace {
 // Names that runs of before have in their config.json.
 constexpr std::pair<std::string_view, std::string_view> renamed[] = {
     // old, new
-    {"error.split.share", "error.split.offset"},        {"error.least_budget", "error.min_gaussians"},
-    {"error.pixels_each", "error.pixels_per_gaussian"}, {"error.fill", "error.growth_end"},
-    {"rates.settle_late", "rates.decay_start_short"},   {"rates.settled", "rates.final_scale"}};
+    {"error.split.share", "error.split.offset"},
+    {"error.least_budget", "error.min_gaussians"},
+    {"error.pixels_each", "error.pixels_per_gaussian"},
+    {"error.fill", "error.growth_end"},
+    {"antialias", "render.antialias"},
+    {"rates.settle_late", "rates.decay_start_short"},
+    {"rates.settled", "rates.final_scale"}};
 
 }  // namespace
 
@@ -78,10 +82,10 @@ void set_fields(gart::train_options& o, std::string const& settings) {
     char* end = nullptr;
     double const number = std::strtod(value.c_str(), &end);
     if (value.empty() || *end != '\0' || !std::isfinite(number))
-      throw usage_error("--set " + one + ": a finite number belongs after " + name + "=");
+      throw usage_error("--set " + one + ": a finite number belongs after " + name + "= (see gart train --help-all)");
     if (number < field->low || number > field->high)
       throw usage_error("--set " + one + ": a number from " + gart::short_number(field->low) + " to " +
-                        gart::short_number(field->high) + " belongs after " + name + "=");
+                        gart::short_number(field->high) + " belongs after " + name + "= (see gart train --help-all)");
     field->set(o, number);
   }
 }

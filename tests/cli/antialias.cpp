@@ -41,7 +41,7 @@ TEST_CASE("an antialiased model says so in its file, and every command shows it 
   CHECK(text == text_of(here / "whole/model.ply"));
   CHECK_FALSE(has(text_of(here / "plain/model.ply"), "antialias"));
   CHECK_FALSE(has(text_of(here / "plain/model.ply"), "SplatRenderMode"));
-  REQUIRE(here.gart("train capture --out narrow --iterations 5 --set antialias=0.25" + small).code == 0);
+  REQUIRE(here.gart("train capture --out narrow --iterations 5 --set render.antialias=0.25" + small).code == 0);
   CHECK(has(text_of(here / "narrow/model.ply"), "comment gart antialias 0.25\n"));
   CHECK(here.json("narrow/metrics.json")["approximations"]["antialias"] == 0.25);
   std::string const own = "comment gart antialias 0.300000012\n", mark = "comment SplatRenderMode: mip\n";

@@ -28,11 +28,12 @@ CUDA = ["-std=c++20", "--expt-relaxed-constexpr", "-diag-suppress=20012", "-arch
         "-x", "cu"]
 
 
-# Members that are not named have initialisers of their own, or -Wextra warns in every program that does this.
+# Members that are not named have initialisers of their own, or -Wextra warns in every program that does this. Those of
+# render_options, which has a base, are assigned.
 OPTIONS = """#include <gart/gart.hpp>
 gart::dataset_options const loading{.downscale = 4};
 gart::train_options const training{.iterations = 2000};
-gart::render_options const rendering{.near = 0.1f};
+gart::approximation_options const approximations{.alpha_min = 0.01f};
 gart::configuration_request const request{.backend = gart::backend_kind::openmp};
 """
 
