@@ -7,6 +7,7 @@
 #include "progress.hpp"
 
 #include <gart/io/dataset.hpp>
+#include <gart/io/extent.hpp>
 #include <gart/runtime/model_file.hpp>
 
 #include <algorithm>
@@ -28,13 +29,12 @@ struct mesh_arguments {
   bool quiet = false;
 };
 
-// 1.1 times the largest distance of a camera from their mean, as of captures.
+// As of captures.
 double extent_of(std::vector<gart::named_camera> const& cameras) {
-  gart::vec3d mean(0.0);
-  for (auto const& c : cameras) mean += c.view.position / static_cast<double>(cameras.size());
-  double most = 0;
-  for (auto const& c : cameras) most = std::max(most, glm::length(c.view.position - mean));
-  return most > 0 ? 1.1 * most : 1;
+  std::vector<gart::vec3d> positions;
+  for (auto const& c : cameras) positions.push_back(c.view.position);
+  double const extent = gart::camera_extent(positions);
+  return extent > 0 ? extent : 1;
 }
 
 // The width of a pixel where rays of the view meet the scene, in the middle of all.

@@ -8,6 +8,7 @@
 
 #include <gart/core/error.hpp>
 #include <gart/io/dataset.hpp>
+#include <gart/io/extent.hpp>
 #include <gart/io/file.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/origin.hpp>
@@ -144,14 +145,10 @@ void drop_frames_without_photo(capture& c, bool load_images) {
   }
 }
 
-double length(vec3d const& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
-
 void measure_extent(dataset& data) {
-  vec3d mean(0.0);
-  for (dataset_view const& v : data.train) mean += v.view.position / static_cast<double>(data.train.size());
-  double radius = 0;
-  for (dataset_view const& v : data.train) radius = std::max(radius, length(v.view.position - mean));
-  float const extent = static_cast<float>(1.1 * radius);
+  std::vector<vec3d> positions;
+  for (dataset_view const& v : data.train) positions.push_back(v.view.position);
+  float const extent = static_cast<float>(camera_extent(positions));
   if (extent > 0 && std::isfinite(extent)) {
     data.extent = extent;
   } else {
@@ -357,6 +354,14 @@ dataset load(fs::path const& path, dataset_options const& options) {
 
 }  // namespace
 }  // namespace io
+
+double camera_extent(std::vector<vec3d> const& positions) {
+  vec3d mean(0.0);
+  for (vec3d const& p : positions) mean += p / static_cast<double>(positions.size());
+  double radius = 0;
+  for (vec3d const& p : positions) radius = std::max(radius, glm::length(p - mean));
+  return 1.1 * radius;
+}
 
 camera downscaled(camera const& c, int factor, std::string const& where) {
   int const width = c.width / factor, height = c.height / factor;

@@ -1,6 +1,8 @@
 // Captures.
 #include "bindings.hpp"
 
+#include <gart/io/extent.hpp>
+
 #include <algorithm>
 
 namespace gart_python {
@@ -25,13 +27,12 @@ py::object shown_image(gart::basic_image<T> const& image, py::handle owner) {
   return shown_array(std::move(shape), image.data.data(), owner);
 }
 
-// 1.1 times the largest distance of a camera from their mean, as of a capture that is read.
+// As of a capture that is read.
 float extent_of(std::vector<gart::dataset_view> const& views) {
-  gart::vec3d mean(0.0);
-  for (auto const& v : views) mean += v.view.position / static_cast<double>(views.size());
-  double radius = 0;
-  for (auto const& v : views) radius = std::max(radius, glm::distance(v.view.position, mean));
-  return radius > 0 ? static_cast<float>(1.1 * radius) : 1.0f;
+  std::vector<gart::vec3d> positions;
+  for (auto const& v : views) positions.push_back(v.view.position);
+  double const extent = gart::camera_extent(positions);
+  return extent > 0 ? static_cast<float>(extent) : 1.0f;
 }
 
 gart::dataset dataset_of(std::vector<gart::dataset_view> train, std::vector<gart::dataset_view> test,

@@ -31,11 +31,6 @@ struct kept_batch {
   u64 count = 0;                ///< places, with those that hold no hit
   int ray_bits = 0;             ///< of a key
   bool sorted = false;          ///< keys are in order, and places with them
-
-  /// Bytes that it holds.
-  std::size_t bytes() const {
-    return keys.capacity() * 8 + entries.capacity() * sizeof(lt_entry) + depths.capacity() * 4 + places.capacity() * 4;
-  }
 };
 
 namespace ray_kernels {
