@@ -1,4 +1,4 @@
-# cmake -DFOLDER=... -DOUTPUT=page.cpp -P GartEmbed.cmake: the files of a folder as a C++ table that backends/view/page.hpp
+# cmake -DFOLDER=... -DOUTPUT=page.cpp -P GartEmbed.cmake: the files of a folder as a C++ table that src/view/page.hpp
 # declares.
 file(GLOB files RELATIVE ${FOLDER} ${FOLDER}/*.html ${FOLDER}/*.js ${FOLDER}/*.css ${FOLDER}/*.svg)
 list(SORT files)
@@ -13,7 +13,7 @@ foreach(name IN LISTS files)
   string(APPEND table "    {\"${name}\", file_${number}, sizeof file_${number} - 1},\n")
   math(EXPR number "${number} + 1")
 endforeach()
-file(WRITE ${OUTPUT}.new "// Made from backends/view/page by cmake/GartEmbed.cmake.
+file(WRITE ${OUTPUT}.new "// Made from src/view/page by cmake/GartEmbed.cmake.
 #include \"page.hpp\"
 
 namespace {

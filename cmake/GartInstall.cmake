@@ -92,7 +92,7 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/gartConfig.cmake.in ${
                               INSTALL_DESTINATION ${_package_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/gartConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/gartConfig.cmake ${PROJECT_BINARY_DIR}/gartConfigVersion.cmake
-              ${PROJECT_SOURCE_DIR}/backends/io/FindTurboJPEG.cmake ${PROJECT_SOURCE_DIR}/backends/io/FindZSTD.cmake
-              ${PROJECT_SOURCE_DIR}/backends/io/FindWebP.cmake
+              ${PROJECT_SOURCE_DIR}/src/io/FindTurboJPEG.cmake ${PROJECT_SOURCE_DIR}/src/io/FindZSTD.cmake
+              ${PROJECT_SOURCE_DIR}/src/io/FindWebP.cmake
               ${PROJECT_SOURCE_DIR}/backends/distributed/FindNCCL.cmake
         DESTINATION ${_package_dir})

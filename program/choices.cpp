@@ -1,7 +1,7 @@
 #include "choices.hpp"
 
 #include "progress.hpp"
-#include "train_fields.hpp"
+#include "train/train_fields.hpp"
 
 #include <gart/runtime/validation.hpp>
 #include <gart/train/densify/error_growth.hpp>

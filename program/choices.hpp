@@ -2,7 +2,7 @@
 // What the program settles for a capture where the command line leaves it open, each with its reason: said at the start
 // of a run and kept under "chosen" in config.json, metrics.json and report.html.
 
-#include "train_arguments.hpp"
+#include "train/train_arguments.hpp"
 
 #include <gart/runtime/choose.hpp>
 

@@ -1,6 +1,6 @@
 #include "field_names.hpp"
 
-#include "train_fields.hpp"
+#include "train/train_fields.hpp"
 
 #include <gart/io/dataset.hpp>
 #include <gart/render/options.hpp>

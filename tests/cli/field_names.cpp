@@ -3,7 +3,7 @@
 #include "program.hpp"
 
 #include <field_names.hpp>
-#include <train_fields.hpp>
+#include <train/train_fields.hpp>
 
 #include <support/policies.hpp>
 

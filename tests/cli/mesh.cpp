@@ -7,9 +7,9 @@
 
 #include <doctest/doctest.h>
 
-#include "mesh_distance.hpp"
-#include "mesh_fusion.hpp"
-#include "mesh_parts.hpp"
+#include "mesh/mesh_distance.hpp"
+#include "mesh/mesh_fusion.hpp"
+#include "mesh/mesh_parts.hpp"
 
 #include <cmath>
 #include <numbers>

@@ -4,7 +4,7 @@
 
 #include <support/policies.hpp>
 
-#include <train_arguments.hpp>
+#include <train/train_arguments.hpp>
 
 #include <random>
 

@@ -19,8 +19,8 @@ RESULT = re.compile(r"`([a-z0-9_]+\.json)`")
 FILES = {"cameras.json", "config.json", "exposures.json", "history.json", "keyframes.json", "metrics.json", "poses.json",
          "poses_test.json", "transforms.json", "transforms_test.json", "transforms_train.json"}
 # Where the paths of a page may begin.
-ROOTS = ("", "include/gart", "backends", "tests", "program", "bench")
-SOURCES = ("backends", "bench", "cmake", "examples", "include", "program", "scripts", "tests")
+ROOTS = ("", "include/gart", "src", "backends", "tests", "program", "bench")
+SOURCES = ("backends", "bench", "cmake", "examples", "include", "program", "scripts", "src", "tests")
 SUFFIXES = {".hpp", ".cuh", ".cpp", ".cu", ".py", ".js", ".cmake", ".sh", ".txt"}
 
 

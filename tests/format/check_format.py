@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import sys
 
-FOLDERS = ("include", "backends", "program", "examples", "tests", "bench")
+FOLDERS = ("include", "src", "backends", "program", "examples", "tests", "bench")
 SUFFIXES = {".hpp", ".cuh", ".cpp", ".cu", ".h"}
 VERSION = 14
 

@@ -2,8 +2,8 @@
 
 #include "fuzz/support.hpp"
 
-#include <history.hpp>
-#include <train_arguments.hpp>
+#include <report/history.hpp>
+#include <train/train_arguments.hpp>
 
 #include <gart/io/dataset.hpp>
 

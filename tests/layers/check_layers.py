@@ -1,4 +1,4 @@
-"""Holds the includes of include/gart and backends to cmake/layers.txt, and first shows that it would see a violation.
+"""Holds the includes of include/gart, src and backends to cmake/layers.txt, and first shows that it would see a violation.
 
 What it asks for: every folder has a line in layers.txt; a header includes only folders its line names; nothing in
 include/gart includes a backend; GLM is included in math/glm.hpp alone; x.hpp, which must be safe for any host compiler,
@@ -62,12 +62,15 @@ def violations(root, layers, interface):
              for name in sorted(interface) if not opens_gart(root / "include" / "gart" / name)]
     headers = root / "include" / "gart"
     fields = fields_of("".join((root / t).read_text() for t in (FIELD_TABLE, TRAIN_TABLE) if (root / t).exists()))
-    for path in sorted([*headers.rglob("*"), *(root / "backends").rglob("*")]):
+    for path in sorted([*headers.rglob("*"), *(root / "src").rglob("*"), *(root / "backends").rglob("*")]):
         if path.suffix not in SUFFIXES:
             continue
         inside = path.is_relative_to(headers)
         relative = path.relative_to(headers) if inside else path.relative_to(root)
-        folder = "gart" if inside and len(relative.parts) == 1 else relative.parts[0]
+        if inside and len(relative.parts) == 1:
+            folder = "gart"
+        else:  # src/NAME is the body of include/gart/NAME, and is held to its line
+            folder = relative.parts[1 if relative.parts[0] == "src" else 0]
         if folder not in layers:
             found.append(f"{path}: folder {folder} has no line in cmake/layers.txt")
             continue
@@ -84,7 +87,7 @@ def violations(root, layers, interface):
                 found.append(f"{where}: includes {name}; include gart/math/glm.hpp")
             if inside and path.suffix == ".hpp" and name.endswith(".cuh"):
                 found.append(f"{where}: a .hpp is for any host compiler and may not include {name}")
-            if inside and (name.startswith(("backends/", "..")) or '"' in line):
+            if inside and (name.startswith(("backends/", "src/", "..")) or '"' in line):
                 found.append(f"{where}: include/gart includes with <gart/...>, and no backend")
             if not name.startswith("gart/"):
                 continue
@@ -107,6 +110,7 @@ def self_check(layers):
         "include/gart/exec/f.cuh": "#include <gart/core/nowhere.hpp>\n",
         "include/gart/attic/g.hpp": "\n",
         "backends/cpu/d.hpp": "#include <gart/train/b.hpp>\n",
+        "src/math/m.cpp": "#include <gart/train/b.hpp>\n",
         "include/gart/math/h.hpp": "namespace gart { inline namespace GART_ISA { namespace detail {}}}\n",
         "include/gart/math/i.hpp": "namespace gart::detail {}\n",
         "include/gart/math/j.hpp": "namespace gart {}\n",
@@ -115,14 +119,14 @@ def self_check(layers):
         FIELD_TABLE: '{GART_CLI_FIELD(train_options, points), "--points"},\n',
     }
     expected = {"core/a.hpp:1", "train/b.hpp:2", "math/c.hpp:1", "exec/e.hpp:1", "exec/f.cuh:1", "attic/g.hpp",
-                "math/h.hpp", "math/i.hpp", "math/k.hpp:1", "math/k.hpp:2", "math/l.hpp:1"}
+                "math/h.hpp", "math/i.hpp", "math/k.hpp:1", "math/k.hpp:2", "math/l.hpp:1", "math/m.cpp:1"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for name, text in wrong.items():
             (root / name).parent.mkdir(parents=True, exist_ok=True)
             (root / name).write_text(text)
         found = violations(root, layers, {"math/h.hpp", "math/j.hpp"})
-        seen = {v.removeprefix(f"{root}/include/gart/").split(": ")[0] for v in found}
+        seen = {v.removeprefix(f"{root}/include/gart/").removeprefix(f"{root}/src/").split(": ")[0] for v in found}
     if seen != expected:
         sys.exit(f"the check itself is broken: of a tree with violations at {sorted(expected)} it saw {sorted(seen)}")
 

@@ -14,9 +14,9 @@
 #include <string>
 
 #include "support/policies.hpp"
-#include "synth_capture.hpp"
-#include "synth_random.hpp"
-#include "synth_trace.hpp"
+#include "synth/synth_capture.hpp"
+#include "synth/synth_random.hpp"
+#include "synth/synth_trace.hpp"
 
 #include <unistd.h>
 

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import {openPage} from './browser.mjs';
 
-const source = new URL('../../backends/view/page/', import.meta.url);
+const source = new URL('../../src/view/page/', import.meta.url);
 
 export const people = {
   async 'the page is at most 150 KB, names no outside address and has no inline script or style'() {

@@ -3,7 +3,7 @@
 if(NOT TARGET gart_synth)
   add_library(gart_synth STATIC ${CMAKE_CURRENT_LIST_DIR}/synth_capture.cpp ${CMAKE_CURRENT_LIST_DIR}/synth_scene.cpp
                                 ${CMAKE_CURRENT_LIST_DIR}/synth_trace.cpp)
-  target_include_directories(gart_synth PUBLIC ${CMAKE_CURRENT_LIST_DIR})
+  target_include_directories(gart_synth PUBLIC ${CMAKE_CURRENT_LIST_DIR}/..)
   find_package(Threads REQUIRED)
   target_link_libraries(gart_synth PUBLIC gart::gart gart::io Threads::Threads PRIVATE gart_private_flags)
   if(NOT GART_EMBREE STREQUAL "OFF")

@@ -2,7 +2,7 @@
 #include "image_writer.hpp"
 #include "output.hpp"
 #include "process_memory.hpp"
-#include "report.hpp"
+#include "report/report.hpp"
 #include "training_run.hpp"
 
 #include <gart/io/camera_file.hpp>

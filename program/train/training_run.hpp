@@ -1,10 +1,10 @@
 #pragma once
 // A run of `gart train`: from the command line to the results in its folder.
 
-#include "history.hpp"
 #include "interrupt.hpp"
 #include "progress.hpp"
 #include "ranks.hpp"
+#include "report/history.hpp"
 #include "run_folder.hpp"
 #include "scores.hpp"
 #include "train_arguments.hpp"

@@ -1,9 +1,9 @@
 #include "tradeoff_page.hpp"
 
 #include "progress.hpp"
-#include "report_style.hpp"
-#include "svg_chart.hpp"
-#include "svg_scatter.hpp"
+#include "report/report_style.hpp"
+#include "report/svg_chart.hpp"
+#include "report/svg_scatter.hpp"
 
 #include <gart/core/version.hpp>
 

@@ -1,5 +1,5 @@
 #pragma once
-// The page's files, compiled in from backends/view/page by cmake/GartEmbed.cmake.
+// The page's files, compiled in from src/view/page by cmake/GartEmbed.cmake.
 
 #include <gart/core/types.hpp>
 
