@@ -143,7 +143,7 @@ std::vector<candidate> usual_candidates(capture_traits const& traits, train_opti
   std::vector<candidate> all;
   all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }});
   if (!traits.panoramas) all.push_back({"vignetting", "on", [](train_options& o) { o.vignetting = true; }});
-  all.push_back({"rates.sh_rest", "0.0025", [](train_options& o) { o.rates.sh_rest = 0.0025f; }});
+  all.push_back({"rates.sh_rest", "0.000125", [](train_options& o) { o.rates.sh_rest = 0.000125f; }});
   error_growth_options more = options.error;
   more.pixels_per_gaussian = 100;
   index_t const most = options.max_gaussians;

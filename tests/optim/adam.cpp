@@ -86,6 +86,35 @@ TEST_CASE_TEMPLATE("Adam follows the textbook, with a rate per group", E, GART_T
   CHECK(worst < 2e-6);  // values up to 4, six roundings
 }
 
+TEST_CASE_TEMPLATE("bands above the first are pulled where they have a gradient", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed());
+  E exec;
+  index_t const n = 203;
+  int const degree = 2;
+  gaussian_model const start = gart_test::random_model(n, degree, random);
+  gaussian_model g = gart_test::random_model(n, degree, random);
+  index_t const width = 3 * sh_coefficients(degree);
+  for (std::size_t i = 0; i < g.sh.size(); ++i)
+    if (i / width % 3 == 0 || i % 5 == 0) g.sh[i] = 0;
+  gaussian_model pulled = g;
+  adam_options options;
+  options.sh_pull = 0.25f;
+  for (std::size_t i = 0; i < g.sh.size(); ++i)
+    if (i % width >= 3 && g.sh[i] != 0) pulled.sh[i] = std::fma(options.sh_pull, start.sh[i], g.sh[i]);
+  auto const moved = [&](gaussian_model const& slope, adam_options const& with) {
+    gaussians<E> model(exec, start);
+    optimizer_state<E> state(exec, n, degree);
+    adam_step(exec, model, gaussians<E>(exec, slope), state, learning_rates{}, 1, degree, {}, with);
+    return model.to_host();
+  };
+  gaussian_model const by_pull = moved(g, options), by_gradient = moved(pulled, {}), without = moved(g, {});
+  CHECK(by_pull.sh == by_gradient.sh);
+  CHECK(by_pull.sh != without.sh);
+  CHECK(by_pull.mean == without.mean);
+  CHECK(by_pull.opacity == without.opacity);
+}
+
 TEST_CASE_TEMPLATE("elements whose gradient is not finite stay, and are counted", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());

@@ -9,6 +9,11 @@
 /// With options.sparse a Gaussian whose mean has no gradient, one that no ray of the step met, keeps its parameters
 /// and moments: 12 bytes of it are read for each of five groups, and none written. Its moments wait until it is seen
 /// again instead of fading, and so do penalties on it.
+///
+/// options.sh_pull is the derivative of a penalty on the square of the bands of colour above the first: fast rates make
+/// them follow the noise of single views, which the pull takes out (L2 regularization). It joins the gradient here, where
+/// the coefficient is read anyway. A coefficient without a gradient is not pulled: what a view does not show, it does not
+/// fade, however many views there are.
 
 #include <gart/exec/concepts.hpp>
 #include <gart/math/arith.hpp>
@@ -94,6 +99,7 @@ struct adam_group {
   index_t active;  // of these, the first so many are trained
   index_t head;    // of these, the first so many have rate_head
   float rate_head, rate_rest;
+  float pull_rest;  // of the rest, times the parameter
 };
 
 struct adam_arguments {
@@ -139,10 +145,15 @@ struct adam_kernel : adam_arguments {
     return (mean[0] != 0) | (mean[1] != 0) | (mean[2] != 0);
   }
 
+  GART_HD static float pulled(float g, float parameter, float pull) {
+    return g != 0.0f ? fma(pull, parameter, g) : g;
+  }
+
   // One element; whether it was finite.
   GART_KERNEL bool move(adam_group const& group, index_t column, float g, adam_element<float>& e) const {
-    float const rate = column < group.head ? group.rate_head : group.rate_rest;
-    auto const to = rule.moved<float>(e, g, rate);
+    bool const head = column < group.head;
+    float const slope = pulled(g, e.parameter, head ? 0.0f : group.pull_rest);
+    auto const to = rule.moved<float>(e, slope, head ? group.rate_head : group.rate_rest);
     if (!is_finite(g) || !is_finite(to.second) || !is_finite(to.parameter)) {
       if (skipped) E::atomic_add(skipped, u64{1});
       return false;
@@ -201,10 +212,11 @@ struct adam_kernel : adam_arguments {
   // Elements a lane each, whatever their columns; where one is not finite, one by one.
   void update_elements(adam_group const& group, index_t row, index_t rows_here) const {
     constexpr index_t max_width = 48;  // of an array
-    float rates[max_width + lane_count], trained[max_width + lane_count];
+    float rates[max_width + lane_count], trained[max_width + lane_count], pulls[max_width + lane_count];
     for (index_t k = 0; k < group.stride + lane_count; ++k) {
       index_t const column = k % group.stride;
       rates[k] = column < group.head ? group.rate_head : group.rate_rest;
+      pulls[k] = column < group.head ? 0.0f : group.pull_rest;
       trained[k] = column < group.active ? 1.0f : 0.0f;
     }
     auto const read = [](float const* p) {
@@ -221,7 +233,8 @@ struct adam_kernel : adam_arguments {
       lane_mask const wanted = read(trained + column) > lanes(0.0f);
       lanes const g = read(group.gradient + i);
       adam_element<lanes> const from{read(group.parameter + i), read(group.first + i), read(group.second + i)};
-      auto const to = rule.moved(from, g, read(rates + column));
+      lanes const slope = select(magnitude(g) > lanes(0.0f), fma(read(pulls + column), from.parameter, g), g);
+      auto const to = rule.moved(from, slope, read(rates + column));
       lanes const infinity(__builtin_huge_valf());
       lane_mask const finite =
           (magnitude(g) < infinity) & (magnitude(to.second) < infinity) & (magnitude(to.parameter) < infinity);
@@ -278,7 +291,8 @@ class adam_pass {
                                                     a.width(degree),
                                                     detail::head_columns,
                                                     rate(rates.*head),
-                                                    rate(rates.*rest)};
+                                                    rate(rates.*rest),
+                                                    a.number == sh_array ? options.sh_pull : 0.0f};
         },
         p, gradient.view(), state.first.view(), state.second.view());
     with_.rows = p.count;

@@ -15,7 +15,7 @@ struct learning_rates {
   float quaternion = 1e-3f;    ///< of the raw quaternion
   float opacity = 2.5e-2f;     ///< of the logit
   float sh_dc = 2.5e-3f;       ///< of the first band
-  float sh_rest = 1.25e-4f;    ///< of the bands above the first: a twentieth, as in 3DGS
+  float sh_rest = 1e-3f;       ///< of the bands above the first: eight times 3DGS', with train_options::sh_penalty
   /// All rates but those of the means, exposures and lenses stay as they are for a share of the run, then decay
   /// exponentially to `final_scale` of it.
   float final_scale = 0.1f;                   ///< share of a rate that is left at the end
@@ -34,6 +34,8 @@ struct learning_rates {
 struct adam_options {
   static constexpr float beta1 = 0.9f, beta2 = 0.999f, epsilon = 1e-15f;  ///< as in adam.hpp
   bool sparse = false;  ///< Gaussians that the step's view did not show stay as they are (adam.hpp)
+  /// Added to the gradient of each coefficient above the first band that has one, times the coefficient.
+  float sh_pull = 0;
 };
 
 /// The opacity below which a Gaussian is of no use: `usual`, for the usual alpha_min of 1/255, and in proportion above.

@@ -265,9 +265,11 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(Plan& plan, lear
     plan.sum_arrived(g.gradients);
     progress_.hooks.before_optimizer(std::as_const(g.model).view(), g.gradients.view(), step - options_.batch);
   }
+  adam_options adam = options_.adam;
+  adam.sh_pull = options_.sh_penalty / static_cast<float>(std::max<u64>(g.total, 1));
   plan.move(exec_,
             adam_pass<E>(g.model, g.gradients, g.moments, rates, step, degree,
-                         finite_ ? finite_->skipped() : span<u64>{}, options_.adam, options_.batch),
+                         finite_ ? finite_->skipped() : span<u64>{}, adam, options_.batch),
             g.gradients);
   span<float const> filter;
   if (options_.render.antialias > 0 && densifier_->due(step)) {
