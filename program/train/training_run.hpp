@@ -6,7 +6,6 @@
 #include "ranks.hpp"
 #include "report/history.hpp"
 #include "run_folder.hpp"
-#include "scores.hpp"
 #include "train_arguments.hpp"
 #include "training_view.hpp"
 
