@@ -4,7 +4,8 @@
 ///   x y z nx ny nz f_dc_0..2 f_rest_0..(3K-4) opacity scale_0..2 rot_0..3
 /// f_rest channel-major, opacity a logit, scales logarithms, rot w,x,y,z and not normalised. Written in that order,
 /// byte for byte, read by name in any order, ascii or binary of either endianness, without normals and with extra
-/// properties. gart's own traits travel as header comments ("comment gart kernel_degree 2"). A model with the trait
+/// properties. Features (scene/features.hpp) are properties feature_0 to feature_(N-1) behind these, floats; where they
+/// are numbered from 0 without a gap they are read. gart's own traits travel as header comments ("comment gart kernel_degree 2"). A model with the trait
 /// antialias is also marked as other programs mark theirs, "comment SplatRenderMode: mip"; a file with that mark, or
 /// with "comment antialiased 1", and no trait of gart's own is read as one whose antialias has no value.
 ///

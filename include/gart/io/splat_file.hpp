@@ -44,6 +44,7 @@ struct splat_room {
   bool antialias = false;  ///< a mark for the trait antialias, without its width
   bool origin = false;     ///< the trait origin (io/origin.hpp)
   bool world = false;      ///< coordinates in double, for splat_packing.world
+  bool features = false;   ///< of each Gaussian (scene/features.hpp)
 };
 
 /// A format of files of Gaussians.

@@ -14,17 +14,19 @@ struct gradient_targets {
   gaussians_view<float> gaussians = {};
   float* pose = nullptr;           ///< [6]: dL/d the pose of a view, a pose_gradient's numbers in order
   ray_gradient_targets rays = {};  ///< dL/d the rays of a batch
+  channel_gradient_targets channels = {};  ///< dL/d features
 };
 
 /// Of one forward pass of a renderer, which it must not outlive. What it was given in memory of the policy must stay as
-/// it is until the last backward(): rays, and Gaussians that are bound.
+/// it is until the last backward(): rays, and Gaussians and features that are bound.
 class forward_context {
  public:
   /// Its memory goes back to the renderer.
   virtual ~forward_context() = default;
-  /// From dL/d what was shown; may be called again. Errors: invalid_argument where the renderer has another model by
-  /// now, for gradients of another size, for targets that a view or a batch has not, and for gradients by depth or
-  /// transmittance of a view where configuration_request.depth did not ask for them.
+  /// From dL/d what was shown; may be called again. Gradients by features, and those by depth and transmittance of a
+  /// view where configuration_request.depth did not ask for them, are of its hits, listed once: up to two traces more.
+  /// Errors: invalid_argument where the renderer has another model by now, for gradients of another size, and for
+  /// targets that a view or a batch has not.
   virtual void backward(output_gradients const& by, gradient_targets const& to) = 0;
 };
 
