@@ -72,14 +72,13 @@ gart::similarity similarity_named(std::string const& text) {
 // The Gaussians with keep(i), in their order.
 gart::gaussian_model kept(gart::gaussian_model const& model, auto const& keep) {
   gart::gaussian_model some;
-  some.sh_degree = model.sh_degree;
-  gart::for_each_array(
-      [&](gart::parameter_array const& a, auto& to, auto const& from) {
-        std::size_t const width = a.width(model.sh_degree);
+  some.sh_degree = model.sh_degree, some.feature_count = model.feature_count;
+  gart::for_each_row_array(
+      [&](std::size_t width, auto& to, auto const& from) {
         for (std::size_t i = 0; i < model.size(); ++i)
-          if (keep(i)) to.insert(to.end(), &from[i * width], &from[i * width] + width);
+          if (keep(i)) to.insert(to.end(), from.data() + i * width, from.data() + (i + 1) * width);
       },
-      some, model);
+      model, some, model);
   return some;
 }
 

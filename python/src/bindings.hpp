@@ -62,7 +62,9 @@ struct python_renderer {
   place where;
   gart::render_options usual;  // of the model that was set
   std::int64_t count = 0;      // of Gaussians
+  std::int64_t features = 0;   // of each
   std::vector<lent> bound;     // their arrays, where they are somebody else's
+  lent bound_features;         // the same
   std::mutex mutex;
 };
 
@@ -89,8 +91,8 @@ gart::gaussians_view<T> parameters_of(std::array<py::object, 5> const& given, st
   return out;
 }
 
-// Images of a view in memory of the policy: colour, transmittance, depth, hits, rgba; each may be None.
+// Images of a view in memory of the policy: colour, transmittance, depth, hits, rgba, features; each may be None.
 gart::render_targets targets_of(python_renderer const& r, gart::camera const& view, std::string const& call,
-                                std::array<py::object, 5> const& given, std::vector<lent>& kept);
+                                std::array<py::object, 6> const& given, std::vector<lent>& kept);
 
 }  // namespace gart_python

@@ -12,14 +12,15 @@ struct context {
   std::unique_ptr<gart::forward_context> it;
   std::vector<std::int64_t> shape;  // of what was shown: [H, W], or [R]
   std::vector<lent> rays;           // are read again
+  std::int64_t features = 0;        // of a Gaussian
   ~context() {
     std::lock_guard<std::mutex> const one(owner->mutex);
     it.reset();
   }
 };
 
-std::vector<std::int64_t> with_channels(std::vector<std::int64_t> shape) {
-  shape.push_back(3);
+std::vector<std::int64_t> with_channels(std::vector<std::int64_t> shape, std::int64_t channels = 3) {
+  shape.push_back(channels);
   return shape;
 }
 
@@ -29,12 +30,12 @@ gart::span<float const> span_of(lent const& given) {
 }
 
 std::unique_ptr<context> forward(shared_renderer const& r, gart::camera const& view, py::object const& options,
-                                 std::array<py::object, 5> const& targets, py::kwargs const& given) {
+                                 std::array<py::object, 6> const& targets, py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r->usual);
   std::vector<lent> kept;
   gart::render_targets const to = targets_of(*r, view, "Renderer.forward", targets, kept);
   auto out = std::make_unique<context>();
-  out->owner = r, out->shape = {view.height, view.width};
+  out->owner = r, out->shape = {view.height, view.width}, out->features = r->features;
   out->it = without_gil(r->mutex, [&] { return r->it->forward(view, o, to); });
   return out;
 }
@@ -55,31 +56,36 @@ gart::ray_batch rays_of(std::string const& call, py::object const& directions, p
 std::unique_ptr<context> forward_rays(shared_renderer const& r, py::object const& directions, py::object const& origins,
                                       py::object const& t_max, std::array<double, 3> const& frame,
                                       py::object const& color, py::object const& transmittance, py::object const& depth,
-                                      py::object const& options, py::kwargs const& given) {
+                                      py::object const& features, py::object const& options,
+                                      py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r->usual);
   auto out = std::make_unique<context>();
-  out->owner = r;
+  out->owner = r, out->features = r->features;
   gart::ray_batch const rays = rays_of("Renderer.forward_rays", directions, origins, t_max, frame, r->where, out->rays);
   out->shape = {rays.count()};
   std::int64_t const n = rays.count();
   lent const to[] = {
       lent::if_given<float>(color, {"Renderer.forward_rays: color", {n, 3}, true}, r->where),
       lent::if_given<float>(transmittance, {"Renderer.forward_rays: transmittance", {n}, true}, r->where),
-      lent::if_given<float>(depth, {"Renderer.forward_rays: depth", {n}, true}, r->where)};
+      lent::if_given<float>(depth, {"Renderer.forward_rays: depth", {n}, true}, r->where),
+      lent::if_given<float>(features, {"Renderer.forward_rays: features", {n, r->features}, true}, r->where)};
   gart::batch_targets targets;
   targets.color = to[0].data<float>(), targets.transmittance = to[1].data<float>(), targets.depth = to[2].data<float>();
+  targets.channels.features = to[3].data<float>();
   out->it = without_gil(r->mutex, [&] { return r->it->forward(rays, o, targets); });
   return out;
 }
 
 void backward(context& c, py::object const& color, py::object const& depth, py::object const& transmittance,
               std::array<py::object, 5> const& gaussians, py::object const& pose, py::object const& origins,
-              py::object const& directions) {
+              py::object const& directions, py::object const& by_features, py::object const& features, bool detached) {
   place const& where = c.owner->where;
   lent const by[] = {
       lent::if_given<float>(color, {"Context.backward: color_gradient", with_channels(c.shape)}, where),
       lent::if_given<float>(depth, {"Context.backward: depth_gradient", c.shape}, where),
-      lent::if_given<float>(transmittance, {"Context.backward: transmittance_gradient", c.shape}, where)};
+      lent::if_given<float>(transmittance, {"Context.backward: transmittance_gradient", c.shape}, where),
+      lent::if_given<float>(by_features, {"Context.backward: features_gradient", with_channels(c.shape, c.features)},
+                            where)};
   std::vector<lent> kept;
   gart::gradient_targets to;
   if (!gaussians[0].is_none())
@@ -88,20 +94,25 @@ void backward(context& c, py::object const& color, py::object const& depth, py::
   lent const more[] = {
       lent::if_given<float>(pose, {"Context.backward: pose", {gart::pose_gradient::floats}, true}, where),
       lent::if_given<float>(origins, {"Context.backward: origins", of_rays, true}, where),
-      lent::if_given<float>(directions, {"Context.backward: directions", of_rays, true}, where)};
+      lent::if_given<float>(directions, {"Context.backward: directions", of_rays, true}, where),
+      lent::if_given<float>(features, {"Context.backward: features", {c.owner->count, c.features}, true}, where)};
   to.pose = more[0].data<float>();
   to.rays = {more[1].data<float>(), more[2].data<float>()};
-  without_gil(c.owner->mutex, [&] { c.it->backward({span_of(by[0]), span_of(by[1]), span_of(by[2])}, to); });
+  if (auto* const data = more[3].data<float>())
+    to.channels.features = {data, static_cast<gart::index_t>(c.owner->count), static_cast<int>(c.features)};
+  gart::output_gradients const all{span_of(by[0]), span_of(by[1]), span_of(by[2]), {span_of(by[3]), detached}};
+  without_gil(c.owner->mutex, [&] { c.it->backward(all, to); });
 }
 
 py::dict trace(python_renderer& r, py::object const& directions, py::object const& origins, py::object const& t_max,
-               std::array<double, 3> const& frame, py::object const& options, py::kwargs const& given) {
+               std::array<double, 3> const& frame, py::object const& options, bool features, py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r.usual);
   std::vector<lent> kept;
   gart::ray_batch const rays = rays_of("Renderer.trace", directions, origins, t_max, frame, {}, kept);
-  gart::traced_rays seen = without_gil(r.mutex, [&] { return r.it->trace(rays, o); });
+  gart::traced_rays seen = without_gil(r.mutex, [&] { return r.it->trace(rays, o, features); });
   py::ssize_t const n = rays.count();
   py::dict out;
+  if (features && r.features > 0) out["features"] = owned_array({n, r.features}, std::move(seen.features));
   out["color"] = owned_array({n, 3}, std::move(seen.color));
   out["transmittance"] = owned_array({n}, std::move(seen.transmittance));
   out["depth"] = owned_array({n}, std::move(seen.depth)), out["median"] = owned_array({n}, std::move(seen.median));
@@ -140,21 +151,26 @@ another model by then it raises InvalidArgument.)")
           "backward",
           [](context& c, py::object const& color, py::object const& depth, py::object const& transmittance,
              py::object a, py::object b, py::object d, py::object e, py::object f, py::object const& pose,
-             py::object const& origins, py::object const& directions) {
-            backward(c, color, depth, transmittance, {a, b, d, e, f}, pose, origins, directions);
+             py::object const& origins, py::object const& directions, py::object const& by_features,
+             py::object const& features, bool detached) {
+            backward(c, color, depth, transmittance, {a, b, d, e, f}, pose, origins, directions, by_features, features,
+                     detached);
           },
           py::arg("color_gradient") = none, py::kw_only(), py::arg("depth_gradient") = none,
           py::arg("transmittance_gradient") = none, py::arg("mean") = none, py::arg("log_scale") = none,
           py::arg("quaternion") = none, py::arg("opacity") = none, py::arg("sh") = none, py::arg("pose") = none,
-          py::arg("origins") = none, py::arg("directions") = none,
+          py::arg("origins") = none, py::arg("directions") = none, py::arg("features_gradient") = none,
+          py::arg("features") = none, py::arg("detached") = false,
           R"(From dL/d what was shown to what is asked for, all float32 in memory of the policy; may be called again.
 
 color_gradient                           [H, W, 3] or [R, 3]; None: zero
-depth_gradient, transmittance_gradient   [H, W] or [R]; of a view they need a Renderer with depth=True
+depth_gradient, transmittance_gradient   [H, W] or [R]; of a view faster by a Renderer with depth=True
+features_gradient                        [H, W, F] or [R, F]; detached=True: by them features alone have gradients
 mean, log_scale, quaternion, opacity, sh dL/d each, of Model's shapes, overwritten; all of them or none
 pose                                     [6], of a view: dL/d the camera's position, world units, then by a small turn w
                                          of the camera about it, world axes: a direction d becomes d + w x d
-origins, directions                      [R, 3], dL/d rays)");
+origins, directions                      [R, 3], dL/d rays
+features                                 [N, F], dL/d features, overwritten)");
 
   // Renderer is bound before this.
   auto renderer = py::reinterpret_borrow<py::class_<python_renderer, shared_renderer>>(m.attr("Renderer"));
@@ -162,20 +178,21 @@ origins, directions                      [R, 3], dL/d rays)");
       .def(
           "forward",
           [](shared_renderer const& r, gart::camera const& view, py::object const& options, py::object a, py::object b,
-             py::object c, py::object d, py::object e, py::kwargs const& given) {
-            return forward(r, view, options, {a, b, c, d, e}, given);
+             py::object c, py::object d, py::object e, py::object f, py::kwargs const& given) {
+            return forward(r, view, options, {a, b, c, d, e, f}, given);
           },
           py::arg("camera"), py::arg("options") = none, py::kw_only(), py::arg("color") = none,
           py::arg("transmittance") = none, py::arg("depth") = none, py::arg("hits") = none, py::arg("rgba") = none,
+          py::arg("features") = none,
           "As render_to, with what gradients need: returns a Context.")
       .def("forward_rays", &forward_rays, py::arg("directions"), py::arg("origins") = none, py::arg("t_max") = none,
            py::arg("frame") = origin, py::kw_only(), py::arg("color") = none, py::arg("transmittance") = none,
-           py::arg("depth") = none, py::arg("options") = none,
+           py::arg("depth") = none, py::arg("features") = none, py::arg("options") = none,
            R"(What rays see, from and to memory of the policy, with what gradients need: returns a Context.
 
-Rays as of trace; color [R, 3], transmittance and depth [R], float32.)")
+Rays as of trace; color [R, 3], transmittance and depth [R], features [R, F], float32.)")
       .def("trace", &trace, py::arg("directions"), py::arg("origins") = none, py::arg("t_max") = none,
-           py::arg("frame") = origin, py::arg("options") = none,
+           py::arg("frame") = origin, py::arg("options") = none, py::kw_only(), py::arg("features") = false,
            R"(What rays see that no image has, from arrays of the host, as a dictionary of new numpy arrays.
 
 directions  float32 [R, 3], of any length but 0
@@ -183,7 +200,8 @@ origins     float32 [R, 3], relative to frame, a point in double; None: all rays
 t_max       float32 [R], where rays end, world units along the ray; None: nowhere
 
 color [R, 3], transmittance, depth (sum of weight * t), median (t of the hit that brings the transmittance below 0.5) and
-first (t of the first hit; -1 where there is none) [R]; hits, first_id, median_id, top_id (of the largest weight) uint32 [R].)")
+first (t of the first hit; -1 where there is none) [R]; hits, first_id, median_id, top_id (of the largest weight) uint32 [R]. With
+features=True, where there are any, features [R, F].)")
       .def("list_hits", &list_hits, py::arg("directions"), py::arg("origins") = none, py::arg("t_max") = none,
            py::arg("frame") = origin, py::arg("options") = none,
            R"(All hits of rays in order, as trace takes them: a dictionary of new numpy arrays.

@@ -28,33 +28,52 @@ std::shared_ptr<self> make(py::object const& model, py::kwargs const& given) {
   out->where = {on_device, out->request.device, out->request.stream};
   py::gil_scoped_release released;
   out->it = gart::make_renderer(out->request);
-  if (file) out->it->set_model(file->model), out->usual = file->render, out->count = std::int64_t(file->model.size());
+  if (!file) return out;
+  out->it->set_model(file->model), out->usual = file->render;
+  out->count = std::int64_t(file->model.size()), out->features = file->model.feature_count;
   return out;
 }
 
 void set_model(self& r, gart::model_file const& file) {
   std::vector<lent> let_go;
+  lent features;
   without_gil(r.mutex, [&] {
     r.it->set_model(file.model);
-    std::swap(r.bound, let_go);
+    std::swap(r.bound, let_go), std::swap(r.bound_features, features);
     r.usual = file.render, r.count = static_cast<std::int64_t>(file.model.size());
+    r.features = file.model.feature_count;
   });
 }
 
 void bind(self& r, std::array<py::object, 5> const& arrays) {
   std::vector<lent> kept;
+  lent features;
   auto const view = parameters_of<float const>(arrays, "Renderer.bind", -1, r.where, kept);
   without_gil(r.mutex, [&] {
     r.it->bind(view);
     std::swap(r.bound, kept);  // what was bound goes with the interpreter's lock held
-    r.count = view.count;
+    std::swap(r.bound_features, features);
+    r.count = view.count, r.features = 0;
   });
 }
 
-py::dict render(self& r, gart::camera const& view, py::object const& options, py::kwargs const& given) {
+void bind_features(self& r, py::object const& array) {
+  lent features = lent::if_given<float>(array, {"Renderer.bind_features: features", {r.count, -1}}, r.where);
+  int const width = features.data<float>() ? static_cast<int>(features.shape()[1]) : 0;
+  without_gil(r.mutex, [&] {
+    r.it->bind_channels({{features.data<float>(), static_cast<gart::index_t>(r.count), width}});
+    std::swap(r.bound_features, features);
+    r.features = width;
+  });
+}
+
+py::dict render(self& r, gart::camera const& view, py::object const& options, bool features, py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r.usual);
-  gart::rendered image = without_gil(r.mutex, [&] { return r.it->render(view, o); });
+  gart::rendered image = without_gil(r.mutex, [&] { return r.it->render(view, o, features); });
   py::dict out;
+  py::ssize_t const width = image.features.channels;
+  if (!image.features.data.empty())
+    out["features"] = owned_array({view.height, view.width, width}, std::move(image.features.data));
   out["color"] = image_array(std::move(image.color));
   out["transmittance"] = image_array(std::move(image.transmittance));
   out["depth"] = image_array(std::move(image.depth));
@@ -67,7 +86,7 @@ py::object render_8bit(self& r, gart::camera const& view, py::object const& opti
   return image_array(without_gil(r.mutex, [&] { return r.it->render_8bit(view, o); }));
 }
 
-void render_to(self& r, gart::camera const& view, py::object const& options, std::array<py::object, 5> const& targets,
+void render_to(self& r, gart::camera const& view, py::object const& options, std::array<py::object, 6> const& targets,
                py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r.usual);
   std::vector<lent> kept;
@@ -154,18 +173,20 @@ or by name: render(camera, background=(1, 1, 1)); without them they are those th
 }  // namespace
 
 gart::render_targets targets_of(python_renderer const& r, gart::camera const& view, std::string const& call,
-                                std::array<py::object, 5> const& given, std::vector<lent>& kept) {
+                                std::array<py::object, 6> const& given, std::vector<lent>& kept) {
   std::int64_t const h = view.height, w = view.width;
   auto const name = [&](char const* what) { return call + ": " + what; };
-  std::string const names[] = {name("color"), name("transmittance"), name("depth"), name("hits"), name("rgba")};
+  std::string const names[] = {name("color"), name("transmittance"), name("depth"), name("hits"), name("rgba"),
+                               name("features")};
   kept.clear();
   kept.push_back(lent::if_given<float>(given[0], {names[0].c_str(), {h, w, 3}, true}, r.where));
   kept.push_back(lent::if_given<float>(given[1], {names[1].c_str(), {h, w}, true}, r.where));
   kept.push_back(lent::if_given<float>(given[2], {names[2].c_str(), {h, w}, true}, r.where));
   kept.push_back(lent::if_given<gart::u32>(given[3], {names[3].c_str(), {h, w}, true}, r.where));
   kept.push_back(lent::if_given<gart::u8>(given[4], {names[4].c_str(), {h, w, 4}, true}, r.where));
-  return {kept[0].data<float>(), kept[1].data<float>(), kept[2].data<float>(), kept[3].data<gart::u32>(),
-          kept[4].data<gart::u8>()};
+  kept.push_back(lent::if_given<float>(given[5], {names[5].c_str(), {h, w, r.features}, true}, r.where));
+  return {kept[0].data<float>(),     kept[1].data<float>(),    kept[2].data<float>(),
+          kept[3].data<gart::u32>(), kept[4].data<gart::u8>(), {kept[5].data<float>()}};
 }
 
 gart::configuration_request request_of(py::kwargs const& given, char const* call) {
@@ -225,23 +246,29 @@ void bind_renderer(py::module_& m) {
           R"(Takes float32 arrays in memory of the policy, of Model's shapes, without a copy.
 
 They are kept until another model is set or bound. What is written to them between two views counts for the second.)")
-      .def("render", &render, py::arg("camera"), py::arg("options") = none,
+      .def("bind_features", &bind_features, py::arg("features"),
+           R"(Takes features of each Gaussian, float32 [N, F] in memory of the policy, 1 to 512 of each, without a copy.
+
+They are kept until others are bound, None lets them go, or another model is set or bound.)")
+      .def("render", &render, py::arg("camera"), py::arg("options") = none, py::kw_only(), py::arg("features") = false,
            R"(A view as a dictionary of new numpy arrays:
 
 color          float32 [H, W, 3], background composited
 transmittance  float32 [H, W]
 depth          float32 [H, W], sum of weight * distance along the ray
-hits           uint32 [H, W], Gaussians composited)")
+hits           uint32 [H, W], Gaussians composited
+features       float32 [H, W, F], sum of weight * features; with features=True, where there are any)")
       .def("render_8bit", &render_8bit, py::arg("camera"), py::arg("options") = none,
            "The colours of a view as a new numpy array, uint8 [H, W, 3].")
       .def(
           "render_to",
           [](self& r, gart::camera const& view, py::object const& options, py::object a, py::object b, py::object c,
-             py::object d, py::object e, py::kwargs const& given) {
-            render_to(r, view, options, {a, b, c, d, e}, given);
+             py::object d, py::object e, py::object f, py::kwargs const& given) {
+            render_to(r, view, options, {a, b, c, d, e, f}, given);
           },
           py::arg("camera"), py::arg("options") = none, py::kw_only(), py::arg("color") = none,
           py::arg("transmittance") = none, py::arg("depth") = none, py::arg("hits") = none, py::arg("rgba") = none,
+          py::arg("features") = none,
           "A view into memory of the policy, of render's shapes; rgba is uint8 [H, W, 4].")
       .def("backward", &backward, py::arg("camera"), py::arg("color_gradient"), py::arg("options") = none,
            py::kw_only(), py::arg("pose") = false,

@@ -181,14 +181,29 @@ void bind_scene(py::module_& m) {
   py::class_<file, std::shared_ptr<file>> model(m, "Model", model_text);
   model
       .def(py::init([](py::object const& mean, py::object const& log_scale, py::object const& quaternion,
-                       py::object const& opacity, py::object const& sh, int kernel_degree) {
+                       py::object const& opacity, py::object const& sh, int kernel_degree,
+                       py::object const& features) {
              file out;
              out.model = model_of(mean, log_scale, quaternion, opacity, sh, "Model");
              out.total = out.model.size(), out.kernel_degree = kernel_degree;
+             if (!features.is_none()) {
+               auto const n = static_cast<std::int64_t>(out.model.size());
+               lent const given = lent::of<float>(features, {"Model: features", {n, -1}});
+               out.model.features.assign(given.data<float>(), given.data<float>() + given.size());
+               out.model.feature_count = static_cast<int>(given.shape()[1]);
+             }
              return std::make_shared<file>(std::move(out));
            }),
            py::arg("mean"), py::arg("log_scale"), py::arg("quaternion"), py::arg("opacity"), py::arg("sh"),
-           py::arg("kernel_degree") = 2)
+           py::arg("kernel_degree") = 2, py::arg("features") = py::none())
+      .def_property_readonly(
+          "features",
+          [](py::object const& self) -> py::object {
+            gart::gaussian_model const& m = self.cast<file const&>().model;
+            if (m.feature_count == 0) return py::none();
+            return shown_array({static_cast<py::ssize_t>(m.size()), m.feature_count}, m.features.data(), self);
+          },
+          "float32 [N, F], in PLY alone; None where there are none")
       .def("__len__", [](file const& f) { return f.model.size(); })
       .def_property_readonly("sh_degree", [](file const& f) { return f.model.sh_degree; })
       .def_readonly("kernel_degree", &file::kernel_degree, "2: Gaussians")

@@ -97,14 +97,14 @@ std::vector<u32> along_a_curve(gaussian_model const& model) {
 
 gaussian_model in_order(gaussian_model const& model, std::vector<u32> const& order) {
   gaussian_model sorted;
+  sorted.feature_count = model.feature_count;
   sorted.resize(order.size(), model.sh_degree);
-  for_each_array(
-      [&](parameter_array const& a, std::vector<float>& to, std::vector<float> const& from) {
-        std::size_t const width = a.width(model.sh_degree);
+  for_each_row_array(
+      [&](std::size_t width, std::vector<float>& to, std::vector<float> const& from) {
         for (std::size_t i = 0; i < order.size(); ++i)
-          std::copy_n(from.data() + order[i] * width, width, &to[i * width]);
+          std::copy_n(from.data() + order[i] * width, width, to.data() + i * width);
       },
-      sorted, model);
+      model, sorted, model);
   return sorted;
 }
 

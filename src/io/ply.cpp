@@ -9,6 +9,7 @@
 #include <gart/io/origin.hpp>
 #include <gart/io/ply.hpp>
 #include <gart/math/logit.hpp>
+#include <gart/scene/features.hpp>
 
 namespace gart {
 namespace {
@@ -16,8 +17,8 @@ namespace {
 using namespace io::ply;
 using io::put;
 
-// INRIA's order; who reads leaves the normals out, since nothing uses them.
-std::vector<std::string> splat_columns(int degree, bool normals) {
+// INRIA's order, and features behind it; who reads leaves the normals out, since nothing uses them.
+std::vector<std::string> splat_columns(int degree, bool normals, int features = 0) {
   std::vector<std::string> names{"x", "y", "z"};
   if (normals) names.insert(names.end(), {"nx", "ny", "nz"});
   auto const numbered = [&](char const* stem, int n) {
@@ -28,10 +29,11 @@ std::vector<std::string> splat_columns(int degree, bool normals) {
   names.push_back("opacity");
   numbered("scale_", 3);
   numbered("rot_", 4);
+  numbered("feature_", features);
   return names;
 }
 
-// Puts column c of vertex i, in the order of splat_columns(degree, false), into its array.
+// Puts column c of vertex i, in the order of splat_columns(degree, false, features), into its array.
 struct splat_store {
   gaussian_model& model;
   std::vector<double>* exact = nullptr;   // where means go in double
@@ -78,8 +80,14 @@ struct splat_store {
       return;
     }
     c -= 3;
-    if (c < 4)
+    if (c < 4) {
       model.quaternion[4 * i + c] = v;
+      return;
+    }
+    c -= 4;
+    std::size_t const features = static_cast<std::size_t>(model.feature_count);
+    if (c < features)
+      model.features[features * i + c] = v;
     else
       (*filter)[i] = value;
   }
@@ -132,7 +140,13 @@ gaussian_model splats_of(ply_file const& file, std::vector<std::string>* notes, 
     file.refuse("there are " + std::to_string(rest) + " properties f_rest_*, not 0, 9, 24 or 45",
                 "gart reads spherical harmonics of degree 0 to 3: export the model with one of them");
   }
-  std::vector<std::string> const columns = splat_columns(model.sh_degree, false);
+  while (model.feature_count <= most_features && find(e, "feature_" + std::to_string(model.feature_count)))
+    ++model.feature_count;
+  if (model.feature_count > most_features)
+    file.refuse("there are more properties feature_* than " +
+                    std::to_string(most_features),
+                "export the model with fewer");
+  std::vector<std::string> const columns = splat_columns(model.sh_degree, false, model.feature_count);
   require_columns(file, e, columns, "export the model with every property of the INRIA layout");
   io::unusable bad;
   std::vector<double> exact;
@@ -162,12 +176,12 @@ gaussian_model splats_of(ply_file const& file, std::vector<std::string>* notes, 
   return io::in_order(model, bad.others(model.size(), "Gaussian", file.name, notes));
 }
 
-std::string header_of(std::filesystem::path const& path, int sh_degree, u64 count, splat_traits const& traits,
-                      bool world = false) {
+std::string header_of(std::filesystem::path const& path, gaussian_model const& model, u64 count,
+                      splat_traits const& traits, bool world = false) {
   std::string text = header_start(path, world ? with_origin(traits, vec3d(0.0)) : traits);
   text += "element vertex " + std::to_string(count) + "\n";
   std::string const type = world ? "property double " : "property float ";
-  for (std::string const& name : splat_columns(sh_degree, true))
+  for (std::string const& name : splat_columns(model.sh_degree, true, model.feature_count))
     text += (name.size() == 1 ? type : "property float ") + name + "\n";
   return text + "end_header\n";
 }
@@ -188,6 +202,8 @@ void put_vertex(std::string& text, gaussian_model const& model, std::size_t i, v
   put(text, model.opacity[i]);
   for (std::size_t c = 0; c < 3; ++c) put(text, model.log_scale[3 * i + c]);
   for (std::size_t c = 0; c < 4; ++c) put(text, model.quaternion[4 * i + c]);
+  std::size_t const features = static_cast<std::size_t>(model.feature_count);
+  for (std::size_t c = 0; c < features; ++c) put(text, model.features[features * i + c]);
 }
 
 void require_agreement(std::filesystem::path const& path, gaussian_model const& model) {
@@ -198,7 +214,7 @@ void require_agreement(std::filesystem::path const& path, gaussian_model const& 
 void write_ply(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits, bool world) {
   require_agreement(path, model);
   vec3d const origin = origin_of(traits, path.string());
-  std::string text = header_of(path, model.sh_degree, model.size(), traits, world);
+  std::string text = header_of(path, model, model.size(), traits, world);
   write_file(path, [&](std::ostream& out) {
     for (std::size_t i = 0; i < model.size(); ++i) {
       put_vertex(text, model, i, world ? &origin : nullptr);
@@ -244,8 +260,8 @@ void write_splat_ply(std::filesystem::path const& path, gaussian_model const& mo
 void write_splat_ply_rows(shared_file& file, std::filesystem::path const& path, gaussian_model const& mine,
                           row_owners const& owners, u64 total, splat_traits const& traits) {
   require_agreement(path, mine);
-  std::string const head = header_of(path, mine.sh_degree, total, traits);
-  u64 const record = sizeof(float) * splat_columns(mine.sh_degree, true).size();
+  std::string const head = header_of(path, mine, total, traits);
+  u64 const record = sizeof(float) * splat_columns(mine.sh_degree, true, mine.feature_count).size();
   if (owners.rank == 0) file.write(0, head.data(), head.size());
   std::string text;
   owners.for_each_run(total, [&](u64 first, u64 count, u64 row) {
@@ -264,7 +280,7 @@ extern splat_format const ply_format;
 splat_format const ply_format = {
     "PLY",
     ".ply",
-    {.traits = true, .kernel = true, .world = true},
+    {.traits = true, .kernel = true, .world = true, .features = true},
     [](std::string_view first) { return first.starts_with("ply\n") || first.starts_with("ply\r"); },
     read_splat_ply,
     [](std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits,

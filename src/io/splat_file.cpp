@@ -85,15 +85,14 @@ gaussian_model read_splats(std::filesystem::path const& path, splat_traits* trai
 
 gaussian_model rows_of(gaussian_model const& all, row_owners const& owners) {
   gaussian_model mine;
-  mine.sh_degree = all.sh_degree;
-  for_each_array(
-      [&](parameter_array const& a, auto& to, auto const& from) {
-        std::size_t const width = a.width(all.sh_degree);
+  mine.sh_degree = all.sh_degree, mine.feature_count = all.feature_count;
+  for_each_row_array(
+      [&](std::size_t width, auto& to, auto const& from) {
         owners.for_each_run(all.size(), [&](u64 first, u64 count, u64) {
           to.insert(to.end(), from.data() + first * width, from.data() + (first + count) * width);
         });
       },
-      mine, all);
+      all, mine, all);
   return mine;
 }
 
@@ -141,6 +140,8 @@ std::vector<std::string> left_out(std::filesystem::path const& path, gaussian_mo
   if (model.sh_degree > format.room.sh_degree)
     lines.push_back("spherical harmonics above degree " + std::to_string(format.room.sh_degree) +
                     " (the model has degree " + std::to_string(model.sh_degree) + ")");
+  if (model.feature_count > 0 && !format.room.features)
+    lines.push_back(io::counted(static_cast<std::size_t>(model.feature_count), "feature") + " of each Gaussian");
   if (std::size_t const strays = format.room.strays && !packing.spz ? 0 : io::bulk_of(model).strays.size())
     lines.push_back("the distance of " + io::counted(strays, "Gaussian") + ", over " +
                     std::to_string(static_cast<int>(io::far_reach)) +

@@ -26,13 +26,12 @@ gaussian_model without_faint(gaussian_model model, float factor) {
   std::size_t n = 0;
   for (std::size_t i = 0; i < model.size(); ++i) {
     if (opacity_of(model, i, factor) < faintest_solid) continue;
-    for_each_array(
-        [&](parameter_array const& a, auto& values) {
-          std::size_t const width = a.width(model.sh_degree);
+    for_each_row_array(
+        [&](std::size_t width, auto& values) {
           std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * width), width,
                       values.begin() + static_cast<std::ptrdiff_t>(n * width));
         },
-        model);
+        model, model);
     ++n;
   }
   model.resize(n, model.sh_degree);

@@ -60,15 +60,15 @@ gaussian_model cropped(gaussian_model const& model, view_box const& box) {
     if (inside) kept.push_back(i);
   }
   gaussian_model out;
+  out.feature_count = model.feature_count;
   out.resize(kept.size(), model.sh_degree);
-  for_each_array(
-      [&](parameter_array const& a, auto& to, auto const& from) {
-        std::size_t const width = a.width(model.sh_degree);
+  for_each_row_array(
+      [&](std::size_t width, auto& to, auto const& from) {
         for (std::size_t i = 0; i < kept.size(); ++i)
           std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(kept[i] * width), width,
                       to.begin() + static_cast<std::ptrdiff_t>(i * width));
       },
-      out, model);
+      model, out, model);
   return out;
 }
 

@@ -301,3 +301,55 @@ TEST_CASE("points keep position and colour; other colour types are scaled; none 
   CHECK(gart::read_point_ply(path).color == std::vector<gart::u8>{128, 255, 9});
   CHECK(holds(error_of([&] { gart::read_splat_ply(path); }), "points, not Gaussians"));
 }
+
+TEST_CASE("features are properties of a splat file, kept row by row") {
+  CAPTURE(seed());
+  std::mt19937_64 random(seed());
+  std::normal_distribution<float> normal;
+  scratch_folder const folder;
+  fs::path const path = folder.path / "model.ply";
+  gaussian_model m = random_model(23, 1, random);
+  m.feature_count = 19, m.resize(23, 1);
+  for (float& x : m.features) x = normal(random);
+  gart::write_splat_ply(path, m);
+  gaussian_model const again = gart::read_splat_ply(path);
+  check_equal(again, m);
+  CHECK(again.feature_count == 19);
+  CHECK(again.features == m.features);
+  gart::row_owners const second{2, 1, 4};
+  gaussian_model const mine = gart::rows_of(again, second);
+  gart::u64 total = 0;
+  CHECK(gart::read_splat_ply_rows(path, second, total).features == mine.features);
+  CHECK(mine.features.size() == 19 * mine.size());
+
+  // By name, up to the first number that is not there; a row with one that is no number is left out.
+  auto const ascii = [&](std::string const& names, std::string const& rows) {
+    std::string text = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float feature_1\n";
+    for (std::string const& name : inria_names(0)) text += "property float " + name + "\n";
+    std::ofstream(path) << text << names << "end_header\n" << rows;
+  };
+  ascii("property float feature_0\nproperty float feature_3\n",
+        "7 0 0 0 0 0 0 0 0 0 1 0 0 0 1 0 0 0 8 9\n5 1 0 0 0 0 0 0 0 0 1 0 0 0 1 0 0 0 6 9\n");
+  gaussian_model const named = gart::read_splat_ply(path);
+  CHECK(named.feature_count == 2);
+  CHECK(named.features == std::vector<float>{8, 7, 6, 5});
+  ascii("property float feature_0\n",
+        "7 0 0 0 0 0 0 0 0 0 1 0 0 0 1 0 0 0 nan\n5 1 0 0 0 0 0 0 0 0 1 0 0 0 1 0 0 0 6\n");
+  std::vector<std::string> notes;
+  CHECK(gart::read_splat_ply(path, nullptr, &notes).features == std::vector<float>{6, 5});
+  REQUIRE(notes.size() == 1);
+  CHECK(notes[0].find("feature_0") != std::string::npos);
+
+  CHECK(gart::left_out("model.ply", m, {}).empty());
+  auto const lines = gart::left_out("model.spz", m, {});
+  REQUIRE(lines.size() == 1);
+  CHECK(lines[0] == "19 features of each Gaussian");
+  m.features.pop_back();
+  CHECK_THROWS_AS(gart::write_splat_ply(path, m), gart::invalid_argument);
+  std::string many;
+  for (int i = 0; i <= 513; ++i)
+    if (i != 1) many += "property float feature_" + std::to_string(i) + "\n";
+  ascii(many, "");
+  CHECK_THROWS_WITH_AS(gart::read_splat_ply(path), doctest::Contains("more properties feature_* than 512"),
+                       gart::io_error);
+}

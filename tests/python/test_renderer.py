@@ -175,6 +175,45 @@ class Renderer(unittest.TestCase):
         self.assertEqual(failures, [])
         self.assertGreater(len(ticks), 10)
 
+    def test_features_are_shown_kept_and_learned(self):
+        arrays, view = scenes.parameters(n=60), scenes.camera()
+        features = np.ascontiguousarray(np.random.default_rng(2).normal(size=(60, 5)), np.float32)
+        model = gart.Model(*arrays, features=features)
+        np.testing.assert_array_equal(model.features, features)
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "model.ply"
+            gart.save_model(path, model)
+            np.testing.assert_array_equal(gart.load_model(path).features, features)
+        renderer = gart.Renderer(model, backend="openmp")
+        image = renderer.render(view, features=True)
+        self.assertEqual(image["features"].shape, (32, 40, 5))
+        self.assertNotIn("features", renderer.render(view))
+        directions = np.array([[0, 0, 1], [0.28, 0, 0.96]], np.float32)
+        frame = (0.3, -0.2, -4.0)
+        hits = renderer.list_hits(directions, frame=frame)
+        expected = np.zeros((2, 5), np.float32)
+        for r in range(2):
+            a, b = hits["offsets"][r:r + 2]
+            expected[r] = hits["weight"][a:b] @ features[hits["ids"][a:b]]
+        np.testing.assert_allclose(renderer.trace(directions, frame=frame, features=True)["features"], expected,
+                                   atol=1e-5)
+
+        # Toward another image, by features alone.
+        learned = np.zeros((60, 5), np.float32)
+        renderer.bind_features(learned)
+        shown, gradient, losses = np.empty((32, 40, 5), np.float32), np.empty((60, 5), np.float32), []
+        for _ in range(20):
+            context = renderer.forward(view, features=shown)
+            off = np.ascontiguousarray(shown - image["features"])
+            losses.append((off ** 2).sum())
+            context.backward(features_gradient=off, features=gradient, detached=True)
+            learned -= 0.02 * gradient
+        self.assertLess(losses[-1], 0.3 * losses[0])
+        with self.assertRaisesRegex(gart.InvalidArgument, "Renderer.bind_features: features"):
+            renderer.bind_features(learned[:50])
+        renderer.bind_features(None)
+        self.assertNotIn("features", renderer.render(view, features=True))
+
     def test_tracking_finds_the_camera(self):
         model, truth = scenes.model(n=60), scenes.camera(80, 64)
         renderer = gart.Renderer(model, backend="openmp")

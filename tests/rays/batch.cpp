@@ -12,28 +12,6 @@ using gart::u32;
 
 namespace {
 
-std::vector<std::pair<char const*, gart::camera>> cameras() {
-  std::vector<std::pair<char const*, gart::camera>> all;
-  gart::camera c;
-  c.width = 37, c.height = 26, c.fx = 31, c.fy = 29, c.cx = 18.2f, c.cy = 12.6f;
-  c.rotation = gart::mat3(0.36f, 0.48f, -0.8f, -0.8f, 0.6f, 0, 0.48f, 0.64f, 0.6f);
-  c.position = gart::vec3d(-1.44, -1.92, -1.8);
-  all.emplace_back("pinhole", c);
-  c.lens.k1 = -0.1f, c.lens.p1 = 0.003f;
-  all.emplace_back("OPENCV", c);
-  c.lens = {}, c.kind = gart::camera_kind::fisheye, c.fx = c.fy = 14;
-  all.emplace_back("fisheye", c);
-  c.kind = gart::camera_kind::equirectangular, c.position = gart::vec3d(0.1, 0, -0.2);
-  all.emplace_back("equirectangular", c);
-  c = all[0].second;
-  c.kind = gart::camera_kind::orthographic, c.fx = c.fy = 9;
-  all.emplace_back("orthographic", c);
-  c = all[0].second;
-  c.shutter = gart::shutter_kind::top_to_bottom, c.travel = gart::vec3(0.2f, 0.1f, -0.3f), c.turn.y = 0.1f;
-  all.emplace_back("rolling shutter", c);
-  return all;
-}
-
 template <class F>
 void refused(F&& call, char const* what) {
   CHECK_THROWS_WITH_AS(call(), doctest::Contains(what), gart::invalid_argument);

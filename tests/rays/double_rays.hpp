@@ -9,14 +9,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace gart_test {
 
 // The arrays of a model, in double.
 struct double_model {
-  std::size_t count = 0, bands = 0;
-  std::vector<double> mean, log_scale, quaternion, opacity, sh;
+  std::size_t count = 0, bands = 0, width = 0;
+  std::vector<double> mean, log_scale, quaternion, opacity, sh, features;
 
   explicit double_model(gart::gaussian_model const& m)
       : count(m.size()),
@@ -25,7 +26,10 @@ struct double_model {
         log_scale(m.log_scale.begin(), m.log_scale.end()),
         quaternion(m.quaternion.begin(), m.quaternion.end()),
         opacity(m.opacity.begin(), m.opacity.end()),
-        sh(m.sh.begin(), m.sh.end()) {}
+        sh(m.sh.begin(), m.sh.end()),
+        features(m.features.begin(), m.features.end()) {
+    width = static_cast<std::size_t>(m.feature_count);
+  }
 };
 
 struct double_ray {
@@ -36,11 +40,13 @@ struct double_ray {
 // Weights of what a ray sees.
 struct ray_weights {
   double color[3], depth, transmittance;
+  float const* features = nullptr;  // of as many as the model has
 };
 
 struct seen {
   double loss = 0;
   std::uint64_t branches = 0;  // which hits, in which order, clamped where
+  std::vector<std::pair<std::size_t, double>> weights;  // of the hits, by Gaussian
 };
 
 inline void harmonics(double const (&d)[3], double (&y)[16]) {
@@ -116,6 +122,10 @@ inline seen see(double_model const& m, double_ray const& ray, ray_weights const&
       out.loss += by.color[c] * weight * std::max(color, 0.0);
     }
     out.loss += by.depth * weight * h.t;
+    if (by.features)
+      for (std::size_t c = 0; c < m.width; ++c)
+        out.loss += double{by.features[c]} * weight * m.features[m.width * h.id + c];
+    out.weights.emplace_back(h.id, weight);
     transmittance *= 1 - h.alpha;
     note(h.id << 8 | clamps);
     if (transmittance < double{o.transmittance_min} || ++count == o.max_hits) break;

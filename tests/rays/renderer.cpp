@@ -179,9 +179,10 @@ TEST_CASE_TEMPLATE("contexts of views wait for their gradients side by side", E,
     }
     gart::gaussians<E> out(exec, count, degree);
     gart::buffer<float, E> const by(exec, 3 * pixels), one(exec, pixels);
+    gart::output_gradients of_features = by_image(by);
+    of_features.channels.features = one;
     refused([&] { contexts[0]->backward(by_image(one), {.gaussians = out.view()}); }, "output_gradients.color has 693");
-    refused([&] { contexts[0]->backward(by_image(by, one), {.gaussians = out.view()}); },
-            "configuration_request.depth");
+    refused([&] { contexts[0]->backward(of_features, {.gaussians = out.view()}); }, "the Gaussians have none");
     refused(
         [&] {
           contexts[0]->backward(by_image(by), {.rays = {out.mean.data(), nullptr}});
@@ -199,23 +200,28 @@ TEST_CASE_TEMPLATE("gradients of depth: a view's and its rays' agree", E, GART_T
   gart::gaussian_model const model = cloud(seed, 3, 120);
   gart::camera const view = view_at(0.2);
   index_t const count = static_cast<index_t>(model.size());
-  auto const renderer = gart::make_renderer(request_of(exec, 3, true));
-  renderer->set_model(model);
   auto const picture = trace_view<gart::bvh_tracer<E>>(exec, model, view, {}, 3);
   batch_memory<E> const batch(exec, view.position, picture.origins, picture.directions);
   gart::buffer<float, E> const by_color(exec, picture.directions), by_depth(exec, picture.transmittance),
       by_transmittance(exec, picture.depth);
   gart::output_gradients const by{by_color, by_depth, by_transmittance};
-  gart::gaussians<E> of_view(exec, count, 3), of_rays(exec, count, 3);
-  renderer->forward(view, {}, gart::render_targets{})->backward(by, {.gaussians = of_view.view()});
-  renderer->forward(batch.rays(), {}, gart::batch_targets{})->backward(by, {.gaussians = of_rays.view()});
-  renderer->wait();
-  gart::gaussian_model const a = of_view.to_host(), b = of_rays.to_host();
-  CHECK(difference(b.mean, a.mean) < 1e-4);
-  CHECK(difference(b.log_scale, a.log_scale) < 1e-4);
-  CHECK(difference(b.quaternion, a.quaternion) < 1e-4);
-  CHECK(difference(b.opacity, a.opacity) < 1e-4);
-  CHECK(difference(b.sh, a.sh) < 1e-4);
+  // By the strategy's own pass, and over the hits where it has none.
+  for (bool const fused : {true, false}) {
+    CAPTURE(fused);
+    auto const renderer = gart::make_renderer(request_of(exec, 3, fused));
+    CHECK(renderer->configuration().depth == fused);
+    renderer->set_model(model);
+    gart::gaussians<E> of_view(exec, count, 3), of_rays(exec, count, 3);
+    renderer->forward(view, {}, gart::render_targets{})->backward(by, {.gaussians = of_view.view()});
+    renderer->forward(batch.rays(), {}, gart::batch_targets{})->backward(by, {.gaussians = of_rays.view()});
+    renderer->wait();
+    gart::gaussian_model const a = of_view.to_host(), b = of_rays.to_host();
+    CHECK(difference(b.mean, a.mean) < 1e-4);
+    CHECK(difference(b.log_scale, a.log_scale) < 1e-4);
+    CHECK(difference(b.quaternion, a.quaternion) < 1e-4);
+    CHECK(difference(b.opacity, a.opacity) < 1e-4);
+    CHECK(difference(b.sh, a.sh) < 1e-4);
+  }
 }
 
 TEST_CASE_TEMPLATE("rays of a response that is not compiled are refused", E, GART_TEST_POLICIES) {

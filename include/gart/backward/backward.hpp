@@ -116,6 +116,8 @@ class backward_pass {
   /// Of the last differentiate(), [N][moment_stride]: at error_place the error that is seen through each Gaussian,
   /// where the pixels' errors were given.
   span<float const> moments() const { return moments_; }
+  /// The same, for gradients of other channels to be added to before finish_gradients.
+  span<float> moments() { return moments_; }
   /// Of a strategy with sums in a fixed order, after differentiate(): what was summed, a row of
   /// pair_gradient<sh_degree>::quads for each (primitive, tile) pair, those of primitive i from pair_offsets()[i] on.
   span<quad const> pair_rows() const requires ordered { return rows_; }

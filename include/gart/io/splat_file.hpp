@@ -45,6 +45,7 @@ struct splat_room {
   bool origin = false;     ///< the trait origin (io/origin.hpp)
   bool world = false;      ///< coordinates in double, for splat_packing.world
   bool spz = false;        ///< SPZ inside, for splat_packing.spz
+  bool features = false;   ///< of each Gaussian (scene/features.hpp)
 };
 
 /// A format of files of Gaussians.

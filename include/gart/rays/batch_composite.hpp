@@ -5,6 +5,7 @@
 /// degrees: coefficients are read in their stride.
 
 #include <gart/backward/lt_slot.hpp>
+#include <gart/channels/hit_table.hpp>
 #include <gart/math/blend.hpp>
 #include <gart/math/sh.hpp>
 #include <gart/rays/batch_rays.hpp>
@@ -142,51 +143,29 @@ struct batch_composite : ray_program_base {
 };
 static_assert(ray_program<batch_composite<>>);
 
-/// The ray program of hit lists: counts them where there are no lists, else writes them to the places that the counts
-/// make. The same hits as those that are composited.
+/// The ray program of hit lists: the same hits as those that are composited.
 struct batch_list : ray_program_base {
   using ray_type = ray;  ///< from anywhere
   /// A ray on its way.
-  struct state {
-    ray own;                  ///< the ray
-    float far;                ///< where it ends
-    u64 at;                   ///< place of its first hit
-    u32 count = 0;            ///< hits so far
-    float transmittance = 1;  ///< after them
+  struct state : hit_writer::state {
+    float far;  ///< where it ends
   };
 
-  batch_rays rays;               ///< of the batch
-  float transmittance_min = 0;   ///< a ray ends after the hit that brings T below this
-  u32 max_hits = 0;              ///< a ray ends after so many; 0: no cap
-  u32* counts = nullptr;         ///< [R], written where there are no lists
-  u64 const* offsets = nullptr;  ///< [R + 1], read where there are lists
-  u32* ids = nullptr;            ///< null: hits are counted
-  float* t = nullptr;            ///< distances
-  float* alpha = nullptr;        ///< opacities
-  float* weight = nullptr;       ///< transmittance before the hit times alpha
+  batch_rays rays;  ///< of the batch
+  hit_writer to;    ///< where hits go
 
   /// Every ray is one.
   GART_HD bool active(index_t) const { return true; }
   /// Where ray i ends.
   GART_HD float far(index_t i) const { return rays.far(i); }
   /// The state before the first hit.
-  GART_HD state begin(index_t i) const { return {rays.of(i), rays.far(i), ids ? offsets[i] : 0}; }
+  GART_HD state begin(index_t i) const { return {to.begin(i, rays.of(i)), rays.far(i)}; }
   /// Ray i, in the batch's frame.
   GART_HD ray ray_of(index_t, state const& s) const { return s.own; }
-  /// Counts or writes a hit. False: the ray ends.
-  GART_HD GART_INLINE bool on_hit(state& s, hit const& h) const {
-    if (h.t > s.far) return false;
-    if (ids) {
-      u64 const at = s.at + s.count;
-      ids[at] = h.id, t[at] = h.t, alpha[at] = h.alpha, weight[at] = s.transmittance * h.alpha;
-    }
-    s.transmittance *= 1.0f - h.alpha;
-    return ++s.count != max_hits && s.transmittance >= transmittance_min;
-  }
-  /// Writes the count.
-  GART_HD void end(index_t i, state const& s) const {
-    if (!ids) counts[i] = s.count;
-  }
+  /// Takes a hit. False: the ray ends.
+  GART_HD GART_INLINE bool on_hit(state& s, hit const& h) const { return h.t <= s.far && to.on_hit(s, h); }
+  /// Takes the ray.
+  GART_HD void end(index_t, state const& s) const { to.end(s); }
 };
 static_assert(ray_program<batch_list>);
 

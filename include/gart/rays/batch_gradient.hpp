@@ -47,6 +47,34 @@ struct gather_rays {
   }
 };
 
+// Adds what channels (channels/differentiate.hpp) bring to the gradients of rays.
+template <class Response>
+struct add_channels {
+  batch_rays rays;
+  hit_table_view hits;
+  float const *by_alpha, *alongs;
+  ray_gaussian const* records;
+  ray_gradient_targets out;
+  GART_KERNEL void operator()(index_t i) const {
+    ray const own = rays.of(i);
+    vec3 by_origin(0.0f), by_direction(0.0f);
+    for (u64 k = hits.offsets[i]; k < hits.offsets[i + 1]; ++k) {
+      ray_gaussian const gaussian = records[hits.ids[k]];
+      ray_peak const r = evaluate(gaussian, own);
+      float const along = alongs ? alongs[k] : 0.0f;
+      moments_of<float> const m = hit_moments_with_depth<Response>(gaussian, r, by_alpha[k], along, true);
+      ray_part const part = ray_part_of(gaussian, r, m, along);
+      by_origin += part.origin, by_direction += part.direction;
+    }
+    by_direction = rays.gradient_of_given(i, own.direction, by_direction);
+    for (int c = 0; c < 3; ++c) {
+      std::size_t const at = std::size_t{3} * i + static_cast<std::size_t>(c);
+      if (out.origins) out.origins[at] += by_origin[c];
+      if (out.directions) out.directions[at] += by_direction[c];
+    }
+  }
+};
+
 }  // namespace ray_kernels
 
 /// The ray program of the backward pass. Targets that are null are left out.
@@ -128,11 +156,8 @@ struct batch_scatter : ray_program_base {
     }
     if (of_rays.directions) {
       vec3 const &d = s.own.direction, &w = s.by_turn;
-      // A turn w moves the direction by w x d; what stands along it changes its length alone.
-      vec3 by = s.by_direction + glm::cross(w, d);
-      by -= d * glm::dot(by, d);
-      float const length2 = batch_rays::length2(rays.given(i));
-      if (!batch_rays::is_unit(length2)) by *= 1.0f / square_root(length2);
+      // A turn w moves the direction by w x d.
+      vec3 const by = rays.gradient_of_given(i, d, s.by_direction + glm::cross(w, d));
       float* const to = of_rays.directions + at;
       to[0] = by.x, to[1] = by.y, to[2] = by.z;
     }

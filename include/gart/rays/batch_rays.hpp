@@ -45,6 +45,13 @@ struct batch_rays {
     }
     return out;
   }
+  /// From dL/d the unit direction d of ray i to dL/d the direction as it was given: what stands along it changes its
+  /// length alone.
+  GART_HD GART_INLINE vec3 gradient_of_given(index_t i, vec3 const& d, vec3 by) const {
+    by -= d * glm::dot(by, d);
+    float const given2 = length2(given(i));
+    return is_unit(given2) ? by : by * (1.0f / square_root(given2));
+  }
   /// Where ray i ends.
   GART_HD GART_INLINE float far(index_t i) const { return t_max ? t_max[i] : infinity; }
 };

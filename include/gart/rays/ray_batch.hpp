@@ -10,6 +10,8 @@
 /// Errors: invalid_argument for spans whose sizes disagree, by field, and for a ray that is none, by number: a number
 /// that is not finite, a direction of no length, an end before options.near.
 
+#include <gart/channels/hit_lists.hpp>
+#include <gart/channels/targets.hpp>
 #include <gart/core/error.hpp>
 #include <gart/core/span.hpp>
 #include <gart/core/types.hpp>
@@ -56,6 +58,7 @@ struct batch_targets {
   u32* first_id = nullptr;         ///< Gaussian of the first hit; no_gaussian where there is none
   u32* median_id = nullptr;        ///< of the hit at `median`
   u32* top_id = nullptr;           ///< of the largest weight, the first of equal ones
+  channel_targets channels = {};   ///< features
 };
 
 /// The same in host memory, each [R].
@@ -63,16 +66,7 @@ struct traced_rays {
   std::vector<float> color;                                ///< [R][3]
   std::vector<float> transmittance, depth, median, first;  ///< as batch_targets has them
   std::vector<u32> hits, first_id, median_id, top_id;      ///< as batch_targets has them
-};
-
-/// The hits of all rays, one ray after the other and each ray's in order: those of ray r are [offsets[r], offsets[r +
-/// 1]).
-struct hit_lists {
-  std::vector<u64> offsets;   ///< [R + 1]
-  std::vector<u32> ids;       ///< Gaussians
-  std::vector<float> t;       ///< distances
-  std::vector<float> alpha;   ///< opacities
-  std::vector<float> weight;  ///< transmittance before the hit times alpha
+  std::vector<float> features = {};                        ///< [R][width], where they are asked for
 };
 
 /// dL/d what a batch or a view showed, in memory of the policy; empty where there is no such gradient.
@@ -80,6 +74,7 @@ struct output_gradients {
   span<float const> color = {};          ///< [R][3]
   span<float const> depth = {};          ///< [R], of the sum of weight * t
   span<float const> transmittance = {};  ///< [R]
+  channel_gradients channels = {};       ///< of features
 };
 
 /// dL/d rays, in memory of the policy; null where it is not wanted. A direction's gradient stands across it.

@@ -13,6 +13,8 @@
 /// up to are those of an image's pixels. options.antialias must be 0: rays have no pixels to filter by; options.rows is
 /// not looked at.
 ///
+/// Features (channels/) are shown and differentiated over hit lists: a second trace, and 16 or 40 bytes a hit.
+///
 /// Memory beside the tree: 64 bytes a Gaussian, with gradients 48 more, and 20 bytes a ray that a context holds; hits
 /// that are kept by gradient_form::primitive take 32 each, and 16 places at a time a ray.
 /// Cost: on the first batch after a change the tree; on a batch in another frame than the last one launch over the
@@ -21,6 +23,7 @@
 /// Gaussians that have changed; out_of_memory for more than 2^32 hits kept at a time.
 
 #include <gart/backward/finish.hpp>
+#include <gart/channels/passes.hpp>
 #include <gart/rays/batch_gather.hpp>
 #include <gart/rays/fingerprint.hpp>
 #include <gart/rays/world_index.hpp>
@@ -34,7 +37,8 @@ namespace gart { inline namespace GART_ISA {
 template <execution E>
 struct batch_context {
   /// Nothing yet.
-  explicit batch_context(E& exec) : color(exec), transmittance(exec), depth(exec), kept(exec) {}
+  explicit batch_context(E& exec)
+      : color(exec), transmittance(exec), depth(exec), kept(exec), hits(exec), listed(exec) {}
 
   ray_batch rays;                                ///< that were traced
   render_options options;                        ///< by which
@@ -43,22 +47,10 @@ struct batch_context {
   u64 scene = 0;                                 ///< its number of the scene
   buffer<float, E> color, transmittance, depth;  ///< what was seen
   kept_batch<E> kept;                            ///< hits, of gradient_form::primitive
-};
-
-/// Hit lists (rays/ray_batch.hpp) in memory of the policy.
-template <execution E>
-struct batch_hits {
-  /// None yet.
-  explicit batch_hits(E& exec) : offsets(exec), ids(exec), t(exec), alpha(exec), weight(exec) {}
-
-  buffer<u64, E> offsets;             ///< [R + 1]
-  buffer<u32, E> ids;                 ///< Gaussians
-  buffer<float, E> t, alpha, weight;  ///< of the hits
-
-  /// A copy for the host; waits for it.
-  hit_lists to_host() const {
-    return {offsets.to_host(), ids.to_host(), t.to_host(), alpha.to_host(), weight.to_host()};
-  }
+  gaussian_channels channels;                    ///< that could be shown
+  buffer<u32, E> hits;                           ///< of each ray, where there are channels
+  hit_table<E> listed;                           ///< all hits, where they are wanted
+  bool is_listed = false;                        ///< they are there
 };
 
 /// Traces batches of rays.
@@ -74,7 +66,9 @@ class ray_tracer {
         moments_(exec),
         differentiated_(exec),
         gather_(exec),
-        counts_(exec) {}
+        counts_(exec),
+        listed_(exec),
+        channels_backward_(exec) {}
 
   /// The Gaussians, of any SH degree, whose arrays must stay; bands above active_degree are not evaluated. Where they
   /// are the same as before, what was made of them is kept.
@@ -85,47 +79,48 @@ class ray_tracer {
     u64 const print = print_.of(*exec_, scene);
     if (number_ == 0 || print != scene_print_ || scene.count != scene_.count || active_degree != active_degree_)
       ++number_, index_is_old_ = records_are_old_ = true;
-    scene_ = scene, scene_print_ = print, active_degree_ = active_degree;
+    scene_ = scene, scene_print_ = print, active_degree_ = active_degree, channels_ = {};
+  }
+  /// What the Gaussians have besides, in arrays that must stay; none until the next call of either.
+  void set_channels(gaussian_channels const& channels) {
+    require_channels(channels, scene_.count, "ray_tracer.set_channels");
+    channels_ = channels;
   }
 
   /// What the rays see, to the targets that are wanted.
   void trace(ray_batch const& rays, render_options const& options, batch_targets const& out) {
+    require_channels(channels_, out.channels, "ray_tracer.trace");
     prepare(rays, options);
-    launch("rays/forward", rays, composite_of<keep_none>(rays, options, out, {}));
+    batch_targets seen = out;
+    if (out.channels.any() && !out.hits) counts_.resize(rays.count()), seen.hits = counts_.data();
+    launch("rays/forward", rays, composite_of<keep_none>(rays, options, seen, {}));
+    if (!out.channels.any()) return;
+    list(listed_, rays, options, false, {seen.hits, rays.count()});
+    sum_channels(*exec_, listed_, channels_, out.channels);
   }
 
   /// Their hits, exact and complete: up to the end of the ray, or to where options end it.
-  batch_hits<E> list(ray_batch const& rays, render_options const& options) {
+  hit_table<E> list(ray_batch const& rays, render_options const& options) {
     prepare(rays, options);
-    batch_hits<E> out(*exec_);
-    index_t const n = rays.count();
-    counts_.resize(n), out.offsets.resize(std::size_t{n} + 1);
-    batch_list program{{}, batch_rays(rays), options.transmittance_min, options.max_hits, counts_.data()};
-    launch("rays/count", rays, program);
-    span<u64> const offsets = out.offsets.view();
-    exclusive_scan(*exec_, span<u32 const>(counts_), offsets.subspan(0, n), offsets.subspan(n, 1));
-    u64 total = 0;
-    exec_->copy_out(&total, out.offsets.data() + n, sizeof total);
-    out.ids.resize(total), out.t.resize(total), out.alpha.resize(total), out.weight.resize(total);
-    if (total == 0) return out;
-    program.offsets = out.offsets.data(), program.ids = out.ids.data();
-    program.t = out.t.data(), program.alpha = out.alpha.data(), program.weight = out.weight.data();
-    launch("rays/list", rays, program);
+    hit_table<E> out(*exec_);
+    list(out, rays, options, false);
     return out;
   }
 
   /// What the rays see, and what backward() needs of it.
   batch_context<E> forward(ray_batch const& rays, render_options const& options, batch_targets const& out = {},
                            gradient_form form = gradient_form::primitive) {
+    require_channels(channels_, out.channels, "ray_tracer.forward");
     prepare(rays, options);
     batch_context<E> context(*exec_);
     context.rays = rays, context.options = options, context.form = form;
-    context.tracer = this, context.scene = number_;
+    context.tracer = this, context.scene = number_, context.channels = channels_;
     index_t const n = rays.count();
     context.color.resize(std::size_t{3} * n), context.transmittance.resize(n), context.depth.resize(n);
     batch_targets seen = out;
     seen.color = context.color.data(), seen.transmittance = context.transmittance.data();
     seen.depth = context.depth.data();
+    if (channels_.features.width > 0 && !out.hits) context.hits.resize(n), seen.hits = context.hits.data();
     if (form == gradient_form::primitive)
       keep(context, seen);
     else
@@ -134,6 +129,11 @@ class ray_tracer {
       if (to) exec_->copy(to, from.data(), from.size() * sizeof(float));
     };
     copy(out.color, context.color), copy(out.transmittance, context.transmittance), copy(out.depth, context.depth);
+    if (out.channels.any()) {
+      list(context.listed, rays, options, true, {seen.hits, n});
+      context.is_listed = true;
+      sum_channels(*exec_, context.listed, context.channels, out.channels);
+    }
     return context;
   }
 
@@ -141,13 +141,14 @@ class ray_tracer {
   /// evaluated, and to dL/d the rays. Gradients of Gaussians are left out where there are no arrays. May be called
   /// again.
   void backward(batch_context<E>& context, output_gradients const& by, gaussians_view<float> gradients,
-                ray_gradient_targets const& of_rays = {}) {
+                ray_gradient_targets const& of_rays = {}, channel_gradient_targets const& of_channels = {}) {
     stage_scope stage(*exec_, "rays backward");
     if (context.tracer != this) throw invalid_argument("ray_tracer.backward: the context is of another tracer");
     if (context.scene != number_)
       throw invalid_argument("ray_tracer.backward: the Gaussians have changed since forward(); call it again");
     index_t const n = context.rays.count();
     require_gradients(by, n, "ray_tracer.backward");
+    require_channels(context.channels, by.channels, of_channels, n, "ray_tracer.backward");
     bool const of_gaussians = gradients.mean != nullptr;
     if (of_gaussians && (gradients.count != scene_.count || gradients.sh_degree < active_degree_ ||
                          gradients.sh_degree > color_rows::most))
@@ -183,6 +184,7 @@ class ray_tracer {
                                         moments_.data(),
                                         of_rays},
              context.options.near);
+    if (by.channels.any() || of_channels.any()) differentiate_channels(context, by, of_gaussians, of_rays, of_channels);
     if (of_gaussians) finish_gradients(*exec_, scene_, gaussians_, camera{}, 0, moments_, gradients);
   }
 
@@ -240,6 +242,35 @@ class ray_tracer {
     records_are_old_ = false;
   }
 
+  // `counts`: of hits, where they are known.
+  void list(hit_table<E>& to, ray_batch const& rays, render_options const& options, bool differentiable,
+            span<u32 const> counts = {}) {
+    to.list(
+        *exec_, rays.count(), options.transmittance_min, options.max_hits, differentiable,
+        [&](char const* label, hit_writer const& writer) {
+          launch(label, rays, batch_list{{}, batch_rays(rays), writer}, options.near);
+        },
+        counts);
+  }
+  // Adds to the moments and to the gradients of rays.
+  void differentiate_channels(batch_context<E>& context, output_gradients const& by, bool of_gaussians,
+                              ray_gradient_targets const& of_rays, channel_gradient_targets const& to) {
+    if (!context.is_listed) list(context.listed, context.rays, context.options, true);
+    context.is_listed = true;
+    bool const rays_too = of_rays.origins || of_rays.directions;
+    if (by.channels.any() && !by.channels.detached && (of_gaussians || rays_too)) {
+      channels_backward_.begin(context.listed);
+      weigh_channels(channels_backward_, context.channels, by.channels);
+      if (of_gaussians) channels_backward_.add_moments(context.listed, gaussians_, moments_);
+      if (rays_too)
+        parallel_for(*exec_, "rays/channels", context.rays.count(),
+                     ray_kernels::add_channels<Response>{batch_rays(context.rays), context.listed.view(),
+                                                         channels_backward_.by_alpha(), channels_backward_.alongs(),
+                                                         gaussians_.data(), of_rays});
+    }
+    pull_channels(*exec_, channels_backward_, context.listed, context.channels, by.channels, to);
+  }
+
   // The forward pass with its hits, once more where there was no room for them.
   void keep(batch_context<E>& context, batch_targets const& out) {
     kept_batch<E>& kept = context.kept;
@@ -281,7 +312,10 @@ class ray_tracer {
   buffer<float, E> moments_;
   buffer<differentiated_ray, E> differentiated_;
   batch_gather<E, Response> gather_;
+  gaussian_channels channels_;
   buffer<u32, E> counts_;
+  hit_table<E> listed_;
+  channel_gradient<E, Response> channels_backward_;
   double per_ray_ = 0;  // hits that the last batch kept
 };
 

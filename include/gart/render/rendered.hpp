@@ -12,6 +12,7 @@ struct rendered {
   image_float transmittance;  ///< 1 channel
   image_float depth;          ///< 1 channel: sum of weight * t
   basic_image<u32> hits;      ///< 1 channel: hits composited
+  image_float features = {};  ///< a channel each, where they are asked for: sum of weight * features
 };
 
 }  // namespace gart

@@ -21,16 +21,21 @@ class compiled_rays final : public ray_service {
   void set_scene(gaussians_view<float const> scene, int active_degree) override {
     tracer_.set_scene(scene, active_degree);
   }
-  traced_rays trace(ray_batch const& rays, render_options const& options) override {
+  void set_channels(gaussian_channels const& channels) override {
+    tracer_.set_channels(channels), features_ = channels.features.width;
+  }
+  traced_rays trace(ray_batch const& rays, render_options const& options, bool with_features) override {
     host_rays const there(exec_, rays);
     std::size_t const n = rays.count();
     buffer<float, E> color(exec_, 3 * n), transmittance(exec_, n), depth(exec_, n), median(exec_, n), first(exec_, n);
     buffer<u32, E> hits(exec_, n), first_id(exec_, n), median_id(exec_, n), top_id(exec_, n);
-    tracer_.trace(there.rays, options,
-                  {color.data(), transmittance.data(), depth.data(), median.data(), first.data(), hits.data(),
-                   first_id.data(), median_id.data(), top_id.data()});
+    buffer<float, E> features(exec_, with_features ? n * static_cast<std::size_t>(features_) : 0);
+    batch_targets out{color.data(), transmittance.data(), depth.data(),     median.data(), first.data(),
+                      hits.data(),  first_id.data(),      median_id.data(), top_id.data()};
+    if (features.size() > 0) out.channels.features = features.data();
+    tracer_.trace(there.rays, options, out);
     return {color.to_host(), transmittance.to_host(), depth.to_host(),     median.to_host(), first.to_host(),
-            hits.to_host(),  first_id.to_host(),      median_id.to_host(), top_id.to_host()};
+            hits.to_host(),  first_id.to_host(),      median_id.to_host(), top_id.to_host(), features.to_host()};
   }
   hit_lists list_hits(ray_batch const& rays, render_options const& options) override {
     host_rays const there(exec_, rays);
@@ -53,7 +58,7 @@ class compiled_rays final : public ray_service {
     void backward(output_gradients const& by, gradient_targets const& to) override {
       if (to.pose)
         throw invalid_argument("forward_context.backward: a batch has no pose; gradient_targets.pose is of a view");
-      tracer_.backward(left_, by, to.gaussians, to.rays);
+      tracer_.backward(left_, by, to.gaussians, to.rays, to.channels);
     }
 
    private:
@@ -74,6 +79,7 @@ class compiled_rays final : public ray_service {
 
   E exec_;
   ray_tracer<E, Response> tracer_;
+  int features_ = 0;  // of a Gaussian
 };
 
 /// The service of a policy and a response, for all renderers of theirs.

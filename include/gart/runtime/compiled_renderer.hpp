@@ -11,6 +11,7 @@
 #include <gart/runtime/model_arrays.hpp>
 #include <gart/runtime/ray_service.hpp>
 #include <gart/runtime/registry.hpp>
+#include <gart/runtime/shown_view.hpp>
 #include <gart/scene/copy_bands.hpp>
 
 #include <memory>
@@ -39,6 +40,7 @@ class compiled_renderer final : public renderer {
         color_(exec_),
         color_gradient_(exec_),
         no_gradient_(exec_),
+        channels_(exec_),
         pose_backward_(exec_) {
     if (degree_ < 0 || degree_ > sh_degree)
       throw invalid_argument("renderer: configuration_request.sh_degree is past what this configuration stores");
@@ -50,6 +52,7 @@ class compiled_renderer final : public renderer {
     differentiated_ = 0, ++models_;
     degree_ == sh_degree ? model_.assign(model) : model_.assign(with_sh_degree(model, sh_degree));
     given_ = scene_ = std::as_const(model_).view();
+    channels_.set_model(model);
     is_bound_ = false, bound_bands_ = nullptr;
   }
   void bind(gaussians_view<float const> parameters) override {
@@ -57,6 +60,7 @@ class compiled_renderer final : public renderer {
     require_arrays(parameters, "renderer.bind");
     differentiated_ = 0, ++models_;
     given_ = scene_ = parameters;
+    channels_.bind({}, parameters.count);
     is_bound_ = true, bound_bands_ = nullptr;
     if (degree_ == sh_degree) return;
     bound_bands_ = parameters.sh;
@@ -64,18 +68,35 @@ class compiled_renderer final : public renderer {
     scene_.sh = bands_.data(), scene_.sh_degree = sh_degree;
   }
 
-  rendered render(camera const& view, render_options const& options) override {
+  void bind_channels(gaussian_channels const& channels) override {
+    channels_.bind(channels, given_.count);
+    channels_are_old_ = true;
+  }
+
+  rendered render(camera const& view, render_options const& options, bool with_features) override {
     prepare(frame_, view, options);
-    return render_image(frame_);
+    rendered out = render_image(frame_);
+    int const width = with_features ? channels_.now().features.width : 0;
+    if (width == 0) return out;
+    buffer<float, E> features(exec_, std::size_t{pixels_of(view)} * static_cast<std::size_t>(width));
+    channels_.show(frame_, {features.data()}, false);
+    out.features.width = view.width, out.features.height = view.height, out.features.channels = width;
+    out.features.data = features.to_host();
+    return out;
   }
   image8 render_8bit(camera const& view, render_options const& options) override {
     prepare(frame_, view, options);
     return render_image_8bit(frame_);
   }
   void render_to(camera const& view, render_options const& options, render_targets const& targets) override {
+    require_channels(channels_.now(), targets.channels, "renderer.render_to");
     prepare(frame_, view, options);
-    image_targets const images = images_of(targets, targets.rgba != nullptr);
+    image_targets images = images_of(targets, targets.rgba != nullptr);
+    bool const more = targets.channels.any();
+    if (more) images.hits = channels_.hits().count(exec_, pixels_of(view));
     frame_.render(images);
+    if (more && targets.hits) exec_.copy(targets.hits, images.hits, sizeof(u32) * pixels_of(view));
+    if (more) channels_.show(frame_, targets.channels, true);
     if (targets.rgba) color_to_bytes(exec_, images.color, pixels_of(view), targets.rgba, 4);
   }
 
@@ -116,31 +137,20 @@ class compiled_renderer final : public renderer {
 
   std::unique_ptr<forward_context> forward(camera const& view, render_options const& options,
                                            render_targets const& targets) override {
-    std::unique_ptr<shown_view> shown;
+    require_channels(channels_.now(), targets.channels, "renderer.forward");
+    std::unique_ptr<shown_type> shown;
     if (!idle_.empty()) shown = std::move(idle_.back()), idle_.pop_back();
-    if (!shown) shown = std::make_unique<shown_view>(exec_);
+    if (!shown) shown = std::make_unique<shown_type>(exec_);
     prepare(shown->frame, view, options);
-    if (!shown->pass.prepare(shown->frame)) throw shown->pass.out_of_memory_error();
-    std::size_t const n = pixels_of(view);
-    shown->color.resize(3 * n), shown->transmittance.resize(n), shown->depth.resize(n);
-    shown->pass.render(shown->frame, {.color = shown->color.data(),
-                                      .transmittance = shown->transmittance.data(),
-                                      .depth = shown->depth.data(),
-                                      .hits = targets.hits});
-    auto const copy = [&](float* to, buffer<float, E> const& from) {
-      if (to) exec_.copy(to, from.data(), from.size() * sizeof(float));
-    };
-    copy(targets.color, shown->color), copy(targets.transmittance, shown->transmittance);
-    copy(targets.depth, shown->depth);
-    if (targets.rgba) color_to_bytes(exec_, shown->color.data(), pixels_of(view), targets.rgba, 4);
+    shown->render(targets, channels_.now());
     return std::make_unique<view_context>(*this, std::move(shown));
   }
   std::unique_ptr<forward_context> forward(ray_batch const& rays, render_options const& options,
                                            batch_targets const& targets, gradient_form form) override {
     return std::make_unique<batch_context>(*this, this->rays().forward(rays, options, targets, form));
   }
-  traced_rays trace(ray_batch const& rays, render_options const& options) override {
-    return this->rays().trace(rays, options);
+  traced_rays trace(ray_batch const& rays, render_options const& options, bool with_features) override {
+    return this->rays().trace(rays, options, with_features);
   }
   void trace_to(ray_batch const& rays, render_options const& options, batch_targets const& targets) override {
     this->rays().trace_to(rays, options, targets);
@@ -164,20 +174,11 @@ class compiled_renderer final : public renderer {
  private:
   using frame_type = frame<E, Traits, Tracer>;
   using pass_type = backward_pass<frame_type, Strategy>;
-
-  // A view as a context keeps it.
-  struct shown_view {
-    explicit shown_view(E& exec)
-        : frame(exec), pass(exec), color(exec), transmittance(exec), depth(exec), gradients(exec, 0, sh_degree) {}
-    frame_type frame;
-    pass_type pass;
-    buffer<float, E> color, transmittance, depth;
-    gaussians<E> gradients;  // where the caller has none
-  };
+  using shown_type = shown_view<frame_type, pass_type>;
 
   class view_context final : public forward_context {
    public:
-    view_context(compiled_renderer& owner, std::unique_ptr<shown_view> shown)
+    view_context(compiled_renderer& owner, std::unique_ptr<shown_type> shown)
         : owner_(owner), shown_(std::move(shown)), model_(owner.models_) {}
     ~view_context() override { owner_.idle_.push_back(std::move(shown_)); }
     void backward(output_gradients const& by, gradient_targets const& to) override {
@@ -187,7 +188,7 @@ class compiled_renderer final : public renderer {
 
    private:
     compiled_renderer& owner_;
-    std::unique_ptr<shown_view> shown_;
+    std::unique_ptr<shown_type> shown_;
     u64 model_;
   };
 
@@ -225,18 +226,18 @@ class compiled_renderer final : public renderer {
       if constexpr (E::device) request.stream = exec_.stream();
       rays_ = make_ray_service(request);
     }
-    if (is_bound_ || rays_model_ != models_ || models_ == 0) rays_->set_scene(given_, degree_);
-    rays_model_ = models_;
+    bool const other = is_bound_ || rays_model_ != models_ || models_ == 0;
+    if (other) rays_->set_scene(given_, degree_);
+    if (other || channels_are_old_) rays_->set_channels(channels_.now());
+    rays_model_ = models_, channels_are_old_ = false;
     return *rays_;
   }
-  void differentiate_shown(shown_view& shown, output_gradients const& by, gradient_targets const& to) {
+  void differentiate_shown(shown_type& shown, output_gradients const& by, gradient_targets const& to) {
     std::size_t const n = pixels_of(shown.frame.view());
     require_gradients(by, n, "forward_context.backward");
     if (to.rays.origins || to.rays.directions)
       throw invalid_argument("forward_context.backward: a view has no gradient_targets.rays; trace them as a batch");
-    if (!has_depth<Strategy> && !(by.depth.empty() && by.transmittance.empty()))
-      throw invalid_argument(
-          "forward_context.backward: gradients of a view by depth or transmittance need configuration_request.depth");
+    require_channels(shown.hits.channels, by.channels, to.channels, n, "forward_context.backward");
     gaussians_view<float> rows = to.gaussians;
     bool const own = !rows.mean, narrow = !own && degree_ != sh_degree;
     if (own) {
@@ -254,8 +255,14 @@ class compiled_renderer final : public renderer {
       no_gradient_.resize(3 * n), no_gradient_.zero();
       color = no_gradient_;
     }
-    gart::differentiate(shown.frame, shown.pass, image_gradients{color, by.depth, by.transmittance}, rows);
+    output_gradients all = by;
+    all.color = color;
+    {
+      stage_scope stage(exec_, "backward");
+      shown.differentiate(all, rows, channels_);
+    }
     if (narrow) copy_bands(exec_, rows.sh, sh_degree, to.gaussians.sh, degree_, rows.count);
+    channels_.pull(shown.frame, shown.hits, by.channels, to.channels);
     if (to.pose) pose_backward_(shown.frame, rows, span<float>(to.pose, pose_gradient::floats));
   }
 
@@ -307,8 +314,10 @@ class compiled_renderer final : public renderer {
   bool is_bound_ = false;
   u64 models_ = 0;  // set or bound so far
   buffer<float, E> color_, color_gradient_, no_gradient_;
+  view_channels<E, typename Traits::response> channels_;
+  bool channels_are_old_ = false;  // of the service
   pose_differentiation<E> pose_backward_;
-  std::vector<std::unique_ptr<shown_view>> idle_;  // of contexts that are gone
+  std::vector<std::unique_ptr<shown_type>> idle_;  // of contexts that are gone
   std::unique_ptr<ray_service> rays_;
   u64 rays_model_ = 0;
 };

@@ -4,6 +4,7 @@
 /// Errors: invalid_argument, naming the array, what it has and what it should have.
 
 #include <gart/core/error.hpp>
+#include <gart/scene/features.hpp>
 #include <gart/scene/gaussians.hpp>
 
 #include <string>
@@ -23,6 +24,12 @@ inline void require_arrays(gaussian_model const& model) {
                                  std::to_string(needed) + ": gaussian_model::resize makes them agree");
       },
       model);
+  std::size_t const needed = model.size() * static_cast<std::size_t>(model.feature_count);
+  if (model.feature_count < 0 || model.feature_count > most_features || model.features.size() != needed)
+    throw invalid_argument("renderer.set_model: gaussian_model.features has " + std::to_string(model.features.size()) +
+                           " numbers, and " + std::to_string(model.size()) + " Gaussians of feature_count " +
+                           std::to_string(model.feature_count) + ", at most " + std::to_string(most_features) +
+                           ", ask for " + std::to_string(needed));
 }
 
 /// Arrays that somebody else owns: none is null. `what` names the call.

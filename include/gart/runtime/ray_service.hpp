@@ -19,8 +19,10 @@ class ray_service {
   virtual ~ray_service() = default;
   /// Sets the Gaussians, whose arrays must stay. Call again when they may have changed. Waits for the policy.
   virtual void set_scene(gaussians_view<float const> scene, int active_degree) = 0;
+  /// What these have besides, after set_scene.
+  virtual void set_channels(gaussian_channels const& channels) = 0;
   /// From and to host memory.
-  virtual traced_rays trace(ray_batch const& rays, render_options const& options) = 0;
+  virtual traced_rays trace(ray_batch const& rays, render_options const& options, bool with_features) = 0;
   /// From and to host memory.
   virtual hit_lists list_hits(ray_batch const& rays, render_options const& options) = 0;
   /// In memory of the policy.

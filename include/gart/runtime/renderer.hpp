@@ -36,6 +36,7 @@ struct render_targets {
   float* depth = nullptr;          ///< [H][W]: sum of weight * t
   u32* hits = nullptr;             ///< [H][W]: hits composited
   u8* rgba = nullptr;              ///< [H][W][4]: the colour in 8 bits a channel, for a screen or an encoder
+  channel_targets channels = {};   ///< features
 };
 
 /// Renders and differentiates views of one model.
@@ -44,14 +45,19 @@ class renderer {
   /// Frees its memory of the policy.
   virtual ~renderer() = default;
 
-  /// Copies the model; bound arrays are no longer used.
+  /// Copies the model, with its features; bound arrays are no longer used.
   virtual void set_model(gaussian_model const& model) = 0;
   /// The arrays, in memory of the policy, must stay until another model is set or bound. What is written to them
   /// between two views counts for the second, on the same stream.
   virtual void bind(gaussians_view<float const> parameters) = 0;
 
-  /// A view to host memory.
-  virtual rendered render(camera const& view, render_options const& options) = 0;
+  /// Features in memory of the policy, in place of those that the model came with; they must stay until others are
+  /// bound, or another model is set or bound. What is written to them between two views counts for the second. Errors:
+  /// invalid_argument where they are not of each Gaussian, or more than 512.
+  virtual void bind_channels(gaussian_channels const& channels) = 0;
+
+  /// A view to host memory; its features too where they are asked for, and there are any.
+  virtual rendered render(camera const& view, render_options const& options, bool with_features = false) = 0;
   /// The view's colours as to_8bit makes them, [H][W][3]. The policy converts them, so 3 bytes a pixel are copied in
   /// place of 24.
   virtual image8 render_8bit(camera const& view, render_options const& options) = 0;
@@ -83,7 +89,7 @@ class renderer {
   /// What rays see, from and to host memory. options.antialias must be 0. The tree is built for the first batch of a
   /// model, and again where bound arrays have changed. Errors: unsupported where batches are not compiled for the
   /// backend and the kernel degree.
-  virtual traced_rays trace(ray_batch const& rays, render_options const& options) = 0;
+  virtual traced_rays trace(ray_batch const& rays, render_options const& options, bool with_features = false) = 0;
   /// The same in memory of the policy. Waits for it to check the rays.
   virtual void trace_to(ray_batch const& rays, render_options const& options, batch_targets const& targets) = 0;
   /// All hits of rays in order, up to where options end a ray: transmittance_min = 0 lists every one. From and to host

@@ -35,6 +35,8 @@ inline void require_count(std::size_t n) {
 struct gaussian_model {
   int sh_degree = 0;                                            ///< D
   std::vector<float> mean, log_scale, quaternion, opacity, sh;  ///< as above
+  int feature_count = 0;                                        ///< features of each (scene/features.hpp); 0: none
+  std::vector<float> features = {};                             ///< [N][feature_count]: shown and kept, not trained
 
   /// N.
   std::size_t size() const { return opacity.size(); }
@@ -42,16 +44,25 @@ struct gaussian_model {
   void resize(std::size_t n, int degree) {
     sh_degree = degree;
     for_each_array([&](parameter_array const& a, auto& values) { values.resize(n * a.width(degree)); }, *this);
+    features.resize(n * static_cast<std::size_t>(feature_count));
   }
   /// Whether all arrays are of size() Gaussians.
   bool arrays_agree() const {
-    bool agree = true;
+    bool agree = feature_count >= 0 && features.size() == size() * static_cast<std::size_t>(feature_count);
     for_each_array([&](parameter_array const& a,
                        auto const& values) { agree = agree && values.size() == size() * a.width(sh_degree); },
                    *this);
     return agree;
   }
 };
+
+/// f(floats a Gaussian, member of every model...) for each array of models of the same degree and features: what moves
+/// whole Gaussians walks these.
+inline void for_each_row_array(auto&& f, gaussian_model const& of, auto&&... models) {
+  for_each_array([&](parameter_array const& a, auto&&... values) { f(std::size_t{a.width(of.sh_degree)}, values...); },
+                 models...);
+  f(static_cast<std::size_t>(of.feature_count), models.features...);
+}
 
 /// The same Gaussians with other storage: coefficients past `degree` are dropped, missing ones are zero.
 inline gaussian_model with_sh_degree(gaussian_model model, int degree) {
