@@ -1,5 +1,6 @@
-// Batches of rays: a lidar of 64 x 1024 at the view's place, and rays without any order from places near it; what they
-// see, their hits, and their gradients in each form.
+// Rays: a view's, by tile lists, by the tree and as a batch; a lidar of 64 x 1024 at the view's place; rays without any
+// order from places near it. What they see, their hits, and their gradients in each form. `alone` is the walk that
+// takes rays one by one. Beside the times: whether the batch shows the same bits as what it is compared with.
 #include "support/frame.hpp"
 
 #include <gart/rays/lidar.hpp>
@@ -25,6 +26,32 @@ gart::ray_list incoherent() {
   out.frame = view.position;
   std::vector<float> const d = gart_bench::noise(3 * rays, 1), o = gart_bench::noise(3 * rays + 1, 0.3f);
   out.directions = d, out.origins.assign(o.begin() + 1, o.end());
+  return out;
+}
+
+// One index a pixel.
+struct copy_directions {
+  gart::pixel_rays rays;
+  int width;
+  float* directions;
+  GART_KERNEL void operator()(gart::index_t i) const {
+    gart::vec3 const d =
+        gart::pixel_ray(rays, gart::pixel{static_cast<int>(i) % width, static_cast<int>(i) / width}).direction;
+    for (gart::index_t k = 0; k < 3; ++k) directions[3 * i + k] = d[static_cast<int>(k)];
+  }
+};
+
+gart::ray_list view() {
+  gart::serial_exec exec;
+  gart::camera const& camera = gart_bench::the_scene().view();
+  gart::camera_rays<gart::serial_exec> rays(exec);
+  rays.cast(exec, camera);
+  gart::ray_list out;
+  out.frame = camera.position;
+  out.directions.resize(std::size_t{3} * camera.width * camera.height);
+  gart::index_t const pixels = static_cast<gart::index_t>(out.directions.size() / 3);
+  copy_directions const copy{rays.view(), camera.width, out.directions.data()};
+  for (gart::index_t i = 0; i < pixels; ++i) copy(i);
   return out;
 }
 
@@ -61,6 +88,41 @@ void trace(benchmark::State& state, E& exec) {
 }
 
 template <gart::ray_list (*Rays)(), gart::execution E>
+void alone(benchmark::State& state, E& exec) {
+  batch<E> b(exec, Rays());
+  b.trace();
+  gart::gaussians_view<float const> const scene = std::as_const(b.scene).view();
+  gart::buffer<gart::ray_gaussian, E> records(exec, scene.count);
+  gart::parallel_for(exec, "records", scene.count,
+                     gart::render_kernels::prepare_gaussians<gart::generalized_gaussian<>>{
+                         scene, b.rays.frame, b.options.alpha_min, records.view()});
+  gart::buffer<float, E> color(exec, b.color.size());
+  gart::batch_composite<> const program{
+      {}, gart::batch_rays(b.rays), {scene.sh, scene.sh_degree, gart_bench::sh_degree}, b.options, {color.data()}, {}};
+  gart::trace_kernels::walk_alone<gart::generalized_gaussian<>, 16, gart::world_view, gart::batch_composite<>> const
+      walk{b.tracer.index().seen_from(b.rays.frame),
+           {records.data(), scene.count, b.options.near},
+           program,
+           nullptr,
+           nullptr};
+  gart_bench::measure(state, exec, [&] { gart::parallel_for(exec, "alone", b.rays.count(), walk); });
+  state.counters["rays"] = b.rays.count();
+  state.counters["same"] = color.to_host() == b.color.to_host();
+}
+
+template <class By, gart::execution E>
+void image(benchmark::State& state, E& exec) {
+  gart_bench::frame<E, By> frame(exec);
+  frame.prepare();
+  gart::buffer<float, E> color(exec, 3 * frame.pixels());
+  gart_bench::measure(state, exec, [&] { frame.traced.render({color.data()}); });
+  batch<E> b(exec, view());
+  b.trace();
+  state.counters["rays"] = b.rays.count();
+  state.counters["same"] = color.to_host() == b.color.to_host();
+}
+
+template <gart::ray_list (*Rays)(), gart::execution E>
 void list(benchmark::State& state, E& exec) {
   batch<E> b(exec, Rays());
   gart_bench::measure(state, exec, [&] { b.tracer.list(b.rays, b.options); });
@@ -87,13 +149,19 @@ void both(benchmark::State& state, E& exec) {
 
 }  // namespace
 
+GART_BENCH("rays/view/tiles", image<gart_bench::by_tiles<8>>)
+GART_BENCH("rays/view/tree", image<gart_bench::by_bvh>)
+GART_BENCH("rays/view/trace", trace<view>)
+GART_BENCH("rays/view/alone", alone<view>)
 GART_BENCH("rays/lidar/trace", trace<lidar>)
+GART_BENCH("rays/lidar/alone", alone<lidar>)
 GART_BENCH("rays/lidar/list", list<lidar>)
 GART_BENCH("rays/lidar/backward/primitive", backward<lidar, gradient_form::primitive>)
 GART_BENCH("rays/lidar/backward/scatter", backward<lidar, gradient_form::scatter>)
 GART_BENCH("rays/lidar/both/primitive", both<lidar, gradient_form::primitive>)
 GART_BENCH("rays/lidar/both/scatter", both<lidar, gradient_form::scatter>)
 GART_BENCH("rays/incoherent/trace", trace<incoherent>)
+GART_BENCH("rays/incoherent/alone", alone<incoherent>)
 GART_BENCH("rays/incoherent/list", list<incoherent>)
 GART_BENCH("rays/incoherent/backward/primitive", backward<incoherent, gradient_form::primitive>)
 GART_BENCH("rays/incoherent/backward/scatter", backward<incoherent, gradient_form::scatter>)

@@ -16,22 +16,35 @@ GART_HD GART_INLINE float slab_inverse(float d) {
   return 1.0f / (d < tiny && d > -tiny ? (d < 0 ? -tiny : tiny) : d);
 }
 
+/// A ray in the frame of a tree, and by how much the tree's boxes are too narrow for it. Boxes of Gaussians are as wide
+/// as rounding needs for rays from the frame (ellipsoid_box). Rays from elsewhere need 32 roundings of their origin
+/// more.
+struct placed_ray {
+  vec3 origin;     ///< in the tree's frame
+  vec3 direction;  ///< of the ray
+  float pad;       ///< length that boxes are to be wider by, on each side
+};
+
+/// A ray of the tree's own frame (primary_ray), or from anywhere in it (ray).
+template <class Ray>
+GART_HD GART_INLINE placed_ray place(Ray const& r) {
+  vec3 const o = origin_of(r);
+  return {o, r.direction, std::is_same_v<Ray, ray> ? 4e-6f * (fabsf(o.x) + fabsf(o.y) + fabsf(o.z)) : 0.0f};
+}
+
 /// A ray as boxes are tested against it.
 struct slab_ray {
   vec3 origin, inverse;  ///< and one over each part of the direction
-  /// Boxes of Gaussians are as wide as rounding needs for rays from the frame (ellipsoid_box). Rays from elsewhere need
-  /// 32 roundings of their origin more; here along the ray, and negative: x - 0 is x, and costs primary rays nothing.
+  /// What boxes are to be wider by, along the ray, and negative: x - 0 is x, and costs primary rays nothing.
   vec3 narrower{0.0f};
-  /// Of a ray of the frame (primary_ray) or of one from anywhere (ray).
+  /// Of a ray in the tree's frame.
+  GART_HD GART_INLINE explicit slab_ray(placed_ray const& r)
+      : origin(r.origin),
+        inverse(slab_inverse(r.direction.x), slab_inverse(r.direction.y), slab_inverse(r.direction.z)),
+        narrower(-r.pad * fabsf(inverse.x), -r.pad * fabsf(inverse.y), -r.pad * fabsf(inverse.z)) {}
+  /// The same.
   template <class Ray>
-  GART_HD GART_INLINE explicit slab_ray(Ray const& r)
-      : origin(origin_of(r)),
-        inverse(slab_inverse(r.direction.x), slab_inverse(r.direction.y), slab_inverse(r.direction.z)) {
-    if constexpr (std::is_same_v<Ray, ray>) {
-      float const pad = -4e-6f * (fabsf(origin.x) + fabsf(origin.y) + fabsf(origin.z));
-      narrower = {pad * fabsf(inverse.x), pad * fabsf(inverse.y), pad * fabsf(inverse.z)};
-    }
-  }
+  GART_HD GART_INLINE explicit slab_ray(Ray const& r) : slab_ray(place(r)) {}
 };
 
 /// Whether the ray crosses the box somewhere in [near, far].

@@ -39,10 +39,13 @@ struct primary_ray_of {
 using primary_ray = primary_ray_of<float>;
 
 /// From anywhere; `origin` relative to the frame.
-struct ray {
-  vec3 origin;     ///< relative to the frame
-  vec3 direction;  ///< unit
+template <class F>
+struct ray_of {
+  vec3_of<F> origin;     ///< relative to the frame
+  vec3_of<F> direction;  ///< unit
 };
+/// One ray.
+using ray = ray_of<float>;
 
 ///@{
 /// Where the ray begins, relative to the frame.
@@ -140,8 +143,9 @@ template <class F>
 GART_HD GART_INLINE F gaussian_origin(ray_gaussian::row const& m, primary_ray_of<F> const&) {
   return m.o;
 }
-GART_HD GART_INLINE float gaussian_origin(ray_gaussian::row const& m, ray const& r) {
-  return fma(m.x, r.origin.x, fma(m.y, r.origin.y, fma(m.z, r.origin.z, m.o)));
+template <class F>
+GART_HD GART_INLINE F gaussian_origin(ray_gaussian::row const& m, ray_of<F> const& r) {
+  return fma(F(m.x), r.origin.x, fma(F(m.y), r.origin.y, fma(F(m.z), r.origin.z, F(m.o))));
 }
 ///@}
 
@@ -175,7 +179,7 @@ GART_HD GART_INLINE auto approach_to(ray_gaussian const& g, Ray const& r) {
   a.od = fma(o.x, a.d.x, fma(o.y, a.d.y, mul(o.z, a.d.z)));
   a.cc = fma(a.c.x, a.c.x, fma(a.c.y, a.c.y, mul(a.c.z, a.c.z)));
   // No hit where o_g.d_g is infinite; for primary rays prepare sees to that.
-  if constexpr (std::is_same_v<Ray, ray>) a.cc = fma(0.0f, a.od, a.cc);
+  if constexpr (std::is_same_v<Ray, ray_of<F>>) a.cc = fma(F(0.0f), a.od, a.cc);
   a.dd = fma(a.d.x, a.d.x, fma(a.d.y, a.d.y, mul(a.d.z, a.d.z)));
   return a;
 }

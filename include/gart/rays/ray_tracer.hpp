@@ -15,7 +15,7 @@
 ///
 /// Features (channels/) are shown and differentiated over hit lists: a second trace, and 16 or 40 bytes a hit.
 ///
-/// Memory beside the tree: 64 bytes a Gaussian, with gradients 48 more, and 20 bytes a ray that a context holds; hits
+/// Memory beside the tree: 64 bytes a Gaussian, with gradients 48 more; 12 bytes a ray, and 20 that a context holds. Hits
 /// that are kept by gradient_form::primitive take 32 each, and 16 places at a time a ray.
 /// Cost: on the first batch after a change the tree; on a batch in another frame than the last one launch over the
 /// Gaussians; then the trace. Checks wait for the policy once a batch.
@@ -61,6 +61,7 @@ class ray_tracer {
   explicit ray_tracer(E& exec)
       : exec_(&exec),
         index_(exec),
+        order_(exec),
         print_(exec),
         gaussians_(exec),
         moments_(exec),
@@ -201,7 +202,7 @@ class ray_tracer {
   template <class P>
   void launch(char const* label, ray_batch const& rays, P const& program, float near) {
     trace_batch<Response>(*exec_, label, index_.seen_from(rays.frame), {gaussians_.data(), scene_.count, near},
-                          rays.count(), program);
+                          rays.count(), order_, program);
   }
   template <class P>
   void launch(char const* label, ray_batch const& rays, P const& program) {
@@ -217,6 +218,8 @@ class ray_tracer {
     require_rays(*exec_, rays, options.near);
     near_ = options.near;
     stand_at(rays.frame, options);
+    world_view const tree = index_.seen_from(rays.frame);
+    order_.make(*exec_, rays, tree.tree, tree.shift);
   }
   // The tree over the Gaussians as they are, and the Gaussians in that frame.
   void stand_at(vec3d const& frame, render_options const& options) {
@@ -302,6 +305,7 @@ class ray_tracer {
   u64 number_ = 0;       // of the scene; 0: none
   u64 scene_print_ = 0;  // of its parameters
   world_index<E, Response> index_;
+  ray_order<E> order_;  // of the last batch; of as many rays it is one too
   fingerprint<E> print_;
   bool index_is_old_ = true, records_are_old_ = true;
   int age_ = 0;

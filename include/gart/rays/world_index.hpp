@@ -7,7 +7,7 @@
 ///
 /// Cost: as bvh_tracer's, once a model in place of once a view: on hosts about 0.15 s a million Gaussians and core.
 
-#include <gart/bvh/walk.hpp>
+#include <gart/rays/ray_order.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 
 namespace gart { inline namespace GART_ISA {
@@ -17,19 +17,20 @@ struct world_view {
   bvh_view tree;     ///< over the ellipsoids' boxes, in the index's frame
   vec3d shift{0.0};  ///< the rays' frame, relative to the index's
 
-  /// A ray as the tree's boxes are tested against it. Its hit lies where float arithmetic in the rays' frame puts it:
-  /// 32 roundings of what it is computed from, as ellipsoid_box has them, and of how the ray comes to this frame.
-  GART_HD GART_INLINE slab_ray slab_of(ray const& r) const {
+  /// A ray in the tree's frame. Its hit lies where float arithmetic in the rays' frame puts it: 32 roundings of what it
+  /// is computed from, as ellipsoid_box has them, and of how the ray comes to this frame.
+  GART_HD GART_INLINE placed_ray place(ray const& r) const {
     vec3 const o = r.origin;
-    vec3 const moved(static_cast<float>(shift.x + o.x), static_cast<float>(shift.y + o.y),
-                     static_cast<float>(shift.z + o.z));
-    slab_ray out(ray{moved, r.direction});
+    placed_ray out = gart::place(
+        ray{{static_cast<float>(shift.x + o.x), static_cast<float>(shift.y + o.y), static_cast<float>(shift.z + o.z)},
+            r.direction});
     float const way =
         fabsf(static_cast<float>(shift.x)) + fabsf(static_cast<float>(shift.y)) + fabsf(static_cast<float>(shift.z));
-    float const pad = -4e-6f * (way + fabsf(o.x) + fabsf(o.y) + fabsf(o.z));
-    for (int k = 0; k < 3; ++k) out.narrower[k] += pad * fabsf(out.inverse[k]);
+    out.pad += 4e-6f * (way + fabsf(o.x) + fabsf(o.y) + fabsf(o.z));
     return out;
   }
+  /// The same for the walk of one ray.
+  GART_HD GART_INLINE slab_ray slab_of(ray const& r) const { return slab_ray(place(r)); }
 };
 
 /// The tree and its memory.
@@ -72,44 +73,13 @@ class world_index {
   float alpha_min_ = 0;
 };
 
-namespace ray_kernels {
-
-// What a ray still looks for, cut at where it ends.
-template <class Visitor>
-struct up_to {
-  Visitor& visitor;
-  float end;
-  GART_HD GART_INLINE float near() const { return visitor.near(); }
-  GART_HD GART_INLINE float far() const { return smaller(visitor.far(), end); }
-  GART_HD GART_INLINE void leaf(u32 id) { visitor.leaf(id); }
-};
-
-template <class Response, int Capacity, ray_program P>
-struct walk_batch {
-  static constexpr int block_size = 128, min_blocks = 1;
-  world_view index;
-  traced_scene scene;
-  P program;
-  GART_KERNEL void operator()(index_t i) const {
-    if (!program.active(i)) return;
-    trace_windows<Capacity, Response>(scene, program, i, [this, i](ray const& r, auto& visitor) {
-      up_to<std::remove_reference_t<decltype(visitor)>> limited{visitor, program.far(i)};
-      walk(index.tree, index.slab_of(r), limited);
-    });
-  }
-};
-
-}  // namespace ray_kernels
-
 /// Feeds `program` the hits of rays 0 to `rays`. `scene` has the Gaussians in the frame of the rays, which are the
 /// program's: of type `ray`, with an end far(i).
 template <class Response, execution E, ray_program P>
 void trace_batch(E& exec, char const* label, world_view const& index, traced_scene const& scene, index_t rays,
-                 P const& program) {
+                 ray_order<E>& order, P const& program) {
   static_assert(std::same_as<typename P::ray_type, ray>);
-  // Hits of a ray that are kept at a time: in registers of a device; on hosts so many that few rays are walked twice.
-  constexpr int window = E::device ? 16 : 64;
-  parallel_for(exec, label, rays, ray_kernels::walk_batch<Response, window, P>{index, scene, program});
+  trace_beams<Response>(exec, label, index, scene, rays, order.of(rays), order.apart, program);
 }
 
 }}  // namespace gart::GART_ISA

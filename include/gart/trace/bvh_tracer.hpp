@@ -1,14 +1,13 @@
 #pragma once
 /// \file
-/// The traverser on gart's own BVH, on every policy: one ray a thread, a window of the nearest hits, resumed until the
-/// ray ends. prepare() fits the tree to the Gaussians of a frame: built anew, or refitted when their number has not
-/// changed and trace_options.rebuild_every says so.
+/// The traverser on gart's own BVH, on every policy: rays of 8 x 4 pixels go through the tree as one beam
+/// (trace/beam_walk.hpp). prepare() fits the tree to the Gaussians of a frame: built anew, or refitted when their
+/// number has not changed and trace_options.rebuild_every says so.
 
-#include <gart/bvh/walk.hpp>
 #include <gart/camera/pixel_rays.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/scene/parameters.hpp>
-#include <gart/trace/k_buffer_visitor.hpp>
+#include <gart/trace/beam_walk.hpp>
 #include <gart/trace/tracer.hpp>
 
 namespace gart { inline namespace GART_ISA {
@@ -26,19 +25,6 @@ struct bound_ellipsoids {
   }
 };
 
-template <class Response, int Capacity, ray_program P>
-struct walk_rays {
-  static constexpr int block_size = 128, min_blocks = 1;
-  bvh_view tree;
-  traced_scene scene;
-  P program;
-  GART_KERNEL void operator()(index_t i) const {
-    if (!program.active(i)) return;
-    trace_windows<Capacity, Response>(scene, program, i,
-                                      [this](auto const& r, auto& visitor) { walk(tree, r, visitor); });
-  }
-};
-
 }  // namespace trace_kernels
 
 /// Response: what the scene's Gaussians are (math/response.hpp).
@@ -49,7 +35,9 @@ class bvh_tracer : public tracer_base {
   static constexpr char const* name = "bvh";  ///< as requests have it
 
   /// Allocates nothing; `exec` must outlive it.
-  explicit bvh_tracer(E& exec) : rays_(exec), boxes_(exec), tree_(exec) { static_assert(tracer<bvh_tracer, E>); }
+  explicit bvh_tracer(E& exec) : rays_(exec), boxes_(exec), tree_(exec), apart_(exec) {
+    static_assert(tracer<bvh_tracer, E>);
+  }
 
   /// View: a camera or a camera model.
   template <class View>
@@ -77,17 +65,17 @@ class bvh_tracer : public tracer_base {
   /// Feeds `program` the hits of rays 0 to `rays`; `label` names the launch in profiles.
   template <ray_program P>
   void trace(E& exec, char const* label, index_t rays, P const& program) {
-    parallel_for(exec, label, rays, trace_kernels::walk_rays<Response, window, P>{tree_.view(), scene_, program});
+    trace_beams<Response>(exec, label, frame_index{tree_.view()}, scene_, rays, nullptr, apart_, program);
   }
 
   /// Over the ellipsoids' boxes, in the view's frame.
   bvh<E> const& tree() const { return tree_; }
 
  private:
-  static constexpr int window = 16;  // hits of a ray that are kept at a time
   camera_rays<E> rays_;
   buffer<box, E> boxes_;
   bvh<E> tree_;
+  buffer<u32, E> apart_;  // of the walk
   traced_scene scene_;
   int age_ = 0;
 };

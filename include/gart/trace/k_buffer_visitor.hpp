@@ -34,19 +34,24 @@ struct k_buffer_visitor {
   }
 };
 
-/// Feeds `program` the hits of ray i; `gather` proposes candidates to the visitor (at least all whose hits lie in
-/// [near(), far()]) and is called again until a window is not full. A program may have a near(i) of its own for each
-/// ray, at least the scene's.
-template <int Capacity, class Response = generalized_gaussian<>, ray_program P, class Gather>
-GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& program, index_t i, Gather const& gather) {
-  auto state = program.begin(i);
-  auto const r = program.ray_of(i, state);
-  k_buffer_visitor<Capacity, std::remove_const_t<decltype(r)>, Response> visitor(scene, r);
-  if constexpr (requires { program.near(i); }) visitor.last_t = program.near(i);
+/// Where ray i begins: at its program's near(i), where it has one, which is at least the scene's; else at the scene's.
+template <class P>
+GART_HD GART_INLINE float start_of_ray(traced_scene const& scene, P const& program, index_t i) {
+  if constexpr (requires { program.near(i); })
+    return program.near(i);
+  else
+    return scene.near;
+}
+
+/// Feeds `program` the hits of ray i that follow the visitor's last; `gather` proposes candidates to the visitor (at
+/// least all whose hits lie in [near(), far()]) and is called again until a window is not full.
+template <int Capacity, class Ray, class Response, ray_program P, class Gather>
+GART_HD GART_INLINE void trace_on(k_buffer_visitor<Capacity, Ray, Response>& visitor, P const& program,
+                                  typename P::state& state, Gather const& gather) {
   bool more = true;
   while (more) {
     visitor.window.clear();
-    gather(r, visitor);
+    gather(visitor.ray, visitor);
     more = visitor.window.full();
     GART_UNROLL
     for (int k = 0; k < Capacity; ++k) {
@@ -59,6 +64,16 @@ GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& progr
       }
     }
   }
+}
+
+/// The same from the first hit on.
+template <int Capacity, class Response = generalized_gaussian<>, ray_program P, class Gather>
+GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& program, index_t i, Gather const& gather) {
+  auto state = program.begin(i);
+  auto const r = program.ray_of(i, state);
+  k_buffer_visitor<Capacity, std::remove_const_t<decltype(r)>, Response> visitor(scene, r);
+  visitor.last_t = start_of_ray(scene, program, i);
+  trace_on(visitor, program, state, gather);
   program.end(i, state);
 }
 

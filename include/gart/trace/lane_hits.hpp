@@ -1,0 +1,89 @@
+#pragma once
+/// \file
+/// The hits of each ray of a beam (trace/beam_walk.hpp) that have been found and not yet passed on, sorted by (t, id):
+/// a ring of Capacity a lane in the memory that the lanes share. One that has no room loses the farthest, and what
+/// is passed on from then on lies before the nearest hit that was lost.
+
+#include <gart/trace/hit.hpp>
+#include <gart/trace/lane_values.hpp>
+
+namespace gart { inline namespace GART_ISA {
+
+/// The memory of all lanes.
+template <int Capacity>
+struct lane_hits {
+  static constexpr int count = Capacity * beam_lanes;  ///< of hits
+  float t[count];                                      ///< distances
+  u32 id[count];                                       ///< Gaussians
+  float alpha[count];                                  ///< opacities
+
+  /// Of hit k of a lane: a bank a lane on a device, side by side on a host.
+  GART_HD GART_INLINE static int place(int k, int lane) {
+#if defined(__CUDA_ARCH__)
+    return k * beam_lanes + lane;
+#else
+    return lane * Capacity + k;
+#endif
+  }
+  /// The hit there.
+  GART_HD GART_INLINE hit at(int place) const { return {t[place], id[place], alpha[place]}; }
+  /// Puts one there.
+  GART_HD GART_INLINE void put(int place, hit const& h) { t[place] = h.t, id[place] = h.id, alpha[place] = h.alpha; }
+};
+
+/// One lane's ring.
+template <int Capacity>
+class hits_of_lane {
+  static constexpr float infinity = __builtin_huge_valf();
+
+ public:
+  /// Empties it.
+  GART_HD GART_INLINE void clear() { first_ = count_ = 0, lost_t_ = infinity, lost_id_ = 0xffffffffu; }
+  GART_HD int size() const { return count_; }               ///< hits in it
+  GART_HD float lost_t() const { return lost_t_; }          ///< of the nearest hit that was lost; infinity: none
+  GART_HD bool lost() const { return lost_t_ < infinity; }  ///< whether one was
+
+  /// Takes a hit, or loses the farthest.
+  GART_HD GART_INLINE void insert(lane_hits<Capacity>& memory, int lane, hit const& h) {
+    if (lost() && !before(h.t, h.id, lost_t_, lost_id_)) return;
+    if (count_ == Capacity) {
+      hit const farthest = memory.at(place(count_ - 1, lane));
+      bool const fits = before(h.t, h.id, farthest.t, farthest.id);
+      lost_t_ = fits ? farthest.t : h.t, lost_id_ = fits ? farthest.id : h.id;
+      if (!fits) return;
+      --count_;
+    }
+    int k = count_++;
+    for (; k > 0; --k) {
+      int const from = place(k - 1, lane);
+      if (!before(h.t, h.id, memory.t[from], memory.id[from])) break;
+      memory.put(place(k, lane), memory.at(from));
+    }
+    memory.put(place(k, lane), h);
+  }
+
+  /// Whether the nearest may be passed on, where no other is to be found before `bound`.
+  GART_HD GART_INLINE bool ready(lane_hits<Capacity> const& memory, int lane, float bound) const {
+    if (count_ == 0) return false;
+    int const at = place(0, lane);
+    return memory.t[at] < bound && (!lost() || before(memory.t[at], memory.id[at], lost_t_, lost_id_));
+  }
+  /// Takes the nearest off.
+  GART_HD GART_INLINE hit pop(lane_hits<Capacity> const& memory, int lane) {
+    hit const h = memory.at(place(0, lane));
+    first_ = first_ + 1 == Capacity ? 0 : first_ + 1, --count_;
+    return h;
+  }
+
+ private:
+  GART_HD GART_INLINE int place(int k, int lane) const {
+    int const at = first_ + k;
+    return lane_hits<Capacity>::place(at >= Capacity ? at - Capacity : at, lane);
+  }
+
+  int first_, count_;
+  float lost_t_;
+  u32 lost_id_;
+};
+
+}}  // namespace gart::GART_ISA
