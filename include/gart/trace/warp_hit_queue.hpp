@@ -45,6 +45,7 @@ class warp_hit_queue {
   static constexpr int lanes = 32;
   static constexpr int window = 14;  // `order_` has room for 16
   static constexpr int run = window - 1, runs = 14;
+  static constexpr int last = 4;
   static_assert(run < 16 && runs < 16);  // `left_` has 4 bits a run; free_run: some of them are always zero
   static constexpr float infinity = __builtin_huge_valf();
   static constexpr u64 numbers = 0x00dcba9876543210ull;  // what lies past the window's is never taken
@@ -72,7 +73,7 @@ class warp_hit_queue {
   __device__ GART_INLINE void clear() {
     order_ = numbers, count_ = 0;
     GART_UNROLL
-    for (int k = 0; k < window; ++k) word(time, k) = -infinity;
+    for (int k = 0; k < last; ++k) last_t_[k] = -infinity;
     left_ = 0, next_t_ = infinity, next_run_ = 0;
     lost_t_ = infinity, lost_key_ = 0;
     GART_UNROLL
@@ -161,6 +162,7 @@ class warp_hit_queue {
     if (!fits) return false;
     order_ = (order_ >> 4 & first_numbers(window - 1)) | u64(farthest) << (4 * (window - 1));
     --count_;
+    find_last();
     return true;
   }
 
@@ -175,28 +177,35 @@ class warp_hit_queue {
     order_ = (order_ & low) | u64(slot) << bits | (order_ & ~low) << 4;
   }
 
-  // How many hits of the window come after h. From the back, where most belong, four at a time: shared memory is waited
-  // for once. What a free slot still holds has been passed on and comes before, or is -infinity.
-  __device__ GART_INLINE int hits_behind(waiting_hit const& h) const {
+  // How many hits of the window come after h. Most belong behind all but a few, whose t are in registers; what has been
+  // passed on and still stands there comes before.
+  __device__ GART_INLINE int hits_behind(waiting_hit const& h) {
     int behind = 0;
-    for (u64 rest = order_; behind < window / 4 * 4; rest >>= 16) {
-      int farther = 0;
-      bool tied = false;
-      GART_UNROLL
-      for (int k = 0; k < 4; ++k) {
-        float const t = word(time, static_cast<int>(rest) >> (4 * k) & 15);
-        farther += t > h.t, tied |= t == h.t;
+    bool tied = false;
+    GART_UNROLL
+    for (int k = 0; k < last; ++k) {
+      behind = h.t < last_t_[k] ? k + 1 : behind, tied |= h.t == last_t_[k];
+    }
+    float t = h.t;
+    GART_UNROLL
+    for (int k = 0; k < last; ++k) {
+      float const farther = fmaxf(t, last_t_[k]);
+      t = fminf(t, last_t_[k]), last_t_[k] = farther;
+    }
+    if (tied) behind = 0;
+    if (tied | (behind == last))
+      for (; behind < count_; ++behind) {
+        int const other = slot_from_back(behind);
+        float const t = word(time, other);
+        if (t < h.t || (t == h.t && !before_(h.key, key_at(other)))) break;
       }
-      if (tied) break;
-      behind += farther;
-      if (farther < 4) return behind;
-    }
-    for (; behind < count_; ++behind) {
-      int const other = slot_from_back(behind);
-      float const t = word(time, other);
-      if (t < h.t || (t == h.t && !before_(h.key, key_at(other)))) break;
-    }
     return behind;
+  }
+
+  // The same registers for the hits that the window has.
+  __device__ GART_INLINE void find_last() {
+    GART_UNROLL
+    for (int k = 0; k < last; ++k) last_t_[k] = k < count_ ? word(time, slot_from_back(k)) : -infinity;
   }
 
   __device__ GART_INLINE waiting_hit at(int slot) const {
@@ -225,13 +234,13 @@ class warp_hit_queue {
     for (int k = 0; k < count; ++k, rest >>= 4) {
       int const slot = static_cast<int>(rest) & 15;
       waiting_hit const h = at(slot);
-      word(time, slot) = -infinity;
       out -= 3;
       out[0] = {h.t, bits_to_float(h.key)}, out[1] = {h.alpha, h.shown.x}, out[2] = {h.shown.y, h.shown.z};
       first = h.t;
     }
     u64 const spilled = first_numbers(count);
     order_ = (order_ & ~(spilled << 4 | 15)) | (order_ & spilled) << 4 | u64(kept), count_ = 1;
+    find_last();
     left_ |= u64(count) << (4 * to);
     set_first(to, first);
   }
@@ -268,6 +277,7 @@ class warp_hit_queue {
   KeyOrder before_;
   u64 order_, left_;
   int count_;
+  float last_t_[last];  // of the window's farthest hits, the farthest first
   float first_t_[runs], next_t_, lost_t_;
   int next_run_;
   u32 lost_key_;
