@@ -122,6 +122,7 @@ TEST_CASE_TEMPLATE("responses, their cut-offs and slopes against double", Respon
     // What is off is the exponent, by two roundings or so.
     worst_response =
         std::max(worst_response, std::fabs(Response::response(d2) / std::exp(exponent) - 1) / (1 - exponent));
+    CHECK(Response::estimated_response(d2) == Response::response(d2));  // on a host
     worst_slope = std::max(worst_slope, std::fabs(Response::slope(d2) * radius * radius / (-n * exponent) - 1));
   }
   for (double ratio = 1; ratio < 1e12; ratio *= 1.01) {

@@ -277,7 +277,7 @@ struct gather_kernel {
     vec3 const opaque = entry.color();
     float opaque_g = opaque.x * g.v[0] + opaque.y * g.v[1] + opaque.z * g.v[2];
     if constexpr (C::terms::depth) opaque_g += entry.depth * at.last.v[2];
-    float const alpha = hit_alpha<response_type>(data.gaussian, r.d2);
+    float const alpha = estimated_hit_alpha<response_type>(data.gaussian, r.d2);
     float const by_alpha = alpha_gradient(opaque_g, at.direction_total.v[3], alpha);
     moments_of<float> m;
     if constexpr (C::terms::depth)

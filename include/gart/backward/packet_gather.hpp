@@ -158,7 +158,7 @@ struct packet_gather {
       packet_entries const e = found[i].slots.template read<C::terms::geometry>(gather.slots, hit);
       // Geometry first: colour's work hides the latency of its chain of steps.
       if constexpr (C::terms::geometry) {
-        lanes const alpha = hit_alpha<response_type>(g, r.d2);
+        lanes const alpha = estimated_hit_alpha<response_type>(g, r.d2);
         lanes opaque_g = dot(e.opaque, at.gradient);
         if constexpr (C::terms::depth)
           opaque_g += found[i].slots.read_depths(gather.depth.slots, hit) * at.depth_gradient[0];

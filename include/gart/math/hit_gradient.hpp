@@ -92,7 +92,7 @@ struct hit_terms {
 template <class Response, class F, class Mask>
 GART_HD GART_INLINE hit_terms<F> terms_of_hit(ray_gaussian const& gaussian, ray_peak_of<F> const& r, F alpha_gradient,
                                               Mask hit) {
-  F const raw = unclamped_alpha<Response>(gaussian, r.d2), zero = 0.0f;
+  F const raw = estimated_unclamped_alpha<Response>(gaussian, r.d2), zero = 0.0f;
   F const a = select(both(hit, raw < F(alpha_max)), raw * alpha_gradient, zero);
   F const b = select(hit, a * Response::slope(r.d2), zero);
   vec3_of<F> const offset = offset_of(r);

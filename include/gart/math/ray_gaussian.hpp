@@ -228,17 +228,39 @@ GART_HD GART_INLINE auto is_hit(ray_gaussian const& g, ray_peak_of<F> const& r, 
   return both(r.d2 <= F(g.cutoff), r.t > F(near));
 }
 
+namespace detail {
+
+template <class F>
+GART_HD GART_INLINE F clamped_alpha(F a) {
+  return select(a < F(alpha_max), a, F(alpha_max));
+}
+
+}  // namespace detail
+
+///@{
 /// Of the squared offset at a hit, r.d2.
 template <class Response = generalized_gaussian<>, class F>
 GART_HD GART_INLINE F unclamped_alpha(ray_gaussian const& g, F d2) {
   return mul(F(g.sigma), Response::response(d2));
 }
+/// For its gradient.
+template <class Response = generalized_gaussian<>, class F>
+GART_HD GART_INLINE F estimated_unclamped_alpha(ray_gaussian const& g, F d2) {
+  return mul(F(g.sigma), Response::estimated_response(d2));
+}
+///@}
 
+///@{
 /// What a hit blends with: at most alpha_max.
 template <class Response = generalized_gaussian<>, class F>
 GART_HD GART_INLINE F hit_alpha(ray_gaussian const& g, F d2) {
-  F const a = unclamped_alpha<Response>(g, d2);
-  return select(a < F(alpha_max), a, F(alpha_max));
+  return detail::clamped_alpha(unclamped_alpha<Response>(g, d2));
 }
+/// For its gradient.
+template <class Response = generalized_gaussian<>, class F>
+GART_HD GART_INLINE F estimated_hit_alpha(ray_gaussian const& g, F d2) {
+  return detail::clamped_alpha(estimated_unclamped_alpha<Response>(g, d2));
+}
+///@}
 
 }}  // namespace gart::GART_ISA

@@ -9,6 +9,7 @@
 /// |p|^2:
 ///   response(d2)   rho
 ///   cutoff(ratio)  the largest |p|^2 with sigma rho >= alpha_min, ratio = sigma / alpha_min >= 1
+///   estimated_response(d2)  the same for a gradient, which decides no hit: on a device by its estimate
 ///   slope(d2)      -2 d ln rho / d |p|^2 = n (4.5 / 3^n) |p|^(n-2), what a hit's moments are weighted with
 ///                  (math/hit_gradient.hpp); 1 for n = 2
 /// All but cutoff take a float or lanes of them. They decide hits: fixed arithmetic (math/arith.hpp), powers by
@@ -32,6 +33,7 @@ concept response_function = requires(float x) {
   { R::response(x) } -> std::same_as<float>;
   { R::cutoff(x) } -> std::same_as<float>;
   { R::slope(x) } -> std::same_as<float>;
+  { R::estimated_response(x) } -> std::same_as<float>;
 };
 
 /// A response: exp(s |p|^n), n the degree.
@@ -45,6 +47,12 @@ struct generalized_gaussian {
   template <class F>
   GART_HD GART_INLINE static F response(F d2) {
     return exponential(mul(F(-scale), power(d2)));
+  }
+
+  /// The same where it decides no hit.
+  template <class F>
+  GART_HD GART_INLINE static F estimated_response(F d2) {
+    return estimated_exponential_of(mul(F(-scale), power(d2)));
   }
 
   /// The largest |p|^2 of a hit; ratio: sigma / alpha_min.

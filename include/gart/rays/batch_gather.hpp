@@ -129,7 +129,7 @@ struct sum_piece {
     }
     ray_peak const r = evaluate(gaussian, from.own());
     float const opaque_g = opaque.x * g.x + opaque.y * g.y + opaque.z * g.z + depths[place] * from.by_depth;
-    float const by_alpha = alpha_gradient(opaque_g, from.total, hit_alpha<Response>(gaussian, r.d2));
+    float const by_alpha = alpha_gradient(opaque_g, from.total, estimated_hit_alpha<Response>(gaussian, r.d2));
     moments_of<float> const m = hit_moments_with_depth<Response>(gaussian, r, by_alpha, w * from.by_depth, true);
     GART_UNROLL
     for (int i = 0; i < error_place; ++i) moment[i] += m.v[i];

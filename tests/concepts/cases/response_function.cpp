@@ -8,6 +8,10 @@ struct bump {
   static F response(F d2) {
     return (F(1.0f) - d2 / F(9.0f)) * (F(1.0f) - d2 / F(9.0f));
   }
+  template <class F>
+  static F estimated_response(F d2) {
+    return response(d2);
+  }
   static float cutoff(float ratio) { return 9.0f * (1.0f - gart::square_root(gart::reciprocal(ratio))); }
 #ifdef GART_WHOLE
   template <class F>
