@@ -31,6 +31,7 @@ class path_tracer {
   /// Allocates nothing; `exec` must outlive it.
   explicit path_tracer(E& exec)
       : exec_(&exec),
+        order_(exec),
         placed_(exec),
         index_(exec),
         gaussians_(exec),
@@ -100,7 +101,7 @@ class path_tracer {
     cast(0, false, 0);
     end_segments();
     trace_batch<Response>(*exec_, "light/layers", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f},
-                          pixels_,
+                          pixels_, order_,
                           light_kernels::layer_segment{{}, paths_.data(), ends_.data(), colors(), options_, out});
     parallel_for(*exec_, "light/layers", pixels_,
                  light_kernels::add_surface_layers{placed_.stand_at(frame_), paths_.data(), ends_.data(), out});
@@ -194,7 +195,7 @@ class path_tracer {
   template <bool PerHit>
   void blend(u32 sample, u32 step) {
     trace_batch<Response>(*exec_, "light/gaussians", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f},
-                          pixels_,
+                          pixels_, order_,
                           light_kernels::segment<PerHit>{{},
                                                          paths_.data(),
                                                          ends_.data(),
@@ -214,10 +215,11 @@ class path_tracer {
                                              paths_options_.seed, sample, step});
     trace_batch<Response>(
         *exec_, "light/transmittance", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f}, pixels_,
-        light_kernels::shadow_segment{{}, shadows_.data(), paths_.data(), options_.transmittance_min});
+        order_, light_kernels::shadow_segment{{}, shadows_.data(), paths_.data(), options_.transmittance_min});
   }
 
   E* exec_;
+  ray_order<E> order_;  // of no batch: paths stay in the order of their pixels
   light_kernels::placed_scene<E> placed_;
   gaussians_view<float const> model_;
   int active_degree_ = 0;
