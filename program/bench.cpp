@@ -32,7 +32,7 @@ double median(std::vector<double> values) {
   return n == 0 ? 0 : n % 2 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
 }
 
-// A capture of one view whose truth is noise, so that every pixel has a gradient.
+// A capture of one view. Its photograph is noise, so that every pixel has a gradient.
 gart::dataset noise_capture(gart::named_camera const& camera) {
   gart::dataset data;
   gart::dataset_view view;

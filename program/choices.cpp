@@ -43,7 +43,7 @@ gart::chosen<std::string> sizes_in_words(gart::dataset const& data, gart::train_
           "few and large Gaussians need no more pixels"};
 }
 
-// Of a setting that has an option of its own; null for those of --set.
+// The option of a setting; null for those of --set.
 std::string* option_of(train_arguments& a, std::string const& setting) {
   return setting == "exposure" ? &a.exposure : setting == "vignetting" ? &a.vignetting : nullptr;
 }
@@ -115,7 +115,7 @@ nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const&
 nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::validation_progress const& progress) {
   gart::train_options const options = train_options_of(a);
   std::vector<gart::candidate> candidates;
-  if (a.automatic) candidates = gart::usual_candidates(gart::inspect(data), options);
+  if (a.automatic) candidates = gart::default_candidates(gart::inspect(data), options);
   std::erase_if(candidates, [&](gart::candidate const& c) {
     std::string const* const own = option_of(a, c.setting);
     return own ? *own != "auto" : sets_field(a.set, c.setting);
@@ -151,7 +151,7 @@ void settle(train_arguments& a, nlohmann::json const& measured, nlohmann::json& 
     say((own ? "--" : "--set ") + setting + " " + value, t["taken"] ? "taken" : "left",
         (gain < 0 ? "" : "+") + fixed(gain, 2) + " dB, give or take " + fixed(t["noise"].get<double>(), 2));
   }
-  // What nothing was measured of is as the literature has it.
+  // Settings that were not measured keep the literature's values.
   for (auto const& [own, usual] : {std::pair{&a.exposure, "off"}, {&a.vignetting, "off"}, {&a.densify, "error"}})
     if (*own == "auto") *own = usual;
 }

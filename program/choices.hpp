@@ -1,6 +1,6 @@
 #pragma once
-// What the program settles for a capture where the command line leaves it open, each with its reason: said at the start
-// of a run and kept under "chosen" in config.json, metrics.json and report.html.
+// The settings that the program chooses for a capture where the command line leaves them open, each with its reason. A
+// run prints them at its start, and keeps them under "chosen" in config.json, metrics.json and report.html.
 
 #include "train/train_arguments.hpp"
 
@@ -19,7 +19,7 @@ gart::chosen<std::string> background_for(gart::capture_traits const& traits);
 // given, "why" says so.
 nlohmann::json choose(train_arguments& a, gart::dataset const& data);
 
-// What a run that is resumed had chosen, as its config.json has it; `now` where that does not say.
+// The choices of a resumed run, from its config.json; `now` where that does not say.
 nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const& now);
 
 // Tries in short trainings what the command line leaves open (gart/runtime/validation.hpp): how, and each trial.

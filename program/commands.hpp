@@ -1,12 +1,12 @@
 #pragma once
-// The commands of the `gart` program. Each add_* puts one subcommand with its options and help on the app, and has the
-// subcommand, when the user names it, leave what is to be run in `selected`; main runs it after the whole command line
-// has been understood, so that no command starts work on a line with a mistake in it.
+// The commands of the `gart` program. Each add_* adds one subcommand with its options and help to the app. When the
+// user names the subcommand, it sets `selected`. main runs that after it has parsed the whole command line, so no
+// command starts work on a line with a mistake.
 //
 //   void add_thing(CLI::App& app, command& selected) {
 //     auto options = std::make_shared<thing_options>();
 //     CLI::App* thing = app.add_subcommand("thing", "One sentence: what it does.");
-//     thing->add_option("--out", options->out, "Folder that the thing goes to")->required();
+//     thing->add_option("--out", options->out, "Folder for the thing")->required();
 //     thing->footer("Writes ...\n\nExamples:\n  gart thing --out here\n");
 //     thing->callback([options, &selected] { selected = [options] { return run_thing(*options); }; });
 //   }

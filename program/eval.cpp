@@ -47,7 +47,7 @@ void refuse_other_images(fs::path const& pairs, std::vector<gart::dataset_view> 
   }
 }
 
-// Those of this rank's.
+// This rank's share.
 gart::some_views dealt(gart::some_views const& views) {
   gart::some_views mine;
   for (std::size_t i = 0; i < views.size(); ++i)

@@ -18,7 +18,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(train_options, background), "--background"},
       {GART_CLI_FIELD(train_options, exposure), "--exposure"},
       {GART_CLI_FIELD(train_options, vignetting), "--vignetting"},
-      {GART_CLI_FIELD(train_options, lt_budget), "--lt-budget"},
+      {GART_CLI_FIELD(train_options, hit_memory), "--hit-memory"},
       {GART_CLI_FIELD(split_shape, offset), "--set error.split.offset"},
       {GART_CLI_FIELD(split_shape, opacity), "--set error.split.opacity"},
       {GART_CLI_FIELD(render_options, alpha_min), "--alpha-min"},

@@ -19,8 +19,8 @@ std::vector<field_name> const& field_names();
 // "train_options.seed" to "--seed"; empty where there is no such field.
 std::string option_of(std::string_view field);
 
-// A message of the library as the program shows it: each field as its option, `field = value` as `--option value`. One
-// that the command has not, by has("--option"), is shown as of gart train, which left the model.
+// A message of the library with each field as its option, and `field = value` as `--option value`. One that the command
+// has not, by has("--option"), is shown as of gart train, which left the model.
 std::string in_options(std::string_view message, std::function<bool(std::string const&)> const& has = {});
 
 }  // namespace gart_cli

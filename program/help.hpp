@@ -15,7 +15,7 @@ namespace gart_cli {
 class help_formatter : public CLI::Formatter {
  public:
   help_formatter() { column_width(34); }
-  // Of a command with many options: --help shows the common ones, --help-all all of them and `more`.
+  // For a command with many options: --help shows the common ones, --help-all all and `more`.
   help_formatter(std::vector<std::string> common, std::string more)
       : common_(std::move(common)), more_(std::move(more)) {
     column_width(34);

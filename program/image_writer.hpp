@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Writes PNG files beside whoever makes the images: to compress one takes longer than to render it. As many at a time
-/// as there are processors, and no more images than that wait. The first error is thrown by the next png() or by
-/// finish(), which must be called last.
+/// Writes PNG files in threads of its own: compressing an image takes longer than rendering it. As many at a time as
+/// there are processors, and no more images than that wait. The first error is thrown by the next png() or by finish(),
+/// which must be called last.
 
 #include <gart/io/image_file.hpp>
 

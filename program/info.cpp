@@ -56,7 +56,7 @@ void print_links(int devices) {
 }
 #endif
 
-// Where each rank is and what it would train on, alike for two that share a GPU; none where no launcher started any.
+// The host and device of each rank, the same for two that share a GPU; empty where no launcher started ranks.
 std::vector<std::string> places_of_ranks() {
 #if defined(GART_WITH_MPI)
   if (gart::mpi_comm const* const all = ranks::comm()) {

@@ -1,5 +1,5 @@
 #pragma once
-// The models that a viewer may open in place of the one that it was started with, and what their runs say of them.
+// The models that a viewer may open in place of its first one, and the scores in their runs' files.
 
 #include <gart/io/dataset.hpp>
 
@@ -10,7 +10,7 @@
 
 namespace gart_cli {
 
-// By their names' endings: those in the model's folder, and where it is of a run the models of the runs beside it.
+// Finds models by their endings: those in the model's folder, and for a run's model those of the runs beside it.
 class model_choice {
  public:
   explicit model_choice(std::filesystem::path const& model);
@@ -24,8 +24,8 @@ class model_choice {
   int first_ = 0;
 };
 
-// PSNR of views, by their place among all of the capture (training views first), from the metrics.json beside a model;
-// none where there is no such file, or views of other names.
+// PSNR of views, by their index in the capture (training views first), from the metrics.json beside a model. Empty
+// without such a file, or if its views have other names.
 std::vector<std::pair<int, double>> scores_of_run(std::filesystem::path const& model, gart::dataset const& data);
 
 }  // namespace gart_cli

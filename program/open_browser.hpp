@@ -6,9 +6,8 @@
 
 namespace gart_cli {
 
-// While it exists there is a file, for this user alone, that leads to the address: the command line of a browser can be
-// read by all users, and an address is a key. Where there is no display or no browser, `said` tells so and nothing else
-// happens.
+// While it exists, a file that only this user can read leads to the address. All users can read a browser's command
+// line, and the address is a key. Where there is no display or no browser, `said` tells so and nothing else happens.
 class opened_browser {
  public:
   explicit opened_browser(std::string const& address);

@@ -2,7 +2,6 @@
 
 #include "printable.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 

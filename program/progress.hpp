@@ -1,6 +1,6 @@
 #pragma once
-// What a command says while it works, on stderr: one line that is rewritten where that is a terminal, else a plain line
-// for each tenth of the work or half minute.
+// A command's progress on stderr. On a terminal one line is rewritten; else there is a line for each tenth of the work
+// or half minute.
 
 #include <chrono>
 #include <cstdint>

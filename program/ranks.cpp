@@ -45,8 +45,8 @@ std::unique_ptr<gart::mpi_comm>& started() {
   return all;
 }
 
-// Where nobody has said how many threads a rank takes: its share of the cores that the launcher lets it run on. Each of
-// several would start a thread a core otherwise, and wait for the others' at every loop.
+// The default number of threads of a rank: its share of the cores that the launcher gives it. Each of several would
+// start a thread a core otherwise, and wait for the others' at every loop.
 #if defined(_OPENMP)
 void share_cores(gart::mpi_comm& all) {
   struct seat {

@@ -1,6 +1,6 @@
 #pragma once
-// The ranks that a launcher (mpirun, srun) started this program as. Rank 0 talks and writes; what one decides by its
-// clock or by a signal all do, because it is agreed on.
+// The ranks that a launcher (mpirun, srun) started this program as. Rank 0 prints and writes. Ranks agree on decisions
+// that depend on a clock or a signal, so all do the same.
 
 #include <gart/core/types.hpp>
 
@@ -24,8 +24,9 @@ class ranks {
 
   static bool const built;  // with MPI
 
-  // Becomes MPI's launcher, which starts this command line as one rank a GPU of this host; returns where `gpus` is 1,
-  // or where a launcher has started them already. usage_error where there are not so many, or no launcher.
+  // Replaces this process by MPI's launcher, which starts this command line as one rank for each of `gpus` GPUs of this
+  // host. Returns if `gpus` is 1, or if a launcher already started the ranks. usage_error where there are fewer GPUs,
+  // or no launcher.
   static void launch_on(int gpus, char** argv);
   // Starts MPI where several were launched, or `wanted` says that one needs it. usage_error where this build has none.
   static void start(bool wanted);
@@ -33,7 +34,7 @@ class ranks {
   static gart::mpi_comm* comm();
   static int size();
   static int rank();
-  // Those of this host, where there are several; else null.
+  // The ranks of this host where there are several; else null.
   static gart::host_group* on_host();
   // Whether this one takes part i of what is dealt out in turn.
   static bool takes(std::size_t i) { return i % static_cast<std::size_t>(size()) == static_cast<std::size_t>(rank()); }
@@ -65,8 +66,8 @@ class ranks {
   // The largest of all.
   static gart::u64 largest(gart::u64 value);
   static void barrier();
-  // After an error of this rank's: ends the others too. Where all have met the same error rank 0 is the one to say so,
-  // for which the others wait a second.
+  // After an error of this rank's: ends the others too. Rank 0 reports an error that all ranks meet; the others wait a
+  // second for that.
   static void wait_to_speak();
   [[noreturn]] static void end_all(int code);
 

@@ -14,12 +14,9 @@
 #include <gart/io/image_file.hpp>
 #include <gart/view/camera_path.hpp>
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <fstream>
-#include <limits>
 #include <memory>
 
 namespace gart_cli {
@@ -40,8 +37,8 @@ struct render_arguments {
   bool depth = false, quiet = false;
 };
 
-// When the path passes its keyframes, from 0 on, where each of the file has a "time" in seconds as the viewer saves it;
-// a closed one ends as long after the last as the others are apart.
+// The times of the path's keyframes, from 0 on, where each in the file has a "time" in seconds, as the viewer saves it.
+// A closed path ends one mean interval after the last.
 std::vector<double> times_of(fs::path const& keyframes, bool closed) {
   std::ifstream file(keyframes);
   nlohmann::json const all = nlohmann::json::parse(file, nullptr, false);
@@ -61,7 +58,7 @@ std::vector<double> times_of(fs::path const& keyframes, bool closed) {
   return times;
 }
 
-// Those of the file, or the frames of the path through those of the other one.
+// The cameras of the file, or the frames of the path through the keyframes' file.
 std::vector<gart::named_camera> cameras_of(render_arguments const& a) {
   if (a.path.empty() == a.cameras.empty())
     throw usage_error(

@@ -1,6 +1,6 @@
 #pragma once
-// The folder of a training run, DIR of `gart train --out DIR`: one program at a time writes there, and what a run
-// replaces is an earlier run's, all of it.
+// The folder of a training run, DIR of `gart train --out DIR`. One program at a time writes there. A run replaces all
+// files of an earlier run, and no others.
 
 #include <filesystem>
 #include <string>
@@ -8,8 +8,8 @@
 namespace gart_cli {
 
 // Holds DIR/.gart.lock (flock) until it is destroyed, and then removes it. A program that dies leaves the file and no
-// lock. Where the file cannot be made nothing is held: what keeps files from being written there is reported by those
-// that write them. io_error, naming the process, where another one holds it.
+// lock. Holds nothing where the file cannot be made: writers report the cause. io_error, naming the process, where
+// another one holds it.
 class run_lock {
  public:
   explicit run_lock(std::filesystem::path const& folder);
@@ -25,7 +25,7 @@ class run_lock {
 // io_error, naming it, for a file that a run would replace where no run of gart's left it.
 void refuse_foreign_files(std::filesystem::path const& folder);
 
-// The background that a model of a run was trained on, by the config.json that lies beside it; empty where none does.
+// The background that a run's model was trained on, from the config.json beside it; empty without one.
 std::string background_of_run(std::filesystem::path const& model);
 
 // What a run that was killed had begun to write, in the folder and its renders/. For who holds the folder's lock.
@@ -33,8 +33,8 @@ void remove_temporary_files(std::filesystem::path const& folder);
 
 // What a run leaves at its end: metrics, the report, the test views' poses and the images of renders/.
 void remove_results(std::filesystem::path const& folder);
-// And what it leaves on its way: the model, its exposures and poses, the checkpoint and the history. config.json stays,
-// lest a run that is being replaced leave a folder that is not known for gart's.
+// Removes the intermediate files too: model, exposures, poses, checkpoint and history. config.json stays, so that the
+// folder is always known as gart's.
 void remove_run(std::filesystem::path const& folder);
 
 }  // namespace gart_cli

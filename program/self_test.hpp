@@ -1,6 +1,6 @@
 #pragma once
-// What `gart info --self-test` does: a small scene through every configuration that runs here, against its image and
-// its gradients by their definition in double (gart/reference/reference.hpp).
+// `gart info --self-test`: compares the image and gradients of a small scene, by every configuration that runs here,
+// with their definition in double (gart/reference/reference.hpp).
 
 namespace gart_cli {
 

@@ -13,7 +13,6 @@
 
 #include <cstdio>
 #include <memory>
-#include <optional>
 
 namespace gart_cli {
 

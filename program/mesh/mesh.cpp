@@ -11,7 +11,6 @@
 #include <gart/runtime/model_file.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <memory>
 

@@ -1,6 +1,6 @@
 #pragma once
-// Where the rays of a view meet the scene: along each ray the hit behind which less than half of the light is left, in
-// the exact order of hits.
+// The distances at which a view's rays meet the scene: along each ray, in exact order, the hit behind which less than
+// half of the light is left.
 
 #include <gart/exec/openmp.hpp>
 #include <gart/render/options.hpp>

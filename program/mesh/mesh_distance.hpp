@@ -1,6 +1,6 @@
 #pragma once
-// How far a mesh is from the one that it should be. Both ways: from the mesh to the reference, and from what the
-// cameras see of the reference to the mesh; what no camera sees no mesh can have.
+// How far a mesh is from the one that it should be. Both ways: from the mesh to the reference, and from the reference's
+// parts that cameras see to the mesh. No mesh can have parts that no camera sees.
 
 #include <gart/io/mesh_file.hpp>
 #include <gart/scene/camera.hpp>

@@ -36,8 +36,8 @@ inline gart::triangle_mesh large_parts(gart::triangle_mesh const& mesh, std::siz
   return out;
 }
 
-// About n points of the surface, evenly by area: of each triangle as many as its area is worth, the rest carried on, at
-// the places of the R2 sequence (Roberts).
+// About n points of the surface, evenly by area. Each triangle gets its share, with the remainder carried on, at the
+// places of the R2 sequence (Roberts).
 inline std::vector<gart::vec3> even_samples(gart::triangle_mesh const& mesh, std::size_t n) {
   auto const corner = [&](std::array<gart::u32, 3> const& t, std::size_t k) {
     return gart::vec3d(mesh.position[t[k]]);

@@ -15,7 +15,7 @@ namespace gart_cli {
 // Lines that a reader can tell apart.
 inline constexpr std::size_t most_compared = 6;
 
-// A finished run, as its folder has it.
+// A finished run, from its folder.
 struct compared_run {
   std::filesystem::path folder;
   std::string name;  // the end of the folder's path, as long as it takes to tell the runs apart
@@ -26,7 +26,7 @@ struct compared_run {
 // What `gart train` left in the folders, in their order. io_error for one that no run finished in.
 std::vector<compared_run> read_runs(std::vector<std::filesystem::path> const& folders);
 
-// A row of options, or of what a run chose, that is not the same in all runs: its name and a value each, "-" for none.
+// An option or choice that differs between runs: its name and a value for each run, "-" for none.
 struct difference {
   std::string name;
   std::vector<std::string> values;

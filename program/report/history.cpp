@@ -61,7 +61,7 @@ void history::restore(std::filesystem::path const& file, int step) {
     }
     return saved[key];
   };
-  // A loss that was not finite is null in the file, and no point of a curve; nor is what no run writes.
+  // A loss that was not finite is null in the file, and no point of a curve. Values that no run writes are none either.
   auto const usable = [step](nlohmann::json const& row, std::size_t columns) {
     return row.is_array() && row.size() == columns &&
            std::all_of(row.begin(), row.end(), [](auto const& v) { return v.is_number(); }) &&

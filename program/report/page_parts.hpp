@@ -1,5 +1,5 @@
 #pragma once
-// What the pages that gart writes share: values of a JSON that may lack them, as HTML; and images inside of the page.
+// Shared by the pages that gart writes: optional JSON values as HTML, and images inside the page.
 
 #include <gart/scene/image.hpp>
 

@@ -30,8 +30,7 @@ struct report_cover {
 };
 report_cover make_report_cover(std::string const& name, gart::image_float const& render);
 
-// The views that the page has room for, chosen while they are rendered: at most 12, evenly spread, and the worst of
-// all.
+// Chooses the views of the page while they are rendered: at most 12, evenly spread, and the worst of all.
 class report_views {
  public:
   // View `index` of `total`, in order.

@@ -1,6 +1,6 @@
 #pragma once
-// Line charts as inline SVG. Colours come from the page's style sheet (classes line-1 to line-6, grid, tick), so that a
-// chart follows the page into dark mode.
+// Line charts as inline SVG. Colours come from the page's style sheet (classes line-1 to line-6, grid, tick), so charts
+// follow its dark mode.
 
 #include <string>
 #include <utility>

@@ -1,6 +1,6 @@
 #pragma once
-// Points over two logarithmic axes as inline SVG, with the front of those that no other beats drawn as a line. Colours
-// come from the page's style sheet (classes line-1, dim, grid, tick, label).
+// Points over two logarithmic axes as inline SVG, with a line along the Pareto front. Colours come from the page's
+// style sheet (classes line-1, dim, grid, tick, label).
 
 #include <string>
 #include <vector>
@@ -18,8 +18,8 @@ struct scatter {
   std::vector<scatter_point> points;  // those that are not positive and finite are left out
 };
 
-// A <figure> the width of the page. Labels keep clear of each other and of the points; a point off the front that has
-// no room for one says its name when it is pointed at. "" where there are not two points.
+// A <figure> the width of the page. Labels keep clear of each other and of the points. A point without room for a label
+// shows its name under the pointer. "" for less than two points.
 std::string to_svg(scatter const& plot);
 
 }  // namespace gart_cli

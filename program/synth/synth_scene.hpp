@@ -1,8 +1,8 @@
 #pragma once
-// The scene of `gart synth`: triangle meshes made by formula, with procedural colours, so that a capture needs no file
-// from outside and its truth is not made of Gaussians. A still life on a disc: a glazed vase with thin leaves, a torus
-// knot, a rounded box with a wire coil, a copper ball in thin brass rings. Units are those of NeRF-Synthetic:
-// everything lies within 1.3 of the origin, z up.
+// The scene of `gart synth`: triangle meshes made by formula, with procedural colours. A capture so needs no other
+// file, and its true scene has no Gaussians. A still life on a disc: a glazed vase with thin leaves, a torus knot, a
+// rounded box with a wire coil, a copper ball in thin brass rings. Units are those of NeRF-Synthetic: everything lies
+// within 1.3 of the origin, z up.
 
 #include <gart/core/types.hpp>
 #include <gart/math/glm.hpp>

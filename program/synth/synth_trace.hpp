@@ -1,13 +1,12 @@
 #pragma once
-// The pictures of `gart synth`: a path tracer over Embree. A camera's rays that miss leave the pixel transparent; what
-// they meet is lit by a round lamp and a soft sky, with shadows, interreflection and one glossy lobe, and averaged over
-// the pixel's samples. The result depends on scene, camera, samples and seed only, never on the number of threads.
+// The pictures of `gart synth`: a path tracer over Embree. Rays that miss leave the pixel transparent. A round lamp and
+// a soft sky light surfaces, with shadows, interreflection and one glossy lobe. A pixel is the mean of its samples. The
+// result depends on scene, camera, samples and seed only, never on the number of threads.
 //
 // Cost: about four rays a sample where there is something to see, one where there is not.
 
 #include "synth_scene.hpp"
 
-#include <gart/camera/models.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/scene/image.hpp>
 
@@ -28,8 +27,8 @@ class synth_renderer {
   // Distances along the rays through the middles of the pixels; 0 where one meets nothing.
   gart::image_float distances(gart::camera const& view) const;
 
-  // Points on the surfaces, each seen by at least one of the cameras and coloured as that camera sees it: what
-  // structure from motion would find.
+  // Points on the surfaces, as structure from motion would find: each is seen by at least one camera, and has the
+  // colour that this camera sees.
   gart::point_cloud points(std::vector<gart::camera> const& cameras, std::size_t count, u64 seed) const;
 
  private:

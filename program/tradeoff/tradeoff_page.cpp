@@ -8,7 +8,6 @@
 #include <gart/core/version.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <iterator>
 

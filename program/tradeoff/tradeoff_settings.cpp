@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <gart/backward/strategies.hpp>
-#include <iterator>
 
 namespace gart_cli {
 

@@ -30,7 +30,7 @@ struct setting {
 // The first is `exact` as it stands; values that are already its own are left out.
 std::vector<setting> settings_of(configuration const& exact);
 
-// Those whose knob or name is in `wanted`, and always the first; all where it is empty. usage_error for a word that
+// The settings whose knob or name is in `wanted`, and always the first; all if it is empty. usage_error for a word that
 // is neither.
 std::vector<setting> selected_settings(std::vector<setting> const& all, std::vector<std::string> const& wanted);
 

@@ -1,6 +1,5 @@
 #pragma once
-// What the settings of `gart tradeoff` are held against: some pixels of some views, traced by the reference in double,
-// and the gradient of the loss there.
+// The reference for `gart tradeoff`: some pixels of some views, traced in double, and the gradient of the loss there.
 
 #include "options.hpp"
 
@@ -35,8 +34,8 @@ struct view_set {
 };
 view_set load_views(std::filesystem::path const& cameras, view_choice const& choice, gart::vec3d const& origin);
 
-// Sets color_gradient: of the training loss of `image`, which shows all of the view, against the photograph; without
-// one, random numbers.
+// Sets color_gradient: that of the training loss of `image`, the whole view, against the photograph; without one,
+// random numbers.
 void set_color_gradient(tradeoff_view& view, gart::image_float const& image, gart::vec3 background, float ssim_weight);
 void trace_reference(tradeoff_view& view, gart::model_file const& file, gart::render_options const& options);
 

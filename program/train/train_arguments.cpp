@@ -168,7 +168,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "How gradients are summed: primitive (one sum a Gaussian and\ntile), hybrid (a quarter of the "
                  "memory), pixel, or\ndeterministic (the same bits in every run); auto: the fastest"))
       ->check(one_of_strategies());
-  in_group(r.add(train, "--lt-budget", a.lt_budget_gb, "GB",
+  in_group(r.add(train, "--hit-memory", a.hit_memory_gb, "GB",
                  "Memory for what the forward pass records; a step that\nneeds more is done by hybrid, which needs a "
                  "quarter, and where\nthat is too much by pixel, which needs none. 0: half of what\nis free "
                  "at the start (deterministic: no limit)"))
@@ -244,8 +244,9 @@ void continue_run(train_arguments& a) {
     throw gart::io_error(a.config_file().string(), "has no \"options\"", "start anew without --resume");
   }
   nlohmann::json options = config["options"];
-  // Earlier runs call it t-min.
-  if (options.contains("t-min")) options.emplace("transmittance-min", options["t-min"]);
+  // Names in the files of earlier runs.
+  for (auto const& [old, now] : {std::pair{"t-min", "transmittance-min"}, {"lt-budget", "hit-memory"}})
+    if (options.contains(old)) options.emplace(now, options[old]);
   if (options.contains("set") && options["set"].is_string()) options["set"] = with_new_names(options["set"]);
   a.raised = a.recorded.continue_from(options, a.config_file(), {"iterations", "time-budget"});
   a.origin = origin_in(config, a.config_file());
@@ -276,7 +277,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.densify = gart::from_string(a.densify, o.densify);
   o.exposure = a.exposure == "on", o.vignetting = a.vignetting == "on";
   o.adam.sparse = a.adam == "seen";
-  o.lt_budget = static_cast<gart::u64>(a.lt_budget_gb * 1e9);
+  o.hit_memory = static_cast<gart::u64>(a.hit_memory_gb * 1e9);
   // Until it is settled it decides nothing.
   o.background = gart::from_string(a.background, gart::background_kind::black);
   o.render.antialias = a.antialias ? gart::default_antialias : 0;

@@ -49,7 +49,7 @@ struct train_arguments {
   double depth_unit = 0;
   std::string exposure = "auto", vignetting = "auto", adam = "all", set;
   bool antialias = false;
-  double lt_budget_gb = 0;
+  double hit_memory_gb = 0;
   recorded_options recorded;
 
   std::filesystem::path config_file() const { return out / "config.json"; }
@@ -73,8 +73,7 @@ struct train_arguments {
 void add_arguments(CLI::App& train, train_arguments& a);
 // Sets what the command line leaves open and the preset says.
 void fill_in(CLI::App const& train, train_arguments& a);
-// Takes the options and the origin of the run in `out`, and its dataset where none was named. io_error where there is
-// no such run.
+// Takes the options and the origin of the run in `out`, and its dataset if none was named. io_error without such a run.
 void continue_run(train_arguments& a);
 gart::configuration_request configuration_request_of(train_arguments const& a);
 // `background` is a colour's name or "random".

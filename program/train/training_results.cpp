@@ -1,4 +1,3 @@
-#include "choices.hpp"
 #include "image_writer.hpp"
 #include "output.hpp"
 #include "process_memory.hpp"

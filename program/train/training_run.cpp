@@ -142,7 +142,7 @@ void training_run::say_memory() {
       " at the least, for its part of " + with_commas(most) + " Gaussians, and what the views take");
 }
 
-// Rank 0 measures, and all take what it found. Of a run that ends at a time it is a tenth of that at most.
+// Rank 0 measures, and all take what it found. For a run that ends at a time it is at most a tenth of that time.
 void training_run::measure_capture() {
   stopwatch const measuring;
   if (writes_) {

@@ -1,4 +1,3 @@
-#include "choices.hpp"
 #include "training_run.hpp"
 
 #include <algorithm>
@@ -12,7 +11,7 @@ namespace {
 // Timing each launch slows a step a little: one step in so many is timed.
 constexpr int profile_every = 16;
 
-// Of several ranks how fast the slowest and the fastest step, and what memory they have come to.
+// For several ranks: the steps a second of the slowest and the fastest, and their memory.
 std::string in_ranks(recent_steps const& recent, std::size_t peak_bytes) {
   if (ranks::size() == 1) return {};
   struct rank_state {
@@ -52,7 +51,7 @@ bool training_run::train(interrupt_guard const& interrupt) {
     if (report.backward != configuration_.backward && !fell_back_) {
       fell_back_ = true;
       say_.note("step " + with_commas(report.step) +
-                ": the LT buffer would pass --lt-budget or its 2^32 slots, this step and others like it are " +
+                ": the LT buffer would pass --hit-memory or its 2^32 slots, this step and others like it are " +
                 report.backward);
     }
     if (!std::isfinite(report.loss)) {
@@ -120,7 +119,7 @@ void training_run::show_curve() {
   view_->set_curve(curve);
 }
 
-// Of a run that ends at a time, a point for each two hundredth of it, whatever the number of steps.
+// A run that ends at a time has a point for each two hundredth of the time.
 history training_run::course_of(train_arguments const& a) {
   return history(a.time_budget > 0 ? std::numeric_limits<int>::max() : a.options.iterations);
 }

@@ -1,5 +1,5 @@
 #pragma once
-// The viewer of a training that runs: what it is shown between steps, and what is asked of it.
+// The viewer of a running training: it renders views and answers requests between steps.
 
 #include "interrupt.hpp"
 #include "train_arguments.hpp"
@@ -12,7 +12,6 @@
 #include <chrono>
 #include <functional>
 #include <memory>
-#include <optional>
 
 namespace gart_cli {
 
@@ -24,9 +23,9 @@ class training_view {
   // Whether nobody is there and nothing was asked: one atomic load, and all that a training without a viewer pays.
   bool idle() const noexcept { return server_.idle() && !paused_; }
 
-  // Between two steps, of which the last took so long: tells how it stands, renders what there is time for, does what
-  // was asked, and waits while it is paused. `save` writes the checkpoint, and says where. False where the training is
-  // to stop.
+  // Called between two steps with the last one's duration. Sends the state, renders views while time is left, does what
+  // clients asked, and waits while the training is paused. `save` writes the checkpoint, and says where. False where
+  // the training is to stop.
   bool attend(double step_seconds, gart::view_status status, interrupt_guard const& interrupt,
               std::function<std::string()> const& save);
   // What the pages are told when the viewer ends.

@@ -5,7 +5,6 @@
 #include <gart/math/glm.hpp>
 #include <gart/scene/gaussians.hpp>
 
-#include <string>
 #include <utility>
 #include <vector>
 

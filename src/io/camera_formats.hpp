@@ -2,7 +2,6 @@
 // The camera models of files: one table of COLMAP's and nerfstudio's names, numbers and parameters, for every reader.
 // A model that gart traces names its kind (scene/camera.hpp); a reader refuses the others by name.
 
-#include <gart/core/span.hpp>
 #include <gart/scene/camera.hpp>
 
 #include <optional>

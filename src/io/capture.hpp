@@ -61,12 +61,12 @@ std::size_t images_in_colmap(std::filesystem::path const& folder, bool text);
 // The folders of photos in a capture's: images, then its smaller copies by their factor, then input.
 std::vector<std::filesystem::path> photo_folders_in(std::filesystem::path const& capture);
 
-// Finds what photos the frames have not, by their names; says which names are others than the files', and which none.
+// Finds missing photos of frames by their names. Notes say which names differ from the files', and which have no file.
 void find_photos(capture& c);
 // Masks in a folder `masks` beside that of the photos, where the files of the capture name none.
 void find_masks(capture& c);
 
-// Where maps of a kind are: a folder of that name beside the photo's folder of photos; the photo's path below the
+// The place of a kind of maps: a folder of that name beside the folder of photos, and the photo's path below the
 // latter.
 struct place_beside {
   std::filesystem::path folder, below;

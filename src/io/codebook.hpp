@@ -8,13 +8,13 @@
 
 namespace gart::io {
 
-// 256 numbers in ascending order, close together where the values are dense: the density that leaves the least squared
-// error, its cube root, then each moved to the mean of what is nearest to it.
+// 256 numbers in ascending order, closer where the values are dense: their density is the cube root of the values',
+// which gives the least squared error. Then each moves to the mean of its nearest values.
 class codebook {
  public:
   explicit codebook(std::vector<float> const& values);
-  // Numbers a step apart, nought among them, where 256 of them reach from the least to the most; else as above. What is
-  // written with them takes fewer bits: the numbers in the middle come up more often than those at the ends.
+  // Numbers a step apart, with 0 among them, if 256 of them reach from the least to the greatest value; else as above.
+  // They compress better, since middle numbers are more frequent.
   static codebook even(std::vector<float> const& values, double step);
   u8 nearest(float value) const;
   std::array<float, 256> const& numbers() const { return numbers_; }
@@ -31,10 +31,9 @@ struct palette {
   std::size_t count() const { return width ? rows.size() / width : 0; }
 };
 
-// `count` rows, or fewer, near the given ones [n][width], nearer where the weight [n] is more: the set with the largest
-// squared error is halved at its mean, along the column that varies most, until there are as many sets as rows; then
-// each row goes to the nearest mean and the means follow, a few times. Where there are many of both, "the nearest" is
-// that of a branch of the sets, so that it takes seconds.
+// At most `count` rows near the given ones [n][width], nearer for larger weights [n]. The set with the largest squared
+// error is halved at its mean, along its most varied column, until there are `count` sets. A few rounds of k-means
+// follow. For many rows the search for the nearest mean keeps to a branch of the sets, so it takes seconds.
 palette shared_rows(std::vector<float> const& rows, std::vector<float> const& weights, std::size_t width,
                     std::size_t count);
 

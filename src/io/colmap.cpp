@@ -219,8 +219,8 @@ fs::path above_of(fs::path const& model) {
   return base.has_filename() ? base : base.parent_path();
 }
 
-// Of the folders of photos beside the model or above it, the one that has most of the names; the nearest of them, and
-// `images` before its smaller copies, where several have as many.
+// The folder of photos, beside the model or above it, that has most of the names. Among equals the nearest wins, and
+// `images` before its smaller copies.
 fs::path photo_folder_of(fs::path const& model, std::vector<pose> const& poses) {
   constexpr int levels = 4;
   constexpr std::size_t asked = 64;

@@ -10,7 +10,6 @@
 #include <gart/io/file.hpp>
 #include <gart/io/ply.hpp>
 
-#include <limits>
 #include <ostream>
 
 namespace gart {
@@ -80,7 +79,7 @@ float unpack_coefficient(u8 b) {
   return static_cast<float>((level - 0.5) * 8);
 }
 
-// The records of one element of fixed size, and where in each a property stands.
+// The records of one element of fixed size, and the place of each property.
 struct records {
   element const& of;
   u8 const* bytes;

@@ -32,7 +32,7 @@ std::vector<std::string> parts_of(std::string const& path) {
   return parts;
 }
 
-// How many parts two paths have alike from the end, where that is all of one of them but its folder of photos.
+// The number of equal parts of two paths from the end, if that is all of one path except its folder of photos.
 std::size_t alike(std::vector<std::string> const& a, std::vector<std::string> const& b) {
   std::size_t n = 0;
   while (n < std::min(a.size(), b.size()) && a[n] == b[n]) ++n;

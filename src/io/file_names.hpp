@@ -1,6 +1,6 @@
 #pragma once
-// One resolver of the names that captures give their photos, masks and depth maps: programs write them for another
-// system, another folder, another case or another extension than the disk has.
+// One resolver for the names of photos, masks and depth maps in captures. Programs may have written them for another
+// system, folder, case or extension than the disk's.
 
 #include <cstddef>
 #include <filesystem>
@@ -20,7 +20,7 @@ bool is_photo_folder(std::string const& name);
 
 class file_names {
  public:
-  // Files below a folder. Those of these extensions are found by names that differ from theirs.
+  // Files below a folder. Files with these extensions are also found by differing names.
   explicit file_names(std::filesystem::path folder,
                       std::initializer_list<std::string_view> extensions = {".png", ".jpg", ".jpeg", ".webp"})
       : folder_(std::move(folder)), extensions_(extensions) {}
@@ -29,8 +29,8 @@ class file_names {
     std::filesystem::path file;  // empty: none, or several alike
     bool as_named = false;       // but for an extension that the name lacks
   };
-  // The file of that name; else the one whose name is the same but for case, a photo's extension, folders that one of
-  // both has before it, or another folder of photos.
+  // The file of that name. Else one whose name differs by case, by a photo's extension, by folders before it, or by
+  // another folder of photos.
   match find(std::string const& name);
 
   std::filesystem::path const& folder() const { return folder_; }

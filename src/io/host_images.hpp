@@ -12,8 +12,8 @@ namespace gart::io {
 // f() on all ranks of the host; an error of one ends it on all.
 void agreed_on_host(host_group& host, std::function<void()> const& f);
 
-// Of each view the images are there on the rank i % ranks: after it they are on all, in memory that is theirs together.
-// False, on all, where there is none.
+// The images of view i lie on rank i % ranks. Afterwards they are on all ranks, in shared memory. False, on all, where
+// there is none.
 bool share_on_host(host_group& host, std::vector<dataset_view>& views);
 
 }  // namespace gart::io

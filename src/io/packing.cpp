@@ -8,7 +8,6 @@
 #include <gart/math/sh.hpp>
 
 #include <exception>
-#include <numeric>
 #include <thread>
 #include <utility>
 
@@ -16,14 +15,13 @@ namespace gart::io {
 
 namespace {
 
-// Of the floats of a model over the bytes of its file, so that with a copy of it they are 64 times these; and what is
-// little memory, however small the file.
+// Largest bytes of a model's floats over its file's bytes, so that a model and a copy take 64 times the file; and the
+// memory that any file may use.
 constexpr u64 most_growth = 30, small_model = u64{1} << 20;
 constexpr float least_log_scale = -69;  // of a scale of about 1e-30
 constexpr double sh_0 = 0.28209479177387814;
 
-// What half a turn about an axis does to each function of the basis: it changes its sign or leaves it, as any one
-// direction in no plane of symmetry shows.
+// The signs of the basis functions under half a turn about an axis. One direction in no plane of symmetry shows them.
 std::array<float, 16> signs_of_half_turn(int axis) {
   vec3 d(0.48f, 0.36f, 0.8f);
   sh_basis<3> const before(d);

@@ -1,6 +1,5 @@
 #pragma once
-// What the formats that pack Gaussians share: a number as a byte, an order in which neighbours are neighbours, other
-// axes, threads.
+// Shared by the formats that pack Gaussians: numbers as bytes, a spatial order, other axes, threads.
 
 #include <gart/core/error.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -11,7 +10,6 @@
 #include <filesystem>
 #include <functional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace gart::io {
@@ -62,16 +60,15 @@ void half_turn(gaussian_model& model, int axis);
 // f(first, last) over parts of [0, n) on as many threads as there are, f free of shared writes.
 void in_parts(std::size_t n, std::function<void(std::size_t, std::size_t)> const& f);
 
-// Refuses a count of Gaussians that take many times the file's bytes, before there is memory for them: what packs most
-// takes a twentieth.
+// Refuses a count of Gaussians that would take many times the file's bytes, before allocating. The densest format takes
+// a twentieth.
 void require_plausible(std::string const& file, u64 gaussians, int sh_degree, u64 bytes);
-// A logit without end is an opacity of all or nothing, and the logarithm of nothing a scale: finite ones for these.
+// Replaces infinite logits of opacities, and infinite negative logarithms of scales, by finite ones.
 float settled_opacity(float logit);
 float settled_scale(float log_scale);
 // A quaternion too short, or too long, to be drawn: the same rotation, of length 1. Others keep their bits.
 void settle_rotation(float* q);
-// Settles all of them, and leaves out the Gaussians with other numbers that are not finite, or rotations of no
-// direction.
+// Does so for all Gaussians. Leaves out those with other numbers that are not finite, or with zero rotations.
 void keep_usable(std::string const& file, gaussian_model& model, std::vector<std::string>* notes);
 // Refuses to write numbers that are not finite: packed they would be others.
 void require_packable(std::filesystem::path const& path, gaussian_model const& model);

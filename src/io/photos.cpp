@@ -65,7 +65,7 @@ void find_photos(capture& c) {
     else
       by_another_name.emplace_back(&f, file);
   }
-  // A photo of one frame is not that of another, however alike their names.
+  // Two frames never share a photo, however similar their names.
   std::map<fs::path, int> wanted;
   for (auto const& [f, file] : by_another_name) ++wanted[file];
   std::size_t found = 0;

@@ -157,7 +157,7 @@ gaussian_model splats_of(ply_file const& file, std::vector<std::string>* notes, 
                ", properties rot_0 to rot_3 are all zero, which is no rotation";
       });
   if (bad.records().empty()) return model;
-  // Whose row a Gaussian is goes by its number in the file.
+  // A Gaussian's owner follows from its number in the file.
   if (file.owners.ranks > 1) file.refuse(bad.first(), "gart convert leaves it out: start with what that writes");
   return io::in_order(model, bad.others(model.size(), "Gaussian", file.name, notes));
 }

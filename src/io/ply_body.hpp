@@ -115,8 +115,8 @@ inline property const* find(element const& e, std::string_view name) {
   return nullptr;
 }
 
-// Where a property's value goes: store(column, vertex, value), after store.settled(column, value). Those that are no
-// finite floats even then make their vertex one of `bad`.
+// Where a property's value goes: store(column, vertex, value), after store.settled(column, value). A vertex with
+// numbers that are still no finite floats goes to `bad`.
 template <class Store>
 void read_vertices(ply_file const& file, std::vector<std::string> const& columns, Store const& store, unusable& bad) {
   body_reader body(file);

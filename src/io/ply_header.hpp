@@ -60,8 +60,8 @@ struct ply_file {
 };
 
 ply_file open(std::filesystem::path const& path);
-// The header, and of the vertices those of these owners alone, `total` in the file; all where they cannot be told apart
-// without reading them.
+// Reads the header and the owners' vertices of `total` in the file; all vertices if their places are unknown without
+// reading.
 ply_file open_rows(std::filesystem::path const& path, row_owners const& owners, u64& total);
 
 // The first lines of a binary splat file of these traits, as comments. invalid_argument for one that is no line.

@@ -92,7 +92,7 @@ bool decode(png_structp png, png_infop info, png_state& state, image8& image) {
   return true;
 }
 
-// As decode, of one channel of 16 bits.
+// As decode, for one channel of 16 bits.
 bool decode16(png_structp png, png_infop info, png_state& state, basic_image<u16>& image) {
   if (setjmp(png_jmpbuf(png))) return false;
   png_set_read_fn(png, &state, pull);

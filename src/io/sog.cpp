@@ -24,8 +24,8 @@ namespace fs = std::filesystem;
 
 constexpr double root = 1.41421356237309504880;
 constexpr std::size_t palette_columns = 64, most_rows = 65536, gaussians_a_row = 4;
-// Steps of logarithms of scales and of the coefficients of degree 0. Those above have a step that adds so much to the
-// squared error of the palette, in which they are.
+// Steps of logarithms of scales and of the coefficients of degree 0. Bands above have a step that adds so much to the
+// squared error of their palette.
 constexpr double scale_step = 1.0 / 16, base_step = 0.03, error_added = 0.2;
 constexpr u8 first_tag = 252;  // of the largest component w; then x, y, z
 
@@ -54,7 +54,7 @@ bool unpack_rotation(u8 const* rgba, float* wxyz) {
   return true;
 }
 
-// The entries of a SOG: of a zip file, or of the folder that a path is, or that its meta.json is in.
+// The entries of a SOG: a zip file, a folder, or the folder of a meta.json.
 class sog_entries {
  public:
   explicit sog_entries(fs::path const& path) : name_(path.string()) {

@@ -1,6 +1,6 @@
 #pragma once
-// A text file by lines: with or without a byte order mark, whichever way its lines end; the line's number for errors.
-// A record is a line: what it does not take of it is refused, not passed over.
+// Reads a text file by lines, with or without a byte order mark, and with any line ends. It counts lines for errors. A
+// record is a line: unread rests of a line are refused.
 
 #include "bytes.hpp"
 

@@ -58,7 +58,7 @@ void read_lens(record const& r, frame& f) {
   if (r.has("w")) f.set_size(r.size("w"), r.size("h"));
 }
 
-// Of a frame or the whole file: the map's file, the length of a step of it, and what it measures.
+// A map's settings, of a frame or the whole file: the file, the length of a step, and the measured quantity.
 void read_depth_fields(record const& r, fs::path const& folder, frame& f) {
   if (r.own.contains("depth_file_path") && !r.own["depth_file_path"].is_null())
     f.depth = from_text(folder, r.text("depth_file_path"));
@@ -87,7 +87,7 @@ std::set<std::string> name_list(record const& r, char const* key) {
   return names;
 }
 
-// The frames of one file, added to `result`.
+// Adds the frames of one file to `result`.
 void read_frames(fs::path const& file, part role, capture& result) {
   json const root = read_json(file);
   record const top{root, nullptr, file.string()};

@@ -10,11 +10,11 @@
 
 namespace gart::io {
 
-// The mask of a photo of that size. A block of which any pixel is ignored is ignored.
+// Reads the mask of a photo of that size. A block of which any pixel is ignored is ignored.
 image8 read_mask(std::filesystem::path const& path, image_size size, int factor);
 
-// Distances along the rays of `view`, the camera of the photo made smaller by options.downscale: the sample in the
-// middle of each block, for a mean would lie between the surfaces at an edge. 0 where nothing was measured.
+// Reads distances along the rays of `view`, the photo's camera after options.downscale; 0: not measured. Each block
+// gives its middle sample, since a mean at an edge would lie between the surfaces.
 image_float read_distances(frame const& f, camera const& view, image_size size, dataset_options const& options);
 
 }  // namespace gart::io

@@ -8,7 +8,6 @@
 #endif
 
 #include <cstring>
-#include <memory>
 
 namespace gart::io {
 
@@ -56,7 +55,7 @@ texture decode_webp(std::vector<u8> const& bytes, std::size_t most, std::string 
 
 namespace {
 
-// Even what is all of one colour: 16 million pixels, or a thousand a byte.
+// The most pixels, even of one colour: 16 million, or a thousand a byte.
 constexpr u64 most_pixels = u64{1} << 24, pixels_a_byte = 1024;
 
 WebPBitstreamFeatures features_of(std::vector<u8> const& bytes, std::string const& where) {

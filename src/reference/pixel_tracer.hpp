@@ -1,7 +1,6 @@
 #pragma once
-// What a ray meets, in double, and what of it is seen: the Gaussians relative to the camera, the cone that leaves most
-// of them out of a block of pixels, the hits of a ray in order, their compositing and its gradient (reference.hpp has
-// the definitions).
+// Traces pixels in double (reference.hpp has the definitions). It has the Gaussians relative to the camera, a cone that
+// culls most of them for a block of pixels, a ray's hits in order, compositing and its gradient.
 
 #include "rays.hpp"
 
@@ -9,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 #include <vector>
 
 namespace gart::by_definition {

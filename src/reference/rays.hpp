@@ -1,6 +1,6 @@
 #pragma once
-// The ray of a pixel of any camera, in double, by the models' definitions (scene/camera.hpp says which there are): the
-// inverse of where a lens sends a direction, found by following it from the axis outwards.
+// The ray of a pixel of any camera (scene/camera.hpp), in double, by the models' definitions. It inverts the lens's map
+// of directions, by following it from the axis outwards.
 
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>
@@ -17,8 +17,8 @@ struct pixel_ray {
   vec3d origin{0.0}, direction{0.0};
 };
 
-// Where the polynomials of a lens send a point (a, b), of numbers that may be complex: of slopes for a perspective
-// lens, of angles for a fisheye.
+// The map of a point (a, b) by a lens's polynomials, also of complex numbers: slopes for a perspective lens, angles for
+// a fisheye.
 template <class T>
 void bend(distortion const& l, bool tangential_last, T a, T b, T& u, T& v) {
   T const r2 = a * a + b * b;
@@ -41,8 +41,8 @@ struct lens_point {
   bool found;
 };
 
-// The point that is sent to (u, v): Newton's method along the way from the axis, where the lens is the identity, in
-// steps so short that it stays on the branch that begins there. Not found where that folds.
+// The point that is sent to (u, v): Newton's method along the way from the axis, where the lens is the identity. Short
+// steps keep it on the branch that begins there. Not found where that folds.
 inline lens_point unbent(distortion const& l, bool tangential_last, double u, double v) {
   if (!l.any()) return {u, v, true};
   using complex = std::complex<double>;

@@ -14,8 +14,8 @@ using namespace by_definition;
 
 namespace {
 
-// The filter of a view's pixels, of numbers that may be complex: a derivative is then the imaginary part of a value at
-// a point moved by an imaginary step, without a difference and exact to double.
+// The filter of a view's pixels, also of complex numbers. The imaginary part after an imaginary step gives a derivative
+// exact to double, without a difference.
 class filter {
  public:
   filter(camera const& view, double pixels) : view_(view), pixels_(pixels) {
@@ -140,8 +140,8 @@ body body_of(gaussian_model const& m, std::size_t i, vec3d const& camera, double
   return g;
 }
 
-// From the gradient by what the pixels see of a Gaussian to that by what is stored: each stored number moves the
-// log-scales and the logit that are seen.
+// Turns the gradient by a Gaussian's filtered numbers into that by its stored ones: each stored number moves the
+// filtered log-scales and logit.
 void pull_back(reference_gradients& g, std::size_t i, filter const& pixels, filter::parameters<double> const& stored) {
   using complex = std::complex<double>;
   constexpr double step = 1e-30;

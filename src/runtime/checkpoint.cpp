@@ -1,4 +1,4 @@
-// Whole states to a checkpoint and back: that of one rank, which has all rows.
+// Reads and writes checkpoints of a single rank, which has all rows.
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
 #include <gart/train/checkpoint_rows.hpp>

@@ -163,7 +163,7 @@ recommendation recommended(train_options const& options, dataset const& data, co
   if (request.backward == "auto") all.request.backward = choose_backward(traits).value;
   if (!is_given("background")) all.options.background = choose_background(traits).value;
   std::vector<candidate> candidates;
-  for (candidate& c : usual_candidates(traits, options))
+  for (candidate& c : default_candidates(traits, options))
     if (!is_given(c.setting)) candidates.push_back(std::move(c));
   all.measured = validate(all.request, all.options, data, candidates, progress);
   all.options = all.measured.options;

@@ -58,7 +58,7 @@ model_file load_model(std::filesystem::path const& path, row_owners const& owner
 }
 
 splat_traits traits_of(render_options const& render, int kernel_degree) {
-  render_options const usual;
+  render_options const defaults;
   splat_traits traits;
   auto const put = [&](char const* key, float value, float otherwise) {
     if (value == otherwise) return;
@@ -66,10 +66,10 @@ splat_traits traits_of(render_options const& render, int kernel_degree) {
     std::snprintf(text, sizeof text, "%.9g", static_cast<double>(value));
     traits[key] = text;
   };
-  put("alpha_min", render.alpha_min, usual.alpha_min);
-  put("t_min", render.transmittance_min, usual.transmittance_min);
-  put("near", render.near, usual.near);
-  put("antialias", render.antialias, usual.antialias);
+  put("alpha_min", render.alpha_min, defaults.alpha_min);
+  put("t_min", render.transmittance_min, defaults.transmittance_min);
+  put("near", render.near, defaults.near);
+  put("antialias", render.antialias, defaults.antialias);
   if (kernel_degree != 2) traits["kernel_degree"] = std::to_string(kernel_degree);
   if (render.max_hits != 0) traits["max_hits"] = std::to_string(render.max_hits);
   return traits;

@@ -1,4 +1,3 @@
-#include <gart/core/error.hpp>
 #include <gart/runtime/initial.hpp>
 #include <gart/runtime/registry.hpp>
 

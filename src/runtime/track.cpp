@@ -15,7 +15,7 @@ constexpr int numbers = 6;
 using vec6 = std::array<double, numbers>;
 using mat6 = std::array<vec6, numbers>;
 
-// A box of 2 r + 1 pixels along an axis, nothing beyond the border: its own adjoint, as the sum of its kind is.
+// A box of 2 r + 1 pixels along an axis, with zeros beyond the border. It is its own adjoint.
 void box(image_float& image, int r, bool across) {
   int const lines = across ? image.height : image.width, length = across ? image.width : image.height;
   std::size_t const step =
@@ -51,8 +51,8 @@ double mean_square(image_float const& image) {
   return sum / static_cast<double>(image.data.size());
 }
 
-// A ray of a grid over the image, in the camera's axes, and the directions on the sphere that a pixel to the right and
-// one down are dual to.
+// A ray of a grid over the image, in the camera's axes, and the sphere's directions that are dual to a pixel to the
+// right and one down.
 struct grid_ray {
   int x, y;
   vec3d direction, right, down;
@@ -76,7 +76,7 @@ std::vector<grid_ray> grid_of(camera const& view, int stride) {
   return out;
 }
 
-// Of the mean of squares by (t, w), without second derivatives of the image.
+// The curvature of the mean of squares by (t, w), without second derivatives of the image.
 mat6 curvature(std::vector<grid_ray> const& grid, int stride, image_float const& image, rendered const& r) {
   mat6 out{};
   auto const at = [&](int x, int y, int c) {
@@ -178,7 +178,7 @@ class tracker {
         begin();
         by = step_of(curvature_, gradient_);
       } else {
-        // To the least of the parabola through both losses and the slope.
+        // Goes to the minimum of the parabola through both losses and the slope.
         double const share = std::clamp(-0.5 * slope / (loss - loss_ - slope), 0.05, 0.5);
         for (double& x : by) x *= share;
       }

@@ -22,8 +22,8 @@ namespace {
 constexpr std::size_t views_for_one = 4, fewest_held_out = 3;
 constexpr int least_pixels = 128, most_shrink = 4;
 constexpr int fewest_steps = 700, most_steps = 2000;
-// A step of a trial takes about this share of the time of one of the run, where its images are smaller: they have a
-// quarter of the pixels or less, but starting the kernels costs as much.
+// A trial's step on shrunk images takes about this share of a run's step. Images have a quarter of the pixels or less,
+// but kernels cost as much to start.
 constexpr double step_share = 0.4, run_share = 0.1;
 // Small images leave a GPU idle between kernels. Trials beside each other fill it: each adds about this share of the
 // time that it takes alone.
@@ -76,8 +76,8 @@ struct end_all_on_failure {
   }
 };
 
-// Calls run(i, go_on) for each trial: in turn, or beside each other in threads. go_on() counts a step, and is false
-// from when `progress` ended it all.
+// Calls run(i, go_on) for each trial, in turn or in parallel threads. go_on() counts a step, and returns false once
+// `progress` has ended the measurement.
 template <class Run>
 void run_trials(validation_plan const& plan, validation_progress const& progress, Run run) {
   double const all = static_cast<double>(plan.trials) * (plan.steps + 1);
@@ -111,10 +111,10 @@ void run_trials(validation_plan const& plan, validation_progress const& progress
   for (std::future<void>& t : trials) t.get();  // throws what a trial threw
 }
 
-// What the run's options are in a trial: as many Gaussians a pixel, and all that is counted in steps as much sooner. A
-// slow rate of the bands above the first would not get as far as in the run, and a fast one would seem to pay: it is
-// raised as those of the geometry are in short runs (optim/schedule.hpp), at most to that of the first band. One view a
-// step, by its photograph and the capture's pose: views held out have no pose learned, and small ones no depth map.
+// A trial's options: as many Gaussians a pixel as in the run, and all counts of steps shortened alike. The rate of the
+// bands above the first is raised like those of geometry in short runs (optim/schedule.hpp), at most to the first
+// band's; else a fast rate would seem to pay. A step has one view, without learned poses or depth: held-out views have
+// no learned pose, and shrunk ones no depth map.
 train_options of_trial(train_options options, validation_plan const& plan) {
   int const area = plan.shrink * plan.shrink;
   double const shorter = static_cast<double>(plan.steps) / options.iterations;
@@ -139,7 +139,7 @@ train_options of_trial(train_options options, validation_plan const& plan) {
 
 }  // namespace
 
-std::vector<candidate> usual_candidates(capture_traits const& traits, train_options const& options) {
+std::vector<candidate> default_candidates(capture_traits const& traits, train_options const& options) {
   std::vector<candidate> all;
   all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }});
   if (!traits.panoramas) all.push_back({"vignetting", "on", [](train_options& o) { o.vignetting = true; }});

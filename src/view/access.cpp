@@ -30,7 +30,7 @@ bool same(std::string_view a, std::string_view b) {
   return difference == 0;
 }
 
-// "name" or "name:port", as a Host header has it.
+// "name" or "name:port", from a Host header.
 bool is_host(std::string_view text) {
   std::string_view const name = text.substr(0, text.find(':')), port = text.substr(name.size());
   auto const is_of_name = [](char c) {

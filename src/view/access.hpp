@@ -27,8 +27,7 @@ class access {
   request_path path_of(std::string_view path) const;
   // Whether a Host header names this server: a page of another name that resolves to this machine does not.
   bool host_is_ours(std::string_view host) const;
-  // Whether an Origin header is that of a page from this Host, or from one that is allowed: a proxy may tell its own
-  // name alone.
+  // Whether an Origin header names this Host or an allowed one: a proxy may send its own name only.
   bool origin_is_ours(std::string_view origin, std::string_view host) const;
 
   std::string address(access_right of) const;  // for the browser
@@ -41,8 +40,8 @@ class access {
   std::string control_ = new_token(), view_ = new_token();
 };
 
-// What to listen at: a numeric address, and the names under which browsers may ask for it. invalid_argument for what is
-// no IPv4 address or name of this machine.
+// The numeric address to listen at, and the names under which browsers may ask for it. invalid_argument for anything
+// but an IPv4 address or name of this machine.
 struct listen_place {
   std::string address;
   std::vector<std::string> hosts;  // the first is the one to print

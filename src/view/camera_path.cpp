@@ -52,8 +52,8 @@ rotation operator*(rotation const& a, rotation const& b) {
           a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
 }
 
-// The way from one value to another, and where a way leads to: what a vector space and rotations have in common. Of
-// rotations it is half the turn about an axis in the body's frame, the shorter way round.
+// Differences of values, and steps by them: common to vector spaces and rotations. Of rotations it is half the turn
+// about an axis in the body's frame, the shorter way round.
 template <class V>
 V way(V const& from, V const& to) {
   return to - from;
@@ -80,8 +80,8 @@ struct stretch {
   double time_before, time, time_after;
 };
 
-// At a share of the stretch: the cubic Bezier curve whose speed at a keyframe is that of Catmull and Rom, in the
-// cumulative form of Kim, Kim and Shin, which needs no sums of values.
+// The value at a share of the stretch: a cubic Bezier curve with Catmull and Rom's speeds at keyframes. The cumulative
+// form of Kim, Kim and Shin needs no sums of values.
 template <class Value>
 auto at_share(stretch const& s, double share, Value const& value) {
   auto const from = value(*s.from), to = value(*s.to);

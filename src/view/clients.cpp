@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <utility>
 
 namespace gart::view {
@@ -154,7 +153,7 @@ int clients::moving(double now) const {
   return n;
 }
 
-// What is asked for once comes first, then views that move, then those at rest, which take longer, and files last.
+// Single requests come first, then moving views, then views at rest, which take longer, and files last.
 std::optional<job> clients::job_of(int id, client& c, double now, int urgency) {
   if (urgency == 0) {
     if (c.texts.size() >= answers_most) return {};

@@ -1,6 +1,6 @@
 #pragma once
-// What the thread of the sockets and the one that renders share: of each client the newest view that it wants, and what
-// waits to be sent to it. All calls may come from any thread; times are seconds of one clock.
+// The state that the thread of the sockets shares with the one that renders: each client's newest wanted view, and the
+// data waiting to be sent to it. All calls may come from any thread; times are seconds of one clock.
 
 #include <gart/view/message.hpp>
 #include <gart/view/pacing.hpp>

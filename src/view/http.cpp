@@ -1,7 +1,6 @@
 #include "http.hpp"
 
 #include <algorithm>
-#include <array>
 
 namespace gart::view {
 

@@ -1,6 +1,6 @@
 #pragma once
-// A request of HTTP/1.1 as a browser sends it, or of HTTP/1.0 as some proxies do, read strictly, and the head of an
-// answer. No request has a body here.
+// Reads requests of HTTP/1.1 (browsers) and HTTP/1.0 (some proxies) strictly, and writes heads of answers. No request
+// has a body here.
 
 #include <cstddef>
 #include <string>

@@ -1,5 +1,5 @@
 #pragma once
-// Lines for a log that a client can bring about: plain text whatever it sent, and few a second however much it sends.
+// Log lines that clients can cause: always plain text, and few a second.
 
 #include <algorithm>
 #include <cstddef>

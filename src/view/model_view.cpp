@@ -3,7 +3,6 @@
 #include <gart/io/image_file.hpp>
 #include <gart/view/model_view.hpp>
 
-#include <algorithm>
 #include <memory>
 #include <utility>
 

@@ -1,13 +1,12 @@
 #pragma once
-// A view in parts, so that one that takes long can be let go between two of them: rows of whole tiles, which are the
-// same bits whatever they are cut into.
+// Renders a view in parts, so that a slow one can be dropped between two. Parts are rows of whole tiles: the bits do
+// not depend on the cut.
 
 #include <gart/render/rendered.hpp>
 #include <gart/scene/image.hpp>
 #include <gart/view/scene.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <vector>
 

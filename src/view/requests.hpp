@@ -1,5 +1,5 @@
 #pragma once
-// What a request of HTTP is answered by: a file of the page, a photograph, or why not; and who may become a viewer.
+// Answers requests of HTTP with a file of the page, a photograph, or an error. Decides who may become a viewer.
 
 #include "access.hpp"
 #include "clients.hpp"
@@ -25,7 +25,7 @@ class requests {
   // The status by which a WebSocket is refused; 101 where it is let in.
   int upgrade(http_request const& asked) const;
   access_right right_of(http_request const& asked) const { return gate_.path_of(asked.path).of; }
-  // Those of every answer, so that the page stays by itself.
+  // The headers of every answer, which isolate the page.
   std::vector<std::string> safe_headers(http_request const& asked) const;
 
  private:

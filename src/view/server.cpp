@@ -11,7 +11,6 @@
 #include <gart/view/server.hpp>
 
 #include <chrono>
-#include <cmath>
 
 namespace gart {
 
@@ -30,8 +29,8 @@ char const* type_of(image_message const&) { return "image"; }
 char const* type_of(pick_message const&) { return "pick"; }
 char const* type_of(path_message const&) { return "path"; }
 
-// A camera whose middle pixel is the image point, and the pixel that it lies in. The sphere has no such part: all of
-// it, small.
+// A camera whose middle pixel is the image point, and the pixel that it lies in. The whole sphere has no such part: it
+// is shown whole and small.
 struct pick_place {
   camera view;
   int x, y;

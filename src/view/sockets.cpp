@@ -31,8 +31,8 @@ constexpr char const* protocol_name = "gart-view";
 constexpr int send_buffer = 256 * 1024;
 // Connections that are no viewers: the one that was longest of no use makes room for the next.
 constexpr std::size_t requests_most = 64;
-// Seconds: a request's head and each part of its answer; a viewer of whom nothing is heard until it is asked and until
-// it is given up; one that takes nothing of what it is sent; a close.
+// Limits in seconds: a request's head and each part of its answer; a silent viewer until it is asked, and until it is
+// closed; a viewer that reads nothing; a close.
 constexpr double request_seconds = 15, ping_seconds = 20, unheard_seconds = 60, stalled_seconds = 30, close_seconds = 2;
 constexpr int tick_ms = 250;
 
@@ -166,7 +166,7 @@ struct sockets::state {
     c.now = connection::gone;
   }
 
-  // What came is thrown away while a close is under way: with it unread the system would take back what was sent.
+  // Received data is discarded during a close: the system would withdraw sent data if it stayed unread.
   void read(connection& c) {
     char bytes[16384];
     ssize_t const n = ::recv(c.socket.number(), bytes, sizeof bytes, 0);
@@ -345,8 +345,8 @@ struct sockets::state {
 
   void serve() {
     while (!ends) turn(tick_ms);
-    // What is left to say is given a moment, where anyone takes it, and so is the answer to a close: with that unread
-    // the system would take back the last word.
+    // Waits a moment until clients take the remaining data and answer the close: the system would withdraw the last
+    // message if answers stayed unread.
     all.send_all(bye_text(all.why_it_ends()));
     double const until = seconds_now() + close_seconds;
     bool told = false;

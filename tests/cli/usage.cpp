@@ -70,7 +70,7 @@ TEST_CASE("train --help is short, and --help-all has the rest") {
   CHECK(options(brief) <= 20);
   CHECK(options(all) > 45);
   CHECK(has(brief, "--iterations"));
-  CHECK_FALSE(has(brief, "--lt-budget"));
+  CHECK_FALSE(has(brief, "--hit-memory"));
   CHECK(has(brief, "--help-all"));
 }
 

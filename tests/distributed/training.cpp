@@ -317,7 +317,7 @@ TEST_CASE("a Gaussian that no view shows takes the bytes that were told before, 
   int const ranks = mpi_comm().size();
   for (auto const& [batch, antialias] : {std::pair{1, 0.0f}, {ranks, 0.0f}, {1, 0.3f}, {ranks, 0.3f}}) {
     train_options options = short_run(densify_kind::none);
-    options.batch = batch, options.lt_budget = 1 << 26, options.render.antialias = antialias;
+    options.batch = batch, options.hit_memory = 1 << 26, options.render.antialias = antialias;
     auto const peak = [&](index_t more) {
       exec_type exec = gart_test::make_exec();
       dataset const data = gart_test::capture(exec, 4);

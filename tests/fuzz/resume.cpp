@@ -48,7 +48,7 @@ bool resume_config(std::string_view input) {
             "a count that the command line would refuse");
     promise(o.render.alpha_min > 0 && o.render.alpha_min < 1 && o.render.transmittance_min >= 0 &&
                 o.render.transmittance_min < 1 && o.initial_opacity >= 0 && o.initial_opacity < 1 &&
-                o.initial_scale >= 0 && a.lt_budget_gb >= 0,
+                o.initial_scale >= 0 && a.hit_memory_gb >= 0,
             "a number that the command line would refuse");
     gart_cli::check_same_dataset(a, data);
   });

@@ -27,9 +27,9 @@ struct course {
 };
 
 template <class Strategy, class E>
-course train(E& exec, gart::dataset const& data, gart::u64 seed, gart::u64 lt_budget = 0) {
+course train(E& exec, gart::dataset const& data, gart::u64 seed, gart::u64 hit_memory = 0) {
   gart::train_options options;
-  options.lt_budget = lt_budget, options.iterations = 40;
+  options.hit_memory = hit_memory, options.iterations = 40;
   options.densify = gart::densify_kind::none;
   run_of<E, Strategy> run(exec, options, data, cloud(seed + 1, 0.7f));
   course out;

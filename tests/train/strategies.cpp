@@ -21,9 +21,9 @@ struct course {
 };
 
 template <class Strategy, class E>
-course train(E& exec, gart::dataset const& data, u64 seed, u64 lt_budget = 0) {
+course train(E& exec, gart::dataset const& data, u64 seed, u64 hit_memory = 0) {
   gart::train_options options;
-  options.lt_budget = lt_budget;
+  options.hit_memory = hit_memory;
   options.iterations = steps;
   options.densify = gart::densify_kind::none;
   run_of<E, Strategy> run(exec, options, data, cloud(seed + 1, 0.7f));

@@ -17,9 +17,9 @@ struct poor_exec : gart::serial_exec {
 static_assert(gart::host_execution<poor_exec>);
 
 template <class Strategy, class E>
-std::string taken_by(E& exec, gart::dataset const& data, gart::u64 lt_budget) {
+std::string taken_by(E& exec, gart::dataset const& data, gart::u64 hit_memory) {
   gart::train_options options;
-  options.lt_budget = lt_budget, options.densify = gart::densify_kind::none;
+  options.hit_memory = hit_memory, options.densify = gart::densify_kind::none;
   run_of<E, Strategy> run(exec, options, data, cloud(5, 0.7f));
   return run.step().backward;
 }

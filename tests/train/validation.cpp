@@ -172,7 +172,7 @@ TEST_CASE("what changes nothing of a run is no candidate") {
   gart::train_options of;
   traits.pixels = 10'000'000'000;
   auto const has = [&](char const* setting) {
-    auto const all = gart::usual_candidates(traits, of);
+    auto const all = gart::default_candidates(traits, of);
     return std::any_of(all.begin(), all.end(), [&](auto const& c) { return c.setting == setting; });
   };
   CHECK(has("exposure"));
@@ -183,7 +183,7 @@ TEST_CASE("what changes nothing of a run is no candidate") {
   CHECK(has("error.pixels_per_gaussian"));
   of.densify = gart::densify_kind::mcmc;
   CHECK(!has("error.pixels_per_gaussian"));
-  for (auto const& c : gart::usual_candidates({}, {})) c.take(of);
+  for (auto const& c : gart::default_candidates({}, {})) c.take(of);
   CHECK(of.exposure);
   CHECK(of.vignetting);
 }

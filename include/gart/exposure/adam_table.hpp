@@ -66,7 +66,7 @@ class adam_table {
                                          second_.data() + from, adam_rule(adam, visit),
                                          static_cast<float>(rate * adam_rule::first_correction(adam, visit))});
   }
-  /// By the sum that another rank has found, [Floats], in host memory.
+  /// The same by another rank's sum, [Floats], in host memory.
   void move(std::size_t row, span<float const> gradient, float rate) {
     gradient_.assign(std::vector<float>(gradient.begin(), gradient.end()));
     move(row, rate);
@@ -96,8 +96,8 @@ class adam_table {
   /// A row.
   float* at(std::size_t row) { return value_.data() + row * Floats; }
 
-  /// Sums up what an image says of a row: lane i of kernel.lanes writes its part to kernel.sums[Floats * i]. The sum
-  /// stays until the next call.
+  /// Sums a row's gradient over an image: lane i of kernel.lanes writes its part to kernel.sums[Floats * i]. The sum
+  /// lasts until the next call.
   template <class Kernel>
   span<float const> sum(char const* label, Kernel kernel) {
     constexpr index_t lanes = runs * runs;

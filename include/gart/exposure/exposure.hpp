@@ -1,11 +1,10 @@
 #pragma once
 /// \file
-/// The exposure of a photograph against the scene's own colours: x' = M x + b on the composited colour, M a 3 x 3
-/// matrix, as 3DGS compensates it. A camera that sets its exposure and white balance by what it sees takes neighbouring
-/// photographs of different brightness. Gaussians alone can only learn that as haze in front of the cameras.
+/// The exposure of a photograph relative to the scene's colours: x' = M x + b on the composited colour, M a 3 x 3
+/// matrix, as in 3DGS. Cameras with automatic exposure and white balance take neighbouring photographs of different
+/// brightness. Gaussians alone can only learn that as haze in front of the cameras.
 
 #include <gart/core/macros.hpp>
-#include <gart/core/types.hpp>
 #include <gart/math/arith.hpp>
 
 namespace gart {

@@ -1,17 +1,16 @@
 #pragma once
 /// \file
-/// The exposure of any view, from those learned of the training views: what the camera saw set its exposure, and from
-/// about the same pose it saw about the same. A photograph that is kept for testing is not looked at.
+/// The exposure of any view, predicted from the learned exposures of the training views. A camera sets its exposure by
+/// what it sees, and sees about the same from about the same pose. Photographs kept for testing are not used.
 ///
-/// Where a view stands is six numbers: the camera's position over the median distance of a training view to its
-/// nearest, and its axis over 0.1. Of each of the twelve numbers of the exposure
+/// A view's place is six numbers: the camera's position over the median distance of a training view to its nearest, and
+/// its axis over 0.1. For each of the twelve numbers of the exposure
 ///   minimise over a, b:  sum_i w_i (m_i - a - b . d_i)^2 + 0.02 (sum_i w_i) |b|^2 r^2,   w_i = (|d_i|^2 + 1e-4)^-3,
-/// where d_i leads to training view i and r^2 is the weighted mean of |d_i|^2: a line through the nearest, since a
-/// camera on its way passes between them, and the constant a is what the view gets. (A weighted mean, which b = 0 is,
-/// leaves errors a quarter larger where one view is left out of the others.) Far from all views it comes to their mean.
-/// The falloff is that of the lens whose focal lengths and principal point, over the size of its images, are nearest.
-/// Cost: O(views) in double for each call. Without views the exposure is the identity, without lenses there is no
-/// falloff.
+/// where d_i leads to training view i and r^2 is the weighted mean of |d_i|^2. The view gets the constant a of this
+/// line through the nearest views. (With b = 0, a weighted mean, the error of a view predicted from the others is a
+/// quarter larger.) Far from all views it tends to their mean. The falloff is that of the lens with the nearest focal
+/// lengths and principal point, over the size of its images. Cost: O(views) in double for each call. Without views the
+/// exposure is the identity, without lenses there is no falloff.
 
 #include <gart/exposure/photo_response.hpp>
 #include <gart/math/glm.hpp>
@@ -19,28 +18,27 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace gart {
 
-/// The exposure of a training view, and where it stands.
+/// The exposure of a training view, and its place.
 struct view_exposure {
   std::string name;         ///< of the view
-  vec3d position{0.0};      ///< of the camera
+  vec3d position{0.0};      ///< the camera's
   vec3 direction{0, 0, 1};  ///< its axis, a unit vector
   exposure value;           ///< its exposure
 };
 
-/// The falloff of one of a capture's lenses, and which lens it is.
+/// The falloff of a lens of the capture, and the numbers that identify the lens.
 struct lens_falloff {
   vec2 focal{0}, center{0};  ///< focal lengths and principal point, over the images' width and height
   vignetting value;          ///< its falloff
 
   lens_falloff() = default;
-  /// Of the lens of a view.
+  /// The falloff of a view's lens.
   GART_HD GART_INLINE lens_falloff(camera const& view, vignetting const& falloff) : value(falloff) {
     vec2 const size(static_cast<float>(view.width), static_cast<float>(view.height));
     focal = vec2(view.fx, view.fy) / size, center = vec2(view.cx, view.cy) / size;
@@ -51,7 +49,7 @@ struct lens_falloff {
 class exposure_field {
  public:
   exposure_field() = default;
-  /// Of these views and lenses.
+  /// From these views and lenses.
   explicit exposure_field(std::vector<view_exposure> views, std::vector<lens_falloff> lenses = {})
       : views_(std::move(views)), lenses_(std::move(lenses)) {
     std::vector<double> nearest;
@@ -91,7 +89,7 @@ class exposure_field {
     return best;
   }
 
-  /// What a photograph taken as the view is shows.
+  /// The response of a photograph with the view's camera.
   photo_response at(camera const& view) const {
     photo_response out{exposure_at(view), {}, {}};
     if (view.kind == camera_kind::equirectangular) return out;  // no lens sees it
@@ -153,7 +151,7 @@ class exposure_field {
     return square;
   }
 
-  // Upwards, so that the first row is left with the constant alone. The matrix is positive definite.
+  // Eliminates upwards, so that the first row keeps the constant alone. The matrix is positive definite.
   template <class Right>
   static void eliminate(matrix& a, Right& right) {
     for (int p = size - 1; p > 0; --p) {

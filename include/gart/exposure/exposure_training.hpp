@@ -1,11 +1,10 @@
 #pragma once
 /// \file
-/// Exposures of the training views, learned with the Gaussians (exposure.hpp): applied to the rendered image before the
-/// loss, and moved by Adam, the twelve numbers of the step's view alone. With x' the exposed image,
+/// Exposures of the training views, learned with the Gaussians (exposure.hpp). Each is applied to the rendered image
+/// before the loss. Adam moves the twelve numbers of the step's view. With x' the exposed image,
 ///   dL/dx = M^T dL/dx',   dL/dM = sum over pixels of dL/dx' (x, 1)^T.
 ///
-/// The scene's own colours are those of an exposure that is the identity; nothing holds the views' mean to it but that
-/// they start there.
+/// The identity shows the scene's colours. Only the start at the identity keeps the views' mean exposure near it.
 ///
 /// Buffers and cost: those of adam_table.hpp, a copy of the image and another pass over it.
 
@@ -27,7 +26,7 @@ struct expose_kernel {
   }
 };
 
-// A lane takes every lanes-th pixel, turns its gradient and sums what it says of the exposure.
+// A lane takes every lanes-th pixel, turns its gradient, and sums the exposure's gradient.
 struct exposure_gradient_kernel {
   exposure const* view;
   float const* image;
@@ -58,10 +57,10 @@ struct exposure_gradient_kernel {
 template <execution E>
 class exposure_training : public adam_table<E, exposure::floats> {
  public:
-  /// As many identities as there are views.
+  /// An identity for each view.
   exposure_training(E& exec, std::size_t views) : base(exec, identities(views)), exec_(&exec), exposed_(exec) {}
 
-  /// The image [H][W][3] as the view's photograph would show it; until the next call.
+  /// Exposes the image [H][W][3] as the view's photograph; the result lasts until the next call.
   span<float const> expose(std::size_t view, span<float const> image) {
     exposed_.resize(image.size());
     parallel_for(*exec_, "expose", static_cast<index_t>(image.size() / 3),
@@ -75,8 +74,8 @@ class exposure_training : public adam_table<E, exposure::floats> {
     this->move(view, rate);
   }
 
-  /// The first half of a step: turns dL/d exposed into dL/d image. What it says of the exposure, [12], stays until the
-  /// next call.
+  /// The first half of a step: turns dL/d exposed into dL/d image. The exposure's gradient, [12], lasts until the next
+  /// call.
   span<float const> differentiate(std::size_t view, span<float const> image, span<float> gradient) {
     return this->sum("exposure_gradient", detail::exposure_gradient_kernel{of(view), image.data(), gradient.data(),
                                                                            static_cast<index_t>(image.size() / 3)});

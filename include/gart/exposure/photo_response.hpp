@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// What a photograph shows of the scene's own colours: those that the lens lets through to each pixel
-/// (exposure/vignetting.hpp), exposed (exposure/exposure.hpp), x' = M (V x) + b.
+/// How a photograph shows the scene's colours: darkened by the lens (exposure/vignetting.hpp), then exposed
+/// (exposure/exposure.hpp), x' = M (V x) + b.
 
 #include <gart/exposure/exposure.hpp>
 #include <gart/exposure/vignetting.hpp>
@@ -9,10 +9,10 @@
 
 namespace gart {
 
-/// Of one view; nothing changes where it is the default.
+/// The response of one view; the default changes nothing.
 struct photo_response {
-  exposure exposed;     ///< of the photograph
-  vignetting falloff;   ///< of its lens,
+  exposure exposed;     ///< the photograph's exposure
+  vignetting falloff;   ///< its lens's falloff,
   image_circle circle;  ///< on its image
 
   /// V of a channel at a pixel.
@@ -25,7 +25,7 @@ struct photo_response {
 
 namespace gart { inline namespace GART_ISA {
 
-/// Of every pixel of an image of three channels.
+/// Applies a response to every pixel of an image of three channels.
 inline void apply(photo_response const& response, image_float& image) {
   float* x = image.data.data();
   for (int row = 0; row < image.height; ++row) {

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The falloffs of a capture's lenses, learned with the Gaussians (vignetting.hpp): applied to the rendered image
-/// before its exposure, and moved by Adam, the nine numbers of the step's lens alone. With x' the shaded image, of each
+/// The falloffs of a capture's lenses, learned with the Gaussians (vignetting.hpp). Each is applied to the rendered
+/// image before its exposure. Adam moves the nine numbers of the step's lens. With x' the shaded image, for each
 /// channel
 ///   dL/dx = V dL/dx',   dL/dk_j = sum over pixels of u^(j + 1) x dL/dx'.
 ///
@@ -31,7 +31,7 @@ struct shade_kernel {
   }
 };
 
-// A lane takes every lanes-th pixel, as that of exposures.
+// A lane takes every lanes-th pixel.
 struct vignetting_gradient_kernel {
   vignetting const* lens;
   image_circle circle;
@@ -65,13 +65,13 @@ struct vignetting_gradient_kernel {
 template <execution E>
 class vignetting_training : public adam_table<E, vignetting::floats> {
  public:
-  /// Of these views' lenses, no falloff at first. Errors: invalid_argument, naming the view, for a camera that has no
-  /// principal point.
+  /// For these views' lenses, without falloff at first. Errors: invalid_argument, naming the view, for a camera without
+  /// a principal point.
   vignetting_training(E& exec, std::vector<named_camera> const& views)
       : vignetting_training(exec, lenses_of(views), views) {}
 
-  /// The image [H][W][3] of a view as its lens lets it through, shaded() until the next call. `captured`: the view's
-  /// camera as the capture has it, for an image of that size, here and below.
+  /// Darkens the image [H][W][3] of a view by its lens; shaded() has it until the next call. `captured`, here and
+  /// below: the capture's camera of the view, for an image of that size.
   span<float const> shade(std::size_t view, camera const& captured, span<float const> image) {
     shaded_.resize(image.size());
     parallel_for(*exec_, "shade", static_cast<index_t>(image.size() / 3),
@@ -79,7 +79,7 @@ class vignetting_training : public adam_table<E, vignetting::floats> {
                                       image.data(), shaded_.data()});
     return shaded_;
   }
-  /// The image that was shaded last.
+  /// The last shaded image.
   span<float const> shaded() const { return shaded_; }
 
   /// Turns dL/d shaded into dL/d image, and takes Adam's step for the view's lens.
@@ -88,8 +88,7 @@ class vignetting_training : public adam_table<E, vignetting::floats> {
     this->move(lens_of_[view], rate);
   }
 
-  /// The first half of a step: turns dL/d shaded into dL/d image. What it says of the lens, [9], stays until the next
-  /// call.
+  /// The first half of a step: turns dL/d shaded into dL/d image. The lens's gradient, [9], lasts until the next call.
   span<float const> differentiate(std::size_t view, camera const& captured, span<float const> image,
                                   span<float> gradient) {
     return this->sum("vignetting_gradient", detail::vignetting_gradient_kernel{
@@ -97,7 +96,7 @@ class vignetting_training : public adam_table<E, vignetting::floats> {
                                                 image.data(), gradient.data(), static_cast<index_t>(image.size() / 3)});
   }
 
-  /// The second, of another rank's view.
+  /// The second half, for another rank's view.
   void move_lens_of(std::size_t view, span<float const> gradient, float rate) {
     this->move(lens_of_[view], gradient, rate);
   }

@@ -61,9 +61,8 @@ constexpr u32 crc_product(u32 a, u32 b) {
 
 }  // namespace detail
 
-/// What the checksum of some bytes comes to with `after` more behind them: that of A and B together is
-/// crc32c_before(crc of A, bytes of B) ^ crc of B, so that parts are summed apart and in any order. Cost: the logarithm
-/// of `after`.
+/// The part of a checksum from bytes that `after` others follow. The checksum of A and B together is crc32c_before(crc
+/// of A, bytes of B) ^ crc of B. So parts can be summed separately, in any order. Cost: the logarithm of `after`.
 constexpr u32 crc32c_before(u32 crc, u64 after) {
   for (u32 step = 0x00800000u; after != 0; after >>= 1, step = detail::crc_product(step, step))  // x^8
     if ((after & 1) != 0) crc = detail::crc_product(step, crc);

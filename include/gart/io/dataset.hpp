@@ -5,13 +5,13 @@
 /// load_dataset recognises, in a folder or by the file named: COLMAP (sparse/0 or its larger neighbour, sparse, the
 /// same below colmap, or the folder itself, .bin before .txt; photos in images/, images_N/ or input/), Blender
 /// (transforms_train.json and transforms_test.json, points3d.ply where it is there), nerfstudio / instant-ngp
-/// (transforms.json). A folder that holds COLMAP and transforms.json is read as COLMAP. Photos are found by names that
-/// differ in case, slashes, extension or folders, masks in a folder masks beside them (docs/formats.md). Survey
-/// coordinates are held from an origin among the cameras (io/origin.hpp). Images are
-/// decoded in parallel and kept as 8 bits: width * height * channels bytes each. Frames without a photo, or with a pose
-/// that is none, points in a camera's centre and points that are not finite are left out, with a note. Errors: io_error
-/// naming the file, the field and the remedy; unsupported for a camera model that gart does not trace, by its name;
-/// invalid_argument for an option out of its range.
+/// (transforms.json). A folder that holds COLMAP and transforms.json is read as COLMAP. Photos are found although names
+/// differ in case, slashes, extension or folders; masks lie in a folder masks beside them (docs/formats.md). Survey
+/// coordinates count from an origin among the cameras (io/origin.hpp). Images are decoded in parallel and kept as 8
+/// bits: width * height * channels bytes each. Frames without a photo or with an invalid pose are left out with a note.
+/// So are points that are not finite, and points in a camera's centre. Errors: io_error naming the file, the field and
+/// the remedy; unsupported, naming the model, for a camera that gart does not trace; invalid_argument for an option out
+/// of its range.
 
 #include <gart/comm/host_group.hpp>
 #include <gart/core/names.hpp>
@@ -67,20 +67,18 @@ struct dataset {
   }
 };
 
-/// Which depth maps to read of a capture, and what their values are. A frame's map is what `depth_file_path` of a
-/// transforms.json names, else NAME.png or NAME.npy in a folder `depths` beside the photo's `images` (of any such
-/// name).
+/// Which depth maps to read of a capture, and what their values are. The map is the file that `depth_file_path` of a
+/// transforms.json names. Else it is NAME.png or NAME.npy in a folder `depths` beside the photos' folder.
 struct depth_map_options {
   bool load = false;  ///< whether to read those of the training views; then all must be there
   depth_kind kind =
       depth_kind::automatic;  ///< what they measure; automatic: what 'depth_kind' of the file says, else z
-  /// Length of a step; 0: what 'depth_unit_scale_factor' of the file says, else 0.001 for a PNG and 1 for a .npy.
+  /// Length of a step; 0: the file's 'depth_unit_scale_factor', else 0.001 for a PNG and 1 for a .npy.
   double unit = 0;
 };
 
-/// Which views are kept for testing: each Nth by name, between views that are trained on; or a sector of as many, the
-/// cameras on both sides of the first by name around all cameras' mean, which asks for views from where none is
-/// trained.
+/// Which views are kept for testing. Each Nth by name lies between trained views. A sector of as many cameras lies on
+/// both sides of the first by name, around all cameras' mean: no trained view sees from there.
 enum class split_kind { nth, sector };
 /// Their names.
 constexpr auto names_of(split_kind) {
@@ -100,23 +98,21 @@ struct dataset_options {
   depth_map_options depth = {};  ///< maps of depth
   /// Called from the loading threads, one at a time.
   std::function<void(std::size_t done, std::size_t total)> progress = {};
-  /// Where ranks of one host load the same capture, those: images are decoded by one of them each, in turn, and held
-  /// once, or by each where the host cannot. They make this call together; an error of one is an error of all.
+  /// The ranks of one host that load the same capture. They share the decoding of images, and hold them once where the
+  /// host can share memory. All call this together; an error of one is an error of all.
   host_group* host = nullptr;
 };
 
 /// Reads a capture from a folder, or by the file named.
 dataset load_dataset(std::filesystem::path const& path, dataset_options const& options = {});
 
-/// The camera of an image that dataset_options.downscale shrank: a partial last block of pixels is cropped, so that the
-/// scale is 1 / factor itself. Errors: invalid_argument, naming `where`, where nothing is left, or for a view of the
-/// whole sphere that the factor does not divide.
+/// The camera of an image shrunk by dataset_options.downscale. A partial last block of pixels is cropped, so the scale
+/// is exactly 1 / factor. Errors: invalid_argument, naming `where`, for an empty result, or for a view of the whole
+/// sphere that the factor does not divide.
 camera downscaled(camera const& c, int factor, std::string const& where);
 
-/// The cameras alone: a dataset (all its views, test views first) or a camera JSON, a list of
-/// {"name","width","height","fx","fy","cx","cy","c2w"} with c2w camera-to-world in OpenCV axes, and "camera_model" by
-/// COLMAP's name, with the parameters of its lens, where it is no pinhole; EQUIRECTANGULAR has no fx to cy. Positions
-/// are in the coordinates of the capture, from no origin.
+/// The cameras alone, from a dataset (all its views, test views first) or a camera JSON (io/camera_file.hpp);
+/// EQUIRECTANGULAR has no fx to cy. Positions are in the coordinates of the capture, from no origin.
 std::vector<named_camera> load_cameras(std::filesystem::path const& path);
 
 }  // namespace gart

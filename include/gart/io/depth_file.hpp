@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// Depth maps in files: PNG of one channel of 16 bits, where a step is `unit` of the scene's lengths and 0 stands for
-/// what was not measured, and .npy (NumPy, version 1 to 3) of little-endian float32 in C order, [H][W] or [H][W][1].
-/// The kind is told by the first bytes. What a map measures, z or distance, its file does not say (io/dataset.hpp).
-/// Errors: io_error naming the file and what is wrong with it.
+/// Depth maps in files: PNG with one channel of 16 bits: a step is `unit` in the scene's lengths, and 0 means not
+/// measured. Or .npy (NumPy, version 1 to 3) of little-endian float32 in C order, [H][W] or [H][W][1]. The kind is told
+/// by the first bytes. What a map measures, z or distance, its file does not say (io/dataset.hpp). Errors: io_error
+/// naming the file and what is wrong with it.
 
 #include <gart/core/names.hpp>
 #include <gart/scene/image.hpp>
@@ -20,10 +20,11 @@ constexpr auto names_of(depth_kind) {
   return std::array<name_of<depth_kind>, 3>{{{automatic, "auto"}, {z, "z"}, {distance, "distance"}}};
 }
 
-/// A map in the scene's lengths; 0 where nothing was measured. unit: length of a step, or of 1 in a .npy; 0: 0.001 for
-/// a PNG, 1 for a .npy. Errors: io_error also for a value that is not finite or negative.
+/// Reads a map in the scene's lengths; 0: not measured. unit: length of a step, or of 1 in a .npy. Its 0 means 0.001
+/// for a PNG, 1 for a .npy. Errors: io_error also for a value that is not finite or negative.
 image_float read_depth(std::filesystem::path const& path, double unit = 0);
-/// A map of one channel as 16-bit PNG: value / unit, rounded, at most 65535; 0 where it is not positive and finite.
+/// Writes a map of one channel as 16-bit PNG: value / unit, rounded, at most 65535; 0 where it is not positive and
+/// finite.
 void write_depth_png(std::filesystem::path const& path, image_float const& map, double unit);
 /// An image of any number of channels as .npy, float32, [H][W][channels], or [H][W] for one.
 void write_npy(std::filesystem::path const& path, image_float const& image);

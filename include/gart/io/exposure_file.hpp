@@ -1,7 +1,6 @@
 #pragma once
 /// \file
-/// Exposures of training views and falloffs of lenses as JSON, to be read by `gart render` and `gart eval`, and by
-/// hand:
+/// Exposures of training views and falloffs of lenses as JSON, for `gart render`, `gart eval` and people:
 ///   {"views": [{"name": "00002", "position": [x, y, z], "direction": [x, y, z], "matrix": [12 numbers]}, ...],
 ///    "lenses": [{"focal": [x, y], "center": [x, y], "falloff": [9 numbers]}, ...]}
 /// position and direction: of the camera and its axis, in the capture's coordinates (io/origin.hpp); matrix: a row of

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Images of floats as OpenEXR files (https://openexr.com), as programs of compositing read them: one part of scan
-/// lines, 32-bit floats, packed without loss (ZIP, 16 lines at a time). Written only; needs zlib, no other library.
+/// Images of floats as OpenEXR files (https://openexr.com): one part of scan lines, 32-bit floats, packed without loss
+/// (ZIP, 16 lines at a time). Written only; needs zlib, no other library.
 
 #include <gart/scene/image.hpp>
 

@@ -7,7 +7,6 @@
 #include <gart/scene/image.hpp>
 
 #include <filesystem>
-#include <string>
 #include <vector>
 
 namespace gart {

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// The origin of coordinates. Survey coordinates (UTM, geocentric) are millions of units from zero, where a float's
-/// steps are coarser than what is to be seen. Such a capture is held from an origin among its cameras: places less the
+/// steps are coarser than visible detail. Such a capture is held from an origin among its cameras: places less the
 /// origin, in double, then floats. A model keeps its capture's origin as the trait "origin", three numbers; one without
 /// it is from zero. Cameras and exposures in files have the capture's own coordinates.
 ///
@@ -15,9 +15,9 @@
 
 namespace gart {
 
-/// The origin that suits places: zero where floats keep a hundred-thousandth of their spread, else their median,
-/// rounded to a power of ten within the spread. The spread is what 99 of 100 keep from the median; where that is
-/// nothing, that of `others`, and else 1. O(places).
+/// The origin for some places: zero where floats resolve a hundred-thousandth of their spread, else their median,
+/// rounded to a power of ten within the spread. 99 of 100 places lie within the spread of the median. If it is zero,
+/// that of `others` counts, and else 1. O(places).
 vec3d origin_for(std::vector<vec3d> const& places, std::vector<double> const& others = {});
 
 /// Of a model by its traits; `file` is what errors name.

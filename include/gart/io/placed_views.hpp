@@ -1,13 +1,13 @@
 #pragma once
 /// \file
-/// Training views at other poses than their capture has them: those of a camera JSON (io/camera_file.hpp), as a run
-/// writes the poses that it has learned (train_options::refine_poses). A scene that formed while its poses were still
-/// off keeps some of that; formed anew from the poses found, it does not (docs/calibration.md).
+/// Training views with poses from a camera JSON (io/camera_file.hpp) in place of the capture's. A run writes its
+/// learned poses as one (train_options::refine_poses). A scene keeps some errors from the time when its poses were
+/// wrong; training anew from the learned poses avoids them (docs/calibration.md).
 ///
-/// Position, rotation and what a rolling shutter moves by are taken, by the views' names; size and lens stay the
-/// capture's, so that the two may be of images of another size. Positions in the file are from no origin. Cameras of
-/// other names do not matter, and test views stay where they are. Errors: io_error, naming the file, for a training
-/// view that it has no camera of, or one of another shutter.
+/// Position, rotation and a rolling shutter's motion are taken, by the views' names. Size and lens stay the capture's,
+/// so images may have another size. Positions in the file are from no origin. Cameras of other names do not matter, and
+/// test views stay where they are. Errors: io_error, naming the file, for a training view that it has no camera of, or
+/// one of another shutter.
 
 #include <gart/io/dataset.hpp>
 

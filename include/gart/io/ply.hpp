@@ -5,8 +5,8 @@
 /// f_rest channel-major, opacity a logit, scales logarithms, rot w,x,y,z and not normalised. Written in that order,
 /// byte for byte, read by name in any order, ascii or binary of either endianness, without normals and with extra
 /// properties. gart's own traits travel as header comments ("comment gart kernel_degree 2"). A model with the trait
-/// antialias is also marked as other programs mark theirs, "comment SplatRenderMode: mip"; a file with that mark, or
-/// with "comment antialiased 1", and no trait of gart's own is read as one whose antialias has no value.
+/// antialias also gets other programs' mark, "comment SplatRenderMode: mip". A file with that mark or "comment
+/// antialiased 1", and without gart's trait, is read as antialiased without a value.
 ///
 /// Errors: io_error naming the file, the property and the remedy, for a truncated body, a missing property, a count of
 /// f_rest that is no degree from 0 to 3, a 2D Gaussian file (no scale_2), a file of which no Gaussian can be used (with
@@ -22,8 +22,8 @@
 
 namespace gart {
 
-/// Reads a splat file; the comments of its header that begin with "gart" into `traits`, where that is not null, and
-/// what was left out into `notes`, as read_splats has it (io/splat_file.hpp).
+/// Reads a splat file. `traits`, if not null, gets the header's comments that begin with "gart"; `notes` gets what was
+/// left out (read_splats in io/splat_file.hpp).
 gaussian_model read_splat_ply(std::filesystem::path const& path, splat_traits* traits = nullptr,
                               std::vector<std::string>* notes = nullptr);
 /// Writes a splat file, with these traits.
@@ -31,12 +31,12 @@ void write_splat_ply(std::filesystem::path const& path, gaussian_model const& mo
 
 /// Whether the name's ending asks for a splat PLY.
 bool is_splat_ply(std::filesystem::path const& path);
-/// This rank's rows of the file, byte for byte what write_splat_ply writes of `total` Gaussians; rank 0 writes the
-/// header too. `path` is for messages. Memory: a few MB.
+/// Writes this rank's rows, byte for byte as write_splat_ply of `total` Gaussians; rank 0 writes the header too. `path`
+/// is for messages. Memory: a few MB.
 void write_splat_ply_rows(shared_file& file, std::filesystem::path const& path, gaussian_model const& mine,
                           row_owners const& owners, u64 total, splat_traits const& traits = {});
-/// This rank's rows of a splat PLY, and how many Gaussians there are. Of a binary file no more is read than these; one
-/// in ascii, or with lists before its vertices, is read whole.
+/// This rank's rows of a splat PLY, and how many Gaussians there are. Of a binary file no other rows are read; an ascii
+/// file, or one with lists before its vertices, is read whole.
 gaussian_model read_splat_ply_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
                                    splat_traits* traits = nullptr);
 

@@ -9,12 +9,12 @@
 ///   dL/d fx = sum over pixels of -x / fx (dL/d ray . d ray / d x),   dL/d cx = sum of -1 / fx (dL/d ray . d ray / d
 ///   x),
 /// x = (u - cx) / fx, and so for y. dL/d ray is backward/differentiate_rays.hpp, d ray / d x the camera's own
-/// (camera/lens_slopes.hpp). It holds for every tracer, any function of the image, and every camera that has a focal
-/// length, whatever its lens and shutter.
+/// (camera/lens_slopes.hpp). It holds for every tracer, any function of the image, and every camera with a focal
+/// length.
 ///
 /// Sums in double, in an order that depends on the number of pixels only. Cost: a trace of the view. Memory: 40 bytes a
-/// pixel. Errors: invalid_argument for a camera without a focal length, and for a view through a filter of the pixels,
-/// whose width changes with the focal length too, which is not in the sums.
+/// pixel. Errors: invalid_argument for a camera without a focal length, and for a view with antialiasing: the sums do
+/// not contain the filter's dependence on the focal length.
 
 #include <gart/algorithm/reduce.hpp>
 #include <gart/backward/differentiate_rays.hpp>
@@ -25,9 +25,9 @@ namespace gart { inline namespace GART_ISA {
 /// dL/d focal lengths and principal point, in pixels.
 struct lens_gradient {
   static constexpr int floats = 4;        ///< numbers
-  double fx = 0, fy = 0, cx = 0, cy = 0;  ///< by each
+  double fx = 0, fy = 0, cx = 0, cy = 0;  ///< gradient by each
   ///@{
-  /// Zero, or from four numbers in this order; of an image `shrink` times as small as the one that it is to be of.
+  /// Zero, or from four numbers in this order. `shrink`: how many times smaller their image was than the wanted one.
   lens_gradient() = default;
   explicit lens_gradient(float const* v, int shrink = 1)
       : fx(double{v[0]} / shrink), fy(double{v[1]} / shrink), cx(double{v[2]} / shrink), cy(double{v[3]} / shrink) {}
@@ -63,7 +63,7 @@ struct weigh_pixels {
 /// Gradients of lenses, one view at a time, and the memory that they need.
 template <execution E>
 class lens_differentiation {
-  // Of a frame that has all rows.
+  // For a frame with all rows.
   struct alone {
     void operator()(float*) const {}
   };
@@ -73,9 +73,9 @@ class lens_differentiation {
   explicit lens_differentiation(E& exec)
       : exec_(&exec), by_direction_(exec), by_origin_(exec), parts_(exec), out_(exec) {}
 
-  /// Into out, [4] in the policy's memory: a lens_gradient's numbers in order. The rest is as differentiate_rays has
-  /// it. Where the frame has rows of the image alone, share(float* plane) is called to fill in what others have of an
-  /// image of one float a pixel, [H][W], for each of the four numbers.
+  /// Writes a lens_gradient's numbers in order to out, [4] in the policy's memory. Other arguments: as
+  /// differentiate_rays. Where the frame has some rows only, share(float* plane) fills in other ranks' rows of an image
+  /// [H][W], once for each of the four numbers.
   template <class Frame, class Share = alone>
   void operator()(Frame& frame, span<float const> color, image_gradients const& image, span<float> out,
                   depth_and_transmittance const& more = {}, Share&& share = {}) {
@@ -105,14 +105,14 @@ class lens_differentiation {
     });
   }
 
-  /// The same where others have traced all of the view's rows, of an image of so many pixels.
+  /// The same on a rank that traced no row of the view; pixels: the image's.
   template <class Share>
   void of_others(std::size_t pixels, span<float> out, Share&& share) {
     parts_.resize(lens_gradient::floats * pixels);
     add_up(pixels, out, share);
   }
 
-  /// To the host; waits for it.
+  /// Returns it to the host; waits for it.
   template <class Frame>
   lens_gradient operator()(Frame& frame, span<float const> color, image_gradients const& image,
                            depth_and_transmittance const& more = {}) {
@@ -135,7 +135,7 @@ class lens_differentiation {
   buffer<float, E> parts_, out_;
 };
 
-/// Once, to the host.
+/// The same for a single call.
 template <class Frame>
 lens_gradient differentiate_lens(Frame& frame, span<float const> color, image_gradients const& image,
                                  depth_and_transmittance const& more = {}) {

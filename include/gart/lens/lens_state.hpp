@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// Lenses as they are learned: three numbers for each camera of a capture, over the focal length as the capture has it,
+/// Learned lenses: three numbers for each camera of a capture, relative to the capture's focal length,
 ///   fx = fx_0 (1 + f),   fy = fy_0 (1 + f),   cx = cx_0 + fx_0 x,   cy = cy_0 + fy_0 y.
-/// One number for both focal lengths: pixels keep their shape, which sensors have for certain. In double: a step of a
-/// training may move a lens by less than a float tells.
+/// One number serves both focal lengths, since a sensor's pixels keep their shape. All in double: a training step may
+/// move a lens by less than a float resolves.
 
 #include <gart/core/isa.hpp>
 #include <gart/core/types.hpp>
@@ -17,7 +17,7 @@ namespace gart {
 /// Three numbers of a lens: f, x, y.
 using lens_numbers = std::array<double, 3>;
 
-/// The lenses of a run and Adam's moments of them, as a checkpoint holds them.
+/// The lenses of a run and their moments, as in a checkpoint.
 struct lens_state {
   std::vector<double> value;          ///< [cameras][3]; empty: no lenses are learned
   std::vector<double> first, second;  ///< [cameras][3]
@@ -28,7 +28,7 @@ struct lens_state {
 
 namespace gart { inline namespace GART_ISA {
 
-/// The camera with its lens changed: all else stays.
+/// The camera with a changed lens; all else stays.
 inline camera through(camera view, lens_numbers const& by) {
   double const fx = double{view.fx}, fy = double{view.fy};
   view.fx = static_cast<float>(fx * (1 + by[0])), view.fy = static_cast<float>(fy * (1 + by[0]));
@@ -37,7 +37,7 @@ inline camera through(camera view, lens_numbers const& by) {
   return view;
 }
 
-/// Whether two views are through one camera of the capture, for all that it says: the same model, size and lens.
+/// Whether two views count as one camera of the capture: the same model, size and lens.
 inline bool same_lens(camera const& a, camera const& b) {
   static_assert(sizeof(distortion) == 18 * sizeof(float), "a new number of a lens is to be compared too");
   auto const all = [](camera const& c) {

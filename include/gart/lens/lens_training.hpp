@@ -1,10 +1,10 @@
 #pragma once
 /// \file
-/// Lenses of a capture, learned with the Gaussians: Adam on three numbers for each camera of it (lens/lens_state.hpp),
-/// on the host. Views of the same model, size and lens are of one camera, and each step of one moves it.
+/// Lenses of a capture, learned with the Gaussians. Adam runs on the host, on three numbers for each camera
+/// (lens/lens_state.hpp). Views of the same model, size and lens share a camera.
 ///
-/// A gradient that is not finite moves nothing. Each number stays within half of the focal length, either way, so that
-/// it stays positive: what is farther off is no calibration to refine. Cost: none that shows beside the gradient's.
+/// A gradient that is not finite moves nothing. Each number stays within half the focal length either way, so the focal
+/// length stays positive. Cost: none that shows beside the gradient's.
 
 #include <gart/core/named_arrays.hpp>
 #include <gart/lens/differentiate_lens.hpp>
@@ -21,8 +21,8 @@ namespace gart { inline namespace GART_ISA {
 /// The lenses of a run.
 class lens_training {
  public:
-  /// Of these views' cameras, as the capture has them. Errors: invalid_argument, naming the view, for a camera that has
-  /// no focal length.
+  /// For the capture's cameras of these views. Errors: invalid_argument, naming the view, for a camera without a focal
+  /// length.
   lens_training(lens_options const& options, std::vector<named_camera> const& views) : options_(options) {
     for (named_camera const& v : views) {
       visit_camera(v.view, [&]<class M>(M const&) {
@@ -38,16 +38,16 @@ class lens_training {
     state_ = {std::vector<double>(3 * n), std::vector<double>(3 * n), std::vector<double>(3 * n), std::vector<u32>(n)};
   }
 
-  /// A camera of the capture, at whatever pose, with its lens as it is learned; another stays as it is.
+  /// A camera of the capture, at any pose, with its learned lens; other cameras stay unchanged.
   camera view(camera const& captured) const {
     std::size_t const k = find(captured);
     return k < captured_.size() && state_.visits[k] ? through(captured, numbers(k)) : captured;
   }
 
-  /// Whether lenses change in a step of a run of so many.
+  /// Whether lenses move in step `step` of so many.
   bool learns(int step, int iterations) const { return step >= warm_up(iterations); }
 
-  /// Moves the lens of view i by the gradient through it as it stands.
+  /// Moves the lens of view i by the gradient at its present value.
   void step(std::size_t i, lens_gradient const& by, int step, int iterations) {
     std::size_t const k = of_view_[i];
     camera const& c = captured_[k];
@@ -101,7 +101,7 @@ class lens_training {
 
   lens_options options_;
   std::vector<camera> captured_;      // one view of each
-  std::vector<std::size_t> of_view_;  // the place there of each training view's
+  std::vector<std::size_t> of_view_;  // index in captured_ for each training view
   lens_state state_;
 };
 

@@ -6,10 +6,9 @@
 /// A Gaussian that explains one photograph alone is then of little use, so this reduces overfitting. From a share
 /// `until` of the run on, steps show the whole scene, which is what will be rendered.
 ///
-/// An o' over 0.995 is that, or o where that is more. The gradient by the logit of o' is taken for that by the logit of
-/// o, and what is left out has none. Draws go by the numbers that Gaussians have in the scene, so that ranks draw as
-/// one does. Cost: 4 bytes a Gaussian, and a pass that reads and writes as much. Without a share there is nothing of
-/// it.
+/// An o' over 0.995 is that, or o where that is more. The gradient by the logit of o' is used as that by the logit of
+/// o; Gaussians left out have none. Draws depend on the Gaussians' numbers in the scene, so several ranks draw as one
+/// does. Cost: 4 bytes a Gaussian, and a pass that reads and writes as much; nothing without a share.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/exec/buffer.hpp>
@@ -24,8 +23,8 @@ namespace gart { inline namespace GART_ISA {
 namespace detail {
 
 struct dropout_kernel {
-  static constexpr float none = -40.0f;  // the logit of what is under any alpha_min
-  static constexpr float most = 0.995f;  // the opacity up to which a Gaussian is made more opaque
+  static constexpr float none = -40.0f;  // a logit below any alpha_min
+  static constexpr float most = 0.995f;  // no Gaussian is made more opaque than this
   float const* opacity;
   float* shown;
   row_owners owners;
@@ -45,7 +44,7 @@ struct dropout_kernel {
 template <execution E>
 class dropout {
  public:
-  /// For a share of the Gaussians, less than 1, until a share of the run.
+  /// Leaves out a share of the Gaussians, less than 1, until a share of the run.
   dropout(E& exec, float share, float until, u64 seed)
       : exec_(&exec), share_(share), until_(until), seed_(seed), shown_(exec) {}
   /// Makes room for so many Gaussians.
@@ -53,13 +52,13 @@ class dropout {
     if (share_ > 0) shown_.reserve(count);
   }
 
-  /// While it lives, the scene has the opacities that a step shows.
+  /// While it lives, the scene has the step's opacities.
   class scope {
    public:
     scope(scope const&) = delete;
     scope& operator=(scope const&) = delete;
     ~scope() { end(); }
-    /// The scene has its own again; kernels and frames that took the others in may go on with them.
+    /// Restores the scene's opacities; kernels and frames that have read the others are unaffected.
     void end() {
       if (auto* const scene = std::exchange(scene_, nullptr)) std::swap(scene->opacity, *shown_);
     }
@@ -71,8 +70,8 @@ class dropout {
     buffer<float, E>* shown_;
   };
 
-  /// Leaves out of `scene`, the rows of these owners, what step `step` of so many is not to show, until the scope ends.
-  /// The scene keeps its count until then.
+  /// Applies the dropout of step `step` of so many to `scene`, the rows of these owners, until the scope ends. The
+  /// scene must keep its count until then.
   [[nodiscard]] scope leave_out(gaussians<E>& scene, int step, int iterations, row_owners const& owners) {
     bool const drops = share_ > 0 && static_cast<float>(step) < until_ * static_cast<float>(iterations);
     if (!drops || scene.size() == 0) return scope(nullptr, nullptr);

@@ -1,14 +1,14 @@
 #pragma once
 /// \file
-/// Checks that all parameters and Adam's moments are finite. One launch over each counts what is not; one read brings
+/// Checks that all parameters and Adam's moments are finite. One launch over each counts the others; one read brings
 /// the counts to the host.
 ///
-/// Adam leaves updates out that are not finite, so that a gradient never gets as far as a parameter; what is found here
-/// was there at the start, came out of a checkpoint or of densification, or is a bug. How many updates Adam left out is
-/// counted beside it (adam_step's `skipped`), and is no error.
+/// Adam skips updates that are not finite, so gradients cannot cause such a parameter. One found here came from the
+/// start, a checkpoint or a densification, or is a bug. Adam's skipped updates are counted too (adam_step's `skipped`),
+/// and are no error.
 ///
 /// Cost: reads 12 bytes of each parameter (708 a Gaussian at SH degree 3, where Adam moves 1,652) and waits for the
-/// queue. Errors: not_finite, which names the group, how many numbers of it, the first Gaussian and what to look at.
+/// queue. Errors: not_finite, naming the group, the count, the first Gaussian and what to check.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/core/error.hpp>
@@ -49,20 +49,20 @@ struct count_not_finite_kernel {
 
 }  // namespace detail
 
-/// Looks at a whole model and its moments.
+/// Checks a whole model and its moments.
 template <execution E>
 class finite_check {
  public:
-  /// Nothing is counted yet. `owners`: where the rows looked at are not all of the scene.
+  /// Nothing is counted yet. `owners`: needed where the rows are not all of the scene.
   explicit finite_check(E& exec, row_owners const& owners = {})
       : exec_(exec), owners_(owners), counts_(exec, kinds + 1) {
     counts_.zero();
   }
 
-  /// For adam_step.
+  /// The counter for adam_step.
   span<u64> skipped() const { return {counts_.data() + kinds, 1}; }
 
-  /// The updates that Adam left out since the last call. `where` begins the error's message: "step 7, view a".
+  /// The updates that Adam skipped since the last call. `where` begins the error's message: "step 7, view a".
   u64 operator()(gaussians<E> const& model, optimizer_state<E> const& state, std::string const& where) {
     count("finite/parameters", {&model}, 0);
     count("finite/moments", {&state.first, &state.second}, parameter_arrays);

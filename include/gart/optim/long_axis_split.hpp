@@ -1,23 +1,21 @@
 #pragma once
 /// \file
-/// One Gaussian becomes two along its longest axis (Deng et al., Efficient Density Control for 3D Gaussian Splatting,
-/// 2024): the children end where it ended and are as thick in their middles as it was there, so the silhouette stays.
-/// With q = split_shape::offset and s the longest standard deviation, their centres lie at +-q 3 s, where the
-/// cross-section at three standard deviations is sqrt(1 - q^2) of the middle one; they are 1 - q times as long, q 3 s +
-/// (1 - q) 3 s = 3 s, and sqrt(1 - q^2) times as thick. Between middle and end they reach up to 6% further out where q
-/// = 0.4. Opacity falls to split_shape::opacity of what it was: where a child is needed it rises again, and where not
-/// it fades, which keeps a growing model from overfitting its training views.
+/// Splits a Gaussian in two along its longest axis (Deng et al., Efficient Density Control for 3D Gaussian Splatting,
+/// 2024). The children end where it ended and have its thickness at their centres, so the silhouette stays. With q =
+/// split_shape::offset and s the longest standard deviation, their centres lie at +-q 3 s. They are 1 - q times as
+/// long, since q 3 s + (1 - q) 3 s = 3 s. They are sqrt(1 - q^2) times as thick, the cross-section there at three
+/// standard deviations. Between middle and end they reach up to 6% further out where q = 0.4. Their opacity is
+/// split_shape::opacity times the parent's. It rises again where a child is needed, and fades where not, which reduces
+/// overfitting.
 
 #include <gart/math/quaternion.hpp>
 #include <gart/optim/options.hpp>
 
-#include <cmath>
-
 namespace gart { inline namespace GART_ISA {
 
-/// What the two children are.
+/// The two children.
 struct split_child {
-  vec3 offset;     ///< of one child's centre from the old one; the other's is its negative
+  vec3 offset;     ///< from the old centre to one child's; the other has its negative
   vec3 log_scale;  ///< of both
   float opacity;   ///< of each
 };

@@ -16,15 +16,15 @@ struct learning_rates {
   float opacity = 2.5e-2f;     ///< of the logit
   float sh_dc = 2.5e-3f;       ///< of the first band
   float sh_rest = 1.25e-4f;    ///< of the bands above the first: a twentieth, as in 3DGS
-  /// All rates but those of the means, exposures and lenses stay as they are for a share of the run, then decay
-  /// exponentially to `final_scale` of it.
-  float final_scale = 0.1f;                   ///< share of a rate that is left at the end
+  /// All rates except those of means, exposures and lenses are constant for a share of the run. Then they decay
+  /// exponentially to `final_scale` times their value.
+  float final_scale = 0.1f;                   ///< a rate's last value over its first
   static constexpr float decay_start = 0.5f;  ///< share of the run before the decay
-  /// The rates are those of a run of at least so many steps. A shorter one has less time to go as far: its rates of
-  /// mean, scale and opacity are sqrt(long_run / steps) times as large, at most four times, and it settles the later
-  /// the shorter it is, up to decay_start_short of the run.
+  /// The rates suit runs of at least so many steps. Shorter runs multiply the rates of mean, scale and opacity by
+  /// sqrt(long_run / steps), at most by four. Their decay starts later, the shorter the run, at most at
+  /// decay_start_short.
   int long_run = 15000;
-  float decay_start_short = 0.9f;                      ///< the share
+  float decay_start_short = 0.9f;                      ///< share of the shortest runs before the decay
   float exposure = 0.05f;                              ///< a visit of the view; decays like the means'
   static constexpr float exposure_final = 0.005f;      ///< where it ends
   float vignetting = 1e-2f, vignetting_final = 1e-4f;  ///< a visit of the lens; likewise
@@ -36,16 +36,16 @@ struct adam_options {
   bool sparse = false;  ///< Gaussians that the step's view did not show stay as they are (adam.hpp)
 };
 
-/// The opacity below which a Gaussian is of no use: `usual`, for the usual alpha_min of 1/255, and in proportion above.
-/// What is fainter than alpha_min is never hit and gets no gradient, so that it would stay as it is for good.
-inline float least_opacity(float usual, float alpha_min) { return std::max(usual, 255 * usual * alpha_min); }
+/// The opacity below which a Gaussian is useless: `opacity` at the default alpha_min of 1/255, and proportional above.
+/// A Gaussian fainter than alpha_min is never hit, so no gradient would ever change it.
+inline float least_opacity(float opacity, float alpha_min) { return std::max(opacity, 255 * opacity * alpha_min); }
 
 /// Of Markov chain Monte Carlo (train/densify/mcmc.hpp).
 struct mcmc_options {
   int from = 500, every = 100;  ///< steps: the first, and from one to the next
   float until = 5.0f / 6;       ///< share of the run
   float growth = 1.05f;         ///< a step of growth, up to max_gaussians; more in runs too short for it (growth_for)
-  float dead_opacity = 0.005f;  ///< as least_opacity has it for the alpha_min traced with
+  float dead_opacity = 0.005f;  ///< least opacity at the default alpha_min (least_opacity)
   float noise = 1e6f;           ///< times the rate of the means, and the covariance in units of the extent
   float opacity_penalty = 0.01f, scale_penalty = 0.014f;  ///< the scale in units of the extent
 };
@@ -63,7 +63,7 @@ struct error_growth_options {
   int from = 500, every = 100;     ///< steps: the first, and from one to the next
   float growth_end = 0.5f;         ///< share of the run at which the count has reached its budget
   float until = 5.0f / 6;          ///< share of the run after which the dead stay where they are
-  float dead_opacity = 0.005f;     ///< as least_opacity has it for the alpha_min traced with
+  float dead_opacity = 0.005f;     ///< least opacity at the default alpha_min (least_opacity)
   float opacity_penalty = 0.003f;  ///< times the mean opacity (and train/foreground_fraction.hpp)
   split_shape split;               ///< how one becomes two
   /// The count ends at one Gaussian for so many pixels of the training views: more would overfit them, and take
@@ -78,7 +78,7 @@ struct adc_options {
   float until = 0.5f;                                       ///< share of the run
   float gradient = 2e-4f;        ///< mean length of the mean's gradient in the image that makes a Gaussian grow
   float dense = 0.01f;           ///< times the extent: larger ones split, smaller ones are cloned
-  float prune_opacity = 0.005f;  ///< as least_opacity has it for the alpha_min traced with
+  float prune_opacity = 0.005f;  ///< least opacity at the default alpha_min (least_opacity)
   static constexpr float prune_scale = 0.1f;  ///< times the extent, after the first opacity reset
 };
 

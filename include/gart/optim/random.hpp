@@ -1,8 +1,8 @@
 #pragma once
 /// \file
 /// Random numbers without state: Philox4x32-10 (Salmon et al., Parallel Random Numbers: As Easy as 1, 2, 3, SC 2011).
-/// A number is a function of (seed, step, use, index), so kernels draw in any order, a checkpoint carries nothing, and
-/// the integers and uniforms have the same bits on every policy. Normals go through log, cos and sin, which policies
+/// A number is a function of (seed, step, use, index). So kernels draw in any order, and checkpoints need no random
+/// state. Integers and uniforms have the same bits on every policy. Normals go through log, cos and sin, which policies
 /// may round differently. About 40 integer instructions for four words.
 
 #include <gart/core/macros.hpp>

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
 /// A Gaussian as one row of floats across the parameter arrays, in the order of their table
-/// (scene/parameter_table.hpp): columns 0-2 mean, 3-5 log_scale, 6-9 quaternion, 10 opacity, 11.. sh. What moves,
-/// copies or clears whole Gaussians is one launch over (row, column), coalesced on a device.
+/// (scene/parameter_table.hpp): columns 0-2 mean, 3-5 log_scale, 6-9 quaternion, 10 opacity, 11.. sh. One launch over
+/// (row, column), coalesced on a device, moves, copies or clears whole Gaussians.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/exec/concepts.hpp>
@@ -41,8 +41,8 @@ GART_HD GART_INLINE T& row_element(gaussians_view<T> const& g, index_t row, inde
   return *element;
 }
 
-/// The largest opacity that a Gaussian may be seen with. `filter`: of each Gaussian, the narrowest filter that a
-/// training view has where it is (train/min_pixel_filter.hpp); null where there is none.
+/// The largest opacity that a view shows a Gaussian with. `filter`: the narrowest filter of any training view at each
+/// Gaussian (train/min_pixel_filter.hpp), or null.
 GART_HD inline float opacity_shown(gaussians_view<float const> const& g, index_t row, float const* filter) {
   float const own = sigmoid(g.opacity[row]);
   if (!filter) return own;
@@ -50,8 +50,8 @@ GART_HD inline float opacity_shown(gaussians_view<float const> const& g, index_t
   return own * largest_share_left(vec3(s[0], s[1], s[2]), filter[row]);
 }
 
-/// Whether a Gaussian is of use: the opacity that it may be seen with above the least, and it and the geometry finite.
-/// One that no view's filter leaves anything of is met by no ray, and has no gradient that would bring it back.
+/// Whether a Gaussian is alive: its largest visible opacity is above the least, and all its geometry is finite. No ray
+/// meets a Gaussian that every view's filter makes too faint, so no gradient would bring it back.
 GART_HD inline bool is_alive(gaussians_view<float const> const& g, index_t row, float least_opacity,
                              float const* filter) {
   bool alive = is_finite(g.opacity[row]) && opacity_shown(g, row, filter) > least_opacity;
@@ -88,8 +88,8 @@ void launch_rows(E& exec, char const* label, index_t rows, index_t width, Body c
 }  // namespace detail
 
 ///@{
-/// body(row, column) for every element of `rows` rows of `width`, known when compiled or not; a tile of rows at a time,
-/// so that the count of elements may pass 2^32.
+/// Calls body(row, column) for every element of `rows` rows of `width`, a compile-time constant or not. Works on a tile
+/// of rows at a time, so more than 2^32 elements are possible.
 template <execution E, class Body>
 void for_each_column(E& exec, char const* label, index_t rows, index_t width, Body const& body) {
   detail::launch_rows<0>(exec, label, rows, width, body);
@@ -144,15 +144,15 @@ struct number_rows {
 
 }  // namespace detail
 
-/// Adam's moments of Gaussians, by their numbers, become zero: of those that are here.
+/// Sets Adam's moments of these Gaussians, by number, to zero, for those that are here.
 template <execution E>
 void clear_moments(E& exec, optimizer_state<E>& state, span<u32 const> rows, row_owners const& owners) {
   for_each_element(exec, "clear_moments", static_cast<index_t>(rows.size()), state.first.sh_degree(),
                    detail::clear_moments_body{state.first.view(), state.second.view(), rows.data(), owners});
 }
 
-/// Where the rows of a scene are, as densification asks: here, all of them. Several ranks have another
-/// (shard/sharded_rows.hpp), whose members all ranks call together.
+/// The rows of a scene for densification: here all of them. sharded_rows (shard/sharded_rows.hpp) serves several ranks,
+/// which call its members together.
 template <execution E>
 class all_rows {
  public:
@@ -160,26 +160,26 @@ class all_rows {
   virtual row_owners owners() const { return {}; }             ///< this rank has all
   virtual bool spread() const { return false; }                ///< whether other ranks have some
   virtual index_t total(index_t here) { return here; }         ///< Gaussians of the scene, of which `here` are here
-  virtual index_t here(index_t total) const { return total; }  ///< of so many, those that are here
-  /// An element of each row that is here becomes one of each Gaussian, by number.
+  virtual index_t here(index_t total) const { return total; }  ///< Gaussians here among so many
+  /// Gathers one element of each Gaussian, by number, from those of the rows here.
   virtual void gather(E&, buffer<u32, E>&) {}
-  /// Gaussian to[k] becomes a copy of from[k], by numbers; `from` and `to` have none in common.
+  /// Copies Gaussian from[k] over to[k], by numbers; `from` and `to` have none in common.
   virtual void copy(E& exec, gaussians<E>& model, span<u32 const> from, span<u32 const> to) {
     for_each_element(exec, "copy_rows", static_cast<index_t>(from.size()), model.sh_degree(),
                      detail::copy_row_body{model.view(), from.data(), to.data()});
   }
-  /// Gaussian g of `to` becomes origin[g] of `from`, by numbers; `to` has as many as `origin`.
+  /// Copies Gaussian origin[g] of `from` to g of `to`, by numbers; `to` has as many as `origin`.
   virtual void take(E& exec, gaussians<E> const& from, gaussians<E>& to, span<u32 const> origin) {
     for_each_element(exec, "take_rows", static_cast<index_t>(origin.size()), from.sh_degree(),
                      detail::take_row_body{from.view(), to.view(), origin.data()});
   }
-  /// `width` sums of each run of so many Gaussians, in host memory: those of all ranks, in order.
+  /// Gathers `width` sums of each run of so many Gaussians, in host memory, from all ranks in order.
   virtual std::vector<double> sums_of_runs(std::vector<double> const& mine, index_t /*run*/, std::size_t /*width*/) {
     return mine;
   }
 };
 
-/// The rows of one rank by itself.
+/// The rows of a single rank.
 template <execution E>
 all_rows<E>& whole_scene() {
   static all_rows<E> rows;
@@ -189,7 +189,7 @@ all_rows<E>& whole_scene() {
 /// What a densification did. Where the count changed, gradients and other per-Gaussian buffers have a new size.
 struct density_change {
   index_t relocated = 0, added = 0, removed = 0;  ///< Gaussians
-  /// Whether anything was done.
+  /// Whether any Gaussian changed.
   bool any() const { return relocated || added || removed; }
 };
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Gaussians under training: parameters, their gradients and Adam's moments, of one number at all times. Memory: 16
-/// bytes a float of a Gaussian. Errors: as gaussians<E>.
+/// Gaussians under training: parameters, gradients and Adam's moments, always of the same count. Memory: 16 bytes a
+/// float of a Gaussian. Errors: as gaussians<E>.
 
 #include <gart/optim/adam.hpp>
 #include <gart/optim/rows.hpp>
@@ -17,10 +17,10 @@ template <execution E>
 struct trained_gaussians {
   gaussians<E> model, gradients;  ///< gradients: of the last step
   optimizer_state<E> moments;     ///< Adam's
-  int degree;                     ///< of the model; coefficients above it are zero
+  int degree;                     ///< the model's; coefficients above it are zero
   index_t total;                  ///< Gaussians of all ranks
 
-  /// A copy of the host's, in rows of `stored_degree`, the model's or a higher one. Moments are zero.
+  /// Copies a host model, in rows of `stored_degree`, which is the model's or higher. Moments are zero.
   trained_gaussians(E& exec, gaussian_model const& start, int stored_degree)
       : model(exec, 0, stored_degree),
         gradients(exec, model.size(), stored_degree),
@@ -38,7 +38,7 @@ struct trained_gaussians {
   void resize(std::size_t n) {
     for (gaussians<E>* each : all()) each->resize_keep(n);
   }
-  /// All numbers of the rows from `first` on become zero.
+  /// Sets all numbers of the rows from `first` on to zero.
   void clear_from(E& exec, index_t first) {
     for (gaussians<E>* each : all())
       for_each_array(
@@ -48,11 +48,11 @@ struct trained_gaussians {
           },
           *each);
   }
-  /// Memory for n Gaussians in all: growth up to there neither takes slack nor has an array twice while it copies it.
+  /// Reserves memory for n Gaussians. Growth up to n then needs no slack, and no second copy of an array.
   void reserve(std::size_t n) {
     for (gaussians<E>* each : all()) each->reserve(n);
   }
-  /// Gaussian g becomes what origin[g] was, by numbers, of which there may be fewer or more than before.
+  /// Replaces Gaussian g by origin[g], by numbers; the count may change.
   void take(E& exec, all_rows<E>& rows, span<u32 const> origin) {
     index_t const next = rows.here(static_cast<index_t>(origin.size()));
     for (gaussians<E>* each : {&model, &moments.first, &moments.second}) {

@@ -1,26 +1,25 @@
 #pragma once
 /// \file
-/// The gradient of a view's pose, from the gradients of the Gaussians that a backward pass has left:
+/// The gradient of a view's pose, from a backward pass's gradients of the Gaussians:
 ///
 ///   differentiate(frame, pass, color_gradient, gradients);      // backward/backward.hpp
 ///   pose_differentiation<E> by_pose(exec);
 ///   pose_gradient const g = by_pose(frame, gradients);          // or into memory of the policy
 ///
-/// An image depends on where the Gaussians are relative to the camera, so that moving the camera by dp is moving all of
-/// them by -dp, and turning it by a small w about its position p is turning them by -w about p, with the colours that
-/// the turned rays see:
+/// An image depends on the Gaussians relative to the camera. Moving the camera by dp moves all of them by -dp. Turning
+/// it by a small w about its position p turns them by -w about p, with the colours that the turned rays see:
 ///   dL/dp = -sum_i dL/dmean_i
 ///   dL/dw = sum_i [ -(mean_i - p) x dL/dmean_i - torque_i + turn_i ]
-/// torque_i is dL/d a small turn of the Gaussian in the world, 1/2 of the vector part of dL/dq q*, since dL/dq is a
-/// turn pulled back to the quaternion q (math/quaternion.hpp); turn_i that of its colours (math/sh_turn.hpp). No
-/// hit is looked at again. It holds for every strategy, any function of the image, with or without the filter of the
-/// pixels, whose gradients are in those of the parameters, and any camera whose rays all move with its pose.
+/// torque_i is the gradient by a small turn of the Gaussian in the world, half the vector part of dL/dq q*
+/// (math/quaternion.hpp). turn_i is that of its colours (math/sh_turn.hpp). No ray is traced again. It holds for every
+/// strategy, any function of the image, with or without the filter of the pixels, and any camera whose rays all move
+/// with its pose.
 ///
-/// Gaussians whose mean and first band have no gradient were not seen and cost their reads alone; numbers that are not
-/// finite are left out. Sums: in double past a lane's own, in an order that depends on the number of Gaussians only.
-/// Where they are spread over ranks each sums runs of its own (of_rows), and a total of all runs has, on hosts, the
-/// bits of one that has all. Cost: one read of the gradients, and of the parameters of what was seen: 464 bytes a
-/// Gaussian of degree 3 at most. Memory: 48 bytes for each of at most 1024 sums; on hosts one for 64 Gaussians.
+/// Gaussians whose mean and first band have no gradient were not seen, and only cost their reads. Numbers that are not
+/// finite are skipped. Sums over lanes are in double, in an order that depends on the number of Gaussians only. Several
+/// ranks each sum their own runs (of_rows); on hosts the total has the bits of a single rank. Cost: one read of the
+/// gradients, and of the parameters of Gaussians that were seen: at most 464 bytes a Gaussian of degree 3. Memory: 48
+/// bytes for each of at most 1024 sums; on hosts one for 64 Gaussians.
 
 #include <gart/core/error.hpp>
 #include <gart/exec/buffer.hpp>
@@ -121,7 +120,7 @@ struct sum_gaussians {
   }
 };
 
-// One team: the teams' sums, in their order.
+// One team adds the teams' sums, in their order.
 struct sum_teams {
   static constexpr index_t lanes = 32;
   struct scratch {
@@ -150,16 +149,16 @@ struct sum_teams {
 
 }  // namespace pose_kernels
 
-/// The gradients of poses, one at a time, and the memory that they need.
+/// Computes gradients of poses, one at a time, and keeps the memory for them.
 template <execution E>
 class pose_differentiation {
  public:
   /// Allocates nothing; `exec` must outlive it.
   explicit pose_differentiation(E& exec) : exec_(&exec), sums_(exec), out_(exec) {}
 
-  /// Into out, [6] in the policy's memory: a pose_gradient's numbers in order. `gradients` are those that
-  /// differentiate() wrote for the view that the frame is prepared for. Errors: invalid_argument for gradients of
-  /// another number of Gaussians or another degree, or a short `out`.
+  /// Writes a pose_gradient's numbers in order to out, [6] in the policy's memory. `gradients` come from
+  /// differentiate() for the frame's view. Errors: invalid_argument for gradients of another number of Gaussians or
+  /// another degree, or a short `out`.
   template <class Frame>
   void operator()(Frame const& frame, gaussians_view<float const> gradients, span<float> out) {
     gaussians_view<float const> const scene = frame.scene();
@@ -173,7 +172,7 @@ class pose_differentiation {
 
   /// Gaussians that are summed together.
   static constexpr index_t run = pose_kernels::sum_gaussians<0>::run;
-  /// The same from the Gaussians of a scene, wherever its rows are. Over ranks the sums of runs travel, in double.
+  /// The same for the Gaussians of a scene on one or several ranks. Ranks exchange the sums of runs, in double.
   template <int Degree>
   void of_rows(gaussians_view<float const> scene, gaussians_view<float const> gradients, vec3d const& position,
                all_rows<E>& rows, span<float> out) {
@@ -192,7 +191,7 @@ class pose_differentiation {
   /// The policy.
   E& exec() const { return *exec_; }
 
-  /// To the host; waits for it.
+  /// Returns it to the host; waits for it.
   template <class Frame>
   pose_gradient operator()(Frame const& frame, gaussians_view<float const> gradients) {
     out_.resize(pose_gradient::floats);
@@ -208,7 +207,7 @@ class pose_differentiation {
   buffer<float, E> out_;
 };
 
-/// Once, to the host.
+/// The same for a single call.
 template <class Frame>
 pose_gradient differentiate_pose(Frame const& frame, gaussians_view<float const> gradients) {
   return pose_differentiation<typename Frame::execution_type>(frame.exec())(frame, gradients);

@@ -2,8 +2,8 @@
 /// \file
 /// Small changes of a camera's pose: six numbers, in the camera's own axes,
 ///   position = position_0 + unit R_0 t,   rotation = R_0 exp([w]x),
-/// t in a unit of length, of a training the scene's extent, and w in radians; and the gradient of a function of the
-/// image by a pose, in world axes. In double: a step of a training may move a pose by less than a float tells.
+/// t in units of length (in training the scene's extent), w in radians. Also the gradient of a function of the image by
+/// a pose, in world axes. All in double: a training step may move a pose by less than a float resolves.
 
 #include <gart/camera/shutter.hpp>
 #include <gart/core/isa.hpp>
@@ -33,9 +33,9 @@ struct pose_gradient {
 /// Six numbers of a pose: t, then w.
 using pose_numbers = std::array<double, 6>;
 
-/// The poses of all training views as they are learned, and Adam's moments of them, as a checkpoint holds them.
+/// The learned poses of all training views and their moments, as in a checkpoint.
 struct pose_state {
-  std::vector<double> value;          ///< [views][6]: what `moved` is given; empty: no poses are learned
+  std::vector<double> value;          ///< [views][6]: arguments of `moved`; empty: no poses are learned
   std::vector<double> first, second;  ///< [views][6]: in the numbers of the metric
   std::vector<double> metric;         ///< [views][6][6] (pose/pose_metric.hpp), zeros before the first visit
   std::vector<u32> visits;            ///< [views] steps that moved the view
@@ -45,7 +45,7 @@ struct pose_state {
 
 namespace gart { inline namespace GART_ISA {
 
-/// The camera with the pose changed: all else stays.
+/// The camera with a changed pose; all else stays.
 inline camera moved(camera view, pose_numbers const& by, double unit) {
   mat3d const axes = axes_of(view), turned = axes * turn_of({by[3], by[4], by[5]});
   view.position += axes * vec3d(by[0], by[1], by[2]) * unit;
@@ -53,15 +53,15 @@ inline camera moved(camera view, pose_numbers const& by, double unit) {
   return view;
 }
 
-/// What `moved` must be given to come from one camera's pose to another's.
+/// The argument of `moved` that leads from one camera's pose to another's.
 inline pose_numbers pose_between(camera const& from, camera const& to, double unit) {
   mat3d const back = glm::transpose(axes_of(from));
   vec3d const t = back * (to.position - from.position) / unit, w = angles_of(back * axes_of(to));
   return {t.x, t.y, t.z, w.x, w.y, w.z};
 }
 
-/// The gradient by the numbers that `moved` is given, from that by the pose where they lead: turns do not commute, so
-/// that dL/dw is J^T of what the camera's axes see of it, J the left Jacobian of the exponential map.
+/// The gradient by the argument of `moved`, from that by the resulting pose. Turns do not commute: dL/dw is J^T times
+/// the gradient in the camera's axes, J the left Jacobian of the exponential map.
 inline pose_numbers pull_back(camera const& from, pose_numbers const& at, double unit, pose_gradient const& by) {
   mat3d const back = glm::transpose(axes_of(from));
   vec3d const t = back * by.translation * unit, g = back * by.rotation, w(at[3], at[4], at[5]);

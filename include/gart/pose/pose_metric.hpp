@@ -1,12 +1,12 @@
 #pragma once
 /// \file
-/// How far an image moves with its camera's pose. Seen from a camera that moves by unit t and turns by w, in its own
-/// axes, what stands in direction d at a nearness of q, one over its distance, moves on the sphere of directions by
+/// How far an image moves with its camera's pose. Let a camera move by unit t and turn by w, in its own axes. A point
+/// in direction d, with q one over its distance, then moves on the sphere of directions by
 ///   -unit q (1 - d d^T) t + d x w;
-/// the metric is the 6 x 6 matrix of the mean square of that over what the image shows. A shift to the side and a turn
-/// that follows it nearly cancel: numbers in which the metric is the identity are free of that, so that an optimiser
-/// which treats each by itself (Adam) does not crawl along the valley. As Park et al. 2023 (CamP) precondition, from
-/// the image's own depth. A share of the mean diagonal is added, which holds what the image hardly tells.
+/// The metric is the 6 x 6 matrix of the mean square of this movement over the image. A shift to the side and a turn
+/// after it nearly cancel. In numbers where the metric is the identity they do not, so Adam, which treats numbers one
+/// by one, converges fast. CamP (Park et al. 2023) preconditions in the same way; here the image's depth gives the
+/// metric. A share of the mean diagonal is added, which damps directions that the image hardly determines.
 ///
 /// Host side, in double, over a grid of at most about 64 x 64 pixels.
 
@@ -35,7 +35,7 @@ class metric_root {
       }
   }
 
-  /// Gradient by numbers in which the metric is the identity, from that by a pose's.
+  /// The gradient by numbers in which the metric is the identity, from that by a pose's.
   pose_numbers gradient(pose_numbers g) const {
     for (std::size_t i = 0; i < size; ++i) {
       for (std::size_t j = 0; j < i; ++j) g[i] -= root_[size * i + j] * g[j];
@@ -43,7 +43,7 @@ class metric_root {
     }
     return g;
   }
-  /// A step in a pose's numbers, from one in those.
+  /// A step in a pose's numbers, from one in the metric's.
   pose_numbers step(pose_numbers z) const {
     for (std::size_t i = size; i-- > 0;) {
       for (std::size_t j = i + 1; j < size; ++j) z[i] -= root_[size * j + i] * z[j];
@@ -56,7 +56,7 @@ class metric_root {
   std::array<double, size * size> root_{};
 };
 
-/// [6][6], from depth: sum of weight x distance a pixel, transmittance: what is left, [H][W] both.
+/// The metric, [6][6], from depth (the sum of weight x distance) and transmittance, both [H][W].
 inline std::array<double, 36> pose_metric(camera const& view, span<float const> depth, span<float const> transmittance,
                                           double unit) {
   constexpr std::size_t n = metric_root::size;

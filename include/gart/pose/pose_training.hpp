@@ -1,14 +1,14 @@
 #pragma once
 /// \file
-/// Poses of the training views, learned with the Gaussians: Adam on the six numbers of the step's view (pose/pose.hpp),
-/// in those in which its image moves alike whichever changes (pose/pose_metric.hpp), on the host. A pull to the
-/// capture's poses, translations in units of the scene's extent, stands in the loss.
+/// Poses of the training views, learned with the Gaussians. Adam runs on the host, on the six numbers of the step's
+/// view (pose/pose.hpp), scaled by the metric of its image (pose/pose_metric.hpp). The loss holds a pull to the
+/// capture's poses, with translations in units of the scene's extent.
 ///
-/// Where the whole capture is moved, turned and scaled with its scene every image stays as it is: no loss holds the
-/// views there. So once an epoch the similarity that comes nearest to their increments is taken out of them,
+/// Moving, turning and scaling the whole capture with its scene changes no image, so no loss holds the views. So once
+/// an epoch the similarity nearest to their increments is removed from them,
 ///   minimise over v, o, s:  sum_i |a_i - v - o x r_i - s r_i|^2 / extent^2 + |b_i - o|^2,
-/// a_i and b_i the world's increments of position and turn, r_i the position from the mean. Positions and turns then
-/// are, in the mean, where the capture has them.
+/// a_i and b_i the increments of position and turn in world axes, r_i the position from the mean. The mean position and
+/// turn are then the capture's.
 ///
 /// A gradient that is not finite moves nothing. Cost: none that shows; memory: 440 bytes a view.
 
@@ -28,7 +28,7 @@ namespace gart { inline namespace GART_ISA {
 /// The poses of a run.
 class pose_training {
  public:
-  /// From these cameras, where each is as the capture has it; `extent` is the scene's.
+  /// From the capture's cameras; `extent` is the scene's.
   pose_training(pose_options const& options, std::vector<camera> captured, double extent)
       : options_(options), captured_(std::move(captured)), extent_(extent) {
     std::size_t const n = captured_.size();
@@ -36,21 +36,21 @@ class pose_training {
               std::vector<double>(36 * n), std::vector<u32>(n)};
   }
 
-  /// A view's camera as it is learned.
+  /// A view's learned camera.
   camera view(std::size_t i) const {
     return state_.visits[i] ? moved(captured_[i], numbers(i), extent_) : captured_[i];
   }
 
-  /// Whether poses move in a step of a run of so many.
+  /// Whether poses move in step `step` of so many.
   bool learns(int step, int iterations) const { return step >= warm_up(iterations); }
 
-  /// Whether view i has yet to be told how its image moves.
+  /// Whether view i has no metric yet.
   bool wants_metric(std::size_t i) const { return state_.metric[36 * i] == 0; }
-  /// It, from the depth and transmittance of an image by the view's camera as it is learned.
+  /// The metric, from depth and transmittance of an image by the view's learned camera.
   std::array<double, 36> metric_of(camera const& view, span<float const> depth, span<float const> transmittance) const {
     return pose_metric(view, depth, transmittance, extent_);
   }
-  /// Told, before the view's first step.
+  /// Sets the metric, before the view's first step.
   void set_metric(std::size_t i, std::array<double, 36> const& metric) {
     std::copy(metric.begin(), metric.end(), state_.metric.begin() + static_cast<std::ptrdiff_t>(36 * i));
   }
@@ -79,7 +79,7 @@ class pose_training {
     }
     move = metric.step(move);
     for (std::size_t k = 0; k < 6; ++k) state_.value[6 * i + k] -= move[k];
-    u64 visits = 0;  // all that says when: a run that is resumed knows nothing else
+    u64 visits = 0;  // the only clock: a resumed run knows no other
     for (u32 const v : state_.visits) visits += v;
     if (visits % state_.visits.size() == 0) take_out_similarity();
   }
@@ -137,7 +137,7 @@ class pose_training {
       at = {captured_[i].position / extent_, axes * vec3d(x[0], x[1], x[2]), axes * vec3d(x[3], x[4], x[5])};
       middle += at.arm / static_cast<double>(seen), shift += at.shift / static_cast<double>(seen);
     });
-    // Translation, scale and turn each by itself: arms sum to zero, and are orthogonal to what a turn does to them.
+    // Translation, scale and turn separate: arms sum to zero, and a turn moves them at right angles.
     double along = 0, square = 0;
     mat3d inertia(0.0);
     vec3d torque(0.0);

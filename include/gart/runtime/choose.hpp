@@ -1,12 +1,12 @@
 #pragma once
 /// \file
-/// What a capture asks for, known before training starts: `gart train` and `gart eval` take it where an option does not
-/// say otherwise. What cameras and pixels tell for certain is read of them, with its reason in words; what they do not
-/// is measured in short trainings (runtime/validation.hpp).
+/// The options that suit a capture, chosen before training starts. `gart train` and `gart eval` take them where the
+/// user gives none. Cameras and pixels decide some of them, each with its reason in words. Short trainings decide the
+/// others (runtime/validation.hpp).
 ///
-/// inspect() reads every pixel's alpha, and of at most 64 training images, evenly spread, the outermost pixels: O(bytes
-/// of the images). A border is plain where 95% of those pixels lie within 12 of 255 of their median in every channel:
-/// what a bounded object in front of a uniform background looks like, and a photograph of a scene never.
+/// inspect() reads every pixel's alpha, and the outermost pixels of at most 64 training images, evenly spread: O(bytes
+/// of the images). A border is plain where 95% of its pixels lie within 12 of 255 of their median in every channel.
+/// Bounded objects before a uniform background look like that; photographs of a scene do not.
 
 #include <gart/io/dataset.hpp>
 #include <gart/runtime/request.hpp>
@@ -17,7 +17,7 @@
 
 namespace gart {
 
-/// What a capture shows of itself, that choices go by.
+/// The properties of a capture that choices depend on.
 struct capture_traits {
   std::size_t distorted = 0;  ///< training and test views whose lens is no pinhole
   std::size_t folding = 0;    ///< of these, lenses that are not one to one over the image
@@ -25,12 +25,12 @@ struct capture_traits {
   double transparent = 0;     ///< share of the training images' pixels that are not opaque
   std::size_t masked = 0;     ///< training views with a mask
   bool clear_border = false;  ///< the images' borders are transparent
-  bool plain_border = false;  ///< or opaque, and of one colour,
-  u8 border[3] = {0, 0, 0};   ///< which is this
+  bool plain_border = false;  ///< the borders are opaque and of one colour
+  u8 border[3] = {0, 0, 0};   ///< the colour of a plain border
   std::size_t views = 0;      ///< training views
-  u64 pixels = 0;             ///< and their pixels
+  u64 pixels = 0;             ///< pixels of all training views
 
-  /// Whether its objects stand before a background that is not of the scene.
+  /// Whether the objects stand before a background that does not belong to the scene.
   bool bounded() const { return clear_border || plain_border; }
 };
 
@@ -47,19 +47,19 @@ struct chosen {
 /// White for transparent images, as published results have it, and for plain white borders; else black.
 chosen<background_kind> choose_background(capture_traits const& traits);
 
-/// Footprints, which the tiles tracer and every strategy but pixel stand on, need a lens that is one to one over the
-/// image: where one is not, bvh and pixel; else "auto", the fastest there is.
+/// The tiles tracer and every strategy but pixel need footprints, and so a lens that is one to one over the image.
+/// Where a lens folds: bvh and pixel. Else "auto", the fastest.
 chosen<tracer_kind> choose_tracer(capture_traits const& traits);
-/// As choose_tracer has it.
+/// The strategy for choose_tracer's tracer.
 chosen<std::string> choose_backward(capture_traits const& traits);
 
-/// The capture's points; where it has none and depth is trained on, points that its depth maps measured; else random
-/// ones in its bounds. A capture's points lie on surfaces, and opacity 0.1 and a scale of 1.0 (times the distance to
-/// the neighbours) fill the gaps between them. Random points are mostly in empty space: with MCMC, which moves them,
-/// 0.5 and 0.1 let rays through from the first step. What the options say stands.
+/// The capture's points; without points, those that depth maps measured where depth is trained on; else random ones in
+/// the capture's bounds. A capture's points lie on surfaces. Opacity 0.1 and a scale of 1.0 (times the distance to the
+/// neighbours) fill the gaps between them. Random points mostly lie in empty space. With MCMC, which moves them, 0.5
+/// and 0.1 let rays through from the first step. Values that the options give stay.
 struct starting_points {
   bool random = false;    ///< in the capture's bounds
-  bool measured = false;  ///< of its depth maps; neither: the capture's own
+  bool measured = false;  ///< measured by depth maps; neither: the capture's own
   index_t count = 0;      ///< of points
   float opacity = 0,      ///< of the first Gaussians
       scale = 0;          ///< times the distance to the neighbours
@@ -67,18 +67,17 @@ struct starting_points {
 /// Where training starts; the reason names the numbers.
 chosen<starting_points> choose_start(dataset const& data, train_options const& options);
 
-/// The count that the options let the capture grow to: max_gaussians, or what growth by error takes its pixels for
-/// (growth_budget).
+/// The largest number of Gaussians: max_gaussians, or the budget by pixels for growth by error (growth_budget).
 chosen<index_t> choose_budget(dataset const& data, train_options const& options);
 
-/// All choices for a capture, as `gart train` takes them. A choice that is to be another is set afterwards.
+/// All choices for a capture, as `gart train` takes them. Callers may change them afterwards.
 struct recommendation {
   configuration_request request;  ///< the configuration
-  train_options options;          ///< with the choices in them
-  validation measured;            ///< what was tried for them
+  train_options options;          ///< options with the choices
+  validation measured;            ///< the trials behind them
 };
-/// What `request` leaves to gart's choice, and in the options the background and the usual candidates, in place of what
-/// they say; but for settings that are `given`, which stay. O(pixels), and the trials.
+/// Fills in what `request` leaves open, the background, and the default candidates. Settings named in `given` stay as
+/// they are. Cost: O(pixels), and the trials.
 recommendation recommended(train_options const& options, dataset const& data, configuration_request const& request = {},
                            std::vector<std::string> const& given = {}, validation_progress const& progress = {});
 

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Turns templates into configurations: sessions and renderers of a policy, traits, a tracer and a strategy. Include
-/// where the kernels of the policy can be compiled, and call from GART_REGISTER_CONFIGURATIONS register_configurations,
-/// for all SH degrees, or register_configuration_of for one configuration, which takes models up to its degree:
+/// Turns templates into configurations: sessions and renderers of a policy, traits, a tracer and a strategy. Include it
+/// where the policy's kernels can be compiled. In GART_REGISTER_CONFIGURATIONS call register_configurations for all SH
+/// degrees, or register_configuration_of for one configuration, which takes models up to its degree:
 ///   using response = gart::generalized_gaussian<4>;
 ///   GART_REGISTER_CONFIGURATIONS(my_configurations,
 ///                                gart::register_configuration_of<gart::openmp_exec, gart::scene_traits<3, response>,
@@ -19,7 +19,7 @@ namespace gart { inline namespace GART_ISA {
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
 class compiled_session final : public session {
  public:
-  /// As make_session has it; `start` is of the request's degree.
+  /// For make_session; `start` has the request's degree.
   compiled_session(configuration_request const& request, train_options const& options, dataset const& data,
                    start_model const& start)
       : exec_(policy_of<E, Comm>(request)), trainer_(exec_, options, data, start, comm_of<Comm>(request)) {
@@ -80,14 +80,14 @@ void register_configurations(int rank, bool (*available)(std::string*) = always_
   register_configuration_of<E, scene_traits<3>, Tracer, Strategy, Comm>(rank, available);
 }
 
-/// Those with gradients of depth: the primitive strategy for all SH degrees.
+/// Configurations with depth gradients: the primitive strategy for all SH degrees.
 template <execution E, class Tracer>
 void register_depth(int rank, bool (*available)(std::string*) = always_available) {
   register_configurations<E, Tracer, with_depth<primitive_strategy>>(rank, available);
 }
 
-/// All strategies, but on hosts none with ordered sums (a variant has it), ranked from first_rank in the list's order
-/// of preference.
+/// All strategies, ranked from first_rank in the list's order. On hosts those with ordered sums are left to the
+/// variants.
 template <execution E, class Tracer>
 void register_strategies(int first_rank, bool (*available)(std::string*) = always_available) {
   int rank = first_rank;

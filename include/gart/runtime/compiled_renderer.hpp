@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The renderer (runtime/renderer.hpp) of a policy, traits, a tracer and a strategy: a frame, a backward pass, and the
-/// memory that a caller does not bring. Contexts of views have frames and passes of their own, which the renderer lends
-/// and gets back.
+/// The renderer (runtime/renderer.hpp) of a policy, traits, a tracer and a strategy. It holds a frame, a backward pass,
+/// and memory for arrays that the caller does not give. Contexts of views have frames and passes of their own, which
+/// the renderer lends and gets back.
 
 #include <gart/backward/backward.hpp>
 #include <gart/pose/differentiate_pose.hpp>
@@ -19,7 +19,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// A renderer of one configuration.
+/// The renderer of one configuration.
 template <execution E, class Traits, class Tracer, strategy Strategy>
 class compiled_renderer final : public renderer {
  public:

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// What a forward pass leaves for its backward pass: of a view or of a batch of rays, by itself, so that others may run
-/// in between and no gradient is of anything but what was shown.
+/// The data that the forward pass of a view or of a batch of rays keeps for its backward pass. Each context stands
+/// alone, so other passes may run in between.
 
 #include <gart/rays/ray_batch.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -16,15 +16,15 @@ struct gradient_targets {
   ray_gradient_targets rays = {};  ///< dL/d the rays of a batch
 };
 
-/// Of one forward pass of a renderer, which it must not outlive. What it was given in memory of the policy must stay as
-/// it is until the last backward(): rays, and Gaussians that are bound.
+/// The context of one forward pass. It must not outlive its renderer. Rays and bound Gaussians in the policy's memory
+/// must stay unchanged until the last backward().
 class forward_context {
  public:
-  /// Its memory goes back to the renderer.
+  /// Gives its memory back to the renderer.
   virtual ~forward_context() = default;
-  /// From dL/d what was shown; may be called again. Errors: invalid_argument where the renderer has another model by
-  /// now, for gradients of another size, for targets that a view or a batch has not, and for gradients by depth or
-  /// transmittance of a view where configuration_request.depth did not ask for them.
+  /// The gradients from dL/d image; may be called again. Errors: invalid_argument where the renderer has another model
+  /// by now, for gradients of another size, and for targets that do not fit a view or a batch. A view's gradients by
+  /// depth or transmittance need configuration_request.depth.
   virtual void backward(output_gradients const& by, gradient_targets const& to) = 0;
 };
 

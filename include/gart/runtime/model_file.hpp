@@ -1,12 +1,12 @@
 #pragma once
 /// \file
-/// A model with what it was trained with, as its file says it, in any format of io/splat_file.hpp. A splat PLY's header
-/// carries, in lines "comment gart KEY VALUE", what is not as everywhere: alpha_min, t_min, near, max_hits, antialias,
-/// kernel_degree, origin. A model of ordinary Gaussians is byte for byte an ordinary file, and one of another program
-/// is read with the defaults.
+/// A model and the settings that it was trained with, in any format of io/splat_file.hpp. Settings that differ from the
+/// defaults stand in a splat PLY's header as "comment gart KEY VALUE": alpha_min, t_min, near, max_hits, antialias,
+/// kernel_degree, origin. A model with the defaults is byte for byte an ordinary file. Models of other programs are
+/// read with the defaults.
 ///
-/// Errors: load_model throws io_error for what is no splat file, or one whose header says what cannot be, naming the
-/// file, the key and the remedy; save_model as write_splats (io/splat_file.hpp).
+/// Errors: load_model throws io_error for a file that is no splat file, or whose header has a wrong value, naming the
+/// file, the key and the remedy. save_model: as write_splats (io/splat_file.hpp).
 
 #include <gart/io/origin.hpp>
 #include <gart/render/options.hpp>
@@ -18,7 +18,7 @@
 
 namespace gart {
 
-/// A model, and what it was trained to be rendered with.
+/// A model, and the settings to render it with.
 struct model_file {
   gaussian_model model;                 ///< the Gaussians, or a rank's rows of them
   render_options render;                ///< the background is in no file
@@ -30,12 +30,12 @@ struct model_file {
 
 /// Errors: io_error naming the file and what is wrong in it.
 model_file load_model(std::filesystem::path const& path);
-/// The same with this rank's rows alone, of which a binary splat PLY is not read beyond.
+/// The same with this rank's rows alone. Of a binary splat PLY no other rows are read.
 model_file load_model(std::filesystem::path const& path, row_owners const& owners);
 /// Written to a temporary name, then renamed. Errors: io_error.
 void save_model(std::filesystem::path const& path, model_file const& file);
 
-/// What is not the default of `render` and of kernel degree 2, as the header has it.
+/// The header's settings: those that differ from the default render options and kernel degree 2.
 splat_traits traits_of(render_options const& render, int kernel_degree);
 
 inline constexpr u32 max_hits_most = 1'000'000'000;  ///< largest cap of hits that a file can have

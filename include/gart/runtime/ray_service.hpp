@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Batches of rays behind the renderers: one compiled service for each policy and response serves the renderers of all
-/// tracers, strategies and SH degrees. A library that compiles one registers it when it is loaded; a program does so
-/// for a response of its own by register_rays (runtime/compiled_rays.hpp).
+/// Batches of rays for renderers. One compiled service for each policy and response serves all tracers, strategies and
+/// SH degrees. A library registers its services when it is loaded. A program adds one for its own response by
+/// register_rays (runtime/compiled_rays.hpp).
 
 #include <gart/render/options.hpp>
 #include <gart/runtime/forward_context.hpp>
@@ -12,12 +12,12 @@
 
 namespace gart {
 
-/// Traces batches for a renderer; as its calls of the same names (runtime/renderer.hpp).
+/// Traces batches for a renderer, with calls of the same names (runtime/renderer.hpp).
 class ray_service {
  public:
-  /// The policy's memory goes with it.
+  /// Frees its memory of the policy.
   virtual ~ray_service() = default;
-  /// The Gaussians, whose arrays must stay; again where they may have changed. Waits for the policy.
+  /// Sets the Gaussians, whose arrays must stay. Call again when they may have changed. Waits for the policy.
   virtual void set_scene(gaussians_view<float const> scene, int active_degree) = 0;
   /// From and to host memory.
   virtual traced_rays trace(ray_batch const& rays, render_options const& options) = 0;

@@ -1,8 +1,7 @@
 #pragma once
 /// \file
-/// The table of compiled configurations behind make_session and make_renderer. A library that compiles some registers
-/// them when it is loaded (GART_REGISTER_CONFIGURATIONS); a program that instantiates its own may do the same
-/// (examples/5_own_configuration).
+/// The table of compiled configurations behind make_session and make_renderer. Libraries register theirs when they are
+/// loaded (GART_REGISTER_CONFIGURATIONS); programs may add their own (examples/5_own_configuration).
 
 #include <gart/core/error.hpp>
 #include <gart/runtime/renderer.hpp>
@@ -19,15 +18,15 @@ struct compiled_configuration {
   int rank = 0;  ///< "auto" takes the highest that is available; configurations that trade something lie below 0
   /// False: no device, with the reason.
   bool (*available)(std::string* reason);
-  std::unique_ptr<renderer> (*make_renderer)(configuration_request const&);  ///< a renderer of it
-  /// A session of it.
+  std::unique_ptr<renderer> (*make_renderer)(configuration_request const&);  ///< a renderer of this configuration
+  /// A session of this configuration.
   std::unique_ptr<session> (*make_session)(configuration_request const&, train_options const&, dataset const&,
                                            start_model const& start);
 };
 
 /// Adds an entry to the table; before main, from static initialisers.
 void register_configuration(compiled_configuration const& entry);
-/// The best that meets a request; unsupported as resolve has it.
+/// The highest ranked entry that meets a request. Errors: unsupported, naming the compiled configurations.
 compiled_configuration const& find_configuration(configuration_request const& request);
 
 /// Only the bvh tracer has a tree to rebuild.
@@ -43,8 +42,7 @@ inline bool always_available(std::string*) { return true; }
 
 }  // namespace gart
 
-/// Runs the rest of its arguments before main, as registrations ask for. `name` becomes a symbol that the linker is
-/// told to keep, so that the object with the configurations is not dropped.
+/// Runs the rest of its arguments before main. `name` becomes a symbol that keeps the linker from dropping the object.
 #define GART_REGISTER_CONFIGURATIONS(name, ...) \
   extern "C" bool name;                         \
   bool name = [] {                              \

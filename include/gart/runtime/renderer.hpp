@@ -2,20 +2,19 @@
 /// \file
 /// Rendering and its gradients behind one host-safe interface, by a configuration that is chosen at run time.
 ///
-/// The Gaussians are the renderer's own copy (set_model), or lie in memory that somebody else owns (bind). Images and
-/// gradients come to the host (render, differentiate), or stay where they are computed (render_to, differentiate_into):
-/// those calls go to the configuration's queue, the caller's stream where the request names one, and copy nothing. On a
-/// device they return before the work is done: wait(), or what the caller puts into the same stream, comes after it.
+/// The Gaussians are the renderer's own copy (set_model), or lie in the caller's memory (bind). Images and gradients
+/// come to the host (render, differentiate), or stay where they are computed (render_to, differentiate_into). The
+/// latter calls copy nothing, and go to the configuration's queue or to the stream that the request names. On a device
+/// they return before the work is done. Use wait(), or the same stream, to come after it.
 ///
 /// Memory "of the policy" is device memory of the request's device for cuda, host memory for the others.
 ///
-/// Any rays are traced besides views, whatever the tracer (rays/ray_batch.hpp). forward() keeps what the gradient of a
-/// view or of a batch needs, and any number of contexts may wait for theirs.
+/// Every renderer also traces batches of any rays (rays/ray_batch.hpp). forward() keeps the data for the gradient of a
+/// view or of a batch; any number of contexts may wait.
 ///
-/// Errors: unsupported, naming the configurations there are and how to compile one, for a configuration that is not;
-/// invalid_argument for Gaussians of another SH degree or whose arrays disagree in size, for options that no view can
-/// be rendered by, and for options.rebuild_every where the tracer builds no tree; out_of_memory; whatever the policy
-/// throws.
+/// Errors: unsupported where no compiled configuration meets the request, naming those that exist and how to compile
+/// one. invalid_argument for Gaussians of another SH degree, for arrays that disagree in size, for options out of
+/// range, and for options.rebuild_every with a tracer that builds no tree. out_of_memory; other errors of the policy.
 
 #include <gart/exec/profile.hpp>
 #include <gart/pose/pose.hpp>
@@ -30,7 +29,7 @@
 
 namespace gart {
 
-/// Where a view goes, in memory of the policy; null where it is not wanted.
+/// The arrays that a view is written to, in memory of the policy; null where one is not wanted.
 struct render_targets {
   float* color = nullptr;          ///< [H][W][3], background composited
   float* transmittance = nullptr;  ///< [H][W]
@@ -42,10 +41,10 @@ struct render_targets {
 /// Renders and differentiates views of one model.
 class renderer {
  public:
-  /// The policy's memory goes with it.
+  /// Frees its memory of the policy.
   virtual ~renderer() = default;
 
-  /// Copies the model; arrays that were bound are let go.
+  /// Copies the model; bound arrays are no longer used.
   virtual void set_model(gaussian_model const& model) = 0;
   /// The arrays, in memory of the policy, must stay until another model is set or bound. What is written to them
   /// between two views counts for the second, on the same stream.
@@ -53,37 +52,37 @@ class renderer {
 
   /// A view to host memory.
   virtual rendered render(camera const& view, render_options const& options) = 0;
-  /// Its colours alone, as to_8bit makes them, [H][W][3]: made where it is rendered, so that 3 bytes a pixel are copied
-  /// in place of 24.
+  /// The view's colours as to_8bit makes them, [H][W][3]. The policy converts them, so 3 bytes a pixel are copied in
+  /// place of 24.
   virtual image8 render_8bit(camera const& view, render_options const& options) = 0;
   /// A view to memory of the policy.
   virtual void render_to(camera const& view, render_options const& options, render_targets const& targets) = 0;
 
   /// The forward and the backward pass of a view by the configuration's strategy, for dL/dcolour [H][W][3]. The
-  /// gradients stay where the policy computes until they are fetched. "gradients" is the profiler's stage of both
-  /// passes and of what prepares them. Errors: invalid_argument for a gradient of another size than the view.
+  /// gradients stay where the policy computes until they are fetched. The profiler's stage "gradients" holds both
+  /// passes and their preparation. Errors: invalid_argument for a gradient of another size than the view.
   virtual void differentiate(camera const& view, render_options const& options, image_float const& color_gradient) = 0;
   virtual gaussian_model gradients() const = 0;  ///< dL/d every parameter, of the last differentiate
-  /// The same from and into memory of the policy: dL/dcolour [H][W][3], and arrays of the number and the SH degree of
-  /// the Gaussians, which are overwritten. `targets` takes the view besides.
+  /// The same from and into memory of the policy: dL/dcolour is [H][W][3]. The gradients, of the Gaussians' number and
+  /// SH degree, are overwritten. `targets` takes the view besides.
   virtual void differentiate_into(camera const& view, render_options const& options, float const* color_gradient,
                                   gaussians_view<float> gradients, render_targets const& targets = {}) = 0;
-  /// dL/d the pose of the view of the last differentiate. Waits for it. Errors: invalid_argument before that, after
-  /// another view was rendered or another model set or bound, and for a model without Gaussians.
+  /// dL/d the pose of the view of the last differentiate. Waits for it. Errors: invalid_argument before the first
+  /// differentiate, after another view or model, and for a model without Gaussians.
   virtual pose_gradient differentiate_pose() = 0;
 
-  /// A view to memory of the policy, as render_to, and what its gradients need: a frame and a hit buffer for each
-  /// context that waits, which the renderer keeps for the next.
+  /// Renders a view as render_to, and keeps a frame and a hit buffer for its gradients. The renderer reuses them for
+  /// later contexts.
   virtual std::unique_ptr<forward_context> forward(camera const& view, render_options const& options,
                                                    render_targets const& targets) = 0;
-  /// A batch in memory of the policy, as trace_to, and what its gradients need.
+  /// Traces a batch as trace_to, and keeps the data for its gradients.
   virtual std::unique_ptr<forward_context> forward(ray_batch const& rays, render_options const& options,
                                                    batch_targets const& targets,
                                                    gradient_form form = gradient_form::primitive) = 0;
 
   /// What rays see, from and to host memory. options.antialias must be 0. The tree is built for the first batch of a
-  /// model, and of bound arrays again where they have changed. Errors: unsupported where batches are not compiled for
-  /// the backend and the kernel degree.
+  /// model, and again where bound arrays have changed. Errors: unsupported where batches are not compiled for the
+  /// backend and the kernel degree.
   virtual traced_rays trace(ray_batch const& rays, render_options const& options) = 0;
   /// The same in memory of the policy. Waits for it to check the rays.
   virtual void trace_to(ray_batch const& rays, render_options const& options, batch_targets const& targets) = 0;

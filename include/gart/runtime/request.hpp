@@ -24,8 +24,7 @@ struct configuration_request {
   bool depth = false;  ///< gradients of depth and transmittance too; training by depth_weight asks for it itself
   int threads = 0;     ///< of the openmp policy; 0: as many as OpenMP gives
   int device = 0;      ///< of the cuda policy; ranks take a host's GPUs in turn
-  /// Of the cuda policy: a cudaStream_t of the caller's that all work goes to (cudaStreamLegacy for the default one);
-  /// null: one of its own.
+  /// The cuda policy's stream: the caller's cudaStream_t (cudaStreamLegacy for the default one), or null for its own.
   void* stream = nullptr;
   /// The ranks that train together (comm/mpi_comm.hpp), all of which make the same calls; null: this process by itself.
   /// Must outlive what is made for the request.

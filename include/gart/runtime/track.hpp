@@ -1,19 +1,17 @@
 #pragma once
 /// \file
-/// Where a photograph was taken, from a model of the scene and a guess: the pose at which the model's image is nearest
-/// to it.
+/// The pose of a photograph, from a model of the scene and a guess: the pose whose image is nearest to the photograph.
 ///
 ///   auto const renderer = make_renderer({});
 ///   renderer->set_model(model);
 ///   track_result const found = track(*renderer, photo, guess, {.render = options});
 ///
-/// Least squares of the colours by a quasi-Newton method, from coarse to fine: image and photograph are blurred,
-/// at first by a share of the width, then by half of that and so on, and at last not at all, so that a guess some tens
-/// of pixels off still falls into the right minimum. The gradient is that of the whole renderer
-/// (pose/differentiate_pose.hpp); the first curvature comes from the image alone, what gradients change over steps goes
-/// into it (BFGS): with d a pixel's ray in the camera's
-/// axes, n the slope of the image on the sphere of directions, there, and q one over its depth, the colour changes by
-/// q n . t + (d x n) . w as the camera moves by t and turns by w. Any camera with one centre.
+/// Method: least squares of the colours by a quasi-Newton method, from coarse to fine. Image and photograph are
+/// blurred, by half as much in each round and in the last not at all. So a guess that is some tens of pixels off still
+/// finds the right minimum. The whole renderer gives the gradient (pose/differentiate_pose.hpp). The image alone gives
+/// the first curvature, which BFGS then updates. Let d be a pixel's ray in the camera's axes, n the slope of the image
+/// at d on the sphere of directions, and q one over the pixel's depth. The colour changes by q n . t + (d x n) . w as
+/// the camera moves by t and turns by w. Any camera with one centre.
 ///
 /// Cost of a step: two forward passes, a backward pass and a few passes over the image on the host. Errors:
 /// invalid_argument for a photograph, mask or camera of another size; what the renderer throws.
@@ -37,11 +35,11 @@ struct track_options {
 /// What was found.
 struct track_result {
   camera view;                   ///< the guess, with the pose that was found
-  std::vector<float> residuals;  ///< root of the mean squared error, not blurred, of the best pose after each step
+  std::vector<float> residuals;  ///< root mean squared error of the best pose after each step, without blur
 };
 
-/// The model is the one that the renderer has. photo: 3 channels, [0, 1]; mask: 1 channel of the photograph's size, 0
-/// where it is not to be looked at, or empty.
+/// Finds the pose by the renderer's model. photo: 3 channels, [0, 1]. mask: empty, or 1 channel of the photograph's
+/// size with 0 where pixels do not count.
 track_result track(renderer& renderer, image_float const& photo, camera const& guess, track_options const& options = {},
                    image8 const& mask = {});
 

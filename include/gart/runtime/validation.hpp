@@ -1,24 +1,23 @@
 #pragma once
 /// \file
-/// What a capture asks for, measured before a run: short trainings on small images of a share of the training views,
-/// judged by the views held out of them. No threshold of a statistic of the capture decides, and test views are never
-/// seen.
+/// Options chosen by measurement before a run. Short trainings on small images use most training views, and the others
+/// judge them. Test views are never seen.
 ///
-/// The trials. One training view in 4 is held out, from the middle of each four on: noise falls with their number, and
-/// three quarters of the views train well enough to compare. Images are shrunk, at most by 4 and to no less than 128
-/// pixels, and the Gaussians that there may be with them. The first trial is of the options as they come, which should
-/// be the literature's. Each candidate is tried on these options with one setting changed.
+/// The trials. One training view in 4, the third of each four, is held out. Noise falls with their number, and three
+/// quarters of the views train well enough to compare. Images are shrunk, at most by 4 and to no less than 128 pixels,
+/// and the largest number of Gaussians with them. The first trial has the caller's options, which should be the
+/// literature's. Each candidate changes one setting of these.
 ///
-/// The verdict. Each held-out view gives a gain in PSNR, of the candidate over the first trial. The noise is the
-/// standard error of their mean. A candidate is taken where its gain is above the noise and above least_gain; a tie
-/// leaves the value that was. Gains add up nearly (bench/results/trial_candidates.json), so those taken are taken
-/// together. Twice the noise would be the test of a claim: here both errors cost alike.
+/// The verdict. Each held-out view gives the candidate's gain in PSNR over the first trial. The noise is the standard
+/// error of their mean. A candidate is taken where its gain exceeds the noise and least_gain. Gains nearly add up
+/// (bench/results/trial_candidates.json), so all such candidates are taken together. A claim would need twice the
+/// noise; here a wrong choice costs the same either way.
 ///
-/// Cost: trials have a fixed number of steps, so that the same capture and options give the same choice on the serial
-/// policy whatever the machine's load: together about a tenth of a run's time (plan_validation), more where the run's
-/// own images are small. On a GPU the trials run beside each other, one thread and stream each; with a stream of the
-/// caller's, or where memory ends, in turn. Memory: the training views once more, shrunk, and a session for each trial
-/// that runs. Ranks are left out: let one rank measure and tell the others. Errors: as make_session.
+/// Cost: about a tenth of a run's time (plan_validation), more where the run's own images are small. Trials have a
+/// fixed number of steps, so on the serial policy the choice does not depend on the machine's load. On a GPU the trials
+/// run in parallel, one thread and stream each. With the caller's stream, or where memory ends, they run one after
+/// another. Memory: the training views once more, shrunk, and a session for each running trial. With several ranks let
+/// one rank measure and tell the others. Errors: as make_session.
 
 #include <gart/io/dataset.hpp>
 #include <gart/runtime/request.hpp>
@@ -32,29 +31,29 @@ namespace gart {
 
 struct capture_traits;
 
-/// A setting that training may have in place of the literature's.
+/// A setting to try in place of the literature's.
 struct candidate {
   std::string setting;                       ///< the field of train_options that it sets: "exposure", "rates.sh_rest"
   std::string value;                         ///< in words, as `gart train` takes it
   std::function<void(train_options&)> take;  ///< sets it
 };
 
-/// Those that pay on some captures and cost on others, the first where a run is too short for all; none that changes
-/// nothing: images of the whole sphere have no corners for vignetting, and some budgets do not depend on pixels.
-std::vector<candidate> usual_candidates(capture_traits const& traits, train_options const& options);
+/// The candidates that pay on some captures and cost on others, most useful first. Those without effect on this capture
+/// are left out: images of the whole sphere have no vignetting, and some budgets do not depend on pixels.
+std::vector<candidate> default_candidates(capture_traits const& traits, train_options const& options);
 
 /// How candidates are tried.
 struct validation_plan {
   std::vector<std::size_t> held_out = {};  ///< training views by index; empty: nothing is measured
   int shrink = 1;                          ///< pixels of a photograph to one of a trial's image, across and down
   int steps = 0;                           ///< of each trial
-  std::size_t trials = 0;                  ///< the first, of the options as they come, and one for each candidate
-  bool beside = false;                     ///< all at once, each on a stream of its own
+  std::size_t trials = 0;                  ///< the first, with the caller's options, and one for each candidate
+  bool beside = false;                     ///< in parallel, each on a stream of its own
   std::string why;                         ///< in words
 };
 
-/// For so many candidates at most: fewer where the run is too short for all of them, none where it is too short for
-/// one, or has too few training views to hold some out. `beside`: they may run beside each other.
+/// A plan for at most so many candidates: fewer where the run is too short for all, none where it is too short for one
+/// or has too few training views. `beside`: trials may run in parallel.
 validation_plan plan_validation(train_options const& options, dataset const& data, std::size_t candidates,
                                 bool beside = false);
 
@@ -72,22 +71,22 @@ struct trial {
   bool is_better() const { return gain > least_gain && gain > noise; }
 };
 
-/// What was measured, and what came of it.
+/// The result of all trials.
 struct validation {
   validation_plan plan;       ///< how
   std::vector<trial> trials;  ///< in order
-  train_options options;      ///< with the candidates that were taken
+  train_options options;      ///< the options with the taken candidates
 };
 
-/// Called between steps, by the thread that called validate: how much is done, 0 to 1, and the plan in words. False
-/// ends it: trials that were not finished count for nothing.
+/// Called between steps, in the thread that called validate, with the share done, 0 to 1, and the plan in words.
+/// Returning false ends the measurement; unfinished trials do not count.
 using validation_progress = std::function<bool(double done, std::string const& plan)>;
 
 /// Tries the candidates.
 validation validate(configuration_request const& request, train_options const& options, dataset const& data,
                     std::vector<candidate> const& candidates, validation_progress const& progress = {});
 
-/// The capture as its trials see it: the training views alone, shrunk, and the same points.
+/// The capture for trials: the training views, shrunk, and the same points.
 dataset shrunk(dataset const& data, int shrink);
 
 }  // namespace gart

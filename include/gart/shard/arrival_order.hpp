@@ -13,7 +13,7 @@ namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
-// The first and past-the-last places of each block's run; both are zero where nothing of a block has come.
+// The first and past-the-last places of each block's run; both are zero where no row of a block arrived.
 struct runs_kernel {
   float const* in;
   index_t count, block;
@@ -34,10 +34,10 @@ struct run_lengths_kernel {
   GART_KERNEL void operator()(index_t b) const { lengths[b] = past[b] - first[b]; }
 };
 
-// The order of the numbers: runs in that of their blocks.
+// Puts runs in the order of their blocks.
 struct run_order_kernel {
   runs_kernel runs;
-  u64 const* begin;  // of each block's run, in that order
+  u64 const* begin;  // of each block's run, in block order
   u32* order;
   GART_KERNEL void operator()(index_t k) const {
     u32 const mine = runs.block_of(k);
@@ -47,15 +47,15 @@ struct run_order_kernel {
 
 }  // namespace detail
 
-/// The order, and what finds it.
+/// Finds the order, and keeps it.
 template <execution E>
 class arrival_order {
  public:
-  /// Nothing has come yet.
+  /// No rows yet.
   explicit arrival_order(E& exec) : exec_(&exec), order_(exec), runs_(exec) {}
 
-  /// Of `n` rows of placing_width floats at `in`. Where this rank has so many rows others have at most a block more.
-  /// `begin` is for what is scanned on the way.
+  /// Finds the order of `n` rows of placing_width floats at `in`. Other ranks have at most a block more rows than this
+  /// one. `begin` is memory for a scan.
   void find(float const* in, index_t n, index_t rows, row_owners const& owners, buffer<u64, E>& begin) {
     order_.resize(n);
     std::size_t const mine = (u64{rows} + owners.block - 1) / owners.block + 1,
@@ -71,7 +71,7 @@ class arrival_order {
     parallel_for(*exec_, "exchange/order", n, detail::run_order_kernel{runs, begin.data(), order_.data()});
   }
 
-  /// [rows], until the next find.
+  /// The positions, [rows], until the next find.
   u32 const* data() const { return order_.data(); }
 
  private:

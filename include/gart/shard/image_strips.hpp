@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Strips that ranks have of an array of rows, an image or what is made of one, on their way to the ranks of the same
-/// view that read them: whole images, or the rows around a strip of one's own. Every rank calls these, with a unit to
-/// trace or without; they return the bytes that this one has sent.
+/// Sends strips of an image, or of another array of rows, between the ranks of one view. A rank gets the whole image,
+/// or the rows around its own strip. Every rank calls these functions, with a unit to trace or without. They return the
+/// bytes that this rank sent.
 
 #include <gart/comm/communicator.hpp>
 #include <gart/exec/stage.hpp>
@@ -15,15 +15,15 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// The messages of one rank: to whom and from whom rows go.
+/// The messages of one rank: which rows it sends to which rank, and receives from which.
 struct strip_messages {
   std::vector<work_unit> const& units;  ///< of all ranks
   int rank;                             ///< this one
   std::vector<message> sends = {}, receives = {};
   u64 bytes = 0;  ///< sent
 
-  /// Of the rows at `data`, so many bytes each: those that a unit has go to those that read them. Both are functions
-  /// of a work_unit to image_rows.
+  /// Exchanges rows at `data`, so many bytes each, from the units that have them to those that read them. Both
+  /// functions map a work_unit to image_rows.
   void add(void* data, std::size_t row_bytes, auto const& has, auto const& reads) {
     work_unit const& mine = units[static_cast<std::size_t>(rank)];
     auto const part = [&](int other, image_rows const& there, image_rows const& wanted) {
@@ -40,12 +40,12 @@ struct strip_messages {
   }
 };
 
-/// The rows of pixels of an image that a unit has.
+/// A unit's rows of pixels.
 inline image_rows rows_in(work_unit const& unit, int height) {
   return {unit.rows.first, std::max(std::min(unit.rows.end, height), unit.rows.first)};
 }
 
-/// Of an image [H][W] of `bytes` a pixel, of which a rank has its unit's rows: the rows that a unit reads.
+/// Gives each rank the rows that its unit reads, of an image [H][W] of `bytes` a pixel whose rows the units have.
 template <execution E, class Comm>
 requires communicator<Comm, E> u64 share_strips(E& exec, Comm& comm, std::vector<work_unit> const& units, void* image,
                                                 camera const& view, std::size_t bytes, auto const& reads) {
@@ -58,7 +58,8 @@ requires communicator<Comm, E> u64 share_strips(E& exec, Comm& comm, std::vector
   return all.bytes;
 }
 
-/// Of arrays of so many rows each: all of them, from the unit that has them; beside what is queued (Comm::begin).
+/// Gives all ranks of a view all rows of arrays, from the units that have them. Runs in parallel with queued work
+/// (Comm::begin).
 template <execution E, class Comm>
 requires communicator<Comm, E> u64 begin_sharing_rows(E& exec, Comm& comm, std::vector<work_unit> const& units,
                                                       std::initializer_list<span<float>> arrays, int rows,

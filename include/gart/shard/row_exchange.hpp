@@ -1,28 +1,29 @@
 #pragma once
 /// \file
-/// The rows that a round of a step needs, from their owners to who traces them (work_units.hpp), and the sums of their
-/// gradients back.
+/// Sends the rows that a round of a step needs from their owners to the ranks that trace them (work_units.hpp), and the
+/// sums of their gradients back.
 ///
 ///   row_exchange<E, Comm, 8, 3, response> rows(exec, comm, block);
 ///   rows.fetch(scene, views, names, options);  // `scene`: the rows of this rank
-///   frame.prepare(rows.scene(), views[rows.unit().view], options of rows.unit().rows);
-///   rows.finish_fetch();                     // colours are there for what is queued from here on
+///   frame.prepare(rows.scene(), views[rows.unit().view], options with rows.unit().rows);
+///   rows.finish_fetch();                     // work queued from here on has colours
 ///   ...                                      // the image, its gradient, sum_gradients
-///   rows.give_back(pass, gradients);         // what this rank has summed
-///   rows.sum_moments(v, moments);            // of a view, for the rows of this rank; sum_finished where it finishes()
+///   rows.give_back(pass, gradients);         // this rank's sums
+///   rows.sum_moments(v, moments);            // one view's, for this rank's rows; sum_finished where it finishes()
 ///   rows.sum_colors(0, views, share, sh_gradient, false);  // colours arrive last; or take_colors
 ///
-/// An owner finds the boxes of its rows in each view, and sends a row to those whose tiles a box meets. What arrives is
-/// put in the order of the Gaussians' numbers, so that lists, ties and images have the bits of one rank that has all.
-/// Four fifths of what travels are colours and their gradients: they travel while lists are made, and while the owner
-/// finishes the gradients of geometry. Where one rank traces each view, it finishes them itself, for the rows that its
-/// view shows, and they travel in the moments' place; owners add what came, row by row. Sums are added in the order of
-/// ranks. With sums in a fixed order (a strategy that is `ordered`) they also have the bits of one rank: where a
-/// Gaussian's pairs begin in an earlier strip, they travel one by one, and its owner adds them to that strip's sum.
+/// An owner finds the boxes of its rows in each view, and sends a row to the ranks whose tiles its box meets. Arrived
+/// rows are put in the order of the Gaussians' numbers. So lists, ties and images have the bits of a single rank.
+/// Colours and their gradients are four fifths of the traffic. They travel while lists are made, and while the owner
+/// finishes the gradients of geometry. A rank that traces a whole view finishes them itself, and sends them in place of
+/// moments; owners add them row by row. Sums are added in the order of ranks. An `ordered` strategy also gets the bits
+/// of a single rank. A Gaussian's pairs that began in an earlier strip then travel one by one, and the owner adds them
+/// to that strip's sum.
 ///
 /// Traffic a row and unit: 4 (row width + 1) bytes out, up to a multiple of 16, and 4 (3 K + 12) back: 240 each at
-/// degree 3; ordered, as much again for each pair of a row that began above. Memory: 16 bytes a row of this rank's and
-/// view, 12 a row and unit, and the rows that travel. The host waits once, for the counts. Errors: out_of_memory.
+/// degree 3. If ordered, as much again for each pair of a row that began in an earlier strip. Memory: 16 bytes for each
+/// of this rank's rows and each view, 12 a row and unit, and the rows that travel. The host waits once, for the counts.
+/// Errors: out_of_memory.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/backward/backward.hpp>
@@ -36,12 +37,12 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// Size: side of a tile. Response: of the Gaussians.
+/// Size: side of a tile. Response: the Gaussians'.
 template <execution E, class Comm, int Size, int ShDegree, class Response>
 requires communicator<Comm, E>
 class row_exchange {
  public:
-  /// No row is here yet. `exec` must outlive it.
+  /// Holds no rows yet. `exec` must outlive it.
   row_exchange(E& exec, Comm comm, index_t block)
       : exec_(&exec),
         comm_(std::move(comm)),
@@ -65,8 +66,8 @@ class row_exchange {
         pairs_out_(exec),
         pairs_in_(exec) {}
 
-  /// The rows of the round's views, at most one a rank; the same on all ranks. Without their colours (finish_fetch).
-  /// `names`: a number of each view, by which what it costs is remembered; or none.
+  /// Fetches the rows for the round's views, without colours (finish_fetch). There is at most one view a rank, and all
+  /// ranks pass the same. `names`: a number for each view, to remember its cost by; may be empty.
   void fetch(gaussians_view<float const> scene, std::vector<camera> const& views, std::vector<std::size_t> const& names,
              render_options const& options) {
     stage_scope stage(*exec_, "exchange/rows");
@@ -95,7 +96,7 @@ class row_exchange {
     for_each_column<detail::placing_width / 4>(*exec_, "exchange/unpack", arriving,
                                                detail::unpack_placing_body{scene_.view(), in_.data(), order_.data()});
   }
-  /// Their colours. Every rank calls it, with a unit to trace or without.
+  /// Fetches their colours. Every rank calls it, with a unit to trace or without.
   void finish_fetch() {
     stage_scope stage(*exec_, "exchange/rows");
     comm_.finish(*exec_);
@@ -104,32 +105,32 @@ class row_exchange {
         detail::unpack_colors_body<coefficients>{scene_.sh.data(), colors_in_.data(), order_.data()});
   }
 
-  /// What this rank traces.
+  /// The unit that this rank traces.
   work_unit const& unit() const { return units_[static_cast<std::size_t>(owners_.rank)]; }
-  /// What each does.
+  /// The units of all ranks.
   std::vector<work_unit> const& units() const { return units_; }
-  /// The rows for it, in the order of their numbers.
+  /// The unit's rows, in the order of their numbers.
   gaussians_view<float const> scene() const { return scene_.view(); }
   /// Bytes that this rank has sent to others since the last call.
   u64 take_traffic() { return std::exchange(traffic_, u64{0}); }
 
-  /// Strips of [H][W] of `bytes` a pixel become whole images, on all ranks that trace the same view.
+  /// Joins strips of [H][W] of `bytes` a pixel to whole images, on all ranks that trace the same view.
   void share_image(void* image, camera const& view, std::size_t bytes) {
     share_image(image, view, bytes, [&](work_unit const&) { return image_rows{0, view.height}; });
   }
-  /// Of them only the rows that a unit reads.
+  /// The same for the rows that a unit reads.
   void share_image(void* image, camera const& view, std::size_t bytes, auto const& reads) {
     traffic_ += share_strips(*exec_, comm_, units_, image, view, bytes, reads);
   }
-  /// Beside what is queued, until give_back: as many rows of each of `arrays`, to all ranks that trace the same view,
-  /// from the one that `has` them.
+  /// Sends rows of `arrays`, in parallel with queued work until give_back, from the rank that `has` them to all ranks
+  /// of the same view.
   void begin_sharing(std::initializer_list<span<float>> arrays, int rows, auto const& has) {
     traffic_ += begin_sharing_rows(*exec_, comm_, units_, arrays, rows, has);
   }
 
-  /// Whether each rank traces a whole view, and finishes its gradients: sum_finished has these, and not sum_moments.
+  /// Whether each rank traces a whole view and finishes its gradients; then use sum_finished, not sum_moments.
   bool finishes() const { return finishes_; }
-  /// What the pass has summed over this rank's strip: gradients.sh, and of a whole view all of the gradients.
+  /// Sends the pass's sums over this rank's strip: gradients.sh, and for a whole view all gradients.
   template <class Pass>
   void give_back(Pass const& pass, gaussians_view<float const> gradients) {
     static_assert(!Pass::records || Pass::tile_size == Size);
@@ -137,32 +138,32 @@ class row_exchange {
     if constexpr (Pass::ordered) pack_pairs(pass);
     return_sums(Pass::ordered, pass.moments().data(), gradients);
   }
-  /// The same of a rank that has traced nothing.
+  /// The same for a rank that has traced nothing.
   void give_nothing_back(bool ordered) {
     stage_scope stage(*exec_, "exchange/gradients");
     pairs_out_.resize(0), pairs_leaving_.assign(units_.size(), 0);
     return_sums(ordered, nullptr, {});
   }
 
-  /// Of this rank's rows the colours' gradients, [rows][K][3]: the sum over the views [first, end) of the round, and
-  /// of what is there if it `adds`, times `share`.
+  /// Sums the colour gradients of this rank's rows, [rows][K][3], over the round's views [first, end), times `share`.
+  /// If `adds`, existing values count too.
   void sum_colors(int first, int end, float share, span<float> sh_gradient, bool adds) {
     take_colors(first, end, share, sh_gradient, adds, "exchange/add",
                 detail::keep_sums{sh_gradient.data(), coefficients});
   }
-  /// The same not to memory, but to take(row, first, piece), as adam_pass::colors has it. Until the next fetch.
+  /// The same, given to take(row, first, piece) for adam_pass::colors; until the next fetch.
   template <class Take>
   void take_colors(int first, int end, float share, span<float const> sh_gradient, bool adds, char const* label,
                    Take const& take) {
     comm_.finish(*exec_);
     add_sums<0, layout::coefficients>(label, first, end, colors_in_, share, sh_gradient, adds, take);
   }
-  /// Their moments, [rows][moment_stride], over all pixels of the round's view v.
+  /// Sums their moments, [rows][moment_stride], over all pixels of the round's view v.
   void sum_moments(int v, span<float> moments) {
     add_sums<layout::coefficients, layout::moments>("exchange/add", v, v + 1, in_, 1, moments, false,
                                                     detail::keep_sums{moments.data(), moment_stride});
   }
-  /// Their other gradients, in the same way; to `errors`, [rows] or null, the errors seen through them are added.
+  /// Sums their other gradients in the same way. Errors seen through the rows are added to `errors`, [rows] or null.
   void sum_finished(int first, int end, float share, gaussians_view<float> gradients, float* errors, bool adds) {
     stage_scope stage(*exec_, "exchange/gradients");
     auto const [units, count] = returned_of(first, end);
@@ -179,13 +180,14 @@ class row_exchange {
 
   static u64 total(std::vector<u64> const& counts) { return std::accumulate(counts.begin(), counts.end(), u64{0}); }
 
-  // Rows of `width` floats, so many to each rank, or from it. What stays here is none: it is where it arrives.
+  // Messages of rows of `width` floats, so many to or from each rank. Rows that stay here need none: they are written
+  // where they would arrive.
   std::vector<message> messages(std::vector<u64> const& counts, void* data, std::size_t width) const {
     std::vector<message> all = messages_of(counts, data, width * sizeof(float));
     std::erase_if(all, [&](message const& m) { return m.rank == owners_.rank; });
     return all;
   }
-  // Where they are written before they leave.
+  // The memory where rows are written before they leave.
   template <index_t Width, class T>
   detail::way_out<T, Width> way(std::vector<u64> const& leave, T* out, std::vector<u64> const& arrive, T* in) const {
     auto const me = static_cast<std::ptrdiff_t>(owners_.rank);
@@ -199,14 +201,14 @@ class row_exchange {
     comm_.begin(*exec_, as_span(sends), as_span(receives));
   }
 
-  // The boxes of this rank's rows in each view, and who traces what: of what the views cost when they were traced last,
-  // or where one never was, of what they cost now. What they cost now comes with the counts, for the next time. A view
+  // Finds the boxes of this rank's rows in each view, and the units of all ranks. Units follow from the views' costs
+  // when they were last traced, or now for a new view. Present costs come with the counts, for the next time. A view
   // that one rank traces alone needs no cost.
   void measure(gaussians_view<float const> scene, std::vector<camera> const& views,
                std::vector<std::size_t> const& names, render_options const& options) {
     bool const shared = views.size() < static_cast<std::size_t>(owners_.ranks);
     finishes_ = !shared;
-    constexpr index_t counted = 1 << 16;  // rows of a rank, about, that tell the cost of a view's strips
+    constexpr index_t counted = 1 << 16;  // about so many rows of a rank estimate the cost of a view's strips
     index_t const every = shared ? 1 + scene.count / counted : 0;
     std::size_t const ends = static_cast<std::size_t>(owners_.ranks) + 1, costs = shared ? costs_.count(views) : 0;
     told_.resize(ends + costs), told_.zero();
@@ -235,7 +237,8 @@ class row_exchange {
     units_ = divide_work(costs_.by_view(views, now), owners_.ranks, Size);
   }
 
-  // Which rows go to whom: one scan over the units, for one wait. Returns what this rank's rows cost the views.
+  // Finds which rows go to which rank: one scan over the units, for one wait. Returns the cost of this rank's rows in
+  // each view.
   std::vector<u64> select(index_t rows) {
     std::size_t const units = units_.size(), all = rows * units;
     sent_.assign(units, 0), returned_views_.clear();
@@ -270,13 +273,13 @@ class row_exchange {
     return costs;
   }
 
-  // What came of the views [first, end): the first, and how many.
+  // The first unit that traced the views [first, end), and how many did.
   std::pair<detail::returned_unit const*, index_t> returned_of(int first, int end) const {
     auto const begin = std::lower_bound(returned_views_.begin(), returned_views_.end(), first),
                past = std::lower_bound(begin, returned_views_.end(), end);
     return {returned_.data() + (begin - returned_views_.begin()), static_cast<index_t>(past - begin)};
   }
-  // Of one kind, Width pieces a row, which are those from From on in pairs. `before`: of all rows.
+  // Sums one kind of values, Width pieces a row, which begin at From in pairs. `before`: values of all rows to add to.
   template <index_t From, index_t Width, class Take>
   void add_sums(char const* label, int first, int end, buffer<float, E> const& in, float share,
                 span<float const> before, bool adds, Take const& take) {
@@ -289,7 +292,7 @@ class row_exchange {
             layout::pieces(pairs_in_.data()), adds ? layout::pieces(before.data()) : nullptr, share, take});
   }
 
-  // What each rank has for this one; `costs` become the sums over ranks.
+  // Tells each rank how many rows come to it; `costs` become the sums over ranks.
   std::vector<u64> send_counts(std::vector<u64>& costs) {
     std::size_t const ranks = units_.size(), me = static_cast<std::size_t>(owners_.rank), width = ranks + costs.size();
     std::vector<u64> mine = sent_, all(ranks * width), counts(ranks);
@@ -303,7 +306,7 @@ class row_exchange {
     return counts;
   }
 
-  // The pairs of rows that began in a strip above, in the order in which the rows came.
+  // The pairs of rows that began in an earlier strip, in the order in which the rows arrived.
   template <class Pass>
   void pack_pairs(Pass const& pass) {
     index_t const n = scene_.size();
@@ -336,7 +339,7 @@ class row_exchange {
     return out;
   }
 
-  // The way back of what came: the sums of this rank's unit, if it has traced one.
+  // Sends the sums of this rank's unit back, if it has traced one.
   void return_sums(bool ordered, float const* moments, gaussians_view<float const> gradients) {
     ordered_ = ordered;
     index_t const n = moments ? scene_.size() : 0;
@@ -377,19 +380,19 @@ class row_exchange {
   row_owners owners_;
   antialiased<E> filter_;
   gaussians<E> scene_;
-  std::vector<buffer<footprint_slots, E>> boxes_;  // of this rank's rows, by view
+  std::vector<buffer<footprint_slots, E>> boxes_;  // boxes of this rank's rows, by view
   std::vector<work_unit> units_;
   view_costs<Size> costs_;
   std::vector<u64> sent_, received_, pairs_leaving_;  // by rank
-  buffer<u32, E> place_of_;                           // of each row in each unit
-  buffer<u32, E> list_, sent_pairs_;                  // list_: rows of this rank's, by who they went to
+  buffer<u32, E> place_of_;                           // place of each row in each unit
+  buffer<u32, E> list_, sent_pairs_;                  // list_: this rank's rows, by the rank they went to
   buffer<detail::taken_unit, E> taken_;
   buffer<detail::returned_unit, E> returned_;
   std::vector<int> returned_views_;  // their views
-  arrival_order<E> order_;           // where each row of scene_ lay in what came
+  arrival_order<E> order_;           // the arrival position of each row of scene_
   buffer<u32, E> counts_;
   buffer<u64, E> places_, total_;
-  buffer<u64, E> told_;  // where each unit's rows end, and what its rows of tiles cost each view
+  buffer<u64, E> told_;  // where each unit's rows end, and the costs of rows of tiles
   buffer<float, E> out_, in_, colors_out_, colors_in_, pairs_out_, pairs_in_;
   bool ordered_ = false, finishes_ = false;
   u64 traffic_ = 0;

@@ -12,8 +12,8 @@
 
 namespace gart { inline namespace GART_ISA { namespace detail {
 
-// The box of a row in a view; cost is, by rows of tiles, by how much their pairs are more than those of the row above.
-// One row in `every` is counted, for all of them, and with 0 none: many atomic additions to few addresses are slow.
+// The box of a row in a view. cost: for each row of tiles, its pairs less those of the row above. Only one row in
+// `every` is counted, with 0 none: many atomic additions to few addresses are slow.
 template <class Response, class E, int Size, class Bounds>
 struct box_kernel {
   gaussians_view<float const> scene;
@@ -42,13 +42,13 @@ GART_HD inline pixel_box cut(pixel_box box, image_rows const& rows) {
   return box;
 }
 
-// What a unit takes rows by: their boxes in its view, and its own rows of the image.
+// A unit takes the rows whose boxes in its view meet its own rows of the image.
 struct taken_unit {
   footprint_slots const* boxes;
   image_rows rows;
 };
 
-// Of every row, whether it goes to each unit, [units][rows]: one launch for all of them, whose latency it is.
+// Whether each row goes to each unit, [units][rows]: one launch for all units, since the latency dominates.
 struct select_kernel {
   taken_unit const* units;
   index_t count, rows;
@@ -59,22 +59,22 @@ struct select_kernel {
   }
 };
 
-// The pairs of a box that began above the rows, or begins with them; 0 of others. Of `range`, cut to the rows or not.
+// The pairs of a box that began above the rows, or begins with them, 0 for others; of `range`, cut to the rows or not.
 template <int Size>
 GART_HD inline u32 continued_pairs(footprint_slots range, image_rows const& rows) {
   range.box = cut(range.box, rows);
   return rows.first > 0 && range.box.y0 == rows.first ? tiles_of<Size>(range).area() : 0;
 }
 
-// What a row that does not go to a unit has for its place among those that do.
+// The place of a row that does not go to a unit.
 inline constexpr u32 not_sent = ~u32{0};
 
-// What the exchange has of each row of a rank, sent or not: a box a view, a place and its sum a unit.
+// The exchange's bytes for each row of a rank, sent or not: a box a view, a place and its sum a unit.
 constexpr u64 exchange_bytes_of_row(int views, int units) {
   return static_cast<u64>(views) * sizeof(footprint_slots) + static_cast<u64>(units) * (sizeof(u32) + sizeof(u64));
 }
 
-// The k-th count of what lies before each unit, and of all.
+// The k-th count of the rows before each unit, and of all.
 struct unit_ends_kernel {
   u64 const* places;
   index_t rows;
@@ -100,22 +100,22 @@ struct list_kernel {
   }
 };
 
-// A row travels in two parts: what a Gaussian's place and tiles come from, with its number last, and its colours. A
-// rank that has the first can make its lists while the second is under way.
+// A row travels in two parts: geometry, with the Gaussian's number last, and colours. A rank makes its lists from the
+// first while the second is under way.
 inline constexpr index_t placing_columns = geometry_columns + 1, placing_width = placing_columns + 1;
 static_assert(placing_width % 4 == 0);
-// Floats of the colours as they travel.
+// Floats of the colours in a message.
 constexpr index_t colors_width(index_t coefficients) { return (coefficients + 3) / 4 * 4; }
 
-// Where the k-th row of those that leave is written, of `Width` T: those that stay here, to where they arrive.
+// Where the k-th leaving row is written, of `Width` T: those that stay here, to where they arrive.
 template <class T, index_t Width>
 struct way_out {
   T *out, *in;
-  u64 first, count, arrive;  // of those that stay: the first that leaves, how many, where the first arrives
+  u64 first, count, arrive;  // rows that stay: the first in the list, how many, where the first arrives
   GART_HD T* row(u64 k) const { return k - first < count ? in + (arrive + (k - first)) * Width : out + k * Width; }
 };
 
-// Rows, four columns a lane: by single ones the loads in flight bound it, not the bandwidth.
+// Rows, four columns a lane: with single ones the loads in flight limit it, not the bandwidth.
 struct pack_placing_body {
   gaussians_view<float const> scene;
   row_owners owners;
@@ -173,8 +173,8 @@ struct single {
   float v[1];
 };
 
-// A Gaussian's sums, in pieces of four floats where both kinds are of fours; in pairs colour's gradient comes first,
-// then the moments.
+// A Gaussian's sums, in pieces of four floats where both widths are multiples of four. In pairs colour gradients come
+// first, then moments.
 template <index_t Coefficients>
 struct sums_layout {
   static constexpr index_t lane = Coefficients % 4 == 0 && moment_stride % 4 == 0 ? 4 : 1;  // floats of a piece
@@ -185,7 +185,7 @@ struct sums_layout {
   static piece* pieces(float* p) { return reinterpret_cast<piece*>(p); }
 };
 
-// Of either kind, `Width` pieces a row.
+// Either kind of sums, `Width` pieces a row.
 template <class Piece, index_t Width>
 struct pack_sums_body {
   Piece const* sums;
@@ -196,11 +196,11 @@ struct pack_sums_body {
   }
 };
 
-// Gradients of geometry in the place of moments: those of a row's columns, the error where moments have it, and last
-// the opacity's.
+// Finished gradients of geometry in place of moments: a row's columns, the error in its place among moments, and last
+// the opacity's gradient.
 static_assert(error_place == geometry_columns && moment_stride == geometry_columns + 2);
 
-// The k-th of them, of a row: an element of `gradients`, or of `errors`.
+// A row's k-th finished gradient: an element of `gradients`, or of `errors`.
 template <class T>
 GART_HD T& finished_element(gaussians_view<T> gradients, T* errors, index_t row, index_t k) {
   return k < geometry_columns ? row_element(gradients, row, k)
@@ -224,7 +224,7 @@ struct pack_finished_body {
   }
 };
 
-// By where the row lay when it came.
+// The arrival position of the row.
 template <int Size>
 struct count_pairs_kernel {
   footprint_slots const* ranges;
@@ -253,16 +253,16 @@ struct pack_pairs_body {
   }
 };
 
-// What has come back from a rank: the sums of its unit, from `first` on among all that came.
+// The sums that a rank sent back for its unit, from `first` on among all received.
 struct returned_unit {
   int view;
   u64 first;
   u32 const* place_of;  // of each row of this rank's, in the unit
 };
 
-// One kind of a row's sums, `Width` pieces, which in pairs are those from `From` on: over the ranks that traced a view,
-// in their order, or their pairs one after another; and over views. Rows that no unit has had are zero. Take: what is
-// done with them, take(row, first float of the piece, piece).
+// One kind of a row's sums, `Width` pieces, which begin at `From` in pairs. They are added over views and over the
+// ranks that traced a view, in order, or pair by pair. Rows that no unit had are zero. Take receives take(row, first
+// float of the piece, piece).
 template <index_t Coefficients, index_t From, index_t Width, class Take>
 struct add_sums_body {
   using layout = sums_layout<Coefficients>;
@@ -270,11 +270,11 @@ struct add_sums_body {
   returned_unit const* units;
   index_t count;
   piece const* in;
-  u64 const* places;  // of the pairs of each; null where sums have no fixed order
+  u64 const* places;  // places of each row's pairs; null where sums have no fixed order
   u32 const* pairs;
   piece const* pairs_in;
-  piece const* before;  // what it is added to, or null
-  float share;          // what the sum is multiplied by
+  piece const* before;  // added to, or null
+  float share;          // factor of the sum
   Take take;
   GART_KERNEL void operator()(index_t row, index_t column) const {
     piece total = before ? before[std::size_t{row} * Width + column] : piece{}, view{};
@@ -297,7 +297,7 @@ struct add_sums_body {
   }
 };
 
-// They are kept: [rows][floats].
+// Writes the sums to [rows][floats].
 struct keep_sums {
   float* out;
   index_t floats;  // a row
@@ -306,14 +306,14 @@ struct keep_sums {
   }
 };
 
-// What ranks have finished of a row, straight from what came, four places a lane: the sum of the units', of which each
-// is a whole view, times the share. Errors have none, and are added to what is there one by one, as rounds would.
+// Finished gradients of a row from the received messages, four places a lane: the sum over units, each a whole view,
+// times the share. Errors are not scaled, and are added one by one, in the order of rounds.
 struct add_finished_body {
   returned_unit const* units;
   index_t count;
   float const* in;
   gaussians_view<float> gradients;
-  float* errors;  // null where nobody asks for them
+  float* errors;  // null where not needed
   bool adds;      // to the gradients that are there
   float share;
   GART_KERNEL void operator()(index_t row, index_t four) const {

@@ -1,11 +1,11 @@
 #pragma once
 /// \file
-/// The rows of a scene that is spread over ranks (comm/row_owners.hpp), as densification asks for them
-/// (all_rows in optim/rows.hpp), and the way of whole models to the ranks and back.
+/// The rows of a scene shared by ranks (comm/row_owners.hpp), through densification's interface (all_rows in
+/// optim/rows.hpp). It also spreads whole models over ranks and gathers them.
 ///
-/// What is drawn must not depend on the number of ranks: a word of each Gaussian goes to all, every rank draws as one
-/// alone would, and only the rows that are copied travel. Memory while it does: 4 bytes of each Gaussian of the scene
-/// for each such word. All ranks call the same members together.
+/// Random draws must not depend on the number of ranks. So all ranks get one word of each Gaussian, and all draw as a
+/// single rank would. Only the copied rows travel. Memory meanwhile: 4 bytes for each Gaussian of the scene and each
+/// word. All ranks call the same members together.
 
 #include <gart/comm/communicator.hpp>
 #include <gart/optim/rows.hpp>
@@ -49,7 +49,7 @@ struct unpack_rows_body {
 
 }  // namespace detail
 
-/// One message for each rank, of consecutive parts of a buffer: counts[r] elements of `bytes` to or from rank r.
+/// Messages to or from each rank, from consecutive parts of a buffer: counts[r] elements of `bytes` for rank r.
 inline std::vector<message> messages_of(std::vector<u64> const& counts, void* data, std::size_t bytes) {
   std::vector<message> out;
   char* at = static_cast<char*>(data);
@@ -65,7 +65,7 @@ template <execution E, class Comm>
 requires communicator<Comm, E>
 class sharded_rows final : public all_rows<E> {
  public:
-  /// `block`: Gaussians that stay together.
+  /// `block`: Gaussians in one block (comm/row_owners.hpp).
   sharded_rows(E& exec, Comm comm, index_t block)
       : comm_(std::move(comm)),
         owners_{comm_.size(), comm_.rank(), block},
@@ -73,21 +73,21 @@ class sharded_rows final : public all_rows<E> {
         packed_(exec),
         arrived_(exec) {}
 
-  /// Who has which.
+  /// The owners of all rows.
   row_owners owners() const override { return owners_; }
-  /// They are.
+  /// Several ranks share the rows.
   bool spread() const override { return true; }
-  /// Gaussians in all.
+  /// Gaussians on all ranks.
   index_t total(index_t here) override {
     u64 sum = here;
     comm_.all_reduce(span<u64>(&sum, 1));
     require_count(sum);
     return static_cast<index_t>(sum);
   }
-  /// Of so many, those of this rank.
+  /// Gaussians of this rank among so many.
   index_t here(index_t total) const override { return owners_.owned(total); }
 
-  /// An element of each row that is here becomes one of each Gaussian, by number.
+  /// Gathers one element of each Gaussian, by number, from those of the rows here.
   void gather(E& exec, buffer<u32, E>& words) override {
     index_t const total = this->total(static_cast<index_t>(words.size()));
     std::vector<u64> const counts = counts_of(total);
@@ -102,17 +102,17 @@ class sharded_rows final : public all_rows<E> {
     words.resize(total);
     parallel_for(exec, "shard/interleave", total,
                  detail::interleave_kernel{gathered_.data(), begins.data(), owners_, words.data()});
-    exec.synchronize();  // `begins` goes
+    exec.synchronize();  // `begins` ends here
   }
 
-  /// Gaussian to[k] becomes a copy of from[k], by numbers, wherever they are; from[] and to[] have none in common.
+  /// Copies Gaussian from[k] over to[k], by numbers, on any ranks; from[] and to[] have none in common.
   void copy(E& exec, gaussians<E>& model, span<u32 const> from, span<u32 const> to) override {
     std::vector<u32> sources(from.size()), targets(to.size());
     exec.copy_out(sources.data(), from.data(), from.size() * sizeof(u32));
     exec.copy_out(targets.data(), to.data(), to.size() * sizeof(u32));
     send_rows(exec, model, sources, model, targets);
   }
-  /// Gaussian g of `to` becomes origin[g] of `from`, by numbers; `to` has its rows of as many as `origin` has.
+  /// Copies Gaussian origin[g] of `from` to g of `to`, by numbers; `to` has its rows of origin.size() Gaussians.
   void take(E& exec, gaussians<E> const& from, gaussians<E>& to, span<u32 const> origin) override {
     std::vector<u32> sources(origin.size()), targets(origin.size());
     exec.copy_out(sources.data(), origin.data(), origin.size() * sizeof(u32));
@@ -120,12 +120,12 @@ class sharded_rows final : public all_rows<E> {
     send_rows(exec, from, sources, to, targets);
   }
 
-  /// Runs must be as many Gaussians as make whole blocks.
+  /// Runs must be whole blocks.
   std::vector<double> sums_of_runs(std::vector<double> const& mine, index_t run, std::size_t width) override {
     return sharded_rows(gathered_.exec(), comm_, std::max<index_t>(owners_.block / run, 1)).whole_of(mine, width);
   }
 
-  /// Rows leave[r] of `from` become rows arrive[s] of `to`: of each pair of ranks as many, in one order.
+  /// Sends rows leave[r] of `from` to rank r, and rows of rank s to arrive[s] of `to`, in the same order.
   void move_rows(E& exec, gaussians<E> const& from, std::vector<std::vector<u32>> const& leave, gaussians<E>& to,
                  std::vector<std::vector<u32>> const& arrive) {
     index_t const width = row_width(from.sh_degree());
@@ -138,10 +138,10 @@ class sharded_rows final : public all_rows<E> {
                    as_span(messages_of(received, arrived_.data(), width * sizeof(float))));
     for_each_element(exec, "shard/unpack", static_cast<index_t>(in.size()), from.sh_degree(),
                      detail::unpack_rows_body{to.view(), in.data(), arrived_.data(), width});
-    exec.synchronize();  // the lists go
+    exec.synchronize();  // the lists end here
   }
 
-  /// Of values of each Gaussian, `width` a row, those of this rank's rows.
+  /// This rank's part of values of all Gaussians, `width` a row.
   template <class T>
   std::vector<T> part_of(std::vector<T> const& all, std::size_t width) const {
     std::vector<T> mine;
@@ -150,7 +150,7 @@ class sharded_rows final : public all_rows<E> {
     });
     return mine;
   }
-  /// Of a whole model the rows of this rank.
+  /// This rank's rows of a whole model.
   gaussian_model part_of(gaussian_model const& all) const {
     gaussian_model mine;
     mine.sh_degree = all.sh_degree;
@@ -160,7 +160,7 @@ class sharded_rows final : public all_rows<E> {
     return mine;
   }
 
-  /// The way back: the rows of all ranks, on all ranks, or on `root` alone.
+  /// Gathers the rows of all ranks, on all ranks or on `root` alone.
   template <class T>
   std::vector<T> whole_of(std::vector<T> const& mine, std::size_t width, int root = -1) {
     u64 total = mine.size() / width;
@@ -185,7 +185,7 @@ class sharded_rows final : public all_rows<E> {
       });
     return all;
   }
-  /// The same of a model.
+  /// The same for a model.
   gaussian_model whole_of(gaussian_model const& mine, int root = -1) {
     gaussian_model all;
     all.sh_degree = mine.sh_degree;
@@ -196,7 +196,7 @@ class sharded_rows final : public all_rows<E> {
   }
 
  private:
-  // Gaussian targets[k] of `to` becomes sources[k] of `from`: in the order of the list on both sides.
+  // Copies Gaussian sources[k] of `from` to targets[k] of `to`, in the order of the lists.
   void send_rows(E& exec, gaussians<E> const& from, std::vector<u32> const& sources, gaussians<E>& to,
                  std::vector<u32> const& targets) {
     auto const ranks = static_cast<std::size_t>(owners_.ranks);

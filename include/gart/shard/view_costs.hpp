@@ -4,7 +4,7 @@
 /// is cut by these costs (work_units.hpp). So no rank waits for the counts of others before it knows what it traces. A
 /// view changes little between two visits. Images and gradients do not depend on the cut.
 ///
-/// Costs come as box_kernel counts them: for each view, the difference of each row's cost to the row above, in wrapping
+/// box_kernel gives the costs: for each view, the difference of each row's cost to the row above, in wrapping
 /// arithmetic, and one more number at the end. Views follow one another. Memory: 8 bytes a row of tiles.
 
 #include <gart/core/isa.hpp>
@@ -20,7 +20,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// By a number of each view that its user chooses. Size: side of a tile.
+/// Costs by a number that the caller chooses for each view. Size: side of a tile.
 template <int Size>
 class view_costs {
  public:
@@ -42,13 +42,13 @@ class view_costs {
     return costs;
   }
 
-  /// Whether all of them were traced before. Of views without a name: no.
+  /// Whether all these views were traced before; false for views without a name.
   bool knows(std::vector<std::size_t> const& names) const {
     for (std::size_t const name : names)
       if (!costs_.contains(name)) return false;
     return !names.empty();
   }
-  /// Of views that it knows.
+  /// The costs of known views.
   std::vector<std::vector<u64>> of(std::vector<std::size_t> const& names) const {
     std::vector<std::vector<u64>> costs;
     for (std::size_t const name : names) costs.push_back(costs_.at(name));

@@ -1,18 +1,16 @@
 #pragma once
 /// \file
-/// What each rank traces in a round of a step: one view, and of its image some rows of tiles. Views and ranks may be
-/// any number: where there are fewer views than ranks, ranks share one, in strips of equal cost; where there are more,
-/// a step has several rounds.
+/// A unit is a rank's part of a round: one view, and some rows of tiles of its image. If there are fewer views than
+/// ranks, ranks share a view in strips of equal cost. If there are more, a step has several rounds.
 ///
-/// Cost: counted, for the view itself, as its (primitive, tile) pairs a row of tiles. Strips follow each other down the
-/// image in the order of ranks, which is what keeps sums over pairs in one order, whatever the number of ranks.
+/// The cost of a row of tiles is the number of its (primitive, tile) pairs. Strips lie down the image in the order of
+/// ranks. So sums over pairs have one order for any number of ranks.
 
 #include <gart/core/error.hpp>
 #include <gart/core/span.hpp>
 #include <gart/core/types.hpp>
 #include <gart/scene/image_rows.hpp>
 
-#include <algorithm>
 #include <vector>
 
 namespace gart {
@@ -32,8 +30,8 @@ constexpr int view_of_rank(int rank, int ranks, int views) {
   return static_cast<int>(static_cast<long long>(rank) * views / ranks);
 }
 
-/// `cost` of each row of tiles, cut into parts of about the same: part k is rows [cuts[k], cuts[k + 1]). Without any
-/// cost, parts of about as many rows.
+/// Cuts rows of tiles into parts of about equal cost: part k is rows [cuts[k], cuts[k + 1]). Without any cost, parts of
+/// about as many rows.
 inline std::vector<int> cut_evenly(span<u64 const> cost, int parts) {
   int const rows = static_cast<int>(cost.size());
   u64 total = 0;
@@ -47,7 +45,7 @@ inline std::vector<int> cut_evenly(span<u64 const> cost, int parts) {
       cuts[static_cast<std::size_t>(k)] = rows * k / parts;
       continue;
     }
-    // Where the middle of a row lies past the cut, the row is the next part's.
+    // A row whose middle lies past the cut belongs to the next part.
     u64 const wanted = total / static_cast<u64>(parts) * static_cast<u64>(k);
     while (row < rows && before + cost[static_cast<std::size_t>(row)] / 2 < wanted)
       before += cost[static_cast<std::size_t>(row++)];
@@ -56,7 +54,7 @@ inline std::vector<int> cut_evenly(span<u64 const> cost, int parts) {
   return cuts;
 }
 
-/// A unit for each rank. costs[v]: of each row of tiles of view v.
+/// A unit for each rank. costs[v]: the cost of each row of tiles of view v.
 inline std::vector<work_unit> divide_work(std::vector<std::vector<u64>> const& costs, int ranks, int tile_size) {
   int const views = static_cast<int>(costs.size());
   if (views < 1 || views > ranks) throw invalid_argument("divide_work: a round has from one view to one a rank");
@@ -69,7 +67,7 @@ inline std::vector<work_unit> divide_work(std::vector<std::vector<u64>> const& c
     auto const cuts = cut_evenly({cost.data(), cost.size()}, next - rank);
     for (int k = 0; rank < next; ++rank, ++k) {
       int const first = cuts[static_cast<std::size_t>(k)], end = cuts[static_cast<std::size_t>(k) + 1];
-      // The last row of tiles may go on past the image, and so may its unit.
+      // The last row of tiles, and its unit, may extend past the image.
       units[static_cast<std::size_t>(rank)] = {view, first, end, {first * tile_size, end * tile_size}};
     }
   }

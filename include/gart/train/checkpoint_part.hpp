@@ -1,9 +1,8 @@
 #pragma once
 /// \file
-/// A checkpoint (train/state.hpp) that several ranks write and read, each its own rows and nothing else of what is of
-/// each Gaussian: the file is byte for byte that of one rank. A rank's rows lie in blocks of the file
-/// (comm/row_owners.hpp), and an array's checksum is the sum of what each block adds to it (io/crc32c.hpp). Memory:
-/// what a rank has, and a few bytes an array.
+/// A checkpoint (train/state.hpp) that several ranks write and read, each its own rows. The file is byte for byte that
+/// of one rank. A rank's rows lie in blocks of the file (comm/row_owners.hpp). An array's checksum combines those of
+/// its blocks (io/crc32c.hpp). Memory: what a rank has, and a few bytes an array.
 ///
 /// Errors: io_error on all ranks, naming the file, the rank and the cause; the checkpoint that was there is whole.
 

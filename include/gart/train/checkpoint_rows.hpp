@@ -1,13 +1,12 @@
 #pragma once
 /// \file
-/// The file of a checkpoint, and one rank's rows of it: where they lie, and what they add to its checksums. The ranks
-/// agree by train/checkpoint_part.hpp; one rank by itself has all rows.
+/// The file format of a checkpoint: the position of one rank's rows, and their part of its checksums. The ranks agree
+/// by train/checkpoint_part.hpp; one rank by itself has all rows.
 ///
 /// The file is "gart checkpoint 2\\n", then named arrays, the last one named "end", and nothing after it. An array is,
-/// little endian:
-///   u64 length of the name, the name, u32 version of what the array holds, u64 bytes, the bytes, u32 checksum
-/// with CRC-32C (io/crc32c.hpp) over all of the array before it, so that one flipped bit is found. Files that begin
-/// with "gart checkpoint 1\\n", whose arrays have neither version nor checksum, are read too.
+/// little endian: u64 length of the name, the name, u32 version of the content, u64 bytes, the bytes, u32 CRC-32C
+/// (io/crc32c.hpp) of everything before it. So one flipped bit is found. Files that begin with "gart checkpoint 1\\n",
+/// whose arrays have neither version nor checksum, are read too.
 ///
 /// Errors: io_error naming the file and the array that is missing, truncated, damaged, of another size, or of a version
 /// that is newer than the reader.
@@ -29,12 +28,11 @@ class checkpoint_rows {
  public:
   /// The state must outlive it; of each Gaussian it has the rows of `owners`.
   checkpoint_rows(training_state const& mine, row_owners const& owners);
-  /// Of this rank, in each array.
+  /// Bytes of this rank in each array.
   std::vector<u64> bytes() const;
   /// Where arrays lie that have so many bytes: the sums over the ranks.
   void place(std::vector<u64> const& bytes_of_all);
-  /// What the checksum of each array has of this rank, where it is placed: all ranks' together, by exclusive or, are
-  /// the checksums.
+  /// This rank's part of each array's checksum. The exclusive or of all ranks' parts is the checksum.
   std::vector<u32> checksum_shares() const;
   /// This rank's bytes of the file.
   void write(shared_file& file, std::vector<u32> const& checksums) const;
@@ -44,7 +42,7 @@ class checkpoint_rows {
     std::string name;
     std::vector<char> small;     // the values of an array of the run
     char const* data = nullptr;  // or this rank's rows
-    u64 row = 0;                 // bytes of one; 0: of the run
+    u64 row = 0;                 // bytes for each Gaussian; 0: an array of the run
     u64 bytes = 0, total = 0;    // of this rank, of all
     u64 begin = 0;               // in the file
   };

@@ -1,10 +1,9 @@
 #pragma once
 /// \file
-/// The share of its images that a capture fills. The loss is a mean over all pixels. So the gradients of an object
-/// before an empty background are in proportion to the share of pixels that it covers: a fiftieth on views of the whole
-/// sphere. A penalty beside the loss must shrink as much, or it fades the object. The penalties were measured on
-/// captures that fill a quarter of their images or more (penalty_scale). Cost: a pass over the pixels of at most 32
-/// images, once a run.
+/// The share of a capture's pixels that show the scene. The loss is a mean over all pixels. So an object's gradients
+/// are proportional to the share of pixels that it covers: a fiftieth on views of the whole sphere. A penalty beside
+/// the loss must shrink as much, or it fades the object. The penalties were measured on captures that fill a quarter of
+/// their images or more (penalty_scale). Cost: a pass over the pixels of at most 32 images, once a run.
 
 #include <gart/core/isa.hpp>
 #include <gart/io/dataset.hpp>
@@ -16,9 +15,8 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// The share of the pixels of data.train's `views`, by index, that count in the loss and are not as the background, at
-/// least a thousandth. Those looked at are evenly spread over the views. Before a random background only transparent
-/// pixels are empty.
+/// The share of pixels of data.train's `views`, by index, that count in the loss and differ from the background, at
+/// least a thousandth. Reads some views, evenly spread. Before a random background only transparent pixels are empty.
 inline double foreground_fraction(dataset const& data, std::vector<std::size_t> const& views,
                                   background_kind background) {
   constexpr std::size_t most_views = 32;
@@ -43,7 +41,7 @@ inline double foreground_fraction(dataset const& data, std::vector<std::size_t> 
   return pixels ? std::max(static_cast<double>(shown) / static_cast<double>(pixels), 1e-3) : 1.0;
 }
 
-/// What a penalty is multiplied by in a capture that fills such a share of its images.
+/// The factor of a penalty for a capture whose scene fills such a share of its images.
 inline float penalty_scale(double share) { return static_cast<float>(std::min(1.0, 4 * share)); }
 
 }}  // namespace gart::GART_ISA

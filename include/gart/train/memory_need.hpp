@@ -1,13 +1,13 @@
 #pragma once
 /// \file
-/// What a training needs of memory at the least, known before it starts: of each Gaussian that it may grow to, its
-/// parameters, their gradients and Adam's two moments, 16 bytes a float, and what a step has of it whether it is seen
-/// or not. Over ranks Gaussians are spread in whole blocks (comm/row_owners.hpp). Lists, images, the LT buffer and,
-/// over ranks, the rows of others come on top: they depend on the views, and a step that finds no room for the LT
-/// buffer is done with less. Parameters, gradients and moments of all that it may grow to are made at the start.
+/// The least memory that a training needs, known before it starts. Each Gaussian needs its parameters, their gradients
+/// and Adam's two moments, 16 bytes a float, and a step's records of it. They are allocated at the start for the
+/// largest number of Gaussians. Ranks share them in whole blocks (comm/row_owners.hpp). Lists, images, the hit buffer
+/// and rows of other ranks come on top: they depend on the views. A step without room for the hit buffer computes with
+/// less.
 ///
-/// Errors: out_of_memory, in bytes, before anything is allocated; invalid_argument for more Gaussians than a rank has
-/// numbers for.
+/// Errors: out_of_memory, in bytes, before anything is allocated; invalid_argument for more Gaussians than a rank can
+/// number.
 
 #include <gart/comm/communicator.hpp>
 #include <gart/comm/row_owners.hpp>
@@ -24,41 +24,41 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// The Gaussians that a run may come to, which starts with so many: as many as it is to grow to.
+/// The largest number of Gaussians of a run that starts with `start`.
 inline u64 gaussians_at_end(train_options const& options, dataset const& data, u64 start) {
   switch (options.densify) {
     case densify_kind::error:
       return std::max<u64>(start, growth_budget(options.error, options.max_gaussians, data.training_pixels()));
     case densify_kind::mcmc:
       return std::max<u64>(start, options.max_gaussians);
-    default:  // stays as it is, or grows by what it finds
+    default:  // stays as it is, or grows by an unknown number
       return start;
   }
 }
 
-/// Which Gaussians the first rank has, which has most.
+/// The Gaussians of the first rank, which has the most.
 inline row_owners owners_of(train_options const& options, int ranks) { return {ranks, 0, options.shard_block}; }
 
-/// Bytes of a Gaussian on the rank that has it, of so many ranks.
+/// Bytes of a Gaussian on its rank, one of `ranks`.
 inline u64 bytes_of_gaussian(train_options const& options, int sh_degree, int ranks) {
   u64 const parameters = 11 + 3 * static_cast<u64>(sh_degree + 1) * static_cast<u64>(sh_degree + 1);
-  int const views = std::min(options.batch, ranks);   // of a round
-  bool const finishes = ranks == 1 || views < ranks;  // where ranks trace whole views, those that trace finish
+  int const views = std::min(options.batch, ranks);   // views of a round
+  bool const finishes = ranks == 1 || views < ranks;  // ranks that trace whole views also finish gradients
   u64 bytes = 16 * parameters;
-  if (finishes) bytes += sizeof(ray_gaussian) + moment_stride * sizeof(float);  // its record in a view, its moments
+  if (finishes) bytes += sizeof(ray_gaussian) + moment_stride * sizeof(float);  // its record and its moments in a view
   if (options.dropout > 0) bytes += sizeof(float);                              // the opacity that a step shows
-  // How narrow the filter gets there; three sizes and an opacity as a view shows them, to be sent and to be finished.
+  // The narrowest filter; three filtered sizes and an opacity, once to send and once to finish.
   if (options.render.antialias > 0) bytes += sizeof(float) * (finishes && ranks > 1 ? 9 : 5);
   if (ranks > 1) bytes += detail::exchange_bytes_of_row(views, ranks);
   return bytes;
 }
 
-/// Bytes of the rank that has most, for so many Gaussians on `ranks` ranks.
+/// Bytes of the largest share, for so many Gaussians on `ranks` ranks.
 inline u64 least_bytes(train_options const& options, u64 gaussians, int sh_degree, int ranks) {
   return bytes_of_gaussian(options, sh_degree, ranks) * owners_of(options, ranks).owned(gaussians);
 }
 
-/// Throws where the policy has not even that, of what it shares with other ranks.
+/// Throws where the policy has less memory than that, after its share for other ranks on the same device.
 template <execution E, class Comm>
 void require_room(E& exec, Comm& comm, train_options const& options, dataset const& data, int sh_degree, u64 start) {
   u64 const free = exec.free_bytes() / static_cast<u64>(comm.sharers()),

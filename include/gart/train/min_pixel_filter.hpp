@@ -6,7 +6,7 @@
 /// through that filter is too low is dead (opacity_shown in optim/rows.hpp). Views are those of
 /// whole photographs, whatever size a step's images have.
 ///
-/// Cost: 4 bytes a Gaussian, and a small launch a view at each densification. Without a filter there is nothing of it.
+/// Cost: 4 bytes a Gaussian, and a small launch a view at each densification. Without a filter it costs nothing.
 
 #include <gart/camera/models.hpp>
 #include <gart/exec/buffer.hpp>
@@ -31,7 +31,7 @@ struct min_pixel_filter_kernel {
 
 }  // namespace detail
 
-/// The narrowest filter at each Gaussian. Its memory outlives a call of of().
+/// The narrowest filter at each Gaussian. Its memory is kept between calls.
 template <execution E>
 class min_pixel_filter {
  public:

@@ -133,7 +133,7 @@ inline constexpr option_field option_fields[] = {
 
 #undef GART_FIELD
 
-/// The field of that name; null where there is none.
+/// The field of that name, or null.
 constexpr option_field const* find_option_field(std::string_view name) {
   for (option_field const& f : option_fields)
     if (f.name == name) return &f;

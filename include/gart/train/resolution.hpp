@@ -1,9 +1,8 @@
 #pragma once
 /// \file
-/// The size of a step's images. Early in a run Gaussians are few and large, and a quarter or a half of an image's width
-/// tells where they belong as well as all of it, for a sixteenth or a quarter of the rays; detail is learned at the
-/// full size (as Chen et al., DashGaussian, CVPR 2025, let size and number grow together). The sizes are halves of each
-/// other, so that a pixel is the mean of a block of the photograph's.
+/// The size of a step's images. Early in a run Gaussians are few and large. Images of a quarter or half of the width
+/// place them as well, for a sixteenth or a quarter of the rays. Detail is learned at full size (compare Chen et al.,
+/// DashGaussian, CVPR 2025). Each size is half the next, so a pixel is the mean of a block of the photograph's pixels.
 
 #include <gart/scene/camera.hpp>
 #include <gart/train/options.hpp>
@@ -25,7 +24,8 @@ inline int steps_shrunk(resolution_options const& options, int shrink, int itera
   return step;
 }
 
-/// As much of it as an image of this camera allows: a view of the whole sphere cannot be cropped to whole blocks.
+/// The largest shrink, up to the given one, that this camera's image allows. A view of the whole sphere cannot be
+/// cropped to whole blocks.
 inline int shrink_of(camera const& c, int shrink, resolution_options const& options) {
   auto const fits = [&](int by) {
     bool const whole = c.kind != camera_kind::equirectangular || (c.width % by == 0 && c.height % by == 0);

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The photograph of a step at the size of its image (train/resolution.hpp), and its depth map: means of blocks, made
-/// anew in each step, since reading the photograph costs little beside tracing its rays. Buffers: those of one image.
+/// A step's photograph and depth map at the size of its image (train/resolution.hpp), as means of blocks. They are made
+/// anew in each step: reading a photograph costs little beside tracing its rays. Memory: one image.
 
 #include <gart/exec/buffer.hpp>
 #include <gart/exec/parallel.hpp>
@@ -24,7 +24,7 @@ struct shrink_photo_kernel {
   }
 };
 
-// Of what was measured of a block.
+// The mean of a block's measured distances.
 struct shrink_map_kernel {
   float const* map;
   pixel_blocks blocks;
@@ -40,14 +40,14 @@ struct shrink_map_kernel {
 
 }  // namespace detail
 
-/// Of the step that asked last.
+/// The photograph of the last step that called it.
 template <execution E>
 class smaller_photo {
  public:
   /// No buffer is allocated yet.
   explicit smaller_photo(E& exec) : exec_(&exec), pixels_(exec), mask_(exec), map_(exec) {}
 
-  /// Of a photograph of so many pixels; by 1 it itself.
+  /// Shrinks a photograph of so many pixels; by 1 it is returned itself.
   truth_view shrink(truth_view photo, int width, int height, int by) {
     if (by == 1) return photo;
     index_t const count = blocks_in(height, width, by);
@@ -59,7 +59,7 @@ class smaller_photo {
     photo.pixels = pixels_.data(), photo.mask = mask;
     return photo;
   }
-  /// Of a depth map.
+  /// Shrinks a depth map.
   float const* shrink(float const* map, int width, int height, int by) {
     if (by == 1) return map;
     index_t const count = blocks_in(height, width, by);

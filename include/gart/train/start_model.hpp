@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The Gaussians that a training begins with: all of them, or of several ranks each its own rows
-/// (comm/row_owners.hpp), so that no rank has to hold a model that is too large for one.
+/// The Gaussians that a training begins with: all, or each rank's own rows (comm/row_owners.hpp). So no rank must hold
+/// a model that is too large for it.
 
 #include <gart/scene/gaussians.hpp>
 

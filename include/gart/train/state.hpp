@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Everything the next step of a training run depends on, in host memory, and its way into a checkpoint and back.
-/// Numbers drawn at random are functions of (seed, step) and need no room in it.
+/// The state of a training run in host memory: everything the next step depends on. Also its checkpoint's writer and
+/// reader. Random draws are functions of (seed, step) and need no state.
 ///
 /// Errors: read_checkpoint throws io_error naming the file and the array that is missing, truncated or of another size.
 
@@ -17,21 +17,21 @@ namespace gart {
 /// A run between two steps.
 struct training_state {
   gaussian_model scene,  ///< the parameters
-      first,             ///< Adam's first moment of each
-      second;            ///< and its second
+      first,             ///< Adam's first moments
+      second;            ///< Adam's second moments
   int step = 0;          ///< steps done
   vec3d origin{0.0};     ///< of the coordinates (io/origin.hpp)
-  u64 seed = 1;          ///< of all numbers drawn at random
+  u64 seed = 1;          ///< of all random draws
   named_arrays parts;    ///< of the densifier, and of what is learned besides the Gaussians
 };
 
-/// Whether the array of a part has a number of 4 bytes for each Gaussian, or none: those whose names begin with
-/// "gaussians/", and three that are older than this rule. All others are of the run.
+/// Whether a part's array holds one number of 4 bytes for each Gaussian. Such names begin with "gaussians/"; three
+/// older names are exceptions. Other arrays belong to the run.
 inline bool of_gaussians(std::string const& name) {
   return name.starts_with("gaussians/") || name == "error_growth/error_sum" || name.starts_with("adc/");
 }
 
-/// What of a state is not of each Gaussian.
+/// The part of a state that does not grow with the Gaussians.
 training_state without_rows(training_state const& state);
 
 /// Written to a temporary name, then renamed. Errors: io_error.
@@ -40,7 +40,7 @@ void write_checkpoint(std::filesystem::path const& path, training_state const& s
 training_state read_checkpoint(std::filesystem::path const& path);
 /// io_error where the checkpoint is of another degree.
 training_state read_checkpoint(std::filesystem::path const& path, int sh_degree);
-/// The same of a state that was read of this checkpoint.
+/// The same for a state that was read from this checkpoint.
 void require_degree(std::filesystem::path const& path, training_state const& state, int sh_degree);
 
 }  // namespace gart

@@ -1,7 +1,8 @@
 #pragma once
 /// \file
-/// The image of a step under way, its gradient and what it gives: buffers of one image, kept from step to step. Memory:
-/// 24 bytes a pixel, and where it is asked for 4 of each of depth, transmittance, the gradients by them, and errors.
+/// The buffers of a step's image: colours, their gradient and the numbers that the image gives. They are kept from step
+/// to step. Memory: 24 bytes a pixel; 4 more for each of depth, transmittance, their gradients, and errors, where
+/// needed.
 
 #include <gart/backward/backward.hpp>
 #include <gart/loss/depth_loss.hpp>
@@ -10,13 +11,13 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// An image in a policy's memory, and the loss that it is given to.
+/// An image in a policy's memory, and its loss.
 template <execution E>
 struct step_image {
-  buffer<float, E> color, by_color;  ///< [H][W][3], and dL/d of it
-  buffer<float, E> error;            ///< [H][W], where densification asks for it; else empty
+  buffer<float, E> color, by_color;  ///< [H][W][3], and its gradient
+  buffer<float, E> error;            ///< [H][W], where densification needs it; else empty
   image_loss<E> loss;                ///< with its buffers
-  buffer<float, E> numbers;          ///< a row for each image of the step: loss, mean squared error, and of each part
+  buffer<float, E> numbers;  ///< a row for each image of the step: loss, mean squared error, and the parts' numbers
 
   /// Allocates nothing; `exec` must outlive it.
   explicit step_image(E& exec)
@@ -30,7 +31,7 @@ struct step_image {
         by_depth_(exec),
         by_transmittance_(exec) {}
 
-  /// Of so many pixels; gradients by depth begin with zero.
+  /// Begins an image of so many pixels; gradients by depth start at zero.
   image_targets begin(std::size_t pixels, bool with_depth, bool with_depth_gradients) {
     color.resize(3 * pixels), by_color.resize(3 * pixels);
     std::size_t const deep = with_depth ? pixels : 0, by_deep = with_depth_gradients ? pixels : 0;
@@ -41,9 +42,9 @@ struct step_image {
     if (deep) targets.depth = depth_.data(), targets.transmittance = transmittance_.data();
     return targets;
   }
-  /// Of the image that was begun.
+  /// Depth and transmittance of the current image.
   depth_pixels depth() { return {depth_, transmittance_, by_depth_, by_transmittance_}; }
-  /// Its gradients.
+  /// Gradients of the current image.
   image_gradients gradients() const { return {by_color, by_depth_, by_transmittance_}; }
 
  private:

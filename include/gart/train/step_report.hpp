@@ -8,7 +8,7 @@
 
 namespace gart {
 
-/// The report of one step.
+/// What a step reports.
 struct step_report {
   int step = 0;           ///< steps done, this one included
   float loss = 0;         ///< of this step's training view

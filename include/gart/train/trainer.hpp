@@ -1,21 +1,21 @@
 #pragma once
 /// \file
 /// Training, one step at a time: a view, the forward pass, the loss, the backward pass by the strategy, Adam,
-/// densification. Composed from the parts; each can be replaced.
+/// densification. Each of these parts can be replaced.
 ///
 ///   openmp_exec exec;
 ///   trainer<openmp_exec, scene_traits<3>, bvh_tracer<openmp_exec>, pixel_strategy> run(exec, options, data, start);
 ///   while (run.steps_done() < options.iterations) run.step();
 ///   write_splat_ply("model.ply", run.model());
 ///
-/// A program's own: a loss, given to step(); a densifier (train/densify/densifier.hpp), given to densify_by(); a part
-/// that is learned (train/learned/part.hpp), given to learn(); and hooks between the parts of a step.
+/// A program may bring its own loss (step()), densifier (densify_by(), train/densify/densifier.hpp), learned part
+/// (learn(), train/learned/part.hpp), and hooks between the parts of a step.
 ///
-/// A step is a plan of units: on one rank a whole view (train/plan/whole_view.hpp). On several ranks the Gaussians are
-/// spread over them, with their moments (comm/row_owners.hpp), and each takes a part of every step: strips of one view,
-/// or views of a batch (train/plan/rank_units.hpp). With a strategy that is `ordered` the bits of a run are those of
-/// any number of ranks. All ranks make the same calls; what is said of the Gaussians is of all of them, but for
-/// scene(), edit() and gradients(), which are of this rank's rows. docs/backends.md has more.
+/// A step is a plan of units: on one rank a whole view (train/plan/whole_view.hpp). Several ranks share the Gaussians
+/// and their moments (comm/row_owners.hpp). Each rank takes a part of every step: strips of one view, or views of a
+/// batch (train/plan/rank_units.hpp). With an `ordered` strategy the bits do not depend on the number of ranks. All
+/// ranks make the same calls. Results describe all Gaussians; scene(), edit() and gradients() concern this rank's rows.
+/// docs/backends.md has more.
 ///
 ///   mpi_comm ranks;
 ///   trainer<openmp_exec, traits, tracer, deterministic_strategy, mpi_comm> run(exec, options, data, start, ranks);
@@ -54,25 +54,24 @@ namespace gart { inline namespace GART_ISA {
 template <execution E>
 struct loss_input {
   E& exec;                   ///< the policy
-  dataset_view const& view;  ///< of this step, as the capture has it
+  dataset_view const& view;  ///< the step's view, with the capture's camera
   truth_view truth;          ///< the photograph at the image's size, in the policy's memory
-  int width, height;         ///< of the image, in pixels
+  int width, height;         ///< the image's size in pixels
   span<float const> image;   ///< [H][W][3]
   span<float> gradient;      ///< [H][W][3]
   span<float> value;         ///< [2]
-  depth_pixels depth;        ///< to add to, of a strategy with_depth; else empty
+  depth_pixels depth;        ///< to add to, for strategies with_depth; else empty
 };
 
-/// A loss, called once a step: by its type a trainer would be compiled again for each.
+/// A loss, called once a step. A function object: a template parameter would compile the trainer again for each loss.
 template <execution E>
 using loss_function = std::function<void(loss_input<E> const&)>;
 
-/// What a program does between the parts of a step; `step` counts the images before it. A hook that is empty costs
-/// nothing.
+/// A program's calls between the parts of a step; `step` counts the images before it. An empty hook costs nothing.
 template <execution E>
 struct training_hooks {
   std::function<void(learning_rates&, int step)> rates = {};  ///< changes the rates of a step
-  /// Changes gradients that are complete, penalties included; numbers of Gaussians must stay.
+  /// Changes the complete gradients, penalties included; the number of Gaussians must stay.
   std::function<void(gaussians_view<float const> const& model, gaussians_view<float> const& gradients, int step)>
       before_optimizer = {};
   std::function<void(step_report const&)> after_step = {};  ///< the trainer may be changed
@@ -82,11 +81,11 @@ struct training_hooks {
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 class basic_trainer {
  public:
-  static constexpr int sh_degree = Traits::sh_degree;  ///< that rows of coefficients have room for
-  using frame_type = frame<E, Traits, Tracer>;         ///< of its images
+  static constexpr int sh_degree = Traits::sh_degree;  ///< the largest degree that rows of coefficients hold
+  using frame_type = frame<E, Traits, Tracer>;         ///< the frame of a step's image
 
-  /// Starts from `start`, of that degree or a lower one, which the run keeps. Errors: invalid_argument for a higher
-  /// degree, or where no view is left to train on, and for options that several ranks do not have; out_of_memory.
+  /// Starts from `start`, whose degree the run keeps: sh_degree or lower. Errors: invalid_argument for a higher degree,
+  /// for no view to train on, and for options that several ranks do not support; out_of_memory.
   basic_trainer(E& exec, train_options const& options, dataset const& data, start_model const& start,
                 Comm comm = Comm());
   /// The dataset must outlive the trainer.
@@ -95,7 +94,7 @@ class basic_trainer {
 
   /// One step, with the loss of the options.
   step_report step() { return step_by(nullptr); }
-  /// One step, with a loss of one's own, called with a loss_input.
+  /// One step with the caller's loss, which gets a loss_input.
   template <class Loss>
   step_report step(Loss&& loss) {
     loss_function<E> const own = std::ref(loss);
@@ -103,63 +102,63 @@ class basic_trainer {
   }
   /// Called in every step from the next on.
   void set_hooks(training_hooks<E> hooks) { progress_.hooks = std::move(hooks); }
-  /// Takes the place of the options' densifier.
+  /// Replaces the options' densifier.
   void densify_by(std::unique_ptr<densifier<E>> own);
-  /// Is learned too, from the next step on; sees images after what is learned already.
+  /// Adds a learned part from the next step on; it sees images after the parts before it.
   void learn(std::unique_ptr<learned_part<frame_type>> part) {
     if (!part) throw invalid_argument("trainer.learn: there is no part");
     parts_.push_back(std::move(part));
   }
 
-  /// Of the run's model; bands above it are zero in the policy's memory.
+  /// The degree of the run's model; bands above it are zero in the policy's memory.
   int degree() const { return gaussians_.degree; }
   /// Steps done.
   int steps_done() const { return progress_.step; }
-  void set_iterations(int iterations);  ///< as session has it
+  void set_iterations(int iterations);  ///< as session::set_iterations
   /// The Gaussians, in host memory.
   gaussian_model model() const { return whole_of(gaussians_.to_host(gaussians_.model)); }
-  /// A view of the Gaussians to host memory.
+  /// Renders a view to host memory.
   rendered render(camera const& view, vec3 background);
-  /// Its colours alone, in 8 bits a channel: [H][W][3].
+  /// The view's colours in 8 bits a channel: [H][W][3].
   image8 render_8bit(camera const& view, vec3 background);
-  /// Gaussians, of all ranks.
+  /// The number of Gaussians on all ranks.
   index_t size() const { return gaussians_.total; }
   /// Everything the next step depends on.
   training_state state() const;
-  /// Takes up the run that the state is of. Errors: invalid_argument for another degree, or other parts.
+  /// Takes up the run of a state. Errors: invalid_argument for another degree, or other parts.
   void set_state(training_state const& state);
-  /// Writes the state to a checkpoint: one file, whatever the number of ranks, each of which writes its rows.
+  /// Writes the state to a checkpoint: one file, to which each rank writes its rows.
   void save(std::filesystem::path const& path) const;
-  /// Takes up the run of a checkpoint, of which each rank reads its rows.
+  /// Takes up the run of a checkpoint; each rank reads its rows.
   void load(std::filesystem::path const& path);
-  /// Writes the Gaussians in the format that the name's ending says; ranks write a splat PLY each its rows, of another
-  /// format rank 0 all.
+  /// Writes the Gaussians in the format of the name's ending. Each rank writes its rows of a splat PLY; rank 0 writes
+  /// other formats whole.
   void save_model(std::filesystem::path const& path, splat_traits const& traits = {}) const;
-  /// Of the views that were trained on and their lenses; empty where none are learned.
+  /// The learned exposures of the training views and their lenses; empty where none are learned.
   exposure_field exposures() const;
   /// The cameras of the training views, where poses or lenses are learned; else empty.
   std::vector<named_camera> poses() const;
-  /// A camera of the capture, at whatever pose, with its lens as it is learned.
+  /// A camera of the capture, at any pose, with its learned lens.
   camera as_learned(camera view) const {
     for (auto const& part : parts_) view = part->through(view);
     return view;
   }
   std::size_t lt_bytes() const { return progress_.lt_bytes; }  ///< of the last step
-  u64 sent_bytes() const { return progress_.sent; }            ///< from this rank to others in its steps
+  u64 sent_bytes() const { return progress_.sent; }            ///< sent by this rank to others in its steps
   /// The Gaussians, in the policy's memory, in rows of sh_degree.
   gaussians<E> const& scene() const { return gaussians_.model; }
   /// The same, to be changed.
   gaussians_view<float> edit() { return gaussians_.model.view(); }
-  /// To so many Gaussians of all ranks. New ones are zero, and so are their moments, until edit() changes them.
+  /// Sets the number of Gaussians on all ranks. New ones and their moments are zero until edit() changes them.
   void resize(index_t total);
-  /// Of the last step, in their shape; where it changed the count of the Gaussians, undefined.
+  /// The last step's gradients, in the Gaussians' shape; undefined where that step changed the count of Gaussians.
   gaussians<E> const& gradients() const {
     if constexpr (!Comm::alone) plans_.ranks.sum_arrived(gaussians_.gradients);
     return gaussians_.gradients;
   }
 
  private:
-  // trainer_impl.hpp. `loss`: one's own, or null.
+  // trainer_impl.hpp. `loss`: the caller's, or null.
   step_report step_by(loss_function<E> const* loss);
   template <class Plan>
   step_report step_on(Plan& plan, loss_function<E> const* loss);
@@ -170,14 +169,14 @@ class basic_trainer {
   void make_room();
   bool in_ranks() const { return !Comm::alone && (comm_.size() > 1 || options_.batch > 1); }
   vec3 background_of(int step) const;
-  // The camera of a training view as it is learned, and its image's size in a step.
+  // The learned camera of a training view, and its image's size in a step.
   camera seen_by(std::size_t index) const {
     camera view = data_.train[index].view;
     for (auto const& part : parts_) view = part->view(index, view);
     return view;
   }
   step_view view_of(int before, int image);
-  // Numbers that an image gives, and where part i's begin.
+  // The numbers that an image gives, and where those of part i begin.
   std::size_t numbers(std::size_t parts) const {
     std::size_t sum = 2;
     for (std::size_t i = 0; i < parts; ++i) sum += parts_[i]->numbers();
@@ -188,7 +187,7 @@ class basic_trainer {
     return row.subspan(numbers(part), parts_[part]->numbers());
   }
 
-  // trainer_state_impl.hpp: what of values of all Gaussians is this rank's, and the way back.
+  // trainer_state_impl.hpp: this rank's part of values of all Gaussians, and the way back.
   static train_options const& checked(E& exec, Comm& comm, train_options const& options, dataset const& data,
                                       start_model const& start);
   static u64 total_of(Comm& comm, start_model const& start);
@@ -241,8 +240,8 @@ class basic_trainer {
   progress progress_;
 };
 
-/// The same by itself, where no communicator is named. An alias, since nvcc makes of a class's default argument one of
-/// each member template too.
+/// A trainer; without a communicator, on one rank. An alias, since nvcc would copy a class's default argument to each
+/// member template.
 template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
 using trainer = basic_trainer<E, Traits, Tracer, Strategy, Comm>;
 

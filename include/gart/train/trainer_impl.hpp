@@ -34,8 +34,8 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       finite_.emplace(exec, plans_.ranks.rows().owners());
   }
   // Sums in a fixed order were asked for: no budget of our own takes them away.
-  if (options.lt_budget == 0 && !Strategy::ordered)
-    options_.lt_budget = exec.free_bytes() / 2 / static_cast<u64>(comm_.sharers());
+  if (options.hit_memory == 0 && !Strategy::ordered)
+    options_.hit_memory = exec.free_bytes() / 2 / static_cast<u64>(comm_.sharers());
   parts_ = make_learned_parts<frame_type, has_depth<Strategy>>(exec, options, data, in_ranks());
   densify_by(make_densifier(exec, density_setup{options, data, gaussians_.total, Traits::response::degree}));
 }
@@ -161,7 +161,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_on(Plan& plan
     report.skipped = plan.sum((*finite_)(gaussians_.model, gaussians_.moments,
                                          "step " + std::to_string(report.step) + ", view " + report.view));
   double sum = 0, square = 0;
-  // From what each image said of what the step began with, whoever traced it.
+  // All ranks have the numbers of all images, so all do the same.
   for (int k = 0; k < batch; ++k) {
     span<float> const of_image = row(span<float>(found), k);
     step_view const& view = images[static_cast<std::size_t>(k)];
@@ -192,7 +192,7 @@ step_view basic_trainer<E, Traits, Tracer, Strategy, Comm>::view_of(int before, 
   return v;
 }
 
-// This rank's unit of a round: its rows of the image, the loss of the whole, its sums of the gradients.
+// Traces this rank's unit of a round, and sums its gradients. The loss is that of the whole image.
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 template <class Plan>
 void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace(Plan& plan, loss_function<E> const* loss, step_view& v,
@@ -242,8 +242,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace(Plan& plan, loss_fu
   frame_type& frame = tracing_.frame;
   frame.prepare(plan.scene(), v.seen, render, degree);
   plan.finish_fetch();
-  // With less memory where the LT buffer would pass its budget or the numbers of its slots, and then with none.
-  tracing_.passes.with_room(frame, options_.lt_budget, [&]<class Pass>(Pass& pass) {
+  // Falls back to a smaller hit buffer, and then to none, where it would exceed its budget or the largest slot number.
+  tracing_.passes.with_room(frame, options_.hit_memory, [&]<class Pass>(Pass& pass) {
     plan.require(pass);
     pass.render(frame, targets);
     differentiate_loss();

@@ -1,7 +1,6 @@
 #pragma once
 /// \file
-/// The bodies of trainer.hpp for what a run can be taken up from and for what it leaves: states, checkpoints, models,
-/// of one rank and of all.
+/// The bodies of trainer.hpp for states, checkpoints and models, of one rank and of all.
 
 #include <gart/train/trainer.hpp>
 

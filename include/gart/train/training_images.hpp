@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// The true images where kernels can read them, at the size of a step's images: the dataset's own memory on host
-/// policies. On a device each is copied at its first use and stays while there is room: a quarter of what is free at
-/// the start. Those that find none are copied at each use (1 ms for 8 million pixels, beside the kernels before it), so
-/// that thousands of large photographs need no more. Masks have the weights of the cameras' pixels
+/// The photographs where kernels can read them, at the size of a step's images. Host policies read the dataset's own
+/// memory. On a device a photograph is copied at its first use. It stays there while all take at most a quarter of the
+/// memory that was free at the start. Others are copied at each use (1 ms for 8 million pixels, hidden behind earlier
+/// kernels), so thousands of large photographs fit. Masks have the weights of the cameras' pixels
 /// (camera/pixel_weights.hpp) in them.
 
 #include <gart/camera/pixel_weights.hpp>
@@ -76,7 +76,7 @@ class training_images {
   dataset const& data_;
   u64 room_;  // bytes that photographs may still take for good
   std::vector<buffer<u8, E>> pixels_, masks_;
-  buffer<u8, E> streamed_pixels_, streamed_mask_;  // of one that found no room
+  buffer<u8, E> streamed_pixels_, streamed_mask_;  // a photograph that does not stay
   std::vector<image8> weights_;
   smaller_photo<E> smaller_;
 };

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Every training view once an epoch, those held out excepted, in an order shuffled by (seed, epoch): a function of the
-/// step alone.
+/// The view of a step. Every training view that is not held out comes once an epoch, in an order shuffled by (seed,
+/// epoch).
 
 #include <gart/optim/random.hpp>
 

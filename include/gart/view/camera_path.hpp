@@ -2,16 +2,15 @@
 /// \file
 /// A smooth path of a camera through keyframes: what a viewer plays and `gart render` follows.
 ///
-/// Between two keyframes lies a cubic Bezier curve whose speed at either end is that of a Catmull-Rom spline, by the
-/// way to the keyframes on both sides: of positions, of rotations (the cumulative form of Kim, Kim and Shin, "A general
-/// construction scheme for unit quaternion curves", 1995), of the logarithms of focal lengths, of principal points. The
-/// path goes through every keyframe, and its speed has no jump there. The time between two keyframes is the square root
-/// of the way between them, distance and angle (centripetal: close keyframes make no loops), so that no stretch is
-/// without time; times that are given stand in its place. Size, model and lens are those of the first keyframe. In
-/// double.
+/// Between two keyframes lies a cubic Bezier curve with the end speeds of a Catmull-Rom spline. It is a curve of
+/// positions, of rotations, of logarithms of focal lengths and of principal points. Rotations use the cumulative form
+/// of Kim, Kim and Shin, "A general construction scheme for unit quaternion curves", 1995. The path goes through every
+/// keyframe, and its speed has no jump there. The time between two keyframes is the square root of their distance and
+/// angle (centripetal: close keyframes make no loops). Given times take its place. Size, model and lens are those of
+/// the first keyframe. In double.
 ///
 /// Errors: invalid_argument for less than two keyframes or frames, for keyframes of different camera models, and for
-/// times that are not one a keyframe, from 0 on, each more than the one before.
+/// wrong times. There must be one a keyframe, from 0 on, each more than the one before.
 
 #include <gart/scene/camera.hpp>
 
@@ -39,8 +38,8 @@ class camera_path {
   bool closed_;
 };
 
-/// `frames` cameras along the path, evenly in time, the first and the last one at its ends; of a closed path the end is
-/// left out, for it is the start.
+/// `frames` cameras along the path, evenly in time, with both ends; a closed path leaves out its end, which is the
+/// start.
 std::vector<camera> smooth_path(std::vector<camera> const& keyframes, int frames, bool closed = false,
                                 std::vector<double> const& times = {});
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// What a render tells of a scene besides its colours, as images: distances, normals, opacity, hits, the difference to
-/// a photograph; and the colour maps that show them. Host memory, a few passes over the pixels each.
+/// Images of a scene besides its colours: distances, normals, opacity, hits, the difference to a photograph. Also the
+/// colour maps that show them. Host memory, a few passes over the pixels each.
 
 #include <gart/render/rendered.hpp>
 #include <gart/scene/camera.hpp>
@@ -14,8 +14,8 @@ namespace gart {
 /// The mean distance of what each pixel sees, along its ray; 0 where it sees less than half.
 image_float mean_distances(rendered const& r);
 
-/// Normals of the surface that the distances make, in the world's axes, towards the camera: [H][W][3], zero where a
-/// pixel or both of its neighbours in a direction have no distance.
+/// Normals of the distances' surface, in the world's axes, towards the camera: [H][W][3]. Zero where a pixel, or both
+/// of its neighbours in a direction, have no distance.
 image_float normals_of(image_float const& distances, camera const& view);
 /// Normals as colours, (n + 1) / 2, black where there is none: [H][W][3] in [0, 1].
 image_float normal_colors(image_float normals);
@@ -25,10 +25,10 @@ image_float hits_of(rendered const& r);   ///< Gaussians met by each pixel's ray
 
 /// The least and the largest value above 0; zeros where there is none.
 std::pair<float, float> range_of(image_float const& map);
-/// A map of one channel in colours, from `low` to `high`: yellow, orange, violet, dark blue; black where it is 0.
+/// Colours a map of one channel from `low` to `high`: yellow, orange, violet, dark blue; black where it is 0.
 image8 in_colors(image_float const& map, float low, float high);
-/// The colour map of errors, dark violet over red to pale yellow: lightness rises with the error, so that it also reads
-/// in grey. Evenly spaced, linear between them.
+/// The colour map of errors, dark violet over red to pale yellow. Lightness rises with the error, so it also reads in
+/// grey. Evenly spaced, linear between them.
 inline constexpr u8 error_colors[6][3] = {{10, 8, 26},   {74, 20, 96},   {150, 38, 96},
                                           {218, 76, 62}, {249, 149, 54}, {252, 240, 170}};
 /// A map of errors in these colours, from 0 to `high`.

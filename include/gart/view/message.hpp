@@ -1,14 +1,13 @@
 #pragma once
 /// \file
-/// What the page of a viewer and its server say to each other, without the sockets: one JSON object a message as text,
-/// and frames and images in bytes. docs/rendering.md has the fields of each.
+/// The messages between a viewer's page and its server, without sockets. Texts are one JSON object each; frames and
+/// images are bytes. docs/rendering.md has the fields of each.
 ///
-/// parse_message reads what a client sent, from outside and therefore held to: at most message_bytes, objects no deeper
-/// than message_depth, every field there and in its range, no other one. Errors: invalid_argument naming the field.
-/// The texts of the other direction are whole JSON objects; a frame is {u32 length of the header, header JSON, JPEG}.
+/// parse_message reads a client's message strictly: at most message_bytes, objects no deeper than message_depth, every
+/// field present and in its range, no others. Errors: invalid_argument naming the field. Texts to clients are whole
+/// JSON objects. A frame is {u32 length of the header, header JSON, JPEG}.
 
 #include <gart/core/names.hpp>
-#include <gart/core/span.hpp>
 #include <gart/core/types.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/view/scene.hpp>
@@ -63,7 +62,7 @@ struct path_message {
   std::vector<camera> keyframes;  ///< two at least
   int frames = 0;                 ///< cameras along the path
   bool closed = false;            ///< whether it ends where it began
-  /// Of the keyframes, and of the end of a closed path, in increasing seconds from 0; none: by the way between them.
+  /// Times of the keyframes, and of a closed path's end, in increasing seconds from 0; empty: by their distances.
   std::vector<double> times;
 };
 
@@ -98,7 +97,7 @@ using client_message =
 /// Reads a client's text.
 client_message parse_message(std::string_view text);
 
-/// The first text to a client: what there is to see, and whether it may control.
+/// The first text to a client: the scene's contents, and whether the client may control.
 std::string hello_text(view_scene const& scene, bool control);
 /// The state of a training.
 std::string status_text(view_status const& status);

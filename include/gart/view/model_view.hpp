@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Views of a model that does not change, for a viewer: what view_server renders by. Where settings change the
-/// Gaussians (a crop box, another size), the renderer holds a copy, which is made when they change.
+/// Views of a model that does not change, for a viewer: what view_server renders by. Settings that change the Gaussians
+/// (a crop box, another size) give the renderer a changed copy.
 
 #include <gart/render/options.hpp>
 #include <gart/render/rendered.hpp>
@@ -19,14 +19,14 @@ namespace gart {
 struct view_render {
   /// Everything a pixel can tell.
   std::function<rendered(camera const& view, view_settings const& settings)> images;
-  /// Its colours alone, as to_8bit makes them of `images`, [H][W][3]: what view_mode::colour shows, where it is given.
-  /// On a device it spares the copy of the rest.
+  /// The view's colours as to_8bit of `images`, [H][W][3]; view_mode::colour uses it where it is given. On a device it
+  /// spares the copy of the rest.
   std::function<image8(camera const& view, view_settings const& settings)> colours;
   /// Whether settings.rows is heeded: then a view that takes long is asked for in parts. Else each part is the whole.
   bool in_parts = false;
 
   view_render() = default;
-  /// Of a function that renders everything, and one of the colours alone where there is one.
+  /// From a function that renders everything, and optionally one for the colours alone.
   template <std::invocable<camera const&, view_settings const&> F>
   view_render(F all, decltype(colours) alone = {}) : images(std::move(all)), colours(std::move(alone)) {}
 };

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// How large a view may be to be there in time, and how much time views may take from what else there is to do. Pure
-/// functions of measured times: no clock, no threads.
+/// Limits the size of views, so that they arrive in time, and the time that they take from a training. Pure functions
+/// of measured times: no clock, no threads.
 
 #include <gart/core/isa.hpp>
 
@@ -11,8 +11,8 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// Sizes of views that are rendered within a time, by the milliseconds a pixel that the last ones took. A view's own
-/// fixed cost is taken for one of its pixels, so that sizes come down to where the time is met, and stay there.
+/// Sizes of views that are rendered within a time, by the milliseconds a pixel that the last ones took. A view's fixed
+/// cost counts as a cost of its pixels. So sizes shrink until the time is met, and stay there.
 class frame_pacing {
  public:
   /// A view of so many pixels took so long.
@@ -28,7 +28,7 @@ class frame_pacing {
     if (!(rate_ > 0)) rate_ = other.rate_;
   }
 
-  /// The size, in the shape of the full one, that takes about so many milliseconds; at most the full one, at least an
+  /// The size, in the full size's shape, that takes about so many milliseconds: at most the full size, at least an
   /// eighth of its sides. Sides are whole parts in 32 of the full ones, so that a size does not change with every view.
   /// With nothing measured it is a quarter of the sides.
   std::pair<int, int> size(int full_width, int full_height, double milliseconds) const {
@@ -42,24 +42,24 @@ class frame_pacing {
   double rate_ = 0;
 };
 
-/// Keeps views to a share of the time that a training takes, so that it is slower by no more than that: work earns them
-/// time, each view spends it. What is saved up is bounded, so that a viewer who comes late does not stop the training.
-/// A step after a view finds caches cold and a device without work; what it takes beyond the usual is the view's.
+/// Limits views to a share of a training's time: work earns time, each view spends it. Saved time is bounded, so a late
+/// viewer does not stop the training. A step after a view starts with cold caches and an idle device; its extra time
+/// counts as the view's.
 class time_share {
  public:
   /// Between 0 and 1 of the training's own time; 1: as much as is wanted.
   explicit time_share(double share) { set(share); }
   /// The same, from here on.
   void set(double share) { share_ = std::clamp(share, 0.0, 1.0); }
-  /// Of the training's own time.
+  /// The share, 0 to 1.
   double share() const { return share_; }
   /// So many seconds went into a step of the training.
   void worked(double seconds) {
     double own = seconds;
-    if (after_view_ && usual_ > 0)
-      own = std::min(seconds, usual_);
+    if (after_view_ && mean_step_ > 0)
+      own = std::min(seconds, mean_step_);
     else
-      usual_ += (seconds - usual_) * (usual_ > 0 ? usual_weight : 1);
+      mean_step_ += (seconds - mean_step_) * (mean_step_ > 0 ? mean_weight : 1);
     after_view_ = false;
     saved_ = std::min(saved_ + own * share_, saved_most) - (seconds - own);
   }
@@ -69,10 +69,10 @@ class time_share {
   bool may_view() const { return saved_ > 0 || share_ >= 1; }
 
  private:
-  static constexpr double saved_most = 0.1;     // seconds
-  static constexpr double usual_weight = 0.05;  // of a step in the mean
+  static constexpr double saved_most = 0.1;    // seconds
+  static constexpr double mean_weight = 0.05;  // of a step, in the mean
   double share_ = 0, saved_ = 0;
-  double usual_ = 0;  // seconds of a step that no view came before
+  double mean_step_ = 0;  // seconds of a step that no view came before
   bool after_view_ = false;
 };
 

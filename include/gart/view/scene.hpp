@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// What a viewer is told of a scene and of a training, and what it may ask to be shown of a view.
+/// The description of a scene and of a training for viewers, and the settings of a view.
 
 #include <gart/core/names.hpp>
 #include <gart/math/glm.hpp>
@@ -70,10 +70,10 @@ struct view_settings {
 
 /// A camera of the capture.
 struct view_camera {
-  std::string name;    ///< as the capture has it
+  std::string name;    ///< the capture's camera
   camera view;         ///< the camera
   bool test = false;   ///< held out of the training
-  bool photo = false;  ///< whether there is a photograph of it
+  bool photo = false;  ///< whether it has a photograph
 };
 
 /// What there is to see.
@@ -103,8 +103,8 @@ view_scene scene_of(std::string name, gaussian_model const& model, int kernel_de
 gaussian_model cropped(gaussian_model const& model, view_box const& box);
 
 /// The Gaussians that are traced of a model for these settings. Ellipsoids and points are hit where their response is
-/// at least `solid_response`, which is then the render's alpha_min; of them, what is fainter than `faintest_solid`
-/// after the factor is left out. `extent` is half the scene's diagonal: a point's radius is 0.004 of it.
+/// at least `solid_response`, which is then the render's alpha_min. Those fainter than `faintest_solid` after the
+/// factor are left out. `extent` is half the scene's diagonal: a point's radius is 0.004 of it.
 gaussian_model altered(gaussian_model model, view_settings const& settings, int kernel_degree, float extent);
 inline constexpr float solid_response = 0.8f;   ///< at the rim of an ellipsoid
 inline constexpr float faintest_solid = 0.05f;  ///< opacity

@@ -11,14 +11,14 @@
 ///   auto const render = gart::render_of(*renderer, file.model, file.render);
 ///   for (;;) server.render_next(render, 1.0);
 ///
-/// The server has a thread of its own for its sockets; views are rendered in the thread that calls render_next, one at
-/// a time. Only the newest view of each client is rendered, and none while the client has not yet taken the one before:
-/// one that stalls costs at most two frames, and does not slow the others. A view at rest that takes long is rendered
-/// in parts, and dropped between two of them when the client has moved on or left.
+/// The server has a thread for its sockets. The thread that calls render_next renders views, one at a time. Only a
+/// client's newest view is rendered, after the client has taken the one before. So a stalled client costs at most two
+/// frames, and does not slow the others. A slow view at rest is rendered in parts. It is dropped between two of them
+/// when the client has moved on or left.
 ///
-/// It listens on this machine alone unless options.listen says otherwise. An address has a token of 128 random bits;
-/// requests with another one, or from another host's page, are answered by 403. There is no encryption: over a network
-/// it goes through `ssh -L` (docs/rendering.md). Connections that stay silent make room for others.
+/// It listens on this machine alone unless options.listen says otherwise. An address has a token of 128 random bits.
+/// Requests with another token, or from another host's page, get 403. There is no encryption: over a network it goes
+/// through `ssh -L` (docs/rendering.md). Connections that stay silent make room for others.
 ///
 /// Errors: invalid_argument for an address that is not this machine's; error where the port is taken.
 
@@ -51,7 +51,7 @@ struct view_server_options {
   std::function<void(std::string)> log;  ///< a line: clients that were closed, and why; from the server's thread
 };
 
-/// Serves the views of one scene.
+/// Serves views of one scene.
 class view_server {
  public:
   /// Listens from here on.
@@ -75,7 +75,7 @@ class view_server {
   double render_next(view_render const& render, double wait_seconds);
 
   ///@{
-  /// What the clients are told, now and when they come: of a training, and PSNR of views by the camera's index.
+  /// Sets what present and later clients are told: a training's state, and PSNR of views by the camera's index.
   void set_status(view_status const& status);
   void set_curve(view_curve const& curve);
   void set_scores(std::vector<std::pair<int, double>> const& scores);

@@ -1,21 +1,20 @@
 #pragma once
 /// \file
 /// Adaptive density control (Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023):
-/// Gaussians whose image-space gradient is large on average are cloned (small ones) or split in two (large ones);
-/// transparent and oversized ones are removed; opacities are reset now and then.
+/// Gaussians with a large mean gradient in image space are cloned if small, and split in two if large. Transparent and
+/// oversized ones are removed; opacities are reset from time to time.
 ///
-/// The statistic. 3DGS thresholds the gradient of the loss in the mean's place on the screen, in coordinates -1 to 1.
-/// Ray tracing has no such variable, but sideways motion acts through it: with the mean at (x, y, z) in the camera,
-/// ndc_x = 2 (fx x / z + cx) / W - 1, so dL/dx = dL/dndc_x * 2 fx / (W z), hence
+/// The statistic. 3DGS compares a threshold with the loss's gradient by the mean's screen position, in coordinates -1
+/// to 1. Ray tracing has no such variable, but sideways motion acts through it: with the mean at (x, y, z) in the
+/// camera, ndc_x = 2 (fx x / z + cx) / W - 1, so dL/dx = dL/dndc_x * 2 fx / (W z), hence
 ///   dL/dndc = (dL/dx * z W / (2 fx), dL/dy * z H / (2 fy)),
 /// whose length is added up at every step that gives the Gaussian a gradient; the mean over those steps meets the same
 /// threshold as in 3DGS. A Gaussian whose mean is behind the camera adds nothing in that step.
 ///
 /// Past the budget the largest statistics grow and the rest stay as they are. New Gaussians begin with zero moments.
-/// Gaussians that are not finite are removed. A split moves its children by draws from itself. What is removed closes
-/// the ranks of those behind it: every number may change, and where rows are spread over ranks they move with their
-/// numbers. Cost: one small launch a step; a densification is O(N) with one host read, and holds a second copy of the
-/// parameters while it runs.
+/// Gaussians that are not finite are removed. A split moves its children by draws from itself. Removing a Gaussian
+/// renumbers those after it, and rows move to the rank of their new number. Cost: one small launch a step. A
+/// densification is O(N) with one host read, and needs a second copy of the parameters.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>
@@ -27,7 +26,6 @@
 #include <gart/train/densify/densifier.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace gart { inline namespace GART_ISA {
@@ -196,7 +194,7 @@ class adaptive_density final : public densifier<E> {
         origin_(exec),
         offset_(exec),
         totals_(exec, 2) {}
-  /// Of a run.
+  /// For a run.
   adaptive_density(E& exec, density_setup const& run)
       : adaptive_density(exec, options_of(run.options), run.options.max_gaussians, run.options.iterations,
                          run.data.extent, run.options.seed) {}

@@ -1,13 +1,13 @@
 #pragma once
 /// \file
-/// Densification: which Gaussians a training adds, moves and removes. A densifier is a class on densifier<E>; what it
-/// does not override, it does not do, and the base itself changes nothing. Those of the library are listed in
-/// densifiers.hpp, and a program gives its own to trainer::densify_by. In the order of a step:
+/// Densification: which Gaussians a training adds, moves and removes. A densifier derives from densifier<E>, whose
+/// members do nothing, and overrides what it needs. densifiers.hpp lists those of the library; a program gives its own
+/// to trainer::densify_by. In the order of a step:
 ///   1. observe: once for each view of the step, with that view's gradients; or error_sums, which the backward pass
 ///   adds.
 ///   2. penalty: adds to the gradients, before the optimizer.
 ///   3. step: after the optimizer; it may change the Gaussians, their moments and their number.
-/// All is called on all ranks alike. What a step draws must depend on the seed and the step only, or be in the state.
+/// All ranks make the same calls. Random draws must depend on the seed, the step and the state alone.
 
 #include <gart/core/named_arrays.hpp>
 #include <gart/io/dataset.hpp>
@@ -20,28 +20,28 @@ namespace gart { inline namespace GART_ISA {
 
 /// When a run densifies.
 struct density_schedule {
-  int from = 0, every = 0;  ///< steps: after the first so many, and from one to the next; 0: never
+  int from = 0, every = 0;  ///< steps before the first densification, and between two; every = 0: never
   float until = 1;          ///< share of the run
 };
 
-/// What a densifier of a run is made from.
+/// The inputs for making a run's densifier.
 struct density_setup {
   train_options const& options;  ///< of the run
-  dataset const& data;           ///< its capture
+  dataset const& data;           ///< the capture
   index_t start;                 ///< Gaussians that the run starts with
   int kernel_degree;             ///< of their response
 };
 
-/// What a step tells a densifier.
+/// What a densifier gets in each step.
 template <execution E>
 struct density_step {
-  int step = 0;                          ///< steps done, this one included; of a batch each image counts
-  float mean_rate = 0;                   ///< Adam's of the means
-  all_rows<E>& rows = whole_scene<E>();  ///< where the Gaussians are
-  span<float const> filter = {};         ///< as opacity_shown has it, where the step densifies
+  int step = 0;                          ///< steps done, with this one; each image of a batch counts
+  float mean_rate = 0;                   ///< Adam's rate of the means
+  all_rows<E>& rows = whole_scene<E>();  ///< the rows on all ranks
+  span<float const> filter = {};         ///< the filter for opacity_shown, in steps that densify
 };
 
-/// One that changes nothing.
+/// The base: changes nothing.
 template <execution E>
 class densifier {
  public:
@@ -54,28 +54,29 @@ class densifier {
   virtual bool due(int step) const {
     return step > schedule_.from && is_multiple(step, schedule_.every, batch_) && running(step);
   }
-  /// Whether it looks at the errors seen through the Gaussians.
+  /// Whether it needs the error seen through each Gaussian.
   virtual bool by_error() const { return false; }
-  /// Where the backward passes add these up, [n] for the rows of this rank.
+  /// The sums of that error, [n] for this rank's rows; backward passes add to them.
   virtual span<float> error_sums(index_t /*n*/) { return {}; }
-  /// Whether it looks at the gradients of each view.
+  /// Whether it needs the gradients of each view.
   virtual bool by_gradient() const { return false; }
-  /// These, and the camera of the step's image.
+  /// Takes one view's gradients, and the camera of its image.
   virtual void observe(gaussians<E> const& /*model*/, gaussians<E> const& /*gradients*/, camera const& /*view*/) {}
   /// Before the optimizer: adds to the gradients. `total`: Gaussians of all ranks.
   virtual void penalty(trained_gaussians<E>&, index_t /*total*/) {}
   /// After the optimizer.
   virtual density_change step(trained_gaussians<E>&, density_step<E> const&) { return {}; }
-  /// What the next step depends on. Arrays of one 4-byte number a Gaussian are named as of_gaussians says.
+  /// The state for the next step. of_gaussians (train/state.hpp) has the names for arrays of one 4-byte number a
+  /// Gaussian.
   virtual void save(named_arrays&) const {}
   virtual void load(named_arrays const&) {}  ///< from a state
-  /// From the next step on the schedules are those of a run of so many steps.
+  /// Sets the run's length for schedules from the next step on.
   virtual void set_iterations(int iterations) { iterations_ = iterations; }
-  /// Steps are counted in images, of which each has so many.
+  /// Sets the images of a step; schedules count images.
   void set_batch(int images) { batch_ = images; }
 
  protected:
-  /// Whether the schedule is not over.
+  /// Whether the schedule goes on.
   bool running(int step) const { return static_cast<float>(step) < schedule_.until * static_cast<float>(iterations_); }
   int iterations_ = 0;  ///< of the run
   int batch_ = 1;       ///< images a step
@@ -94,7 +95,7 @@ struct error_sum_kernel {
 
 }  // namespace detail
 
-/// The errors of one of a step's views, from the moments that its backward pass left ([N][moment_stride]).
+/// Adds one view's errors, from the moments of its backward pass ([N][moment_stride]), to the sums.
 template <execution E>
 void add_errors(E& exec, span<float const> moments, span<float> sums) {
   parallel_for(exec, "error_sum", static_cast<index_t>(sums.size()),

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The densifiers of the library, by the names of train_options.densify. A new one is a header and a line here, and
-/// where its run grows to a known number a line in gaussians_at_end (train/memory_need.hpp).
+/// The densifiers of the library, by the names of train_options.densify. A new one is a header and a line here. One
+/// that grows to a known number also has a line in gaussians_at_end (train/memory_need.hpp).
 
 #include <gart/train/densify/adc.hpp>
 #include <gart/train/densify/error_growth.hpp>

@@ -5,25 +5,23 @@
 /// The statistic. The backward pass sums, over a Gaussian's hits, the weight w of the hit times the error of its pixel.
 /// It works for any camera, since it needs no projection. The sums of all steps since the last densification are the
 /// Gaussian's share of the total error. A mean over the views that saw it would favour haze that few views see. The
-/// share is multiplied by the opacity: much error is seen through haze that other Gaussians cause, and splitting haze
-/// overfits single views.
+/// share is multiplied by the opacity. Haze shows much error that other Gaussians cause, and splitting haze overfits
+/// single views.
 ///
-/// A densification draws Gaussians without replacement, in proportion to their share times their opacity (Efraimidis
-/// and Spirakis 2006: the least of -ln(u) / weight, u uniform), and splits each along its long axis
-/// (long_axis_split.hpp). As many are drawn as there are dead Gaussians, whose rows the second children take, and as
-/// the count is to grow. It grows on a square-root curve, early, to the budget at the share `growth_end` of the run,
-/// and at most doubles at a time. The budget follows the capture's pixels where they are few (growth_budget): a
-/// Gaussian that covers a pixel or two of each photograph learns its noise, and what is wrong with its pose. First
-/// children keep Adam's moments, second ones start with none. After `growth_end` only the dead are replaced, after
-/// `until` nothing moves.
+/// A densification draws Gaussians without replacement, in proportion to share times opacity. The least values of
+/// -ln(u) / weight, u uniform, are drawn (Efraimidis and Spirakis 2006). Each is split along its long axis
+/// (long_axis_split.hpp). One is drawn for each dead Gaussian, whose row the second child takes, and for each that the
+/// count grows by. The count follows a square-root curve to the budget at the share `growth_end` of the run. It at most
+/// doubles at a time. Few pixels in the capture lower the budget (growth_budget): Gaussians of a pixel or two learn the
+/// noise and pose errors of photographs. First children keep Adam's moments, second ones start with none. After
+/// `growth_end` only the dead are replaced, after `until` nothing moves.
 ///
-/// A small penalty on the mean opacity, paid by all Gaussians, takes those that no view needs; they fade until they are
-/// dead. A Gaussian whose opacity or geometry is not finite counts as dead. Where no error is attributed, or none is
-/// alive, nothing is moved.
+/// A small penalty on the mean opacity fades Gaussians that no view needs, until they are dead. A Gaussian whose
+/// opacity or geometry is not finite counts as dead. Where no error is attributed, or none is alive, nothing is moved.
 ///
-/// It has no state but the statistic, [N] floats, which a checkpoint must hold: what is drawn depends on it, the seed
-/// and the step. Equal weights give the same draws on every policy but for the last bits of a logarithm. Cost: one
-/// small launch a step; a densification is a sort of N pairs, two scans and one host read.
+/// Its only state is the statistic, [N] floats, which checkpoints hold. Draws depend on it, the seed and the step.
+/// Equal weights give the same draws on every policy but for the last bits of a logarithm. Cost: one small launch a
+/// step; a densification is a sort of N pairs, two scans and one host read.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>
@@ -122,8 +120,8 @@ inline index_t growth_budget(error_growth_options const& options, index_t most, 
 }
 
 /// The q that children are made by, in a capture of so many training pixels: options.split.offset, or what suits it.
-/// Nearer children overlap, and fit better what they share; where pixels end growth the overlap of large Gaussians
-/// takes more memory than it is worth.
+/// Nearer children overlap and fit their common part better. Where pixels limit growth, the overlap of large Gaussians
+/// costs more memory than it gains.
 inline float split_offset(error_growth_options const& options, index_t most, u64 pixels) {
   if (options.split.offset != 0) return options.split.offset;
   return growth_budget(options, most, pixels) < most ? 0.4f : 0.35f;
@@ -158,7 +156,7 @@ class error_growth final : public densifier<E> {
     if (!(split.opacity > 0 && split.opacity <= 1))
       throw invalid_argument("split_shape.opacity is " + std::to_string(split.opacity) + ": more than 0, at most 1");
   }
-  /// Of a run.
+  /// For a run.
   error_growth(E& exec, density_setup const& run)
       : error_growth(exec, options_of(run.options, run.data),
                      growth_budget(run.options.error, run.options.max_gaussians, run.data.training_pixels()),

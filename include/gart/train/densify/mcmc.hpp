@@ -1,25 +1,23 @@
 #pragma once
 /// \file
 /// Densification as Markov chain Monte Carlo (Kheradmand et al., 3D Gaussian Splatting as Markov Chain Monte Carlo,
-/// 2024; constants as in gsplat): dead Gaussians move onto live ones, drawn in proportion to opacity; the count grows
-/// to a budget in the same way; the means take a random step every step; opacity and size carry a small penalty.
+/// 2024; constants as in gsplat). Dead Gaussians move onto live ones, drawn in proportion to opacity; growth to the
+/// budget draws in the same way. Every step moves the means at random, and penalizes opacity and size a little.
 ///
 /// A Gaussian of opacity o that becomes N in one place (its copies and itself; N is cut at 51) keeps what they render:
 ///   o' = 1 - (1 - o)^(1/N),  scale' = scale * o / sum_{j=1..N} C(N, j) (-1)^(j-1) o'^j / sqrt(j),
 /// which keeps the integral of the composited opacity across a line through the centre. (The paper's double sum, with
 /// sum_i C(i-1, j-1) = C(N, j).) For a generalised Gaussian of degree n (math/response.hpp) it is the n-th root of j.
-/// Moments as in gsplat: growth leaves its sources' and gives copies none; relocation clears its sources' and leaves
-/// the moved ones theirs. A first moment fills up in 10 steps and a second one in 1,000, so a cleared pair steps up to
-/// 6.5 times its rate for a hundred steps: were growth to clear its sources', the best Gaussians of a scene would be at
-/// it all the time, and those that the next views do not show would follow the penalties alone (docs/training.md).
+/// Moments as in gsplat. Growth keeps the moments of sources, and copies start without. Relocation clears the sources'
+/// moments and keeps those of moved Gaussians. A first moment fills up in 10 steps, a second one in 1,000. So cleared
+/// ones step up to 6.5 times their rate for a hundred steps. If growth cleared its sources, the best Gaussians would do
+/// so all the time (docs/training.md).
 ///
-/// Noise and the penalty on size are stated in the extent of the scene, so that a capture in other units trains to the
-/// same result.
+/// Noise and the size penalty are in units of the scene's extent, so a capture in other units trains alike.
 ///
-/// Weights are 32-bit fixed point and their sums 64-bit integers, so the draws are exact for any count and have the
-/// same bits on every policy. A Gaussian whose opacity or geometry is not finite counts as dead. Where none is alive
-/// nothing is relocated or grown. Cost: one host read and O(N) work a densification; a step in between is two small
-/// launches.
+/// Weights are 32-bit fixed point and their sums 64-bit integers. So draws are exact, with the same bits on every
+/// policy. A Gaussian whose opacity or geometry is not finite counts as dead. Where none is alive nothing is relocated
+/// or grown. Cost: one host read and O(N) work a densification; a step in between is two small launches.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/math/logit.hpp>
@@ -162,8 +160,8 @@ struct mcmc_penalty_kernel {
 
 }  // namespace detail
 
-/// The growth of a run that starts from `count` Gaussians: options.growth, or what reaches the budget within the first
-/// two fifths of the densification steps where that is more, but no more than 1.2.
+/// The growth factor of a run that starts from `count` Gaussians. It is options.growth, or the larger factor that
+/// reaches the budget in the first two fifths of the densifications, at most 1.2.
 inline float growth_for(mcmc_options const& options, index_t count, index_t max_gaussians, int iterations) {
   constexpr double steepest = 1.2;
   float const steps = options.until * static_cast<float>(iterations) - static_cast<float>(options.from);
@@ -196,7 +194,7 @@ class mcmc final : public densifier<E> {
         before_(exec),
         dead_before_(exec),
         totals_(exec, 2) {}
-  /// Of a run.
+  /// For a run.
   mcmc(E& exec, density_setup const& run)
       : mcmc(exec, options_of(run.options), run.options.max_gaussians, run.options.iterations, run.data.extent,
              run.options.seed, run.kernel_degree) {

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
 /// Training by depth maps besides colour (loss/depth_loss.hpp) as a part of a training: of a strategy with_depth. Its
-/// gradients by depth and transmittance stand beside those of the colours, for a loss of one's own to add to. Memory:
-/// on a device 4 bytes a pixel of each view that was seen.
+/// gradients by depth and transmittance stand beside those of the colours; a caller's loss may add to them. Memory: on
+/// a device 4 bytes a pixel of each view that was seen.
 
 #include <gart/train/learned/part.hpp>
 #include <gart/train/smaller_photo.hpp>
@@ -30,7 +30,7 @@ class learned_depth final : public learned_part<Frame> {
   using E = typename Frame::execution_type;
 
  public:
-  /// weight: of the loss, over the scene's extent; 0: no gradient but one of the caller's own.
+  /// weight: the loss's, over the scene's extent; 0: only the caller's loss gives gradients.
   learned_depth(E& exec, dataset const& data, float weight)
       : exec_(&exec),
         data_(&data),

@@ -1,8 +1,9 @@
 #pragma once
 /// \file
-/// What a training learns besides the Gaussians, or compares besides colours: exposures, vignetting, poses, lenses,
-/// depth. A part is a class on learned_part<Frame>, which does nothing; those of the library are listed in parts.hpp,
-/// and a program adds its own by trainer::learn. In the order of a step, each image by the ranks that trace it:
+/// Parts: what a training learns besides the Gaussians, or compares besides colours: exposures, vignetting, poses,
+/// lenses, depth. A part derives from learned_part<Frame>, whose members do nothing. parts.hpp lists those of the
+/// library; a program adds its own by trainer::learn. The calls in the order of a step, for each image on the ranks
+/// that trace it:
 ///   view            the camera that the image is traced by
 ///   before_loss     the image as the photograph would show it
 ///   after_loss      dL/d of that becomes dL/d image; the last part first
@@ -18,37 +19,36 @@
 #include <gart/io/dataset.hpp>
 #include <gart/loss/depth_loss.hpp>
 #include <gart/optim/rows.hpp>
-#include <gart/train/options.hpp>
 
 #include <functional>
 #include <vector>
 
 namespace gart { inline namespace GART_ISA {
 
-/// One of a step's images, where it is traced.
+/// One image of a step, on a rank that traces it.
 struct step_view {
-  std::size_t index = 0;                   ///< of the training views
-  int step = 0, iterations = 0;            ///< images before it, and of the run
+  std::size_t index = 0;                   ///< among the training views
+  int step = 0, iterations = 0;            ///< images before it; images of the run
   int shrink = 1;                          ///< pixels of the photograph to one of the image, across and down
-  camera seen = {}, captured = {};         ///< as it is traced, and as the capture has it; of the image's size
+  camera seen = {}, captured = {};         ///< the camera that is traced, and the capture's; both of the image's size
   truth_view truth = {};                   ///< the photograph
   span<float const> color = {};            ///< [H][W][3]
-  depth_pixels depth = {};                 ///< where a part asked for it; gradients of a strategy with_depth alone
+  depth_pixels depth = {};                 ///< where a part needs it; gradients only with a strategy with_depth
   image_gradients by_image = {};           ///< dL/d image
-  std::function<void(float*)> share = {};  ///< fills in what others have traced of an image of one float a pixel
+  std::function<void(float*)> share = {};  ///< fills in the rows of other ranks, in an image of one float a pixel
 };
 
-/// What a part asks of a step.
+/// What a part needs from a step.
 struct part_needs {
   bool image = false;      ///< the whole image on each rank that traces it
-  bool depth = false;      ///< its depth and transmittance too
+  bool depth = false;      ///< depth and transmittance too
   bool gradients = false;  ///< dL/d Gaussians by each view alone
 };
 
-/// What a run has learned of its photographs' colours.
+/// The learned colour corrections of a run's photographs.
 struct learned_colors {
   std::vector<view_exposure> views;    ///< exposures
-  std::vector<lens_falloff> falloffs;  ///< of lenses
+  std::vector<lens_falloff> falloffs;  ///< falloffs of lenses
 };
 
 /// The cameras of the training views.
@@ -58,7 +58,7 @@ inline std::vector<named_camera> training_cameras(dataset const& data) {
   return all;
 }
 
-/// One that learns nothing. Frame: of the trainer.
+/// The base: learns nothing. Frame: the trainer's.
 template <class Frame>
 class learned_part {
  public:
@@ -66,38 +66,38 @@ class learned_part {
   learned_part() = default;
   virtual ~learned_part() = default;
 
-  /// Floats that an image gives.
+  /// Floats that this part gets from an image.
   virtual std::size_t numbers() const { return 0; }
-  /// Of a step that begins after so many images.
+  /// The needs of a step that begins after so many images.
   virtual part_needs needs(std::size_t /*view*/, int /*step*/, int /*iterations*/) const { return {}; }
   /// Whether it changes cameras.
   virtual bool moves_cameras() const { return false; }
-  /// The camera of a training view as it is learned.
+  /// The learned camera of a training view.
   virtual camera view(std::size_t /*index*/, camera const& as_known) const { return as_known; }
-  /// Any camera of the capture.
+  /// The learned camera for any camera of the capture.
   virtual camera through(camera const& as_known) const { return as_known; }
   /// The image as this part shows it, until the next call.
   virtual span<float const> before_loss(step_view const&, span<float const> image, span<float> /*numbers*/) {
     return image;
   }
-  /// Turns the gradient by what before_loss gave to that by what it was given.
+  /// Turns the gradient by before_loss's output into that by its input.
   virtual void after_loss(step_view const&, span<float> /*gradient*/, span<float> /*numbers*/) {}
   /// `frame`: null on a rank that has no rows of the image.
   virtual void after_backward(Frame* /*frame*/, step_view const&, span<float> /*numbers*/) {}
-  /// Of this rank's rows.
+  /// Takes the gradients of this rank's rows.
   virtual void after_gradients(gaussians_view<float const> const& /*model*/,
                                gaussians_view<float const> const& /*gradients*/, camera const& /*seen*/,
                                all_rows<execution_type>& /*rows*/, span<float> /*numbers*/) {}
-  /// The numbers, in host memory.
+  /// Takes the numbers, in host memory.
   virtual void found(step_view const&, span<float> /*numbers*/) {}
-  /// What they add to the loss that is reported.
+  /// What the numbers add to the reported loss.
   virtual float loss(span<float const> /*numbers*/) const { return 0; }
   /// After the optimizer, for each image of the step in order. `step`: images before it.
   virtual void step(std::size_t /*view*/, int /*shrink*/, span<float const> /*numbers*/, int /*step*/,
                     int /*iterations*/, learning_rates const&) {}
-  virtual void save(named_arrays&) const {}    ///< what the next step depends on
+  virtual void save(named_arrays&) const {}    ///< to a state
   virtual void load(named_arrays const&) {}    ///< from a state
-  virtual void tell(learned_colors&) const {}  ///< what it has learned, for files
+  virtual void tell(learned_colors&) const {}  ///< adds its results, for files
 };
 
 }}  // namespace gart::GART_ISA

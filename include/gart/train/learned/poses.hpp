@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// Poses of the training views (pose/pose_training.hpp) as a part of a training. An image gives the gradient by its
-/// pose, and the first one of a view also how the image moves with it (pose/pose_metric.hpp).
+/// pose. A view's first image also gives the metric of its pose (pose/pose_metric.hpp).
 
 #include <gart/pose/differentiate_pose.hpp>
 #include <gart/pose/pose_training.hpp>

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The plan of a step on several ranks, or of a batch of views: rounds, in which each rank traces a unit
-/// (shard/work_units.hpp), with the exchange of rows, and the sums of the gradients. Of a trainer by itself it is
-/// whole_view.hpp, which has the same members.
+/// The plan of a step on several ranks, or of a batch of views. A step has rounds. In each round every rank traces a
+/// unit (shard/work_units.hpp), ranks exchange rows, and gradients are summed. whole_view.hpp, the plan of one rank,
+/// has the same members.
 
 #include <gart/render/render_image.hpp>
 #include <gart/shard/row_exchange.hpp>
@@ -17,7 +17,7 @@ namespace gart { inline namespace GART_ISA {
 
 namespace train_kernels {
 
-// Sums over the views of a batch, and their mean with the last.
+// Adds a view's gradients to the sum over a batch; `share` of the last view makes it the mean.
 struct add_gradients_body {
   gaussians_view<float> sum, view;
   float share;
@@ -33,10 +33,11 @@ struct add_gradients_body {
 template <execution E, class Comm, class Traits, class Tracer, bool Ordered>
 class rank_units {
  public:
-  static constexpr int sh_degree = Traits::sh_degree;  ///< of the coefficients that are stored
-  using exchange = row_exchange<E, Comm, Tracer::tile_size, sh_degree, typename Traits::response>;  ///< of its tiles
+  static constexpr int sh_degree = Traits::sh_degree;  ///< degree of the stored coefficients
+  using exchange = row_exchange<E, Comm, Tracer::tile_size, sh_degree,
+                                typename Traits::response>;  ///< exchange for the tracer's tiles
 
-  /// `block`: Gaussians that stay together.
+  /// `block`: Gaussians in one block of rows (comm/row_owners.hpp).
   rank_units(E& exec, Comm const& comm, index_t block)
       : exec_(&exec),
         comm_(comm),
@@ -48,29 +49,29 @@ class rank_units {
         unit_gradients_(exec, 0, sh_degree),
         moments_(exec) {}
 
-  /// Most views of a round: ranks trace one each, or share one.
+  /// Most views of a round: each rank traces one, or several ranks share one.
   int views() const { return comm_.size(); }
-  /// Who has which Gaussians.
+  /// The rows of this rank, and which rank owns which.
   sharded_rows<E, Comm>& rows() { return rows_; }
-  /// The last step's gradients go.
+  /// Drops the last step's gradients.
   void begin_step() { arrived_.reset(); }
-  /// Begins a round, as row_exchange has it.
+  /// Begins a round (row_exchange::fetch).
   void fetch(gaussians_view<float const> const& scene, std::vector<camera> const& views,
              std::vector<std::size_t> const& names, render_options const& options) {
     round_.fetch(scene, views, names, options);
   }
-  /// What this rank traces.
+  /// The unit that this rank traces.
   work_unit const& unit() const { return round_.unit(); }
-  /// The Gaussians for it; their colours from finish_fetch on.
+  /// The Gaussians of the unit; their colours are there from finish_fetch on.
   gaussians_view<float const> scene() const { return round_.scene(); }
   void finish_fetch() { round_.finish_fetch(); }  ///< all ranks call it
-  /// Strips of [H][W] of `bytes` a pixel become whole images.
+  /// Joins strips of [H][W] of `bytes` a pixel to whole images.
   void share(void* image, camera const& view, std::size_t bytes) { round_.share_image(image, view, bytes); }
 
-  /// Whether each rank differentiates the loss of its own strip, where nobody asks for the whole image.
+  /// Lets each rank differentiate the loss of its own strip, where nothing needs the whole image.
   bool divides_loss(bool may) { return divides_loss_ = may; }
-  /// It: the rows that windows reach come from the others, and the sums of the loss go to them, while gradients are
-  /// gathered.
+  /// Differentiates the loss of this rank's strip. Other ranks send the rows that its windows reach, and get its sums
+  /// of the loss while gradients are gathered.
   void differentiate_loss(step_image<E>& image, truth_view const& truth, camera const& seen, float ssim_weight,
                           bool errors) {
     using loss = image_loss<E>;
@@ -83,7 +84,7 @@ class rank_units {
     round_.begin_sharing({image.loss.sums(0), image.loss.sums(1)}, loss::sums_of({}, seen.height).end,
                          [&](work_unit const& unit) { return loss::sums_of(rows(unit), seen.height); });
   }
-  /// And its value, when all is queued.
+  /// The loss's value, when all work is queued.
   void finish_loss(step_image<E>& image, span<float> value) {
     if (divides_loss_) image.loss.total(value);
   }
@@ -93,13 +94,13 @@ class rank_units {
   void require(Pass const& pass) const {
     if constexpr (Ordered && !Pass::ordered) throw pass.out_of_memory_error();
   }
-  /// The sums over this rank's unit.
+  /// Sums gradients over this rank's unit.
   template <class Frame, class Pass>
   void sum(Frame& frame, Pass& pass, step_image<E> const& image, gaussians<E>&) {
     unit_gradients_.resize_keep(round_.scene().count);
     sum_gradients(frame, pass, image.gradients(), unit_gradients_.view(), image.error);
   }
-  /// To the Gaussians' owners.
+  /// Sends the sums to the Gaussians' owners.
   template <class Frame, class Pass>
   void give_back(Frame& frame, Pass const& pass, float antialias) {
     if (round_.finishes())
@@ -107,11 +108,11 @@ class rank_units {
                        unit_gradients_.view());
     if constexpr (!Ordered || Pass::ordered) round_.give_back(pass, std::as_const(unit_gradients_).view());
   }
-  void give_nothing_back() { round_.give_nothing_back(Ordered); }  ///< of a rank without a unit
+  void give_nothing_back() { round_.give_nothing_back(Ordered); }  ///< for a rank without a unit
 
-  /// From the sums over the pixels of the round's views, of which the first is the image'th of the step, to gradients
-  /// of this rank's rows. own(v, gradients): those by view v alone, with colours where `by_view`; else colours are
-  /// added over all views at once, and where nobody asks for a view's own, all are.
+  /// Turns the round's sums into gradients of this rank's rows. The round's first view is image number `image` of the
+  /// step. own(v, gradients) gets the gradients by view v alone, with colours only if `by_view`. Colours are else added
+  /// over all views at once, as is everything where neither densifier nor caller needs single views.
   template <class Own>
   void take(E& exec, trained_gaussians<E>& g, std::vector<camera> const& views, int image, int batch,
             render_options const& options, densifier<E>& densify, bool by_view, Own const& own) {
@@ -147,14 +148,15 @@ class rank_units {
         for_each_column(exec, "batch/add", n, by_view ? row_width(sh_degree) : geometry_columns + 1,
                         train_kernels::add_gradients_body{gradients.view(), to.view(), share_after(image + 1)});
     }
-    // Last: they arrive last. A device's Adam takes the step's last ones as they come: 8 bytes less to move an element.
+    // Colours come last because they arrive last. On a device Adam takes the step's last ones from the received
+    // buffers, which saves 8 bytes an element.
     if (by_view) return;
     if (E::device && image == batch)
       arrived_ = {count, share_after(image), adds};
     else
       round_.sum_colors(0, count, share_after(image), gradients.sh.view(), adds);
   }
-  /// Adam's step, while the last colours arrive.
+  /// Adam's step; the last colours arrive meanwhile.
   void move(E& exec, adam_pass<E> const& adam, gaussians<E>& gradients) {
     if (!arrived_) return adam.all(exec);
     adam.geometry(exec);
@@ -162,18 +164,18 @@ class rank_units {
     adam.colors(
         [&](auto const& take) { round_.take_colors(0, views, share, gradients.sh.view(), adds, "adam/colors", take); });
   }
-  /// Into gradients.sh, for who asks for it.
+  /// Writes the received colour gradients into gradients.sh, for callers that read it.
   void sum_arrived(gaussians<E>& gradients) {
     if (auto const arrived = std::exchange(arrived_, {}))
       round_.sum_colors(0, arrived->views, arrived->share, gradients.sh.view(), arrived->adds);
   }
-  /// `changed`: there are other Gaussians now, and their gradients are gone.
+  /// `changed`: the set of Gaussians has changed, so their gradients are invalid.
   void end_step(bool changed) {
     if (changed) arrived_.reset();
   }
 
-  /// What the first rank of each of a round's views has found, a row of `width` numbers, to all; `first`: the round's
-  /// first image in the rows.
+  /// Gives all ranks the numbers that the first rank of each view found: a row of `width` a view. `first`: the row of
+  /// the round's first view.
   void collect(std::vector<float>& rows, std::size_t width, int first) {
     auto const at = [&](int view) { return rows.data() + static_cast<std::size_t>(first + view) * width; };
     std::vector<float> all(width * static_cast<std::size_t>(comm_.size()));
@@ -182,15 +184,15 @@ class rank_units {
       std::copy_n(all.data() + static_cast<std::size_t>(rank) * width, width,
                   at(round_.units()[static_cast<std::size_t>(rank)].view));
   }
-  /// Over all ranks.
+  /// The sum over all ranks.
   u64 sum(u64 mine) {
     comm_.all_reduce(span<u64>(&mine, 1));
     return mine;
   }
-  /// A view by all ranks, each with its rows of the image.
+  /// Renders a view by all ranks; each traces its rows of the image.
   template <class Frame>
   rendered render(Frame& frame, trained_gaussians<E>& g, camera const& view, render_options render, int degree) {
-    sum_arrived(g.gradients);  // before what they are made of goes
+    sum_arrived(g.gradients);  // before the received buffers are overwritten
     round_.fetch(std::as_const(g.model).view(), {view}, {}, render);
     render.rows = unit().rows;
     bool const traces = !unit().empty();
@@ -209,11 +211,11 @@ class rank_units {
   u64 take_traffic() { return round_.take_traffic(); }
 
  private:
-  // Gradients of colours that are in no memory but as ranks have sent them (shard/row_exchange.hpp).
+  // Colour gradients that exist only in the received buffers (shard/row_exchange.hpp).
   struct arrived_colors {
-    int views = 0;      // of the step's last round
-    float share = 1;    // as row_exchange::sum_colors has it
-    bool adds = false;  // to those of the rounds before
+    int views = 0;      // views of the step's last round
+    float share = 1;    // factor, see row_exchange::sum_colors
+    bool adds = false;  // to the gradients of earlier rounds
   };
 
   E* exec_;
@@ -222,11 +224,11 @@ class rank_units {
   exchange round_;
   antialiased<E> filter_;             // of this rank's rows
   buffer<ray_gaussian, E> prepared_;  // this rank's rows in a view's frame
-  gaussians<E> view_gradients_,       // of this rank's rows, by one view of a batch
-      unit_gradients_;                // what this rank has summed of its unit: .sh, and of a whole view all
-  buffer<float, E> moments_;          // of this rank's rows, by one view
+  gaussians<E> view_gradients_,       // this rank's rows, by one view of a batch
+      unit_gradients_;                // this rank's sums over its unit: .sh, and for a whole view all parameters
+  buffer<float, E> moments_;          // this rank's rows, by one view
   bool divides_loss_ = false;
-  std::optional<arrived_colors> arrived_;  // of the last step, where Adam took them as they came
+  std::optional<arrived_colors> arrived_;  // the last step's, where Adam read the received buffers
 };
 
 }}  // namespace gart::GART_ISA
