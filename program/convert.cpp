@@ -69,7 +69,7 @@ gart::similarity similarity_named(std::string const& text) {
                     " numbers, not 16 (a matrix), 7 (quaternion, translation) or 8 (and a scale)");
 }
 
-// Those of which keep(i) is true, in their order.
+// The Gaussians with keep(i), in their order.
 gart::gaussian_model kept(gart::gaussian_model const& model, auto const& keep) {
   gart::gaussian_model some;
   some.sh_degree = model.sh_degree;
@@ -129,7 +129,7 @@ int run_convert(convert_arguments const& a) {
   model = gart::with_sh_degree(std::move(model), std::min(a.sh_degree, model.sh_degree));
   if (moved) gart::apply(*moved, model);
 
-  std::vector<std::string> lost = gart::left_out(a.out, model, traits);
+  std::vector<std::string> lost = gart::left_out(a.out, model, traits, packing);
   if (fs::exists(a.in.parent_path() / "exposures.json"))
     lost.push_back("exposures and falloffs of lenses in " + (a.in.parent_path() / "exposures.json").string() +
                    ", which no format holds");
@@ -180,6 +180,8 @@ void add_convert(CLI::App& app, command& selected) {
       ->type_name("X,Y,Z");
   convert->add_flag("--world", a->packing.world,
                     "PLY and GLB: in the coordinates of the capture, in double, and not\nfrom an origin");
+  convert->add_flag("--spz", a->packing.spz,
+                    "GLB: packed as SPZ 2, a tenth of the size; not all programs that\nread GLB know it");
   convert
       ->add_option("--sh-bits", a->sh_bits,
                    "SPZ: bits of a coefficient of degree 1, and of those above, 1 to 8\n(default: 6,6)")

@@ -49,6 +49,25 @@ std::vector<u8> zlib_stream(std::vector<u8> const& bytes, std::string const& fil
   return out;
 }
 
+std::vector<u8> gzipped(std::vector<u8> const& bytes, std::string const& file) {
+  z_stream stream{};
+  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, gzip_window, 8, Z_DEFAULT_STRATEGY) != Z_OK)
+    throw io_error(file, "cannot be deflated", "free some memory");
+  std::vector<u8> out;
+  std::size_t used = 0;
+  for (int code = Z_OK; code != Z_STREAM_END;) {
+    std::size_t const at = out.size(), part = std::min<std::size_t>(bytes.size() - used, std::size_t{1} << 30);
+    out.resize(at + (std::size_t{1} << 20));
+    stream.next_in = const_cast<Bytef*>(bytes.data() + used), stream.avail_in = static_cast<uInt>(part);
+    stream.next_out = out.data() + at, stream.avail_out = uInt{1} << 20;
+    code = deflate(&stream, used + part == bytes.size() ? Z_FINISH : Z_NO_FLUSH);
+    used += part - stream.avail_in;
+    out.resize(out.size() - stream.avail_out);
+  }
+  deflateEnd(&stream);
+  return out;
+}
+
 u32 zip_checksum(u8 const* bytes, std::size_t size) {
   uLong sum = crc32(0, nullptr, 0);
   for (std::size_t at = 0; at < size;) {

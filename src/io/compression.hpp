@@ -12,10 +12,12 @@ namespace gart::io {
 // zlib's word for a gzip file, and for a stream without any header, as in a zip file.
 inline constexpr int gzip_window = 16 + 15, raw_window = -15;
 
-// The first bytes that these hold, `most` of them or what there is.
+// The first unpacked bytes, at most `most`.
 std::vector<u8> inflated(u8 const* bytes, std::size_t size, int window, std::size_t most, std::string const& file);
 // A stream with zlib's header.
 std::vector<u8> zlib_stream(std::vector<u8> const& bytes, std::string const& file);
+// A gzip file.
+std::vector<u8> gzipped(std::vector<u8> const& bytes, std::string const& file);
 u32 zip_checksum(u8 const* bytes, std::size_t size);
 
 // One frame of zstd, and the `size` bytes in one. io_error naming the package, where gart was built without zstd.

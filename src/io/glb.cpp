@@ -1,13 +1,10 @@
-// GLB with KHR_gaussian_splatting: a glTF mesh of points whose attributes are Gaussians', unpacked, or packed as SPZ
-// (KHR_gaussian_splatting_compression_spz_2). Axes: x left, y up, z forward. Read with the transforms of the nodes
-// above, as far as Gaussians can be turned by them; written as floats.
-// https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_gaussian_splatting
+// Reads GLB, with the transforms of the nodes above, as far as Gaussians can be turned by them.
 
+#include "glb.hpp"
 #include "bytes.hpp"
 #include "packing.hpp"
 #include "spz.hpp"
 
-#include <gart/core/version.hpp>
 #include <gart/io/file.hpp>
 #include <gart/io/origin.hpp>
 #include <gart/io/splat_file.hpp>
@@ -17,35 +14,17 @@
 #include <nlohmann/json.hpp>
 
 #include <limits>
-#include <ostream>
 #include <vector>
 
 namespace gart {
 namespace {
 
 using namespace io;
+using namespace io::glb;
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr u32 magic = 0x46546c67, json_chunk = 0x4e4f534a, binary_chunk = 0x004e4942;
-constexpr char const *extension = "KHR_gaussian_splatting", *spz_extension = "KHR_gaussian_splatting_compression_spz_2";
-constexpr int up_axis = 2;  // half a turn about z is from a splat file's axes to glTF's
-constexpr int array_buffer = 34962;
 constexpr int deepest_node = 64;
-
-enum component { i8 = 5120, byte = 5121, i16 = 5122, word = 5123, f32 = 5126 };
-
-std::string attribute(std::string const& name) { return std::string(extension) + ":" + name; }
-
-// The coefficient k of 16 in the extension's words.
-std::string coefficient_name(int k) {
-  int degree = 0;
-  while (k >= (degree + 1) * (degree + 1)) ++degree;
-  return attribute("SH_DEGREE_" + std::to_string(degree) + "_COEF_" + std::to_string(k - degree * degree));
-}
-
-// The half turn of a place.
-vec3d turned(vec3d const& p) { return {-p.x, -p.y, p.z}; }
 
 class glb_reader {
  public:
@@ -151,9 +130,9 @@ class glb_reader {
   void add(json const& primitive, json const& how, similarity const& placed, gaussian_model& all) {
     // Drafts had neither, and meant these.
     bool const draft = how.contains("extensions") && how["extensions"].contains(spz_extension);
-    if (how.value("kernel", draft ? "ellipse" : "") != "ellipse")
+    if (how.value("kernel", draft ? kernel : "") != kernel)
       refuse("has Gaussians of the kernel '" + how.value("kernel", "") + "'", "gart reads 'ellipse'");
-    if (how.value("colorSpace", draft ? "srgb_rec709_display" : "") != "srgb_rec709_display")
+    if (how.value("colorSpace", draft ? color_space : "") != color_space)
       refuse("has colours in the space '" + how.value("colorSpace", "") + "'",
              "gart composites what is displayed, 'srgb_rec709_display': convert it");
     if (how.contains("extensions") && !how["extensions"].empty()) {
@@ -208,7 +187,7 @@ class glb_reader {
     apply_placement(from_origin(placed, part), part);
     seen_ = true;
     if (all.size() == 0) return void(all = std::move(part));
-    // Of several meshes with other degrees, the highest holds all.
+    // Meshes may differ in degree; the highest holds all.
     int const most = std::max(degree, all.sh_degree);
     part = with_sh_degree(std::move(part), most), all = with_sh_degree(std::move(all), most);
     for_each_array(
@@ -216,7 +195,7 @@ class glb_reader {
         part);
   }
 
-  // Where a node puts its Gaussians so far from zero that floats would lose what they have, it is the origin.
+  // A node that puts its Gaussians too far from zero for floats becomes the origin.
   similarity from_origin(similarity placed, gaussian_model const& part) {
     if (!seen_ && placed.translation != vec3d(0.0)) {
       std::vector<vec3d> places;
@@ -240,7 +219,6 @@ class glb_reader {
     json const& accessor = document_->at("accessors").at(number);
     int const type = accessor.at("componentType").get<int>();
     bool const normalized = accessor.value("normalized", false);
-    static constexpr char const* shapes[] = {"SCALAR", "VEC2", "VEC3", "VEC4"};
     if (accessor.at("type") != shapes[width - 1] || accessor.at("count").get<std::size_t>() != n ||
         accessor.contains("sparse") || !accessor.contains("bufferView"))
       refuse("attribute " + name + " is not " + std::to_string(n) + " " + shapes[width - 1] + " of a buffer");
@@ -308,110 +286,16 @@ class glb_reader {
   vec3d origin_{0.0};  // in glTF's axes
 };
 
-// Attributes one after the other: their bytes, and what glTF says of them.
-struct glb_buffer {
-  std::string bytes;
-  json accessors = json::array(), views = json::array(), attributes = json::object();
-
-  // n times `width` numbers of a type, value(i, c).
-  template <class T>
-  json& add(std::string const& name, std::size_t n, std::size_t width, int type, auto const& value) {
-    static constexpr char const* shapes[] = {"SCALAR", "VEC2", "VEC3", "VEC4"};
-    std::size_t const at = bytes.size();
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t c = 0; c < width; ++c) put(bytes, static_cast<T>(value(i, c)));
-    views.push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", bytes.size() - at}, {"target", array_buffer}});
-    attributes[name] = accessors.size();
-    accessors.push_back(
-        {{"bufferView", views.size() - 1}, {"componentType", type}, {"count", n}, {"type", shapes[width - 1]}});
-    return accessors.back();
-  }
-};
-
-// glTF's fallback colours are linear light, a Gaussian's are as displayed.
-double linear_light(double c) { return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4); }
-
-void write_glb(fs::path const& path, gaussian_model const& given, splat_traits const& all_traits,
-               splat_packing const& packing) {
-  require_packable(path, given);
-  if (given.size() == 0) throw io_error(path.string(), "glTF has no mesh without a point", "keep some Gaussians");
-  gaussian_model m = given;
-  half_turn(m, up_axis);
-  std::size_t const n = m.size(), k = static_cast<std::size_t>(sh_coefficients(m.sh_degree));
-  glb_buffer out;
-  json& position =
-      out.add<float>("POSITION", n, 3, f32, [&](std::size_t i, std::size_t c) { return m.mean[3 * i + c]; });
-  for (std::size_t c = 0; c < 3; ++c) {
-    float least = m.mean[c], most = m.mean[c];
-    for (std::size_t i = 0; i < n; ++i)
-      least = std::min(least, m.mean[3 * i + c]), most = std::max(most, m.mean[3 * i + c]);
-    position["min"].push_back(least), position["max"].push_back(most);
-  }
-  out.add<u8>("COLOR_0", n, 4, byte, [&](std::size_t i, std::size_t c) {
-    if (c == 3) return u32{opacity_byte(m.opacity[i])};
-    return unorm(linear_light(std::clamp(static_cast<double>(base_color(m.sh[3 * k * i + c])), 0.0, 1.0)), 8);
-  })["normalized"] = true;
-  std::vector<double> q(4 * n);
-  for (std::size_t i = 0; i < n; ++i) {
-    auto const u = unit(&m.quaternion[4 * i]);
-    std::copy(u.begin(), u.end(), &q[4 * i]);
-  }
-  out.add<float>(attribute("ROTATION"), n, 4, f32,
-                 [&](std::size_t i, std::size_t c) { return q[4 * i + (c + 1) % 4]; });
-  out.add<float>(attribute("SCALE"), n, 3, f32, [&](std::size_t i, std::size_t c) {
-    return std::exp(std::min(static_cast<double>(m.log_scale[3 * i + c]), 80.0));
-  });
-  out.add<float>(attribute("OPACITY"), n, 1, f32,
-                 [&](std::size_t i, std::size_t) { return sigmoid_in_double(static_cast<double>(m.opacity[i])); });
-  for (std::size_t j = 0; j < k; ++j)
-    out.add<float>(coefficient_name(static_cast<int>(j)), n, 3, f32,
-                   [&](std::size_t i, std::size_t c) { return m.sh[3 * (k * i + j) + c]; });
-  json asset = {{"version", "2.0"}, {"generator", std::string("gart ") + version}};
-  splat_traits const traits = packing.world ? with_origin(all_traits, vec3d(0.0)) : all_traits;
-  if (!traits.empty()) asset["extras"]["gart"] = traits;
-  json node = {{"mesh", 0}};
-  if (vec3d const place = turned(origin_of(all_traits, path.string())); packing.world && place != vec3d(0.0))
-    node["translation"] = {place.x, place.y, place.z};
-  json const how = {{"kernel", "ellipse"},
-                    {"colorSpace", "srgb_rec709_display"},
-                    {"projection", "perspective"},
-                    {"sortingMethod", "cameraDistance"}};
-  json const document = {
-      {"asset", asset},
-      {"extensionsUsed", {extension}},
-      {"scene", 0},
-      {"scenes", {{{"nodes", {0}}}}},
-      {"nodes", json::array({node})},
-      {"buffers", {{{"byteLength", out.bytes.size()}}}},
-      {"bufferViews", out.views},
-      {"accessors", out.accessors},
-      {"meshes",
-       {{{"primitives", {{{"attributes", out.attributes}, {"mode", 0}, {"extensions", {{extension, how}}}}}}}}}};
-  std::string text = document.dump();
-  text.resize((text.size() + 3) / 4 * 4, ' ');
-  std::size_t const whole = 28 + text.size() + out.bytes.size();
-  if (whole > 0xffffffffu)
-    throw io_error(path.string(), "would be larger than the 4 GB of a GLB file",
-                   "keep fewer Gaussians or a lower SH degree");
-  std::string head;
-  for (std::size_t const v : {std::size_t{magic}, std::size_t{2}, whole, text.size(), std::size_t{json_chunk}})
-    put(head, static_cast<u32>(v));
-  head += text;
-  put(head, static_cast<u32>(out.bytes.size()));
-  put(head, binary_chunk);
-  write_file(path, [&](std::ostream& file) { file << head << out.bytes; });
-}
-
 }  // namespace
 
 extern splat_format const glb_format;
 splat_format const glb_format = {"GLB",
                                  ".glb",
-                                 {.traits = true, .world = true},
+                                 {.traits = true, .world = true, .spz = true},
                                  [](std::string_view first) { return first.starts_with("glTF"); },
                                  [](fs::path const& path, splat_traits* traits, std::vector<std::string>* notes) {
                                    return glb_reader(path).read(traits, notes);
                                  },
-                                 write_glb};
+                                 glb::write};
 
 }  // namespace gart

@@ -123,6 +123,8 @@ void write_splats(std::filesystem::path const& path, gaussian_model const& model
   if (packing.world && !format.room.world)
     throw io_error(path.string(), std::string(format.name) + " has no room for coordinates in double",
                    "write a .ply or a .glb in the capture's coordinates, or keep the origin");
+  if (packing.spz && !format.room.spz)
+    throw io_error(path.string(), std::string(format.name) + " has no SPZ inside", "write a .glb");
   splat_traits kept;
   for (auto const& trait : traits)
     if (keeps(format.room, trait.first)) kept.insert(trait);
@@ -133,13 +135,13 @@ void write_splats(std::filesystem::path const& path, gaussian_model const& model
 }
 
 std::vector<std::string> left_out(std::filesystem::path const& path, gaussian_model const& model,
-                                  splat_traits const& traits) {
+                                  splat_traits const& traits, splat_packing const& packing) {
   splat_format const& format = written_as(path);
   std::vector<std::string> lines;
   if (model.sh_degree > format.room.sh_degree)
     lines.push_back("spherical harmonics above degree " + std::to_string(format.room.sh_degree) +
                     " (the model has degree " + std::to_string(model.sh_degree) + ")");
-  if (std::size_t const strays = format.room.strays ? 0 : io::bulk_of(model).strays.size())
+  if (std::size_t const strays = format.room.strays && !packing.spz ? 0 : io::bulk_of(model).strays.size())
     lines.push_back("the distance of " + io::counted(strays, "Gaussian") + ", over " +
                     std::to_string(static_cast<int>(io::far_reach)) +
                     " times as far out as 99 of 100: nearer, and as much smaller, they look the same from the middle");

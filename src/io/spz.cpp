@@ -1,5 +1,5 @@
-// SPZ, versions 1 to 4 read, 4 written: streams of fixed-point numbers, the first three versions one after the other in
-// a gzip file, the fourth each in a frame of zstd. Axes: x right, y up, z back.
+// SPZ, versions 1 to 4 read, 4 written, and 2 for GLB. Streams of fixed-point numbers: the first three versions have
+// them one after the other in a gzip file, the fourth each in a frame of zstd. Axes: x right, y up, z back.
 // https://github.com/nianticlabs/spz
 
 #include "spz.hpp"
@@ -85,6 +85,13 @@ void unpack_first_three(u8 const* bytes, float* wxyz) {
     wxyz[k + 1] = static_cast<float>(v), rest -= v * v;
   }
   wxyz[0] = static_cast<float>(std::sqrt(std::max(0.0, rest)));
+}
+
+// x, y and z of a unit quaternion whose w is not negative.
+void pack_first_three(float const* wxyz, u8* bytes) {
+  std::array<double, 4> const q = unit(wxyz);
+  for (std::size_t k = 0; k < 3; ++k)
+    bytes[k] = static_cast<u8>(std::clamp(std::round((q[0] < 0 ? -q[k + 1] : q[k + 1]) * 127.5 + 127.5), 0.0, 255.0));
 }
 
 // The nearest multiple of the step that `bits` bits leave of 8; 0 is one of them.
@@ -256,20 +263,27 @@ int fraction_bits(fs::path const& path, gaussian_model const& m) {
   return bits;
 }
 
-void write_spz(fs::path const& path, gaussian_model const& given, splat_traits const& traits,
-               splat_packing const& packing) {
+struct packed_model {
+  header h;
+  std::array<std::vector<u8>, streams> s;
+};
+
+packed_model packed(u32 version, fs::path const& path, gaussian_model const& given, splat_traits const& traits,
+                    splat_packing const& packing) {
   require_packable(path, given);
   gaussian_model m = in_order(given, along_a_curve(given));
   draw_in_strays(m, far_reach);
-  header h;
+  packed_model out;
+  header& h = out.h;
+  h.version = version;
   h.count = static_cast<u32>(m.size()), h.degree = static_cast<u8>(m.sh_degree);
   h.fraction = static_cast<u8>(fraction_bits(path, m));
   h.flags = traits.count("antialias") ? flag_antialiased : u8{0};
   auto const width = widths(h);
-  std::array<std::vector<u8>, streams> s;
+  auto& s = out.s;
   for (std::size_t i = 0; i < streams; ++i) s[i].resize(width[i] * m.size());
   std::size_t const k = static_cast<std::size_t>(sh_coefficients(m.sh_degree)), rest = 3 * (k - 1);
-  // Half a turn about x, as half_turn has it, on the way.
+  // Applies half a turn about x (half_turn) on the way.
   gaussian_model one;
   one.resize(1, m.sh_degree);
   std::fill(one.mean.begin(), one.mean.end(), 1.0f);
@@ -288,17 +302,36 @@ void write_spz(fs::path const& path, gaussian_model const& given, splat_traits c
       }
       float q[4];
       for (std::size_t c = 0; c < 4; ++c) q[c] = m.quaternion[4 * i + c] * one.quaternion[c];
-      u32 const r = pack_rotation(q);
-      for (std::size_t b = 0; b < 4; ++b) s[rotations][4 * i + b] = static_cast<u8>(r >> 8 * b);
+      if (version < 3) {
+        pack_first_three(q, &s[rotations][3 * i]);
+      } else {
+        u32 const r = pack_rotation(q);
+        for (std::size_t b = 0; b < 4; ++b) s[rotations][4 * i + b] = static_cast<u8>(r >> 8 * b);
+      }
       s[opacities][i] = opacity_byte(m.opacity[i]);
       for (std::size_t j = 0; j < rest; ++j)
         s[harmonics][rest * i + j] =
             pack_coefficient(m.sh[3 * k * i + 3 + j] * one.sh[3 + j], j < 9 ? packing.sh1_bits : packing.sh_bits);
     }
   });
+  return out;
+}
 
+// What begins all versions' headers.
+std::string head_of(header const& h, std::size_t last) {
+  std::string head;
+  put(head, magic);
+  put(head, h.version);
+  put(head, h.count);
+  for (u8 const byte : {h.degree, h.fraction, h.flags, static_cast<u8>(last)}) put(head, byte);
+  return head;
+}
+
+void write_spz(fs::path const& path, gaussian_model const& given, splat_traits const& traits,
+               splat_packing const& packing) {
+  auto [h, s] = packed(4, path, given, traits, packing);
   std::vector<std::vector<u8>> frames;
-  std::string contents, head, extensions;
+  std::string contents, extensions;
   if (vec3d const origin = origin_of(traits, path.string()); origin != vec3d(0.0)) {
     h.flags |= flag_extensions;
     put(extensions, origin_extension);
@@ -311,10 +344,7 @@ void write_spz(fs::path const& path, gaussian_model const& given, splat_traits c
     put(contents, u64{frames.back().size()});
     put(contents, u64{stream.size()});
   }
-  put(head, magic);
-  put(head, h.version);
-  put(head, h.count);
-  for (u8 const byte : {h.degree, h.fraction, h.flags, static_cast<u8>(frames.size())}) put(head, byte);
+  std::string head = head_of(h, frames.size());
   put(head, static_cast<u32>(32 + extensions.size()));
   head.resize(32, '\0');
   head += extensions;
@@ -326,6 +356,15 @@ void write_spz(fs::path const& path, gaussian_model const& given, splat_traits c
 }
 
 }  // namespace
+
+std::vector<u8> io::spz_2(fs::path const& path, gaussian_model const& model, splat_traits const& traits,
+                          splat_packing const& packing) {
+  auto const [h, s] = packed(2, path, model, traits, packing);
+  std::string const head = head_of(h, 0);
+  std::vector<u8> all(head.begin(), head.end());
+  for (auto const& stream : s) all.insert(all.end(), stream.begin(), stream.end());
+  return gzipped(all, path.string());
+}
 
 gaussian_model io::read_spz(std::vector<u8> bytes, std::string const& name, splat_traits* traits,
                             std::vector<std::string>* notes) {

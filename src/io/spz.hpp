@@ -1,5 +1,5 @@
 #pragma once
-// SPZ as other files have it within them.
+// SPZ inside other files.
 
 #include <gart/io/splat_file.hpp>
 
@@ -8,8 +8,12 @@
 
 namespace gart::io {
 
-// All of an SPZ file, `name` in errors; traits and notes where they are not null.
+// Reads a whole SPZ file; `name` in errors. traits and notes may be null.
 gaussian_model read_spz(std::vector<u8> bytes, std::string const& name, splat_traits* traits,
                         std::vector<std::string>* notes);
+
+// A file of version 2, which glTF's extension names; `path` in errors. The width of antialias and the origin are lost.
+std::vector<u8> spz_2(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits,
+                      splat_packing const& packing);
 
 }  // namespace gart::io

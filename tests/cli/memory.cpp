@@ -1,6 +1,7 @@
 // What reading a small file may take: 64 times its bytes, beside what the program takes anyway.
 
 #include "program.hpp"
+#include "support/glb_bytes.hpp"
 
 #include <gart/io/splat_file.hpp>
 
@@ -13,6 +14,7 @@
 #include <cstring>
 
 using namespace cli_test;
+using gart_test::glb_of;
 
 namespace {
 
@@ -62,18 +64,6 @@ std::string spz_of(gart::u32 gaussians) {
   raw += std::string("\3\x0c\0\0", 4);
   raw += std::string(std::size_t{64} * gaussians, '\0');
   return gzipped(raw);
-}
-
-std::string glb_of(std::string json, std::string binary) {
-  json.resize((json.size() + 3) / 4 * 4, ' ');
-  std::string out;
-  for (std::size_t v : {std::size_t{0x46546c67}, std::size_t{2}, 28 + json.size() + binary.size(), json.size(),
-                        std::size_t{0x4e4f534a}})
-    append(out, static_cast<gart::u32>(v));
-  out += json;
-  append(out, static_cast<gart::u32>(binary.size()));
-  append(out, gart::u32{0x004e4942});
-  return out + binary;
 }
 
 // All attributes of degree 3 in the same bytes, eight a Gaussian, in as many meshes.

@@ -5,6 +5,7 @@
 #include <gart/io/splat_file.hpp>
 
 #include "support.hpp"
+#include "support/glb_bytes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -45,18 +46,6 @@ std::map<std::string, std::string> sog_of(scratch_folder const& folder, gart::ga
   if (said.empty()) return unpacked(text_of(folder.path / "whole.sog"));
   CHECK(holds(said, "libwebp-dev"));
   return {};
-}
-
-std::string glb_of(std::string json, std::string binary) {
-  json.resize((json.size() + 3) / 4 * 4, ' '), binary.resize((binary.size() + 3) / 4 * 4, '\0');
-  std::string out;
-  for (std::size_t v : {std::size_t{0x46546c67}, std::size_t{2}, 28 + json.size() + binary.size(), json.size(),
-                        std::size_t{0x4e4f534a}})
-    append(out, static_cast<gart::u32>(v));
-  out += json;
-  append(out, static_cast<gart::u32>(binary.size()));
-  append(out, gart::u32{0x004e4942});
-  return out + binary;
 }
 
 }  // namespace
@@ -254,4 +243,40 @@ TEST_CASE("a GLB with SPZ in it is that SPZ, where its node places it") {
   CHECK(holds(error_of([&] { gart::read_splats(folder.put("short.glb", glb("", spz.size() + 9))); }),
               "reaches past the end"));
   CHECK(holds(error_of([&] { gart::read_splats(folder.put("cut.glb", glb("", spz.size() / 2))); }), "cut.glb: SPZ"));
+}
+
+TEST_CASE("a GLB is written with SPZ 2 in it") {
+  scratch_folder const folder;
+  auto const model = few(60, 2);
+  gart::splat_packing const packing{.spz = true};
+  gart::splat_traits const traits{{"antialias", "0.3"}, {"origin", "1000 0 0"}};
+  gart::write_splats(folder.path / "m.glb", model, traits, packing);
+  std::string const bytes = text_of(folder.path / "m.glb");
+  CHECK(holds(bytes, R"("extensionsRequired":["KHR_gaussian_splatting","KHR_gaussian_splatting_compression_spz_2"])"));
+  gart::u32 text = 0;
+  std::memcpy(&text, &bytes[12], 4);
+  CHECK(bytes.compare(28 + text, 2, "\x1f\x8b") == 0);
+  CHECK(bytes.size() % 4 == 0);
+  CHECK(bytes.size() < 60 * 59 * 4 / 2);
+
+  gart::splat_traits read;
+  auto const back = gart::read_splats(folder.path / "m.glb", &read);
+  CHECK(read == traits);
+  // Version 4 has the same numbers in the same order, but finer rotations.
+  if (!error_of([&] { gart::write_splats(folder.path / "m.spz", model); }).empty()) return;
+  auto const fine = gart::read_splats(folder.path / "m.spz");
+  CHECK(back.mean == fine.mean);
+  CHECK(back.log_scale == fine.log_scale);
+  CHECK(back.opacity == fine.opacity);
+  CHECK(back.sh == fine.sh);
+  for (std::size_t i = 0; i < 60; ++i) {
+    float dot = 0;
+    for (std::size_t k = 0; k < 4; ++k) dot += back.quaternion[4 * i + k] * fine.quaternion[4 * i + k];
+    CHECK(std::abs(dot) > 0.99f);
+  }
+  CHECK(holds(error_of([&] { gart::write_splats(folder.path / "m.ply", model, {}, packing); }), "write a .glb"));
+  auto far = model;
+  far.mean[0] = 1e6f;
+  CHECK(gart::left_out(folder.path / "m.glb", far, {}).empty());
+  REQUIRE(gart::left_out(folder.path / "m.glb", far, {}, packing).size() == 1);
 }

@@ -1,16 +1,15 @@
 #pragma once
 /// \file
-/// Files of Gaussians in any format that gart knows: one table has them. A file is known by its first bytes when it is
-/// read, whatever its name, and by the ending of its name when it is written. docs/formats.md has what each format
-/// holds, and what it costs.
+/// Files of Gaussians in any format that gart knows: one table has them. A reader knows a file by its first bytes, a
+/// writer by the ending of its name. docs/formats.md has what each format holds, and what it costs.
 ///
 /// Every model is in the axes of a splat PLY; formats that keep others (SPZ: y up, z back; GLB: y up, x left) are
 /// turned as they are read and written, with the colours that depend on direction.
 ///
-/// Errors: io_error naming the file and the formats there are, where it is in none of them; naming what the format has
-/// no room for, where the image would be another one without it; naming the package to install, where gart was built
-/// without it; else as the format's own reader and writer (io/ply.hpp). invalid_argument for a model whose arrays
-/// disagree in size, and for a packing out of its range.
+/// Errors: io_error naming the file and the supported formats, where it has none of them; naming a property that
+/// changes the image and that the format cannot hold; naming the package to install, where gart was built without it;
+/// else as the format's reader and writer (io/ply.hpp). invalid_argument for a model whose arrays disagree in size, and
+/// for a packing out of its range.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/core/span.hpp>
@@ -32,6 +31,7 @@ struct splat_packing {
   int sh1_bits = 6;    ///< SPZ: of a coefficient of degree 1, 1 to 8
   int sh_bits = 6;     ///< SPZ: of a coefficient of degree 2 or 3, 1 to 8
   int palette = 0;     ///< SOG: rows of coefficients that all Gaussians share, to 65,536; 0: by their number
+  bool spz = false;    ///< GLB: packed as SPZ 2, which not all readers of GLB know
   bool world = false;  ///< PLY, GLB: in the capture's own coordinates, in double (io/origin.hpp)
 };
 
@@ -44,6 +44,7 @@ struct splat_room {
   bool antialias = false;  ///< a mark for the trait antialias, without its width
   bool origin = false;     ///< the trait origin (io/origin.hpp)
   bool world = false;      ///< coordinates in double, for splat_packing.world
+  bool spz = false;        ///< SPZ inside, for splat_packing.spz
 };
 
 /// A format of files of Gaussians.
@@ -64,15 +65,15 @@ span<splat_format const* const> splat_formats();
 
 /// Reads a file of Gaussians; its traits into `traits`, where that is not null. A Gaussian with a number that is not
 /// finite, or a rotation of zeros, is left out: `notes`, where it is not null, says how many, and what is wrong with
-/// the first. A file of no other is refused. An opacity whose logit is infinite is 1 or 0, a scale whose logarithm is
-/// -inf nothing: the model has finite numbers for these. A quaternion too short or too long to be drawn gets the length
-/// 1. Of SOG `path` may be a folder, or the meta.json in it.
+/// the first. A file of no other is refused. An opacity with an infinite logit becomes 1 or 0, a scale with the
+/// logarithm -inf 0: the model has finite numbers for these. A quaternion too short or too long to be drawn gets the
+/// length 1. Of SOG `path` may be a folder, or the meta.json in it.
 gaussian_model read_splats(std::filesystem::path const& path, splat_traits* traits = nullptr,
                            std::vector<std::string>* notes = nullptr);
-/// Of a whole model the rows of a rank.
+/// A rank's rows of a whole model.
 gaussian_model rows_of(gaussian_model const& all, row_owners const& owners);
-/// Of the Gaussians of a file, `total` of them, those of this rank: of a binary splat PLY no other is read, so that one
-/// that cannot be used is refused there where there are several ranks.
+/// Reads this rank's Gaussians of the file's `total`. Of a binary splat PLY no others are read; several ranks therefore
+/// refuse a bad Gaussian in place of leaving it out.
 gaussian_model read_splat_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
                                splat_traits* traits = nullptr, std::vector<std::string>* notes = nullptr);
 /// Writes a file of Gaussians, to a temporary name, then renamed.
@@ -81,6 +82,6 @@ void write_splats(std::filesystem::path const& path, gaussian_model const& model
 
 /// What the format of this name has no room for and write_splats leaves out of this model, a line each.
 std::vector<std::string> left_out(std::filesystem::path const& path, gaussian_model const& model,
-                                  splat_traits const& traits);
+                                  splat_traits const& traits, splat_packing const& packing = {});
 
 }  // namespace gart
