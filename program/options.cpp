@@ -128,8 +128,7 @@ gart::configuration_request configuration_request_for(gart::model_file const& fi
   return wanted;
 }
 
-nlohmann::json approximations_of(gart::approximation_options const& render,
-                                 gart::configuration_info const& configuration) {
+nlohmann::json approximations_of(gart::render_options const& render, gart::configuration_info const& configuration) {
   return {{"alpha_min", render.alpha_min},
           {"t_min", render.transmittance_min},
           {"max_hits", render.max_hits},

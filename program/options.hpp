@@ -87,7 +87,6 @@ void add_photo_options(CLI::App& command, photo_options& o);
 gart::configuration_request configuration_request_for(gart::model_file const& file, std::filesystem::path const& path,
                                                       gart::configuration_request wanted);
 // What a run left out or computed shorter, as every report tells it.
-nlohmann::json approximations_of(gart::approximation_options const& render,
-                                 gart::configuration_info const& configuration);
+nlohmann::json approximations_of(gart::render_options const& render, gart::configuration_info const& configuration);
 
 }  // namespace gart_cli

@@ -154,6 +154,8 @@ inline void require_options(train_options const& options) {
     if (double const value = f.get(options); !(value >= f.low * (1 - slack) && value <= f.high * (1 + slack)))
       throw invalid_argument("train_options." + std::string(f.name) + " is " + short_number(value) + ": from " +
                              short_number(f.low) + " to " + short_number(f.high));
+  if (options.render.near != render_options().near)
+    throw invalid_argument("train_options.render.near is not used: set train_options.near, in units of the extent");
 }
 
 }  // namespace gart
