@@ -30,7 +30,7 @@ if done.returncode != 0:
 # Without the namespace of the instruction set (core/isa.hpp).
 names = re.findall(r"Compiling entry function '(\S+)'", done.stderr)
 plain = subprocess.run(["c++filt"], input="\n".join(names), capture_output=True, text=True, check=True).stdout
-plain = re.sub(r"isa_\w+::", "", plain).split("\n")
+plain = re.sub(r"v\d+_\d+_\w+::", "", plain).split("\n")
 figures = re.findall(r"(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads\n.*?Used (\d+) registers",
                      done.stderr)
 if not names or len(figures) != len(names):

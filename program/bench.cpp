@@ -63,6 +63,7 @@ int run_bench(bench_arguments const& a) {
   options.iterations = 1;  // the full SH degree from the first step
   options.sh_every = 1;
   options.render = file.render;
+  options.render.near = gart::render_options().near;  // training has its own
   // Rates of zero keep the model as it is; Adam's work is the same.
   options.rates = {0, 0, 0, 0, 0, 0, 0};
 

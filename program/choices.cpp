@@ -16,12 +16,6 @@ namespace {
 
 char const* const by_option = "given";
 
-std::string short_number(float value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%g", static_cast<double>(value));
-  return text;
-}
-
 // Until which step images are smaller than their photographs: the largest photographs'.
 gart::chosen<std::string> sizes_in_words(gart::dataset const& data, gart::train_options const& options) {
   int most = 1;
@@ -85,17 +79,18 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
         : start.value.random                      ? "the capture has no points: random ones"
         : start.value.count == data.points.size() ? "the capture's points"
                                                   : "a random subset of the capture's points");
-    say("--init-opacity", short_number(start.value.opacity), a.options.initial_opacity != 0 ? by_option : start.why);
-    say("--init-scale", short_number(start.value.scale), a.options.initial_scale != 0 ? by_option : start.why);
+    say("--init-opacity", gart::short_number(start.value.opacity),
+        a.options.initial_opacity != 0 ? by_option : start.why);
+    say("--init-scale", gart::short_number(start.value.scale), a.options.initial_scale != 0 ? by_option : start.why);
   }
   gart::train_options const options = train_options_of(a);
   auto const budget = gart::choose_budget(data, options);
   if (options.densify != gart::densify_kind::none) say("budget", with_commas(budget.value), budget.why);
   auto const [sizes, why_sizes] = sizes_in_words(data, options);
   say("images", sizes, why_sizes);
-  if (options.densify == gart::densify_kind::error && !sets_field(a.set, "error.split.offset")) {
+  if (options.densify == gart::densify_kind::error && !a.set.has("error.split.offset")) {
     float const share = gart::split_offset(options.error, options.max_gaussians, traits.pixels);
-    say("--set error.split.offset", short_number(share),
+    say("--set error.split.offset", gart::short_number(share),
         budget.value < options.max_gaussians ? "their pixels end growth, and nearer halves take more memory"
                                              : "near halves fit what they share");
   }
@@ -118,7 +113,7 @@ nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::valid
   if (a.automatic) candidates = gart::default_candidates(gart::inspect(data), options);
   std::erase_if(candidates, [&](gart::candidate const& c) {
     std::string const* const own = option_of(a, c.setting);
-    return own ? *own != "auto" : sets_field(a.set, c.setting);
+    return own ? *own != "auto" : a.set.has(c.setting);
   });
   gart::validation const found = gart::validate(configuration_request_of(a), options, data, candidates, progress);
   nlohmann::json trials = nlohmann::json::array();
@@ -147,13 +142,13 @@ void settle(train_arguments& a, nlohmann::json const& measured, nlohmann::json& 
     std::string* const own = option_of(a, setting);
     double const gain = t["gain"];
     if (t["taken"] && own) *own = value;
-    if (t["taken"] && !own) a.set = with_field(a.set, setting, value);
+    if (t["taken"] && !own) a.set.set(setting, value);
     say((own ? "--" : "--set ") + setting + " " + value, t["taken"] ? "taken" : "left",
         (gain < 0 ? "" : "+") + fixed(gain, 2) + " dB, give or take " + fixed(t["noise"].get<double>(), 2));
   }
   // Settings that were not measured keep the literature's values.
-  for (auto const& [own, usual] : {std::pair{&a.exposure, "off"}, {&a.vignetting, "off"}, {&a.densify, "error"}})
-    if (*own == "auto") *own = usual;
+  for (auto const& [own, given] : {std::pair{&a.exposure, "off"}, {&a.vignetting, "off"}, {&a.densify, "error"}})
+    if (*own == "auto") *own = given;
 }
 
 }  // namespace gart_cli

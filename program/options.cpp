@@ -23,12 +23,13 @@ nlohmann::json recorded_options::continue_from(nlohmann::json const& saved, std:
     nlohmann::json const given = e.get(), &value = saved[e.name];
     bool const named = e.option->count() > 0;
     auto const take = [&e](nlohmann::json const& from) {
+      if (e.take) return e.take(from);
       e.option->clear();
       e.option->add_result(from.is_string() ? from.get<std::string>() : from.dump());
       e.option->run_callback();
     };
     try {
-      if (value.is_structured() || value.is_null()) throw CLI::ConversionError("it is not one value");
+      if (!e.take && (value.is_structured() || value.is_null())) throw CLI::ConversionError("it is not one value");
       take(value);
     } catch (CLI::Error const& wrong) {
       throw gart::io_error(file.string(), "option \"" + e.name + "\" is not valid: " + wrong.what(),
@@ -128,8 +129,7 @@ gart::configuration_request configuration_request_for(gart::model_file const& fi
   return wanted;
 }
 
-nlohmann::json approximations_of(gart::approximation_options const& render,
-                                 gart::configuration_info const& configuration) {
+nlohmann::json approximations_of(gart::render_options const& render, gart::configuration_info const& configuration) {
   return {{"alpha_min", render.alpha_min},
           {"t_min", render.transmittance_min},
           {"max_hits", render.max_hits},

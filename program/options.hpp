@@ -27,6 +27,24 @@ class recorded_options {
     entries_.push_back({flag.substr(2), option, [&value] { return nlohmann::json(value); }});
     return option;
   }
+  // A value with a text on the command line (T::of_text) and its own JSON (json, T::of_json), which throw usage_error.
+  template <class T>
+  requires requires(T const& v) { T::of_json(v.json()); }
+  CLI::Option* add(CLI::App& app, std::string const& flag, T& value, std::string const& type, std::string const& help) {
+    auto const or_refused = [&value](auto const& read) {
+      try {
+        value = read();
+      } catch (gart::error const& e) {
+        throw CLI::ConversionError(e.what());
+      }
+    };
+    CLI::Option* option = app.add_option_function<std::string>(
+        flag, [or_refused](std::string const& text) { or_refused([&] { return T::of_text(text); }); }, help);
+    option->type_name(type);
+    entries_.push_back({flag.substr(2), option, [&value] { return value.json(); },
+                        [or_refused](nlohmann::json const& saved) { or_refused([&] { return T::of_json(saved); }); }});
+    return option;
+  }
   // A flag with its opposite: "--auto,!--no-auto".
   CLI::Option* add_flag(CLI::App& app, std::string const& flags, bool& value, std::string const& help) {
     CLI::Option* option = app.add_flag(flags, value, help);
@@ -46,6 +64,7 @@ class recorded_options {
     std::string name;
     CLI::Option* option;
     std::function<nlohmann::json()> get;
+    std::function<void(nlohmann::json const&)> take = {};  // empty: by the command line's text
   };
   std::vector<entry> entries_;
 };
@@ -87,7 +106,6 @@ void add_photo_options(CLI::App& command, photo_options& o);
 gart::configuration_request configuration_request_for(gart::model_file const& file, std::filesystem::path const& path,
                                                       gart::configuration_request wanted);
 // What a run left out or computed shorter, as every report tells it.
-nlohmann::json approximations_of(gart::approximation_options const& render,
-                                 gart::configuration_info const& configuration);
+nlohmann::json approximations_of(gart::render_options const& render, gart::configuration_info const& configuration);
 
 }  // namespace gart_cli

@@ -54,14 +54,6 @@ void name_runs(std::vector<compared_run>& runs) {
   }
 }
 
-std::string in_words(json const& value) {
-  if (value.is_string()) return value.get<std::string>();
-  if (!value.is_number_float()) return value.dump();
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value.get<double>());
-  return text;
-}
-
 std::string heads(std::vector<compared_run> const& runs, char const* first) {
   std::string html = std::string("<tr><th>") + first + "</th>";
   for (std::size_t i = 0; i < runs.size(); ++i) {

@@ -63,4 +63,17 @@ std::string page_start(std::string const& title) {
 
 std::string page_end() { return "<footer>gart " + std::string(gart::version) + "</footer></main></body></html>\n"; }
 
+std::string in_words(nlohmann::json const& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_object()) {
+    std::string all;
+    for (auto const& [name, one] : value.items()) all += (all.empty() ? "" : ",") + name + "=" + in_words(one);
+    return all;
+  }
+  if (!value.is_number_float()) return value.dump();
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value.get<double>());
+  return text;
+}
+
 }  // namespace gart_cli

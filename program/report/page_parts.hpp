@@ -26,4 +26,7 @@ std::string page_image(std::vector<gart::u8> const& jpeg, std::string const& alt
 std::string page_start(std::string const& title);
 std::string page_end();
 
+// An option's value: a text, a number, or NAME=VALUE,... of an object.
+std::string in_words(nlohmann::json const& value);
+
 }  // namespace gart_cli

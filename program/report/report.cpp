@@ -154,12 +154,7 @@ std::string settings(json const& m, json const& config) {
     html += "<div><span>" + html_escape(name) + "</span><b>" + html_escape(value) + "</b></div>";
   };
   json const options = config.value("options", json::object());
-  for (auto const& [name, value] : options.items()) {
-    bool const fraction = value.is_number_float();
-    char text[32];
-    if (fraction) std::snprintf(text, sizeof text, "%.6g", value.get<double>());
-    row("--" + name, fraction ? text : value.is_string() ? value.get<std::string>() : value.dump());
-  }
+  for (auto const& [name, value] : options.items()) row("--" + name, in_words(value));
   double const max_hits = number_of(m["approximations"], "max_hits");
   std::string cap = max_hits > 0 ? " or after " + fixed(max_hits, 0) + " hits" : "";
   if (text_of(m["approximations"], "adam") == "seen")

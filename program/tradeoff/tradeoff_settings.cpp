@@ -10,7 +10,8 @@ namespace gart_cli {
 
 namespace {
 
-std::string short_number(double value) {
+// Three digits.
+std::string rounded(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);
   return text;
@@ -33,7 +34,7 @@ class table {
       configuration probe = exact_;
       if (member(probe) == v) continue;
       if constexpr (std::is_arithmetic_v<Value>)
-        add(knob, short_number(v), [&](configuration& c) { member(c) = v; });
+        add(knob, rounded(v), [&](configuration& c) { member(c) = v; });
       else if constexpr (gart::named<Value>)
         add(knob, gart::to_string(v), [&](configuration& c) { member(c) = v; });
       else

@@ -247,7 +247,6 @@ void continue_run(train_arguments& a) {
   // Names in the files of earlier runs.
   for (auto const& [old, now] : {std::pair{"t-min", "transmittance-min"}, {"lt-budget", "hit-memory"}})
     if (options.contains(old)) options.emplace(now, options[old]);
-  if (options.contains("set") && options["set"].is_string()) options["set"] = with_new_names(options["set"]);
   a.raised = a.recorded.continue_from(options, a.config_file(), {"iterations", "time-budget"});
   a.origin = origin_in(config, a.config_file());
   if (a.dataset.empty()) {
@@ -283,7 +282,7 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.render.antialias = a.antialias ? gart::default_antialias : 0;
   // The other tracers build no tree, and the images are the same.
   if (a.tracer != gart::to_string(gart::tracer_kind::bvh)) o.render.rebuild_every = 1;
-  set_fields(o, a.set);
+  a.set.apply(o);
   return o;
 }
 

@@ -2,6 +2,7 @@
 // What `gart train` was asked for, and its way into config.json and back.
 
 #include "options.hpp"
+#include "train_fields.hpp"
 #include "view_options.hpp"
 
 #include <gart/runtime/choose.hpp>
@@ -47,7 +48,8 @@ struct train_arguments {
   bool no_masks = false;
   std::string depth_kind = "auto";
   double depth_unit = 0;
-  std::string exposure = "auto", vignetting = "auto", adam = "all", set;
+  std::string exposure = "auto", vignetting = "auto", adam = "all";
+  field_values set;
   bool antialias = false;
   double hit_memory_gb = 0;
   recorded_options recorded;

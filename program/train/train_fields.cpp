@@ -37,7 +37,7 @@ std::string flag_of(gart::option_field const& field) {
 
 namespace {
 
-// Names that runs of before have in their config.json.
+// Names in the config.json of earlier runs.
 constexpr std::pair<std::string_view, std::string_view> renamed[] = {
     // old, new
     {"error.split.share", "error.split.offset"},
@@ -48,46 +48,66 @@ constexpr std::pair<std::string_view, std::string_view> renamed[] = {
     {"rates.settle_late", "rates.decay_start_short"},
     {"rates.settled", "rates.final_scale"}};
 
-}  // namespace
-
-std::string with_new_names(std::string const& settings) {
-  std::string text;
-  std::istringstream list(settings);
-  for (std::string one; std::getline(list, one, ',');) {
-    std::size_t const end = one.find('=');
-    for (auto const& [old, now] : renamed)
-      if (end != one.npos && one.substr(0, end) == old) {
-        one.replace(0, end, now);
-        break;
-      }
-    text += (text.empty() ? "" : ",") + one;
-  }
-  return text;
+std::string new_name(std::string const& name) {
+  for (auto const& [old, now] : renamed)
+    if (old == name) return std::string(now);
+  return name;
 }
 
-void set_fields(gart::train_options& o, std::string const& settings) {
-  std::istringstream list(settings);
+// f(name, value) for each NAME=VALUE of a list; NaN where the value is no number.
+template <class F>
+void each_of(std::string const& text, F const& f) {
+  std::istringstream list(text);
   for (std::string one; std::getline(list, one, ',');) {
     std::size_t const equals = one.find('=');
-    std::string const name = one.substr(0, equals), value = equals == std::string::npos ? "" : one.substr(equals + 1);
-    gart::option_field const* const field = gart::find_option_field(name);
-    if (!field) {
-      std::vector<std::string> names;
-      for (gart::option_field const& f : gart::option_fields) names.emplace_back(f.name);
-      std::string const now = with_new_names(one);
-      throw usage_error("--set " + one + ": no such field" +
-                        (now != one ? "; it is " + now + " now" : did_you_mean(name, names)) +
-                        " (see gart train --help-all)");
-    }
+    std::string const value = equals == std::string::npos ? "" : one.substr(equals + 1);
     char* end = nullptr;
     double const number = std::strtod(value.c_str(), &end);
-    if (value.empty() || *end != '\0' || !std::isfinite(number))
-      throw usage_error("--set " + one + ": a finite number belongs after " + name + "= (see gart train --help-all)");
-    if (number < field->low || number > field->high)
-      throw usage_error("--set " + one + ": a number from " + gart::short_number(field->low) + " to " +
-                        gart::short_number(field->high) + " belongs after " + name + "= (see gart train --help-all)");
-    field->set(o, number);
+    bool const is_number = !value.empty() && *end == '\0';
+    f(one.substr(0, equals), is_number ? number : std::nan(""));
   }
+}
+
+}  // namespace
+
+void field_values::add(std::string const& name, double value) {
+  gart::option_field const* const field = gart::find_option_field(name);
+  if (!field) {
+    std::vector<std::string> names;
+    for (gart::option_field const& f : gart::option_fields) names.emplace_back(f.name);
+    std::string const now = new_name(name);
+    throw usage_error("--set " + name + ": no such field" +
+                      (now != name ? "; it is " + now + " now" : did_you_mean(name, names)));
+  }
+  if (!std::isfinite(value)) throw usage_error("--set " + name + ": a finite number belongs after " + name + "=");
+  if (value < field->low || value > field->high)
+    throw usage_error("--set " + name + "=" + gart::short_number(value) + ": a number from " +
+                      gart::short_number(field->low) + " to " + gart::short_number(field->high) + " belongs after " +
+                      name + "=");
+  values_[name] = value;
+}
+
+field_values field_values::of_text(std::string const& text) {
+  field_values all;
+  each_of(text, [&](std::string const& name, double value) { all.add(name, value); });
+  return all;
+}
+
+field_values field_values::of_json(nlohmann::json const& recorded) {
+  field_values all;
+  if (recorded.is_string())
+    each_of(recorded.get<std::string>(),
+            [&](std::string const& name, double value) { all.add(new_name(name), value); });
+  else if (!recorded.is_object())
+    throw usage_error("--set: an object of numbers belongs there");
+  else
+    for (auto const& [name, value] : recorded.items())
+      all.add(new_name(name), value.is_number() ? value.get<double>() : std::nan(""));
+  return all;
+}
+
+void field_values::apply(gart::train_options& options) const {
+  for (auto const& [name, value] : values_) gart::find_option_field(name)->set(options, value);
 }
 
 std::string fields_in_help() {
@@ -95,22 +115,10 @@ std::string fields_in_help() {
   std::string text = "\nRules, by --set NAME=VALUE,...:\n";
   for (gart::option_field const& f : gart::option_fields) {
     if (!flag_of(f).empty()) continue;
-    std::string const name = "  " + std::string(f.name) + "=" + gart::short_number(static_cast<float>(f.get(defaults)));
+    std::string const name = "  " + std::string(f.name) + "=" + gart::short_number(f.get(defaults));
     text += name + std::string(name.size() < 34 ? 34 - name.size() : 1, ' ') + std::string(f.help) + "\n";
   }
   return text;
-}
-
-std::string with_field(std::string const& settings, std::string const& name, std::string const& value) {
-  std::string others;
-  std::istringstream list(settings);
-  for (std::string one; std::getline(list, one, ',');)
-    if (one.substr(0, one.find('=')) != name) others += "," + one;
-  return name + "=" + value + others;
-}
-
-bool sets_field(std::string const& settings, std::string const& name) {
-  return ("," + settings).find("," + name + "=") != std::string::npos;
 }
 
 }  // namespace gart_cli

@@ -135,7 +135,7 @@ TEST_CASE("what is given is not measured, and --no-auto takes the literature's s
   CHECK(options["exposure"] == "off");
   CHECK(options["vignetting"] == "off");
   CHECK(options["densify"] == "error");
-  CHECK(options["set"] == "");
+  CHECK(options["set"] == nlohmann::json::object());
   CHECK(tried("").contains("exposure"));
   auto const given = tried("--exposure on --set rates.sh_rest=1e-3");
   CHECK(!given.contains("exposure"));

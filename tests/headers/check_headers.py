@@ -28,13 +28,15 @@ CUDA = ["-std=c++20", "--expt-relaxed-constexpr", "-diag-suppress=20012", "-arch
         "-x", "cu"]
 
 
-# Members that are not named have initialisers of their own, or -Wextra warns in every program that does this. Those of
-# render_options, which has a base, are assigned.
+# Members that are not named have initialisers of their own, and no struct has a base, or -Wextra warns in every program
+# that does this.
 OPTIONS = """#include <gart/gart.hpp>
-gart::dataset_options const loading{.downscale = 4};
-gart::train_options const training{.iterations = 2000};
-gart::approximation_options const approximations{.alpha_min = 0.01f};
-gart::configuration_request const request{.backend = gart::backend_kind::openmp};
+inline gart::dataset_options const loading{.downscale = 4};
+inline gart::train_options const training{.iterations = 2000};
+inline gart::render_options const rendering{.alpha_min = 0.01f, .near = 0.1f, .background = gart::vec3(1)};
+inline gart::track_options const tracking{.render = {.near = 0.1f}};
+inline gart::splat_packing const packing{.palette = 4096};
+inline gart::configuration_request const request{.backend = gart::backend_kind::openmp};
 """
 
 
@@ -157,7 +159,7 @@ with tempfile.TemporaryDirectory() as folder:
     there = {name: command for name, command in others.items() if works(command, folder)}
     with concurrent.futures.ThreadPoolExecutor(max(1, a.jobs)) as pool:
         jobs = []
-        everything = "".join(f"#include <{name}>\n" for name in plain) + TEMPLATES
+        everything = "".join(f"#include <{name}>\n" for name in plain) + OPTIONS + TEMPLATES
         for number, (name, command) in enumerate(there.items()):
             jobs.append(pool.submit(program_failure, f"{number} all headers by {name}", everything, command, include, folder))
         if a.nvcc:

@@ -15,7 +15,7 @@ constexpr float small = -8.5f;  // exp of it is 0.0002, of a filter 0.04 wide at
 // One step that densifies, from a cloud; nothing grows.
 template <class E>
 gart::gaussian_model densified(E& exec, gart::densify_kind densify, gart::gaussian_model const& start,
-                               gart::approximation_options const& render) {
+                               gart::render_options const& render) {
   auto const data = capture(exec, gart_test::seed());
   gart::train_options options;
   options.iterations = 60;
@@ -35,7 +35,7 @@ template <class E>
 gart::gaussian_model densified(E& exec, gart::densify_kind densify, float alpha_min) {
   gart::gaussian_model start = cloud(gart_test::seed() + 1, 0.7f);
   for (std::size_t i = 0; i < start.size(); ++i) start.opacity[i] = i % 3 == 0 ? std::log(faint / (1 - faint)) : 1.0f;
-  gart::approximation_options render;
+  gart::render_options render;
   render.alpha_min = alpha_min;
   return densified(exec, densify, start, render);
 }
@@ -47,7 +47,7 @@ gart::gaussian_model filtered(E& exec, gart::densify_kind densify, float antiali
   for (std::size_t i = 0; i < start.size(); ++i) start.opacity[i] = 1.0f;
   for (std::size_t i = 0; i < start.log_scale.size(); i += 9)
     for (std::size_t k = 0; k < 3; ++k) start.log_scale[i + k] = small;
-  gart::approximation_options render;
+  gart::render_options render;
   render.antialias = antialias;
   return densified(exec, densify, start, render);
 }

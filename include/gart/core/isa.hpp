@@ -2,16 +2,21 @@
 /// \file
 /// GART_ISA: the inline namespace of everything whose layout, bits or code follow from the instruction set that a host
 /// translation unit is compiled for. The number of lanes (math/lanes.hpp) and whether a*b + c is one rounding
-/// (math/arith.hpp) follow from -march; nvcc's host compiler has no lanes. Objects of one program may differ in these,
-/// and an inline function, a template or a type of one name is shared among them: all would run it, or lay it out, as
-/// one of them has it. With the instruction set in the name there are as many as are needed.
+/// (math/arith.hpp) follow from -march; nvcc's host compiler has no lanes. Objects of one program may differ in these.
+/// They would share inline functions, templates and types of one name, and all would use one object's. With the
+/// instruction set in the name each has its own.
 ///
 ///   namespace gart { inline namespace GART_ISA {   // formulas, kernels, host policies, tracers, trainers
 ///   namespace gart {                    // what the compiled libraries define and take, and link by
 ///
 /// In the second lie sessions, renderers, data sets, cameras, models, options, errors, files and cuda_exec
-/// (cmake/interface.txt has the headers): their layout is the same everywhere, and an inline function there that needs
+/// (cmake/interface.txt has the headers). Their layout is the same everywhere, and an inline function there that needs
 /// fma or lanes is forced inline. tests/package links objects and libraries of different instruction sets.
+///
+/// The name also has gart's version, so objects of two versions do not share what lies there. The compiled libraries of
+/// two versions are in one process as shared objects: their symbols carry the version (backends/CMakeLists.txt).
+
+#include <gart/core/version.hpp>
 
 #if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512VL__) && defined(__FMA__) && defined(__BMI2__)
 #define GART_LANES_AVX512 1
@@ -22,21 +27,28 @@
 #endif
 
 #if defined(__CUDACC__) && defined(GART_FUSED)
-#define GART_ISA isa_nvcc_fma
+#define GART_INSTRUCTION_SET nvcc_fma
 #elif defined(__CUDACC__)
-#define GART_ISA isa_nvcc
+#define GART_INSTRUCTION_SET nvcc
 #elif defined(GART_LANES_AVX512)
-#define GART_ISA isa_avx512
+#define GART_INSTRUCTION_SET avx512
 #elif defined(__AVX2__) && defined(GART_FUSED)
-#define GART_ISA isa_avx2_fma
+#define GART_INSTRUCTION_SET avx2_fma
 #elif defined(__AVX2__)
-#define GART_ISA isa_avx2
+#define GART_INSTRUCTION_SET avx2
 #elif defined(GART_FUSED)
-#define GART_ISA isa_fma
+#define GART_INSTRUCTION_SET fma
 #else
-/// The inline namespace of the instruction set that this file is compiled for.
-#define GART_ISA isa_base
+/// The instruction set that this file is compiled for.
+#define GART_INSTRUCTION_SET base
 #endif
+
+///@{
+/// The inline namespace's name, as v0_1_avx2_fma.
+#define GART_ISA_PASTED(major, minor, set) v##major##_##minor##_##set
+#define GART_ISA_OF(major, minor, set) GART_ISA_PASTED(major, minor, set)
+#define GART_ISA GART_ISA_OF(GART_VERSION_MAJOR, GART_VERSION_MINOR, GART_INSTRUCTION_SET)
+///@}
 
 /// As they stand; undefined below.
 #define GART_TEXT_OF(...) #__VA_ARGS__
@@ -45,7 +57,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-inline constexpr char const* instruction_set = &GART_TEXT(GART_ISA)[sizeof "isa"];  ///< "avx2_fma"
+inline constexpr char const* instruction_set = GART_TEXT(GART_INSTRUCTION_SET);  ///< "avx2_fma"
 
 }}  // namespace gart::GART_ISA
 

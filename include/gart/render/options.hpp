@@ -13,8 +13,8 @@
 
 namespace gart {
 
-/// What trades exactness for time, in training and in rendering alike.
-struct approximation_options {
+/// How one view is rendered. A flat struct, so that designated initialisers name any member.
+struct render_options {
   float alpha_min = 1.0f / 255.0f;  ///< a Gaussian is hit where sigma * rho >= alpha_min
   float transmittance_min = 1e-4f;  ///< a ray ends after the hit that brings T below this
   u32 max_hits = 0;                 ///< a ray ends after so many hits composited; 0: no cap
@@ -22,10 +22,6 @@ struct approximation_options {
   /// The BVH tracer builds its tree every so many views, else refits it: exact. Another tracer has no tree: sessions
   /// and renderers refuse what is not 1 there.
   int rebuild_every = 1;
-};
-
-/// How one view is rendered.
-struct render_options : approximation_options {
   float near = 0.01f;     ///< hits lie at t > near, world units along the ray
   vec3 background{0.0f};  ///< linear RGB behind the last hit
   /// What is traced of the image; whole rows of tiles. Pixels of other rows are left as they are, or written without

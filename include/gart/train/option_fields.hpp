@@ -7,7 +7,10 @@
 #include <gart/core/error.hpp>
 #include <gart/train/options.hpp>
 
+#include <charconv>
+#include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -142,11 +145,17 @@ constexpr option_field const* find_option_field(std::string_view name) {
   return nullptr;
 }
 
-/// A number as messages show it.
+/// A number as messages show it: the fewest digits that give the float, or else the double, again.
 inline std::string short_number(double value) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.9g", value);
-  return text;
+  if (value == std::floor(value) && std::abs(value) < 1e9) {
+    std::snprintf(text, sizeof text, "%.0f", value);
+    return text;
+  }
+  auto const single = static_cast<float>(value);
+  auto const end = static_cast<double>(single) == value ? std::to_chars(text, std::end(text), single)
+                                                        : std::to_chars(text, std::end(text), value);
+  return {text, end.ptr};
 }
 
 /// Checks all fields.
@@ -156,6 +165,8 @@ inline void require_options(train_options const& options) {
     if (double const value = f.get(options); !(value >= f.low * (1 - slack) && value <= f.high * (1 + slack)))
       throw invalid_argument("train_options." + std::string(f.name) + " is " + short_number(value) + ": from " +
                              short_number(f.low) + " to " + short_number(f.high));
+  if (options.render.near != render_options().near)
+    throw invalid_argument("train_options.render.near is not used: set train_options.near, in units of the extent");
 }
 
 }  // namespace gart

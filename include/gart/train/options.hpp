@@ -79,7 +79,7 @@ struct train_options {
   u64 seed = 1;                                     ///< of all numbers drawn at random
   float near = 0.002f;                              ///< hits lie at t > near, times the scene's extent
   resolution_options resolution = {};               ///< of a step's images
-  approximation_options render = {};                ///< accuracy traded for time
+  render_options render = {};                       ///< of a step's views; near, background and rows are the run's own
   learning_rates rates = {};                        ///< of Adam, by group of parameters
   adam_options adam = {};                           ///< of Adam
   pose_options poses = {};                          ///< of learned poses
@@ -91,7 +91,9 @@ struct train_options {
 
 /// The render options for a scene of that extent.
 inline render_options render_options_of(train_options const& options, float extent, vec3 background = vec3(0.0f)) {
-  return {options.render, options.near * extent, background};
+  render_options render = options.render;
+  render.near = options.near * extent, render.background = background, render.rows = {};
+  return render;
 }
 
 }  // namespace gart

@@ -228,9 +228,7 @@ class adaptive_density final : public densifier<E> {
   density_change densify(trained_gaussians<E>& g, density_step<E> const& now) {
     stage_scope stage(*exec_, "densify");
     density_change change;
-    all_rows<E>& rows = now.rows;
-    index_t const here = g.size(), n = rows.total(here);
-    row_owners const owners = rows.owners();
+    auto const [rows, here, n, owners] = rows_of(g, now);
     if (n == 0) return change;
     if (touched.size() != here) clear_statistic(here);
 

@@ -41,6 +41,20 @@ struct density_step {
   span<float const> filter = {};         ///< the filter for opacity_shown, in steps that densify
 };
 
+/// The Gaussians that a densification starts from.
+template <execution E>
+struct density_rows {
+  all_rows<E>& rows;  ///< the rows on all ranks
+  index_t here, all;  ///< Gaussians here, and on all ranks
+  row_owners owners;  ///< which rank has which
+};
+/// Those of a step.
+template <execution E>
+density_rows<E> rows_of(trained_gaussians<E> const& g, density_step<E> const& now) {
+  index_t const here = g.size();
+  return {now.rows, here, now.rows.total(here), now.rows.owners()};
+}
+
 /// The base: changes nothing.
 template <execution E>
 class densifier {

@@ -191,9 +191,7 @@ class error_growth final : public densifier<E> {
   density_change densify(trained_gaussians<E>& g, density_step<E> const& now) {
     stage_scope stage(*exec_, "densify");
     density_change change;
-    all_rows<E>& rows = now.rows;
-    index_t const here = g.size(), n = rows.total(here);
-    row_owners const owners = rows.owners();
+    auto const [rows, here, n, owners] = rows_of(g, now);
     if (n == 0) return change;
     float const* const errors = error_sums(here).data();
     dead_.resize(here), drawable_.resize(here), key_.resize(here), id_.resize(here), place_.resize(n);
