@@ -1,6 +1,7 @@
 // Rays: a view's, by tile lists, by the tree and as a batch; a lidar of 64 x 1024 at the view's place; rays without any
 // order from places near it. What they see, their hits, and their gradients in each form. `alone` is the walk that
-// takes rays one by one. Beside the times: whether the batch shows the same bits as what it is compared with.
+// takes rays one by one, `width` beams of other widths than the library's. Beside the times: whether the batch shows
+// the same bits as what it is compared with.
 #include "support/frame.hpp"
 
 #include <gart/rays/lidar.hpp>
@@ -87,27 +88,43 @@ void trace(benchmark::State& state, E& exec) {
   state.counters["rays"] = b.rays.count();
 }
 
-template <gart::ray_list (*Rays)(), gart::execution E>
-void alone(benchmark::State& state, E& exec) {
+// The same rays by the walks themselves: all of them one by one (widest: 0), or in beams of a width.
+template <gart::ray_list (*Rays)(), int WidestInHundredths, gart::execution E>
+void walks(benchmark::State& state, E& exec) {
+  using response = gart::generalized_gaussian<>;
+  using program_type = gart::batch_composite<>;
   batch<E> b(exec, Rays());
   b.trace();
   gart::gaussians_view<float const> const scene = std::as_const(b.scene).view();
+  gart::index_t const rays = b.rays.count(), beams = (rays + gart::beam_lanes - 1) / gart::beam_lanes;
   gart::buffer<gart::ray_gaussian, E> records(exec, scene.count);
-  gart::parallel_for(exec, "records", scene.count,
-                     gart::render_kernels::prepare_gaussians<gart::generalized_gaussian<>>{
-                         scene, b.rays.frame, b.options.alpha_min, records.view()});
+  gart::parallel_for(
+      exec, "records", scene.count,
+      gart::render_kernels::prepare_gaussians<response>{scene, b.rays.frame, b.options.alpha_min, records.view()});
   gart::buffer<float, E> color(exec, b.color.size());
-  gart::batch_composite<> const program{
-      {}, gart::batch_rays(b.rays), {scene.sh, scene.sh_degree, gart_bench::sh_degree}, b.options, {color.data()}, {}};
-  gart::trace_kernels::walk_alone<gart::generalized_gaussian<>, 16, gart::world_view, gart::batch_composite<>> const
-      walk{b.tracer.index().seen_from(b.rays.frame),
-           {records.data(), scene.count, b.options.near},
-           program,
-           nullptr,
-           nullptr};
-  gart_bench::measure(state, exec, [&] { gart::parallel_for(exec, "alone", b.rays.count(), walk); });
-  state.counters["rays"] = b.rays.count();
+  gart::buffer<gart::u32, E> apart(exec, beams);
+  program_type const program{{},        gart::batch_rays(b.rays), {scene.sh, scene.sh_degree, gart_bench::sh_degree},
+                             b.options, {color.data()},           {}};
+  gart::traced_scene const traced{records.data(), scene.count, b.options.near};
+  gart::world_view const index = b.tracer.index().seen_from(b.rays.frame);
+  gart::ray_order<E> order(exec);
+  order.make(exec, b.rays, index.tree, index.shift);
+  constexpr bool beamed = WidestInHundredths > 0;
+  gart::u32 const* const neighbours = beamed ? order.of(rays) : nullptr;
+  gart::trace_kernels::walk_beams<response, gart::world_view, program_type> const together{
+      index, traced, program, rays, neighbours, apart.data(), 0.01f * WidestInHundredths};
+  gart::trace_kernels::walk_alone<response, 16, gart::world_view, program_type> const alone{
+      index, traced, program, neighbours, beamed ? apart.data() : nullptr};
+  gart_bench::measure(state, exec, [&] {
+    if (beamed) gart::parallel_for(exec, "beams", gart::tile_range{beams, gart::beam_lanes}, together);
+    gart::parallel_for(exec, "alone", rays, alone);
+  });
+  state.counters["rays"] = rays;
   state.counters["same"] = color.to_host() == b.color.to_host();
+  if (!beamed) return;
+  double left = 0;
+  for (gart::u32 const one : apart.to_host()) left += one;
+  state.counters["apart"] = left / beams;
 }
 
 template <class By, gart::execution E>
@@ -152,16 +169,19 @@ void both(benchmark::State& state, E& exec) {
 GART_BENCH("rays/view/tiles", image<gart_bench::by_tiles<8>>)
 GART_BENCH("rays/view/tree", image<gart_bench::by_bvh>)
 GART_BENCH("rays/view/trace", trace<view>)
-GART_BENCH("rays/view/alone", alone<view>)
+GART_BENCH("rays/view/alone", walks<view, 0>)
 GART_BENCH("rays/lidar/trace", trace<lidar>)
-GART_BENCH("rays/lidar/alone", alone<lidar>)
+GART_BENCH("rays/lidar/alone", walks<lidar, 0>)
 GART_BENCH("rays/lidar/list", list<lidar>)
 GART_BENCH("rays/lidar/backward/primitive", backward<lidar, gradient_form::primitive>)
 GART_BENCH("rays/lidar/backward/scatter", backward<lidar, gradient_form::scatter>)
 GART_BENCH("rays/lidar/both/primitive", both<lidar, gradient_form::primitive>)
 GART_BENCH("rays/lidar/both/scatter", both<lidar, gradient_form::scatter>)
 GART_BENCH("rays/incoherent/trace", trace<incoherent>)
-GART_BENCH("rays/incoherent/alone", alone<incoherent>)
+GART_BENCH("rays/incoherent/alone", walks<incoherent, 0>)
+GART_BENCH("rays/incoherent/width/10", walks<incoherent, 10>)
+GART_BENCH("rays/incoherent/width/50", walks<incoherent, 50>)
+GART_BENCH("rays/incoherent/width/200", walks<incoherent, 200>)
 GART_BENCH("rays/incoherent/list", list<incoherent>)
 GART_BENCH("rays/incoherent/backward/primitive", backward<incoherent, gradient_form::primitive>)
 GART_BENCH("rays/incoherent/backward/scatter", backward<incoherent, gradient_form::scatter>)

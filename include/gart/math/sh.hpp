@@ -54,6 +54,21 @@ struct sh_basis {
   }
   /// The first bands alone.
   GART_HD GART_INLINE vec3_of<F> unclamped(float const* coefficients, int bands) const {
+#if !defined(__CUDACC__) && defined(__AVX2__) && defined(GART_FUSED)
+    // A channel is a lane, of four that are read. The last band's fourth would lie past the row.
+    if constexpr (std::is_same_v<F, float>) {
+      int const all = bands < size ? bands : size;
+      __m128 sum = _mm_set1_ps(0.5f);
+#pragma GCC unroll 16
+      for (int k = 0; k < size; ++k) {
+        if (k + 1 >= all) break;
+        sum = _mm_fmadd_ps(_mm_set1_ps(y[k]), _mm_loadu_ps(coefficients + 3 * k), sum);
+      }
+      float const* const last = coefficients + 3 * (all - 1);
+      sum = _mm_fmadd_ps(_mm_set1_ps(y[all - 1]), _mm_setr_ps(last[0], last[1], last[2], 0), sum);
+      return {sum[0], sum[1], sum[2]};
+    }
+#endif
     F r = 0.5f, g = 0.5f, b = 0.5f;
     GART_UNROLL
     for (int k = 0; k < size; ++k) {

@@ -23,8 +23,10 @@ struct color_rows {
   /// The colour of a Gaussian along a direction, before the clamp.
   GART_HD GART_INLINE vec3 unclamped(sh_basis<most> const& basis, u32 id) const {
     float const* const row = sh + static_cast<std::size_t>(3 * sh_coefficients(stored_degree)) * id;
+#if defined(__CUDACC__)
     // Whole rows lie on 16 bytes and are read so.
     if (stored_degree == most) return basis.unclamped(sh_row<most>(row, active_degree).v);
+#endif
     return basis.unclamped(row, sh_coefficients(active_degree));
   }
 };

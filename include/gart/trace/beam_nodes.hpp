@@ -38,19 +38,14 @@ class beam_node_queue {
   /// Puts nodes at the places from `places` on.
   GART_HD GART_INLINE void add(int count) { places += count, nodes += count; }
 
-  /// The distance of the nearest node, beyond all where there is none.
-  GART_HD GART_INLINE u32 least_key(beam_nodes const& s) const {
-    return least_word([&](int l) {
-      int at;
-      return least_of(s, l, at);
-    });
-  }
+  /// Bits of the distance of the nearest node; beyond all where there is none.
+  GART_HD GART_INLINE u32 least_key(beam_nodes const& s) const { return least_of_all(s); }
 
   /// Takes nodes no farther than `reach`, as many as there is room for the children of; how many. Where it is
   /// out_of_reach one was dropped; where there is no_room, none.
   template <class Team>
   GART_HD GART_INLINE int take(Team const& team, beam_nodes& s, float reach) {
-    if (places + beam_lanes > beam_nodes::room) close_gaps(team, s);
+    if (places + beam_lanes > beam_nodes::room || places > 2 * nodes + 2 * beam_lanes) close_gaps(team, s);
     if (nodes == 0) return 0;
     if (places + beam_lanes <= beam_nodes::room) return take_nearest(team, s, reach);
     if (places + bvh_width > beam_nodes::room) return no_room;
@@ -59,33 +54,55 @@ class beam_node_queue {
   static constexpr int out_of_reach = -1, no_room = -2;  ///< what take() may say
 
  private:
+#if defined(__CUDA_ARCH__)
   // Of a lane: the nearest of each 32nd node.
-  GART_HD GART_INLINE u32 least_of(beam_nodes const& s, int lane, int& at) const {
+  __device__ GART_INLINE u32 least_of_lane(beam_nodes const& s, int& at) const {
     u32 least = beam_nodes::gone;
     at = 0;
-    for (int k = lane; k < places; k += beam_lanes)
+    for (int k = static_cast<int>(threadIdx.x); k < places; k += beam_lanes)
       if (s.key[k] < least) least = s.key[k], at = k;
     return least;
   }
+  __device__ GART_INLINE u32 least_of_all(beam_nodes const& s) const {
+    int at;
+    return __reduce_min_sync(0xffffffffu, least_of_lane(s, at));
+  }
+  // Of each lane its nearest at most: the four are the nearest of all, or almost.
+  __device__ GART_INLINE int pop_nearest(beam_nodes& s, u32 reach) const {
+    int at, count = 0;
+    u32 key = least_of_lane(s, at);
+    GART_UNROLL
+    for (; count < beam_nodes::at_once; ++count) {
+      u32 const least = __reduce_min_sync(0xffffffffu, key);
+      if (least > reach) break;
+      int const whose = lowest_bit(__ballot_sync(0xffffffffu, key == least));
+      if (static_cast<int>(threadIdx.x) == whose)
+        s.taken[count] = s.node[at], s.key[at] = key = beam_nodes::gone;
+    }
+    return count;
+  }
+#else
+  u32 least_of_all(beam_nodes const& s) const {
+    u32 least = beam_nodes::gone;
+    for (int k = 0; k < places; ++k) least = s.key[k] < least ? s.key[k] : least;
+    return least;
+  }
+  int pop_nearest(beam_nodes& s, u32 reach) const {
+    int count = 0;
+    for (; count < beam_nodes::at_once; ++count) {
+      u32 const least = least_of_all(s);
+      if (least > reach) break;
+      int at = 0;
+      while (s.key[at] != least) ++at;
+      s.taken[count] = s.node[at], s.key[at] = beam_nodes::gone;
+    }
+    return count;
+  }
+#endif
 
   template <class Team>
   GART_HD GART_INLINE int take_nearest(Team const& team, beam_nodes& s, float reach) {
-    per_lane<u32> key;
-    per_lane<int> at;
-    each_lane([&](int l) { key[l] = least_of(s, l, at[l]); });
-    int count = 0;
-    GART_UNROLL
-    for (int k = 0; k < beam_nodes::at_once; ++k) {
-      u32 const least = least_word([&](int l) { return key[l]; });
-      if (least == beam_nodes::gone || bits_to_float(least) > reach) break;
-      int const whose = lowest_bit(lanes_where([&](int l) { return key[l] == least; }));
-      each_lane([&](int l) {
-        if (l != whose) return;
-        s.taken[k] = s.node[at[l]];
-        s.key[at[l]] = beam_nodes::gone, key[l] = beam_nodes::gone;
-      });
-      ++count;
-    }
+    int const count = pop_nearest(s, reach < 0 ? 0 : float_to_bits(reach));
     // The nearest is out of reach, and so are the others.
     nodes = count == 0 ? 0 : nodes - count;
     team.barrier();

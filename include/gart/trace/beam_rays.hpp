@@ -20,7 +20,8 @@ inline constexpr float widest_beam = 0.25f;
 
 /// Of the rays of all lanes that have one; `placed` gives a lane's in the frame of the tree. One at least has.
 template <class Has, class Placed>
-GART_HD GART_INLINE made_beam beam_of(bvh_view const& tree, Has const& has, Placed const& placed) {
+GART_HD GART_INLINE made_beam beam_of(bvh_view const& tree, Has const& has, Placed const& placed,
+                                      float widest = widest_beam) {
   per_lane<placed_ray> rays;
   each_lane([&](int l) {
     if (has(l)) rays[l] = placed(l);
@@ -61,7 +62,7 @@ GART_HD GART_INLINE made_beam beam_of(bvh_view const& tree, Has const& has, Plac
     wide += hi - lo;
     b.by_least_slope[k - 1] = slab_inverse(lo), b.by_greatest_slope[k - 1] = slab_inverse(hi);
   }
-  out.narrow = wide <= widest_beam && apart <= widest_beam / 16 * size;
+  out.narrow = wide <= widest && apart <= widest / 16 * size;
   return out;
 }
 

@@ -67,6 +67,7 @@ class walk_beams {
   index_t rays;      // of the launch
   u32 const* order;  // [rays], a permutation of them: beams are made of neighbours in it; null: as they are
   u32* apart;        // [beams]: whether its rays are left to walk_alone
+  float widest = widest_beam;
 
  private:
   static constexpr int waiting = 24;    // hits of a ray
@@ -108,7 +109,7 @@ class walk_beams {
     if (!lanes_where([&](int l) { return own[l].active; })) return leave_apart(team.tile(), false);
     if (index.tree.count > 0) {
       made_beam const made = beam_of(
-          index.tree, [&](int l) { return own[l].active; }, [&](int l) { return index.place(own[l].own); });
+          index.tree, [&](int l) { return own[l].active; }, [&](int l) { return index.place(own[l].own); }, widest);
       if (!made.narrow) return leave_apart(team.tile(), true);
       each_lane([&](int l) {
         if (l == 0) s.bounds = made.bounds;
