@@ -7,6 +7,7 @@
 
 #include <sys/ioctl.h>
 #include <unistd.h>
+#include <algorithm>
 
 namespace gart_cli {
 

@@ -14,9 +14,12 @@
 #include <gart/io/image_file.hpp>
 #include <gart/view/camera_path.hpp>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <limits>
 #include <memory>
 
 namespace gart_cli {

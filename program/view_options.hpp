@@ -1,6 +1,7 @@
 #pragma once
 // What `gart view` and `gart train --view` share: where the viewer listens, the capture's cameras and photographs.
 
+#include "help.hpp"
 #include "open_browser.hpp"
 
 #include <gart/io/dataset.hpp>

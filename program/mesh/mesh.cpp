@@ -11,6 +11,7 @@
 #include <gart/runtime/model_file.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 

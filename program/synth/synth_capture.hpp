@@ -10,6 +10,8 @@
 // pinhole the transforms name its model and parameters in place of camera_angle_x. The transforms are written last,
 // each file whole: a capture that was interrupted is not taken for one.
 
+#include "synth_scene.hpp"
+
 #include <gart/scene/camera.hpp>
 
 #include <filesystem>

@@ -7,6 +7,7 @@
 
 #include "synth_scene.hpp"
 
+#include <gart/camera/models.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/scene/image.hpp>
 

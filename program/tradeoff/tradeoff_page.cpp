@@ -8,6 +8,7 @@
 #include <gart/core/version.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iterator>
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <gart/backward/strategies.hpp>
+#include <iterator>
 
 namespace gart_cli {
 

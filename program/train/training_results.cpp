@@ -1,3 +1,4 @@
+#include "choices.hpp"
 #include "image_writer.hpp"
 #include "output.hpp"
 #include "process_memory.hpp"

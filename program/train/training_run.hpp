@@ -6,6 +6,7 @@
 #include "ranks.hpp"
 #include "report/history.hpp"
 #include "run_folder.hpp"
+#include "scores.hpp"
 #include "train_arguments.hpp"
 #include "training_view.hpp"
 

@@ -1,3 +1,4 @@
+#include "choices.hpp"
 #include "training_run.hpp"
 
 #include <algorithm>

@@ -73,7 +73,7 @@ class compiled_renderer final : public renderer {
     channels_are_old_ = true;
   }
 
-  rendered render(camera const& view, render_options const& options, bool with_features) override {
+  rendered render(camera const& view, render_options const& options, bool with_features = false) override {
     prepare(frame_, view, options);
     rendered out = render_image(frame_);
     int const width = with_features ? channels_.now().features.width : 0;
@@ -149,7 +149,7 @@ class compiled_renderer final : public renderer {
                                            batch_targets const& targets, gradient_form form) override {
     return std::make_unique<batch_context>(*this, this->rays().forward(rays, options, targets, form));
   }
-  traced_rays trace(ray_batch const& rays, render_options const& options, bool with_features) override {
+  traced_rays trace(ray_batch const& rays, render_options const& options, bool with_features = false) override {
     return this->rays().trace(rays, options, with_features);
   }
   void trace_to(ray_batch const& rays, render_options const& options, batch_targets const& targets) override {
