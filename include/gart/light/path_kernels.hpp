@@ -15,6 +15,7 @@ struct thin_lens {
   float radius = 0, focus = 1;
   bool flat = true;
   mat3 rotation{1.0f};
+  vec3 moved{0.0f};  // from where the frame is
 };
 
 template <camera_model M>
@@ -40,6 +41,7 @@ struct cast_paths {
     auto const cast = model.ray(static_cast<float>(of.x) + at.x, static_cast<float>(of.y) + at.y);
     path p{origin_of(cast), near, cast.direction, 0, vec3(1.0f), path::alive | path::specular | path::direct,
            vec3(0.0f),      place};
+    p.origin += lens.moved;
     if (p.direction == vec3(0.0f)) {  // a pixel that no ray is of
       p.flags = 0, p.radiance = background;
     } else if (lens.radius > 0) {

@@ -20,6 +20,7 @@
 
 #include <gart/light/path_kernels.hpp>
 #include <gart/light/placed_scene.hpp>
+#include <gart/math/turn.hpp>
 #include <gart/render/frame.hpp>
 
 namespace gart { inline namespace GART_ISA {
@@ -84,7 +85,7 @@ class path_tracer {
   void add(int samples) {
     require_begun("path_tracer.add");
     for (int s = 0; s < samples; ++s) {
-      trace(static_cast<u32>(samples_), paths_options_.jitter, paths_options_.aperture);
+      trace(static_cast<u32>(samples_));
       parallel_for(*exec_, "light/sum", rays_, light_kernels::add_samples{paths_.data(), sums_.data()});
       ++samples_;
     }
@@ -99,7 +100,7 @@ class path_tracer {
   /// The layers of rays through the middles of the pixels; targets in memory of the policy.
   void layers(light_kernels::layer_targets const& out) {
     require_begun("path_tracer.layers");
-    cast(0, false, 0);
+    cast(0, false, 0, 0);
     end_segments();
     trace_batch<Response>(*exec_, "light/layers", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f},
                           rays_,
@@ -149,11 +150,17 @@ class path_tracer {
     factors_are_old_ = false;
   }
 
-  void cast(u32 sample, bool jitter, float aperture) {
-    light_kernels::thin_lens const lens{
-        aperture, paths_options_.focus,
-        view_.kind == camera_kind::perspective || view_.kind == camera_kind::orthographic, view_.rotation};
-    visit_camera(view_, [&]<class M>(M const& model) {
+  // Each sample is of one moment: their moments fill the exposure evenly.
+  void cast(u32 sample, bool jitter, float aperture, float blur) {
+    camera view = view_;
+    double const time = (double{light_kernels::unit_interval(light_kernels::reversed(sample))} - 0.5) * double{blur};
+    mat3d const rotation(view.rotation);
+    vec3 const moved(rotation * (time * vec3d(view.travel)));
+    view.rotation = mat3(rotation * turn_of(time * vec3d(view.turn)));
+    light_kernels::thin_lens const lens{aperture, paths_options_.focus,
+                                        view.kind == camera_kind::perspective || view.kind == camera_kind::orthographic,
+                                        view.rotation, moved};
+    visit_camera(view, [&]<class M>(M const& model) {
       parallel_for(*exec_, "light/cast", rays_,
                    light_kernels::cast_paths<M>{model, order_, lens, options_.near, options_.background,
                                                 paths_options_.seed, sample, jitter, paths_.data()});
@@ -163,14 +170,14 @@ class path_tracer {
     parallel_for(*exec_, "light/triangles", rays_,
                  light_kernels::end_segments{placed_.stand_at(frame_), paths_.data(), ends_.data()});
   }
-  void trace(u32 sample, bool jitter, float aperture) {
+  void trace(u32 sample) {
     light_kernels::scene_view const& scene = placed_.stand_at(frame_);
     auto const& o = paths_options_;
     u32 const bounces = static_cast<u32>(o.bounces);
     // A path that catchers let pass goes on as it is, and comes to this many of them.
     u32 const steps = bounces + 1 + (placed_.catches_shadows() ? 4 : 0);
     u32 const lights = scene.light_count + (scene.around.texels ? 1 : 0);
-    cast(sample, jitter, aperture);
+    cast(sample, o.jitter, o.aperture, o.blur);
     for (u32 step = 0; step < steps; ++step) {
       end_segments();
       if (o.shadows == light::shadow_kind::per_hit)
