@@ -46,7 +46,7 @@ struct material {
   float metallic = 0, roughness = 1;            ///< [0, 1]; times the texture's blue and green
   float ior = 1.5f;                             ///< of glass, and of a surface's reflection; 1 or more
   vec3 emission{0.0f};                          ///< radiance; times its texture
-  float opacity = 1;                            ///< [0, 1]; times the base colour texture's alpha
+  float opacity = 1;                            ///< [0, 1]; times the base colour texture's alpha; only a cutout asks
   float cutout = 0;                             ///< positive: opaque where the opacity reaches it, else not there
   int base_color_texture = -1, metallic_roughness_texture = -1, emission_texture = -1;  ///< places, or none
   int normal_texture = -1;  ///< in tangent space, x right, y up, each 2 c - 1; needs uvs

@@ -91,6 +91,7 @@ struct walk_batch {
   traced_scene scene;
   P program;
   GART_KERNEL void operator()(index_t i) const {
+    if (!program.active(i)) return;
     trace_windows<Capacity, Response>(scene, program, i, [this, i](ray const& r, auto& visitor) {
       up_to<std::remove_reference_t<decltype(visitor)>> limited{visitor, program.far(i)};
       walk(index.tree, index.slab_of(r), limited);

@@ -78,4 +78,10 @@ class path_renderer {
 /// The best backend that meets the request: its backend, threads and device count, and its kernel degree.
 std::unique_ptr<path_renderer> make_path_renderer(configuration_request const& request);
 
+/// Makes the renderer that a request asks for.
+using path_renderer_maker = std::unique_ptr<path_renderer> (*)(configuration_request const&);
+/// Adds one to the table; before main, from static initialisers (runtime/compiled_paths.hpp).
+void register_path_renderer(backend_kind backend, int kernel_degree, bool (*available)(std::string*),
+                            path_renderer_maker make);
+
 }  // namespace gart

@@ -35,12 +35,14 @@ struct k_buffer_visitor {
 };
 
 /// Feeds `program` the hits of ray i; `gather` proposes candidates to the visitor (at least all whose hits lie in
-/// [near(), far()]) and is called again until a window is not full.
+/// [near(), far()]) and is called again until a window is not full. A program may have a near(i) of its own for each
+/// ray, at least the scene's.
 template <int Capacity, class Response = generalized_gaussian<>, ray_program P, class Gather>
 GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& program, index_t i, Gather const& gather) {
   auto state = program.begin(i);
   auto const r = program.ray_of(i, state);
   k_buffer_visitor<Capacity, std::remove_const_t<decltype(r)>, Response> visitor(scene, r);
+  if constexpr (requires { program.near(i); }) visitor.last_t = program.near(i);
   bool more = true;
   while (more) {
     visitor.window.clear();

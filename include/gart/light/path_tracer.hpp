@@ -1,0 +1,243 @@
+#pragma once
+/// \file
+/// Paths of light through Gaussians and a scene, on every policy: each sample of all pixels goes in waves, a segment at
+/// a time. Triangles and lights end it, Gaussians are blended along it (light/paths.hpp), shadow rays are sent to each
+/// light, and the surface sends the path on (light/path_kernels.hpp).
+///
+///   path_tracer<E> tracer(exec);
+///   tracer.set_model(gaussians.view(), sh_degree);
+///   tracer.set_scene(scene);
+///   tracer.begin(view, options, paths);
+///   tracer.add(16);
+///
+/// Gaussians alone, without jitter, give the colours of the renderers, bit for bit. Of one seed every policy draws the
+/// same numbers; what follows from them is the same bits on hosts, and on a device compiled with -fmad=false.
+///
+/// Memory: the tree over the Gaussians and 64 bytes each, 12 more for shadows per Gaussian; 150 bytes a triangle; 150
+/// bytes a pixel. Cost of a sample: a walk through triangles and one through Gaussians a segment, and the same a light
+/// at each rough surface.
+/// Errors: invalid_argument for a camera, options or a scene that nothing can be traced by, and for calls out of order.
+
+#include <gart/light/path_kernels.hpp>
+#include <gart/light/placed_scene.hpp>
+#include <gart/render/frame.hpp>
+
+namespace gart { inline namespace GART_ISA {
+
+/// Traces paths for one picture at a time.
+template <execution E, class Response = generalized_gaussian<>>
+class path_tracer {
+ public:
+  /// Allocates nothing; `exec` must outlive it.
+  explicit path_tracer(E& exec)
+      : exec_(&exec),
+        placed_(exec),
+        index_(exec),
+        gaussians_(exec),
+        factors_(exec),
+        paths_(exec),
+        ends_(exec),
+        shadows_(exec),
+        sums_(exec) {}
+
+  /// The Gaussians, whose arrays must stay as they are; bands above active_degree are not evaluated.
+  void set_model(gaussians_view<float const> model, int active_degree) {
+    if (model.sh_degree < 0 || model.sh_degree > color_rows::most || active_degree < 0 ||
+        active_degree > model.sh_degree)
+      throw invalid_argument("path_tracer.set_model: the SH degree is not from 0 to 3, or less than what is evaluated");
+    model_ = model, active_degree_ = active_degree;
+    has_model_ = true, index_is_old_ = factors_are_old_ = true;
+    samples_ = pixels_ = 0;
+  }
+  /// The meshes, materials and lights.
+  void set_scene(light::scene const& scene) {
+    light::require_scene(scene);
+    placed_.set(scene);
+    bool const sized = std::any_of(scene.lights.begin(), scene.lights.end(), [](light::light const& l) {
+      return l.kind == light::light_kind::sphere || l.kind == light::light_kind::rectangle || l.angle > 0;
+    });
+    shadow_samples_ = sized ? 8 : 1;
+    has_scene_ = true, factors_are_old_ = true;
+    samples_ = pixels_ = 0;
+  }
+
+  /// A picture anew.
+  void begin(camera const& view, render_options const& options, light::path_options const& paths) {
+    if (!has_model_) throw invalid_argument("path_tracer.begin: there are no Gaussians; call set_model first");
+    if (!has_scene_) throw invalid_argument("path_tracer.begin: there is no scene; call set_scene first");
+    require_camera(view);
+    require_options(options);
+    light::require_path_options(paths);
+    if (options.antialias != 0)
+      throw invalid_argument("render_options.antialias must be 0 where paths are traced: samples fill the pixels");
+    stand_at(view.position, options.alpha_min);
+    shade(paths);
+    view_ = view, options_ = options, paths_options_ = paths;
+    pixels_ = static_cast<index_t>(view.width) * static_cast<index_t>(view.height);
+    samples_ = 0;
+    paths_.resize(pixels_), ends_.resize(pixels_), sums_.resize(std::size_t{3} * pixels_);
+    sums_.zero();
+  }
+  /// So many samples more a pixel.
+  void add(int samples) {
+    require_begun("path_tracer.add");
+    for (int s = 0; s < samples; ++s) {
+      trace(static_cast<u32>(samples_), paths_options_.jitter, paths_options_.aperture);
+      parallel_for(*exec_, "light/sum", pixels_, light_kernels::add_samples{paths_.data(), sums_.data()});
+      ++samples_;
+    }
+  }
+  /// How many there are.
+  int samples() const { return samples_; }
+  /// Pixels of the picture.
+  index_t pixels() const { return pixels_; }
+  /// The sum of the samples, [H][W][3].
+  buffer<float, E> const& sums() const { return sums_; }
+
+  /// The layers of rays through the middles of the pixels; targets in memory of the policy.
+  void layers(light_kernels::layer_targets const& out) {
+    require_begun("path_tracer.layers");
+    cast(0, false, 0);
+    end_segments();
+    trace_batch<Response>(*exec_, "light/layers", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f},
+                          pixels_,
+                          light_kernels::layer_segment{{}, paths_.data(), ends_.data(), colors(), options_, out});
+    parallel_for(*exec_, "light/layers", pixels_,
+                 light_kernels::add_surface_layers{placed_.stand_at(frame_), paths_.data(), ends_.data(), out});
+  }
+
+ private:
+  void require_begun(char const* call) const {
+    if (pixels_ == 0) throw invalid_argument(std::string(call) + ": there is no picture; call begin first");
+  }
+  light_kernels::gaussian_colors colors() const {
+    auto const& o = paths_options_;
+    bool const shades = o.shadows != light::shadow_kind::none;
+    return {{model_.sh, model_.sh_degree, active_degree_},
+            o.shadows == light::shadow_kind::per_gaussian ? factors_.data() : nullptr,
+            shades && o.relight,
+            o.linear};
+  }
+  light_kernels::shadow_rule rule() const { return {paths_options_.ambient, paths_options_.relight}; }
+
+  void stand_at(vec3d const& frame, float alpha_min) {
+    placed_.stand_at(frame);
+    if (index_is_old_ || index_.alpha_min() != alpha_min) {
+      stage_scope stage(*exec_, "light index");
+      index_.build(*exec_, model_, alpha_min, frame);
+    } else if (frame == frame_) {
+      return;
+    }
+    frame_ = frame, index_is_old_ = false;
+    gaussians_.resize(model_.count);
+    parallel_for(*exec_, "light/preprocess", model_.count,
+                 render_kernels::prepare_gaussians<Response>{model_, frame, alpha_min, gaussians_.view()});
+  }
+  // Once for a model and a scene: they follow from no view.
+  void shade(light::path_options const& paths) {
+    if (paths.shadows != light::shadow_kind::per_gaussian) return;
+    if (!factors_are_old_ && paths.ambient == shaded_by_.ambient && paths.relight == shaded_by_.relight &&
+        paths.seed == shade_seed_)
+      return;
+    shaded_by_ = {paths.ambient, paths.relight}, shade_seed_ = paths.seed;
+    factors_.resize(model_.count);
+    parallel_for(*exec_, "light/shade", model_.count,
+                 light_kernels::shade_gaussians{placed_.stand_at(frame_), model_.mean, frame_, shaded_by_, paths.seed,
+                                                shadow_samples_, factors_.data()});
+    factors_are_old_ = false;
+  }
+
+  void cast(u32 sample, bool jitter, float aperture) {
+    light_kernels::thin_lens const lens{
+        aperture, paths_options_.focus,
+        view_.kind == camera_kind::perspective || view_.kind == camera_kind::orthographic, view_.rotation};
+    visit_camera(view_, [&]<class M>(M const& model) {
+      parallel_for(*exec_, "light/cast", pixels_,
+                   light_kernels::cast_paths<M>{model, lens, options_.near, options_.background, paths_options_.seed,
+                                                sample, jitter, paths_.data()});
+    });
+  }
+  void end_segments() {
+    parallel_for(*exec_, "light/triangles", pixels_,
+                 light_kernels::end_segments{placed_.stand_at(frame_), paths_.data(), ends_.data()});
+  }
+  void trace(u32 sample, bool jitter, float aperture) {
+    light_kernels::scene_view const& scene = placed_.stand_at(frame_);
+    auto const& o = paths_options_;
+    u32 const bounces = static_cast<u32>(o.bounces);
+    // A path that catchers let pass goes on as it is, and comes to this many of them.
+    u32 const steps = bounces + 1 + (placed_.catches_shadows() ? 4 : 0);
+    u32 const lights = scene.light_count + (scene.around.texels ? 1 : 0);
+    cast(sample, jitter, aperture);
+    for (u32 step = 0; step < steps; ++step) {
+      end_segments();
+      if (o.shadows == light::shadow_kind::per_hit)
+        blend<true>(sample, step);
+      else
+        blend<false>(sample, step);
+      if (placed_.triangles() > 0 && bounces > 0)
+        for (u32 l = 0; l < lights; ++l) shadow(l, sample, step);
+      parallel_for(*exec_, "light/surfaces", pixels_,
+                   light_kernels::send_on{scene,
+                                          paths_.data(),
+                                          ends_.data(),
+                                          options_.background,
+                                          bounces,
+                                          static_cast<u32>(o.roulette_after),
+                                          o.firefly,
+                                          {o.ambient, false},
+                                          o.seed,
+                                          sample,
+                                          step});
+    }
+  }
+  template <bool PerHit>
+  void blend(u32 sample, u32 step) {
+    trace_batch<Response>(*exec_, "light/gaussians", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f},
+                          pixels_,
+                          light_kernels::segment<PerHit>{{},
+                                                         paths_.data(),
+                                                         ends_.data(),
+                                                         colors(),
+                                                         options_,
+                                                         placed_.stand_at(frame_),
+                                                         rule(),
+                                                         paths_options_.seed,
+                                                         sample,
+                                                         step});
+  }
+  void shadow(u32 light, u32 sample, u32 step) {
+    shadows_.resize(pixels_);
+    parallel_for(*exec_, "light/shadows", pixels_,
+                 light_kernels::aim_at_light{placed_.stand_at(frame_), paths_.data(), ends_.data(), shadows_.data(),
+                                             light, static_cast<u32>(paths_options_.bounces), paths_options_.firefly,
+                                             paths_options_.seed, sample, step});
+    trace_batch<Response>(
+        *exec_, "light/transmittance", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f}, pixels_,
+        light_kernels::shadow_segment{{}, shadows_.data(), paths_.data(), options_.transmittance_min});
+  }
+
+  E* exec_;
+  light_kernels::placed_scene<E> placed_;
+  gaussians_view<float const> model_;
+  int active_degree_ = 0;
+  bool has_model_ = false, has_scene_ = false, index_is_old_ = true, factors_are_old_ = true;
+  world_index<E, Response> index_;
+  buffer<ray_gaussian, E> gaussians_;  // in frame_
+  vec3d frame_{0.0};
+  buffer<vec3, E> factors_;  // [N], of shadows per Gaussian
+  light_kernels::shadow_rule shaded_by_;
+  u64 shade_seed_ = 0;
+  u32 shadow_samples_ = 1;
+  camera view_;
+  render_options options_;
+  light::path_options paths_options_;
+  buffer<light_kernels::path, E> paths_;
+  buffer<light_kernels::path_hit, E> ends_;
+  buffer<light_kernels::shadow_ray, E> shadows_;
+  buffer<float, E> sums_;
+  index_t pixels_ = 0;
+  int samples_ = 0;
+};
+
+}}  // namespace gart::GART_ISA

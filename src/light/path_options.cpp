@@ -1,0 +1,51 @@
+// What of the options cannot be traced by, and the tones.
+#include <gart/core/error.hpp>
+#include <gart/light/path_options.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace gart::light {
+
+namespace {
+
+float encoded(float x) {
+  x = std::clamp(x, 0.0f, 1.0f);
+  return x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1.0f / 2.4f) - 0.055f;
+}
+// Narkowicz, "ACES filmic tone mapping curve", 2015.
+float rolled_off(float x) {
+  x = std::max(x, 0.0f);
+  return x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f);
+}
+
+}  // namespace
+
+image_float toned(image_float linear, path_options const& o) {
+  float const gain = std::exp2(o.exposure);
+  for (float& x : linear.data) {
+    x *= gain;
+    if (o.tone == tone_kind::srgb) x = encoded(x);
+    if (o.tone == tone_kind::filmic) x = encoded(rolled_off(x));
+  }
+  return linear;
+}
+
+void require_path_options(path_options const& o) {
+  auto const require = [](bool good, char const* field, char const* range, auto value) {
+    if (!good)
+      throw invalid_argument(std::string("path_options.") + field + " must be " + range + ", not " +
+                             std::to_string(value));
+  };
+  require(o.samples >= 1, "samples", "1 or more", o.samples);
+  require(o.bounces >= 0 && o.bounces <= 64, "bounces", "0 to 64", o.bounces);
+  require(o.roulette_after >= 0, "roulette_after", "0 or more", o.roulette_after);
+  require(o.ambient >= 0 && o.ambient <= 1, "ambient", "0 to 1", o.ambient);
+  require(o.aperture >= 0 && std::isfinite(o.aperture), "aperture", "0 or more", o.aperture);
+  require(o.focus > 0 && std::isfinite(o.focus), "focus", "more than 0", o.focus);
+  require(o.firefly >= 0 && std::isfinite(o.firefly), "firefly", "0 or more", o.firefly);
+  require(std::fabs(o.exposure) <= 60, "exposure", "-60 to 60 stops", o.exposure);
+}
+
+}  // namespace gart::light
