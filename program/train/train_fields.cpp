@@ -1,8 +1,8 @@
 #include "train_fields.hpp"
 
 #include "commands.hpp"
-#include "suggestion.hpp"
 
+#include <gart/core/suggestion.hpp>
 #include <gart/train/option_fields.hpp>
 
 #include <cmath>
@@ -76,7 +76,7 @@ void set_fields(gart::train_options& o, std::string const& settings) {
       for (gart::option_field const& f : gart::option_fields) names.emplace_back(f.name);
       std::string const now = with_new_names(one);
       throw usage_error("--set " + one + ": no such field" +
-                        (now != one ? "; it is " + now + " now" : did_you_mean(name, names)) +
+                        (now != one ? "; it is " + now + " now" : gart::did_you_mean(name, names)) +
                         " (see gart train --help-all)");
     }
     char* end = nullptr;
