@@ -55,7 +55,7 @@ RULES = (("all", []),
          ("adc, no resets", ["--densify", "adc", "--set", "adc.opacity_reset_every=0"]))
 
 
-# What gart train chooses among (docs/auto.md), as fixed settings: all combinations.
+# What gart train chooses among (docs/training.md), as fixed settings: all combinations.
 EXPOSURE, VIGNETTING = ["--exposure", "on"], ["--vignetting", "on"]
 BANDS = ["--set", "rates.sh_rest=0.0025"]
 SETTINGS = (("literature", []), ("exposure", EXPOSURE), ("vignetting", VIGNETTING), ("bands", BANDS),

@@ -5,9 +5,9 @@
 #include "help.hpp"
 #include "printable.hpp"
 #include "ranks.hpp"
-#include "suggestion.hpp"
 #include "threads.hpp"
 
+#include <gart/core/suggestion.hpp>
 #include <gart/core/version.hpp>
 
 #include <cstdio>
@@ -37,7 +37,7 @@ std::string suggested(CLI::App const& app) {
   for (CLI::App const* sub : of->get_subcommands({})) names.push_back(sub->get_name());
   std::string words;
   for (std::string const& word : app.remaining(true))
-    words += gart_cli::did_you_mean(word.substr(0, word.find('=')), names);
+    words += gart::did_you_mean(word.substr(0, word.find('=')), names);
   return words;
 }
 

@@ -1,8 +1,8 @@
 #include "train_fields.hpp"
 
 #include "commands.hpp"
-#include "suggestion.hpp"
 
+#include <gart/core/suggestion.hpp>
 #include <gart/train/option_fields.hpp>
 
 #include <cmath>
@@ -77,7 +77,7 @@ void field_values::add(std::string const& name, double value) {
     for (gart::option_field const& f : gart::option_fields) names.emplace_back(f.name);
     std::string const now = new_name(name);
     throw usage_error("--set " + name + ": no such field" +
-                      (now != name ? "; it is " + now + " now" : did_you_mean(name, names)));
+                      (now != name ? "; it is " + now + " now" : gart::did_you_mean(name, names)));
   }
   if (!std::isfinite(value)) throw usage_error("--set " + name + ": a finite number belongs after " + name + "=");
   if (value < field->low || value > field->high)

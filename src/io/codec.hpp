@@ -18,6 +18,8 @@ struct image_size {
 bool is_png(std::vector<u8> const& bytes);
 bool is_jpeg(std::vector<u8> const& bytes);
 
+// PNG, JPEG or WebP.
+image8 decode_image(std::vector<u8> const& bytes, std::string const& where);
 image8 decode_png(std::vector<u8> const& bytes, std::string const& where);
 // One channel of 16 bits, for depth maps; any other kind is refused.
 basic_image<u16> decode_png16(std::vector<u8> const& bytes, std::string const& where);

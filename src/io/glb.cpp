@@ -2,8 +2,10 @@
 
 #include "glb.hpp"
 #include "bytes.hpp"
+#include "gltf_document.hpp"
 #include "packing.hpp"
 #include "spz.hpp"
+#include "surface.hpp"
 
 #include <gart/io/file.hpp>
 #include <gart/io/origin.hpp>
@@ -24,15 +26,13 @@ using namespace io::glb;
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr int deepest_node = 64;
-
 class glb_reader {
  public:
-  explicit glb_reader(fs::path const& path) : name_(path.string()), bytes_(read_file(path)) {}
+  explicit glb_reader(fs::path const& path) : file_(path), name_(file_.name()) {}
 
   gaussian_model read(splat_traits* traits, std::vector<std::string>* notes) {
     try {
-      return from(json_part(), traits, notes);
+      return from(file_.root(), traits, notes);
     } catch (json::exception const& e) {
       throw io_error(name_ + ": glTF", e.what(), "export it again");
     }
@@ -40,26 +40,7 @@ class glb_reader {
 
  private:
   [[noreturn]] void refuse(std::string const& what, std::string const& remedy = "export it again") const {
-    throw io_error(name_, what, remedy);
-  }
-
-  json json_part() {
-    byte_reader in(bytes_, name_);
-    if (in.get<u32>("the magic number") != magic) refuse("does not begin as GLB does", "name a GLB file");
-    u32 const version = in.get<u32>("version");
-    if (version != 2) refuse("is GLB of version " + std::to_string(version), "gart reads version 2: export it as that");
-    in.skip(4, "the length");
-    json document;
-    bool known = false;
-    while (in.remaining() >= 8) {
-      u32 const size = in.get<u32>("a chunk"), type = in.get<u32>("a chunk");
-      u8 const* const at = bytes_.data() + (bytes_.size() - in.remaining());
-      in.skip(size, "a chunk");
-      if (type == json_chunk && !known) document = json::parse(at, at + size), known = true;
-      if (type == binary_chunk && !binary_) binary_ = at, binary_size_ = size;
-    }
-    if (!known || !document.is_object()) refuse("has no JSON chunk");
-    return document;
+    file_.refuse(what, remedy);
   }
 
   gaussian_model from(json const& document, splat_traits* traits, std::vector<std::string>* notes) {
@@ -88,7 +69,8 @@ class glb_reader {
   }
 
   void visit(std::size_t number, similarity const& above, int depth, gaussian_model& all) {
-    if (depth > deepest_node) refuse("has nodes within each other more than " + std::to_string(deepest_node) + " deep");
+    if (depth > deepest_gltf_node)
+      refuse("has nodes within each other more than " + std::to_string(deepest_gltf_node) + " deep");
     json const& node = document_->at("nodes").at(number);
     // glTF's nodes are trees; what is no tree can have as many ways through it as there are names.
     visited_.resize(document_->at("nodes").size());
@@ -145,12 +127,12 @@ class glb_reader {
     int degree = 0;
     while (degree < 3 && attributes.contains(coefficient_name((degree + 1) * (degree + 1)))) ++degree;
     gaussian_model part;
-    std::size_t const n = document_->at("accessors").at(attributes.at("POSITION").get<std::size_t>()).at("count");
-    require_plausible(name_, n + all.size(), std::max(degree, all.sh_degree), bytes_.size());
+    std::size_t const n = file_.count(attributes.at("POSITION"));
+    require_plausible(name_, n + all.size(), std::max(degree, all.sh_degree), file_.all_bytes());
     part.resize(n, degree);
     auto const values = [&](std::string const& name, std::size_t width, auto const& store) {
       if (!attributes.contains(name)) refuse("the Gaussians have no attribute " + name);
-      each(attributes[name].get<std::size_t>(), name, n, width, store);
+      file_.each(attributes[name], "attribute " + name, n, width, store);
     };
     values("POSITION", 3,
            [&](std::size_t i, std::size_t c, double v) { part.mean[3 * i + c] = static_cast<float>(v); });
@@ -172,18 +154,15 @@ class glb_reader {
 
   // SPZ is decoded into glTF's axes, as its own library does that is asked for them.
   gaussian_model of_spz(json const& packed) {
-    json const& view = document_->at("bufferViews").at(packed.at("bufferView").get<std::size_t>());
-    u64 const start = view.value("byteOffset", u64{0}), size = view.at("byteLength").get<u64>();
-    if (view.value("buffer", 0) != 0 || !binary_ || start > binary_size_ || size > binary_size_ - start)
-      refuse("its SPZ reaches past the end of the file's buffer", "the file is truncated: copy or export it again");
-    gaussian_model part = read_spz({binary_ + start, binary_ + start + size}, name_ + ": SPZ", traits_, notes_);
+    auto const [at, size] = file_.view(packed.at("bufferView"), "its SPZ");
+    gaussian_model part = read_spz({at, at + size}, name_ + ": SPZ", traits_, notes_);
     half_turn(part, up_axis);
     return part;
   }
 
   void append(gaussian_model part, similarity const& placed, gaussian_model& all) {
     int const degree = part.sh_degree;
-    require_plausible(name_, part.size() + all.size(), std::max(degree, all.sh_degree), bytes_.size());
+    require_plausible(name_, part.size() + all.size(), std::max(degree, all.sh_degree), file_.all_bytes());
     apply_placement(from_origin(placed, part), part);
     seen_ = true;
     if (all.size() == 0) return void(all = std::move(part));
@@ -214,70 +193,8 @@ class glb_reader {
     if (placed.rotation != mat3d(1.0) || placed.scale != 1 || placed.translation != vec3d(0.0)) apply(placed, part);
   }
 
-  // store(i, c, value) for the numbers of an accessor.
-  void each(std::size_t number, std::string const& name, std::size_t n, std::size_t width, auto const& store) const {
-    json const& accessor = document_->at("accessors").at(number);
-    int const type = accessor.at("componentType").get<int>();
-    bool const normalized = accessor.value("normalized", false);
-    if (accessor.at("type") != shapes[width - 1] || accessor.at("count").get<std::size_t>() != n ||
-        accessor.contains("sparse") || !accessor.contains("bufferView"))
-      refuse("attribute " + name + " is not " + std::to_string(n) + " " + shapes[width - 1] + " of a buffer");
-    std::size_t size = 0;
-    switch (type) {
-      case i8:
-      case byte:
-        size = 1;
-        break;
-      case i16:
-      case word:
-        size = 2;
-        break;
-      case f32:
-        size = 4;
-        break;
-      default:
-        refuse("attribute " + name + " is of the component type " + std::to_string(type));
-    }
-    json const& view = document_->at("bufferViews").at(accessor["bufferView"].get<std::size_t>());
-    if (view.value("buffer", 0) != 0 || !binary_ || document_->at("buffers").at(0).contains("uri"))
-      refuse("attribute " + name + " is in a buffer outside of the file", "export it as one GLB file");
-    u64 const stride = view.value("byteStride", u64{size * width}), in_view = accessor.value("byteOffset", u64{0}),
-              start = view.value("byteOffset", u64{0});
-    if (stride < size * width || stride > 255 || start > binary_size_ || in_view > binary_size_ - start ||
-        (n > 0 && (binary_size_ - start - in_view < size * width ||
-                   (n - 1) > (binary_size_ - start - in_view - size * width) / stride)))
-      refuse("attribute " + name + " reaches past the end of the file's buffer",
-             "the file is truncated: copy or export it again");
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t c = 0; c < width; ++c)
-        store(i, c, number_at(binary_ + start + in_view + stride * i + size * c, type, normalized));
-  }
-
-  static double number_at(u8 const* at, int type, bool normalized) {
-    auto const as = [&](auto value, double most) {
-      std::memcpy(&value, at, sizeof value);
-      double const v = static_cast<double>(value);
-      return normalized ? std::max(v / most, -1.0) : v;
-    };
-    switch (type) {
-      case i8:
-        return as(std::int8_t{}, 127);
-      case byte:
-        return as(u8{}, 255);
-      case i16:
-        return as(std::int16_t{}, 32767);
-      case word:
-        return as(u16{}, 65535);
-    }
-    float value;
-    std::memcpy(&value, at, sizeof value);
-    return static_cast<double>(value);
-  }
-
+  gltf_document file_;
   std::string name_;
-  std::vector<u8> bytes_;
-  u8 const* binary_ = nullptr;
-  std::size_t binary_size_ = 0;
   json const* document_ = nullptr;
   std::vector<bool> visited_;
   splat_traits* traits_ = nullptr;

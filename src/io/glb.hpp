@@ -18,8 +18,6 @@ inline constexpr char const *kernel = "ellipse", *color_space = "srgb_rec709_dis
 inline constexpr char const* shapes[] = {"SCALAR", "VEC2", "VEC3", "VEC4"};  // by width less one
 inline constexpr int up_axis = 2;  // half a turn about z is from a splat file's axes to glTF's
 
-enum component { i8 = 5120, byte = 5121, i16 = 5122, word = 5123, f32 = 5126 };
-
 inline std::string attribute(std::string const& name) { return std::string(extension) + ":" + name; }
 
 // The coefficient k of 16 in the extension's words.

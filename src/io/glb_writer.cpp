@@ -2,6 +2,7 @@
 
 #include "bytes.hpp"
 #include "glb.hpp"
+#include "gltf_document.hpp"
 #include "packing.hpp"
 #include "spz.hpp"
 
@@ -67,8 +68,9 @@ void add_box(json& position, gaussian_model const& m) {
 glb_buffer as_floats(gaussian_model const& m) {
   std::size_t const n = m.size(), k = static_cast<std::size_t>(sh_coefficients(m.sh_degree));
   glb_buffer out;
-  add_box(out.add<float>("POSITION", n, 3, f32, [&](std::size_t i, std::size_t c) { return m.mean[3 * i + c]; }), m);
-  out.add<u8>("COLOR_0", n, 4, byte, [&](std::size_t i, std::size_t c) {
+  add_box(out.add<float>("POSITION", n, 3, gltf_f32, [&](std::size_t i, std::size_t c) { return m.mean[3 * i + c]; }),
+          m);
+  out.add<u8>("COLOR_0", n, 4, gltf_u8, [&](std::size_t i, std::size_t c) {
     if (c == 3) return u32{opacity_byte(m.opacity[i])};
     return unorm(linear_light(std::clamp(static_cast<double>(base_color(m.sh[3 * k * i + c])), 0.0, 1.0)), 8);
   })["normalized"] = true;
@@ -77,15 +79,15 @@ glb_buffer as_floats(gaussian_model const& m) {
     auto const u = unit(&m.quaternion[4 * i]);
     std::copy(u.begin(), u.end(), &q[4 * i]);
   }
-  out.add<float>(attribute("ROTATION"), n, 4, f32,
+  out.add<float>(attribute("ROTATION"), n, 4, gltf_f32,
                  [&](std::size_t i, std::size_t c) { return q[4 * i + (c + 1) % 4]; });
-  out.add<float>(attribute("SCALE"), n, 3, f32, [&](std::size_t i, std::size_t c) {
+  out.add<float>(attribute("SCALE"), n, 3, gltf_f32, [&](std::size_t i, std::size_t c) {
     return std::exp(std::min(static_cast<double>(m.log_scale[3 * i + c]), 80.0));
   });
-  out.add<float>(attribute("OPACITY"), n, 1, f32,
+  out.add<float>(attribute("OPACITY"), n, 1, gltf_f32,
                  [&](std::size_t i, std::size_t) { return sigmoid_in_double(static_cast<double>(m.opacity[i])); });
   for (std::size_t j = 0; j < k; ++j)
-    out.add<float>(coefficient_name(static_cast<int>(j)), n, 3, f32,
+    out.add<float>(coefficient_name(static_cast<int>(j)), n, 3, gltf_f32,
                    [&](std::size_t i, std::size_t c) { return m.sh[3 * (k * i + j) + c]; });
   return out;
 }
@@ -95,11 +97,11 @@ glb_buffer as_spz(fs::path const& path, gaussian_model const& m, gaussian_model 
                   splat_traits const& traits, splat_packing const& packing) {
   std::size_t const n = m.size();
   glb_buffer out;
-  add_box(out.name("POSITION", n, 3, f32), m);
-  out.name("COLOR_0", n, 4, byte)["normalized"] = true;
-  out.name(attribute("ROTATION"), n, 4, f32), out.name(attribute("SCALE"), n, 3, f32);
-  out.name(attribute("OPACITY"), n, 1, f32);
-  for (int j = 0; j < sh_coefficients(m.sh_degree); ++j) out.name(coefficient_name(j), n, 3, f32);
+  add_box(out.name("POSITION", n, 3, gltf_f32), m);
+  out.name("COLOR_0", n, 4, gltf_u8)["normalized"] = true;
+  out.name(attribute("ROTATION"), n, 4, gltf_f32), out.name(attribute("SCALE"), n, 3, gltf_f32);
+  out.name(attribute("OPACITY"), n, 1, gltf_f32);
+  for (int j = 0; j < sh_coefficients(m.sh_degree); ++j) out.name(coefficient_name(j), n, 3, gltf_f32);
   std::vector<u8> const packed = spz_2(path, given, traits, packing);
   out.bytes.assign(packed.begin(), packed.end());
   out.views.push_back({{"buffer", 0}, {"byteLength", packed.size()}});

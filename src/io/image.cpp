@@ -12,18 +12,19 @@
 namespace gart {
 namespace {
 
-[[noreturn]] void refuse_kind(std::filesystem::path const& path) {
-  throw io_error(path.string(), "is neither PNG, JPEG nor WebP", "convert it to one of them");
+[[noreturn]] void refuse_kind(std::string const& where) {
+  throw io_error(where, "is neither PNG, JPEG nor WebP", "convert it to one of them");
 }
 
 }  // namespace
 
-image8 read_image(std::filesystem::path const& path) {
-  std::vector<u8> const bytes = read_file(path);
-  if (io::is_png(bytes)) return io::decode_png(bytes, path.string());
-  if (io::is_jpeg(bytes)) return io::decode_jpeg(bytes, path.string());
-  if (io::is_webp(bytes)) return io::decode_webp_photo(bytes, path.string());
-  refuse_kind(path);
+image8 read_image(std::filesystem::path const& path) { return io::decode_image(read_file(path), path.string()); }
+
+image8 io::decode_image(std::vector<u8> const& bytes, std::string const& where) {
+  if (is_png(bytes)) return decode_png(bytes, where);
+  if (is_jpeg(bytes)) return decode_jpeg(bytes, where);
+  if (is_webp(bytes)) return decode_webp_photo(bytes, where);
+  refuse_kind(where);
 }
 
 io::image_size io::read_image_size(std::filesystem::path const& path) {
@@ -31,7 +32,7 @@ io::image_size io::read_image_size(std::filesystem::path const& path) {
   if (is_png(bytes)) return png_size(bytes, path.string());
   if (is_jpeg(bytes)) return jpeg_size(bytes, path.string());
   if (is_webp(bytes)) return webp_size(bytes, path.string());
-  refuse_kind(path);
+  refuse_kind(path.string());
 }
 
 void write_png(std::filesystem::path const& path, image8 const& image) {

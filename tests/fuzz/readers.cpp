@@ -5,9 +5,11 @@
 #include <gart/io/dataset.hpp>
 #include <gart/io/depth_file.hpp>
 #include <gart/io/exposure_file.hpp>
+#include <gart/io/exr_file.hpp>
 #include <gart/io/image_file.hpp>
 #include <gart/io/mesh_file.hpp>
 #include <gart/io/ply.hpp>
+#include <gart/io/scene_file.hpp>
 
 #include <algorithm>
 #include <array>
@@ -113,6 +115,39 @@ bool read_image(scratch_folder const& folder, char const* name, std::string_view
   return accepted(folder, [&] {
     gart::image8 const image = gart::read_image(file);
     check_image(image, channels);
+  });
+}
+
+// What require_scene asks of a scene, but for what scene.json's numbers are.
+void check_scene(gart::light::scene const& s) {
+  for (gart::light::mesh const& m : s.meshes) {
+    std::size_t const n = m.positions.size();
+    promise(!m.triangles.empty() && m.triangles.size() == 3 * m.triangle_material.size(),
+            "triangles without a material");
+    promise((m.normals.empty() || m.normals.size() == n) && (m.uvs.empty() || m.uvs.size() == n),
+            "vertices that differ");
+    for (gart::u32 const corner : m.triangles) promise(corner < n, "a corner that is no vertex");
+    for (gart::u32 const number : m.triangle_material)
+      promise(number < s.materials.size(), "a material that is not there");
+    for (gart::vec3 const& p : m.positions) promise(finite(gart::vec3d(p)), "a vertex that is not finite");
+    for (gart::vec3 const& v : m.normals)
+      promise(std::abs(v.x * v.x + v.y * v.y + v.z * v.z - 1) < 1e-3f, "a normal that is none");
+  }
+  auto const textures = static_cast<int>(s.textures.size());
+  for (gart::light::material const& m : s.materials)
+    for (int const number : {m.base_color_texture, m.metallic_roughness_texture, m.emission_texture, m.normal_texture})
+      promise(number >= -1 && number < textures, "a texture that is not there");
+  for (gart::light::texture const& t : s.textures)
+    promise(t.texels.size() == std::size_t{4} * static_cast<std::size_t>(t.width) * static_cast<std::size_t>(t.height),
+            "a texture whose texels do not fit its size");
+}
+
+bool read_scene(scratch_folder const& folder, fs::path const& file) {
+  return accepted(folder, [&] {
+    gart::read_scene_splats(file);
+    gart::scene_file const scene = gart::read_scene(file);
+    check_scene(scene.scene);
+    for (gart::named_camera const& c : scene.cameras) check_camera(c.view);
   });
 }
 
@@ -270,6 +305,40 @@ bool mesh_ply(std::string_view input) {
     gart::triangle_mesh const back = gart::read_mesh_ply(again);
     promise(back.position == mesh.position && back.triangle == mesh.triangle,
             "a mesh that is another when written and read again");
+  });
+}
+
+bool gltf(std::string_view input) {
+  static scratch_folder const folder("gltf");
+  static bool const images = (put_photos(folder, "."), true);
+  return images && read_scene(folder, folder.put("scene.gltf", input));
+}
+
+bool obj(std::string_view input) {
+  static scratch_folder const folder("obj");
+  static bool const images = (put_photos(folder, "."), true);
+  put_parts<2>(folder, {"mesh.obj", "mesh.mtl"}, input);
+  return images && read_scene(folder, folder.path() / "mesh.obj");
+}
+
+bool scene_json(std::string_view input) {
+  static scratch_folder const folder("scene_json");
+  static bool const beside =
+      (put_photos(folder, "."), folder.put("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+       gart::write_exr(folder.path() / "sky.exr", gart::image_float(4, 2, 3, 1.0f), "RGB"), true);
+  return beside && read_scene(folder, folder.put("scene.json", input));
+}
+
+bool radiance(std::string_view input) {
+  static scratch_folder const folder("radiance");
+  fs::path const file = folder.put("light.exr", input);
+  return accepted(folder, [&] {
+    gart::image_float const image = gart::read_radiance(file);
+    promise(image.channels == 3 && image.data.size() == std::size_t{3} * static_cast<std::size_t>(image.width) *
+                                                            static_cast<std::size_t>(image.height),
+            "an image whose data do not fit its size");
+    promise(std::all_of(image.data.begin(), image.data.end(), [](float v) { return v >= 0 && v <= 65504; }),
+            "light that is none");
   });
 }
 

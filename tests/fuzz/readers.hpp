@@ -29,6 +29,10 @@ bool png(std::string_view input);
 bool jpeg(std::string_view input);
 bool webp(std::string_view input);
 bool mesh_ply(std::string_view input);        // and written again, which must give the same mesh
+bool gltf(std::string_view input);            // .gltf or .glb
+bool obj(std::string_view input);             // and its MTL, between them a line "===="
+bool scene_json(std::string_view input);      // whatever files it names
+bool radiance(std::string_view input);        // EXR or HDR
 bool checkpoint(std::string_view input);      // loaded by a session, which then takes a step
 bool resume_config(std::string_view input);   // config.json, as --resume reads it
 bool resume_history(std::string_view input);  // history.json, likewise

@@ -44,6 +44,10 @@ constexpr reader readers[] = {
     {"jpeg", gart_fuzz::jpeg},
     {"webp", gart_fuzz::webp},
     {"mesh_ply", gart_fuzz::mesh_ply},
+    {"gltf", gart_fuzz::gltf},
+    {"obj", gart_fuzz::obj},
+    {"scene_json", gart_fuzz::scene_json},
+    {"radiance", gart_fuzz::radiance},
     {"checkpoint", gart_fuzz::checkpoint},
 #if defined(GART_FUZZ_RESUME)
     {"resume_config", gart_fuzz::resume_config},

@@ -85,7 +85,8 @@ TEST_CASE_TEMPLATE("a mirror shows the rays that are mirrored by hand", E, GART_
     float const expected = before.color[i] + before.transmittance[i / 3] * after.color[i];
     wrong += std::fabs(got[i] - expected) > 1e-5f;
   }
-  CHECK(wrong <= 3);  // peaks that lie at the mirror by a rounding
+  // Rays are off by a rounding, and thin Gaussians and those at the mirror see it.
+  CHECK(wrong <= static_cast<long>(got.size() / 200));
 }
 
 TEST_CASE_TEMPLATE("a pane of glass shifts what is behind it by Snell's law", E, GART_TEST_POLICIES) {
@@ -189,6 +190,71 @@ TEST_CASE_TEMPLATE("light that is aimed at has the mean of light that is met", E
   paths.roulette_after = 0;
   vec3d const ended = mean_of(picture(exec, nothing(), scene, view, {}, paths, 128));
   CHECK(ended.y == doctest::Approx(whole.y).epsilon(0.01));
+}
+
+TEST_CASE_TEMPLATE("what the camera moves by blurs, what is in focus is sharp", E, GART_TEST_POLICIES) {
+  // The edge of a glowing half-plane at distance 4: where it stands, moved, and out of focus.
+  E exec;
+  light::scene scene;
+  scene.meshes = {quad({-5, 0, 4}, {5, 0, 0}, {0, -5, 0}, 0)};
+  scene.materials = {glowing(vec3(1.0f))};
+  gart::camera view = camera_at({}, 64, 1, 64);
+  auto const row = [&](light::path_options const& paths) {
+    return picture(exec, nothing(), scene, view, {}, paths, 256);
+  };
+  light::path_options paths = through_middles(0);
+  auto const sharp = row(paths);
+  for (int x = 0; x < 64; ++x) CHECK(sharp[static_cast<std::size_t>(3 * x)] == (x < 32 ? 1.0f : 0.0f));
+  // By one unit, 16 pixels: the edge is anywhere within 8 pixels of where it was, equally long.
+  view.travel = {1, 0, 0}, paths.blur = 1;
+  auto const moved = row(paths);
+  for (int x = 0; x < 64; ++x)
+    CHECK(moved[static_cast<std::size_t>(3 * x)] ==
+          doctest::Approx(std::clamp((40 - (x + 0.5)) / 16, 0.0, 1.0)).scale(1).epsilon(0.02));
+  // A lens of radius 0.5: at the focus as without, at twice the distance of it a disk of 8 pixels' radius.
+  view.travel = vec3(0.0f), paths.blur = 0, paths.aperture = 0.5f, paths.focus = 4;
+  auto const focused = row(paths);
+  for (int x = 0; x < 64; ++x)
+    if (x != 31 && x != 32)
+      CHECK(focused[static_cast<std::size_t>(3 * x)] == doctest::Approx(x < 32 ? 1 : 0).scale(1).epsilon(1e-5));
+  paths.focus = 2;
+  auto const soft = row(paths);
+  for (int x = 0; x < 64; ++x) {
+    double const cut = std::clamp((x + 0.5 - 32) / 8, -1.0, 1.0);
+    double const part = (std::acos(cut) - cut * std::sqrt(1 - cut * cut)) / 3.141592653589793;
+    CHECK(soft[static_cast<std::size_t>(3 * x)] == doctest::Approx(part).scale(1).epsilon(0.02));
+  }
+}
+
+TEST_CASE_TEMPLATE("a Gaussian cut by a surface counts whole or not at all", E, GART_TEST_POLICIES) {
+  // Against its density marched along the ray in double up to the surface: off by 1 - sqrt(1 - alpha) at most, where
+  // the surface goes through its middle, and by nothing far from it.
+  E exec;
+  gart::gaussian_model model = cloud(1, 1, {0, 0, 4}, 0, false, 0);
+  float const scale = 0.1f, alpha = 0.8f;
+  model.log_scale.assign(3, std::log(scale));
+  model.opacity[0] = std::log(alpha / (1 - alpha));
+  light::scene scene;
+  scene.materials = {glowing(vec3(1.0f))};
+  gart::camera const view = camera_at({}, 1, 1, 100);
+  double worst = 0;
+  for (int i = -20; i <= 20; ++i) {
+    double const at = 4 + 0.02 * (i + 0.5);
+    scene.meshes = {quad({0, 0, static_cast<float>(at)}, {1, 0, 0}, {0, -1, 0}, 0)};
+    double const seen = double{picture(exec, model, scene, view, {}, through_middles(0))[0]};
+    // Density whose whole is -ln(1 - alpha), a normal along the ray.
+    double depth = 0;
+    int const steps = 20000;
+    for (int k = 0; k < steps; ++k) {
+      double const z = at * (k + 0.5) / steps, off = (z - 4) / double{scale};
+      depth += at / steps * std::exp(-0.5 * off * off) / (double{scale} * std::sqrt(6.283185307179586));
+    }
+    double const difference = std::fabs(seen - std::pow(1 - double{alpha}, depth));
+    worst = std::max(worst, difference);
+    if (std::abs(i) > 17) CHECK(difference < 2e-3);
+  }
+  CHECK(worst < 1 - std::sqrt(1 - double{alpha}));
+  CHECK(worst > 0.8 * (1 - std::sqrt(1 - double{alpha})));
 }
 
 TEST_CASE("numbers are drawn evenly, and angles are what they should be") {

@@ -80,6 +80,7 @@ TEST_CASE("options that nothing is traced by are refused by name") {
   refused(with([](path_options& o) { o.ambient = 2; }), "path_options.ambient");
   refused(with([](path_options& o) { o.aperture = -1; }), "path_options.aperture");
   refused(with([](path_options& o) { o.focus = 0; }), "path_options.focus");
+  refused(with([](path_options& o) { o.blur = 2; }), "path_options.blur");
   refused(with([](path_options& o) { o.firefly = -1; }), "path_options.firefly");
 }
 

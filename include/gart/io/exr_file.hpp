@@ -1,7 +1,8 @@
 #pragma once
 /// \file
-/// Images of floats as OpenEXR files (https://openexr.com): one part of scan lines, 32-bit floats, packed without loss
-/// (ZIP, 16 lines at a time). Written only; needs zlib, no other library.
+/// Images of floats as OpenEXR files (https://openexr.com), as programs of compositing read them: one part of scan
+/// lines. Written as 32-bit floats, packed without loss (ZIP, 16 lines at a time); read of 16 or 32 bits, unpacked or
+/// packed by RLE, ZIPS or ZIP. Needs zlib, no other library.
 
 #include <gart/scene/image.hpp>
 
@@ -14,5 +15,14 @@ namespace gart {
 /// written as they are, without a change of their transfer curve. Errors: invalid_argument for another number of
 /// letters or an empty image, io_error for a file that cannot be written.
 void write_exr(std::filesystem::path const& path, image_float const& image, std::string_view channels);
+
+/// These channels of a file, in this order; of a file that has Y alone, Y for R, G and B. Numbers stay as they are, NaN
+/// too. Errors: io_error naming the file and the field, for what is damaged, tiled, deep, of several parts, of another
+/// compression, or without a channel.
+image_float read_exr(std::filesystem::path const& path, std::string_view channels = "RGB");
+
+/// Linear RGB of all directions as EXR or Radiance HDR (RGBE), told by the first bytes. What is not finite or below 0
+/// becomes 0, what is above 65504 that. Errors: io_error naming the file and the remedy.
+image_float read_radiance(std::filesystem::path const& path);
 
 }  // namespace gart

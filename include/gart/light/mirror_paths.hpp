@@ -105,13 +105,15 @@ struct split_gradient {
 // Pixels that are traced: all, or those that meet a mirror first; a place for each.
 struct find_mirrors {
   scene_view scene;
+  path const* paths;
   path_hit const* ends;
   bool all;
   u32* traced;
   GART_KERNEL void operator()(index_t i) const {
     path_hit const end = ends[i];
     bool const surface = !end.none() && !end.of_light();
-    traced[i] = all || (surface && scene.materials[scene.rows[end.id].material].kind == material_kind::mirror);
+    traced[i] = paths[i].pixel != path::no_pixel &&
+                (all || (surface && scene.materials[scene.rows[end.id].material].kind == material_kind::mirror));
   }
 };
 struct take_pixels {
@@ -123,7 +125,7 @@ struct take_pixels {
   u32* pixels;
   GART_KERNEL void operator()(index_t i) const {
     if (!traced[i]) return;
-    paths[places[i]] = all_paths[i], ends[places[i]] = all_ends[i], pixels[places[i]] = i;
+    paths[places[i]] = all_paths[i], ends[places[i]] = all_ends[i], pixels[places[i]] = all_paths[i].pixel;
   }
 };
 struct put_pixels {
@@ -273,18 +275,20 @@ class mirror_paths {
   };
 
   void require_begun(std::size_t size, char const* call) const {
-    if (all_ends_.size() == 0) throw invalid_argument(std::string(call) + ": there is no view; call forward first");
-    if (size != 3 * all_ends_.size())
+    if (size_ == 0) throw invalid_argument(std::string(call) + ": there is no view; call forward first");
+    if (size != 3 * size_)
       throw invalid_argument(std::string(call) + ": the gradient has " + std::to_string(size) +
-                             " numbers, and the view has " + std::to_string(all_ends_.size()) + " pixels of three");
+                             " numbers, and the view has " + std::to_string(size_) + " pixels of three");
   }
   void cast(camera const& view, render_options const& options) {
-    index_t const n = static_cast<index_t>(view.width) * static_cast<index_t>(view.height);
+    pixel_order const order{view.width, view.height};
+    index_t const n = order.launch_size();
+    size_ = static_cast<std::size_t>(view.width) * static_cast<std::size_t>(view.height);
     all_paths_.resize(n), all_ends_.resize(n);
     visit_camera(view, [&]<class M>(M const& model) {
-      parallel_for(
-          *exec_, "light/cast", n,
-          light_kernels::cast_paths<M>{model, {}, options.near, options.background, 0, 0, false, all_paths_.data()});
+      parallel_for(*exec_, "light/cast", n,
+                   light_kernels::cast_paths<M>{
+                       model, order, {}, options.near, options.background, 0, 0, false, all_paths_.data()});
     });
     parallel_for(*exec_, "light/triangles", n,
                  light_kernels::end_segments{placed_.stand_at(view.position), all_paths_.data(), all_ends_.data()});
@@ -294,7 +298,8 @@ class mirror_paths {
     index_t const n = static_cast<index_t>(all_ends_.size());
     traced_.resize(n), places_.resize(std::size_t{n} + 1);
     parallel_for(*exec_, "light/mirrors", n,
-                 light_kernels::find_mirrors{scene, all_ends_.data(), which == mirror_pixels::all, traced_.data()});
+                 light_kernels::find_mirrors{scene, all_paths_.data(), all_ends_.data(), which == mirror_pixels::all,
+                                             traced_.data()});
     span<u32> const places = places_.view();
     exclusive_scan(*exec_, span<u32 const>(traced_), places.subspan(0, n), places.subspan(n, 1));
     u32 count = 0;
@@ -334,6 +339,7 @@ class mirror_paths {
   buffer<vec3, E> by_seen_;
   buffer<float, E> by_color_, by_transmittance_;
   std::unique_ptr<gaussians<E>> of_segment_;
+  std::size_t size_ = 0;  // pixels of the view
 };
 
 }}  // namespace gart::GART_ISA

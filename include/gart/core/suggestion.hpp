@@ -1,14 +1,15 @@
 #pragma once
-// The name that was meant: of those that there are, the nearest to what was typed.
+/// \file
+/// The name that was meant: of those that there are, the nearest to what was typed.
 
 #include <algorithm>
 #include <numeric>
 #include <string>
 #include <vector>
 
-namespace gart_cli {
+namespace gart {
 
-// Letters to add, remove, exchange or swap with the next (the restricted Damerau-Levenshtein distance).
+/// Letters to add, remove, exchange or swap with the next (the restricted Damerau-Levenshtein distance).
 inline std::size_t letters_between(std::string const& a, std::string const& b) {
   std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), now(b.size() + 1);
   std::iota(last.begin(), last.end(), std::size_t{0});
@@ -23,7 +24,11 @@ inline std::size_t letters_between(std::string const& a, std::string const& b) {
   return last[b.size()];
 }
 
+<<<<<<< HEAD:program/suggestion.hpp
 // "; did you mean X?" for the nearest name if at most a third of its letters differ; else "".
+=======
+/// "; did you mean X?" for the nearest name, where no more than a third of it is other; else nothing.
+>>>>>>> h-light:include/gart/core/suggestion.hpp
 inline std::string did_you_mean(std::string const& typed, std::vector<std::string> const& names) {
   std::string const* nearest = nullptr;
   std::size_t least = 0;
@@ -35,4 +40,4 @@ inline std::string did_you_mean(std::string const& typed, std::vector<std::strin
   return nearest ? "; did you mean " + *nearest + "?" : "";
 }
 
-}  // namespace gart_cli
+}  // namespace gart

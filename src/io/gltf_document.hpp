@@ -1,0 +1,105 @@
+#pragma once
+// What readers of glTF 2.0 share (https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html): a file's JSON and its
+// buffers, within a GLB, in the JSON as base64, or beside it; the numbers of accessors. What the JSON is not is an
+// exception of its library, which readers make an error of the file.
+
+#include <gart/core/error.hpp>
+#include <gart/core/types.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace gart::io {
+
+inline constexpr int deepest_gltf_node = 64;
+enum gltf_component {
+  gltf_i8 = 5120,
+  gltf_u8 = 5121,
+  gltf_i16 = 5122,
+  gltf_u16 = 5123,
+  gltf_u32 = 5125,
+  gltf_f32 = 5126
+};
+
+class gltf_document {
+ public:
+  explicit gltf_document(std::filesystem::path const& path);
+
+  nlohmann::json const& root() const { return root_; }
+  std::string const& name() const { return name_; }
+  // Of the file and of its buffers beside it, which are read.
+  std::size_t all_bytes();
+  [[noreturn]] void refuse(std::string const& what, std::string const& remedy = "export it again") const {
+    throw io_error(name_, what, remedy);
+  }
+
+  // The bytes of a buffer view; `what` is what lies there.
+  std::pair<u8 const*, std::size_t> view(nlohmann::json const& number, std::string const& what);
+  // What "uri" names, beside the file or within the text; `what` is what has it.
+  std::vector<u8> uri_bytes(std::string const& uri, std::string const& what) const;
+  // The path that it is of, for errors; the file itself for what lies within.
+  std::string uri_name(std::string const& uri) const;
+
+  // How many elements an accessor has.
+  std::size_t count(nlohmann::json const& number) const {
+    return root_.at("accessors").at(number.get<std::size_t>()).at("count").get<std::size_t>();
+  }
+  // store(i, c, value) for the numbers of an accessor of n elements, `width` numbers each.
+  void each(nlohmann::json const& number, std::string const& what, std::size_t n, std::size_t width,
+            auto const& store) {
+    accessor const a = accessor_of(number, what, n, width);
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t c = 0; c < width; ++c)
+        store(i, c, number_at(a.at + a.stride * i + a.size * c, a.type, a.normalized));
+  }
+
+ private:
+  struct accessor {
+    u8 const* at;
+    u64 stride;
+    std::size_t size;
+    int type;
+    bool normalized;
+  };
+  accessor accessor_of(nlohmann::json const& number, std::string const& what, std::size_t n, std::size_t width);
+  std::pair<u8 const*, std::size_t> buffer(std::size_t number, std::string const& what);
+
+  static double number_at(u8 const* at, int type, bool normalized) {
+    auto const as = [&](auto value, double most) {
+      std::memcpy(&value, at, sizeof value);
+      double const v = static_cast<double>(value);
+      return normalized ? std::max(v / most, -1.0) : v;
+    };
+    switch (type) {
+      case gltf_i8:
+        return as(std::int8_t{}, 127);
+      case gltf_u8:
+        return as(u8{}, 255);
+      case gltf_i16:
+        return as(std::int16_t{}, 32767);
+      case gltf_u16:
+        return as(u16{}, 65535);
+      case gltf_u32:
+        return as(u32{}, 4294967295.0);
+    }
+    float value;
+    std::memcpy(&value, at, sizeof value);
+    return static_cast<double>(value);
+  }
+
+  std::string name_;
+  std::filesystem::path folder_;
+  std::vector<u8> bytes_;
+  u8 const* binary_ = nullptr;  // of a GLB
+  std::size_t binary_size_ = 0;
+  nlohmann::json root_;
+  std::vector<std::vector<u8>> outside_;  // buffers with a "uri", once read
+};
+
+}  // namespace gart::io
