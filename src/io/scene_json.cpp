@@ -308,7 +308,8 @@ class scene_reader {
   }
 
   void read_environment() {
-    if (!top_.has("environment")) return;
+    out_.scene.around.visible = top_.has("environment");
+    if (!out_.scene.around.visible) return;
     record const r{top_.at("environment"), nullptr, top_.where + ": environment"};
     require_keys(r, {"file", "color", "degrees", "visible", "sky"});
     light::environment& e = out_.scene.around;
@@ -424,6 +425,7 @@ scene_file read_scene(fs::path const& path, vec3d const& origin) {
   } else {
     throw io_error(path.string(), "is no scene", "scenes are .json, .glb, .gltf, .obj and .ply files");
   }
+  out.scene.around.visible = false;  // the background is
   return out;
 }
 
