@@ -20,6 +20,7 @@
 #include <gart/io/ply.hpp>
 #include <gart/io/splat_file.hpp>
 #include <gart/lens/differentiate_lens.hpp>
+#include <gart/light/path_tracer.hpp>
 #include <gart/loss/affine_color.hpp>
 #include <gart/loss/metrics.hpp>
 #include <gart/pose/differentiate_pose.hpp>
@@ -30,6 +31,7 @@
 #include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/initial.hpp>
 #include <gart/runtime/model_file.hpp>
+#include <gart/runtime/path_renderer.hpp>
 #include <gart/runtime/renderer.hpp>
 #include <gart/runtime/session.hpp>
 #include <gart/runtime/track.hpp>

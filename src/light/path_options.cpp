@@ -44,6 +44,7 @@ void require_path_options(path_options const& o) {
   require(o.ambient >= 0 && o.ambient <= 1, "ambient", "0 to 1", o.ambient);
   require(o.aperture >= 0 && std::isfinite(o.aperture), "aperture", "0 or more", o.aperture);
   require(o.focus > 0 && std::isfinite(o.focus), "focus", "more than 0", o.focus);
+  require(o.blur >= 0 && o.blur <= 1, "blur", "0 to 1", o.blur);
   require(o.firefly >= 0 && std::isfinite(o.firefly), "firefly", "0 or more", o.firefly);
   require(std::fabs(o.exposure) <= 60, "exposure", "-60 to 60 stops", o.exposure);
 }

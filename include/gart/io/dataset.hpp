@@ -16,6 +16,7 @@
 #include <gart/comm/host_group.hpp>
 #include <gart/core/names.hpp>
 #include <gart/io/depth_file.hpp>
+#include <gart/light/scene.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/scene/image.hpp>
 
@@ -58,6 +59,7 @@ struct dataset {
   std::size_t decoded = 0;  ///< photographs that this process has decoded: where ranks share them, its part
   /// Random starting points lie in this box; Blender's [-1.3, 1.3]^3, else around the cameras.
   vec3d bounds_min{-1.3}, bounds_max{1.3};  ///< corners
+  light::scene mirrors = {};                ///< known to be in it, from the same origin: photographs show them
 
   /// Pixels of all training views.
   u64 training_pixels() const {

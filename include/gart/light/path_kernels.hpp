@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// What is done to paths between their segments: cast from the camera, ended at a triangle or a light, lit, and sent
-/// on. An index is a pixel and its path.
+/// on. An index is a path.
 
 #include <gart/camera/models.hpp>
 #include <gart/light/path_options.hpp>
@@ -15,11 +15,13 @@ struct thin_lens {
   float radius = 0, focus = 1;
   bool flat = true;
   mat3 rotation{1.0f};
+  vec3 moved{0.0f};  // from where the frame is
 };
 
 template <camera_model M>
 struct cast_paths {
   M model;
+  pixel_order order;
   thin_lens lens;
   float near;
   vec3 background;
@@ -28,12 +30,18 @@ struct cast_paths {
   bool jitter;
   path* paths;
   GART_KERNEL void operator()(index_t i) const {
-    index_t const width = static_cast<index_t>(model.width);
-    draws const draw = draws::of(seed, i, sample);
+    pixel const of = order.at(i);
+    if (!order.inside(of)) {
+      paths[i] = {vec3(0.0f), near, vec3(0.0f), 0, vec3(0.0f), 0, vec3(0.0f), path::no_pixel};
+      return;
+    }
+    u32 const place = static_cast<u32>(order.address(of));
+    draws const draw = draws::of(seed, place, sample);
     vec2 const at = jitter ? draw.pair(0, draw_pixel) : vec2(0.5f);
-    auto const cast = model.ray(static_cast<float>(i % width) + at.x, static_cast<float>(i / width) + at.y);
+    auto const cast = model.ray(static_cast<float>(of.x) + at.x, static_cast<float>(of.y) + at.y);
     path p{origin_of(cast), near, cast.direction, 0, vec3(1.0f), path::alive | path::specular | path::direct,
-           vec3(0.0f),      0};
+           vec3(0.0f),      place};
+    p.origin += lens.moved;
     if (p.direction == vec3(0.0f)) {  // a pixel that no ray is of
       p.flags = 0, p.radiance = background;
     } else if (lens.radius > 0) {
@@ -89,7 +97,7 @@ struct aim_at_light {
     if (!p.is(path::alive) || p.is(path::opaque) || end.none() || end.of_light() || p.bounces() >= bounces) return;
     surface_point const s(scene, end, p.direction);
     if (s.kind != material_kind::surface) return;
-    draws const draw = draws::of(seed, i, sample);
+    draws const draw = draws::of(seed, p.pixel, sample);
     given_light const g = light < scene.light_count
                               ? give(scene.lights[light], s.position, draw.pair(step, draw_light + light))
                               : from_around(draw.pair(step, draw_environment));
@@ -142,7 +150,7 @@ struct send_on {
       light_row const& l = scene.lights[end.id & ~path_hit::is_light];
       add(p, l.color * (p.is(path::specular) ? 1.0f : balance(p.density, light_density(l, p.own(), end.t))));
     } else {
-      goes_on = at_surface(p, end, draws::of(seed, i, sample));
+      goes_on = at_surface(p, end, draws::of(seed, p.pixel, sample));
     }
     if (!goes_on) p.flags &= ~path::alive;
     paths[i] = p;
@@ -219,8 +227,9 @@ struct add_samples {
   float* sums;  // [P][3]
   GART_KERNEL void operator()(index_t i) const {
     vec3 const c = paths[i].radiance;
+    if (paths[i].pixel == path::no_pixel) return;
     if (!(is_finite(c.x) && is_finite(c.y) && is_finite(c.z))) return;
-    for (int k = 0; k < 3; ++k) sums[std::size_t{3} * i + static_cast<std::size_t>(k)] += c[k];
+    for (int k = 0; k < 3; ++k) sums[std::size_t{3} * paths[i].pixel + static_cast<std::size_t>(k)] += c[k];
   }
 };
 
@@ -249,17 +258,19 @@ struct add_surface_layers {
   path_hit const* ends;
   layer_targets out;
   GART_KERNEL void operator()(index_t i) const {
-    out.mesh[i] = out.triangle[i] = triangle_hit::none;
-    float* const normal = out.normal + std::size_t{3} * i;
-    float* const albedo = out.albedo + std::size_t{3} * i;
+    u32 const at = paths[i].pixel;
+    if (at == path::no_pixel) return;
+    out.mesh[at] = out.triangle[at] = triangle_hit::none;
+    float* const normal = out.normal + std::size_t{3} * at;
+    float* const albedo = out.albedo + std::size_t{3} * at;
     normal[0] = normal[1] = normal[2] = 0;
     path_hit const end = ends[i];
     if (!paths[i].is(path::alive) || end.none() || end.of_light()) return;
     surface_point const s(scene, end, paths[i].direction);
-    float const left = out.transmittance[i];
+    float const left = out.transmittance[at];
     for (int k = 0; k < 3; ++k) normal[k] = left * s.normal[k], albedo[k] += left * s.base[k];
-    out.depth[i] += left * end.t;
-    out.mesh[i] = scene.rows[end.id].mesh, out.triangle[i] = scene.rows[end.id].number;
+    out.depth[at] += left * end.t;
+    out.mesh[at] = scene.rows[end.id].mesh, out.triangle[at] = scene.rows[end.id].number;
   }
 };
 

@@ -45,6 +45,7 @@ struct path_options {
   bool linear = false;   ///< the Gaussians' colours are in sRGB's curve: each hit is decoded before it is blended
   float aperture = 0;    ///< radius of the lens, world units; 0: all is sharp
   float focus = 1;       ///< distance along the axis that is sharp, world units
+  float blur = 0;        ///< exposure, in parts of the camera's travel and turn; 0: one moment
   bool jitter = true;    ///< rays go through all of a pixel, else through its middle
   float firefly = 0;     ///< most radiance that one path adds after its first bounce; 0: no bound
   float exposure = 0;    ///< stops

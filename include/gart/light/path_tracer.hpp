@@ -20,6 +20,7 @@
 
 #include <gart/light/path_kernels.hpp>
 #include <gart/light/placed_scene.hpp>
+#include <gart/math/turn.hpp>
 #include <gart/render/frame.hpp>
 
 namespace gart { inline namespace GART_ISA {
@@ -74,16 +75,18 @@ class path_tracer {
     shade(paths);
     view_ = view, options_ = options, paths_options_ = paths;
     pixels_ = static_cast<index_t>(view.width) * static_cast<index_t>(view.height);
+    order_ = {view.width, view.height};
+    rays_ = order_.launch_size();
     samples_ = 0;
-    paths_.resize(pixels_), ends_.resize(pixels_), sums_.resize(std::size_t{3} * pixels_);
+    paths_.resize(rays_), ends_.resize(rays_), sums_.resize(std::size_t{3} * pixels_);
     sums_.zero();
   }
   /// So many samples more a pixel.
   void add(int samples) {
     require_begun("path_tracer.add");
     for (int s = 0; s < samples; ++s) {
-      trace(static_cast<u32>(samples_), paths_options_.jitter, paths_options_.aperture);
-      parallel_for(*exec_, "light/sum", pixels_, light_kernels::add_samples{paths_.data(), sums_.data()});
+      trace(static_cast<u32>(samples_));
+      parallel_for(*exec_, "light/sum", rays_, light_kernels::add_samples{paths_.data(), sums_.data()});
       ++samples_;
     }
   }
@@ -97,12 +100,12 @@ class path_tracer {
   /// The layers of rays through the middles of the pixels; targets in memory of the policy.
   void layers(light_kernels::layer_targets const& out) {
     require_begun("path_tracer.layers");
-    cast(0, false, 0);
+    cast(0, false, 0, 0);
     end_segments();
     trace_batch<Response>(*exec_, "light/layers", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f},
-                          pixels_,
+                          rays_,
                           light_kernels::layer_segment{{}, paths_.data(), ends_.data(), colors(), options_, out});
-    parallel_for(*exec_, "light/layers", pixels_,
+    parallel_for(*exec_, "light/layers", rays_,
                  light_kernels::add_surface_layers{placed_.stand_at(frame_), paths_.data(), ends_.data(), out});
   }
 
@@ -147,28 +150,34 @@ class path_tracer {
     factors_are_old_ = false;
   }
 
-  void cast(u32 sample, bool jitter, float aperture) {
-    light_kernels::thin_lens const lens{
-        aperture, paths_options_.focus,
-        view_.kind == camera_kind::perspective || view_.kind == camera_kind::orthographic, view_.rotation};
-    visit_camera(view_, [&]<class M>(M const& model) {
-      parallel_for(*exec_, "light/cast", pixels_,
-                   light_kernels::cast_paths<M>{model, lens, options_.near, options_.background, paths_options_.seed,
-                                                sample, jitter, paths_.data()});
+  // Each sample is of one moment: their moments fill the exposure evenly.
+  void cast(u32 sample, bool jitter, float aperture, float blur) {
+    camera view = view_;
+    double const time = (double{light_kernels::unit_interval(light_kernels::reversed(sample))} - 0.5) * double{blur};
+    mat3d const rotation(view.rotation);
+    vec3 const moved(rotation * (time * vec3d(view.travel)));
+    view.rotation = mat3(rotation * turn_of(time * vec3d(view.turn)));
+    light_kernels::thin_lens const lens{aperture, paths_options_.focus,
+                                        view.kind == camera_kind::perspective || view.kind == camera_kind::orthographic,
+                                        view.rotation, moved};
+    visit_camera(view, [&]<class M>(M const& model) {
+      parallel_for(*exec_, "light/cast", rays_,
+                   light_kernels::cast_paths<M>{model, order_, lens, options_.near, options_.background,
+                                                paths_options_.seed, sample, jitter, paths_.data()});
     });
   }
   void end_segments() {
-    parallel_for(*exec_, "light/triangles", pixels_,
+    parallel_for(*exec_, "light/triangles", rays_,
                  light_kernels::end_segments{placed_.stand_at(frame_), paths_.data(), ends_.data()});
   }
-  void trace(u32 sample, bool jitter, float aperture) {
+  void trace(u32 sample) {
     light_kernels::scene_view const& scene = placed_.stand_at(frame_);
     auto const& o = paths_options_;
     u32 const bounces = static_cast<u32>(o.bounces);
     // A path that catchers let pass goes on as it is, and comes to this many of them.
     u32 const steps = bounces + 1 + (placed_.catches_shadows() ? 4 : 0);
     u32 const lights = scene.light_count + (scene.around.texels ? 1 : 0);
-    cast(sample, jitter, aperture);
+    cast(sample, o.jitter, o.aperture, o.blur);
     for (u32 step = 0; step < steps; ++step) {
       end_segments();
       if (o.shadows == light::shadow_kind::per_hit)
@@ -177,7 +186,7 @@ class path_tracer {
         blend<false>(sample, step);
       if (placed_.triangles() > 0 && bounces > 0)
         for (u32 l = 0; l < lights; ++l) shadow(l, sample, step);
-      parallel_for(*exec_, "light/surfaces", pixels_,
+      parallel_for(*exec_, "light/surfaces", rays_,
                    light_kernels::send_on{scene,
                                           paths_.data(),
                                           ends_.data(),
@@ -194,7 +203,7 @@ class path_tracer {
   template <bool PerHit>
   void blend(u32 sample, u32 step) {
     trace_batch<Response>(*exec_, "light/gaussians", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f},
-                          pixels_,
+                          rays_,
                           light_kernels::segment<PerHit>{{},
                                                          paths_.data(),
                                                          ends_.data(),
@@ -207,13 +216,13 @@ class path_tracer {
                                                          step});
   }
   void shadow(u32 light, u32 sample, u32 step) {
-    shadows_.resize(pixels_);
-    parallel_for(*exec_, "light/shadows", pixels_,
+    shadows_.resize(rays_);
+    parallel_for(*exec_, "light/shadows", rays_,
                  light_kernels::aim_at_light{placed_.stand_at(frame_), paths_.data(), ends_.data(), shadows_.data(),
                                              light, static_cast<u32>(paths_options_.bounces), paths_options_.firefly,
                                              paths_options_.seed, sample, step});
     trace_batch<Response>(
-        *exec_, "light/transmittance", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f}, pixels_,
+        *exec_, "light/transmittance", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f}, rays_,
         light_kernels::shadow_segment{{}, shadows_.data(), paths_.data(), options_.transmittance_min});
   }
 
@@ -236,7 +245,8 @@ class path_tracer {
   buffer<light_kernels::path_hit, E> ends_;
   buffer<light_kernels::shadow_ray, E> shadows_;
   buffer<float, E> sums_;
-  index_t pixels_ = 0;
+  pixel_order order_;
+  index_t pixels_ = 0, rays_ = 0;  // rays: of whole blocks of pixels
   int samples_ = 0;
 };
 

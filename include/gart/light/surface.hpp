@@ -139,7 +139,7 @@ GART_HD GART_INLINE vec3 reflected(vec3 const& direction, vec3 const& n) {
 // Where a path meets a triangle.
 struct surface_point {
   vec3 position, side, normal;  // the triangle's normal and that for shading, both against the ray
-  float lift;                   // that new rays begin off the surface
+  float lift;                   // roundings of the position
   bool inside;                  // the ray came from behind
   material_kind kind;
   vec3 base, emission;
@@ -170,9 +170,9 @@ struct surface_point {
     base = m.base_color * vec3(color.x, color.y, color.z), emission = m.emission * vec3(glow.x, glow.y, glow.z);
     metallic = m.metallic * rough.z, roughness = m.roughness * rough.y;
   }
-  // Where a new ray in that direction begins.
+  // Where a new ray in that direction begins: on its line, past the roundings of where the surface is.
   GART_HD GART_INLINE vec3 leave(vec3 const& direction) const {
-    return position + (glm::dot(side, direction) < 0 ? -lift : lift) * side;
+    return position + (lift / fmaxf(fabsf(glm::dot(side, direction)), 0.05f)) * direction;
   }
 
  private:

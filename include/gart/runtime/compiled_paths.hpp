@@ -4,6 +4,8 @@
 /// kernels of the policy can be compiled, and call from GART_REGISTER_CONFIGURATIONS:
 ///   GART_REGISTER_CONFIGURATIONS(my_paths, gart::register_paths<gart::openmp_exec>())
 
+#include <gart/light/mirror_paths.hpp>
+#include <gart/light/mirror_service.hpp>
 #include <gart/light/path_tracer.hpp>
 #include <gart/runtime/configuration_of.hpp>
 #include <gart/runtime/path_renderer.hpp>
@@ -73,13 +75,39 @@ class compiled_paths final : public path_renderer {
   int width_ = 0, height_ = 0;
 };
 
-/// The renderer of a policy and a response, for make_path_renderer.
+/// The mirrors of a policy and a response.
+template <execution E, class Response>
+class compiled_mirrors final : public mirror_service {
+ public:
+  /// `exec` must outlive it.
+  compiled_mirrors(E& exec, light::scene const& scene) : paths_(exec) { paths_.set_scene(scene); }
+
+  void show(gaussians_view<float const> model, int active_degree, camera const& view, render_options const& options,
+            float* image) override {
+    constexpr int bounces = 4;
+    paths_.set_model(model, active_degree);
+    paths_.forward(view, options, bounces, image, mirror_pixels::mirrors);
+  }
+  void take_out(span<float> by_image) override { paths_.take_out(by_image); }
+  void backward(span<float const> by_image, gaussians_view<float> gradients) override {
+    paths_.backward(by_image, gradients, with_what::there_is);
+  }
+
+ private:
+  mirror_paths<E, Response> paths_;
+};
+
+/// The renderer of a policy and a response, for make_path_renderer, and its mirrors, for trainers.
 template <execution E, class Response = generalized_gaussian<>>
 void register_paths(bool (*available)(std::string*) = always_available) {
   register_path_renderer(from_string(E::name, backend_kind::automatic), Response::degree, available,
                          [](configuration_request const& request) -> std::unique_ptr<path_renderer> {
                            return std::make_unique<compiled_paths<E, Response>>(request);
                          });
+  register_mirrors(E::name, E::device ? "" : instruction_set, Response::degree,
+                   [](void* exec, light::scene const& scene) -> std::unique_ptr<mirror_service> {
+                     return std::make_unique<compiled_mirrors<E, Response>>(*static_cast<E*>(exec), scene);
+                   });
 }
 
 }}  // namespace gart::GART_ISA

@@ -170,6 +170,9 @@ class basic_trainer {
   void make_room();
   bool in_ranks() const { return !Comm::alone && (comm_.size() > 1 || options_.batch > 1); }
   vec3 background_of(int step) const;
+  bool shows_more() const {
+    return std::any_of(parts_.begin(), parts_.end(), [](auto const& part) { return part->shows(); });
+  }
   // The camera of a training view as it is learned, and its image's size in a step.
   camera seen_by(std::size_t index) const {
     camera view = data_.train[index].view;

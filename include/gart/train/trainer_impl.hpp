@@ -207,8 +207,10 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace(Plan& plan, loss_fu
   image_targets const targets =
       image_.begin(static_cast<std::size_t>(v.seen.width) * v.seen.height, needs.depth, has_depth<Strategy>);
   v.color = image_.color, v.depth = image_.depth(), v.by_image = image_.gradients();
+  v.model = plan.scene(), v.degree = degree;
   v.share = [&](float* plane) { plan.share(plane, v.seen, sizeof(float)); };
   vec3 const background = background_of(v.step + image);
+  v.options = render_options_of(options_, data_.extent, background);
   bool const divides_loss = plan.divides_loss(!loss && !needs.image && !needs.depth);
   auto const differentiate_loss = [&] {
     stage_scope stage(exec_, "loss");
@@ -229,6 +231,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace(Plan& plan, loss_fu
     for (std::size_t i = parts_.size(); i-- > 0;) parts_[i]->after_loss(v, image_.by_color, numbers_of(row, i));
   };
   auto const after_backward = [&](frame_type* frame) {
+    if (!in_ranks()) v.gradients = gaussians_.gradients.view();
     for (std::size_t i = 0; i < parts_.size(); ++i) parts_[i]->after_backward(frame, v, numbers_of(row, i));
   };
   if (plan.unit().empty()) {
@@ -237,7 +240,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace(Plan& plan, loss_fu
     after_backward(nullptr);
     return plan.give_nothing_back();
   }
-  render_options render = render_options_of(options_, data_.extent, background);
+  render_options render = v.options;
   render.rows = plan.unit().rows;
   frame_type& frame = tracing_.frame;
   frame.prepare(plan.scene(), v.seen, render, degree);
@@ -303,13 +306,21 @@ rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& 
   if constexpr (!Comm::alone)
     if (in_ranks()) return plans_.ranks.render(tracing_.frame, gaussians_, view, options, gaussians_.degree);
   tracing_.frame.prepare(std::as_const(gaussians_.model).view(), view, options, gaussians_.degree);
-  return render_image(tracing_.frame);
+  rendered out = render_image(tracing_.frame);
+  if (!shows_more()) return out;
+  buffer<float, E> image(exec_, out.color.data.size());
+  image.assign(span<float const>(out.color.data));
+  for (auto const& part : parts_)
+    part->show(view, options, std::as_const(gaussians_.model).view(), gaussians_.degree, image);
+  out.color.data = image.to_host();
+  return out;
 }
 
 template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
 image8 basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_8bit(camera const& view, vec3 background) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return to_8bit(render(view, background).color);
+  if (shows_more()) return to_8bit(render(view, background).color);
   tracing_.frame.prepare(std::as_const(gaussians_.model).view(), view,
                          render_options_of(options_, data_.extent, background), gaussians_.degree);
   return render_image_8bit(tracing_.frame);

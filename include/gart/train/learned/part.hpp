@@ -35,6 +35,10 @@ struct step_view {
   span<float const> color = {};            ///< [H][W][3]
   depth_pixels depth = {};                 ///< where a part asked for it; gradients of a strategy with_depth alone
   image_gradients by_image = {};           ///< dL/d image
+  render_options options = {};             ///< that it is traced by
+  gaussians_view<float const> model = {};  ///< that it is traced of, on this rank
+  int degree = 0;                          ///< of the bands that are evaluated
+  gaussians_view<float> gradients = {};    ///< after_backward on one rank: of Gaussians, to add to
   std::function<void(float*)> share = {};  ///< fills in what others have traced of an image of one float a pixel
 };
 
@@ -88,6 +92,11 @@ class learned_part {
   virtual void after_gradients(gaussians_view<float const> const& /*model*/,
                                gaussians_view<float const> const& /*gradients*/, camera const& /*seen*/,
                                all_rows<execution_type>& /*rows*/, span<float> /*numbers*/) {}
+  /// Whether images of the model show more than the Gaussians, by show().
+  virtual bool shows() const { return false; }
+  /// Into an image of the Gaussians, [H][W][3] in memory of the policy.
+  virtual void show(camera const& /*view*/, render_options /*options*/, gaussians_view<float const> /*model*/,
+                    int /*degree*/, span<float> /*image*/) {}
   /// The numbers, in host memory.
   virtual void found(step_view const&, span<float> /*numbers*/) {}
   /// What they add to the loss that is reported.

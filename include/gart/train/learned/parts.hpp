@@ -5,6 +5,7 @@
 #include <gart/train/learned/depth.hpp>
 #include <gart/train/learned/exposure.hpp>
 #include <gart/train/learned/lenses.hpp>
+#include <gart/train/learned/mirrors.hpp>
 #include <gart/train/learned/poses.hpp>
 #include <gart/train/learned/vignetting.hpp>
 
@@ -25,6 +26,7 @@ learned_parts<Frame> make_learned_parts(typename Frame::execution_type& exec, tr
   require_depth<Depth>(options, data);
   if (options.refine_poses) all.push_back(std::make_unique<learned_poses<Frame>>(exec, options, data, spread));
   if (options.refine_lens) all.push_back(std::make_unique<learned_lenses<Frame>>(exec, options, data));
+  if (!data.mirrors.meshes.empty()) all.push_back(std::make_unique<learned_mirrors<Frame>>(exec, data, spread));
   if constexpr (Depth) all.push_back(std::make_unique<learned_depth<Frame>>(exec, data, options.depth_weight));
   if (options.vignetting) all.push_back(std::make_unique<learned_vignetting<Frame>>(exec, data));
   if (options.exposure) all.push_back(std::make_unique<learned_exposures<Frame>>(exec, data));

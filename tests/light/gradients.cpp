@@ -1,0 +1,88 @@
+// Gradients through mirrors: of the light by definition, in double, by finite differences.
+#include <gart/camera/models.hpp>
+#include <gart/light/mirror_paths.hpp>
+
+#include <light/double_light.hpp>
+#include <light/small_scenes.hpp>
+
+using namespace gart_test;
+
+TEST_CASE_TEMPLATE("mirrors pass gradients on to what they show", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  gart::gaussian_model const model = cloud(seed, 25, {0, 0, 4}, 0.7f, true, 1);
+  light::scene scene;
+  scene.meshes = {quad({1.2f, 0, 4.5f}, {1, 0, -1}, {0, -2, 0}, 0), quad({-1.2f, 0, 4.5f}, {1, 0, 1}, {0, -2, 0}, 0),
+                  quad({0, 1.2f, 4}, {0.7f, 0, 0}, {0, 0, 0.7f}, 1)};
+  scene.materials = {material_of(light::material_kind::mirror, {0.9f, 0.8f, 0.7f}), glowing({0.2f, 0.5f, 0.3f})};
+  gart::camera const view = camera_at({0.1, -0.063, 0}, 16, 12, 14);
+  gart::render_options options;
+  options.alpha_min = 1e-7f, options.transmittance_min = 0, options.background = vec3(0.3f, 0.4f, 0.1f);
+  int const bounces = 3;
+  std::size_t const pixels = 16 * 12;
+  std::mt19937_64 engine(seed + 1);
+  std::normal_distribution<float> normal;
+  std::vector<float> weights(3 * pixels);
+  for (float& w : weights) w = normal(engine);
+
+  light::path_options const paths = through_middles(bounces);
+  auto const image = [&](gart::gaussian_model const& m) {
+    double_light const light(m, scene, options, paths);
+    std::vector<double> out;
+    for (int y = 0; y < view.height; ++y)
+      for (int x = 0; x < view.width; ++x) {
+        vec3d const d(gart::ray_direction(view, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
+        vec3d const c = light(view.position, glm::normalize(d));
+        for (int k = 0; k < 3; ++k) out.push_back(c[k]);
+      }
+    return out;
+  };
+  auto const loss = [&](std::vector<double> const& colors) {
+    double sum = 0;
+    for (std::size_t i = 0; i < colors.size(); ++i) sum += double{weights[i]} * colors[i];
+    return sum;
+  };
+
+  gart::gaussians<E> const there(exec, model);
+  gart::gaussians<E> gradients(exec, model.size(), 1);
+  gart::mirror_paths<E> mirrors(exec);
+  mirrors.set_scene(scene), mirrors.set_model(there.view(), 1);
+  gart::buffer<float, E> color(exec, 3 * pixels);
+  gart::buffer<float, E> const by(exec, weights);
+  mirrors.forward(view, options, bounces, color.data());
+  mirrors.backward(by, gradients.view());
+  std::vector<double> const expected = image(model);
+  auto const got = color.to_host();
+  long wrong = 0;
+  for (std::size_t i = 0; i < got.size(); ++i) wrong += std::fabs(double{got[i]} - expected[i]) > 1e-4;
+  CHECK(wrong <= 6);
+
+  gart::gaussian_model const analytic = gradients.to_host();
+  auto const check = [&](char const* name, std::vector<float> gart::gaussian_model::*array, std::size_t each) {
+    CAPTURE(name);
+    long compared = 0, bad = 0;
+    double largest = 0;
+    for (float const g : analytic.*array) largest = std::max(largest, std::fabs(double{g}));
+    for (std::size_t i = 0; i < (model.*array).size(); i += each) {
+      auto const slope = [&](float h) {
+        gart::gaussian_model less = model, more = model;
+        float &a = (less.*array)[i], &b = (more.*array)[i];
+        a -= h, b += h;
+        return (loss(image(more)) - loss(image(less))) / (double{b} - double{a});
+      };
+      double const wide = slope(2e-3f), narrow = slope(1e-3f), g = double{(analytic.*array)[i]};
+      // Across a step both are wrong, each in its way.
+      if (std::fabs(wide - narrow) > 1e-3 * (std::fabs(narrow) + 0.1 * largest)) continue;
+      ++compared;
+      bad += std::fabs(narrow - g) > 5e-3 * (std::fabs(g) + 0.1 * largest);
+    }
+    CHECK(compared > 5);
+    CHECK(bad <= compared / 20);
+  };
+  check("mean", &gart::gaussian_model::mean, 4);
+  check("log_scale", &gart::gaussian_model::log_scale, 4);
+  check("quaternion", &gart::gaussian_model::quaternion, 7);
+  check("opacity", &gart::gaussian_model::opacity, 2);
+  check("sh", &gart::gaussian_model::sh, 17);
+}
