@@ -369,7 +369,7 @@ class scene_reader {
     if (!top_.has("options")) return;
     record const r{top_.at("options"), nullptr, top_.where + ": options"};
     require_keys(r, {"samples", "bounces", "roulette_after", "seed", "shadows", "ambient", "relight", "linear",
-                     "aperture", "focus", "jitter", "firefly", "exposure", "tone_map"});
+                     "aperture", "focus", "blur", "jitter", "firefly", "exposure", "tone_map"});
     light::path_options& o = out_.paths;
     auto const whole = [&](char const* key, int& to) { to = static_cast<int>(number(r, key, to, 0, 1e6)); };
     auto const real = [&](char const* key, float& to, double least, double most) {
@@ -381,7 +381,7 @@ class scene_reader {
     o.relight = flag(r, "relight", o.relight), o.linear = flag(r, "linear", o.linear),
     o.jitter = flag(r, "jitter", o.jitter);
     real("ambient", o.ambient, 0, 1), real("aperture", o.aperture, 0, 1e9), real("focus", o.focus, 1e-9, 1e9);
-    real("firefly", o.firefly, 0, 1e9), real("exposure", o.exposure, -30, 30);
+    real("blur", o.blur, 0, 1e6), real("firefly", o.firefly, 0, 1e9), real("exposure", o.exposure, -30, 30);
   }
 
   fs::path path_;
