@@ -125,6 +125,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--poses", a.poses, "FILE",
                  "With --refine-poses: begin at the poses of this camera JSON,\nby the views' names, in place of the "
                  "capture's. The poses.json of\na run that found them makes a better scene, and better poses"));
+  in_group(
+      r.add(train, "--scene", a.scene, "FILE",
+            "Mirrors that are known to be in the capture, as meshes of a\nscene.json: what photographs show in them is "
+            "learned where it is"));
   in_group(r.add(train, "--downscale", a.downscale, "N", "Shrink images by this whole factor"))->check(between(1, 64));
   in_group(r.add(
       train, "--photos", a.photos, "DIR",
@@ -244,9 +248,10 @@ void continue_run(train_arguments& a) {
     throw gart::io_error(a.config_file().string(), "has no \"options\"", "start anew without --resume");
   }
   nlohmann::json options = config["options"];
-  // Names in the files of earlier runs.
+  // Names in the files of earlier runs, which have no scene.
   for (auto const& [old, now] : {std::pair{"t-min", "transmittance-min"}, {"lt-budget", "hit-memory"}})
     if (options.contains(old)) options.emplace(now, options[old]);
+  options.emplace("scene", "");
   a.raised = a.recorded.continue_from(options, a.config_file(), {"iterations", "time-budget"});
   a.origin = origin_in(config, a.config_file());
   if (a.dataset.empty()) {

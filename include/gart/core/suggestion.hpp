@@ -24,11 +24,7 @@ inline std::size_t letters_between(std::string const& a, std::string const& b) {
   return last[b.size()];
 }
 
-<<<<<<< HEAD:program/suggestion.hpp
-// "; did you mean X?" for the nearest name if at most a third of its letters differ; else "".
-=======
-/// "; did you mean X?" for the nearest name, where no more than a third of it is other; else nothing.
->>>>>>> h-light:include/gart/core/suggestion.hpp
+/// "; did you mean X?" for the nearest name if at most a third of its letters differ; else "".
 inline std::string did_you_mean(std::string const& typed, std::vector<std::string> const& names) {
   std::string const* nearest = nullptr;
   std::size_t least = 0;
