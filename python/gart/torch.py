@@ -182,6 +182,68 @@ class _Trace(torch.autograd.Function):
         return (*out, *by_rays, None, None, None)
 
 
+class _SeenAt(torch.autograd.Function):
+    """The means as a view uses them: what their gradient says of their places in the image goes to means2d too."""
+
+    @staticmethod
+    def forward(ctx, means, means2d, c2w, fx, fy):
+        ctx.save_for_backward(means.detach(), c2w)
+        ctx.focal = fx, fy
+        return means.view_as(means)
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx, by_means):
+        means, c2w = ctx.saved_tensors
+        rotation = c2w[:3, :3].to(by_means)
+        x, y, z = ((means - c2w[:3, 3].to(means)) @ rotation).unbind(-1)
+        sideways = by_means @ rotation[:, :2]  # the image moves by f / z as a mean moves along an axis of the camera
+        by_places = torch.stack((sideways[:, 0] * z / ctx.focal[0], sideways[:, 1] * z / ctx.focal[1]), -1)
+        return by_means, by_places, None, None, None
+
+
+class _Meta(dict):
+    """What views say besides their images. "radii" is computed when it is read."""
+
+    radii = None
+
+    def __missing__(self, name):
+        if name != "radii" or self.radii is None:
+            raise KeyError(name)
+        self[name] = self.radii()
+        return self[name]
+
+
+def _rotations(quats):
+    w, x, y, z = torch.nn.functional.normalize(quats, dim=-1).unbind(-1)
+    rows = (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+            2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+            2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
+    return torch.stack(rows, -1).reshape(-1, 3, 3)
+
+
+def _radii(means, quats, scales, poses, numbers, width, height, near, eps2d):
+    """Radii [C, N, 2] in pixels, as gsplat has them: three standard deviations of the Gaussian's linearised image,
+    rounded up; 0 where the image shows none of that, or it is nearer than `near`."""
+    axes = _rotations(quats.detach()) * scales.detach()[:, None, :]
+    out = []
+    for c2w, (fx, fy, cx, cy) in zip(poses, numbers):
+        rotation = c2w[:3, :3].to(means)
+        x, y, z = ((means.detach() - c2w[:3, 3].to(means)) @ rotation).unbind(-1)
+        along = rotation.T @ axes  # [N, 3, 3]: the axes in the camera
+        inverse = 1 / z.clamp(min=near)
+        sides = []
+        for f, at, centre, size, row in ((fx, x, cx, width, 0), (fy, y, cy, height, 1)):
+            slope = at * inverse
+            deviation = f * inverse[:, None] * (along[:, row] - slope[:, None] * along[:, 2])
+            radius = (3 * (deviation.square().sum(-1) + eps2d).sqrt()).ceil()
+            place = f * slope + centre
+            sides.append((radius, (place + radius > 0) & (place - radius < size)))
+        seen = sides[0][1] & sides[1][1] & (z > near)
+        out.append(torch.stack([torch.where(seen, radius, torch.zeros_like(radius)) for radius, _ in sides], -1))
+    return torch.stack(out).to(torch.int32)
+
+
 def _checked(parameters):
     for name, p in zip(_PARAMETERS, parameters):
         if p.dtype != torch.float32:
@@ -243,13 +305,17 @@ def rasterization(means, quats, scales, opacities, colors, viewmats, Ks, width, 
     world to camera, and Ks [C, 3, 3]. lens: parameters by COLMAP's names, as k1=0.1 with camera_model="fisheye".
 
     Returns render_colors [C, H, W, D], render_alphas [C, H, W, 1] and a dictionary. render_mode may be "RGB", "D", "ED",
-    "RGB+D" or "RGB+ED". Gradients are those of means, quats, scales, opacities, colors, viewmats and backgrounds.
+    "RGB+D" or "RGB+ED". Gradients are those of means, quats, scales, opacities, colors, viewmats, backgrounds and Ks.
+    Ks gets one with pinhole cameras, without antialiasing: views are then traced as batches of rays, which takes longer.
+
+    The dictionary has width, height and n_cameras, and for pinhole cameras what gsplat's strategies read with
+    packed=False: means2d [C, N, 2], whose .grad is the loss's by the means' places in the image, in pixels, and radii
+    [C, N, 2] in pixels.
 
     What is otherwise than there: near_plane is along the ray; depth is that of the point of largest response on the ray,
     where gsplat has the centre's; "antialiased" widens by the filter of math/widened.hpp. far_plane and radius_clip
     must be without effect, and what shows how tiles are kept (packed, tile_size, channel_chunk, segmented, sparse_grad)
-    has none. There is no image of means, so that strategies that read means2d or radii have nothing to go by:
-    gsplat's MCMCStrategy, which reads none, works.
+    has none.
     """
     if covars is not None or distributed or absgrad:
         raise InvalidArgument("gart.torch.rasterization: covars, distributed and absgrad are not there: give quats and "
@@ -268,9 +334,17 @@ def rasterization(means, quats, scales, opacities, colors, viewmats, Ks, width, 
     numbers = Ks.detach()[:, (0, 1, 0, 1), (0, 1, 2, 2)].cpu().tolist()
     behind = [(0.0, 0.0, 0.0)] * views if backgrounds is None else backgrounds.detach().cpu().tolist()
     filter_width = eps2d ** 0.5 if rasterize_mode == "antialiased" else 0.0
+    by_rays = Ks.requires_grad and torch.is_grad_enabled()
+    if by_rays and (camera_model != "pinhole" or filter_width > 0):
+        raise InvalidArgument("gart.torch.rasterization: Ks gets a gradient with camera_model 'pinhole' and "
+                              "rasterize_mode 'classic' alone: detach Ks")
+    means2d = None
+    if camera_model == "pinhole" and means.requires_grad and torch.is_grad_enabled():
+        means2d = _places(means, poses, numbers).requires_grad_()
     images, alphas, known = [], [], {}
     for view in range(views):
         fx, fy, cx, cy = numbers[view]
+        used = means if means2d is None else _SeenAt.apply(means, means2d[view], poses[view].detach(), fx, fy)
         camera = _gart.Camera(width, height, fx, fy, cx, cy, model=_MODELS[camera_model], **lens)
         learned = poses[view] if viewmats.requires_grad else None
         if learned is None:
@@ -285,8 +359,14 @@ def rasterization(means, quats, scales, opacities, colors, viewmats, Ks, width, 
             if (of_view, first) not in known:
                 known[of_view, first] = _coefficients(colors, view, first, sh_degree)
             sh = known[of_view, first]
-            image, transmittance, depth = render(means, log_scale, quats, opacity, sh, camera, c2w=learned,
-                                                 near=near_plane, antialias=filter_width, background=back)
+            settings = {"near": near_plane, "antialias": filter_width, "background": back}
+            gaussians = used, log_scale, quats, opacity, sh
+            if by_rays:
+                rays = _rays(Ks[view], poses[view].to(means.device), width, height)
+                seen = trace(*gaussians, *rays, **settings)
+                image, transmittance, depth = (t.reshape(height, width, *t.shape[1:]) for t in seen)
+            else:
+                image, transmittance, depth = render(*gaussians, camera, c2w=learned, **settings)
             image = image[..., :wide]
             if backgrounds is not None and backgrounds.requires_grad:
                 b = backgrounds[view, first:first + wide]
@@ -301,7 +381,10 @@ def rasterization(means, quats, scales, opacities, colors, viewmats, Ks, width, 
             shown = [*shown, z / alpha.clamp(min=1e-10) if "ED" in render_mode else z]
         images.append(torch.cat(shown, -1) if len(shown) > 1 else shown[0])
         alphas.append(alpha)
-    meta = {"width": width, "height": height, "n_cameras": views}
+    meta = _Meta(width=width, height=height, n_cameras=views)
+    if camera_model == "pinhole":
+        meta["means2d"] = means2d
+        meta.radii = lambda: _radii(means, quats, scales, poses.detach(), numbers, width, height, near_plane, eps2d)
     return torch.stack(images), torch.stack(alphas), meta
 
 
@@ -311,6 +394,26 @@ def _inverted(viewmats):
     position = -(rotation @ viewmats[:, :3, 3:].double())
     last = torch.tensor([0.0, 0.0, 0.0, 1.0], dtype=torch.float64, device=viewmats.device).expand(len(viewmats), 1, 4)
     return torch.cat((torch.cat((rotation, position), 2), last), 1)
+
+
+def _places(means, poses, numbers):
+    """Where views show the means, [C, N, 2] in pixels."""
+    out = []
+    for c2w, (fx, fy, cx, cy) in zip(poses.detach(), numbers):
+        x, y, z = ((means.detach() - c2w[:3, 3].to(means)) @ c2w[:3, :3].to(means)).unbind(-1)
+        out.append(torch.stack((fx * x / z + cx, fy * y / z + cy), -1))
+    return torch.stack(out)
+
+
+def _rays(k, c2w, width, height):
+    """Directions and origins [H W, 3] of a pinhole's pixels, differentiable by its matrix and its pose."""
+    like = {"device": c2w.device, "dtype": torch.float64}
+    k = k.to(c2w)
+    x = (torch.arange(width, **like) + 0.5 - k[0, 2]) / k[0, 0]
+    y = (torch.arange(height, **like) + 0.5 - k[1, 2]) / k[1, 1]
+    in_camera = torch.stack((x.expand(height, width), y[:, None].expand(height, width), torch.ones(height, width, **like)), -1)
+    directions = in_camera.reshape(-1, 3) @ c2w[:3, :3].T
+    return directions.float(), c2w[:3, 3].expand_as(directions).float()
 
 
 def _channels(colors, n, sh_degree):

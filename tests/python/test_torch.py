@@ -160,6 +160,98 @@ class Torch(unittest.TestCase):
         # A feature's gradient is the sum of its weights, alike for all of them.
         np.testing.assert_allclose(features.grad[:, 0], features.grad[:, 4], rtol=1e-3, atol=1e-3)
 
+    def matrix_and_pose(self, view):
+        k = torch.tensor([[view.fx, 0, view.cx], [0, view.fy, view.cy], [0, 0, 1]], dtype=torch.float64)
+        return k, torch.from_numpy(np.linalg.inv(scenes.C2W))
+
+    def test_gradients_of_intrinsics_are_finite_differences(self):
+        arrays, view = tensors(n=4, degree=1), scenes.camera(24, 20)
+        with torch.no_grad():
+            arrays[0][:, 2] = torch.tensor([2.0, -1.5, 0.5, 4.0])
+            arrays[1] += 0.3
+        weight = torch.from_numpy(np.random.default_rng(7).normal(0, 1, (20, 24, 3)))
+        k, _ = self.matrix_and_pose(view)
+        k.requires_grad_()
+        rays = gart.torch._rays(k, torch.from_numpy(scenes.C2W), 24, 20)
+        color = gart.torch.trace(*arrays, *rays, **scenes.SMOOTH)[0].reshape(20, 24, 3)
+        np.testing.assert_allclose(color.detach(), gart.torch.render(*arrays, view, **scenes.SMOOTH)[0].detach(), atol=1e-4)
+        (weight * color.double()).sum().backward()
+
+        def by_definition(numbers):
+            moved = gart.Camera(24, 20, *numbers.tolist(), c2w=scenes.C2W)
+            seen = gart.reference(gart.Model(*[a.detach() for a in arrays]), moved, **scenes.SMOOTH)
+            return (weight * seen["color"]).sum()
+
+        numbers = torch.tensor([view.fx, view.fy, view.cx, view.cy], dtype=torch.float64)
+        self.assert_close(k.grad[(0, 1, 0, 1), (0, 1, 2, 2)], finite_differences(by_definition, numbers, 1e-2))
+
+    def test_rasterization_has_gradients_by_intrinsics(self):
+        mean, log_scale, quaternion, opacity, sh = tensors()
+        view = scenes.camera()
+        k, w2c = (t.float()[None] for t in self.matrix_and_pose(view))
+        gaussians = (mean, quaternion, log_scale.exp(), torch.sigmoid(opacity), sh)
+        expected = gart.torch.rasterization(*gaussians, w2c, k, 40, 32, sh_degree=1)[0].detach()
+        k.requires_grad_(), w2c.requires_grad_()
+        colors, _, _ = gart.torch.rasterization(*gaussians, w2c, k, 40, 32, sh_degree=1)
+        np.testing.assert_allclose(colors.detach(), expected, atol=2e-4)
+        colors.square().sum().backward()
+        by_rays, k.grad, w2c.grad = (k.grad.clone(), w2c.grad.clone(), mean.grad.clone()), None, None
+        self.assertTrue((by_rays[0][0, (0, 1, 0, 1), (0, 1, 2, 2)] != 0).all())
+        mean.grad = None
+        gaussians = (mean, quaternion, log_scale.exp(), torch.sigmoid(opacity), sh)
+        gart.torch.rasterization(*gaussians, w2c, k.detach(), 40, 32, sh_degree=1)[0].square().sum().backward()
+        self.assert_close(by_rays[2], mean.grad.double())
+        self.assert_close(by_rays[1][0, :3, 3], w2c.grad[0, :3, 3].double())
+        with self.assertRaisesRegex(gart.InvalidArgument, "detach Ks"):
+            gart.torch.rasterization(*gaussians, w2c, k, 40, 32, sh_degree=1, rasterize_mode="antialiased")
+
+    def test_strategies_get_what_they_read(self):
+        """means2d's gradient is the loss's by a mean that moves sideways; radii are those of the images."""
+        mean, log_scale, quaternion, opacity, sh = tensors(n=12)
+        view = scenes.camera()
+        k, w2c = (t.float() for t in self.matrix_and_pose(view))
+        turned = w2c.clone()
+        turned[0, 3] += 0.2
+        views, ks = torch.stack((w2c, turned)), k.expand(2, 3, 3)
+
+        def seen(mean):
+            return gart.torch.rasterization(mean, quaternion, log_scale.exp(), torch.sigmoid(opacity), sh, views, ks, 40, 32,
+                                            sh_degree=1)
+
+        colors, _, info = seen(mean)
+        self.assertEqual(info["means2d"].shape, (2, 12, 2))
+        info["means2d"].retain_grad()  # as strategies do before the backward pass
+        weight = torch.linspace(-1, 1, 40)[None, None, :, None]
+        (weight * colors).sum().backward()
+        by_places = info["means2d"].grad
+        camera_means = mean.detach() @ w2c[:3, :3].T + w2c[:3, 3]
+        projected = camera_means @ k.T
+        np.testing.assert_allclose(info["means2d"][0].detach(), projected[:, :2] / projected[:, 2:], rtol=1e-4, atol=1e-3)
+        # Both views move by about the same pixels: the sum of their gradients is the loss's.
+        for axis in range(2):
+            step = torch.zeros(3)
+            step[axis] = 1
+            sideways = (step @ w2c[:3, :3])[None] * (camera_means[:, 2:] / k[axis, axis])
+            along = (mean.grad * sideways).sum(-1)  # the whole gradient, by a pixel
+            np.testing.assert_allclose(by_places.sum(0)[:, axis], along, rtol=2e-3, atol=2e-4 * along.abs().max())
+        radii = info["radii"]
+        self.assertEqual((radii.shape, radii.dtype), ((2, 12, 2), torch.int32))
+        self.assertTrue((radii > 0).all())
+        with torch.no_grad():
+            away = mean.clone()
+            away[0] += 100 * (step @ w2c[:3, :3])
+            self.assertTrue((seen(away)[2]["radii"][:, 0] == 0).all())
+            self.assertIsNone(seen(away)[2]["means2d"])
+        # A round one on the axis has 3 f s / z pixels, rounded up with the filter's 0.3.
+        one = [t.detach()[:1].clone() for t in (mean, quaternion, log_scale, opacity, sh)]
+        one[0][:] = torch.tensor([0, 0, 5.0]) @ w2c[:3, :3] - w2c[:3, 3] @ w2c[:3, :3]
+        info = gart.torch.rasterization(one[0], one[1], torch.full((1, 3), 0.5), torch.sigmoid(one[3]), one[4], views[:1],
+                                        ks[:1], 40, 32, sh_degree=1)[2]
+        expected = [np.ceil(3 * np.sqrt((f * 0.5 / 5) ** 2 + 0.3)) for f in (view.fx, view.fy)]
+        np.testing.assert_array_equal(info["radii"][0, 0], expected)
+        with self.assertRaises(KeyError):
+            info["conics"]
+
     def test_a_scene_is_learned_by_torch(self):
         view = scenes.camera()
         truth = gart.torch.render(*[a.detach() for a in tensors(degree=0)], view)[0]
