@@ -26,9 +26,20 @@ struct finish {
   gaussians_view<float> gradients;
   Filter filter;
   GART_KERNEL void operator()(index_t i) const {
-    ray_gaussian const g = gaussians[i];
     geometry_gradient out{vec3(0.0f), vec3(0.0f), {0, 0, 0, 0}, 0};
-    if (g.cutoff >= 0) out = gradient_of(moments.data() + std::size_t{moment_stride} * i, load_parameters(scene, i), g);
+    float m[moment_stride];
+    bool seen = false;
+    GART_UNROLL
+    for (int q = 0; q < moment_stride / 4; ++q) {
+      quad const four = reinterpret_cast<quad const*>(moments.data() + std::size_t{moment_stride} * i)[q];
+      GART_UNROLL
+      for (int k = 0; k < 4; ++k) m[4 * q + k] = four.v[k], seen |= four.v[k] != 0.0f;
+    }
+    // A view shows a part of a scene: of the others nothing else is read.
+    if (seen) {
+      ray_gaussian const g = gaussians[i];
+      if (g.cutoff >= 0) out = gradient_of(m, load_parameters(scene, i), g);
+    }
     for (int k = 0; k < 3; ++k) {
       gradients.mean[std::size_t{3} * i + k] = out.mean[k];
       gradients.log_scale[std::size_t{3} * i + k] = out.log_scale[k];

@@ -23,7 +23,7 @@ GART_HD constexpr u32 pixel_offset(pixel_box const& cell, u32 x, u32 y) {
   return (y - cell.y0) * cell.width() + (x - cell.x0);
 }
 
-/// The cell of a primitive and a tile, one 16-byte word, by which a gather finds its slots. Slots are counted in 32
+/// The cell of a primitive and a tile, one 16-byte word, by which many pixels find their slots. Slots are counted in 32
 /// bits.
 struct alignas(16) tile_slots {
   u32 first = 0;                            ///< slot of the cell's first pixel
@@ -46,32 +46,12 @@ struct alignas(16) tile_slots {
     std::memcpy(static_cast<void*>(&out), &word, sizeof out);
     return out;
   }
-};
-
-/// The same for a block of 8 x 4 pixels of a tile, a lane a pixel, by which the rays of a warp find their slots.
-struct block_slots {
-  u32 origin = 0;  ///< the slot that pixel (0, 0) of the image would have
-  u32 width = 0;   ///< of the cell, in pixels
-  u32 inside = 0;  ///< a bit a pixel of the block, row by row: it is in the cell
-
-  block_slots() = default;
-  /// x, y: the block's first pixel.
-  GART_HD GART_INLINE block_slots(footprint_slots const& range, pixel_box const& tile, int x, int y) {
-    tile_slots const cell(range, tile);
-    origin = cell.first - cell.y * cell.width - cell.x, width = cell.width;
-    u32 const columns = bits_from(cell.x - x) & ~bits_from(cell.x1 - x) & 0xffu;
-    inside = columns * 0x01010101u & bits_from(8 * (cell.y - y)) & ~bits_from(8 * (cell.y1 - y));
+  /// Boxes hold every hit; memory stays safe regardless. Without a branch: lanes have not to wait for one another.
+  GART_HD GART_INLINE u32 place_of(int px, int py) const {
+    u32 const column = static_cast<u32>(px) - x, row = static_cast<u32>(py) - y;
+    bool const inside = (column < width) & (row < static_cast<u32>(y1 - y));
+    return inside ? first + row * width + column : none;
   }
-  /// Of the pixel, `lane` of the block. Boxes hold every hit; memory stays safe regardless. Without a branch: lanes
-  /// have not to wait for one another.
-  GART_HD GART_INLINE u32 place_of(int px, int py, int lane) const {
-    u32 const place = origin + static_cast<u32>(py) * width + static_cast<u32>(px);
-    return inside >> lane & 1u ? place : tile_slots::none;
-  }
-
- private:
-  // Bits from that number on.
-  GART_HD GART_INLINE static u32 bits_from(int first) { return first <= 0 ? ~0u : first < 32 ? ~0u << first : 0u; }
 };
 
 /// The cell of the box that holds pixel (x, y) of the image, which must lie in the box.

@@ -13,8 +13,8 @@ namespace gart { inline namespace GART_ISA {
 /// The record of an LT buffer with slots of Entry, of tiles of Size pixels a side.
 template <class Entry, int Size>
 struct record_lt {
-  using entry = Entry;       ///< a slot
-  using cell = block_slots;  ///< finds a pair's slots
+  using entry = Entry;      ///< a slot
+  using cell = tile_slots;  ///< finds a pair's slots
   /// [N]: boxes, and where their slots begin.
   footprint_slots const* ranges = nullptr;
   Entry* slots = nullptr;  ///< the LT buffer

@@ -8,7 +8,6 @@
 
 #include <gart/core/span.hpp>
 #include <gart/exec/concepts.hpp>
-#include <gart/exec/parallel.hpp>
 
 namespace gart { inline namespace GART_ISA { namespace tile_kernels {
 

@@ -1,14 +1,13 @@
 #pragma once
 /// \file
-/// The pending hits of one ray of a warp (trace/warp_walk.hpp), in the order (t, id). The latest 14 lie in a window in
-/// shared memory, each lane in a bank of its own. A register of 4-bit numbers has their slots in order, and behind them
-/// the free ones: a hit that is taken leaves its slot where the next free one is expected. A full window is spilled,
+/// The pending hits of one ray of a warp (trace/warp_walk.hpp), in the order (t, id). The latest 15 lie in a window in
+/// shared memory, each lane in a bank of its own, their order a register of 4-bit numbers. A full window is spilled,
 /// all but its first hit, as a run, in order, to memory of its own; of each run the next hit's t is in a register. The
 /// next hit of all is the window's first or that of a run. So a hit is spilled once at most, and the order of others is
 /// never made anew for it.
 ///
 /// Where all runs are taken a hit is lost: what is passed on from then on lies before the nearest hit that was.
-/// Memory: 24 bytes for each of 182 hits a lane. Device only.
+/// Memory: 24 bytes for each of 196 hits a lane. Device only.
 
 #include <gart/core/types.hpp>
 #include <gart/exec/kept_address.hpp>
@@ -43,12 +42,13 @@ struct entry_order {
 template <class KeyOrder>
 class warp_hit_queue {
   static constexpr int lanes = 32;
-  static constexpr int window = 14;  // `order_` has room for 16
+  static constexpr int window = 15;  // as many as `order_` has room for
   static constexpr int run = window - 1, runs = 14;
-  static constexpr int last = 4;
   static_assert(run < 16 && runs < 16);  // `left_` has 4 bits a run; free_run: some of them are always zero
   static constexpr float infinity = __builtin_huge_valf();
-  static constexpr u64 numbers = 0x00dcba9876543210ull;  // what lies past the window's is never taken
+  // Slots are numbered from 1. Of slot 0 there is a t alone, less than that of any hit.
+  static constexpr int no_slot = 0;
+  static constexpr u32 every_slot = ((1u << window) - 1) << 1;
 
   struct alignas(8) pair {
     float a, b;
@@ -57,7 +57,7 @@ class warp_hit_queue {
  public:
   /// What a warp shares.
   struct scratch {
-    float words[6 * window][lanes];  ///< of the waiting hits, a bank a lane
+    float words[1 + 6 * window][lanes];  ///< of the waiting hits, a bank a lane
   };
   static constexpr std::size_t spill_floats_a_lane = std::size_t{6} * runs * run;  ///< of a lane
 
@@ -66,14 +66,13 @@ class warp_hit_queue {
       : own_(&detail::kept_address<float>(&s.words[0][lane])),
         spilled_(reinterpret_cast<pair*>(spill_memory + spill_floats_a_lane * lane)),
         before_(before) {
+    word(time, no_slot) = -infinity;
     clear();
   }
 
   /// Empties it.
   __device__ GART_INLINE void clear() {
-    order_ = numbers, count_ = 0;
-    GART_UNROLL
-    for (int k = 0; k < last; ++k) last_t_[k] = -infinity;
+    order_ = 0, free_ = every_slot, count_ = 0;
     left_ = 0, next_t_ = infinity, next_run_ = 0;
     lost_t_ = infinity, lost_key_ = 0;
     GART_UNROLL
@@ -95,42 +94,31 @@ class warp_hit_queue {
     if (to < runs) spill(to);
   }
 
-  /// A hit, where there is room() or must be some: then one may be lost.
+  /// Needs room, where there can be.
   __device__ GART_INLINE void add(waiting_hit const& h) {
+    int slot = free_slot();
     if (lost() | full()) {
       if (!has_place(h)) return;
+      slot = free_slot();
     }
-    put(h);
+    put(h, slot);
   }
 
-  /// The next hit of all.
-  struct next_hit {
-    waiting_hit first;  ///< of the window
-    float t;            ///< of the next hit; infinity: there is none
-    bool from_run;      ///< whether it is not the window's
-  };
-  /// Which that is. All words of it are read at once, taken or not: shared memory is waited for once.
-  __device__ GART_INLINE next_hit next() const {
-    next_hit n;
-    n.first = at(slot_from_back(count_ - 1));
-    float const t = count_ > 0 ? n.first.t : infinity;
-    n.from_run = next_t_ < t;
-    if (next_t_ == t && t < infinity) n.from_run = before_(key_of(next_spilled()), n.first.key);
-    n.t = n.from_run ? next_t_ : t;
-    return n;
-  }
-  /// Whether it comes before what was lost, and t * cosine < depth.
-  __device__ GART_INLINE bool is_due(next_hit const& n, float depth, float cosine) const {
-    bool due = n.t * cosine < depth;
-    if (due & (n.t >= lost_t_))
-      due = nearer(n.t, n.from_run ? key_of(next_spilled()) : n.first.key, lost_t_, lost_key_);
-    return due;
-  }
-  /// Takes it.
-  __device__ GART_INLINE waiting_hit take(next_hit const& n) {
-    if (n.from_run) return take_of_run();
-    --count_;
-    return n.first;
+  /// Passes on hits with t * cosine < depth until f(hit) is false.
+  template <class F>
+  __device__ GART_INLINE void pass_on(float depth, float cosine, F&& f) {
+    while (true) {
+      int const slot = slot_from_back((count_ - 1) & 15);
+      waiting_hit const first = at(slot);  // all of it, taken or not: shared memory is waited for once
+      float t = count_ > 0 ? first.t : infinity;
+      bool from_run = false;
+      if ((next_t_ < infinity) & (next_t_ <= t)) from_run = next_t_ < t || before_(key_of(next_spilled()), first.key);
+      t = from_run ? next_t_ : t;
+      if ((t == infinity) | !(t * cosine < depth)) return;
+      if (t >= lost_t_ && !nearer(t, from_run ? key_of(next_spilled()) : first.key, lost_t_, lost_key_)) return;
+      if (!from_run) order_ &= ~(u64{15} << (4 * (count_ - 1))), give_back(slot);
+      if (!f(from_run ? take_of_run() : first)) return;
+    }
   }
 
  private:
@@ -144,10 +132,8 @@ class warp_hit_queue {
     return t != other_t ? t < other_t : before_(key, other);
   }
 
-  // The slot of the window's hit that has k behind it; a free one where there is none.
-  __device__ GART_INLINE int slot_from_back(int k) const { return static_cast<int>(order_ >> (4 * (k & 15))) & 15; }
-  // The first `count` numbers of `order_`.
-  __device__ GART_INLINE static u64 first_numbers(int count) { return (u64{1} << (4 * count)) - 1; }
+  // The slot of the window's hit that has k behind it; no_slot where there is none.
+  __device__ GART_INLINE int slot_from_back(int k) const { return static_cast<int>(order_ >> (4 * k)) & 15; }
 
   // Where some hit was lost or the window is full: whether there is a place for this one, nearer than what was lost or
   // will be for it.
@@ -160,58 +146,53 @@ class warp_hit_queue {
     bool const fits = nearer(h.t, h.key, t, key);
     lost_t_ = fits ? t : h.t, lost_key_ = fits ? key : h.key;
     if (!fits) return false;
-    order_ = (order_ >> 4 & first_numbers(window - 1)) | u64(farthest) << (4 * (window - 1));
-    --count_;
-    find_last();
+    order_ >>= 4;
+    give_back(farthest);
     return true;
   }
 
-  __device__ GART_INLINE void put(waiting_hit const& h) {
-    int const slot = slot_from_back(window - 1);
-    int const bits = 4 * hits_behind(h);
+  __device__ GART_INLINE int free_slot() const { return __ffs(static_cast<int>(free_)) - 1; }
+
+  __device__ GART_INLINE void put(waiting_hit const& h, int slot) {
+    free_ &= free_ - 1;
     word(time, slot) = h.t, word(opacity, slot) = h.alpha;
     word(red, slot) = h.shown.x, word(green, slot) = h.shown.y, word(blue, slot) = h.shown.z;
     word(key_bits, slot) = bits_to_float(h.key);
     ++count_;
+    int const bits = 4 * hits_behind(h);
     u64 const low = (u64{1} << bits) - 1;
     order_ = (order_ & low) | u64(slot) << bits | (order_ & ~low) << 4;
   }
 
-  // How many hits of the window come after h. Most belong behind all but a few, whose t are in registers; what has been
-  // passed on and still stands there comes before.
-  __device__ GART_INLINE int hits_behind(waiting_hit const& h) {
+  // How many hits of the window come after h. From the back, where most belong, four at a time: shared memory is waited
+  // for once.
+  __device__ GART_INLINE int hits_behind(waiting_hit const& h) const {
     int behind = 0;
-    bool tied = false;
-    GART_UNROLL
-    for (int k = 0; k < last; ++k) {
-      behind = h.t < last_t_[k] ? k + 1 : behind, tied |= h.t == last_t_[k];
-    }
-    float t = h.t;
-    GART_UNROLL
-    for (int k = 0; k < last; ++k) {
-      float const farther = fmaxf(t, last_t_[k]);
-      t = fminf(t, last_t_[k]), last_t_[k] = farther;
-    }
-    if (tied) behind = 0;
-    if (tied | (behind == last))
-      for (; behind < count_; ++behind) {
-        int const other = slot_from_back(behind);
-        float const t = word(time, other);
-        if (t < h.t || (t == h.t && !before_(h.key, key_at(other)))) break;
+    for (u64 rest = order_;; rest >>= 16) {
+      int farther = 0;
+      bool tied = false;
+      GART_UNROLL
+      for (int k = 0; k < 4; ++k) {
+        float const t = word(time, static_cast<int>(rest) >> (4 * k) & 15);
+        farther += t > h.t, tied |= t == h.t;
       }
-    return behind;
-  }
-
-  // The same registers for the hits that the window has.
-  __device__ GART_INLINE void find_last() {
-    GART_UNROLL
-    for (int k = 0; k < last; ++k) last_t_[k] = k < count_ ? word(time, slot_from_back(k)) : -infinity;
+      if (tied) break;
+      behind += farther;
+      if (farther < 4) return behind;
+    }
+    for (;; ++behind) {
+      int const other = slot_from_back(behind);
+      float const t = word(time, other);
+      if (t < h.t || (t == h.t && !before_(h.key, key_at(other)))) return behind;
+    }
   }
 
   __device__ GART_INLINE waiting_hit at(int slot) const {
     return {
         word(time, slot), word(opacity, slot), {word(red, slot), word(green, slot), word(blue, slot)}, key_at(slot)};
   }
+
+  __device__ GART_INLINE void give_back(int slot) { free_ |= 1u << slot, --count_; }
 
   // Runs. left_: how many each still has, 4 bits a run.
   __device__ GART_INLINE int free_run() const {
@@ -232,15 +213,12 @@ class warp_hit_queue {
     float first = infinity;
     u64 rest = order_;
     for (int k = 0; k < count; ++k, rest >>= 4) {
-      int const slot = static_cast<int>(rest) & 15;
-      waiting_hit const h = at(slot);
+      waiting_hit const h = at(static_cast<int>(rest) & 15);
       out -= 3;
       out[0] = {h.t, bits_to_float(h.key)}, out[1] = {h.alpha, h.shown.x}, out[2] = {h.shown.y, h.shown.z};
       first = h.t;
     }
-    u64 const spilled = first_numbers(count);
-    order_ = (order_ & ~(spilled << 4 | 15)) | (order_ & spilled) << 4 | u64(kept), count_ = 1;
-    find_last();
+    order_ = kept, free_ = every_slot & ~(1u << kept), count_ = 1;
     left_ |= u64(count) << (4 * to);
     set_first(to, first);
   }
@@ -276,8 +254,8 @@ class warp_hit_queue {
   pair* spilled_;  // the lane's own, [runs][run][3]: t and key, alpha and what is shown
   KeyOrder before_;
   u64 order_, left_;
+  u32 free_;
   int count_;
-  float last_t_[last];  // of the window's farthest hits, the farthest first
   float first_t_[runs], next_t_, lost_t_;
   int next_run_;
   u32 lost_key_;

@@ -26,12 +26,10 @@ concept warp_program = pixel_program<P> &&
   { p.shade(s, row) } -> std::same_as<vec3>;               // what a hit shows
   { p.add(s, x, x, shown, place) } -> std::same_as<bool>;  // composites a hit (t, alpha); false ends the ray
   // Whether hits have places: numbers of 32 bits that order a pixel's hits as their Gaussians' ids do. They are then
-  // found by cells of 12 bytes: cell(footprint_slots, tile's box, x, y) of the block that begins there, and
-  // cell.place_of(x, y, lane).
+  // found by cells: cell(footprint_slots, tile's box), cell::read from shared memory, cell.place_of(x, y).
   { P::places_hits } -> std::convertible_to<bool>;
   typename P::cell;
-  requires !P::places_hits ||
-      std::constructible_from<typename P::cell, footprint_slots const&, pixel_box const&, int, int>;
+  requires !P::places_hits || std::constructible_from<typename P::cell, footprint_slots const&, pixel_box const&>;
 };
 
 }}  // namespace gart::GART_ISA

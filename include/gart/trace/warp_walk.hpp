@@ -51,35 +51,24 @@ class walk_tile_warps {
 
  private:
   static constexpr int group = 4;  // candidates staged at once
-  // Groups that are staged: one is read, one is evaluated, and of the one before some rays still have hits to take.
-  static constexpr int groups = 3;
-  static constexpr u32 of_group = (1u << group) - 1;
   // 16-byte words of a candidate: its Gaussian, then its row, which may not be a whole number of them.
   static constexpr int gaussian_words = sizeof(ray_gaussian) / sizeof(quad), row_words = (P::row_floats + 3) / 4;
   static constexpr bool whole_rows = P::row_floats % 4 == 0;
   static constexpr u32 full_warp = 0xffffffffu;
   static constexpr u32 no_key = 0xffffffffu;
 
-  // Where a hit of a candidate belongs, or the candidate's entry; and how near it can be hit.
-  struct alignas(16) listed {
-    std::conditional_t<P::places_hits, typename P::cell, u32> at;
-    float depth;
-  };
-  static_assert(sizeof(listed) == sizeof(quad));
-
   // Of an odd number of words, so that lanes that read different candidates read different banks.
   struct candidate {
     ray_gaussian gaussian;
-    quad row[row_words];
-    listed place;
-    quad room[(gaussian_words + row_words) % 2];
+    quad row[row_words + (gaussian_words + row_words + 1) % 2];
   };
 
   struct warp_scratch {
-    candidate staged[groups][group];
+    candidate staged[2][group];
     // Of the candidates that 32 entries of the list leave.
-    listed place[lanes];
-    u32 id[lanes];
+    typename P::cell cell[P::places_hits ? lanes : 1];
+    u32 id[lanes], entry[lanes];
+    float depth[lanes];
     typename queue::scratch pending;
   };
 
@@ -138,27 +127,25 @@ class walk_tile_warps {
       ray_ = k.program.ray_of(seen, state_);
       depth_of_t_ = k.depth.per_distance(ray_.direction);
       last_t_ = k.scene.near;
-      for (int w = lane_; w < groups * group * row_words; w += lanes)
+      for (int w = lane_; w < 2 * group * row_words; w += lanes)
         s.staged[w / (group * row_words)][w / row_words % group].row[w % row_words] = {};
     }
 
     // Once along the list. Whether to walk it again, for hits that were lost.
     __device__ GART_INLINE bool walk(u32 first, u32 end) {
       pending_.clear();
-      found_ = 0;
       u32 id = 0;
       float depth = 0;
       auto const look_ahead = [&](u32 entry) {
         if (entry < end) id = k_.map.primitives[entry], depth = k_.map.depth(entry);
       };
       look_ahead(first + lane_);
-      bool more = true;
-      for (u32 from = first; from < end && more; from += lanes) {
+      for (u32 from = first; from < end; from += lanes) {
         int const count = leave_out(from + lane_ < end, from + lane_, id, depth);
         look_ahead(from + lanes + lane_);
-        more = meet(count, from + lanes >= end);
+        if (!meet(count)) break;
       }
-      pass_on(infinity, 0);
+      pass_on(infinity);
       alive_ = alive_ && pending_.lost();
       return __any_sync(full_warp, alive_);
     }
@@ -179,38 +166,28 @@ class walk_tile_warps {
       u32 const all = __ballot_sync(full_warp, wanted);
       if (wanted) {
         int const to = __popc(all & ((1u << lane_) - 1));
-        s_.id[to] = id, s_.place[to].depth = depth;
-        if constexpr (P::places_hits)
-          s_.place[to].at = typename P::cell(range, area_, corner_.x, corner_.y);
-        else
-          s_.place[to].at = entry;
+        s_.id[to] = id, s_.entry[to] = entry, s_.depth[to] = depth;
+        if constexpr (P::places_hits) s_.cell[to] = typename P::cell(range, area_);
       }
       __syncwarp();
       return __popc(all);
     }
 
     // All candidates that were left, a group read while the one before is evaluated. False when no ray needs more.
-    __device__ GART_INLINE bool meet(int count, bool last) {
+    __device__ GART_INLINE bool meet(int count) {
       bool more = true;
-      read(after(latest_), 0, count);
-      for (int first = 0; more && first < count + (last ? group : 0); first += group) {
-        bool const exists = first < count;
-        if (exists) {
-          older_ = latest_, latest_ = after(latest_);
-          read(after(latest_), first + group, count);
-          __pipeline_wait_prior(1);
-          __syncwarp();
-          evaluate(count - first);
-        }
-        more = add_found(exists ? of_group : every_group);
+      read(0, 0, count);
+      for (int first = 0, side = 0; first < count && more; first += group, side ^= 1) {
+        read(side ^ 1, first + group, count);
+        __pipeline_wait_prior(1);
+        __syncwarp();
+        more = evaluate(s_.staged[side], first, count);
         __syncwarp();
       }
       __pipeline_wait_prior(0);
       __syncwarp();
       return more;
     }
-
-    __device__ GART_INLINE static int after(int side) { return side + 1 < groups ? side + 1 : 0; }
 
     // The first floats of a word to shared memory, and zero for the others: the active bands may end within one. What
     // __pipeline_memcpy_async does, whose zeros are a number known to the compiler.
@@ -248,119 +225,93 @@ class walk_tile_warps {
           for (int w = reader; w < k_.program.row_floats_read(); w += readers)
             __pipeline_memcpy_async(reinterpret_cast<float*>(to.row) + w, row + w, sizeof(float));
         }
-        if (reader == 0) reinterpret_cast<quad&>(to.place) = reinterpret_cast<quad const&>(s_.place[number]);
       }
       __pipeline_commit();
     }
 
-    // Which candidates of the latest group, of which so many exist, are hits.
-    __device__ GART_INLINE void evaluate(int exist) {
-      candidate const(&from)[group] = s_.staged[latest_];
-      GART_UNROLL
-      for (int c = 0; c < group; ++c) t_[c] = t_[group + c], d2_[c] = d2_[group + c];
+    // The candidates of a group, all rays. False when no ray needs more: all have ended, or have lost a nearer hit.
+    __device__ GART_INLINE bool evaluate(candidate const (&from)[group], int first, int count) {
+      float t[group], d2[group];
       u32 found = 0, tied = 0;
       ray_peak two[2];
       GART_UNROLL
       for (int c = 0; c < group; ++c) {
         if (c % 2 == 0) evaluate_all(two, [&](int k) { return approach_to(from[c + k].gaussian, ray_); });
         ray_peak const& r = two[c % 2];
-        t_[group + c] = r.t, d2_[group + c] = r.d2;
-        found |= (is_hit(from[c].gaussian, r, last_t_) ? 1u : 0u) << c;
-        tied |= (r.t == last_t_ ? 1u : 0u) << c;
+        t[c] = r.t, d2[c] = r.d2;
+        bool const is_new = is_hit(from[c].gaussian, r, last_t_), exists = first + c < count;
+        found |= (exists & is_new ? 1u : 0u) << c;
+        tied |= (exists & (r.t == last_t_) ? 1u : 0u) << c;
       }
-      u32 const existing = exist < group ? (1u << exist) - 1 : of_group;
-      found &= existing, tied &= existing;
       if (tied && last_key_ != no_key) {
         GART_UNROLL
         for (int c = 0; c < group; ++c)
-          if ((tied >> c & 1) && follows_last(from[c].gaussian, t_[group + c], d2_[group + c], key_of(from[c].place)))
-            found |= 1u << c;
+          if ((tied >> c & 1) && follows_last(from[c].gaussian, t[c], d2[c], first + c)) found |= 1u << c;
       }
-      found_ = found_ >> group | (alive_ ? found << group : 0u);
-    }
-
-    // All hits of the candidates that `due` has, the older group's first; rays that have none of them left take hits of
-    // the latest group meanwhile. False when no ray needs more: all have ended, or have lost a nearer hit.
-    __device__ GART_INLINE bool add_found(u32 due) {
-      int const times = static_cast<int>(__reduce_max_sync(full_warp, static_cast<u32>(__popc(found_ & due))));
-      if (__any_sync(full_warp, min(__popc(found_), times) > pending_.room())) return add_crowded(due);
+      if (!alive_) found = 0;
+      if (__any_sync(full_warp, __popc(found) > pending_.room())) return add_crowded(from, t, d2, found, first);
       GART_NO_UNROLL
-      for (int i = 0; i < times; ++i)
-        if (found_) add_next();
+      for (; __any_sync(full_warp, found); found &= found - 1)
+        if (found) add(from, t, d2, __ffs(static_cast<int>(found)) - 1, first);
       return true;
     }
 
     // The same where a ray may have no room: what comes before the first of the hits left is passed on, to make some.
-    __device__ GART_INLINE bool add_crowded(u32 due) {
+    __device__ GART_INLINE bool add_crowded(candidate const (&from)[group], float const (&t)[group],
+                                            float const (&d2)[group], u32 found, int first) {
       bool tried = false;
       GART_NO_UNROLL
-      while (__any_sync(full_warp, found_ & due)) {
-        if (__any_sync(full_warp, found_ && pending_.full())) {
+      while (u32 const left = __reduce_or_sync(full_warp, found)) {
+        if (__any_sync(full_warp, found && pending_.full())) {
           if (!tried) {
             tried = true;
-            u32 const left = __reduce_or_sync(full_warp, found_);
-            float const depth = candidate_at(__ffs(static_cast<int>(left)) - 1).place.depth;
-            pass_on(depth, few);
+            float const depth = s_.depth[first + __ffs(static_cast<int>(left)) - 1];
+            pass_on(depth);
             if (!__any_sync(full_warp, alive_ && !(pending_.lost_t() * depth_of_t_ <= depth))) return false;
-            if (!alive_) found_ = 0;
+            if (!alive_) found = 0;
           }
-          if (__any_sync(full_warp, found_ && pending_.full())) pending_.make_room();
+          if (__any_sync(full_warp, found && pending_.full())) pending_.make_room();
         }
-        if (found_) add_next();
+        if (found) add(from, t, d2, __ffs(static_cast<int>(found)) - 1, first);
+        found &= found - 1;
       }
       return true;
     }
 
-    // Number c of the hits that found_ has.
-    __device__ GART_INLINE candidate const& candidate_at(int c) const {
-      return c < group ? s_.staged[older_][c] : s_.staged[latest_][c - group];
-    }
-
-    // The first of the hits found.
-    __device__ GART_INLINE void add_next() {
-      int const c = __ffs(static_cast<int>(found_)) - 1;
-      found_ &= found_ - 1;
-      candidate const& from = candidate_at(c);
-      pending_.add({pick(t_, c), hit_alpha<Response>(from.gaussian, pick(d2_, c)),
-                    k_.program.shade(state_, reinterpret_cast<float const*>(from.row)), key_of(from.place)});
+    // Candidate c, a hit of this ray.
+    __device__ GART_INLINE void add(candidate const (&from)[group], float const (&t)[group], float const (&d2)[group],
+                                    int c, int first) {
+      pending_.add({pick(t, c), hit_alpha<Response>(from[c].gaussian, pick(d2, c)),
+                    k_.program.shade(state_, reinterpret_cast<float const*>(from[c].row)), key_of(first + c)});
     }
 
     // v[c] of an array in registers.
-    __device__ GART_INLINE static float pick(float const (&v)[2 * group], int c) {
+    __device__ GART_INLINE static float pick(float const (&v)[group], int c) {
       float out = v[0];
       GART_UNROLL
-      for (int k = 1; k < 2 * group; ++k) out = c == k ? v[k] : out;
+      for (int k = 1; k < group; ++k) out = c == k ? v[k] : out;
       return out;
     }
 
     // A hit at the distance of the last one passed on.
-    __device__ bool follows_last(ray_gaussian const& g, float t, float d2, u32 key) const {
-      return d2 <= g.cutoff && t > k_.scene.near && before_(last_key_, key);
+    __device__ bool follows_last(ray_gaussian const& g, float t, float d2, int number) const {
+      return d2 <= g.cutoff && t > k_.scene.near && before_(last_key_, key_of(number));
     }
 
-    __device__ GART_INLINE u32 key_of(listed const& place) const {
+    __device__ GART_INLINE u32 key_of(int number) const {
       if constexpr (P::places_hits)
-        return place.at.place_of(at_.x, at_.y, lane_);
+        return P::cell::read(s_.cell[number]).place_of(at_.x, at_.y);
       else
-        return place.at;
+        return s_.entry[number];
     }
 
-    // Hits nearer than `depth`, which nothing that is left of the list comes before. Where `few` rays at most have one,
-    // and room, these wait for others to have some.
-    __device__ GART_INLINE void pass_on(float depth, int few) {
-      GART_NO_UNROLL
-      while (true) {
-        auto const next = pending_.next();
-        bool const due = alive_ && pending_.is_due(next, depth, depth_of_t_);
-        u32 const all = __ballot_sync(full_warp, due);
-        if (all == 0) return;
-        if (__popc(all) <= few && !__any_sync(full_warp, due && pending_.room() <= enough)) return;
-        if (due) {
-          waiting_hit const h = pending_.take(next);
-          last_t_ = h.t, last_key_ = h.key;
-          alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::places_hits ? h.key : 0);
-        }
-      }
+    // Hits nearer than `depth`, which nothing that is left of the list comes before.
+    __device__ GART_INLINE void pass_on(float depth) {
+      if (!alive_) return;
+      pending_.pass_on(depth, depth_of_t_, [this](waiting_hit const& h) {
+        last_t_ = h.t, last_key_ = h.key;
+        return alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::places_hits ? h.key : 0);
+      });
     }
 
     __device__ GART_INLINE static key_order order_of(walk_tile_warps const& k) {
@@ -371,8 +322,6 @@ class walk_tile_warps {
     }
 
     static constexpr float infinity = __builtin_huge_valf();
-    static constexpr u32 every_group = ~0u;
-    static constexpr int few = 16, enough = 4;  // rays, and room of a queue, by which hits may wait
 
     walk_tile_warps const& k_;
     warp_scratch& s_;
@@ -386,10 +335,6 @@ class walk_tile_warps {
     bool alive_;
     float last_t_;  // the last hit passed on: at first (near, none), t > near
     u32 last_key_ = no_key;
-    int older_ = 0, latest_ = 0;  // groups staged
-    // Hits that are not in the queue yet: a bit a candidate, the older group's, then the latest's; and of these
-    u32 found_ = 0;
-    float t_[2 * group], d2_[2 * group];
     key_order before_;
     queue pending_;
   };
