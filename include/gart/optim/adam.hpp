@@ -11,9 +11,9 @@
 /// again instead of fading, and so do penalties on it.
 ///
 /// options.sh_pull is the derivative of a penalty on the square of the bands of colour above the first: fast rates make
-/// them follow the noise of single views, which the pull takes out (L2 regularization). It joins the gradient here, where
-/// the coefficient is read anyway. A coefficient without a gradient is not pulled: what a view does not show, it does not
-/// fade, however many views there are.
+/// them follow the noise of single views, which the pull takes out (L2 regularization). It joins the gradient here,
+/// where the coefficient is read anyway. A coefficient without a gradient is not pulled: what a view does not show, it
+/// does not fade, however many views there are.
 
 #include <gart/exec/concepts.hpp>
 #include <gart/math/arith.hpp>
@@ -145,9 +145,7 @@ struct adam_kernel : adam_arguments {
     return (mean[0] != 0) | (mean[1] != 0) | (mean[2] != 0);
   }
 
-  GART_HD static float pulled(float g, float parameter, float pull) {
-    return g != 0.0f ? fma(pull, parameter, g) : g;
-  }
+  GART_HD static float pulled(float g, float parameter, float pull) { return g != 0.0f ? fma(pull, parameter, g) : g; }
 
   // One element; whether it was finite.
   GART_KERNEL bool move(adam_group const& group, index_t column, float g, adam_element<float>& e) const {

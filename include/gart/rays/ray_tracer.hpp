@@ -15,12 +15,12 @@
 ///
 /// Features (channels/) are shown and differentiated over hit lists: a second trace, and 16 or 40 bytes a hit.
 ///
-/// Memory beside the tree: 64 bytes a Gaussian, with gradients 48 more; 12 bytes a ray, and 20 that a context holds. Hits
-/// that are kept by gradient_form::primitive take 32 each, and 16 places at a time a ray.
-/// Cost: on the first batch after a change the tree; on a batch in another frame than the last one launch over the
-/// Gaussians; then the trace. Checks wait for the policy once a batch.
-/// Errors: invalid_argument as rays/ray_batch.hpp has it, for options that nothing can be traced by, for a context of
-/// Gaussians that have changed; out_of_memory for more than 2^32 hits kept at a time.
+/// Memory beside the tree: 64 bytes a Gaussian, with gradients 48 more; 12 bytes a ray, and 20 that a context holds.
+/// Hits that are kept by gradient_form::primitive take 32 each, and 16 places at a time a ray. Cost: on the first batch
+/// after a change the tree; on a batch in another frame than the last one launch over the Gaussians; then the trace.
+/// Checks wait for the policy once a batch. Errors: invalid_argument as rays/ray_batch.hpp has it, for options that
+/// nothing can be traced by, for a context of Gaussians that have changed; out_of_memory for more than 2^32 hits kept
+/// at a time.
 
 #include <gart/backward/finish.hpp>
 #include <gart/channels/passes.hpp>
