@@ -32,7 +32,7 @@ class path_tracer {
   /// Allocates nothing; `exec` must outlive it.
   explicit path_tracer(E& exec)
       : exec_(&exec),
-        order_(exec),
+        beams_(exec),
         placed_(exec),
         index_(exec),
         gaussians_(exec),
@@ -104,7 +104,7 @@ class path_tracer {
     cast(0, false, 0, 0);
     end_segments();
     trace_batch<Response>(*exec_, "light/layers", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f},
-                          rays_, order_,
+                          rays_, beams_,
                           light_kernels::layer_segment{{}, paths_.data(), ends_.data(), colors(), options_, out});
     parallel_for(*exec_, "light/layers", rays_,
                  light_kernels::add_surface_layers{placed_.stand_at(frame_), paths_.data(), ends_.data(), out});
@@ -204,7 +204,7 @@ class path_tracer {
   template <bool PerHit>
   void blend(u32 sample, u32 step) {
     trace_batch<Response>(*exec_, "light/gaussians", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f},
-                          rays_, order_,
+                          rays_, beams_,
                           light_kernels::segment<PerHit>{{},
                                                          paths_.data(),
                                                          ends_.data(),
@@ -223,12 +223,12 @@ class path_tracer {
                                              light, static_cast<u32>(paths_options_.bounces), paths_options_.firefly,
                                              paths_options_.seed, sample, step});
     trace_batch<Response>(
-        *exec_, "light/transmittance", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f}, rays_, order_,
+        *exec_, "light/transmittance", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f}, rays_, beams_,
         light_kernels::shadow_segment{{}, shadows_.data(), paths_.data(), options_.transmittance_min});
   }
 
   E* exec_;
-  ray_order<E> order_;  // of no batch: paths stay in the order of their pixels
+  ray_order<E> beams_;  // of no batch: paths stay in the order of their blocks
   light_kernels::placed_scene<E> placed_;
   gaussians_view<float const> model_;
   int active_degree_ = 0;
