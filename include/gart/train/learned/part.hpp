@@ -84,6 +84,8 @@ class learned_part {
   virtual span<float const> before_loss(step_view const&, span<float const> image, span<float> /*numbers*/) {
     return image;
   }
+  /// Takes away the error of pixels that Gaussians of the frame do not cause: densification grows by it.
+  virtual void leave_out(span<float> /*error*/) {}
   /// Turns the gradient by before_loss's output into that by its input.
   virtual void after_loss(step_view const&, span<float> /*gradient*/, span<float> /*numbers*/) {}
   /// `frame`: null on a rank that has no rows of the image.
