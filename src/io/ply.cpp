@@ -143,8 +143,7 @@ gaussian_model splats_of(ply_file const& file, std::vector<std::string>* notes, 
   while (model.feature_count <= most_features && find(e, "feature_" + std::to_string(model.feature_count)))
     ++model.feature_count;
   if (model.feature_count > most_features)
-    file.refuse("there are more properties feature_* than " +
-                    std::to_string(most_features),
+    file.refuse("there are more properties feature_* than " + std::to_string(most_features),
                 "export the model with fewer");
   std::vector<std::string> const columns = splat_columns(model.sh_degree, false, model.feature_count);
   require_columns(file, e, columns, "export the model with every property of the INRIA layout");

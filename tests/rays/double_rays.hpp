@@ -45,7 +45,7 @@ struct ray_weights {
 
 struct seen {
   double loss = 0;
-  std::uint64_t branches = 0;  // which hits, in which order, clamped where
+  std::uint64_t branches = 0;                           // which hits, in which order, clamped where
   std::vector<std::pair<std::size_t, double>> weights;  // of the hits, by Gaussian
 };
 

@@ -111,7 +111,7 @@ bool slope(double& x, F const& loss, double& out) {
 }
 
 inline void compare(gart::gaussian_model const& model, sweep const& s, gart::render_options const& options,
-             results const& got) {
+                    results const& got) {
   double_model m(model);
   auto const loss = [&] {
     seen all;

@@ -56,7 +56,7 @@ concept channel = std::is_trivially_copyable_v<C> &&
   { C::moves } -> std::convertible_to<bool>;
   { c.width() } -> std::same_as<int>;
   { c.parameters() } -> std::same_as<int>;
-  c.add(h, first, n, sums);             // sums[0..n) += w value, of its numbers [first, first + n)
+  c.add(h, first, n, sums);               // sums[0..n) += w value, of its numbers [first, first + n)
   { c.worth(h) } -> std::same_as<float>;  // dL/dS . value
   { c.along(h) } -> std::same_as<float>;
   { c.beyond(ray) } -> std::same_as<float>;

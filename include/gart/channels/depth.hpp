@@ -9,7 +9,7 @@ namespace gart { inline namespace GART_ISA {
 /// The value of a hit is its distance, which moves with the Gaussian.
 struct depth_channel : channel_base {
   static constexpr bool moves = true;  ///< t is a function of the Gaussian
-  float const* gradient = nullptr;  ///< dL/d depth, [R]; null: there is none
+  float const* gradient = nullptr;     ///< dL/d depth, [R]; null: there is none
   /// Adds w t.
   GART_HD GART_INLINE void add(listed_hit const& h, int, int, float (&sums)[1]) const { sums[0] += h.weight * h.t; }
   /// t dL/d depth.

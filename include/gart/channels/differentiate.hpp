@@ -6,8 +6,9 @@
 ///   channel_gradient<E> back(exec);
 ///   back.begin(table);
 ///   back.add(features), back.add(depth);                    // what the weights of hits are worth, in all
-///   back.add_moments(table, gaussians, moments);            // dL/d geometry, for finish_gradients (backward/finish.hpp)
-///   back.pull(table, features, by_features);                // dL/d the parameters of a channel, overwritten
+///   back.add_moments(table, gaussians, moments);            // dL/d geometry, for finish_gradients
+///   (backward/finish.hpp) back.pull(table, features, by_features);                // dL/d the parameters of a channel,
+///   overwritten
 ///
 /// With v the worth of a hit and B what lies behind it,
 ///   dL/dalpha = T v - B / (1 - alpha),   B = sum over hits behind of w v + T_end beyond,
@@ -81,8 +82,8 @@ struct moment_pieces {
           [&](u32 place) { ask_for(&hits.lines[hits.rays[place]]); });
       u32 const place = order.places[k];
       ray_peak const r = evaluate(gaussian, hits.lines[hits.rays[place]]);
-      moments_of<float> const m = hit_moments_with_depth<Response>(gaussian, r, by_alpha[place],
-                                                                   alongs ? alongs[place] : 0.0f, true);
+      moments_of<float> const m =
+          hit_moments_with_depth<Response>(gaussian, r, by_alpha[place], alongs ? alongs[place] : 0.0f, true);
       GART_UNROLL
       for (int i = 0; i < error_place; ++i) sum[i] += m.v[i];
     }
@@ -128,7 +129,8 @@ struct add_up_pieces {
     std::size_t const row = static_cast<std::size_t>(last - first);
     float sums[Chunk] = {};
     for (u64 piece = order.offsets[gaussian]; piece < order.offsets[gaussian + 1]; ++piece)
-      for_each_number<Chunk>(n, [&](int k) { sums[k] += rows[piece * row + static_cast<std::size_t>(begin - first + k)]; });
+      for_each_number<Chunk>(
+          n, [&](int k) { sums[k] += rows[piece * row + static_cast<std::size_t>(begin - first + k)]; });
     float* const to = out + static_cast<std::size_t>(gaussian) * static_cast<std::size_t>(width) + begin;
     for_each_number<Chunk>(n, [&](int k) { to[k] = Add ? to[k] + sums[k] : sums[k]; });
   }
@@ -141,8 +143,7 @@ template <execution E, class Response = generalized_gaussian<>>
 class channel_gradient {
  public:
   /// Allocates nothing; `exec` must outlive it.
-  explicit channel_gradient(E& exec)
-      : exec_(&exec), worths_(exec), alongs_(exec), beyonds_(exec), rows_(exec) {}
+  explicit channel_gradient(E& exec) : exec_(&exec), worths_(exec), alongs_(exec), beyonds_(exec), rows_(exec) {}
 
   /// No channel yet; the table is one that is differentiated.
   void begin(hit_table<E> const& table) {
@@ -156,8 +157,7 @@ class channel_gradient {
     if (C::moves && !moves_) alongs_.resize(hits_.count), alongs_.zero(), moves_ = true;
     parallel_for(*exec_, "channels/worths", hits_.count,
                  channel_kernels::weigh_hits<C>{hits_, from, worths_.data(), C::moves ? alongs_.data() : nullptr});
-    parallel_for(*exec_, "channels/worths", hits_.ray_count,
-                 channel_kernels::weigh_rays<C>{from, beyonds_.data()});
+    parallel_for(*exec_, "channels/worths", hits_.ray_count, channel_kernels::weigh_rays<C>{from, beyonds_.data()});
   }
   /// dL/dalpha of each hit, by all that was added.
   float const* by_alpha() {
@@ -176,9 +176,9 @@ class channel_gradient {
     index_t const n = static_cast<index_t>(gaussians.size());
     gaussian_order_view const order = table.by_gaussian(*exec_, n);
     rows_.resize(std::size_t{moment_stride} * order.pieces);
-    parallel_for(*exec_, "channels/moments", order.pieces,
-                 channel_kernels::moment_pieces<Response>{hits_, order, gaussians.data(), by_alpha(), alongs(),
-                                                          rows_.data()});
+    parallel_for(
+        *exec_, "channels/moments", order.pieces,
+        channel_kernels::moment_pieces<Response>{hits_, order, gaussians.data(), by_alpha(), alongs(), rows_.data()});
     constexpr int lanes = moment_stride / 4;
     parallel_for(*exec_, "channels/moments", n * index_t{lanes},
                  channel_kernels::add_up_pieces<4, true>{order, rows_.data(), 0, moment_stride, lanes, moment_stride,
@@ -190,16 +190,16 @@ class channel_gradient {
   void pull(hit_table<E>& table, C const& from, index_t gaussians, float* out) {
     int const width = from.parameters();
     hits_ = table.view();
-    if (hits_.count == 0)
-      return exec_->zero(out, sizeof(float) * gaussians * static_cast<std::size_t>(width));
+    if (hits_.count == 0) return exec_->zero(out, sizeof(float) * gaussians * static_cast<std::size_t>(width));
     gaussian_order_view const order = table.by_gaussian(*exec_, gaussians);
     index_t const most = order.pieces > gaussians ? order.pieces : gaussians;
     channel_kernels::for_each_launch<C::chunk>(most, width, [&](int first, int last, int lanes) {
       rows_.resize(std::size_t{order.pieces} * static_cast<std::size_t>(last - first));
       parallel_for(*exec_, "channels/pull", order.pieces * static_cast<index_t>(lanes),
                    channel_kernels::pull_pieces<C>{hits_, order, from, first, last, lanes, rows_.data()});
-      parallel_for(*exec_, "channels/pull", gaussians * static_cast<index_t>(lanes),
-                   channel_kernels::add_up_pieces<C::chunk, false>{order, rows_.data(), first, last, lanes, width, out});
+      parallel_for(
+          *exec_, "channels/pull", gaussians * static_cast<index_t>(lanes),
+          channel_kernels::add_up_pieces<C::chunk, false>{order, rows_.data(), first, last, lanes, width, out});
     });
   }
 

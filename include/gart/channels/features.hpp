@@ -12,9 +12,9 @@ namespace gart { inline namespace GART_ISA {
 /// whole.
 template <int Chunk>
 struct feature_channel : channel_base {
-  static constexpr int chunk = Chunk;   ///< numbers that one lane sums at a time
-  feature_view<float const> features;   ///< [N Gaussians][width]
-  float const* gradient = nullptr;      ///< dL/d sums, [R][width]; null on the way forward
+  static constexpr int chunk = Chunk;  ///< numbers that one lane sums at a time
+  feature_view<float const> features;  ///< [N Gaussians][width]
+  float const* gradient = nullptr;     ///< dL/d sums, [R][width]; null on the way forward
 
   /// Features of a Gaussian, and so of a ray.
   GART_HD int width() const { return features.width; }

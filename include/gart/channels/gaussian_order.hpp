@@ -100,8 +100,7 @@ class gaussian_order {
     begins_.resize(gaussians), ends_.resize(gaussians), counts_.resize(gaussians);
     offsets_.resize(std::size_t{gaussians} + 1);
     begins_.zero(), ends_.zero();
-    parallel_for(exec, "channels/order", hits,
-                 channel_kernels::number_hits{ids.data(), ids_.data(), places_.data()});
+    parallel_for(exec, "channels/order", hits, channel_kernels::number_hits{ids.data(), ids_.data(), places_.data()});
     sort_pairs(exec, ids_.view(), places_.view(), static_cast<int>(std::bit_width(gaussians)));
     parallel_for(exec, "channels/order", hits,
                  channel_kernels::find_hits{ids_.data(), hits, begins_.data(), ends_.data()});
@@ -117,8 +116,13 @@ class gaussian_order {
   }
   /// For kernels.
   gaussian_order_view view() const {
-    return {ids_.data(),     places_.data(), ends_.data(),
-            offsets_.data(), firsts_.data(), static_cast<index_t>(firsts_.size()), static_cast<u32>(ids_.size())};
+    return {ids_.data(),
+            places_.data(),
+            ends_.data(),
+            offsets_.data(),
+            firsts_.data(),
+            static_cast<index_t>(firsts_.size()),
+            static_cast<u32>(ids_.size())};
   }
 
  private:

@@ -4,8 +4,8 @@
 /// ray program gives to a hit_writer, of a batch (rays/batch_composite.hpp) or of a view's pixels
 /// (channels/pixel_hits.hpp): exactly the hits that are composited.
 ///
-/// Memory: 16 bytes a hit and 8 a ray; to be differentiated 4 and 24 more. Cost: a trace that writes them, and before it
-/// one that counts them where nobody has. Errors: out_of_memory for 2^32 hits and more.
+/// Memory: 16 bytes a hit and 8 a ray; to be differentiated 4 and 24 more. Cost: a trace that writes them, and before
+/// it one that counts them where nobody has. Errors: out_of_memory for 2^32 hits and more.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/channels/channel.hpp>
@@ -85,7 +85,15 @@ class hit_table {
  public:
   /// None yet; allocates nothing. `exec` must outlive it.
   explicit hit_table(E& exec)
-      : offsets(exec), ids(exec), rays(exec), t(exec), alpha(exec), weight(exec), lines(exec), counts_(exec), order_(exec) {}
+      : offsets(exec),
+        ids(exec),
+        rays(exec),
+        t(exec),
+        alpha(exec),
+        weight(exec),
+        lines(exec),
+        counts_(exec),
+        order_(exec) {}
 
   buffer<u64, E> offsets;             ///< as hit_table_view has them
   buffer<u32, E> ids, rays;           ///< the same
@@ -123,9 +131,14 @@ class hit_table {
 
   /// For kernels.
   hit_table_view view() const {
-    return {offsets.data(), ids.data(),   rays.data(),
-            t.data(),       alpha.data(), weight.data(),
-            lines.data(),   static_cast<index_t>(offsets.size() ? offsets.size() - 1 : 0),
+    return {offsets.data(),
+            ids.data(),
+            rays.data(),
+            t.data(),
+            alpha.data(),
+            weight.data(),
+            lines.data(),
+            static_cast<index_t>(offsets.size() ? offsets.size() - 1 : 0),
             static_cast<index_t>(ids.size())};
   }
   /// The same hits by Gaussian, of so many; made where it is not.

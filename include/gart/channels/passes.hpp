@@ -13,15 +13,13 @@ namespace gart { inline namespace GART_ISA {
 /// The way forward, to what is wanted.
 template <execution E>
 void sum_channels(E& exec, hit_table<E> const& table, gaussian_channels const& of, channel_targets const& out) {
-  if (out.features)
-    sum_channel(exec, table.view(), feature_channel<chunk_of<E>>{{}, of.features}, out.features);
+  if (out.features) sum_channel(exec, table.view(), feature_channel<chunk_of<E>>{{}, of.features}, out.features);
 }
 
 /// Adds the channels by which geometry has a gradient.
 template <execution E, class Response>
 void weigh_channels(channel_gradient<E, Response>& back, gaussian_channels const& of, channel_gradients const& by) {
-  if (!by.features.empty() && !by.detached)
-    back.add(feature_channel<chunk_of<E>>{{}, of.features, by.features.data()});
+  if (!by.features.empty() && !by.detached) back.add(feature_channel<chunk_of<E>>{{}, of.features, by.features.data()});
 }
 
 /// dL/d what Gaussians have of them, where it is wanted; zero where there is no gradient.

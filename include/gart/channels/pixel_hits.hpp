@@ -1,7 +1,8 @@
 #pragma once
 /// \file
 /// The hits of a view's pixels as a table, by any tracer and camera and through the filter of the pixels: row-major, a
-/// ray a pixel. Rows that are not traced have none. Views with one centre are walked in packets on hosts, as images are.
+/// ray a pixel. Rows that are not traced have none. Views with one centre are walked in packets on hosts, as images
+/// are.
 
 #include <gart/channels/hit_table.hpp>
 #include <gart/render/pixels.hpp>

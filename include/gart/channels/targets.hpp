@@ -49,7 +49,8 @@ inline void require_channels(gaussian_channels const& channels, std::size_t gaus
 /// The same where what is to be shown is not there.
 inline void require_channels(gaussian_channels const& channels, channel_targets const& out, std::string const& call) {
   if (out.features && channels.features.width == 0)
-    throw invalid_argument(call + ": channel_targets.features is set, and the Gaussians have no features: bind them first");
+    throw invalid_argument(call +
+                           ": channel_targets.features is set, and the Gaussians have no features: bind them first");
 }
 /// The same of gradients, of so many rays or pixels.
 inline void require_channels(gaussian_channels const& channels, channel_gradients const& by,
@@ -57,7 +58,8 @@ inline void require_channels(gaussian_channels const& channels, channel_gradient
   feature_view<float const> const& f = channels.features;
   std::size_t const needed = rays * static_cast<std::size_t>(f.width);
   if ((!by.features.empty() || to.features.values) && f.width == 0)
-    throw invalid_argument(call + ": there are gradients of features, and the Gaussians have none: bind them before forward");
+    throw invalid_argument(call +
+                           ": there are gradients of features, and the Gaussians have none: bind them before forward");
   if (!by.features.empty() && by.features.size() != needed)
     throw invalid_argument(call + ": channel_gradients.features has " + std::to_string(by.features.size()) +
                            " numbers, and " + std::to_string(rays) + " rays of " + std::to_string(f.width) +

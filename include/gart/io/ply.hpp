@@ -5,9 +5,10 @@
 /// f_rest channel-major, opacity a logit, scales logarithms, rot w,x,y,z and not normalised. Written in that order,
 /// byte for byte, read by name in any order, ascii or binary of either endianness, without normals and with extra
 /// properties. Features (scene/features.hpp) are properties feature_0 to feature_(N-1) behind these, floats; where they
-/// are numbered from 0 without a gap they are read. gart's own traits travel as header comments ("comment gart kernel_degree 2"). A model with the trait
-/// antialias is also marked as other programs mark theirs, "comment SplatRenderMode: mip"; a file with that mark, or
-/// with "comment antialiased 1", and no trait of gart's own is read as one whose antialias has no value.
+/// are numbered from 0 without a gap they are read. gart's own traits travel as header comments ("comment gart
+/// kernel_degree 2"). A model with the trait antialias is also marked as other programs mark theirs, "comment
+/// SplatRenderMode: mip"; a file with that mark, or with "comment antialiased 1", and no trait of gart's own is read as
+/// one whose antialias has no value.
 ///
 /// Errors: io_error naming the file, the property and the remedy, for a truncated body, a missing property, a count of
 /// f_rest that is no degree from 0 to 3, a 2D Gaussian file (no scale_2), a file of which no Gaussian can be used (with

@@ -12,8 +12,8 @@ namespace gart {
 struct gradient_targets {
   /// dL/d the Gaussians, overwritten: of their number, and of the request's SH degree.
   gaussians_view<float> gaussians = {};
-  float* pose = nullptr;           ///< [6]: dL/d the pose of a view, a pose_gradient's numbers in order
-  ray_gradient_targets rays = {};  ///< dL/d the rays of a batch
+  float* pose = nullptr;                   ///< [6]: dL/d the pose of a view, a pose_gradient's numbers in order
+  ray_gradient_targets rays = {};          ///< dL/d the rays of a batch
   channel_gradient_targets channels = {};  ///< dL/d features
 };
 

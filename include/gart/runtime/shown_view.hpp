@@ -12,7 +12,7 @@ namespace gart { inline namespace GART_ISA {
 /// Frame, Pass: of a configuration.
 template <class Frame, class Pass>
 struct shown_view {
-  using E = typename Frame::execution_type;            ///< the policy
+  using E = typename Frame::execution_type;                          ///< the policy
   using channels_type = view_channels<E, typename Frame::response>;  ///< of the renderer
 
   /// Allocates nothing; `exec` must outlive it.
@@ -44,10 +44,8 @@ struct shown_view {
     bool const more = targets.channels.any();
     u32* const counts = more ? hits.count(exec, n) : targets.hits;
     hits.is_listed = false, hits.channels = channels;
-    pass.render(frame, {.color = color.data(),
-                        .transmittance = transmittance.data(),
-                        .depth = depth.data(),
-                        .hits = counts});
+    pass.render(frame,
+                {.color = color.data(), .transmittance = transmittance.data(), .depth = depth.data(), .hits = counts});
     auto const copy = [&](auto* to, auto const* from, std::size_t numbers) {
       if (to && to != from) exec.copy(to, from, numbers * sizeof *to);
     };

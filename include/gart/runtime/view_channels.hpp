@@ -14,10 +14,10 @@ template <execution E>
 struct view_hits {
   /// None yet.
   explicit view_hits(E& exec) : counts(exec), table(exec) {}
-  buffer<u32, E> counts;        ///< [H][W]
-  hit_table<E> table;           ///< the hits
-  bool is_listed = false;       ///< they are those of the view
-  gaussian_channels channels;   ///< that could be shown
+  buffer<u32, E> counts;       ///< [H][W]
+  hit_table<E> table;          ///< the hits
+  bool is_listed = false;      ///< they are those of the view
+  gaussian_channels channels;  ///< that could be shown
 
   /// A view whose hits are counted as it is rendered, to what this returns.
   u32* count(E& exec, std::size_t pixels) {

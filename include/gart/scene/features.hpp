@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Features of Gaussians: N numbers each, 1 to 512, that are shown as colours are, without a direction. What they mean is
-/// the caller's: classes, embeddings, intensities. Errors: invalid_argument naming what disagrees.
+/// Features of Gaussians: N numbers each, 1 to 512, that are shown as colours are, without a direction. What they mean
+/// is the caller's: classes, embeddings, intensities. Errors: invalid_argument naming what disagrees.
 
 #include <gart/core/error.hpp>
 #include <gart/core/macros.hpp>
