@@ -143,7 +143,8 @@ int print_model(std::filesystem::path const& path) {
   std::vector<std::string> notes;
   gart::gaussian_model const model = gart::read_splats(path, &traits, &notes);
   std::printf("model      %s\n", printable(path.string()).c_str());
-  std::printf("Gaussians  %s, SH degree %d\n", with_commas(model.size()).c_str(), model.sh_degree);
+  std::string const features = model.feature_count ? ", " + std::to_string(model.feature_count) + " features each" : "";
+  std::printf("Gaussians  %s, SH degree %d%s\n", with_commas(model.size()).c_str(), model.sh_degree, features.c_str());
   print_origin(gart::origin_of(traits, path.string()));
   print_box(model);
   for (auto const& [key, value] : traits)

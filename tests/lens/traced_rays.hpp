@@ -33,7 +33,8 @@ ray_results ray_gradients_by(E& exec, gart::gaussian_model const& model, gart::c
   frame.prepare(scene.view(), view, options, active_degree);
   frame.render({.color = color.data(), .transmittance = transmittance.data(), .depth = depth.data()});
   gart::image_gradients const image{by_color, by_depth, by_transmittance};
-  gart::depth_and_transmittance const more{depth.data(), transmittance.data()};
+  gart::depth_image more;
+  more.depth = depth.data(), more.transmittance = transmittance.data();
   gart::differentiate_rays(frame, color, image, {direction.data(), origin.data()}, more);
   ray_results out{direction.to_host(), origin.to_host(), {}};
   if (of_lens) out.lens = gart::differentiate_lens(frame, color, image, more);

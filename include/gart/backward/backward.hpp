@@ -110,7 +110,7 @@ class backward_pass {
     }
     frame.render(targets, record);
     color_ = targets.color, stands_at_ = rendered;
-    if constexpr (of_depth) depth_.depth = targets.depth, depth_.transmittance = targets.transmittance;
+    depth_.depth = targets.depth, depth_.transmittance = targets.transmittance;
   }
 
   /// Of the last differentiate(), [N][moment_stride]: at error_place the error that is seen through each Gaussian,
@@ -215,6 +215,7 @@ class backward_pass {
       if ((!image.depth.empty() && !depth_.depth) || (!image.transmittance.empty() && !depth_.transmittance))
         throw invalid_argument(
             "differentiate needs the image's depth or transmittance: give backward_pass.render its target");
+      depth_.slots = depths_.data();
       depth_.depth_gradient = image.depth.data(), depth_.transmittance_gradient = image.transmittance.data();
     }
   }
@@ -228,14 +229,8 @@ class backward_pass {
           frame.exec(), "backward/gather", tile_range{grid_.count(), kernel::block_size},
           kernel{rays, grid_, lists_, footprints_->ranges().data(), slots_.data(), frame.gaussians().data(),
                  frame.active_degree(), color_, color_gradient.data(), error.data(), gradients.sh, moments_.data(),
-                 footprints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near, gathered()});
+                 footprints_->pair_offsets().data(), rows_.data(), last_.data(), frame.options().near, depth_});
     });
-  }
-  auto gathered() const {
-    if constexpr (records_depths)
-      return gathered_depth{depths_.data(), depth_};
-    else
-      return no_depth{};
   }
 
   Frame const* frame_ = nullptr;
@@ -252,7 +247,7 @@ class backward_pass {
   buffer<quad, execution_type> rows_;
   buffer<last_hit, execution_type> last_;
   buffer<float, execution_type> depths_;
-  std::conditional_t<of_depth, depth_image, no_depth> depth_;
+  depth_image depth_;
 };
 
 /// From the gradients of the image that the pass rendered to those of the scene's parameters, without the filter of the

@@ -16,9 +16,10 @@ namespace gart { inline namespace GART_ISA {
 /// is no such gradient.
 struct depth_image {
   float const* depth = nullptr;                   ///< sum of weight * t
-  float const* depth_gradient = nullptr;          ///< dL/d depth
   float const* transmittance = nullptr;           ///< after the last hit
+  float const* depth_gradient = nullptr;          ///< dL/d depth
   float const* transmittance_gradient = nullptr;  ///< dL/d transmittance
+  float const* slots = nullptr;                   ///< beside the LT buffer, a float a slot, where geometry is gathered
 
   /// dL/d depth of a pixel.
   GART_HD GART_INLINE float gradient(std::size_t pixel) const { return depth_gradient ? depth_gradient[pixel] : 0.0f; }
@@ -31,35 +32,17 @@ struct depth_image {
   }
 };
 
-/// In its place where the gradient is of colour alone.
-struct no_depth {};
-
-/// An entry of the LT buffer with the depth beside it.
+/// A slot of the LT buffer with the depth beside it.
 template <class Entry>
 struct entry_with_depth : Entry {
   float depth;  ///< that the pixel would have if the hit were opaque
-};
-
-/// The LT buffer with the depths beside it.
-template <class Entry>
-struct slots_with_depth {
-  Entry const* slots;   ///< the LT buffer
-  float const* depths;  ///< a float a slot
-  /// A slot by its number.
-  GART_HD GART_INLINE entry_with_depth<Entry> operator[](std::size_t k) const { return {{slots[k]}, depths[k]}; }
-};
-
-/// What a gather of depth reads besides.
-struct gathered_depth {
-  float const* slots = nullptr;  ///< beside the LT buffer, a float a slot
-  depth_image image;             ///< of the pixels
 };
 
 /// A record of the LT buffer (backward/record_lt.hpp) that also keeps depths.
 template <class Record>
 struct record_with_depth : Record {
   float* depths = nullptr;             ///< a float a slot
-  static constexpr bool depth = true;  ///< as records_depth has it
+  static constexpr bool depth = true;  ///< it takes them
   using Record::operator();
   /// Writes a slot and its depth.
   GART_HD GART_INLINE void operator()(u32 place, vec3 const& opaque, float weight, vec3 const& unclamped,

@@ -28,12 +28,6 @@ struct ray_targets {
   float* origin = nullptr;     ///< dL/d origin; null where not wanted
 };
 
-/// The image that a gradient is of, where it is of more than its colour.
-struct depth_and_transmittance {
-  float const* depth = nullptr;          ///< [H][W]: sum of weight * t
-  float const* transmittance = nullptr;  ///< [H][W]
-};
-
 namespace backward_kernels {
 
 // The rays of a view with one centre or without.
@@ -127,10 +121,10 @@ struct ray_gradients : ray_program_base {
 }  // namespace backward_kernels
 
 /// From the gradients of an image that the frame rendered, `color`, to those of its pixels' rays. `image` has the
-/// gradients; those by depth and transmittance need the image's own in `more`.
+/// gradients; those by depth and transmittance need the image's own in `depth`.
 template <class Frame>
 void differentiate_rays(Frame& frame, span<float const> color, image_gradients const& image, ray_targets const& out,
-                        depth_and_transmittance const& more = {}) {
+                        depth_image depth = {}) {
   auto& exec = frame.exec();
   auto const& view = frame.view();
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
@@ -140,7 +134,7 @@ void differentiate_rays(Frame& frame, span<float const> color, image_gradients c
     if (!one.empty() && one.size() != pixels)
       throw invalid_argument(
           "differentiate_rays: a gradient by depth or transmittance must have a value for each pixel");
-  if ((!image.depth.empty() && !more.depth) || (!image.transmittance.empty() && !more.transmittance))
+  if ((!image.depth.empty() && !depth.depth) || (!image.transmittance.empty() && !depth.transmittance))
     throw invalid_argument("differentiate_rays needs the image's depth or transmittance: give it with the gradient");
   if (!out.direction) throw invalid_argument("differentiate_rays: ray_targets.direction is needed");
   gaussians_view<float const> const scene = frame.scene();
@@ -156,7 +150,7 @@ void differentiate_rays(Frame& frame, span<float const> color, image_gradients c
       rays = {{own.view, own.directions}, own.origins};
   });
   pixel_order const order{view.width, view.height, options.rows};
-  depth_image const depth{more.depth, image.depth.data(), more.transmittance, image.transmittance.data()};
+  depth.depth_gradient = image.depth.data(), depth.transmittance_gradient = image.transmittance.data();
   using program = backward_kernels::ray_gradients<typename Frame::response>;
   frame.trace("backward/rays", order.launch_size(),
               program{{},

@@ -83,7 +83,7 @@ struct gather_kernel {
   last_hit const* last = nullptr;         ///< recomputed: [H][W]
   float near = 0;                         ///< hits lie at t > near
   /// What depth needs, where it has a gradient.
-  std::conditional_t<C::terms::depth, gathered_depth, no_depth> depth;
+  depth_image depth;
 
   /// Gathers the tile of a team.
   GART_KERNEL void operator()(auto const& team) const {
@@ -160,8 +160,8 @@ struct gather_kernel {
       out.last = {{end.t, bits_to_float(end.place), 0, 0}};
     }
     if constexpr (C::terms::depth) {
-      out.direction_total.v[3] += depth.image.total(a / 3);
-      out.last.v[2] = depth.image.gradient(a / 3);
+      out.direction_total.v[3] += depth.total(a / 3);
+      out.last.v[2] = depth.gradient(a / 3);
     }
     if constexpr (pixel_data::basis_quads > 0) {
       sh_basis<C::sh_degree> const basis(d);
@@ -178,17 +178,16 @@ struct gather_kernel {
     lane_data const data(*this, id);
     pixel_box const cell = cell_in(range, area);
     u32 const first = static_cast<u32>(range.offset) + tile_offset(range, cell);
-    auto const slot = slots_from(first);
     u32 const width = cell.width(), last_slot = cell.area() - 1;
     u32 const skip = area.width() - width;
     u32 p = (cell.y0 - area.y0) * area.width() + (cell.x0 - area.x0);
     u32 column = 0;
     // Read two ahead: the work between hides the latency of memory.
-    slot_type next = slot[0], after = slot[last_slot > 0 ? 1 : 0];
+    slot_type next = slot_at(first, 0), after = slot_at(first, last_slot > 0 ? 1 : 0);
     for (u32 k = 0; k <= last_slot; ++k) {
       slot_type const entry = next;
       next = after;
-      after = slot[k + 2 < last_slot ? k + 2 : last_slot];
+      after = slot_at(first, k + 2 < last_slot ? k + 2 : last_slot);
       pixel_data const& at = s.pixels[p];
       ray_peak r[1];
       peaks_at(r, data, [&](int) -> pixel_data const& { return at; });
@@ -202,12 +201,12 @@ struct gather_kernel {
     finish(range, area, id, sh_sum, moment_sum);
   }
 
-  /// The slots from that number on.
-  GART_HD GART_INLINE auto slots_from(std::size_t first) const {
+  /// Slot k from that number on.
+  GART_HD GART_INLINE slot_type slot_at(std::size_t first, std::size_t k) const {
     if constexpr (C::terms::depth)
-      return slots_with_depth<entry_type>{slots + first, depth.slots + first};
+      return {{(slots + first)[k]}, (depth.slots + first)[k]};
     else
-      return slots + first;
+      return (slots + first)[k];
   }
 
   /// What a lane keeps of its Gaussian: colour alone needs nothing but the slots.

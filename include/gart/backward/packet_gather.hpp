@@ -87,8 +87,8 @@ struct packet_gather {
       }
       out.total.v[l] = total, out.error.v[l] = inside && gather.error ? gather.error[a] : 0.0f;
       if constexpr (C::terms::depth) {
-        out.depth_gradient[0].v[l] = inside ? gather.depth.image.gradient(a) : 0.0f;
-        out.total.v[l] += inside ? gather.depth.image.total(a) : 0.0f;
+        out.depth_gradient[0].v[l] = inside ? gather.depth.gradient(a) : 0.0f;
+        out.total.v[l] += inside ? gather.depth.total(a) : 0.0f;
       }
       last_hit const end = recomputed && inside ? gather.last[a] : last_hit{};
       out.last_t.v[l] = end.t, out.last_place[l] = end.place;

@@ -19,7 +19,8 @@ struct record_lt {
   footprint_slots const* ranges = nullptr;
   Entry* slots = nullptr;  ///< the LT buffer
 
-  static constexpr bool any = true;  ///< something is left
+  static constexpr bool any = true;     ///< something is left
+  static constexpr bool depth = false;  ///< of depth nothing
   /// The number of the hit's slot. Boxes hold every hit; memory stays safe regardless.
   GART_HD GART_INLINE u32 place_of(u32 id, pixel at) const {
     footprint_slots const range = ranges[id];

@@ -47,7 +47,7 @@ struct scatter_program : ray_program_base {
   float* sh_gradient = nullptr;           ///< [N][K][3]
   float* moments_out = nullptr;           ///< [N][moment_stride]
   /// What depth needs, where it has a gradient.
-  std::conditional_t<Terms::depth, depth_image, no_depth> depth;
+  depth_image depth;
 
   /// Whether ray i is of a pixel of the image.
   GART_HD bool active(index_t i) const { return order.inside(order.at(i)); }

@@ -9,6 +9,7 @@
 #include <array>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 namespace gart { inline namespace GART_ISA {
@@ -60,34 +61,20 @@ struct deterministic_strategy : primitive_strategy {
   static constexpr bool ordered = true;                 ///< by a second launch
 };
 
-template <strategy Strategy>
-struct with_depth;
-
-namespace detail {
-
-template <class Strategy>
-struct depth_too {
-  using type = with_depth<Strategy>;
-};
-template <>
-struct depth_too<void> {
-  using type = void;
-};
-
-}  // namespace detail
-
 /// A strategy whose gradient is of the image's depth too, and of its transmittance (backward/depth.hpp): a float a slot
 /// more, where geometry is gathered.
-template <strategy Strategy>
+template <class Strategy>
 struct with_depth : Strategy {
   /// With the depth beside each slot.
   template <int Size>
   using record =
       std::conditional_t<Strategy::gather::geometry, record_with_depth<typename Strategy::template record<Size>>,
                          typename Strategy::template record<Size>>;
-  using gather = typename Strategy::gather::with_depth;                            ///< its geometry of depth too
-  using scatter = typename Strategy::scatter::with_depth;                          ///< its geometry of depth too
-  using fallback = typename detail::depth_too<typename Strategy::fallback>::type;  ///< with depth too
+  using gather = typename Strategy::gather::with_depth;    ///< its geometry of depth too
+  using scatter = typename Strategy::scatter::with_depth;  ///< its geometry of depth too
+  /// With depth too.
+  using fallback =
+      std::conditional_t<std::is_void_v<typename Strategy::fallback>, void, with_depth<typename Strategy::fallback>>;
 };
 /// Whether a strategy's gradient is of depth too.
 template <strategy Strategy>

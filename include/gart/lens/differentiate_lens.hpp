@@ -78,7 +78,7 @@ class lens_differentiation {
   /// [H][W], once for each of the four numbers.
   template <class Frame, class Share = alone>
   void operator()(Frame& frame, span<float const> color, image_gradients const& image, span<float> out,
-                  depth_and_transmittance const& more = {}, Share&& share = {}) {
+                  depth_image const& more = {}, Share&& share = {}) {
     if (frame.options().antialias > 0)
       throw invalid_argument(
           "differentiate_lens: the filter of the pixels has no gradient by the focal length: set "
@@ -115,7 +115,7 @@ class lens_differentiation {
   /// Returns it to the host; waits for it.
   template <class Frame>
   lens_gradient operator()(Frame& frame, span<float const> color, image_gradients const& image,
-                           depth_and_transmittance const& more = {}) {
+                           depth_image const& more = {}) {
     out_.resize(lens_gradient::floats);
     (*this)(frame, color, image, out_.view(), more);
     return lens_gradient(out_.to_host().data());
@@ -138,7 +138,7 @@ class lens_differentiation {
 /// The same for a single call.
 template <class Frame>
 lens_gradient differentiate_lens(Frame& frame, span<float const> color, image_gradients const& image,
-                                 depth_and_transmittance const& more = {}) {
+                                 depth_image const& more = {}) {
   return lens_differentiation<typename Frame::execution_type>(frame.exec())(frame, color, image, more);
 }
 

@@ -122,7 +122,7 @@ struct composite : ray_program_base {
     // A hit of no alpha leaves a ray as it is.
     F const weight = blend(select(now, alpha, zero), select(now, t, zero), c, s.color, s.depth, s.transmittance);
     auto const note = [&](auto const&... where) {
-      if constexpr (records_depth<Record>)
+      if constexpr (Record::depth)
         return record(where..., opaque, weight, unclamped, depth);
       else
         return record(where..., opaque, weight, unclamped);

@@ -38,18 +38,14 @@ template <class R>
 concept hit_record = std::is_trivially_copyable_v<R> &&
     requires(R const& r, u32 id, pixel at, u32 place, vec3 const& color, float weight) {
   { R::any } -> std::convertible_to<bool>;      // whether anything is left; places then order a pixel's hits by id
+  { R::depth } -> std::convertible_to<bool>;    // whether it also takes, as a last argument, the depth as below
   typename R::entry;                            // what a place holds, with a `name`
   typename R::cell;                             // as warp_program has it
   { r.place_of(id, at) } -> std::same_as<u32>;  // where the hit of Gaussian `id` at that pixel belongs
-  // The colour that the pixel would have if the hit were opaque, the hit's weight T alpha, its colour before the clamp.
+  // The colour that the pixel would have if the hit were opaque, the hit's weight T alpha, its colour before the clamp;
+  // of a record with depth the depth that it would have.
   r(place, color, weight, color);
 } && detail::packet_record<R>;
-
-/// Whether a record also takes the depth that the pixel would have if the hit were opaque, as a last argument.
-template <class R>
-inline constexpr bool records_depth = requires {
-  requires R::depth;
-};
 
 /// The entry of a record that keeps nothing.
 struct no_entry {
@@ -58,9 +54,10 @@ struct no_entry {
 
 /// Nothing: the backward pass traces again.
 struct record_none {
-  static constexpr bool any = false;  ///< nothing is left
-  using entry = no_entry;             ///< nothing
-  using cell = no_cell;               ///< hits have no places
+  static constexpr bool any = false;    ///< nothing is left
+  static constexpr bool depth = false;  ///< of depth neither
+  using entry = no_entry;               ///< nothing
+  using cell = no_cell;                 ///< hits have no places
   /// Always 0.
   GART_HD GART_INLINE u32 place_of(u32 /*id*/, pixel) const { return 0; }
   /// Does nothing.

@@ -33,8 +33,8 @@ class learned_lenses final : public learned_part<Frame> {
   void after_backward(Frame* frame, step_view const& v, span<float> numbers) override {
     if (!training_.learns(v.step, v.iterations)) return;
     if (!frame) return differentiate_.of_others(v.color.size() / 3, numbers, v.share);
-    depth_and_transmittance more;
-    if (!v.by_image.depth.empty()) more = {v.depth.depth.data(), v.depth.transmittance.data()};
+    depth_image more;
+    if (!v.by_image.depth.empty()) more.depth = v.depth.depth.data(), more.transmittance = v.depth.transmittance.data();
     differentiate_(*frame, v.color, v.by_image, numbers, more, v.share);
   }
   void step(std::size_t view, int shrink, span<float const> numbers, int step, int iterations,
