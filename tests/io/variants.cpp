@@ -249,7 +249,7 @@ TEST_CASE("a GLB is written with SPZ 2 in it") {
   scratch_folder const folder;
   auto const model = few(60, 2);
   gart::splat_packing const packing{.spz = true};
-  gart::splat_traits const traits{{"antialias", "0.3"}, {"origin", "1000 0 0"}};
+  gart::splat_traits const traits{{"antialias", "0.3"}, {"origin", "1000,0,0"}};
   gart::write_splats(folder.path / "m.glb", model, traits, packing);
   std::string const bytes = text_of(folder.path / "m.glb");
   CHECK(holds(bytes, R"("extensionsRequired":["KHR_gaussian_splatting","KHR_gaussian_splatting_compression_spz_2"])"));
