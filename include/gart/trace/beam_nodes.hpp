@@ -76,8 +76,7 @@ class beam_node_queue {
       u32 const least = __reduce_min_sync(0xffffffffu, key);
       if (least > reach) break;
       int const whose = lowest_bit(__ballot_sync(0xffffffffu, key == least));
-      if (static_cast<int>(threadIdx.x) == whose)
-        s.taken[count] = s.node[at], s.key[at] = key = beam_nodes::gone;
+      if (static_cast<int>(threadIdx.x) == whose) s.taken[count] = s.node[at], s.key[at] = key = beam_nodes::gone;
     }
     return count;
   }
