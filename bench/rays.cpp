@@ -88,9 +88,10 @@ void trace(benchmark::State& state, E& exec) {
   state.counters["rays"] = b.rays.count();
 }
 
-// The same rays by the walks themselves: all of them one by one (widest: 0), or in beams of a width.
-template <gart::ray_list (*Rays)(), int WidestInHundredths, gart::execution E>
-void walks(benchmark::State& state, E& exec) {
+// The same rays by the walks themselves: all of them one by one (widest: 0), or in beams of a width and a number of
+// candidates at most.
+template <gart::ray_list (*Rays)(), gart::execution E>
+void walks(benchmark::State& state, E& exec, float widest, int most, bool ordered = true) {
   using response = gart::generalized_gaussian<>;
   using program_type = gart::batch_composite<>;
   batch<E> b(exec, Rays());
@@ -109,15 +110,16 @@ void walks(benchmark::State& state, E& exec) {
   gart::world_view const index = b.tracer.index().seen_from(b.rays.frame);
   gart::ray_order<E> order(exec);
   order.make(exec, b.rays, index.tree, index.shift);
-  constexpr bool beamed = WidestInHundredths > 0;
-  gart::u32 const* const neighbours = beamed ? order.of(rays) : nullptr;
+  bool const beamed = widest > 0;
+  gart::u32 const* const neighbours = ordered ? order.of(rays) : nullptr;
   gart::trace_kernels::walk_beams<response, gart::world_view, program_type> const together{
-      index, traced, program, rays, neighbours, apart.data(), 0.01f * WidestInHundredths};
-  gart::trace_kernels::walk_alone<response, 16, gart::world_view, program_type> const alone{
-      index, traced, program, neighbours, beamed ? apart.data() : nullptr};
+      index, traced, program, rays, neighbours, apart.data(), widest, most};
   gart_bench::measure(state, exec, [&] {
-    if (beamed) gart::parallel_for(exec, "beams", gart::tile_range{beams, gart::beam_lanes}, together);
-    gart::parallel_for(exec, "alone", rays, alone);
+    if (beamed)
+      gart::parallel_for(exec, "beams", gart::tile_range{beams, static_cast<gart::index_t>(gart::beam_lanes)},
+                         together);
+    gart::trace_kernels::trace_alone<response>(exec, "alone", index, traced, rays, neighbours,
+                                               beamed ? apart.data() : nullptr, program);
   });
   state.counters["rays"] = rays;
   state.counters["same"] = color.to_host() == b.color.to_host();
@@ -169,19 +171,26 @@ void both(benchmark::State& state, E& exec) {
 GART_BENCH("rays/view/tiles", image<gart_bench::by_tiles<8>>)
 GART_BENCH("rays/view/tree", image<gart_bench::by_bvh>)
 GART_BENCH("rays/view/trace", trace<view>)
-GART_BENCH("rays/view/alone", walks<view, 0>)
+GART_BENCH("rays/view/alone", [](auto& state, auto& exec) { walks<view>(state, exec, 0, 0); })
 GART_BENCH("rays/lidar/trace", trace<lidar>)
-GART_BENCH("rays/lidar/alone", walks<lidar, 0>)
+GART_BENCH("rays/lidar/alone", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0, 0); })
 GART_BENCH("rays/lidar/list", list<lidar>)
 GART_BENCH("rays/lidar/backward/primitive", backward<lidar, gradient_form::primitive>)
 GART_BENCH("rays/lidar/backward/scatter", backward<lidar, gradient_form::scatter>)
 GART_BENCH("rays/lidar/both/primitive", both<lidar, gradient_form::primitive>)
 GART_BENCH("rays/lidar/both/scatter", both<lidar, gradient_form::scatter>)
 GART_BENCH("rays/incoherent/trace", trace<incoherent>)
-GART_BENCH("rays/incoherent/alone", walks<incoherent, 0>)
-GART_BENCH("rays/incoherent/width/10", walks<incoherent, 10>)
-GART_BENCH("rays/incoherent/width/50", walks<incoherent, 50>)
-GART_BENCH("rays/incoherent/width/200", walks<incoherent, 200>)
+GART_BENCH("rays/incoherent/alone", [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0, 0); })
 GART_BENCH("rays/incoherent/list", list<incoherent>)
 GART_BENCH("rays/incoherent/backward/primitive", backward<incoherent, gradient_form::primitive>)
 GART_BENCH("rays/incoherent/backward/scatter", backward<incoherent, gradient_form::scatter>)
+// What the library chooses, against other widths and numbers.
+GART_BENCH("rays/choice/view/all", [](auto& state, auto& exec) { walks<view>(state, exec, 100, 1 << 30); })
+GART_BENCH("rays/choice/lidar/512", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0.25f, 512); })
+GART_BENCH("rays/choice/lidar/2048", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0.25f, 2048); })
+GART_BENCH("rays/choice/lidar/4096", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0.25f, 4096); })
+GART_BENCH("rays/choice/incoherent/unordered",
+           [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0, 0, false); })
+GART_BENCH("rays/choice/incoherent/narrow", [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0.1f, 1024); })
+GART_BENCH("rays/choice/incoherent/1024", [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0.25f, 1024); })
+GART_BENCH("rays/choice/incoherent/4096", [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0.25f, 4096); })

@@ -3,6 +3,7 @@
 
 #include <gart/render/frame.hpp>
 #include <gart/trace/bvh_tracer.hpp>
+#include <gart/trace/k_buffer_visitor.hpp>
 #include <support/policies.hpp>
 
 #include <algorithm>

@@ -13,7 +13,6 @@
 #include <gart/trace/beam_meet.hpp>
 #include <gart/trace/beam_nodes.hpp>
 #include <gart/trace/beam_rays.hpp>
-#include <gart/trace/k_buffer_visitor.hpp>
 
 #include <new>
 
@@ -46,14 +45,39 @@ GART_HD GART_INLINE float end_of_ray(P const& program, index_t i) {
     return infinity;
 }
 
-// What a ray still looks for, cut at where it ends.
-template <class Visitor>
-struct up_to {
-  Visitor& visitor;
+// One ray's walk: a window of its next hits in memory that lanes share, walked again for more.
+template <class Response, class Ray, int Capacity, int Lanes>
+struct lone_ray {
+  traced_scene scene;
+  Ray own;
+  float last_t;  // the last hit passed on
+  u32 last_id;
   float end;
-  GART_HD GART_INLINE float near() const { return visitor.near(); }
-  GART_HD GART_INLINE float far() const { return smaller(visitor.far(), end); }
-  GART_HD GART_INLINE void leaf(u32 id) { visitor.leaf(id); }
+  lane_hits<Capacity, Lanes>& memory;
+  int lane;
+  hits_of_lane<Capacity, Lanes> window{};
+
+  GART_HD GART_INLINE float near() const { return last_t; }
+  GART_HD GART_INLINE float far() const { return smaller(window.far(memory, lane), end); }
+  GART_HD GART_INLINE void leaf(u32 id) {
+    ray_gaussian const g = scene.gaussians[id];
+    ray_peak const r = evaluate(g, own);
+    if (is_hit(g, r, scene.near) && before(last_t, last_id, r.t, id) && r.t <= window.far(memory, lane))
+      window.insert(memory, lane, {r.t, id, hit_alpha<Response>(g, r.d2)});
+  }
+
+  GART_KERNEL GART_INLINE void trace(auto const& index, auto const& program, auto& state) {
+    for (bool more = true; more;) {
+      window.clear();
+      walk(index.tree, index.slab_of(own), *this);
+      more = window.full();
+      while (window.size() > 0) {
+        hit const h = window.pop(memory, lane);
+        last_t = h.t, last_id = h.id;
+        if (!program.on_hit(state, h)) return;
+      }
+    }
+  }
 };
 
 template <class Response, class Index, ray_program P>
@@ -67,13 +91,13 @@ class walk_beams {
   index_t rays;      // of the launch
   u32 const* order;  // [rays], a permutation of them: beams are made of neighbours in it; null: as they are
   u32* apart;        // [beams]: whether its rays are left to walk_alone
-  float widest = widest_beam;
+  float widest;      // of a beam
+  int most;          // candidates of a beam: with more of them its rays go on one by one
 
  private:
   static constexpr int waiting = 24;    // hits of a ray
   static constexpr int pass_from = 12;  // of them, from which it is asked which are certain
   static constexpr int batch = 16;      // candidates read at once
-  static constexpr int window = 8;      // hits of a ray that goes on alone
   static constexpr float unbounded = __builtin_huge_valf();
 
   using ray_type = typename P::ray_type;
@@ -100,10 +124,11 @@ class walk_beams {
       index_t const at = team.tile() * beam_lanes + static_cast<index_t>(l);
       my.number = at < rays ? (order ? order[at] : at) : 0;
       my.alive = my.active = at < rays && program.active(my.number);
+      my.own = {}, my.last_t = scene.near, my.last_id = 0xffffffffu;
       if (!my.active) return;
       new (&state[l]) typename P::state(program.begin(my.number));
       my.own = program.ray_of(my.number, state[l]);
-      my.last_t = start_of_ray(scene, program, my.number), my.last_id = 0xffffffffu;
+      my.last_t = start_of_ray(scene, program, my.number);
       my.end = end_of_ray(program, my.number);
     });
     if (!lanes_where([&](int l) { return own[l].active; })) return leave_apart(team.tile(), false);
@@ -114,7 +139,8 @@ class walk_beams {
       each_lane([&](int l) {
         if (l == 0) s.bounds = made.bounds;
       });
-      while (walk(team, s, own, state)) {
+      int left = most;
+      while (walk(team, s, own, state, left)) {
       }
     }
     leave_apart(team.tile(), false);
@@ -131,7 +157,7 @@ class walk_beams {
   }
 
   // Once through the tree. Whether to walk it again, for hits that were lost.
-  GART_KERNEL GART_INLINE bool walk(auto const& team, scratch& s, lane_of& own, state_of& state) const {
+  GART_KERNEL GART_INLINE bool walk(auto const& team, scratch& s, lane_of& own, state_of& state, int& left) const {
     float const from = least_of_lanes([&](int l) { return own[l].alive ? own[l].last_t : infinity; });
     each_lane([&](int l) { own[l].hits.clear(); });
     beam_node_queue queue;
@@ -141,12 +167,13 @@ class walk_beams {
     int candidates = 0;
     for (;;) {
       int const taken = queue.take(team, s.nodes, reach);
-      if (taken == queue.no_room) return trace_apart(own, state);
+      if (taken == queue.no_room) return trace_apart(s, own, state);
       if (taken > 0) expand(team, s, taken, near, queue, candidates);
       bool const last = queue.nodes == 0;
       if (candidates < batch && !last) continue;
       evaluate(team, s, own, candidates);
-      candidates = 0;
+      left -= candidates, candidates = 0;
+      if (left < 0 && !last) return trace_apart(s, own, state);
       if (!last && !lanes_where([&](int l) { return own[l].alive && own[l].hits.size() >= pass_from; })) continue;
       pass_on(s, own, state, last ? unbounded : bits_to_float(queue.least_key(s.nodes)));
       if (last || !lanes_where([&](int l) { return own[l].alive; })) break;
@@ -230,16 +257,12 @@ class walk_beams {
   }
 
   // One by one, from where each ray is. Never again a beam.
-  GART_KERNEL GART_INLINE bool trace_apart(lane_of& own, state_of& state) const {
+  GART_KERNEL GART_INLINE bool trace_apart(scratch& s, lane_of& own, state_of& state) const {
     each_lane([&](int l) {
       lane& my = own[l];
       if (!my.alive) return;
-      k_buffer_visitor<window, ray_type, Response> visitor(scene, my.own);
-      visitor.last_t = my.last_t, visitor.last_id = my.last_id;
-      trace_on(visitor, program, state[l], [&](ray_type const& r, auto& v) {
-        up_to<std::remove_reference_t<decltype(v)>> limited{v, my.end};
-        gart::walk(index.tree, index.slab_of(r), limited);
-      });
+      lone_ray<Response, ray_type, waiting, beam_lanes> ray{scene, my.own, my.last_t, my.last_id, my.end, s.hits, l};
+      ray.trace(index, program, state[l]);
       my.alive = false;
     });
     return false;
@@ -247,25 +270,51 @@ class walk_beams {
 };
 
 // The rays of a launch that are no beams, one by one.
-template <class Response, int Capacity, class Index, ray_program P>
+template <class Response, class Index, ray_program P>
 struct walk_alone {
-  static constexpr int block_size = 128, min_blocks = 1;
+#if defined(__CUDACC__)
+  static constexpr int block_size = 128, min_blocks = 5, waiting = 24;
+#else
+  static constexpr int block_size = 1, min_blocks = 1, waiting = 64;  // so many hits that few rays are walked twice
+#endif
   Index index;
   traced_scene scene;
   P program;
+  index_t rays;
   u32 const* order;  // as walk_beams has it
   u32 const* apart;  // null: all of them
-  GART_KERNEL void operator()(index_t at) const {
-    if (apart && !apart[at / beam_lanes]) return;
-    index_t const i = order ? order[at] : at;
-    if (!program.active(i)) return;
-    float const end = end_of_ray(program, i);
-    trace_windows<Capacity, Response>(scene, program, i, [this, end](auto const& r, auto& visitor) {
-      up_to<std::remove_reference_t<decltype(visitor)>> limited{visitor, end};
-      walk(index.tree, index.slab_of(r), limited);
+
+  using scratch = lane_hits<waiting, block_size>;
+
+  GART_KERNEL void operator()(auto const& team) const {
+    team.for_each(block_size, [&](index_t l) {
+      index_t const at = team.tile() * block_size + l;
+      if (at >= rays || (apart && !apart[at / beam_lanes])) return;
+      index_t const i = order ? order[at] : at;
+      if (!program.active(i)) return;
+      auto state = program.begin(i);
+      lone_ray<Response, typename P::ray_type, waiting, block_size> ray{scene,
+                                                                        program.ray_of(i, state),
+                                                                        start_of_ray(scene, program, i),
+                                                                        0xffffffffu,
+                                                                        end_of_ray(program, i),
+                                                                        team.scratch(),
+                                                                        static_cast<int>(l)};
+      ray.trace(index, program, state);
+      program.end(i, state);
     });
   }
 };
+
+// All of them.
+template <class Response, execution E, class Index, ray_program P>
+void trace_alone(E& exec, char const* label, Index const& index, traced_scene const& scene, index_t rays,
+                 u32 const* order, u32 const* apart, P const& program) {
+  using kernel = walk_alone<Response, Index, P>;
+  constexpr index_t lanes = kernel::block_size;
+  parallel_for(exec, label, tile_range{rays / lanes + (rays % lanes != 0), lanes},
+               kernel{index, scene, program, rays, order, apart});
+}
 
 }  // namespace trace_kernels
 
@@ -274,14 +323,14 @@ struct walk_alone {
 template <class Response, execution E, class Index, ray_program P>
 void trace_beams(E& exec, char const* label, Index const& index, traced_scene const& scene, index_t rays,
                  u32 const* order, buffer<u32, E>& apart, P const& program) {
-  // Hits of a ray alone that are kept at a time: in registers of a device; on hosts so many that few are walked twice.
-  constexpr int window = E::device ? 16 : 64;
+  // Where a beam is slower than its rays, for all the candidates that most of them miss.
+  constexpr int most = E::device ? 2048 : 8192;
   index_t const beams = rays / beam_lanes + (rays % beam_lanes != 0);
   apart.resize(beams);
   parallel_for(exec, label, tile_range{beams, static_cast<index_t>(beam_lanes)},
-               trace_kernels::walk_beams<Response, Index, P>{index, scene, program, rays, order, apart.data()});
-  parallel_for(exec, label, rays,
-               trace_kernels::walk_alone<Response, window, Index, P>{index, scene, program, order, apart.data()});
+               trace_kernels::walk_beams<Response, Index, P>{index, scene, program, rays, order, apart.data(),
+                                                             widest_beam, most});
+  trace_kernels::trace_alone<Response>(exec, label, index, scene, rays, order, apart.data(), program);
 }
 
 }}  // namespace gart::GART_ISA

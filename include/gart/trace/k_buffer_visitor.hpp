@@ -43,15 +43,18 @@ GART_HD GART_INLINE float start_of_ray(traced_scene const& scene, P const& progr
     return scene.near;
 }
 
-/// Feeds `program` the hits of ray i that follow the visitor's last; `gather` proposes candidates to the visitor (at
-/// least all whose hits lie in [near(), far()]) and is called again until a window is not full.
-template <int Capacity, class Ray, class Response, ray_program P, class Gather>
-GART_HD GART_INLINE void trace_on(k_buffer_visitor<Capacity, Ray, Response>& visitor, P const& program,
-                                  typename P::state& state, Gather const& gather) {
+/// Feeds `program` the hits of ray i; `gather` proposes candidates to the visitor (at least all whose hits lie in
+/// [near(), far()]) and is called again until a window is not full.
+template <int Capacity, class Response = generalized_gaussian<>, ray_program P, class Gather>
+GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& program, index_t i, Gather const& gather) {
+  auto state = program.begin(i);
+  auto const r = program.ray_of(i, state);
+  k_buffer_visitor<Capacity, std::remove_const_t<decltype(r)>, Response> visitor(scene, r);
+  visitor.last_t = start_of_ray(scene, program, i);
   bool more = true;
   while (more) {
     visitor.window.clear();
-    gather(visitor.ray, visitor);
+    gather(r, visitor);
     more = visitor.window.full();
     GART_UNROLL
     for (int k = 0; k < Capacity; ++k) {
@@ -64,16 +67,6 @@ GART_HD GART_INLINE void trace_on(k_buffer_visitor<Capacity, Ray, Response>& vis
       }
     }
   }
-}
-
-/// The same from the first hit on.
-template <int Capacity, class Response = generalized_gaussian<>, ray_program P, class Gather>
-GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& program, index_t i, Gather const& gather) {
-  auto state = program.begin(i);
-  auto const r = program.ray_of(i, state);
-  k_buffer_visitor<Capacity, std::remove_const_t<decltype(r)>, Response> visitor(scene, r);
-  visitor.last_t = start_of_ray(scene, program, i);
-  trace_on(visitor, program, state, gather);
   program.end(i, state);
 }
 

@@ -10,17 +10,17 @@
 namespace gart { inline namespace GART_ISA {
 
 /// The memory of all lanes.
-template <int Capacity>
+template <int Capacity, int Lanes = beam_lanes>
 struct lane_hits {
-  static constexpr int count = Capacity * beam_lanes;  ///< of hits
-  float t[count];                                      ///< distances
-  u32 id[count];                                       ///< Gaussians
-  float alpha[count];                                  ///< opacities
+  static constexpr int count = Capacity * Lanes;  ///< of hits
+  float t[count];                                 ///< distances
+  u32 id[count];                                  ///< Gaussians
+  float alpha[count];                             ///< opacities
 
   /// Of hit k of a lane: a bank a lane on a device, side by side on a host.
   GART_HD GART_INLINE static int place(int k, int lane) {
 #if defined(__CUDA_ARCH__)
-    return k * beam_lanes + lane;
+    return k * Lanes + lane;
 #else
     return lane * Capacity + k;
 #endif
@@ -32,8 +32,9 @@ struct lane_hits {
 };
 
 /// One lane's ring.
-template <int Capacity>
+template <int Capacity, int Lanes = beam_lanes>
 class hits_of_lane {
+  using memory_type = lane_hits<Capacity, Lanes>;
   static constexpr float infinity = __builtin_huge_valf();
 
  public:
@@ -43,8 +44,15 @@ class hits_of_lane {
   GART_HD float lost_t() const { return lost_t_; }          ///< of the nearest hit that was lost; infinity: none
   GART_HD bool lost() const { return lost_t_ < infinity; }  ///< whether one was
 
+  /// Whether there is no room left.
+  GART_HD bool full() const { return count_ == Capacity; }
+  /// No hit beyond this distance can enter.
+  GART_HD GART_INLINE float far(memory_type const& memory, int lane) const {
+    return full() ? memory.t[place(Capacity - 1, lane)] : 3.402823466e38f;
+  }
+
   /// Takes a hit, or loses the farthest.
-  GART_HD GART_INLINE void insert(lane_hits<Capacity>& memory, int lane, hit const& h) {
+  GART_HD GART_INLINE void insert(memory_type& memory, int lane, hit const& h) {
     if (lost() && !before(h.t, h.id, lost_t_, lost_id_)) return;
     if (count_ == Capacity) {
       hit const farthest = memory.at(place(count_ - 1, lane));
@@ -63,13 +71,13 @@ class hits_of_lane {
   }
 
   /// Whether the nearest may be passed on, where no other is to be found before `bound`.
-  GART_HD GART_INLINE bool ready(lane_hits<Capacity> const& memory, int lane, float bound) const {
+  GART_HD GART_INLINE bool ready(memory_type const& memory, int lane, float bound) const {
     if (count_ == 0) return false;
     int const at = place(0, lane);
     return memory.t[at] < bound && (!lost() || before(memory.t[at], memory.id[at], lost_t_, lost_id_));
   }
-  /// Takes the nearest off.
-  GART_HD GART_INLINE hit pop(lane_hits<Capacity> const& memory, int lane) {
+  /// Takes the nearest off; there must be one.
+  GART_HD GART_INLINE hit pop(memory_type const& memory, int lane) {
     hit const h = memory.at(place(0, lane));
     first_ = first_ + 1 == Capacity ? 0 : first_ + 1, --count_;
     return h;
@@ -78,7 +86,7 @@ class hits_of_lane {
  private:
   GART_HD GART_INLINE int place(int k, int lane) const {
     int const at = first_ + k;
-    return lane_hits<Capacity>::place(at >= Capacity ? at - Capacity : at, lane);
+    return memory_type::place(at >= Capacity ? at - Capacity : at, lane);
   }
 
   int first_, count_;
