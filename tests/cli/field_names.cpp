@@ -50,6 +50,32 @@ TEST_CASE("every option that a field is shown as is one of train or of view") {
   }
 }
 
+TEST_CASE("settings are recorded as numbers, and read from the text of earlier runs") {
+  using gart_cli::field_values;
+  auto const values = field_values::of_text("rates.mean=0,error.growth_end=0.25");
+  gart::train_options options;
+  values.apply(options);
+  CHECK(options.rates.mean == 0);
+  CHECK(options.error.growth_end == 0.25f);
+  CHECK(values.has("rates.mean"));
+  CHECK_FALSE(values.has("near"));
+  CHECK(values.json() == nlohmann::json{{"rates.mean", 0.0}, {"error.growth_end", 0.25}});
+  CHECK(field_values::of_json(values.json()).json() == values.json());
+  CHECK(field_values::of_json("").json().empty());
+  CHECK(field_values::of_json("error.fill=0.3,rates.settled=0.2").json() ==
+        nlohmann::json{{"error.growth_end", 0.3}, {"rates.final_scale", 0.2}});
+  for (nlohmann::json const& wrong :
+       {nlohmann::json(3), nlohmann::json(), nlohmann::json::array(), nlohmann::json{{"near", "x"}},
+        nlohmann::json{{"nope", 1}}, nlohmann::json{{"dropout", 5}}}) {
+    CAPTURE(wrong.dump());
+    CHECK_THROWS_AS(field_values::of_json(wrong), gart::error);
+  }
+  for (double const value : {0.1, 0.005, 1e5, 0.999, 4294967295.0, 1e-6})
+    CHECK(std::stod(gart::short_number(value)) == value);
+  CHECK(gart::short_number(static_cast<double>(0.06f)) == "0.06");
+  CHECK(gart::short_number(100000) == "100000");
+}
+
 TEST_CASE("the user of the program reads of options") {
   folder const here;
   gart::write_splat_ply(here / "model.ply", one_gaussian());

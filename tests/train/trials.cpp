@@ -126,7 +126,7 @@ gart::dataset grey() {
 
 gart::validation measured(gart::configuration_request const& request, gart::validation_progress const& progress = {}) {
   gart::train_options options;
-  options.iterations = 16000, options.random_points = 10;
+  options.iterations = 30000, options.random_points = 10;  // long enough for all trials in turn
   return gart::validate(request, options, grey(),
                         {{"exposure", "on", [](gart::train_options& o) { o.exposure = true; }},
                          {"vignetting", "on", [](gart::train_options& o) { o.vignetting = true; }}},

@@ -12,13 +12,12 @@
 ///   rows.sum_moments(v, moments);            // one view's, for this rank's rows; sum_finished where it finishes()
 ///   rows.sum_colors(0, views, share, sh_gradient, false);  // colours arrive last; or take_colors
 ///
-/// An owner finds the boxes of its rows in each view, and sends a row to the ranks whose tiles its box meets. Arrived
-/// rows are put in the order of the Gaussians' numbers. So lists, ties and images have the bits of a single rank.
-/// Colours and their gradients are four fifths of the traffic. They travel while lists are made, and while the owner
-/// finishes the gradients of geometry. A rank that traces a whole view finishes them itself, and sends them in place of
-/// moments; owners add them row by row. Sums are added in the order of ranks. An `ordered` strategy also gets the bits
-/// of a single rank. A Gaussian's pairs that began in an earlier strip then travel one by one, and the owner adds them
-/// to that strip's sum.
+/// An owner finds the boxes of its rows in each view, and sends a row to the ranks whose tiles its box meets. Rows are
+/// put in the order of the Gaussians' numbers, so images have the bits of a single rank. Colours and their gradients,
+/// four fifths of the traffic, travel while lists are made and while owners finish the gradients of geometry. A rank
+/// that traces a whole view finishes those itself, and sends them in place of moments. Sums are added in the order of
+/// ranks. An `ordered` strategy also gets the bits of a single rank: pairs that began in an earlier strip travel one by
+/// one, and the owner adds them to that strip's sum.
 ///
 /// Traffic a row and unit: 4 (row width + 1) bytes out, up to a multiple of 16, and 4 (3 K + 12) back: 240 each at
 /// degree 3. If ordered, as much again for each pair of a row that began in an earlier strip. Memory: 16 bytes for each
@@ -66,8 +65,8 @@ class row_exchange {
         pairs_out_(exec),
         pairs_in_(exec) {}
 
-  /// Fetches the rows for the round's views, without colours (finish_fetch). There is at most one view a rank, and all
-  /// ranks pass the same. `names`: a number for each view, to remember its cost by; may be empty.
+  /// Fetches the rows for the round's views, at most one a rank, without colours (finish_fetch). `names`: numbers to
+  /// remember the views' costs by; may be empty.
   void fetch(gaussians_view<float const> scene, std::vector<camera> const& views, std::vector<std::size_t> const& names,
              render_options const& options) {
     stage_scope stage(*exec_, "exchange/rows");
@@ -201,9 +200,8 @@ class row_exchange {
     comm_.begin(*exec_, as_span(sends), as_span(receives));
   }
 
-  // Finds the boxes of this rank's rows in each view, and the units of all ranks. Units follow from the views' costs
-  // when they were last traced, or now for a new view. Present costs come with the counts, for the next time. A view
-  // that one rank traces alone needs no cost.
+  // Finds the boxes of this rank's rows in each view, and the units of all ranks, from the views' costs at their last
+  // trace, or now for a new view. Present costs come with the counts. A view that one rank traces alone needs no cost.
   void measure(gaussians_view<float const> scene, std::vector<camera> const& views,
                std::vector<std::size_t> const& names, render_options const& options) {
     bool const shared = views.size() < static_cast<std::size_t>(owners_.ranks);

@@ -13,8 +13,8 @@ export const lenses = {
   sphere: {title: 'Whole sphere, 360°'},
 };
 
-// The camera of `lens` = {name, angle} or {camera}, one of the capture's, on a stage of that many pixels. The whole
-// sphere and a capture's lens keep their own shape of image, as large as the stage has room for.
+// The camera of `lens` ({name, angle}, or {camera} of the capture) on a stage of that many pixels. The whole sphere and
+// a capture's lens keep the shape of their image, as large as fits the stage.
 export function cameraOf(pose, lens, stage, name = 'view') {
   const c2w = toRows(pose);
   if (lens.camera) return {...fitted(lens.camera, stage), name, c2w};
@@ -50,8 +50,8 @@ export function angleLike(camera, stage) {
   return Math.min(lenses.pinhole.most, Math.max(lenses.pinhole.least, angle));
 }
 
-// The free lens that shows what this camera does: one that the page offers by name where it is one, and otherwise the
-// camera's own, which keeps its shape of image.
+// The free lens for this camera: one that the page offers by name, or else the camera's own, which keeps the shape of
+// its image.
 export function lensLike(camera, stage) {
   const kind = kindOf(camera), bent = /^(k$|[kps][0-9x]|omega|alpha|beta)/;
   if (kind === 'sphere') return {name: 'sphere'};
@@ -67,7 +67,7 @@ export const poseOf = (camera) => fromRows(camera.c2w);
 // What a file has of cameras that are from the scene's origin.
 export const fromOrigin = (cameras, origin) => (origin.some((x) => x !== 0) ? cameras.map((camera) => ({...camera, origin})) : cameras);
 
-// The cameras of a file, from the scene's origin; an Error that names the camera and the field where it is none.
+// The cameras of a file, from the scene's origin; else an Error naming the camera and the field.
 export function readCameras(text, origin) {
   let list;
   try {

@@ -1,4 +1,4 @@
-// The capture's cameras as a list to choose from, with their photographs in small and how well the model shows them.
+// The list of the capture's cameras, with thumbnails and scores.
 
 export function cameraList(ui, jump) {
   let cameras = [], current = null;

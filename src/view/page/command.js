@@ -1,4 +1,4 @@
-// The command that writes what the page shows of the model to a file: the crop box, and the scale of a known length.
+// The command that writes the shown part of the model: the crop box, and the scale of a known length.
 
 const number = (x) => String(Number(x.toPrecision(9)));  // what tells floats apart
 

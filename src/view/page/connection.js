@@ -1,4 +1,4 @@
-// The socket to gart: messages as objects, frames as their header and JPEG, and a new try when it is lost.
+// The socket to gart: messages as objects, frames as header and JPEG. Connects again when it is lost.
 
 const firstWait = 500, longestWait = 8000;  // milliseconds
 

@@ -15,7 +15,7 @@ export function kindOf(camera) {
 
 export const isPinhole = (camera) => ['PINHOLE', 'SIMPLE_PINHOLE'].includes(camera.camera_model ?? 'PINHOLE');
 
-// The distance from the axis of a direction at the angle theta, before radial terms; null where the lens sees nothing.
+// A direction's distance from the axis at the angle theta, before radial terms; null outside the lens.
 function distance(camera, kind, theta) {
   const s = Math.sin(theta), c = Math.cos(theta);
   if (kind === 'fisheye') return theta;

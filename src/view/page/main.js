@@ -47,7 +47,7 @@ const connection = connect({
   path: answer,
   status(message) {
     training.status(message);
-    // What is at rest is asked for again, for the model has changed since; views have their share of time, and no more.
+    // Views at rest are requested again, since the model has changed; their share of time limits them.
     if (!message.paused && !document.hidden) view.refresh();
   },
   curve: (message) => training.curve(message),

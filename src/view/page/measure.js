@@ -1,5 +1,5 @@
-// The distance between two points that were pointed at, in the model's units or by a length that is known. gart says
-// where the ray meets the scene. While it is on, each pair of points is measured; off, nothing of it stays.
+// The distance between two chosen points, in the model's units or by a known length. gart says where the ray meets the
+// scene. While it is on, each pair of points is measured; switching it off clears all.
 
 import {norm, scale, add, sub} from './vector.js';
 import {stroked} from './overlay.js';

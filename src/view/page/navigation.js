@@ -36,7 +36,7 @@ export const styles = {
   walk: {
     title: 'Walk',
     turn: looking,
-    // Over the ground: at one height, whatever the view looks at. Q and E change the height.
+    // Over the ground: at constant height. Q and E change the height.
     step(pose, [right, down, forward], {speed, up}) {
       const flat = unit(cross(up, pose.right)), side = unit(cross(flat, up));
       const ahead = dot(flat, pose.forward) < 0 ? scale(flat, -1) : flat;

@@ -1,5 +1,5 @@
-// Lines over the frame: what stands in the world, projected by the camera that the shown frame was traced through, so
-// that lines and image stay together however long a frame takes.
+// Lines of the world over the frame, projected by the shown frame's camera. So lines and image stay together however
+// long a frame takes.
 
 import {pixelOf, piecesOf} from './lens.js';
 import {seenFrom} from './pose.js';

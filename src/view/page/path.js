@@ -55,7 +55,7 @@ export function keyframes(ui, page) {
     return ui.closed.checked ? [...own, own.at(-1) * (1 + 1 / (own.length - 1))] : own;
   };
   const duration = () => times()?.at(-1) ?? seconds();
-  // All of one size, so that the frames of gart render --path are.
+  // All of one size, as gart render --path needs.
   const sameSize = () => keys.map((key, i) => ({...page.resized(key.camera), name: `key${String(i).padStart(3, '0')}`}));
 
   async function cameras(frames) {
@@ -81,7 +81,7 @@ export function keyframes(ui, page) {
     page.redraw();
   }
 
-  // In time with the clock: where frames take longer, some of the path is left out, and none of its speed.
+  // In time with the clock: slow frames skip parts of the path, at the same speed.
   async function play() {
     const all = await whole(), start = performance.now();
     ui.play.textContent = 'Stop';

@@ -30,7 +30,7 @@ export function photoSplit(stage, image, divider, toggle) {
     place();
   });
   return {
-    // Of the camera that the view looks through; null where it is none of the capture's, or has no photograph.
+    // The photograph of the view's camera; null if the capture has no such camera or photograph.
     through(camera) {
       const next = camera?.photo ? camera.index : null;
       toggle.disabled = next === null;

@@ -1,4 +1,4 @@
-// Where a camera stands and how it is turned: its place, and its axes right, down and forward (OpenCV's) in the world.
+// A camera's pose: its place, and its axes right, down and forward (OpenCV's) in the world.
 
 import {add, cross, dot, scale, sub, turned, unit} from './vector.js';
 
@@ -42,7 +42,7 @@ export function fromRows(rows) {
   return squared({place: column(3), right: column(0), forward: column(2)});
 }
 
-// A point of the world as the camera has it.
+// A point of the world in the camera's axes.
 export function seenFrom(pose, point) {
   const d = sub(point, pose.place);
   return [dot(d, pose.right), dot(d, pose.down), dot(d, pose.forward)];

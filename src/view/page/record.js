@@ -30,8 +30,8 @@ export function recorder(button, canvas, {play, whole}, say) {
     await inTime(started);
     await play();
     await inTime(whole());
-    // What is still being encoded when the recorder stops is lost; on a slow machine that is all of it. So it goes on
-    // until the last frame has come, and nothing after it.
+    // Frames still being encoded when the recorder stops are lost; on a slow machine all of them. So it goes on until
+    // the last frame has come, and nothing after it.
     const begun = parts.length;
     for (const end = performance.now() + longestWait; performance.now() < end;) {
       const before = parts.length, answer = heard('dataavailable');

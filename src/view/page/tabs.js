@@ -1,4 +1,4 @@
-// The panel's tabs: arrow keys go from one to the next, and on a narrow screen the chosen one closes the sheet again.
+// The panel's tabs: arrow keys go to the next, and on a narrow screen the chosen one closes the sheet.
 
 // Where style.css makes the panel a sheet below the view.
 export const narrow = () => matchMedia('(max-width: 700px) and (orientation: portrait)').matches;

@@ -1,4 +1,4 @@
-// A training that runs behind the view: how far it is, its curves, and its buttons for who may use them.
+// The training behind the view: its progress, curves, and buttons for those who may control it.
 
 import {drawChart} from './chart.js';
 

@@ -54,7 +54,7 @@ export class View {
     return {pose: this.pose, lens: this.lens, pivot: this.world.pivot, through: this.through?.index ?? null};
   }
 
-  // As the capture’s first camera sees the scene, or from aside and above, from where all of it is in view.
+  // The start view: the capture’s first camera, or from aside and above, with the whole scene in view.
   home() {
     this.leave();
     const {up, extent} = this.world;
@@ -191,7 +191,7 @@ export class View {
     if (sent) this.#sent.set(id, {camera, pose: this.pose, rect: this.rectOf(camera), through: this.through});
   }
 
-  // Whether nothing newer is wanted than the frame of that number.
+  // Whether the frame of that number is the newest wanted one.
   upTo(id) {
     return !this.#moving && !this.#dirty && id === this.#id;
   }
