@@ -130,10 +130,6 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       train, "--photos", a.photos, "DIR",
       "The folder that the photographs' names are in (default: where the\ncapture has it, as images beside sparse)"));
   in_group(
-      r.add(train, "--mirrors", a.mirrors, "FILE",
-            "A scene, as gart render --scene has it, whose mirrors are known\nto be in the capture: what they show "
-            "teaches what they mirror"));
-  in_group(
       r.add_flag(train, "--no-masks", a.no_masks,
                  "Leave out the masks that the capture names, or that are in a\nfolder masks beside its photographs"));
   in_group(r.add(train, "--background", a.background, "NAME",

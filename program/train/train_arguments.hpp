@@ -43,7 +43,7 @@ struct train_arguments {
   int sh_degree = 3;
   int downscale = 1, test_every = 8, eval_every = -1;
   std::string test_split = "nth";
-  std::string photos, mirrors;
+  std::string photos;
   bool no_masks = false;
   std::string depth_kind = "auto";
   double depth_unit = 0;

@@ -6,7 +6,6 @@
 #include "ranks.hpp"
 
 #include <gart/io/placed_views.hpp>
-#include <gart/io/scene_file.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/train/memory_need.hpp>
 
@@ -194,11 +193,6 @@ void training_run::load() {
                          "raise --test-every, which keeps views for testing");
   }
   if (!a_.poses.empty()) gart::place_training_views(data_, a_.poses);
-  if (!a_.mirrors.empty()) {
-    data_.mirrors = gart::read_scene(a_.mirrors, data_.origin).scene;
-    if (data_.mirrors.meshes.empty())
-      throw gart::io_error(a_.mirrors, "has no meshes", "name the scene of the mirrors, or leave --mirrors out");
-  }
   say_.note(data_.format + " capture: " + std::to_string(data_.train.size()) + " training views, " +
             std::to_string(data_.test.size()) + " test views (" + data_.split + "), " + image_size() + ", " +
             with_commas(data_.points.size()) + " points");
