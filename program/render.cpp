@@ -5,6 +5,7 @@
 #include "progress.hpp"
 #include "ranks.hpp"
 #include "render_images.hpp"
+#include "render_scene.hpp"
 #include "run_folder.hpp"
 #include "samples.hpp"
 
@@ -19,6 +20,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <memory>
 
@@ -31,8 +33,9 @@ namespace fs = std::filesystem;
 struct render_arguments {
   fs::path model, cameras, path, out, json, exposures;
   configuration_options configuration;
+  scene_options scene;
   std::string background = "auto", camera;
-  int downscale = 1, samples = 1, frames = 0;
+  int downscale = 1, samples = 0, frames = 0;
   bool closed = false;
   float alpha_min = -1, transmittance_min = -1;
   int max_hits = -1;
@@ -83,6 +86,43 @@ std::vector<gart::named_camera> cameras_of(render_arguments const& a) {
   return cameras;
 }
 
+// With a scene that names its models the one file is that of the cameras; so is a folder or a list of them.
+void settle_files(render_arguments& a) {
+  if (a.scene.file.empty()) {
+    if (!a.scene.given.empty()) throw usage_error(a.scene.given + " is of a scene: name it by --scene FILE");
+    if (a.model.empty()) throw usage_error("MODEL is missing (see gart render --help)");
+    for (char const* name : {"albedo", "surface", "ids"})
+      if (a.images.has(name)) throw usage_error(std::string("--images ") + name + " is of a --scene");
+    return;
+  }
+  if (a.images.has("hits")) throw usage_error("--images hits: paths of light count no hits (leave one of them out)");
+  bool const named = !gart::read_scene_splats(a.scene.file).empty();
+  bool const cameras = fs::is_directory(a.model) || a.model.extension() == ".json";
+  if (a.cameras.empty() && (named || cameras)) std::swap(a.model, a.cameras);
+}
+
+// How views are drawn: Gaussians alone, or paths of light through a scene.
+struct drawing {
+  gart::configuration_info configuration;
+  std::function<gart::rendered(gart::camera const&, gart::render_options const&)> draw;
+  gart::profiler* profile = nullptr;
+  std::function<std::size_t()> peak_bytes;
+};
+
+drawing drawing_of(gart::renderer& renderer, int samples) {
+  return {renderer.configuration(),
+          [&renderer, samples](auto const& view, auto const& options) {
+            return render_samples(renderer, view, options, samples);
+          },
+          &renderer.profile(), [&renderer] { return renderer.peak_bytes(); }};
+}
+
+drawing drawing_of(path_scene& scene, int samples) {
+  return {scene.renderer().configuration(),
+          [&scene, samples](auto const& view, auto const& options) { return scene.draw(view, options, samples); },
+          &scene.renderer().profile(), [] { return std::size_t{0}; }};
+}
+
 // What each rank has drawn, in the order of the cameras, with the stages' mean.
 nlohmann::json of_all_ranks(nlohmann::json const& mine, std::size_t cameras) {
   std::vector<nlohmann::json> parts;
@@ -99,25 +139,39 @@ nlohmann::json of_all_ranks(nlohmann::json const& mine, std::size_t cameras) {
   return all;
 }
 
-int run_render(render_arguments const& a) {
+int run_render(render_arguments a) {
+  settle_files(a);
   if (ranks::built) ranks::start(false);
   bool const speaks = ranks::rank() == 0;
   image_choice images = a.images;
   if (a.depth && !images.has("depth")) images.images += ",depth";
   check_images(images);
+  if (a.samples > 64 && a.scene.file.empty())
+    throw usage_error("--samples " + std::to_string(a.samples) + ": 64 rays each way are the most");
   if (images.has("hits") && a.samples > 1)
     throw usage_error("--images hits: a mean over --samples counts no hits (leave one of them out)");
-  auto cameras = cameras_of(a);
-  gart::model_file file = gart::load_model(a.model);
+  bool const has_scene = !a.scene.file.empty();
+  std::unique_ptr<path_scene> scene;
+  if (has_scene) scene = std::make_unique<path_scene>(a.scene, a.model, a.configuration);
+  int const samples = a.samples > 0 ? a.samples : has_scene ? scene->samples() : 1;
+  auto cameras = has_scene && a.cameras.empty() && a.path.empty() && !scene->file().cameras.empty()
+                     ? scene->file().cameras
+                     : cameras_of(a);
+  gart::model_file const file = has_scene ? scene->model() : gart::load_model(a.model);
   for (auto& [name, view] : cameras) view.position -= file.origin;
   if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
   prepare_folder(a.out);
   if (!a.json.empty() && speaks) prepare_file(a.json);
 
-  auto const renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
-  renderer->set_model(file.model);
+  std::unique_ptr<gart::renderer> renderer;
+  if (!has_scene) {
+    renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
+    renderer->set_model(file.model);
+  }
+  drawing const how = has_scene ? drawing_of(*scene, samples) : drawing_of(*renderer, samples);
   gart::render_options options = file.render;
   options.background = background_color(a.background != "auto" ? a.background : background_of_run(a.model));
+  if (has_scene && a.background == "auto" && scene->file().background) options.background = *scene->file().background;
   if (a.alpha_min >= 0) options.alpha_min = a.alpha_min;
   if (a.transmittance_min >= 0) options.transmittance_min = a.transmittance_min;
   if (a.max_hits >= 0) options.max_hits = static_cast<gart::u32>(a.max_hits);
@@ -127,15 +181,16 @@ int run_render(render_arguments const& a) {
 
   progress say(a.quiet || !speaks);
   say.notes(file.notes);
-  auto const configuration = renderer->configuration();
+  if (has_scene) say.notes(scene->file().notes);
+  gart::configuration_info const& configuration = how.configuration;
   nlohmann::json timings = {{"backend", gart::to_string(configuration.backend)},
                             {"tracer", gart::to_string(configuration.tracer)},
                             {"gaussians", file.model.size()},
                             {"approximations", approximations_of(options, configuration)},
-                            {"samples", a.samples},
+                            {"samples", samples},
                             {"stages_ms", nlohmann::json::object()},
                             {"views", nlohmann::json::array()}};
-  renderer->profile().enable(!a.json.empty());
+  how.profile->enable(!a.json.empty());
   image_writer files;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     if (!ranks::takes(i)) continue;
@@ -143,20 +198,21 @@ int run_render(render_arguments const& a) {
     if (!a.camera.empty()) view = gart::seen_through(view, a.camera);
     if (a.downscale > 1) view = gart::downscaled(view, a.downscale, "the camera " + name);
     auto const start = std::chrono::steady_clock::now();
-    gart::rendered image = render_samples(*renderer, view, options, a.samples);
+    gart::rendered image = how.draw(view, options);
     if (!exposures.empty()) apply(exposures.at(view), image.color);
     double const ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     if (images.has("colour")) files.png(a.out / (name + ".png"), gart::to_8bit(image.color));
     nlohmann::json entry = {{"name", name}, {"width", view.width}, {"height", view.height}, {"milliseconds", ms}};
     write_images(a.out, name, image, view, images, entry);
+    if (has_scene) write_layers(a.out, name, scene->layers(), images);
     timings["views"].push_back(entry);
     double const share = static_cast<double>(i + 1) / static_cast<double>(cameras.size());
     say.state("rendered " + std::to_string(i + 1) + "/" + std::to_string(cameras.size()) + "  " + fixed(ms, 1) + " ms",
               share);
   }
   files.finish();
-  for (auto const& [label, time] : renderer->profile().stages()) timings["stages_ms"][label] = time.milliseconds;
-  timings["peak_bytes"] = ranks::largest(renderer->peak_bytes());
+  for (auto const& [label, time] : how.profile->stages()) timings["stages_ms"][label] = time.milliseconds;
+  timings["peak_bytes"] = ranks::largest(how.peak_bytes());
   timings = of_all_ranks(timings, cameras.size());
   if (!speaks) return 0;
   if (!a.json.empty()) write_json(a.json, timings);
@@ -176,9 +232,7 @@ int run_render(render_arguments const& a) {
 void add_render(CLI::App& app, command& selected) {
   auto a = std::make_shared<render_arguments>();
   CLI::App* render = app.add_subcommand("render", "Render a model from every camera of a dataset or a camera file.");
-  render->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")
-      ->type_name("")
-      ->required();
+  render->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")->type_name("");
   render
       ->add_option("CAMERAS", a->cameras,
                    "A dataset (all its views), or a JSON list of {\"name\", \"width\",\n"
@@ -214,10 +268,10 @@ void add_render(CLI::App& app, command& selected) {
       ->check(between(1, 64));
   render
       ->add_option("--samples", a->samples,
-                   "Rays a pixel each way, N x N in all: the mean over the pixel\nitself, in N x N times the time")
+                   "Rays a pixel each way, N x N in all: the mean over the pixel\nitself, in N x N times the time. Of "
+                   "--scene: paths a pixel\n(default: 1; of a scene what it says, else 16)")
       ->type_name("N")
-      ->capture_default_str()
-      ->check(between(1, 64));
+      ->check(between(1, 65536));
   render
       ->add_option("--alpha-min", a->alpha_min,
                    "Opacity below which a Gaussian is not hit, 0 to 1\n(default: what the model says, else 1/255)")
@@ -234,7 +288,7 @@ void add_render(CLI::App& app, command& selected) {
                    "Which images, by commas: colour (NAME.png), depth (mean distance\nalong the ray, 0 where less than "
                    "half is seen), normal (of the\ndepth, in the world's axes, (n + 1) / 2), alpha, hits (Gaussians "
                    "met):\nNAME_depth.png and so on; depth and hits of 16 bits, with a\nNAME_depth_preview.png in "
-                   "colours")
+                   "colours. Of --scene also albedo, surface (its normals), and ids of\nGaussian, mesh and triangle")
       ->type_name("LIST")
       ->capture_default_str();
   render
@@ -250,15 +304,21 @@ void add_render(CLI::App& app, command& selected) {
   render->add_flag("--depth", a->depth, "The depth too: adds it to --images");
   render->add_option("--json", a->json, "Write timings of each view and stage in milliseconds")->type_name("FILE");
   render->add_flag("--quiet", a->quiet, "Say nothing but errors");
+  add_scene_options(*render, a->scene);
   add_configuration_options(*render, a->configuration);
   render->footer(
       "\nWrites DIR/NAME.png for each camera, NAME as the dataset or file has it. The first view pays for the start.\n"
       "\nExamples:\n"
       "  gart render run/model.ply lego --out images --background white\n"
       "  gart render scene.ply path.json --out frames --images colour,depth,normal --json timings.json\n"
+      "  gart render --scene scene.json --out images --samples 64 --tone-map filmic\n"
       "  gart render run/model.ply --path keyframes.json --frames 240 --out film\n"
       "  ffmpeg -framerate 30 -i film/frame_%05d.png film.mp4      makes a video of it");
-  render->callback([a, &selected] { selected = [a] { return run_render(*a); }; });
+  render->callback([a, render, &selected] {
+    for (char const* name : {"--bounces", "--shadows", "--aperture", "--focus", "--exposure", "--tone-map", "--seed"})
+      if (render->count(name) > 0) a->scene.given = name;
+    selected = [a] { return run_render(*a); };
+  });
 }
 
 }  // namespace gart_cli

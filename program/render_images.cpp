@@ -37,7 +37,7 @@ void check_steps(std::string const& name, char const* what, double largest, doub
 }  // namespace
 
 std::vector<std::string> const& image_choice::names() {
-  static std::vector<std::string> const all{"colour", "depth", "normal", "alpha", "hits"};
+  static std::vector<std::string> const all{"colour", "depth", "normal", "alpha", "hits", "albedo", "surface", "ids"};
   return all;
 }
 
@@ -49,10 +49,44 @@ bool image_choice::has(std::string const& name) const {
 void check_images(image_choice const& choice) {
   auto const& names = image_choice::names();
   auto const chosen = parts_of(choice.images);
-  if (chosen.empty()) throw usage_error("--images: name one of colour, depth, normal, alpha, hits");
+  std::string all;
+  for (std::string const& name : names) all += (all.empty() ? "" : ", ") + name;
+  if (chosen.empty()) throw usage_error("--images: name one of " + all);
   for (std::string const& one : chosen)
     if (std::find(names.begin(), names.end(), one) == names.end())
-      throw usage_error("--images " + one + ": there is no such image; there are colour, depth, normal, alpha, hits");
+      throw usage_error("--images " + one + ": there is no such image; there are " + all);
+}
+
+void write_layers(fs::path const& folder, std::string const& name, gart::path_layers const& layers,
+                  image_choice const& choice) {
+  auto const write = [&](std::string const& what, image_float const& values, char const* channels, bool exact) {
+    fs::path const file = folder / (name + "_" + what);
+    if (choice.format == "npy")
+      gart::write_npy(file.string() + ".npy", values);
+    else if (choice.format == "exr" || exact)
+      gart::write_exr(file.string() + ".exr", values, channels);
+    else
+      gart::write_png(file.string() + ".png", gart::to_8bit(values));
+  };
+  if (choice.has("albedo")) write("albedo", layers.albedo, "RGB", false);
+  if (choice.has("surface")) {
+    image_float normal = layers.normal;
+    if (choice.format == "png")
+      for (float& v : normal.data) v = 0.5f * (v + 1);
+    write("surface", normal, "XYZ", false);
+  }
+  if (choice.has("ids")) {
+    image_float ids(layers.mesh.width, layers.mesh.height, 3, -1.0f);
+    for (std::size_t i = 0; i < layers.mesh.data.size(); ++i) {
+      std::size_t c = 0;
+      for (auto const* of : {&layers.gaussian, &layers.mesh, &layers.triangle}) {
+        gart::u32 const number = of->data[i];
+        if (number != gart::no_number) ids.data[3 * i + c] = static_cast<float>(number);
+        ++c;
+      }
+    }
+    write("ids", ids, "GMT", true);
+  }
 }
 
 void write_images(fs::path const& folder, std::string const& name, gart::rendered const& image,

@@ -2,6 +2,7 @@
 // The images of `gart render --images`: what each is, as files beside NAME.png.
 
 #include <gart/render/rendered.hpp>
+#include <gart/runtime/path_renderer.hpp>
 #include <gart/scene/camera.hpp>
 
 #include <nlohmann/json.hpp>
@@ -27,5 +28,9 @@ void check_images(image_choice const& choice);
 // where 16 bits do not hold them.
 void write_images(std::filesystem::path const& folder, std::string const& name, gart::rendered const& image,
                   gart::camera const& view, image_choice const& choice, nlohmann::json& entry);
+
+// What paths met first: of these images albedo, surface and ids.
+void write_layers(std::filesystem::path const& folder, std::string const& name, gart::path_layers const& layers,
+                  image_choice const& choice);
 
 }  // namespace gart_cli

@@ -92,6 +92,10 @@ void add_synth(CLI::App& app, command& selected) {
                   "Also a depth map of each view, r_N_depth.png: distances along\nthe rays, for gart train "
                   "--depth-weight");
   synth->add_flag("--mesh", options->mesh, "Also the scene itself, mesh.ply, for gart mesh --against");
+  synth->add_flag(
+      "--mirror", options->mirror,
+      "A flat mirror stands in the scene; also scene.json and mirror.ply,\nwhich say where, for gart render "
+      "--scene");
   synth->add_flag("--quiet", *quiet, "Print nothing but errors");
   synth->footer(
       "Writes DIR/transforms_train.json and DIR/transforms_test.json (Blender's layout), DIR/train/r_N.png and\n"

@@ -149,6 +149,20 @@ gart::triangle_mesh mesh_of(synth_scene const& scene) {
 
 }  // namespace
 
+namespace {
+
+// A ray that misses all is as white in the mirror as the photographs' background.
+constexpr char scene_with_mirror[] = R"({
+  "up": [0, 0, 1],
+  "background": [1, 1, 1],
+  "environment": {"color": [1, 1, 1]},
+  "materials": [{"name": "mirror", "kind": "mirror"}],
+  "meshes": [{"file": "mirror.ply", "material": "mirror"}]
+}
+)";
+
+}  // namespace
+
 std::vector<gart::camera> synth_cameras(int count, int size, bool test) {
   double const golden = std::numbers::pi * (3 - std::sqrt(5.0));
   std::vector<gart::camera> cameras;
@@ -193,7 +207,8 @@ void write_synth_capture(synth_options const& options, std::function<void(int do
       train[i] = while_moving(train[i], options.rolling, hash(options.seed, 0x726f6c6c + i));
       gart::require_camera(train[i]);
     }
-  synth_renderer const renderer(make_synth_scene(options.seed), options.threads);
+  synth_scene const scene = make_synth_scene(options.seed, options.mirror);
+  synth_renderer const renderer(scene, options.threads);
   prepare_folder(options.out);
   int done = 0;
   int const total = options.train + options.test;
@@ -210,7 +225,11 @@ void write_synth_capture(synth_options const& options, std::function<void(int do
     }
   }
   gart::write_point_ply(options.out / "points3d.ply", renderer.points(train, options.points, options.seed), origin);
-  if (options.mesh) gart::write_mesh_ply(options.out / "mesh.ply", mesh_of(make_synth_scene(options.seed)), origin);
+  if (options.mesh) gart::write_mesh_ply(options.out / "mesh.ply", mesh_of(scene), origin);
+  if (options.mirror) {
+    gart::write_mesh_ply(options.out / "mirror.ply", mesh_of({scene.back()}), origin);
+    gart::write_file(options.out / "scene.json", std::string_view(scene_with_mirror));
+  }
   gart::write_file(options.out / "transforms_test.json", transforms_json(test, "test", options.depth, origin));
   gart::write_file(options.out / "transforms_train.json", transforms_json(train, "train", options.depth, origin));
   std::error_code ignored;

@@ -231,9 +231,17 @@ synth_mesh make_coil(vec3 base) {
   return mesh;
 }
 
+// Upright, towards the middle, as high as the vase.
+synth_mesh make_mirror() {
+  synth_mesh mesh{.material = {[](vec3, vec2) { return vec3(1.0f); }}, .point_density = 0};
+  mesh.material.mirror = true;
+  add_surface(mesh, 1, 1, [](float u, float v) { return vec3(-0.92f, 1.2f * (u - 0.5f), ground + 0.95f * v); });
+  return mesh;
+}
+
 }  // namespace
 
-synth_scene make_synth_scene(u64 seed) {
+synth_scene make_synth_scene(u64 seed, bool mirror) {
   synth_scene scene;
   scene.push_back(make_disc());
   vec3 const vase(-0.30f, 0.34f, ground);
@@ -257,6 +265,7 @@ synth_scene make_synth_scene(u64 seed) {
               revolution({{0.0f, 0.0f}, {0.15f, 0.0f}, {0.15f, 0.025f}, {0.05f, 0.04f}, {0.03f, 0.085f}, {0.0f, 0.09f}},
                          {globe.x, globe.y, ground}, true));
   scene.push_back(std::move(rings));
+  if (mirror) scene.push_back(make_mirror());
   return scene;
 }
 

@@ -22,6 +22,7 @@ struct synth_material {
   float f0 = 0;
   float roughness = 0.5f;  // GGX alpha
   bool metal = false;      // then the albedo is the reflectance
+  bool mirror = false;     // reflects all, and is nothing else
 };
 
 struct synth_mesh {
@@ -34,7 +35,8 @@ struct synth_mesh {
 
 using synth_scene = std::vector<synth_mesh>;
 
-// The seed places the leaves. About 60,000 triangles.
-synth_scene make_synth_scene(u64 seed);
+// The seed places the leaves. About 60,000 triangles. With a mirror a flat one stands at the disc's edge, the last
+// mesh.
+synth_scene make_synth_scene(u64 seed, bool mirror = false);
 
 }  // namespace gart_cli

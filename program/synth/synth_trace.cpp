@@ -17,6 +17,7 @@ using gart::u8;
 constexpr float pi = std::numbers::pi_v<float>;
 constexpr float offset = 2e-4f;   // where rays leave a surface: above rounding, below the thinnest wire
 constexpr int path_vertices = 2;  // surfaces on a path
+constexpr int most_mirrors = 8;   // on the way to a surface
 constexpr float glow = 0.28f;     // even light that stands for the paths' further bounces
 constexpr float exposure = 0.88f;
 constexpr float brightest = 6.0f;  // of one sample, so that a rare highlight stays a highlight and no firefly
@@ -163,6 +164,7 @@ struct synth_renderer::implementation {
   bool radiance(vec3 origin, vec3 direction, sample_sequence& random, vec3& result) const {
     vec3 weight(1.0f);
     result = vec3(0.0f);
+    int mirrors = 0;
     for (int vertex = 0; vertex < path_vertices; ++vertex) {
       synth_hit hit;
       if (!tracer.intersect(origin, direction, 0, hit)) {
@@ -172,6 +174,12 @@ struct synth_renderer::implementation {
       }
       surface_point const p = resolve(direction, hit);
       synth_material const& m = *p.material;
+      if (m.mirror && mirrors++ < most_mirrors) {
+        direction -= 2 * glm::dot(direction, p.geometric) * p.geometric;
+        origin = p.position + offset * p.geometric;
+        --vertex;  // as if seen from behind it
+        continue;
+      }
       frame const basis(p.normal);
       vec3 const out = basis.to_local(-direction);
       float const fresnel = m.metal ? 1 : m.f0 > 0 ? schlick(m.f0, out.z) : 0;

@@ -125,6 +125,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--poses", a.poses, "FILE",
                  "With --refine-poses: begin at the poses of this camera JSON,\nby the views' names, in place of the "
                  "capture's. The poses.json of\na run that found them makes a better scene, and better poses"));
+  in_group(
+      r.add(train, "--scene", a.scene, "FILE",
+            "Mirrors that are known to be in the capture, as meshes of a\nscene.json: what photographs show in them is "
+            "learned where it is"));
   in_group(r.add(train, "--downscale", a.downscale, "N", "Shrink images by this whole factor"))->check(between(1, 64));
   in_group(r.add(
       train, "--photos", a.photos, "DIR",
@@ -244,8 +248,9 @@ void continue_run(train_arguments& a) {
     throw gart::io_error(a.config_file().string(), "has no \"options\"", "start anew without --resume");
   }
   nlohmann::json options = config["options"];
-  // Earlier runs call it t-min.
+  // Earlier runs call it t-min, and have no scene.
   if (options.contains("t-min")) options.emplace("transmittance-min", options["t-min"]);
+  options.emplace("scene", "");
   if (options.contains("set") && options["set"].is_string()) options["set"] = with_new_names(options["set"]);
   a.raised = a.recorded.continue_from(options, a.config_file(), {"iterations", "time-budget"});
   a.origin = origin_in(config, a.config_file());

@@ -33,7 +33,8 @@ struct train_arguments {
   double view_share = 0.1;
 
   // What follows decides the result and is recorded.
-  std::string backend = "auto", tracer = "auto", backward = "auto", densify = "auto", background = "auto", start, poses;
+  std::string backend = "auto", tracer = "auto", backward = "auto", densify = "auto", background = "auto", start, poses,
+              scene;
   std::string lt_format = "auto";
   std::string preset = "exact";
   gart::train_options options;  // by the table of fields; what is "auto" here is open there

@@ -6,6 +6,7 @@
 #include "ranks.hpp"
 
 #include <gart/io/placed_views.hpp>
+#include <gart/io/scene_file.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/train/memory_need.hpp>
 
@@ -95,6 +96,16 @@ void training_run::prepare() {
   say_choices();
   say_.note(a_.backend + " backend, " + a_.tracer + " tracer, " + configuration_.backward + " backward pass");
   load_seconds_ = loading.seconds();
+}
+
+// What --scene names; recorded as a whole path, as --poses is.
+void training_run::read_mirrors() {
+  a_.scene = fs::absolute(a_.scene).lexically_normal().string();
+  gart::scene_file file = gart::read_scene(a_.scene, data_.origin);
+  for (std::string const& note : file.notes) say_.note("  " + note);
+  if (file.scene.meshes.empty())
+    throw gart::io_error(a_.scene, "has no mesh", "describe the capture's mirrors in 'meshes' (docs/light.md)");
+  data_.mirrors = std::move(file.scene);
 }
 
 // What is said of --poses; recorded as a whole path, since a run may be resumed from anywhere.
@@ -193,6 +204,7 @@ void training_run::load() {
                          "raise --test-every, which keeps views for testing");
   }
   if (!a_.poses.empty()) gart::place_training_views(data_, a_.poses);
+  if (!a_.scene.empty()) read_mirrors();
   say_.note(data_.format + " capture: " + std::to_string(data_.train.size()) + " training views, " +
             std::to_string(data_.test.size()) + " test views (" + data_.split + "), " + image_size() + ", " +
             with_commas(data_.points.size()) + " points");

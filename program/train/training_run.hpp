@@ -56,6 +56,7 @@ class training_run {
   // Before the first step (training_run.cpp).
   void prepare();
   void check_poses();
+  void read_mirrors();
   void share_out();
   gart::configuration_request request() const;
   gart::row_owners owners() const;

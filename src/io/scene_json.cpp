@@ -308,7 +308,8 @@ class scene_reader {
   }
 
   void read_environment() {
-    if (!top_.has("environment")) return;
+    out_.scene.around.visible = top_.has("environment");
+    if (!out_.scene.around.visible) return;
     record const r{top_.at("environment"), nullptr, top_.where + ": environment"};
     require_keys(r, {"file", "color", "degrees", "visible", "sky"});
     light::environment& e = out_.scene.around;
@@ -368,7 +369,7 @@ class scene_reader {
     if (!top_.has("options")) return;
     record const r{top_.at("options"), nullptr, top_.where + ": options"};
     require_keys(r, {"samples", "bounces", "roulette_after", "seed", "shadows", "ambient", "relight", "linear",
-                     "aperture", "focus", "jitter", "firefly", "exposure", "tone_map"});
+                     "aperture", "focus", "blur", "jitter", "firefly", "exposure", "tone_map"});
     light::path_options& o = out_.paths;
     auto const whole = [&](char const* key, int& to) { to = static_cast<int>(number(r, key, to, 0, 1e6)); };
     auto const real = [&](char const* key, float& to, double least, double most) {
@@ -380,7 +381,7 @@ class scene_reader {
     o.relight = flag(r, "relight", o.relight), o.linear = flag(r, "linear", o.linear),
     o.jitter = flag(r, "jitter", o.jitter);
     real("ambient", o.ambient, 0, 1), real("aperture", o.aperture, 0, 1e9), real("focus", o.focus, 1e-9, 1e9);
-    real("firefly", o.firefly, 0, 1e9), real("exposure", o.exposure, -30, 30);
+    real("blur", o.blur, 0, 1e6), real("firefly", o.firefly, 0, 1e9), real("exposure", o.exposure, -30, 30);
   }
 
   fs::path path_;
@@ -424,6 +425,7 @@ scene_file read_scene(fs::path const& path, vec3d const& origin) {
   } else {
     throw io_error(path.string(), "is no scene", "scenes are .json, .glb, .gltf, .obj and .ply files");
   }
+  out.scene.around.visible = false;  // the background is
   return out;
 }
 

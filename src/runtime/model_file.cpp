@@ -1,6 +1,7 @@
 #include <gart/core/error.hpp>
 #include <gart/runtime/kinds.hpp>
 #include <gart/runtime/model_file.hpp>
+#include <gart/scene/similarity.hpp>
 
 #include <algorithm>
 #include <cstdio>
@@ -55,6 +56,37 @@ model_file load_model(std::filesystem::path const& path, row_owners const& owner
     file.render.max_hits = static_cast<u32>(parsed);
   }
   return file;
+}
+
+model_file load_models(std::vector<placed_splats> const& splats) {
+  model_file all;
+  for (placed_splats const& one : splats) {
+    model_file part = load_model(one.file);
+    similarity where{rotation_of(one.rotation), one.scale, one.translation};
+    vec3d const at = where(part.origin);
+    if (&one == &splats.front() && part.origin != vec3d(0.0)) all.origin = at;
+    where.translation = at - all.origin;
+    if (where.rotation != mat3d(1.0) || where.scale != 1 || where.translation != vec3d(0.0))  // else it keeps its bits
+      apply(where, part.model);
+    for (std::string& note : part.notes) all.notes.push_back(std::move(note));
+    if (&one == &splats.front()) {
+      all.render = part.render, all.kernel_degree = part.kernel_degree, all.model = std::move(part.model);
+    } else {
+      if (part.kernel_degree != all.kernel_degree)
+        throw unsupported(one.file.string() + ": its kernel degree is " + std::to_string(part.kernel_degree) +
+                          ", and that of the scene's first model " + std::to_string(all.kernel_degree) +
+                          " (models of one scene have one)");
+      int const degree = std::max(all.model.sh_degree, part.model.sh_degree);
+      all.model = with_sh_degree(std::move(all.model), degree);
+      part.model = with_sh_degree(std::move(part.model), degree);
+      for_each_array(
+          [](parameter_array const&, auto& to, auto const& from) { to.insert(to.end(), from.begin(), from.end()); },
+          all.model, part.model);
+    }
+    all.total += part.total;
+  }
+  require_count(all.model.size());
+  return all;
 }
 
 splat_traits traits_of(render_options const& render, int kernel_degree) {

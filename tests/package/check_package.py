@@ -114,6 +114,9 @@ with tempfile.TemporaryDirectory() as temporary:
     points = folder / "points.ply"
     expect(run(examples["6_lidar_scan"] / "lidar_scan", model, 0, 0, 0, points), "65536 rays")
     assert points.read_bytes().startswith(b"ply\n")
+    picture = folder / "light.png"
+    expect(run(examples["7_light"] / "light", model, capture, 0, 0, 0, 0.5, picture), "64 samples a pixel")
+    assert picture.read_bytes().startswith(b"\x89PNG")
     own = folder / "own.ply"
     expect(run(examples["5_own_configuration"] / "own_configuration", capture, own, 3), "openmp, tiles, primitive: kernel degree 4")
     expect(own.read_bytes()[:400].decode("latin-1"), "comment gart kernel_degree 4\n")

@@ -6,6 +6,7 @@
 #include <gart/core/error.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/file.hpp>
+#include <gart/io/scene_file.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -355,4 +356,44 @@ TEST_CASE("an option out of its range is refused by name, before anything is wri
   if (!has_embree()) return;
   std::ofstream(folder.path) << "a file";
   CHECK_THROWS_AS(write_synth_capture(small(folder.path)), gart::io_error);
+}
+
+TEST_CASE("a mirror shows what a camera behind it would see") {
+  if (!has_embree()) return;
+  synth_renderer const with(make_synth_scene(3, true), 2), without(make_synth_scene(3), 2);
+  double const plane = make_synth_scene(3, true).back().position[0].x;
+  gart::camera front;
+  front.width = front.height = 48, front.fx = front.fy = 90, front.cx = front.cy = 24;
+  gart::vec3d const at(1.9, 0.3, 0.75), to(plane, 0.1, 0.1),
+      ahead = glm::normalize(to - at), right = glm::normalize(glm::cross(ahead, gart::vec3d(0, 0, 1))),
+      down = glm::cross(ahead, right);
+  front.position = at, front.rotation = gart::mat3(gart::vec3(right), gart::vec3(down), gart::vec3(ahead));
+  // Behind the mirror left is right.
+  gart::camera behind = front;
+  behind.position.x = 2 * plane - front.position.x;
+  for (int axis = 0; axis < 3; ++axis) behind.rotation[axis].x = -front.rotation[axis].x;
+  behind.rotation[0] = -behind.rotation[0];
+  auto const seen = with.render(front, 32, 1), meant = without.render(behind, 32, 2);
+  auto const distance = with.distances(front), covered = without.distances(front);
+  double sum = 0;
+  int count = 0;
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 48; ++x) {
+      if (distance.at(x, y, 0) == covered.at(x, y, 0) || meant.at(47 - x, y, 3) != 255) continue;
+      for (int c = 0; c < 3; ++c) sum += std::abs(seen.at(x, y, c) - meant.at(47 - x, y, c)), ++count;
+    }
+  CHECK(count > 300);
+  CHECK(sum / count < 12);  // noise, and light that the mirror itself sends on
+}
+
+TEST_CASE("a capture with a mirror says where it stands") {
+  if (!has_embree()) return;
+  scratch_folder const folder;
+  synth_options options = small(folder.path / "mirror");
+  options.mirror = true;
+  write_synth_capture(options);
+  gart::scene_file const file = gart::read_scene(options.out / "scene.json");
+  REQUIRE(file.scene.meshes.size() == 1);
+  CHECK(file.scene.meshes[0].triangles.size() == 6);
+  CHECK(file.scene.materials.at(file.scene.meshes[0].triangle_material[0]).kind == gart::light::material_kind::mirror);
 }

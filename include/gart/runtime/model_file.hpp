@@ -9,6 +9,7 @@
 /// file, the key and the remedy; save_model as write_splats (io/splat_file.hpp).
 
 #include <gart/io/origin.hpp>
+#include <gart/io/scene_file.hpp>
 #include <gart/render/options.hpp>
 #include <gart/scene/gaussians.hpp>
 
@@ -32,6 +33,9 @@ struct model_file {
 model_file load_model(std::filesystem::path const& path);
 /// The same with this rank's rows alone, of which a binary splat PLY is not read beyond.
 model_file load_model(std::filesystem::path const& path, row_owners const& owners);
+/// Those of a scene, each in its place, as one model: with the origin and the rendering of the first. Errors:
+/// unsupported where their kernel degrees differ; a model without Gaussians where there are none.
+model_file load_models(std::vector<placed_splats> const& splats);
 /// Written to a temporary name, then renamed. Errors: io_error.
 void save_model(std::filesystem::path const& path, model_file const& file);
 

@@ -1,0 +1,80 @@
+#include "render_scene.hpp"
+
+#include "commands.hpp"
+
+namespace gart_cli {
+
+namespace fs = std::filesystem;
+
+void add_scene_options(CLI::App& app, scene_options& o) {
+  app.add_option("--scene", o.file,
+                 "Paths of light through Gaussians, meshes and lights: a scene.json,\nor a mesh (.glb, .gltf, .obj, "
+                 ".ply). MODEL is left out where the\nscene names its models, CAMERAS where it has cameras")
+      ->type_name("FILE");
+  app.add_option("--bounces", o.bounces,
+                 "Of --scene: surfaces that a path goes on from\n(default: the scene's, else 4)")
+      ->type_name("N")
+      ->check(between(0, 64));
+  app.add_option("--shadows", o.shadows,
+                 "Of --scene: shadows of meshes on Gaussians, none, per-gaussian (one\nvisibility each and light) or "
+                 "per-hit (sharper, slower)")
+      ->type_name("KIND")
+      ->check(name_of_a<gart::light::shadow_kind>());
+  app.add_option("--aperture", o.aperture, "Of --scene: radius of the lens, world units; 0: all is sharp")
+      ->type_name("R")
+      ->check(between(0, 1e9));
+  app.add_option("--focus", o.focus, "Of --scene: distance along the axis that is sharp")
+      ->type_name("D")
+      ->check(between(1e-9, 1e9));
+  app.add_option("--exposure", o.exposure, "Of --scene: stops that the picture is made brighter by")
+      ->type_name("S")
+      ->check(between(-30, 30));
+  app.add_option("--tone-map", o.tone_map, "Of --scene: none, srgb or filmic, from light to what a screen shows")
+      ->type_name("NAME")
+      ->check(name_of_a<gart::light::tone_kind>());
+  app.add_option("--seed", o.seed, "Of --scene: of all that is random")->type_name("N");
+}
+
+path_scene::path_scene(scene_options const& o, fs::path const& model, configuration_options const& configuration) {
+  std::vector<gart::placed_splats> splats = gart::read_scene_splats(o.file);
+  if (!model.empty()) splats.insert(splats.begin(), gart::placed_splats{.file = model});
+  model_ = gart::load_models(splats);
+  file_ = gart::read_scene(o.file, model_.origin);
+  gart::light::path_options& p = file_.paths;
+  if (o.bounces) p.bounces = *o.bounces;
+  if (o.seed) p.seed = *o.seed;
+  if (!o.shadows.empty()) p.shadows = gart::from_string<gart::light::shadow_kind>(o.shadows);
+  if (!o.tone_map.empty()) p.tone = gart::from_string<gart::light::tone_kind>(o.tone_map);
+  if (o.aperture) p.aperture = *o.aperture;
+  if (o.focus) p.focus = *o.focus;
+  if (o.exposure) p.exposure = *o.exposure;
+  if (model_.render.antialias > 0) {
+    model_.render.antialias = 0;
+    file_.notes.push_back("paths of light are traced without the filter that the model was trained with (antialias)");
+  }
+  gart::configuration_request wanted = configuration.request();
+  wanted.sh_degree = model_.model.sh_degree, wanted.kernel_degree = model_.kernel_degree;
+  renderer_ = gart::make_path_renderer(wanted);
+  renderer_->set_model(model_.model);
+  try {
+    gart::light::require_path_options(p);
+    renderer_->set_scene(file_.scene);
+  } catch (gart::invalid_argument const& e) {
+    throw gart::io_error(o.file.string(), e.what(), "correct it");
+  }
+}
+
+gart::rendered path_scene::draw(gart::camera const& view, gart::render_options options, int samples) {
+  gart::light::path_options paths = file_.paths;
+  paths.samples = samples;
+  renderer_->begin(view, options, paths);
+  renderer_->add(samples);
+  layers_ = renderer_->layers();
+  gart::rendered out;
+  out.color = renderer_->picture(), out.depth = layers_.depth, out.transmittance = layers_.transmittance;
+  for (std::size_t i = 0; i < layers_.mesh.data.size(); ++i)  // nothing is seen behind a surface
+    if (layers_.mesh.data[i] != gart::no_number) out.transmittance.data[i] = 0;
+  return out;
+}
+
+}  // namespace gart_cli
