@@ -130,11 +130,18 @@ struct take_pixels {
 };
 struct put_pixels {
   u32 const* pixels;
-  vec3 const* from;  // null: zeros
+  vec3 const* from;
   float* to;
   GART_KERNEL void operator()(index_t i) const {
-    vec3 const c = from ? from[i] : vec3(0.0f);
-    for (int k = 0; k < 3; ++k) to[std::size_t{3} * pixels[i] + static_cast<std::size_t>(k)] = c[k];
+    for (int k = 0; k < 3; ++k) to[std::size_t{3} * pixels[i] + static_cast<std::size_t>(k)] = from[i][k];
+  }
+};
+struct clear_pixels {
+  u32 const* pixels;
+  std::size_t channels;
+  float* to;
+  GART_KERNEL void operator()(index_t i) const {
+    for (std::size_t k = 0; k < channels; ++k) to[channels * pixels[i] + k] = 0;
   }
 };
 struct get_pixels {
@@ -250,11 +257,12 @@ class mirror_paths {
       add(gradients, of_segment_->view());
     }
   }
-  /// Zero at the pixels that the last forward traced, of [H][W][3].
-  void take_out(span<float> by_color) {
-    require_begun(by_color.size(), "mirror_paths.take_out");
+  /// Zero at the pixels that the last forward traced, of [H][W][3] or [H][W].
+  void take_out(span<float> image) {
+    bool const plane = image.size() == size_;
+    require_begun(image.size() * (plane ? 3 : 1), "mirror_paths.take_out");
     parallel_for(*exec_, "light/mirrors", static_cast<index_t>(pixels_.size()),
-                 light_kernels::put_pixels{pixels_.data(), nullptr, by_color.data()});
+                 light_kernels::clear_pixels{pixels_.data(), plane ? std::size_t{1} : std::size_t{3}, image.data()});
   }
   /// Pixels that the last forward traced.
   index_t traced() const { return static_cast<index_t>(pixels_.size()); }

@@ -24,8 +24,8 @@ class mirror_service {
   /// Those pixels of an image, others stay; of Gaussians whose arrays stay until backward.
   virtual void show(gaussians_view<float const> model, int active_degree, camera const& view,
                     render_options const& options, float* image) = 0;
-  /// Zero at the pixels of the last show.
-  virtual void take_out(span<float> by_image) = 0;
+  /// Zero at the pixels of the last show, of [H][W][3] or [H][W].
+  virtual void take_out(span<float> image) = 0;
   /// Adds what dL/d those pixels comes to.
   virtual void backward(span<float const> by_image, gaussians_view<float> gradients) = 0;
 };

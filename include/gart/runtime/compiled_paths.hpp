@@ -88,7 +88,7 @@ class compiled_mirrors final : public mirror_service {
     paths_.set_model(model, active_degree);
     paths_.forward(view, options, bounces, image, mirror_pixels::mirrors);
   }
-  void take_out(span<float> by_image) override { paths_.take_out(by_image); }
+  void take_out(span<float> image) override { paths_.take_out(image); }
   void backward(span<float const> by_image, gaussians_view<float> gradients) override {
     paths_.backward(by_image, gradients, with_what::there_is);
   }

@@ -227,7 +227,10 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace(Plan& plan, loss_fu
     else
       image_.loss.evaluate(photo, v.truth, v.seen.width, v.seen.height, options_.ssim_weight, image_.by_color,
                            row.subspan(0, 2));
-    if (densifier_->by_error()) error_map(exec_, photo, v.truth, image_.error);
+    if (densifier_->by_error()) {
+      error_map(exec_, photo, v.truth, image_.error);
+      for (auto const& part : parts_) part->leave_out(image_.error);
+    }
     for (std::size_t i = parts_.size(); i-- > 0;) parts_[i]->after_loss(v, image_.by_color, numbers_of(row, i));
   };
   auto const after_backward = [&](frame_type* frame) {

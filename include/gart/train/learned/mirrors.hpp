@@ -37,6 +37,7 @@ class learned_mirrors final : public learned_part<Frame> {
     exec_->copy(by_.data(), gradient.data(), gradient.size() * sizeof(float));
     mirrors_->take_out(gradient);
   }
+  void leave_out(span<float> error) override { mirrors_->take_out(error); }
   void after_backward(Frame*, step_view const& v, span<float>) override { mirrors_->backward(by_, v.gradients); }
   bool shows() const override { return true; }
   void show(camera const& view, render_options options, gaussians_view<float const> model, int degree,

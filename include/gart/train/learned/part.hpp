@@ -84,6 +84,8 @@ class learned_part {
   virtual span<float const> before_loss(step_view const&, span<float const> image, span<float> /*numbers*/) {
     return image;
   }
+  /// Of the error of each pixel, by which densification grows Gaussians: where those of the frame are not to blame.
+  virtual void leave_out(span<float> /*error*/) {}
   /// Turns the gradient by what before_loss gave to that by what it was given.
   virtual void after_loss(step_view const&, span<float> /*gradient*/, span<float> /*numbers*/) {}
   /// `frame`: null on a rank that has no rows of the image.
