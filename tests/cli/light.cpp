@@ -46,7 +46,7 @@ TEST_CASE("gart render --scene draws what the scene says") {
   CHECK_MESSAGE(run.code == 0, run.err);
   gart::image8 const image = gart::read_image(here / "out/a.png");
   CHECK(image.at(0, 8, 1) == 255);  // the lamp
-  CHECK(image.at(0, 8, 0) == 0);
+  CHECK(image.at(0, 8, 0) < 10);    // its gloss shows some of the Gaussian
   CHECK(image.at(12, 8, 0) > 150);  // the Gaussian
   CHECK(image.at(12, 8, 2) < 60);
   gart::image_float const ids = gart::read_exr(here / "out/a_ids.exr", "GMT"),
