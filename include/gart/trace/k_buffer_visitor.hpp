@@ -34,15 +34,6 @@ struct k_buffer_visitor {
   }
 };
 
-/// Where ray i begins: at its program's near(i), where it has one, which is at least the scene's; else at the scene's.
-template <class P>
-GART_HD GART_INLINE float start_of_ray(traced_scene const& scene, P const& program, index_t i) {
-  if constexpr (requires { program.near(i); })
-    return program.near(i);
-  else
-    return scene.near;
-}
-
 /// Feeds `program` the hits of ray i; `gather` proposes candidates to the visitor (at least all whose hits lie in
 /// [near(), far()]) and is called again until a window is not full.
 template <int Capacity, class Response = generalized_gaussian<>, ray_program P, class Gather>

@@ -31,6 +31,15 @@ struct traced_scene {
   float near = 0;     ///< hits lie at t > near
 };
 
+/// Where ray i begins: at its program's near(i), where it has one, which is at least the scene's; else at the scene's.
+template <class P>
+GART_HD GART_INLINE float start_of_ray(traced_scene const& scene, P const& program, index_t i) {
+  if constexpr (requires { program.near(i); })
+    return program.near(i);
+  else
+    return scene.near;
+}
+
 /// What a tracer has unless it says otherwise.
 struct tracer_base {
   static constexpr int tile_size = 8;              ///< side of the tiles that footprints are cut into
