@@ -18,6 +18,7 @@
 #include <gart/io/mesh_file.hpp>
 #include <gart/io/origin.hpp>
 #include <gart/io/ply.hpp>
+#include <gart/io/scene_file.hpp>
 #include <gart/io/splat_file.hpp>
 #include <gart/lens/differentiate_lens.hpp>
 #include <gart/light/path_tracer.hpp>

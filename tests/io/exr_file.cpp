@@ -167,7 +167,7 @@ TEST_CASE("an EXR file that is written is read, channel by channel") {
   CHECK(holds(with_byte("\x76\x2f\x31\x01", 5, 2), "is tiled"));
 }
 
-TEST_CASE("halfs, runs and single lines of EXR files are read as the format says") {
+TEST_CASE("halfs, runs and single lines of EXR files are read") {
   scratch_folder const folder;
   auto const file = [&](char compression, std::string const& block, int size) {
     std::string text;

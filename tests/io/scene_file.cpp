@@ -63,7 +63,7 @@ std::string refusal(fs::path const& path) {
 
 }  // namespace
 
-TEST_CASE("a glTF's triangle is where its nodes place it, in a world whose y goes down") {
+TEST_CASE("a glTF's triangle is where its nodes place it") {
   scratch_folder const folder;
   folder.put("a b.bin", triangle_bytes());
   auto const read = [&](std::string const& text) { return gart::read_scene(folder.put("a.gltf", text)); };
