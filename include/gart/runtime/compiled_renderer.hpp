@@ -238,6 +238,8 @@ class compiled_renderer final : public renderer {
     if (to.rays.origins || to.rays.directions)
       throw invalid_argument("forward_context.backward: a view has no gradient_targets.rays; trace them as a batch");
     require_channels(shown.hits.channels, by.channels, to.channels, n, "forward_context.backward");
+    // Features alone need no pass of the colours.
+    if (!to.gaussians.mean && !to.pose) return channels_.pull(shown.frame, shown.hits, by.channels, to.channels);
     gaussians_view<float> rows = to.gaussians;
     bool const own = !rows.mean, narrow = !own && degree_ != sh_degree;
     if (own) {
