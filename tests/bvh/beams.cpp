@@ -2,7 +2,7 @@
 // Gaussian says by itself, whatever waits, is lost or has no room.
 #include <bvh/ray_hits.hpp>
 
-#include <gart/exec/serial.hpp>
+#include <gart/exec/parallel.hpp>
 #include <gart/trace/beam_rays.hpp>
 
 #include <limits>
