@@ -15,7 +15,7 @@ struct made_beam {
 };
 
 /// Rays of a beam differ by this much in slope, all in all: above it a beam meets so many boxes that none of its rays
-/// does that rays are faster one by one.
+/// does that rays are faster one by one. Their origins differ by a 128th of that, in sizes of the tree.
 inline constexpr float widest_beam = 0.25f;
 
 /// Of the rays of all lanes that have one; `placed` gives a lane's in the frame of the tree. One at least has.
@@ -62,7 +62,7 @@ GART_HD GART_INLINE made_beam beam_of(bvh_view const& tree, Has const& has, Plac
     wide += hi - lo;
     b.by_least_slope[k - 1] = slab_inverse(lo), b.by_greatest_slope[k - 1] = slab_inverse(hi);
   }
-  out.narrow = wide <= widest && apart <= widest / 16 * size;
+  out.narrow = wide <= widest && apart <= widest / 128 * size;
   return out;
 }
 
