@@ -12,7 +12,7 @@
 ///
 /// Or of the pixels alone that meet a mirror first: a trainer shows the others. Its loss sees both in one image
 /// (forward), takes the gradient out of the pixels of mirrors (take_out), and adds what it comes to before the
-/// optimizer's step (backward, with_what::there_is). tests/light/training.cpp trains so.
+/// optimizer's step (backward, with_what::there_is). train/learned/mirrors.hpp trains so.
 ///
 /// With C and T what a segment's Gaussians add and let through, and b a mirror's colour, a path from segment k on has
 ///   L_k = C_k + T_k B_k,   B_k = b_k L_(k + 1) at a mirror, else what shines there;
