@@ -1,15 +1,15 @@
 #pragma once
 /// \file
 /// The tile-primitive map: for every tile, the primitives that its pixels may hit. A pair is emitted for each tile that
-/// a primitive's box overlaps, in primitive order; those that fail the test of pairs (tiles/pair_test.hpp) are in no
-/// tile. One 32-bit key sorts by tile, and within a tile by an order (tiles/tile_order.hpp) in the bits that the tile's
-/// number leaves free; ties stay in primitive order. A host sorts the keys by digits, and a tile's list begins where
-/// its number first stands in a key. A device sorts each tile's list (tiles/sort_lists.hpp).
+/// a primitive's box overlaps, in primitive order, and radix sorted by tile; those that fail the test of pairs
+/// (tiles/pair_test.hpp) come last, in no tile. A tile's list begins where its number first stands in a key.
+///
+/// One 32-bit key sorts by tile, and within a tile by an order (tiles/tile_order.hpp) in the bits that the tile's
+/// number leaves free. Ties stay in primitive order, since the sort is stable.
 
 #include <gart/algorithm/sort_pairs.hpp>
 #include <gart/tiles/footprints.hpp>
 #include <gart/tiles/pair_test.hpp>
-#include <gart/tiles/sort_lists.hpp>
 #include <gart/tiles/tile_order.hpp>
 
 namespace gart { inline namespace GART_ISA {
@@ -18,10 +18,10 @@ namespace gart { inline namespace GART_ISA {
 struct tile_map_view {
   span<u32 const> primitives;     ///< all lists, tile after tile
   span<u32 const> offsets;        ///< [tiles + 1]
-  span<u32 const> keys;           ///< of all lists, sorted; after offsets[tiles] whatever is left
+  span<u32 const> keys;           ///< of all lists, sorted
   int order_bits = 0;             ///< low bits of a key: the order's
   int depth_shift = 0;            ///< of depth_order: bits of a depth that keys leave out
-  span<u32 const> longest_first;  ///< the tiles by the length of their lists, on a device
+  span<u32 const> longest_first;  ///< the tiles, if asked for (rank_tiles)
 
   /// In lists sorted by depth_order: no hit of entry k, or of any after it in its list, has a smaller z.
   GART_HD GART_INLINE float depth(u32 k) const {
@@ -60,7 +60,6 @@ struct emit_pairs {
   Test test;
   int order_bits;
   span<u32> keys, primitives;
-  span<u32> counts;  // on a device: of each tile's pairs, zero at first
 
   GART_KERNEL void operator()(auto const& team) const {
     u32 const begin = team.tile() * share, left = static_cast<u32>(ranges.size()) - begin;
@@ -107,8 +106,6 @@ struct emit_pairs {
     bool const meets = !s.is_tested[k] || test.meets(s.tested[k], cell, tile);
     keys[to] = meets ? tile << order_bits | order.key(s.primitive[k], cell, tile) : grid.count() << order_bits;
     primitives[to] = begin + k;
-    if constexpr (E::device)
-      if (meets) E::atomic_add(&counts[tile], u32{1});
   }
 };
 
@@ -130,6 +127,18 @@ struct begin_lists {
   }
 };
 
+// Longer lists have smaller keys.
+struct rank_tiles {
+  static constexpr u32 step = 16, most = 255;
+  span<u32 const> offsets;
+  span<u32> keys, tiles;
+  GART_KERNEL void operator()(index_t i) const {
+    u32 const steps = (offsets[i + 1] - offsets[i]) / step;
+    keys[i] = most - (steps < most ? steps : most);
+    tiles[i] = i;
+  }
+};
+
 }  // namespace tile_kernels
 
 /// The map of a view, and its buffers.
@@ -137,7 +146,7 @@ template <execution E, int Size>
 class tile_map {
  public:
   /// No map yet.
-  explicit tile_map(E& exec) : keys_(exec), primitives_(exec), offsets_(exec), counts_(exec), longest_first_(exec) {}
+  explicit tile_map(E& exec) : keys_(exec), primitives_(exec), offsets_(exec), ranks_(exec), longest_first_(exec) {}
 
   /// A new map of a view's footprints; out_of_memory for 2^31 pairs or more.
   template <tile_order Order, pair_test Test = every_pair>
@@ -155,41 +164,31 @@ class tile_map {
     order_bits_ = order.take(32 - tile_bits);
     depth_shift_ = order.shift();
     keys_.resize(pairs), primitives_.resize(pairs), offsets_.resize(grid.count() + 1);
-    if constexpr (E::device) counts_.resize(grid.count()), counts_.zero();
     using emit = tile_kernels::emit_pairs<E, Size, Order, Test>;
     parallel_for(
         exec, "map/emit",
         tile_range{(static_cast<u32>(prints.ranges().size()) + emit::share - 1) / emit::share, emit::block_size},
-        emit{grid, prints.ranges(), prints.pair_offsets(), pairs, order, test, order_bits_, keys_, primitives_,
-             counts_});
-    if constexpr (E::device) {
-      sort_by_tiles(exec, grid.count());
-    } else {
-      sort_pairs(exec, keys_.view(), primitives_.view(), tile_bits + order_bits_);
-      parallel_for(exec, "map/begin", static_cast<index_t>(offsets_.size()),
-                   tile_kernels::begin_lists{keys_, order_bits_, offsets_});
-    }
+        emit{grid, prints.ranges(), prints.pair_offsets(), pairs, order, test, order_bits_, keys_, primitives_});
+    sort_pairs(exec, keys_.view(), primitives_.view(), tile_bits + order_bits_);
+    parallel_for(exec, "map/begin", static_cast<index_t>(offsets_.size()),
+                 tile_kernels::begin_lists{keys_, order_bits_, offsets_});
+  }
+
+  /// After build: the tiles by the length of their lists, longest first, in 255 steps of 16. Lists differ by orders of
+  /// magnitude, and a long one begun last would keep the whole device waiting.
+  void rank_tiles(E& exec) {
+    stage_scope stage(exec, "map");
+    index_t const tiles = static_cast<index_t>(offsets_.size() - 1);
+    ranks_.resize(tiles), longest_first_.resize(tiles);
+    parallel_for(exec, "map/rank", tiles, tile_kernels::rank_tiles{offsets_, ranks_, longest_first_});
+    sort_pairs(exec, ranks_.view(), longest_first_.view(), 8);
   }
 
   /// Until the next build.
   tile_map_view view() const { return {primitives_, offsets_, keys_, order_bits_, depth_shift_, longest_first_}; }
 
  private:
-  void sort_by_tiles(E& exec, u32 tiles) {
-    stage_scope stage(exec, "map/sort");
-    longest_first_.resize(tiles);
-    buffer<u64, E> lists(exec, keys_.size());
-    exclusive_scan(exec, span<u32 const>(counts_), offsets_.view().subspan(0, tiles),
-                   offsets_.view().subspan(tiles, 1));
-    using rank = tile_kernels::rank_tiles<E>;
-    parallel_for(exec, "map/rank", tile_range{1, rank::block_size}, rank{offsets_, longest_first_});
-    parallel_for(exec, "map/scatter", static_cast<index_t>(keys_.size()),
-                 tile_kernels::scatter_pairs<E>{keys_, primitives_, order_bits_, tiles, offsets_, counts_, lists});
-    parallel_for(exec, "map/lists", tile_range{tiles, tile_kernels::sort_lists::block_size},
-                 tile_kernels::sort_lists{longest_first_, offsets_, lists, keys_, primitives_});
-  }
-
-  buffer<u32, E> keys_, primitives_, offsets_, counts_, longest_first_;
+  buffer<u32, E> keys_, primitives_, offsets_, ranks_, longest_first_;
   int order_bits_ = 0, depth_shift_ = 0;
 };
 

@@ -161,6 +161,7 @@ class tile_tracer : public tracer_base {
       auto const order = orders_.of(exec, model, rays_, footprints_.depths().data(), gaussians.data());
       map_.build(exec, grid_, footprints_, order, orders_.test_of(model, gaussians.data()));
     });
+    if constexpr (E::device) map_.rank_tiles(exec);
     scene_ = {gaussians.data(), scene.count, options.near};
   }
 
