@@ -128,7 +128,7 @@ nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::valid
           {"shrink", found.plan.shrink},
           {"steps", found.plan.steps},
           {"trials", trials},
-          {"why", a.automatic ? found.plan.why : "--no-auto: the literature's settings"}};
+          {"why", a.automatic ? found.plan.why : "--no-auto: the usual settings"}};
 }
 
 void settle(train_arguments& a, nlohmann::json const& measured, nlohmann::json& chosen) {
@@ -146,7 +146,7 @@ void settle(train_arguments& a, nlohmann::json const& measured, nlohmann::json& 
     say((own ? "--" : "--set ") + setting + " " + value, t["taken"] ? "taken" : "left",
         (gain < 0 ? "" : "+") + fixed(gain, 2) + " dB, give or take " + fixed(t["noise"].get<double>(), 2));
   }
-  // Settings that were not measured keep the literature's values.
+  // Settings that were not measured keep the usual values.
   for (auto const& [own, given] : {std::pair{&a.exposure, "off"}, {&a.vignetting, "off"}, {&a.densify, "error"}})
     if (*own == "auto") *own = given;
 }

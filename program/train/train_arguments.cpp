@@ -92,7 +92,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add_flag(train, "--auto,!--no-auto", a.automatic,
                       "Measure what the capture asks for before the run: settings\nleft open are tried in short "
                       "trainings on small images, and\ntraining views held out of them judge (docs/training.md).\n"
-                      "--no-auto: the literature's settings, the same for all"));
+                      "--no-auto: the usual settings, the same for all"));
   in_group(r.add(train, "--sh-degree", a.sh_degree, "0..3", "Degree of the spherical harmonics of colour"))
       ->check(between(0, 3));
   in_group(r.add(train, "--adam", a.adam, "NAME",

@@ -118,7 +118,7 @@ TEST_CASE("what the library measures is what gart train does, recorded, and the 
   CHECK(here.json("parts/metrics.json")["chosen"] == metrics["chosen"]);
 }
 
-TEST_CASE("what is given is not measured, and --no-auto takes the literature's settings") {
+TEST_CASE("what is given is not measured, and --no-auto takes the usual settings") {
   folder const here;
   write_capture(here / "capture", 24);
   std::string const run = "train capture --iterations 30000 --max-gaussians 30 --backend serial --stop-at 1 ";

@@ -6,7 +6,7 @@
 /// The trials. One training view in 4, the third of each four, is held out. Noise falls with their number, and three
 /// quarters of the views train well enough to compare. Images are shrunk, at most by 4 and to no less than 128 pixels,
 /// and the largest number of Gaussians with them. The first trial has the caller's options, which should be the
-/// literature's. Each candidate changes one setting of these.
+/// usual ones. Each candidate changes one setting of these.
 ///
 /// The verdict. Each held-out view gives the candidate's gain in PSNR over the first trial. The noise is the standard
 /// error of their mean. A candidate is taken where its gain exceeds the noise and least_gain. Gains nearly add up
@@ -31,7 +31,7 @@ namespace gart {
 
 struct capture_traits;
 
-/// A setting to try in place of the literature's.
+/// A setting to try in place of the usual one.
 struct candidate {
   std::string setting;                       ///< the field of train_options that it sets: "exposure", "rates.sh_rest"
   std::string value;                         ///< in words, as `gart train` takes it

@@ -91,7 +91,6 @@ inline constexpr option_field option_fields[] = {
     {GART_FIELD(resolution.long_run), 1, 1e9, "Rules", "steps that a longer run's shares are of"},
     {GART_FIELD(sh_every), 1, 1e9, "Rules", "steps to the next degree of colour"},
     {GART_FIELD(sh_penalty), 0, 1e6, "Rules", "weight of the bands' squares above the first, halved, in the loss"},
-    {GART_FIELD(sh_penalty_final), 0, 1e6, "Rules", "the same at the end of the run"},
     {GART_FIELD(shard_block), 1, 4294967295.0, "Rules", "Gaussians in a row that one of several ranks has"},
     {GART_FIELD(rates.mean), 0, 1e6, "Rules", "Adam's rate of means, times the extent"},
     {GART_FIELD(rates.mean_final), 0, 1e6, "Rules", "the same at the end of the run"},

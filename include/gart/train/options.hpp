@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// All options of a training run, with the defaults of the literature (3DGS, 3DGS-MCMC, gsplat).
+/// All options of a training run, with the usual defaults (docs/training.md says from where).
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/core/names.hpp>
@@ -49,7 +49,6 @@ struct train_options {
   /// Weight of the square of the bands of colour above the first, halved and in the mean over the Gaussians, in the
   /// loss (optim/adam.hpp). Rates of bands can then be eight times those of 3DGS without noise.
   float sh_penalty = 0.01f;
-  float sh_penalty_final = 0.001f;  ///< its last value: once geometry stands, colours may differ more by direction
   int sh_every = 1000;  ///< a degree more after so many steps (or iterations / (10 * degrees) in shorter runs)
   std::vector<std::size_t> held_out = {};               ///< training views, by index, that are not trained on
   background_kind background = background_kind::black;  ///< behind the scene

@@ -272,8 +272,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(Plan& plan, lear
     progress_.hooks.before_optimizer(std::as_const(g.model).view(), g.gradients.view(), step - options_.batch);
   }
   adam_options adam = options_.adam;
-  adam.sh_pull = exponential_decay(options_.sh_penalty, options_.sh_penalty_final, step, options_.iterations) /
-                 static_cast<float>(std::max<u64>(g.total, 1));
+  adam.sh_pull = options_.sh_penalty / static_cast<float>(std::max<u64>(g.total, 1));
   plan.move(exec_,
             adam_pass<E>(g.model, g.gradients, g.moments, rates, step, degree,
                          finite_ ? finite_->skipped() : span<u64>{}, adam, options_.batch),
