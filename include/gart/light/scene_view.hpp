@@ -63,7 +63,8 @@ struct environment_view {
   GART_HD GART_INLINE vec3 radiance(vec3 const& direction) const {
     if (!texels) return color;
     vec2 const at = place_of(direction);
-    float const x = at.x * width - 0.5f, y = clamped(at.y * height - 0.5f, 0.0f, static_cast<float>(height - 1));
+    float const x = at.x * static_cast<float>(width) - 0.5f,
+                y = clamped(at.y * static_cast<float>(height) - 0.5f, 0.0f, static_cast<float>(height - 1));
     float const left = floorf(x), top = floorf(y);
     int const x0 = (static_cast<int>(left) + width) % width, x1 = (x0 + 1) % width, y0 = static_cast<int>(top),
               y1 = y0 + 1 < height ? y0 + 1 : y0;
@@ -73,11 +74,12 @@ struct environment_view {
 
   // Of the place: how likely sample() draws it, by solid angle.
   GART_HD GART_INLINE float density(vec2 const& at) const {
-    int const y = static_cast<int>(clamped(at.y * height, 0.0f, height - 1.0f)),
-              x = static_cast<int>(clamped(at.x * width, 0.0f, width - 1.0f));
+    int const y = static_cast<int>(clamped(at.y * static_cast<float>(height), 0.0f, static_cast<float>(height - 1))),
+              x = static_cast<int>(clamped(at.x * static_cast<float>(width), 0.0f, static_cast<float>(width - 1)));
     float const* const row = columns + static_cast<std::size_t>(y) * (width + 1);
     float const part = (rows[y + 1] - rows[y]) * (row[x + 1] - row[x]), sine = turn_of(0.5f * at.y).y;
-    return sine > 1e-6f ? part * width * height / (2.0f * pi * pi * sine) : 0.0f;
+    return sine > 1e-6f ? part * static_cast<float>(width) * static_cast<float>(height) / (2.0f * pi * pi * sine)
+                        : 0.0f;
   }
   // The last entry of [0, n) at or below u, and how far u is in it.
   GART_HD GART_INLINE static float found(float const* sums, int n, float u) {
@@ -87,13 +89,13 @@ struct environment_view {
       (sums[middle] <= u ? lo : hi) = middle;
     }
     float const size = sums[lo + 1] - sums[lo];
-    return lo + (size > 0 ? clamped((u - sums[lo]) / size, 0.0f, 0.999f) : 0.5f);
+    return static_cast<float>(lo) + (size > 0 ? clamped((u - sums[lo]) / size, 0.0f, 0.999f) : 0.5f);
   }
   // By its brightness: a place, and its direction.
   GART_HD GART_INLINE vec3 sample(vec2 const& u, vec2& at) const {
     float const y = found(rows, height, u.x);
     float const x = found(columns + static_cast<std::size_t>(static_cast<int>(y)) * (width + 1), width, u.y);
-    at = {x / width, y / height};
+    at = {x / static_cast<float>(width), y / static_cast<float>(height)};
     vec2 const down = turn_of(0.5f * at.y), around = turn_of(at.x < 0.5f ? at.x + 0.5f : at.x - 0.5f);
     return glm::transpose(to_image) * vec3(down.y * around.y, down.x, -down.y * around.x);
   }
@@ -137,7 +139,8 @@ struct scene_view {
     texture_row const t = textures[texture];
     // Far places repeat too; beyond what floats count, or of no number, the corner stands.
     auto const sane = [](float x) { return fabsf(x) < 1e6f ? x : 0.0f; };
-    float const x = sane(uv.x * t.width - 0.5f), y = sane(uv.y * t.height - 0.5f), left = floorf(x), top = floorf(y);
+    float const x = sane(uv.x * static_cast<float>(t.width) - 0.5f),
+                y = sane(uv.y * static_cast<float>(t.height) - 0.5f), left = floorf(x), top = floorf(y);
     int const x0 = static_cast<int>(left), y0 = static_cast<int>(top);
     float const fx = x - left, fy = y - top;
     return (1.0f - fy) * ((1.0f - fx) * texel(t, x0, y0) + fx * texel(t, x0 + 1, y0)) +

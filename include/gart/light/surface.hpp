@@ -63,7 +63,7 @@ struct rough_surface {
     int const i = static_cast<int>(x) < most ? static_cast<int>(x) : most,
               j = static_cast<int>(y) < most ? static_cast<int>(y) : most;
     vec2 const *const top = table + j * specular_side + i, *const bottom = top + specular_side;
-    float const fx = x - i, fy = y - j;
+    float const fx = x - static_cast<float>(i), fy = y - static_cast<float>(j);
     return (1.0f - fy) * ((1.0f - fx) * top[0] + fx * top[1]) + fy * ((1.0f - fx) * bottom[0] + fx * bottom[1]);
   }
 
@@ -103,7 +103,9 @@ inline std::vector<vec2> specular_albedos() {
       double all = 0, rim = 0;
       for (int a = 0; a < steps; ++a)
         for (int b = 0; b < steps; ++b) {
-          vec3 const h = visible_normal(w, alpha, {(a + 0.5f) / steps, (b + 0.5f) / steps});
+          vec3 const h = visible_normal(w, alpha,
+                                        {(static_cast<float>(a) + 0.5f) / static_cast<float>(steps),
+                                         (static_cast<float>(b) + 0.5f) / static_cast<float>(steps)});
           float const facing = glm::dot(w, h);
           vec3 const in = 2.0f * facing * h - w;
           if (!(in.z > 0)) continue;
