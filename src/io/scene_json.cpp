@@ -1,7 +1,7 @@
 // scene.json: models, meshes, materials, lights, what lies around them, cameras, options.
 
 #include "capture.hpp"
-#include "json_record.hpp"
+#include "json_checks.hpp"
 #include "scene_parts.hpp"
 
 #include <gart/core/suggestion.hpp>
@@ -20,10 +20,7 @@ namespace gart {
 namespace {
 
 namespace fs = std::filesystem;
-using io::json;
-using io::record;
-
-constexpr double furthest = 1e12;  // what a file may say of lengths and places
+using namespace io;
 
 std::string ending_of(fs::path const& path) {
   std::string e = path.extension().string();
@@ -32,72 +29,6 @@ std::string ending_of(fs::path const& path) {
 }
 
 bool is_gltf(fs::path const& path) { return ending_of(path) == ".glb" || ending_of(path) == ".gltf"; }
-
-// No other than these.
-void require_keys(record const& r, std::vector<std::string> const& names) {
-  if (!r.own.is_object()) throw io_error(r.where, "is not a JSON object", "write {\"...\": ...}");
-  for (auto const& [key, value] : r.own.items()) {
-    if (std::find(names.begin(), names.end(), key) != names.end()) continue;
-    std::string all;
-    for (std::string const& name : names) all += (all.empty() ? "" : ", ") + name;
-    throw io_error(r.where, "has no field '" + key.substr(0, 60) + "'" + did_you_mean(key, names), "there are " + all);
-  }
-}
-
-template <std::size_t n>
-std::array<double, n> numbers(record const& r, char const* key, std::array<double, n> otherwise,
-                              double least = -furthest, double most = furthest) {
-  json const* const list = r.find(key);
-  if (!list) return otherwise;
-  std::array<double, n> out{};
-  bool sound = list->is_array() && list->size() == n;
-  for (std::size_t k = 0; sound && k < n; ++k) {
-    sound = (*list)[k].is_number();
-    if (sound) out[k] = (*list)[k].template get<double>();
-    sound = sound && out[k] >= least && out[k] <= most;
-  }
-  if (!sound)
-    throw io_error(r.where,
-                   std::string("'") + key + "' is not a list of " + std::to_string(n) + " numbers from " +
-                       json(least).dump() + " to " + json(most).dump(),
-                   "correct it");
-  return out;
-}
-
-vec3d three(record const& r, char const* key, vec3d const& otherwise, double least = -furthest,
-            double most = furthest) {
-  auto const v = numbers<3>(r, key, {otherwise.x, otherwise.y, otherwise.z}, least, most);
-  return {v[0], v[1], v[2]};
-}
-
-double number(record const& r, char const* key, double otherwise, double least, double most) {
-  double const v = r.number_or(key, otherwise);
-  if (!(v >= least && v <= most))
-    throw io_error(r.where,
-                   std::string("'") + key + "' is " + json(v).dump() + ", not between " + json(least).dump() + " and " +
-                       json(most).dump(),
-                   "correct it");
-  return v;
-}
-
-bool flag(record const& r, char const* key, bool otherwise) {
-  json const* const value = r.find(key);
-  if (value && !value->is_boolean())
-    throw io_error(r.where, std::string("'") + key + "' is not true or false", "write one of them");
-  return value ? value->get<bool>() : otherwise;
-}
-
-template <named E>
-E choice(record const& r, char const* key, E otherwise) {
-  if (!r.has(key)) return otherwise;
-  std::string const name = r.text(key);
-  try {
-    return from_string<E>(name);
-  } catch (invalid_argument const& e) {
-    throw io_error(r.where, std::string("'") + key + "': " + e.what() + did_you_mean(name, list_of_names<E>()),
-                   "correct it");
-  }
-}
 
 constexpr vec3d none(0.0);
 
@@ -124,7 +55,7 @@ class scene_reader {
     each("models", "model", [&](record const& r) {
       require_keys(r, {"name", "file", "translation", "rotation", "scale"});
       placed_splats p = placed(r);
-      p.file = file_of(r, "file"), p.scale = number(r, "scale", 1, 1e-9, 1e9);
+      p.file = file_of(r, "file"), p.scale = number_within(r, "scale", 1, 1e-9, 1e9);
       all.push_back(p);
     });
     return all;
@@ -180,12 +111,12 @@ class scene_reader {
       m.kind = choice(r, "kind", m.kind);
       bool const reflects = m.kind == light::material_kind::mirror || m.kind == light::material_kind::dielectric;
       m.base_color = vec3(three(r, "base_color", reflects ? vec3d(1.0) : vec3d(m.base_color), 0, 1));
-      m.metallic = static_cast<float>(number(r, "metallic", 0, 0, 1));
-      m.roughness = static_cast<float>(number(r, "roughness", 1, 0, 1));
-      m.ior = static_cast<float>(number(r, "ior", 1.5, 1, 10));
+      m.metallic = static_cast<float>(number_within(r, "metallic", 0, 0, 1));
+      m.roughness = static_cast<float>(number_within(r, "roughness", 1, 0, 1));
+      m.ior = static_cast<float>(number_within(r, "ior", 1.5, 1, 10));
       m.emission = vec3(three(r, "emission", none, 0, 1e9));
-      m.opacity = static_cast<float>(number(r, "opacity", 1, 0, 1));
-      m.cutout = static_cast<float>(number(r, "cutout", 0, 0, 1));
+      m.opacity = static_cast<float>(number_within(r, "opacity", 1, 0, 1));
+      m.cutout = static_cast<float>(number_within(r, "cutout", 0, 0, 1));
       auto const texture = [&](char const* key, bool colours) {
         if (!r.has(key)) return -1;
         out_.scene.textures.push_back(io::texture_of(read_image(file_of(r, key)), colours, r.text(key)));
@@ -218,7 +149,7 @@ class scene_reader {
       if (json const* const s = r.find("scale"); s && s->is_array())
         scale = three(r, "scale", scale);
       else
-        scale = vec3d(number(r, "scale", 1, -1e9, 1e9));
+        scale = vec3d(number_within(r, "scale", 1, -1e9, 1e9));
       if (scale.x == 0 || scale.y == 0 || scale.z == 0) throw io_error(r.where, "'scale' is zero", "correct it");
       io::placing where{rotation_of(p.rotation), p.translation};
       for (int c = 0; c < 3; ++c) where.linear[c] *= scale[c];
@@ -300,8 +231,8 @@ class scene_reader {
       l.direction = vec3(three(r, "direction", -turn_[1], -1e6, 1e6));
       if (l.direction == vec3(0.0f))
         throw io_error(r.where, "'direction' is all zero", "write the way that its light goes");
-      l.angle = static_cast<float>(number(r, "angle", 0, 0, 180) * std::numbers::pi / 360);
-      l.radius = static_cast<float>(number(r, "radius", 1, 1e-9, 1e9));
+      l.angle = static_cast<float>(number_within(r, "angle", 0, 0, 180) * std::numbers::pi / 360);
+      l.radius = static_cast<float>(number_within(r, "radius", 1, 1e-9, 1e9));
       l.edge_u = vec3(three(r, "edge_u", turn_[0])), l.edge_v = vec3(three(r, "edge_v", turn_[2]));
       out_.scene.lights.push_back(l);
     });
@@ -323,7 +254,7 @@ class scene_reader {
     } else if (r.has("sky")) {
       read_sky(record{r.at("sky"), nullptr, r.where + ", sky"}, e);
     }
-    double const turned = number(r, "degrees", 0, -360, 360) * std::numbers::pi / 180, c = std::cos(turned),
+    double const turned = number_within(r, "degrees", 0, -360, 360) * std::numbers::pi / 180, c = std::cos(turned),
                  s = std::sin(turned);
     mat3d about(1.0);  // -turned about y
     about[0] = vec3d(c, 0, s), about[2] = vec3d(-s, 0, c);
@@ -371,12 +302,12 @@ class scene_reader {
     require_keys(r, {"samples", "bounces", "roulette_after", "seed", "shadows", "ambient", "relight", "linear",
                      "aperture", "focus", "blur", "jitter", "firefly", "exposure", "tone_map"});
     light::path_options& o = out_.paths;
-    auto const whole = [&](char const* key, int& to) { to = static_cast<int>(number(r, key, to, 0, 1e6)); };
+    auto const whole = [&](char const* key, int& to) { to = static_cast<int>(number_within(r, key, to, 0, 1e6)); };
     auto const real = [&](char const* key, float& to, double least, double most) {
-      to = static_cast<float>(number(r, key, static_cast<double>(to), least, most));
+      to = static_cast<float>(number_within(r, key, static_cast<double>(to), least, most));
     };
     whole("samples", o.samples), whole("bounces", o.bounces), whole("roulette_after", o.roulette_after);
-    o.seed = static_cast<u64>(number(r, "seed", 0, 0, 9e15));
+    o.seed = static_cast<u64>(number_within(r, "seed", 0, 0, 9e15));
     o.shadows = choice(r, "shadows", o.shadows), o.tone = choice(r, "tone_map", o.tone);
     o.relight = flag(r, "relight", o.relight), o.linear = flag(r, "linear", o.linear),
     o.jitter = flag(r, "jitter", o.jitter);
