@@ -252,6 +252,14 @@ void continue_run(train_arguments& a) {
   for (auto const& [old, now] : {std::pair{"t-min", "transmittance-min"}, {"lt-budget", "hit-memory"}})
     if (options.contains(old)) options.emplace(now, options[old]);
   options.emplace("scene", "");
+  // Runs that recorded --set as text had other defaults, which they keep.
+  if (options.contains("set") && options["set"].is_string()) {
+    std::string text = options["set"];
+    for (std::string const before : {"rates.sh_rest=0.000125", "sh_penalty=0"})
+      if (text.find(before.substr(0, before.find('=') + 1)) == std::string::npos)
+        text += (text.empty() ? "" : ",") + before;
+    options["set"] = text;
+  }
   a.raised = a.recorded.continue_from(options, a.config_file(), {"iterations", "time-budget"});
   a.origin = origin_in(config, a.config_file());
   if (a.dataset.empty()) {

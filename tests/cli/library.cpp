@@ -144,6 +144,24 @@ TEST_CASE("what is given is not measured, and --no-auto takes the usual settings
   CHECK(here.json("run/config.json")["options"]["exposure"] == "on");
 }
 
+TEST_CASE("a run from before the penalty on bands of colour keeps its rates") {
+  folder const here;
+  write_capture(here / "capture");
+  fill_images(here / "capture", true);
+  std::string const run = "train capture --iterations 6 --no-auto --backend serial --quiet ";
+  for (auto const& [recorded, rate] : {std::pair{"", "0.000125"}, {"rates.sh_rest=0.0005", "0.0005"}}) {
+    std::string const set = std::string("--set sh_penalty=0,rates.sh_rest=") + rate;
+    REQUIRE(here.gart(run + set + " --out whole").code == 0);
+    REQUIRE(here.gart(run + set + " --out parts --stop-at 2").code == 130);
+    auto config = here.json("parts/config.json");
+    config["options"]["set"] = recorded;
+    gart::write_file(here / "parts/config.json", config.dump());
+    auto const resumed = here.gart("train --resume --out parts --quiet");
+    REQUIRE_MESSAGE(resumed.code == 0, resumed.err);
+    CHECK(text_of(here / "parts/model.ply") == text_of(here / "whole/model.ply"));
+  }
+}
+
 template <class Data>
 concept trains_on = requires(gart::train_options const& options, Data&& data) {
   gart::make_session({}, options, std::forward<Data>(data));
