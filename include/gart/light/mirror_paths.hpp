@@ -23,7 +23,7 @@
 /// Errors: invalid_argument as ray_tracer, path_tracer and calls out of order have it.
 
 #include <gart/algorithm/exclusive_scan.hpp>
-#include <gart/light/path_kernels.hpp>
+#include <gart/light/mirror_kernels.hpp>
 #include <gart/light/placed_scene.hpp>
 #include <gart/rays/ray_tracer.hpp>
 
@@ -31,136 +31,6 @@
 #include <vector>
 
 namespace gart { inline namespace GART_ISA {
-
-namespace light_kernels {
-
-// The rays of a segment, and what lies at its end; the path goes on where that is a mirror.
-struct follow_mirrors {
-  scene_view scene;
-  path* paths;
-  path_hit const* ends;
-  vec3 background;
-  float near;
-  float *origins, *directions, *t_max;
-  vec3 *share, *behind;  // the mirror's colour, zero where there is none; what shines at the end
-  bool last;
-  GART_KERNEL void operator()(index_t i) const {
-    path p = paths[i];
-    std::size_t const at = std::size_t{3} * i;
-    path_hit const end = ends[i];
-    bool const alive = p.is(path::alive);
-    vec3 const direction = alive ? p.direction : vec3(0.0f, 0.0f, 1.0f);
-    for (int k = 0; k < 3; ++k) {
-      origins[at + static_cast<std::size_t>(k)] = p.origin[k];
-      directions[at + static_cast<std::size_t>(k)] = direction[k];
-    }
-    // A ray that has ended is as short as one may be.
-    t_max[i] = fmaxf(alive ? end.t : 0.0f, 2.0f * near);
-    share[i] = vec3(0.0f), behind[i] = vec3(0.0f);
-    if (!alive) return;
-    p.flags = 0;
-    if (end.none()) {
-      behind[i] = scene.around.visible ? scene.around.radiance(p.direction) : background;
-    } else if (end.of_light()) {
-      behind[i] = scene.lights[end.id & ~path_hit::is_light].color;
-    } else {
-      surface_point const s(scene, end, p.direction);
-      behind[i] = s.emission;
-      if (s.kind == material_kind::mirror && !last) {
-        share[i] = s.base;
-        p.direction = reflected(p.direction, s.normal);
-        p.origin = s.leave(p.direction), p.near = 0, p.flags = path::alive;
-      }
-    }
-    paths[i] = p;
-  }
-};
-
-// What a segment sees, from the last one to the first; `behind` becomes all that comes from its end.
-struct blend_segment {
-  float const *color, *transmittance;
-  vec3 const *share, *beyond;  // beyond: null behind the last
-  vec3 *behind, *seen;
-  GART_KERNEL void operator()(index_t i) const {
-    if (beyond) behind[i] += share[i] * beyond[i];
-    float const* const c = color + std::size_t{3} * i;
-    seen[i] = vec3(c[0], c[1], c[2]) + transmittance[i] * behind[i];
-  }
-};
-
-// From the gradient by what a segment sees, which becomes that of the next.
-struct split_gradient {
-  float const* transmittance;
-  vec3 const *share, *behind;
-  vec3* by_seen;
-  float *by_color, *by_transmittance;
-  GART_KERNEL void operator()(index_t i) const {
-    vec3 const g = by_seen[i];
-    for (int k = 0; k < 3; ++k) by_color[std::size_t{3} * i + static_cast<std::size_t>(k)] = g[k];
-    by_transmittance[i] = glm::dot(g, behind[i]);
-    by_seen[i] = g * share[i] * transmittance[i];
-  }
-};
-
-// Pixels that are traced: all, or those that meet a mirror first; a place for each.
-struct find_mirrors {
-  scene_view scene;
-  path const* paths;
-  path_hit const* ends;
-  bool all;
-  u32* traced;
-  GART_KERNEL void operator()(index_t i) const {
-    path_hit const end = ends[i];
-    bool const surface = !end.none() && !end.of_light();
-    traced[i] = paths[i].pixel != path::no_pixel &&
-                (all || (surface && scene.materials[scene.rows[end.id].material].kind == material_kind::mirror));
-  }
-};
-struct take_pixels {
-  path const* all_paths;
-  path_hit const* all_ends;
-  u32 const *traced, *places;
-  path* paths;
-  path_hit* ends;
-  u32* pixels;
-  GART_KERNEL void operator()(index_t i) const {
-    if (!traced[i]) return;
-    paths[places[i]] = all_paths[i], ends[places[i]] = all_ends[i], pixels[places[i]] = all_paths[i].pixel;
-  }
-};
-struct put_pixels {
-  u32 const* pixels;
-  vec3 const* from;
-  float* to;
-  GART_KERNEL void operator()(index_t i) const {
-    for (int k = 0; k < 3; ++k) to[std::size_t{3} * pixels[i] + static_cast<std::size_t>(k)] = from[i][k];
-  }
-};
-struct clear_pixels {
-  u32 const* pixels;
-  std::size_t channels;
-  float* to;
-  GART_KERNEL void operator()(index_t i) const {
-    for (std::size_t k = 0; k < channels; ++k) to[channels * pixels[i] + k] = 0;
-  }
-};
-struct get_pixels {
-  u32 const* pixels;
-  float const* from;
-  vec3* to;
-  GART_KERNEL void operator()(index_t i) const {
-    float const* const c = from + std::size_t{3} * pixels[i];
-    to[i] = {c[0], c[1], c[2]};
-  }
-};
-
-struct add_floats {
-  float const* from;
-  float* to;
-  GART_KERNEL void operator()(index_t i) const { to[i] += from[i]; }
-};
-
-}  // namespace light_kernels
 
 /// Which pixels are traced.
 enum class mirror_pixels { all, mirrors };
@@ -318,22 +188,20 @@ class mirror_paths {
                                             paths_.data(), ends_.data(), pixels_.data()});
     return count;
   }
-  template <class F>
-  static void each_array(gaussians_view<float> const& g, F&& f) {
-    f(g.mean, 3), f(g.log_scale, 3), f(g.quaternion, 4), f(g.opacity, 1);
-    f(g.sh, static_cast<std::size_t>(g.sh_stride()));
-  }
   void zero(gaussians_view<float> const& g) {
-    each_array(g, [&](float* values, std::size_t width) { exec_->zero(values, width * g.count * sizeof(float)); });
+    for_each_array(
+        [&](parameter_array const& a, float* values) {
+          exec_->zero(values, std::size_t{a.width(g.sh_degree)} * g.count * sizeof(float));
+        },
+        g);
   }
   void add(gaussians_view<float> const& to, gaussians_view<float> const& from) {
-    std::vector<float const*> of;
-    each_array(from, [&](float const* values, std::size_t) { of.push_back(values); });
-    std::size_t k = 0;
-    each_array(to, [&](float* values, std::size_t width) {
-      parallel_for(*exec_, "light/add", static_cast<index_t>(width * to.count),
-                   light_kernels::add_floats{of[k++], values});
-    });
+    for_each_array(
+        [&](parameter_array const& a, float* sums, float const* more) {
+          parallel_for(*exec_, "light/add", static_cast<index_t>(std::size_t{a.width(to.sh_degree)} * to.count),
+                       light_kernels::add_floats{more, sums});
+        },
+        to, from);
   }
 
   E* exec_;
