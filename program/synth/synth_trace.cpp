@@ -1,5 +1,7 @@
 #include "synth_trace.hpp"
 
+#include <gart/math/srgb.hpp>
+
 #include "synth_embree.hpp"
 #include "synth_random.hpp"
 
@@ -88,11 +90,7 @@ float masking(vec3 w, float alpha) {
   return 2 / (1 + std::sqrt(1 + alpha * alpha * tan2));
 }
 
-u8 to_srgb(float linear) {
-  float const x = std::clamp(linear, 0.0f, 1.0f);
-  float const encoded = x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1 / 2.4f) - 0.055f;
-  return static_cast<u8>(255 * encoded + 0.5f);
-}
+u8 to_srgb(float linear) { return static_cast<u8>(255 * gart::displayed(std::clamp(linear, 0.0f, 1.0f)) + 0.5f); }
 
 }  // namespace
 

@@ -10,6 +10,7 @@
 #include <gart/io/file.hpp>
 #include <gart/io/origin.hpp>
 #include <gart/math/logit.hpp>
+#include <gart/math/srgb.hpp>
 
 #include <nlohmann/json.hpp>
 
@@ -52,9 +53,6 @@ struct glb_buffer {
   }
 };
 
-// glTF's fallback colours are linear light, a Gaussian's are as displayed.
-double linear_light(double c) { return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4); }
-
 // glTF wants the box of the positions.
 void add_box(json& position, gaussian_model const& m) {
   for (std::size_t c = 0; c < 3; ++c) {
@@ -72,6 +70,7 @@ glb_buffer as_floats(gaussian_model const& m) {
           m);
   out.add<u8>("COLOR_0", n, 4, gltf_u8, [&](std::size_t i, std::size_t c) {
     if (c == 3) return u32{opacity_byte(m.opacity[i])};
+    // glTF's fallback colours are linear light, a Gaussian's are as displayed.
     return unorm(linear_light(std::clamp(static_cast<double>(base_color(m.sh[3 * k * i + c])), 0.0, 1.0)), 8);
   })["normalized"] = true;
   std::vector<double> q(4 * n);

@@ -19,7 +19,6 @@ namespace {
 // memory that any file may use.
 constexpr u64 most_growth = 30, small_model = u64{1} << 20;
 constexpr float least_log_scale = -69;  // of a scale of about 1e-30
-constexpr double sh_0 = 0.28209479177387814;
 
 // The signs of the basis functions under half a turn about an axis. One direction in no plane of symmetry shows them.
 std::array<float, 16> signs_of_half_turn(int axis) {
@@ -53,8 +52,8 @@ u8 opacity_byte(float logit) { return static_cast<u8>(unorm(sigmoid_in_double(st
 float opacity_logit(double opacity) { return static_cast<float>(logit_in_double(std::clamp(opacity, 1e-6, 1 - 1e-6))); }
 float opacity_logit(u8 byte) { return opacity_logit(byte / 255.0); }
 
-float base_color(float coefficient) { return static_cast<float>(static_cast<double>(coefficient) * sh_0 + 0.5); }
-float base_coefficient(double color) { return static_cast<float>((color - 0.5) / sh_0); }
+float base_color(float coefficient) { return static_cast<float>(static_cast<double>(coefficient) * sh_constant + 0.5); }
+float base_coefficient(double color) { return static_cast<float>((color - 0.5) / sh_constant); }
 
 std::array<double, 4> unit(float const* q) {
   std::array<double, 4> u;

@@ -2,6 +2,8 @@
 
 #include "unusable.hpp"
 
+#include <gart/math/srgb.hpp>
+
 #include <algorithm>
 
 namespace gart::io {

@@ -44,9 +44,6 @@ void add_placed(light::scene& to, raw_mesh const& raw, mesh_place const& place, 
 // io_error, naming `file` and the last note, where there is no mesh.
 void require_meshes(light::scene const& scene, std::string const& file, std::vector<std::string> const& notes);
 
-// From what a screen shows to light, [0, 1].
-inline double linear_light(double c) { return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4); }
-
 // An image of 1, 3 or 4 channels; `colours` are in sRGB's curve.
 light::texture texture_of(image8 const& image, bool colours, std::string name);
 

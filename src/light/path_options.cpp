@@ -1,6 +1,7 @@
 // What of the options cannot be traced by, and the tones.
 #include <gart/core/error.hpp>
 #include <gart/light/path_options.hpp>
+#include <gart/math/srgb.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +11,7 @@ namespace gart::light {
 
 namespace {
 
-float encoded(float x) {
-  x = std::clamp(x, 0.0f, 1.0f);
-  return x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1.0f / 2.4f) - 0.055f;
-}
+float encoded(float x) { return displayed(std::clamp(x, 0.0f, 1.0f)); }
 // Narkowicz, "ACES filmic tone mapping curve", 2015.
 float rolled_off(float x) {
   x = std::max(x, 0.0f);

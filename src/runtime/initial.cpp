@@ -1,5 +1,6 @@
 #include <gart/camera/models.hpp>
 #include <gart/core/error.hpp>
+#include <gart/math/sh.hpp>
 #include <gart/optim/random.hpp>
 #include <gart/runtime/choose.hpp>
 #include <gart/runtime/initial.hpp>
@@ -95,7 +96,6 @@ std::vector<float> neighbor_distance2(std::vector<float> const& position) {
 }
 
 gaussian_model model_from_points(point_cloud const& points, int sh_degree, float o, float scale, float least_distance) {
-  constexpr float sh_constant = 0.28209479177387814f;
   if (!(o > 0 && o < 1)) throw invalid_argument("train_options.initial_opacity must lie between 0 and 1");
   if (!(scale > 0)) throw invalid_argument("train_options.initial_scale must be positive");
   gaussian_model m;
@@ -110,8 +110,8 @@ gaussian_model model_from_points(point_cloud const& points, int sh_degree, float
     m.opacity[i] = std::log(o / (1 - o));
     // Black is a little more than none: a channel at the clamp has no gradient and would stay there.
     for (int c = 0; c < 3; ++c)
-      m.sh[stride * i + c] =
-          (std::max(static_cast<float>(points.color[3 * i + c]), 0.5f) / 255.0f - 0.5f) / sh_constant;
+      m.sh[stride * i + c] = (std::max(static_cast<float>(points.color[3 * i + c]), 0.5f) / 255.0f - 0.5f) /
+                             static_cast<float>(sh_constant);
   }
   return m;
 }

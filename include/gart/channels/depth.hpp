@@ -27,7 +27,7 @@ struct transmittance_channel : channel_base {
   /// Nothing.
   GART_HD GART_INLINE float worth(listed_hit const&) const { return 0; }
   /// dL/d transmittance.
-  GART_HD GART_INLINE float beyond(u32 of) const { return gradient ? gradient[of] : 0.0f; }
+  GART_HD GART_INLINE float beyond(u32 ray_number) const { return gradient ? gradient[ray_number] : 0.0f; }
 };
 static_assert(channel<transmittance_channel>);
 

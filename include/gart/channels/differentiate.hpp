@@ -6,9 +6,8 @@
 ///   channel_gradient<E> back(exec);
 ///   back.begin(table);
 ///   back.add(features), back.add(depth);                    // what the weights of hits are worth, in all
-///   back.add_moments(table, gaussians, moments);            // dL/d geometry, for finish_gradients
-///   (backward/finish.hpp) back.pull(table, features, by_features);                // dL/d the parameters of a channel,
-///   overwritten
+///   back.add_moments(table, gaussians, moments);            // dL/d geometry, for backward/finish.hpp
+///   back.pull(table, features, count, by_features);         // dL/d the parameters of a channel, overwritten
 ///
 /// With v the worth of a hit and B what lies behind it,
 ///   dL/dalpha = T v - B / (1 - alpha),   B = sum over hits behind of w v + T_end beyond,

@@ -42,8 +42,8 @@ struct feature_channel : channel_base {
     for_each_number<Chunk>(n, [&](int k) { sums[k] += h.weight * by[k]; });
   }
   /// Asks for that gradient.
-  GART_HD GART_INLINE void ask(u32 of, int first, int n) const {
-    float const* const by = row_of(gradient, of) + first;
+  GART_HD GART_INLINE void ask(u32 ray_number, int first, int n) const {
+    float const* const by = row_of(gradient, ray_number) + first;
     for (int k = 0; k < n; k += 16) ask_for(by + k);
   }
 

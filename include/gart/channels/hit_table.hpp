@@ -31,7 +31,7 @@ struct hit_table_view {
   index_t count = 0;              ///< hits
 
   /// Hit k, of that ray.
-  GART_HD GART_INLINE listed_hit at(u64 k, u32 of) const { return {of, ids[k], t[k], weight[k]}; }
+  GART_HD GART_INLINE listed_hit at(u64 k, u32 ray_number) const { return {ray_number, ids[k], t[k], weight[k]}; }
   /// Hit k.
   GART_HD GART_INLINE listed_hit at(u64 k) const { return at(k, rays[k]); }
 };

@@ -13,6 +13,8 @@
 /// Gaussians alone, without jitter, give the colours of the renderers, bit for bit. Of one seed every policy draws the
 /// same numbers; what follows from them is the same bits on hosts, and on a device compiled with -fmad=false.
 ///
+/// Samples that are not finite count as black, so that one broken texel or Gaussian does not spoil its pixel.
+///
 /// Memory: the tree over the Gaussians and 64 bytes each, 12 more for shadows per Gaussian; 150 bytes a triangle; 150
 /// bytes a pixel. Cost of a sample: a walk through triangles and one through Gaussians a segment, and the same a light
 /// at each rough surface.

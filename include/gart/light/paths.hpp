@@ -11,6 +11,7 @@
 /// hit is taken twice, and none is lost.
 
 #include <gart/light/lights.hpp>
+#include <gart/math/srgb.hpp>
 #include <gart/rays/batch_composite.hpp>
 #include <gart/rays/world_index.hpp>
 
@@ -45,12 +46,7 @@ struct alignas(16) shadow_ray {
 };
 static_assert(sizeof(shadow_ray) == 48);
 
-// From sRGB's curve.
-GART_HD GART_INLINE float decoded(float x) {
-  if (!(x > 0.04045f)) return x * (1.0f / 12.92f);
-  return exponential(2.4f * logarithm((x + 0.055f) * (1.0f / 1.055f)));
-}
-GART_HD GART_INLINE vec3 decoded(vec3 const& c) { return {decoded(c.x), decoded(c.y), decoded(c.z)}; }
+GART_HD GART_INLINE vec3 decoded(vec3 const& c) { return {linear_light(c.x), linear_light(c.y), linear_light(c.z)}; }
 
 // What colour a Gaussian has among the lights.
 struct gaussian_colors {
@@ -65,7 +61,7 @@ struct gaussian_colors {
   }
   GART_HD GART_INLINE vec3 of_first_band(u32 id) const {
     float const* const row = rows.sh + static_cast<std::size_t>(3 * sh_coefficients(rows.stored_degree)) * id;
-    return vec3(0.5f) + 0.28209479f * vec3(row[0], row[1], row[2]);
+    return vec3(0.5f) + static_cast<float>(sh_constant) * vec3(row[0], row[1], row[2]);
   }
 };
 

@@ -8,6 +8,7 @@
 #include <gart/core/macros.hpp>
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
+#include <gart/math/optics.hpp>
 
 namespace gart { inline namespace GART_ISA { namespace light_kernels {
 
@@ -15,7 +16,6 @@ constexpr float pi = 3.14159265f;
 
 GART_HD GART_INLINE float luminance(vec3 const& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 GART_HD GART_INLINE float largest(vec3 const& c) { return fmaxf(c.x, fmaxf(c.y, c.z)); }
-GART_HD GART_INLINE vec3 unit(vec3 const& v) { return v * reciprocal(square_root(glm::dot(v, v))); }
 GART_HD GART_INLINE float clamped(float x, float lo, float hi) { return fminf(fmaxf(x, lo), hi); }
 GART_HD GART_INLINE vec3 mixed(vec3 const& a, vec3 const& b, float part) { return a * (1.0f - part) + b * part; }
 

@@ -29,7 +29,7 @@ enum class material_kind {
   surface,         ///< metallic-roughness, as glTF has it: a diffuse base under GGX
   mirror,          ///< reflects all, in its base colour
   dielectric,      ///< smooth glass: Snell, Fresnel, total reflection; base colour tints what goes through
-  shadow_catcher,  ///< not seen itself: what lies behind is darkened where meshes shadow it
+  shadow_catcher,  ///< not seen itself: what lies behind is darkened where meshes shadow it; a path passes four at most
 };
 /// Their names.
 constexpr auto names_of(material_kind) {

@@ -12,6 +12,9 @@
 
 namespace gart { inline namespace GART_ISA {
 
+/// The first function, which no direction changes: 1 / (2 sqrt(pi)).
+inline constexpr double sh_constant = 0.28209479177387814;
+
 /// Of one direction, or of one a lane.
 template <int Degree, class F = float>
 struct sh_basis {
@@ -22,7 +25,7 @@ struct sh_basis {
   /// At a unit direction. The arithmetic is fixed (math/arith.hpp): a compiler that contracts products and sums does so
   /// otherwise in each kernel, and tracers would differ in the last bits of a colour.
   GART_HD GART_INLINE explicit sh_basis(vec3_of<F> const& d) {
-    y[0] = 0.28209479177387814f;
+    y[0] = static_cast<float>(sh_constant);
     if constexpr (Degree >= 1) {
       y[1] = mul(F(-0.4886025119029199f), d.y);
       y[2] = mul(F(0.4886025119029199f), d.z);

@@ -58,10 +58,10 @@ struct keep_hits {
   u64 no_key = 0;               ///< of a place without a hit; past all others
 
   /// Keeps a hit of a ray.
-  GART_KERNEL GART_INLINE void keep(state& s, index_t of, u32 id, lt_entry const& entry, float depth) const {
+  GART_KERNEL GART_INLINE void keep(state& s, index_t ray_number, u32 id, lt_entry const& entry, float depth) const {
     if (s.left == 0) s.at = E::atomic_add(used, u64{run}), s.left = run;
     if (s.at < capacity) {
-      keys[s.at] = u64{id} << ray_bits | of;
+      keys[s.at] = u64{id} << ray_bits | ray_number;
       entries[s.at] = entry, depths[s.at] = depth;
     }
     ++s.at, --s.left;

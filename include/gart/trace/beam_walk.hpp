@@ -36,15 +36,6 @@ struct frame_index {
 
 namespace trace_kernels {
 
-// Where ray i of a program ends.
-template <class P>
-GART_HD GART_INLINE float end_of_ray(P const& program, index_t i) {
-  if constexpr (requires { program.far(i); })
-    return program.far(i);
-  else
-    return infinity;
-}
-
 // One ray's walk: a window of its next hits in memory that lanes share, walked again for more.
 template <class Response, class Ray, int Capacity, int Lanes>
 struct lone_ray {
@@ -150,9 +141,9 @@ class walk_beams {
   }
 
  private:
-  GART_HD GART_INLINE void leave_apart(index_t tile, bool are) const {
+  GART_HD GART_INLINE void leave_apart(index_t tile, bool go_alone) const {
     each_lane([&](int l) {
-      if (l == 0) apart[tile] = are;
+      if (l == 0) apart[tile] = go_alone;
     });
   }
 

@@ -7,6 +7,7 @@
 /// A tracer derives from tracer_base and is held to the concept where it is defined. render/frame.hpp has one, and
 /// calls it in the right order.
 
+#include <gart/bvh/box.hpp>
 #include <gart/camera/pixel_rays.hpp>
 #include <gart/exec/concepts.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -38,6 +39,15 @@ GART_HD GART_INLINE float start_of_ray(traced_scene const& scene, P const& progr
     return program.near(i);
   else
     return scene.near;
+}
+
+/// Where it ends: at its program's far(i), where it has one.
+template <class P>
+GART_HD GART_INLINE float end_of_ray(P const& program, index_t i) {
+  if constexpr (requires { program.far(i); })
+    return program.far(i);
+  else
+    return infinity;
 }
 
 /// What a tracer has unless it says otherwise.
