@@ -8,6 +8,7 @@
 #include <gart/io/origin.hpp>
 #include <gart/math/logit.hpp>
 #include <gart/scene/similarity.hpp>
+#include <gart/view/scene.hpp>
 
 #include <charconv>
 #include <cmath>
@@ -110,15 +111,11 @@ int run_convert(convert_arguments const& a) {
     traits = gart::with_origin(traits, {origin[0], origin[1], origin[2]});
   }
   std::size_t const read = model.size();
-  if (!box.empty())
-    model = kept(model, [&](std::size_t i) {
-      bool inside = true;
-      for (std::size_t c = 0; c < 3; ++c) {
-        double const v = static_cast<double>(model.mean[3 * i + c]);
-        inside = inside && v >= box[c] && v <= box[c + 3];
-      }
-      return inside;
-    });
+  if (!box.empty()) {
+    // In floats, as coordinates are: a corner that was printed with nine digits is the float that it was.
+    auto const corner = [&](std::size_t at) { return gart::vec3(gart::vec3d(box[at], box[at + 1], box[at + 2])); };
+    model = gart::cropped(model, {corner(0), corner(3)});
+  }
   if (a.prune > 0)
     model = kept(model, [&](std::size_t i) {
       return gart::sigmoid_in_double(static_cast<double>(model.opacity[i])) >= a.prune;

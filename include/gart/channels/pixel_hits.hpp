@@ -5,6 +5,7 @@
 /// are.
 
 #include <gart/channels/hit_table.hpp>
+#include <gart/render/options.hpp>
 #include <gart/render/pixels.hpp>
 #include <gart/trace/packet_walk.hpp>
 

@@ -99,7 +99,7 @@ float extent_of(view_scene const& scene);
 view_scene scene_of(std::string name, gaussian_model const& model, int kernel_degree,
                     std::vector<view_camera> cameras = {});
 
-/// The Gaussians whose mean lies in the box.
+/// The Gaussians whose mean lies in the box, faces included.
 gaussian_model cropped(gaussian_model const& model, view_box const& box);
 
 /// The Gaussians that are traced of a model for these settings. Ellipsoids and points are hit where their response is

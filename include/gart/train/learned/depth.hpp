@@ -4,7 +4,9 @@
 /// gradients by depth and transmittance stand beside those of the colours; a caller's loss may add to them. Memory: on
 /// a device 4 bytes a pixel of each view that was seen.
 
+#include <gart/io/dataset.hpp>
 #include <gart/train/learned/part.hpp>
+#include <gart/train/options.hpp>
 #include <gart/train/smaller_photo.hpp>
 
 #include <algorithm>

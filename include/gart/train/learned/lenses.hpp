@@ -5,6 +5,7 @@
 #include <gart/lens/differentiate_lens.hpp>
 #include <gart/lens/lens_training.hpp>
 #include <gart/train/learned/part.hpp>
+#include <gart/train/options.hpp>
 
 namespace gart { inline namespace GART_ISA {
 

@@ -6,6 +6,7 @@
 #include <gart/pose/differentiate_pose.hpp>
 #include <gart/pose/pose_training.hpp>
 #include <gart/train/learned/part.hpp>
+#include <gart/train/options.hpp>
 
 #include <array>
 #include <cstring>
