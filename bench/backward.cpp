@@ -1,4 +1,4 @@
-// The backward pass by strategy and tile size, and what it asks of the step before it: footprints and the LT buffer.
+// The backward pass by strategy and tile size, and what it asks of the step before it: footprints and the hit buffer.
 #include "support/frame.hpp"
 
 #include <gart/backward/backward.hpp>
@@ -36,15 +36,15 @@ void backward(benchmark::State& state, E& exec) {
   gart_bench::measure(state, exec, [&] {
     gart::differentiate(f.frame.traced, f.pass, {f.color_gradient, f.depth_gradient}, f.gradients);
   });
-  state.counters["lt_bytes"] = static_cast<double>(f.pass.lt_bytes());
+  state.counters["hit_buffer_bytes"] = static_cast<double>(f.pass.hit_buffer_bytes());
 }
 
-// The tile lists and the clear of the LT buffer, and footprints where no tracer lends them.
+// The tile lists and the clear of the hit buffer, and footprints where no tracer lends them.
 template <class By, class Strategy, gart::execution E>
 void prepare(benchmark::State& state, E& exec) {
   backward_frame<E, By, Strategy> f(exec);
   gart_bench::measure(state, exec, [&] { f.prepare(); });
-  state.counters["lt_bytes"] = static_cast<double>(f.pass.lt_bytes());
+  state.counters["hit_buffer_bytes"] = static_cast<double>(f.pass.hit_buffer_bytes());
 }
 
 template <class By, class Strategy>

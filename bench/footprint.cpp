@@ -12,7 +12,7 @@ void footprint(benchmark::State& state, E& exec) {
   gart_bench::measure(state, exec, [&] {
     prints.measure(exec, frame.scene(), frame.view, frame.options.alpha_min, frame.options.near);
   });
-  state.counters["lt_slots"] = static_cast<double>(prints.slots());
+  state.counters["hit_slots"] = static_cast<double>(prints.slots());
   state.counters["pairs"] = static_cast<double>(prints.pairs());
 }
 

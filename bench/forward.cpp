@@ -13,16 +13,16 @@ void forward(benchmark::State& state, E& exec) {
   if (!pass.prepare(frame.traced)) throw pass.out_of_memory_error();
   gart::buffer<float, E> color(exec, 3 * frame.pixels());
   gart_bench::measure(state, exec, [&] { pass.render(frame.traced, {color.data()}); });
-  state.counters["lt_bytes"] = static_cast<double>(pass.lt_bytes());
+  state.counters["hit_buffer_bytes"] = static_cast<double>(pass.hit_buffer_bytes());
 }
 
 }  // namespace
 
 GART_BENCH("forward/bvh/record_none", forward<gart_bench::by_bvh, gart::pixel_strategy>)
 GART_BENCH("forward/bvh/record_w", forward<gart_bench::by_bvh, gart::hybrid_strategy>)
-GART_BENCH("forward/bvh/record_lt", forward<gart_bench::by_bvh, gart::primitive_strategy>)
+GART_BENCH("forward/bvh/record_slots", forward<gart_bench::by_bvh, gart::primitive_strategy>)
 GART_BENCH("forward/tiles/record_none", forward<gart_bench::by_tiles<8>, gart::pixel_strategy>)
 GART_BENCH("forward/tiles/record_w", forward<gart_bench::by_tiles<8>, gart::hybrid_strategy>)
-GART_BENCH("forward/tiles/record_lt", forward<gart_bench::by_tiles<8>, gart::primitive_strategy>)
-GART_BENCH("forward/tiles/record_lt_depth",
+GART_BENCH("forward/tiles/record_slots", forward<gart_bench::by_tiles<8>, gart::primitive_strategy>)
+GART_BENCH("forward/tiles/record_slots_depth",
            forward<gart_bench::by_tiles<8>, gart::with_depth<gart::primitive_strategy>>)

@@ -60,11 +60,11 @@ class Pages:
             ms, pixel = backward_ms(run), slowest.get((run["scene"], run["tracer"]))
             rows.append([run["scene"], run["tracer"], run["backward"], f"{run['stages_ms'].get('forward', 0):.2f}",
                          f"{ms:.2f}", f"{pixel / ms:.1f}x" if pixel else "", f"{run['step_ms']:.2f}",
-                         f"{run['lt_bytes'] / 1e9:.2f}", f"{run['peak_bytes'] / 1e9:.2f}"])
+                         f"{run['hit_buffer_bytes'] / 1e9:.2f}", f"{run['peak_bytes'] / 1e9:.2f}"])
         first = good[0] if good else None
         size = f"{first['width']} x {first['height']}, mean of {first['views']} views" if first else ""
         self.tables["strategies"] = table(
-            ["scene", "tracer", "strategy", "forward, ms", "backward, ms", "against pixel", "step, ms", "LT, GB",
+            ["scene", "tracer", "strategy", "forward, ms", "backward, ms", "against pixel", "step, ms", "hit buffer, GB",
              "peak, GB"], rows) + ["", f"{size}, medians of {first['repeats'] if first else 0}; {source(result)}."]
         if not good:
             return

@@ -192,7 +192,7 @@ void steps(mpi_comm& ranks, arguments const& a) {
   double const took = largest(ranks, seconds() - began) / a.steps;
   double const most_sent = largest(ranks, static_cast<double>(run->sent_bytes() - sent)) / a.steps,
                peak = largest(ranks, static_cast<double>(run->peak_bytes())),
-               lt = largest(ranks, static_cast<double>(run->lt_bytes()));
+               lt = largest(ranks, static_cast<double>(run->hit_buffer_bytes()));
   u32 checksum = 0;
   if (a.learn) {
     gaussian_model const model = run->model();
@@ -206,7 +206,7 @@ void steps(mpi_comm& ranks, arguments const& a) {
       "{\"ranks\": %d, \"backend\": \"%s\", \"tracer\": \"%s\", \"backward\": \"%s\", \"gaussians\": %zu, "
       "\"sh_degree\": %d, "
       "\"width\": %d, \"height\": %d, \"batch\": %d, \"step_ms\": %.4f, \"images_a_second\": %.3f, "
-      "\"sent_bytes\": %.0f, \"peak_bytes\": %.0f, \"lt_bytes\": %.0f, \"loss\": %.9g",
+      "\"sent_bytes\": %.0f, \"peak_bytes\": %.0f, \"hit_buffer_bytes\": %.0f, \"loss\": %.9g",
       ranks.size(), to_string(c.backend), to_string(c.tracer), c.backward.c_str(),
       parts ? a.scene.gaussians : scene.model.size(), scene.model.sh_degree, scene.view().width, scene.view().height,
       a.batch, 1e3 * took, a.batch / took, most_sent, peak, lt, static_cast<double>(loss));

@@ -8,10 +8,11 @@ using namespace gart;
 namespace {
 
 template <int ShDegree, class Response, class Entry>
-using forward_kernel = walk_tile_warps<Response, 8, composite<ShDegree, record_lt<Entry, 8>>>;
+using forward_kernel = walk_tile_warps<Response, 8, composite<ShDegree, record_slots<Entry, 8>>>;
 
 template <int ShDegree, class Response, class Entry>
-using forward_depth_kernel = walk_tile_warps<Response, 8, composite<ShDegree, record_with_depth<record_lt<Entry, 8>>>>;
+using forward_depth_kernel =
+    walk_tile_warps<Response, 8, composite<ShDegree, record_with_depth<record_slots<Entry, 8>>>>;
 
 template <int ShDegree, class Response, class Entry, gather_sums Sums, class Terms>
 struct gather_row {
@@ -51,10 +52,10 @@ using backward_depth_kernel =
 
 using plain = generalized_gaussian<>;
 
-ROW(0, plain, lt_entry)
-ROW(3, plain, lt_entry)
-ROW(3, generalized_gaussian<4>, lt_entry)
-ROW(3, plain, lt_half_entry)
-BACKWARD(3, plain, lt_entry, gather_sums::ordered)
-DEPTH(0, plain, lt_entry)
-DEPTH(3, plain, lt_entry)
+ROW(0, plain, hit_entry)
+ROW(3, plain, hit_entry)
+ROW(3, generalized_gaussian<4>, hit_entry)
+ROW(3, plain, half_hit_entry)
+BACKWARD(3, plain, hit_entry, gather_sums::ordered)
+DEPTH(0, plain, hit_entry)
+DEPTH(3, plain, hit_entry)

@@ -40,10 +40,10 @@ rows = {}
 for name, (stack, stores, loads, registers) in zip(plain, figures):
     sh = re.search(r"(?:composite|gather_row)<(\d)", name).group(1)
     response = re.search(r"generalized_gaussian<(\d)>", name)
-    entry = re.search(r"gart::(?:lt_)?(\w*?)_?entry", name).group(1) or "float4"
+    half = "gart::half_hit_entry" in name
     ordered = "(gart::gather_sums)1" in name
     row = (f"SH {sh}" + (f", kernel degree {response.group(1)}" if response.group(1) != "2" else "") +
-           (f", LT {entry}" if entry in ("half", "shared") else "") + (", ordered" if ordered else "") + (", depth" if "depth" in name else ""))
+           (", slots in half" if half else "") + (", ordered" if ordered else "") + (", depth" if "depth" in name else ""))
     kernel = "forward" if "walk_tile_warps" in name else "gather"
     rows.setdefault(row, {})[kernel] = {"registers": int(registers), "stack": int(stack),
                                         "spilled": int(stores) + int(loads)}

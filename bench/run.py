@@ -9,8 +9,8 @@ What (comma-separated; default tests and paper):
   stages      gart_bench_cuda on the first scene: each stage on its own, and tile sizes 4, 8 and 16
   cpu         gart_bench: the same stages on the host policies, on a small scene; a minute or two
   strategies  `gart bench`: a training step by strategy and tracer, on the first two scenes
-  memory      `gart bench`: LT and peak memory against the number of Gaussians, at two resolutions
-  traits      `gart bench`: a training step by row (docs/performance.md): SH and kernel degree, LT format,
+  memory      `gart bench`: hit buffer and peak memory against the number of Gaussians, at two resolutions
+  traits      `gart bench`: a training step by row (docs/performance.md): SH and kernel degree, hit format,
               determinism; on --backend, a host by one thread, and bytes a Gaussian. Needs -DGART_VARIANTS=ON
   paper       strategies, memory and stages
   tradeoff    `gart tradeoff` on the first scene and on every --model: what each approximation costs and buys
@@ -59,7 +59,7 @@ PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits",
 # Rows of docs/performance.md: name, SH degree, kernel degree, options of gart bench.
 TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
               [(f"kernel degree {n}", 3, n, {}) for n in (4,)] +
-              [("LT half", 3, 2, {"lt-format": "half"}),
+              [("hit slots in half", 3, 2, {"hit-format": "half"}),
                ("hybrid", 3, 2, {"backward": "hybrid"}), ("deterministic", 3, 2, {"backward": "deterministic"})])
 
 
@@ -196,7 +196,7 @@ class Bench(Checks, Trainings, Formats, View):
                     result = self.gart_bench(ply, self.enlarged(cameras, factor), self.a.tracers[0], backward, 1, 1, 3)
                     runs.append({"scene": name, "thousands": thousands, "scale": factor, **result})
                     if "error" not in result:
-                        self.say(f"{name}, x{factor}, {backward}: LT {result['lt_bytes'] / 1e9:.2f} GB, peak "
+                        self.say(f"{name}, x{factor}, {backward}: hit buffer {result['hit_buffer_bytes'] / 1e9:.2f} GB, peak "
                                  f"{result['peak_bytes'] / 1e9:.2f} GB")
         self.write("memory", runs)
 

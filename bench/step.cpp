@@ -22,7 +22,7 @@ void step(benchmark::State& state, E& exec) {
   using traits = gart::scene_traits<gart_bench::sh_degree>;
   gart::trainer<E, traits, tracer, Strategy> trainer(exec, options, data, scene.model);
   gart_bench::measure(state, exec, [&] { trainer.step(); });
-  state.counters["lt_bytes"] = static_cast<double>(trainer.lt_bytes());
+  state.counters["hit_buffer_bytes"] = static_cast<double>(trainer.hit_buffer_bytes());
   state.counters["peak_bytes"] = static_cast<double>(exec.memory.peak);
 }
 

@@ -15,7 +15,7 @@ if(PROJECT_IS_TOP_LEVEL AND GART_BUILD_BACKENDS)
   set(_with_backends ON)
 endif()
 option(GART_BUILD_PROGRAM "Build the gart program" ${_with_backends})
-option(GART_VARIANTS "Configurations for the program to measure trades with: kernel degree 4, halves of LT"
+option(GART_VARIANTS "Configurations for the program to measure trades with: kernel degree 4, half hit slots"
        ${GART_BUILD_PROGRAM})
 option(GART_BUILD_EXAMPLES "Build the examples" ${_with_backends})
 option(GART_BUILD_TESTS "Build the tests (doctest, Eigen)" ${_with_backends})

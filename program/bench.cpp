@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 struct bench_arguments {
   fs::path model, cameras, json;
   configuration_options configuration;
-  std::string backward = "auto", lt_format = "auto";
+  std::string backward = "auto", hit_format = "auto";
   int views = 4, warmups = 5, repeats = 20;
   bool quiet = false;
 };
@@ -56,7 +56,7 @@ int run_bench(bench_arguments const& a) {
   if (!a.json.empty()) prepare_file(a.json);
 
   auto wanted = a.configuration.request();
-  wanted.backward = a.backward, wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
+  wanted.backward = a.backward, wanted.hit_format = gart::from_string<gart::hit_format_kind>(a.hit_format);
   auto const request = configuration_request_for(file, a.model, wanted);
   gart::train_options options;
   options.densify = gart::densify_kind::none;
@@ -68,7 +68,7 @@ int run_bench(bench_arguments const& a) {
   options.rates = {0, 0, 0, 0, 0, 0, 0};
 
   std::map<std::string, double> stages;
-  double wall = 0, processor = 0, hits = 0, lt_bytes = 0;
+  double wall = 0, processor = 0, hits = 0, hit_buffer_bytes = 0;
   std::size_t peak = 0;
   gart::configuration_info configuration;
   progress say(a.quiet);
@@ -100,7 +100,7 @@ int run_bench(bench_arguments const& a) {
     auto const image = session->render(cameras[v].view, gart::vec3(0.0f));
     hits += std::accumulate(image.hits.data.begin(), image.hits.data.end(), 0.0) /
             static_cast<double>(image.hits.data.size() * cameras.size());
-    lt_bytes += static_cast<double>(session->lt_bytes()) / static_cast<double>(cameras.size());
+    hit_buffer_bytes += static_cast<double>(session->hit_buffer_bytes()) / static_cast<double>(cameras.size());
     peak = std::max(peak, session->peak_bytes());
     say.state("measured " + std::to_string(v + 1) + "/" + std::to_string(cameras.size()),
               static_cast<double>(v + 1) / static_cast<double>(cameras.size()));
@@ -111,7 +111,7 @@ int run_bench(bench_arguments const& a) {
                            {"backward", configuration.backward},
                            {"sh_degree", configuration.sh_degree},
                            {"kernel_degree", configuration.kernel_degree},
-                           {"lt_format", gart::to_string(configuration.lt_format)},
+                           {"hit_format", gart::to_string(configuration.hit_format)},
                            {"gaussians", file.model.size()},
                            {"width", cameras[0].view.width},
                            {"height", cameras[0].view.height},
@@ -122,7 +122,7 @@ int run_bench(bench_arguments const& a) {
                            {"step_processor_ms", processor},
                            {"stages_ms", stages},
                            {"hits_per_ray", hits},
-                           {"lt_bytes", lt_bytes},
+                           {"hit_buffer_bytes", hit_buffer_bytes},
                            {"peak_bytes", peak}};
   if (!a.json.empty()) write_json(a.json, result);
   std::printf("%s, %s, %s: %zu Gaussians, %d x %d, medians of %d, mean over %zu views\n",
@@ -131,8 +131,8 @@ int run_bench(bench_arguments const& a) {
               a.repeats, cameras.size());
   std::printf("  %-24s %10.3f ms\n  %-24s %10.3f ms\n", "whole step", wall, "of the processor", processor);
   for (auto const& [label, ms] : stages) std::printf("  %-24s %10.3f ms\n", label.c_str(), ms);
-  std::printf("  %-24s %10.1f\n  %-24s %10s\n  %-24s %10s\n", "hits a ray", hits, "LT buffer",
-              as_bytes(lt_bytes).c_str(), "peak memory", as_bytes(static_cast<double>(peak)).c_str());
+  std::printf("  %-24s %10.1f\n  %-24s %10s\n  %-24s %10s\n", "hits a ray", hits, "hit buffer",
+              as_bytes(hit_buffer_bytes).c_str(), "peak memory", as_bytes(static_cast<double>(peak)).c_str());
   return 0;
 }
 
@@ -166,10 +166,10 @@ void add_bench(CLI::App& app, command& selected) {
   bench->add_option("--json", a->json, "Write the figures to this file")->type_name("FILE");
   bench->add_flag("--quiet", a->quiet, "No progress line");
   add_configuration_options(*bench, a->configuration);
-  bench->add_option("--lt-format", a->lt_format, "What the forward pass leaves of a hit: float4 or half")
+  bench->add_option("--hit-format", a->hit_format, "What the forward pass leaves of a hit: float4 or half")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(name_of_a<gart::lt_format_kind>());
+      ->check(name_of_a<gart::hit_format_kind>());
   bench->footer(
       "\nStages nest: \"backward\" is everything between the image's gradient and the parameters', \"backward/...\" "
       "its\n"

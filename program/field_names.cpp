@@ -40,7 +40,7 @@ std::vector<field_name> const& field_names() {
       {GART_CLI_FIELD(configuration_request, backward), "--backward"},
       {GART_CLI_FIELD(configuration_request, sh_degree), "--sh-degree"},
       {GART_CLI_FIELD(configuration_request, kernel_degree), "--kernel-degree"},
-      {GART_CLI_FIELD(configuration_request, lt_format), "--lt-format"},
+      {GART_CLI_FIELD(configuration_request, hit_format), "--hit-format"},
       {GART_CLI_FIELD(configuration_request, depth), "--depth-weight"},
       {GART_CLI_FIELD(view_server_options, listen), "--listen"},
       {GART_CLI_FIELD(view_server_options, port), "--port"},

@@ -186,14 +186,14 @@ int run_info(bool tests) {
   for (auto const& r : gart::compiled_configurations()) {
     configurations[{to_string(r.backend), to_string(r.tracer),
                     r.backward + (r.depth ? "+depth" : "") + (r.ranks ? "+ranks" : ""), r.kernel_degree,
-                    to_string(r.lt_format)}]
+                    to_string(r.hit_format)}]
         .insert(r.stored_degree);
   }
-  std::puts("\nbackend  tracer  backward            kernel  LT format  SH degrees stored");
+  std::puts("\nbackend  tracer  backward            kernel  hit format  SH degrees stored");
   for (auto const& [names, degrees] : configurations) {
-    auto const& [backend, tracer, backward, kernel_degree, lt_format] = names;
+    auto const& [backend, tracer, backward, kernel_degree, hit_format] = names;
     std::printf("%-8s %-7s %-19s %-7d %-10s", backend.c_str(), tracer.c_str(), backward.c_str(), kernel_degree,
-                lt_format.c_str());
+                hit_format.c_str());
     for (int const degree : degrees) std::printf(" %d", degree);
     std::puts("");
   }

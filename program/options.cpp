@@ -134,7 +134,7 @@ nlohmann::json approximations_of(gart::render_options const& render, gart::confi
           {"t_min", render.transmittance_min},
           {"max_hits", render.max_hits},
           {"antialias", render.antialias},
-          {"lt_format", gart::to_string(configuration.lt_format)}};
+          {"hit_format", gart::to_string(configuration.hit_format)}};
 }
 
 }  // namespace gart_cli

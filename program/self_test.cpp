@@ -22,7 +22,7 @@ constexpr double off_image = 1e-4;  // most that a colour may be off by
 
 // And a gradient, in parts of the largest of its kind.
 double off_gradient(gart::configuration_info const& c) {
-  return c.lt_format == gart::lt_format_kind::half ? 0.02 : 1e-3;
+  return c.hit_format == gart::hit_format_kind::half ? 0.02 : 1e-3;
 }
 
 // Numbers in [-1, 1], the same on every machine.
@@ -104,7 +104,7 @@ differences measure(gart::configuration_info const& c) {
   gart::configuration_request request;
   request.backend = c.backend, request.tracer = c.tracer, request.backward = c.backward;
   request.sh_degree = c.stored_degree, request.kernel_degree = c.kernel_degree;
-  request.lt_format = c.lt_format, request.depth = c.depth;
+  request.hit_format = c.hit_format, request.depth = c.depth;
   auto const renderer = gart::make_renderer(request);
   renderer->set_model(scene_of(c.stored_degree));
   gart::reference_image const& expected = definition(c.stored_degree, c.kernel_degree);
@@ -127,11 +127,11 @@ differences measure(gart::configuration_info const& c) {
 int self_test() {
   int wrong = 0, right = 0;
   auto const start = std::chrono::steady_clock::now();
-  std::puts("backend  tracer  backward            kernel  LT format  SH  image    gradients");
+  std::puts("backend  tracer  backward            kernel  hit format  SH  image    gradients");
   for (gart::configuration_info const& c : gart::compiled_configurations()) {
     if (c.ranks || c.tracer == gart::tracer_kind::own) continue;  // ranks train, and have the others' kernels
     std::printf("%-8s %-7s %-19s %-7d %-10s %-3d ", to_string(c.backend), to_string(c.tracer),
-                (c.backward + (c.depth ? "+depth" : "")).c_str(), c.kernel_degree, to_string(c.lt_format),
+                (c.backward + (c.depth ? "+depth" : "")).c_str(), c.kernel_degree, to_string(c.hit_format),
                 c.stored_degree);
     try {
       differences const off = measure(c);

@@ -13,11 +13,11 @@ void register_variant(bool (*available)(std::string*)) {
   register_configuration_of<E, scene_traits<3, Response>, tile_tracer<E, 8, Response>, Strategy>(rank, available);
 }
 
-// Kernel degree 4, and an LT buffer of half the memory.
+// Kernel degree 4, and a hit buffer of half the memory.
 template <execution E>
 void register_variants(bool (*available)(std::string*) = always_available) {
   register_variant<E, generalized_gaussian<4>>(available);
-  register_variant<E, generalized_gaussian<>, primitive_strategy_in<lt_half_entry>>(available);
+  register_variant<E, generalized_gaussian<>, primitive_strategy_in<half_hit_entry>>(available);
 }
 
 }  // namespace gart

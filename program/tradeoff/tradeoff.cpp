@@ -188,7 +188,7 @@ class tradeoff_run {
     renderer->set_model(model);
     error_sums errors;
     std::map<std::string, double> stages;
-    double lt_bytes = 0;
+    double hit_buffer_bytes = 0;
     double const share = 1 / static_cast<double>(set_.views.size());
     for (tradeoff_view const& v : set_.views) {
       gart::camera const view = s.use.shrink == 1 ? v.view : smaller(v.view, s.use.shrink);
@@ -199,11 +199,11 @@ class tradeoff_run {
       }
       // A format may store the Gaussians in another order: they are not those of the reference, one by one.
       if (s.use.format.empty()) errors.add_gradients(v, renderer->gradients());
-      lt_bytes += share * static_cast<double>(renderer->lt_bytes());
+      hit_buffer_bytes += share * static_cast<double>(renderer->hit_buffer_bytes());
       gart::image_float const image = renderer->render(view, s.use.render).color;
       errors.add_image(v, s.use.shrink == 1 ? image : enlarged(image, v.view.width, v.view.height));
     }
-    return entry(s, renderer->configuration(), errors, stages, lt_bytes, renderer->peak_bytes());
+    return entry(s, renderer->configuration(), errors, stages, hit_buffer_bytes, renderer->peak_bytes());
   }
 
   static constexpr char const* processor = "processor";
@@ -248,7 +248,7 @@ class tradeoff_run {
   }
 
   json entry(setting const& s, gart::configuration_info const& configuration, error_sums const& errors,
-             std::map<std::string, double> const& stages, double lt_bytes, std::size_t peak_bytes) const {
+             std::map<std::string, double> const& stages, double hit_buffer_bytes, std::size_t peak_bytes) const {
     auto const of = [&](char const* label) { return stages.count(label) ? stages.at(label) : 0.0; };
     bool const packed = !s.use.format.empty();
     auto const groups = errors.gradients();
@@ -279,7 +279,7 @@ class tradeoff_run {
             {"backward_ms", backward},
             {"processor_ms", of(processor)},
             {"stages_ms", without_processor},
-            {"lt_bytes", lt_bytes},
+            {"hit_buffer_bytes", hit_buffer_bytes},
             {"peak_bytes", peak_bytes}};
   }
 

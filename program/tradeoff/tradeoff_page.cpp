@@ -46,15 +46,15 @@ std::string milliseconds(json const& value) {
 
 using row = std::vector<std::string>;
 
-row const heads = {"setting", "image max", "PSNR, dB", "mean",      "scale",     "rotation", "opacity", "sh",
-                   "prepare", "forward",   "backward", "total, ms", "processor", "LT",       "peak",    "file"};
+row const heads = {"setting", "image max", "PSNR, dB", "mean",      "scale",     "rotation",  "opacity", "sh",
+                   "prepare", "forward",   "backward", "total, ms", "processor", "hit slots", "peak",    "file"};
 
 row cells_of(json const& s) {
   row out{s["name"].get<std::string>(), small(s["image"]["max"]), decimals(s["image"]["psnr"], 1)};
   for (char const* group : tradeoff_groups) out.push_back(small(s["gradients"][group]));
   for (char const* stage : {"prepare_ms", "forward_ms", "backward_ms", "total_ms", "processor_ms"})
     out.push_back(milliseconds(s[stage]));
-  out.push_back(number(s["lt_bytes"]) > 0 ? as_bytes(number(s["lt_bytes"])) : "-");
+  out.push_back(number(s["hit_buffer_bytes"]) > 0 ? as_bytes(number(s["hit_buffer_bytes"])) : "-");
   out.push_back(as_bytes(number(s["peak_bytes"])));
   out.push_back(s["file_bytes"].is_number() ? as_bytes(number(s["file_bytes"])) : "-");
   return out;

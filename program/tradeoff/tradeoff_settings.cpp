@@ -69,7 +69,8 @@ std::vector<setting> settings_of(configuration const& exact) {
   t.sweep(
       "kernel_degree", [](c& x) -> int& { return x.configuration.kernel_degree; }, std::vector<int>{2, 4});
   t.sweep(
-      "lt_format", [](c & x) -> auto& { return x.configuration.lt_format; }, std::vector{gart::lt_format_kind::half});
+      "hit_format", [](c & x) -> auto& { return x.configuration.hit_format; },
+      std::vector{gart::hit_format_kind::half});
   t.sweep(
       "backward", [](c& x) -> std::string& { return x.configuration.backward; }, gart::strategy_names());
   t.sweep(

@@ -198,10 +198,10 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "exact, or quick: " + std::to_string(quick_iterations) + " steps, where --iterations is not given"))
       ->check(one_of({"exact", "quick"}));
 
-  in_group(r.add(train, "--lt-format", a.lt_format, "NAME",
+  in_group(r.add(train, "--hit-format", a.hit_format, "NAME",
                  "What the forward pass leaves of a hit for primitive: float4,\nor half (half the memory, less exact "
                  "gradients)"))
-      ->check(name_of_a<gart::lt_format_kind>());
+      ->check(name_of_a<gart::hit_format_kind>());
 
   group = "Course";
   in_group(r.add(train, "--eval-every", a.eval_every, "N",
@@ -249,7 +249,8 @@ void continue_run(train_arguments& a) {
   }
   nlohmann::json options = config["options"];
   // Names in the files of earlier runs, which have no scene.
-  for (auto const& [old, now] : {std::pair{"t-min", "transmittance-min"}, {"lt-budget", "hit-memory"}})
+  for (auto const& [old, now] :
+       {std::pair{"t-min", "transmittance-min"}, {"lt-budget", "hit-memory"}, {"lt-format", "hit-format"}})
     if (options.contains(old)) options.emplace(now, options[old]);
   options.emplace("scene", "");
   // Runs that recorded --set as text had other defaults, which they keep.
@@ -277,7 +278,7 @@ gart::configuration_request configuration_request_of(train_arguments const& a) {
   wanted.backward = a.backward;
   wanted.sh_degree = a.sh_degree;
   wanted.kernel_degree = a.kernel_degree;
-  wanted.lt_format = gart::from_string<gart::lt_format_kind>(a.lt_format);
+  wanted.hit_format = gart::from_string<gart::hit_format_kind>(a.hit_format);
   wanted.threads = a.threads;
   wanted.depth = a.options.depth_weight > 0;
   return wanted;

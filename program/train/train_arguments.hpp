@@ -36,7 +36,7 @@ struct train_arguments {
   // What follows decides the result and is recorded.
   std::string backend = "auto", tracer = "auto", backward = "auto", densify = "auto", background = "auto", start, poses,
               scene;
-  std::string lt_format = "auto";
+  std::string hit_format = "auto";
   std::string preset = "exact";
   gart::train_options options;  // by the table of fields; what is "auto" here is open there
   double time_budget = 0;       // seconds of training; 0: none

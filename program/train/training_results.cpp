@@ -32,7 +32,7 @@ gart::place_view training_run::aligned_to_photographs(std::vector<gart::named_ca
   auto request = configuration_request_of(a_);
   request.sh_degree = session_->configuration().sh_degree;
   auto without_buffer = request;
-  without_buffer.backward = "pixel", without_buffer.lt_format = gart::lt_format_kind::automatic;
+  without_buffer.backward = "pixel", without_buffer.hit_format = gart::hit_format_kind::automatic;
   std::shared_ptr<gart::renderer> renderer;
   try {
     renderer = gart::make_renderer(without_buffer);

@@ -54,7 +54,7 @@ void training_run::prepare() {
   configuration_ = gart::resolve(request());
   a_.backend = to_string(configuration_.backend), a_.tracer = to_string(configuration_.tracer),
   a_.backward = configuration_.backward;
-  a_.lt_format = to_string(configuration_.lt_format);
+  a_.hit_format = to_string(configuration_.hit_format);
   for (auto& choice : chosen_) {
     if (choice["option"] == "--tracer") choice["value"] = a_.tracer;
     if (choice["option"] == "--backward") choice["value"] = a_.backward;

@@ -52,7 +52,7 @@ bool training_run::train(interrupt_guard const& interrupt) {
     if (report.backward != configuration_.backward && !fell_back_) {
       fell_back_ = true;
       say_.note("step " + with_commas(report.step) +
-                ": the LT buffer would pass --hit-memory or its 2^32 slots, this step and others like it are " +
+                ": the hit buffer would pass --hit-memory or its 2^32 slots, this step and others like it are " +
                 report.backward);
     }
     if (!std::isfinite(report.loss)) {

@@ -157,7 +157,7 @@ std::pair<gart::camera, std::vector<float>> track(self& r, py::object const& pho
 char const class_text[] = R"(Renders and differentiates views of one model.
 
 Renderer(model=None, *, backend="auto", tracer="auto", backward="auto", sh_degree=3, kernel_degree=2,
-         lt_format="auto", depth=False, threads=0, device=0, stream=None)
+         hit_format="auto", depth=False, threads=0, device=0, stream=None)
 
 The degrees are those of the model where one is given. depth=True gives gradients of depth and transmittance too.
 stream is a cudaStream_t as a number, as torch.cuda.Stream.cuda_stream; without one work goes to the legacy default
@@ -176,8 +176,8 @@ gart::render_targets targets_of(python_renderer const& r, gart::camera const& vi
                                 std::array<py::object, 6> const& given, std::vector<lent>& kept) {
   std::int64_t const h = view.height, w = view.width;
   auto const name = [&](char const* what) { return call + ": " + what; };
-  std::string const names[] = {name("color"), name("transmittance"), name("depth"), name("hits"), name("rgba"),
-                               name("features")};
+  std::string const names[] = {name("color"), name("transmittance"), name("depth"),
+                               name("hits"),  name("rgba"),          name("features")};
   kept.clear();
   kept.push_back(lent::if_given<float>(given[0], {names[0].c_str(), {h, w, 3}, true}, r.where));
   kept.push_back(lent::if_given<float>(given[1], {names[1].c_str(), {h, w}, true}, r.where));
@@ -203,8 +203,8 @@ gart::configuration_request request_of(py::kwargs const& given, char const* call
       out.sh_degree = value.cast<int>();
     else if (name == "kernel_degree")
       out.kernel_degree = value.cast<int>();
-    else if (name == "lt_format")
-      out.lt_format = named<gart::lt_format_kind>(value);
+    else if (name == "hit_format")
+      out.hit_format = named<gart::hit_format_kind>(value);
     else if (name == "depth")
       out.depth = value.cast<bool>();
     else if (name == "threads")
@@ -217,7 +217,7 @@ gart::configuration_request request_of(py::kwargs const& given, char const* call
                                    : reinterpret_cast<void*>(std::max<std::uintptr_t>(1, value.cast<std::uintptr_t>()));
     else
       throw py::type_error(std::string(call) + ": no argument '" + name +
-                           "': there are backend, tracer, backward, sh_degree, kernel_degree, lt_format, depth, "
+                           "': there are backend, tracer, backward, sh_degree, kernel_degree, hit_format, depth, "
                            "threads, device, stream");
   }
   return out;
@@ -227,7 +227,7 @@ py::dict as_dict(gart::configuration_info const& info) {
   py::dict out;
   out["backend"] = to_string(info.backend), out["tracer"] = to_string(info.tracer);
   out["backward"] = info.backward, out["sh_degree"] = info.sh_degree, out["stored_degree"] = info.stored_degree;
-  out["kernel_degree"] = info.kernel_degree, out["lt_format"] = to_string(info.lt_format);
+  out["kernel_degree"] = info.kernel_degree, out["hit_format"] = to_string(info.hit_format);
   out["depth"] = info.depth, out["ranks"] = info.ranks, out["instruction_set"] = info.instruction_set;
   return out;
 }
@@ -268,8 +268,7 @@ features       float32 [H, W, F], sum of weight * features; with features=True, 
           },
           py::arg("camera"), py::arg("options") = none, py::kw_only(), py::arg("color") = none,
           py::arg("transmittance") = none, py::arg("depth") = none, py::arg("hits") = none, py::arg("rgba") = none,
-          py::arg("features") = none,
-          "A view into memory of the policy, of render's shapes; rgba is uint8 [H, W, 4].")
+          py::arg("features") = none, "A view into memory of the policy, of render's shapes; rgba is uint8 [H, W, 4].")
       .def("backward", &backward, py::arg("camera"), py::arg("color_gradient"), py::arg("options") = none,
            py::kw_only(), py::arg("pose") = false,
            R"(Both passes of a view, for dL/dcolour as float32 [H, W, 3] on the host.

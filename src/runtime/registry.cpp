@@ -25,9 +25,9 @@ std::string peculiarities(configuration_info const& r) {
   std::string out;
   auto const add = [&out](std::string const& text) { out += ", " + text; };
   if (r.kernel_degree != 2) add("kernel degree " + std::to_string(r.kernel_degree));
-  using enum lt_format_kind;
-  if (r.lt_format != none && r.lt_format != weight && r.lt_format != float4)
-    add(std::string("LT format ") + to_string(r.lt_format));
+  using enum hit_format_kind;
+  if (r.hit_format != none && r.hit_format != weight && r.hit_format != float4)
+    add(std::string("hit format ") + to_string(r.hit_format));
   if (r.depth) add("with depth");
   if (r.ranks) add("on several ranks");
   return out;
@@ -56,7 +56,7 @@ bool matches(configuration_request const& wanted, configuration_info const& ther
          (wanted.backward == "auto" || wanted.backward == there.backward) && wanted.sh_degree >= 0 &&
          wanted.sh_degree <= there.stored_degree && wanted.depth == there.depth &&
          wanted.kernel_degree == there.kernel_degree && (wanted.ranks != nullptr) == there.ranks &&
-         matches(wanted.lt_format, there.lt_format) &&
+         matches(wanted.hit_format, there.hit_format) &&
          ((wanted.device == 0 && !wanted.stream) || there.backend == backend_kind::cuda);
 }
 
@@ -64,7 +64,7 @@ std::string as_text(configuration_request const& r) {
   std::string out = std::string("backend ") + to_string(r.backend) + ", tracer " + to_string(r.tracer) + ", backward " +
                     r.backward + ", SH degree " + std::to_string(r.sh_degree);
   if (r.kernel_degree != 2) out += ", kernel degree " + std::to_string(r.kernel_degree);
-  if (r.lt_format != lt_format_kind::automatic) out += std::string(", LT format ") + to_string(r.lt_format);
+  if (r.hit_format != hit_format_kind::automatic) out += std::string(", hit format ") + to_string(r.hit_format);
   if (r.depth) out += ", with depth";
   if (r.ranks) out += ", on several ranks";
   if (r.device != 0) out += ", device " + std::to_string(r.device);

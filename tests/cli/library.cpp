@@ -175,8 +175,8 @@ TEST_CASE("what a session would read after it is gone does not compile") {
 TEST_CASE("names and values of a kind are each other's") {
   CHECK(gart::from_string<gart::densify_kind>("mcmc") == gart::densify_kind::mcmc);
   CHECK(std::string(gart::to_string(gart::tracer_kind::automatic)) == "auto");
-  for (auto const& name : gart::list_of_names<gart::lt_format_kind>())
-    CHECK(name == gart::to_string(gart::from_string<gart::lt_format_kind>(name)));
+  for (auto const& name : gart::list_of_names<gart::hit_format_kind>())
+    CHECK(name == gart::to_string(gart::from_string<gart::hit_format_kind>(name)));
   CHECK_THROWS_WITH_AS(gart::from_string<gart::backend_kind>("opencl"),
                        "'opencl' is none of auto, serial, openmp, cuda", gart::invalid_argument);
 }

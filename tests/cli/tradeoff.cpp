@@ -120,7 +120,7 @@ TEST_CASE("tradeoff measures every knob, names those it has not, and finds the f
   std::string absent;
   for (auto const& a : result["absent"]) absent += a["name"].get<std::string>() + " ";
   CHECK(has(absent, "tracer=tiles"));  // for openmp and cuda
-  for (char const* row : {"backward=deterministic", "kernel_degree=4", "lt_format=half"})
+  for (char const* row : {"backward=deterministic", "kernel_degree=4", "hit_format=half"})
     CHECK_MESSAGE(has(absent, row), row);
   auto const table = text_of(here / "trade/table.txt");
   CHECK(has(table, "absent  tracer=tiles"));

@@ -63,7 +63,7 @@ TEST_CASE("a model of another kernel degree says so in its file and is rendered 
 TEST_CASE("what is traded is chosen by name and reported") {
   folder const here;
   write_capture(here / "capture");
-  for (auto const& [option, name, value] : {std::array{"--lt-format half", "lt_format", "half"}}) {
+  for (auto const& [option, name, value] : {std::array{"--hit-format half", "hit_format", "half"}}) {
     CAPTURE(option);
     auto const done = here.gart(std::string("train capture --out traded ") + option + openmp);
     REQUIRE_MESSAGE(done.code == 0, done.err);

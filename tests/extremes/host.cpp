@@ -84,7 +84,7 @@ TEST_CASE("nothing is stored in less than 32 bits but the place of boxes") {
   static_assert(std::is_same_v<decltype(gaussians<serial_exec>::log_scale), buffer<float, serial_exec>>);
   static_assert(std::is_same_v<decltype(ray_gaussian::row::o), float> && sizeof(ray_gaussian) == 64);
   static_assert(std::is_same_v<decltype(hit::t), float> && std::is_same_v<decltype(hit::alpha), float>);
-  static_assert(std::is_same_v<decltype(lt_entry::w), float> && sizeof(lt_entry) == 16);
+  static_assert(std::is_same_v<decltype(hit_entry::w), float> && sizeof(hit_entry) == 16);
   static_assert(std::is_same_v<decltype(weight_entry::w), float> && sizeof(weight_entry) == 4);
   static_assert(std::is_same_v<decltype(moments_of<float>::v), float[moment_stride]>);
   static_assert(std::is_same_v<decltype(box::lo), vec3>);            // of which a bvh_node holds what lies around it

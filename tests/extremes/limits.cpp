@@ -93,10 +93,10 @@ TEST_CASE_TEMPLATE("sums past 2^32 and pairs past 2^31", E, GART_TEST_POLICIES) 
   frame.prepare(scene.view(), view);
   gart::backward_pass<frame_type, gart::primitive_strategy> pass(exec);
   CHECK_FALSE(pass.prepare(frame, u64{1} << 40));
-  CHECK(pass.lt_bytes() == 0);
+  CHECK(pass.hit_buffer_bytes() == 0);
   // Nor are slots that have no number of 32 bits.
   CHECK_FALSE(pass.prepare(frame));
-  CHECK(pass.lt_bytes() == 0);
+  CHECK(pass.hit_buffer_bytes() == 0);
 }
 
 TEST_CASE_TEMPLATE("more bytes than there are, and more than can be counted", E, GART_TEST_POLICIES) {

@@ -116,11 +116,11 @@ TEST_CASE_TEMPLATE("gradients by depth are refused where nothing was made ready 
   CHECK_THROWS_WITH_AS(gart::differentiate(frame, plain, {color, depth}, gradients),
                        "differentiate: the strategy has no gradient of depth: take with_depth<strategy>",
                        gart::invalid_argument);
-  std::size_t const bytes = plain.lt_bytes();
+  std::size_t const bytes = plain.hit_buffer_bytes();
 
   gart::backward_pass<frame_type, gart::with_depth<gart::primitive_strategy>> deep(exec);
   REQUIRE(deep.prepare(frame));
-  CHECK(deep.lt_bytes() == bytes / 16 * 20);
+  CHECK(deep.hit_buffer_bytes() == bytes / 16 * 20);
   deep.render(frame, {.color = color.data()});
   CHECK_THROWS_AS(gart::differentiate(frame, deep, {color, depth}, gradients), gart::invalid_argument);
   deep.render(frame, {.color = color.data(), .depth = depth.data()});

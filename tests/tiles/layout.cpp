@@ -1,5 +1,5 @@
-// The addresses of the LT buffer: one to one onto [0, sum of box areas), primitive by primitive, tile by tile.
-#include <gart/backward/lt_layout.hpp>
+// The addresses of the hit buffer: one to one onto [0, sum of box areas), primitive by primitive, tile by tile.
+#include <gart/backward/hit_layout.hpp>
 #include <support/policies.hpp>
 
 #include <random>
@@ -57,7 +57,7 @@ void check_addresses(std::mt19937_64& random, int trials) {
         gart::pixel_box const cell = gart::cell_in(r, grid.tile(t));
         u64 const cell_begin = next;
         for (u32 y = cell.y0; y < cell.y1; ++y)
-          for (u32 x = cell.x0; x < cell.x1; ++x) wrong += gart::lt_index<Size>(r, x, y) != next++;
+          for (u32 x = cell.x0; x < cell.x1; ++x) wrong += gart::hit_slot_index<Size>(r, x, y) != next++;
         // What a gather over (primitive, tile) walks.
         if (!cell.empty()) wrong_walk += r.offset + gart::tile_offset(r, cell) != cell_begin;
         wrong_walk += next - cell_begin != cell.area();
@@ -98,7 +98,7 @@ TEST_CASE("addresses of (primitive, tile, pixel) are one to one and in order") {
 
 TEST_CASE("addresses keep 64 bits") {
   gart::footprint_slots const range{u64{5} << 32, {0, 0, 65535, 65535}};
-  CHECK(gart::lt_index<8>(range, 65534, 65534) == (u64{5} << 32) + u64{65535} * 65535 - 1);
+  CHECK(gart::hit_slot_index<8>(range, 65534, 65534) == (u64{5} << 32) + u64{65535} * 65535 - 1);
 }
 
 TEST_CASE("tiles cover every pixel once, whatever the image's size") {

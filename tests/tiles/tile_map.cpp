@@ -1,4 +1,4 @@
-// Footprints, their places in the LT buffer and the tile-primitive map of whole scenes, on every policy, against one
+// Footprints, their places in the hit buffer and the tile-primitive map of whole scenes, on every policy, against one
 // Gaussian at a time on the host.
 #include <tiles/ellipsoids.hpp>
 

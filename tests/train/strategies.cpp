@@ -16,7 +16,7 @@ constexpr int steps = 150;
 struct course {
   std::vector<float> loss;
   std::string backward;  // of the last step
-  std::size_t lt_bytes;
+  std::size_t hit_buffer_bytes;
   gart::gaussian_model model;
 };
 
@@ -32,7 +32,7 @@ course train(E& exec, gart::dataset const& data, u64 seed, u64 hit_memory = 0) {
     auto const report = run.step();
     out.loss.push_back(report.loss), out.backward = report.backward;
   }
-  out.lt_bytes = run.lt_bytes(), out.model = run.model();
+  out.hit_buffer_bytes = run.hit_buffer_bytes(), out.model = run.model();
   return out;
 }
 
@@ -51,13 +51,13 @@ TEST_CASE_TEMPLATE("every strategy trains along the same loss curve", E, GART_TE
   auto const reference = train<gart::primitive_strategy>(exec, data, seed);
   CHECK(reference.loss.back() < 0.8f * reference.loss.front());
   CHECK(reference.backward == "primitive");
-  // Where the LT buffer has no room a step is done with less.
-  auto const with_less = train<gart::primitive_strategy>(exec, data, seed, reference.lt_bytes / 2);
+  // Where the hit buffer has no room a step is done with less.
+  auto const with_less = train<gart::primitive_strategy>(exec, data, seed, reference.hit_buffer_bytes / 2);
   CHECK(with_less.backward == "hybrid");
-  CHECK(with_less.lt_bytes <= reference.lt_bytes / 2);
+  CHECK(with_less.hit_buffer_bytes <= reference.hit_buffer_bytes / 2);
   auto const with_none = train<gart::primitive_strategy>(exec, data, seed, 1);
   CHECK(with_none.backward == "pixel");
-  CHECK(with_none.lt_bytes == 0);
+  CHECK(with_none.hit_buffer_bytes == 0);
   std::vector<course> others{with_less, with_none};
   gart::strategies::for_each([&]<class Strategy>(Strategy) {
     if constexpr (!std::same_as<Strategy, gart::primitive_strategy>)

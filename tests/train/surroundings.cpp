@@ -1,5 +1,5 @@
-// What a trainer takes from its surroundings where the options say nothing: the LT buffer's budget from the memory that
-// is free.
+// What a trainer takes from its surroundings where the options say nothing: the hit buffer's budget from the memory
+// that is free.
 #include "runs.hpp"
 
 #include <gart/exec/serial.hpp>
@@ -10,7 +10,7 @@ using namespace gart_test;
 
 namespace {
 
-// All but out of memory: the Gaussians have room, the LT buffer has none.
+// All but out of memory: the Gaussians have room, the hit buffer has none.
 struct poor_exec : gart::serial_exec {
   static std::size_t free_bytes() { return 80'000; }
 };
@@ -26,7 +26,7 @@ std::string taken_by(E& exec, gart::dataset const& data, gart::u64 hit_memory) {
 
 }  // namespace
 
-TEST_CASE("without a budget the LT buffer takes no more than half of what is free, but for sums in a fixed order") {
+TEST_CASE("without a budget the hit buffer takes no more than half of what is free, but for sums in a fixed order") {
   gart::serial_exec exec;
   auto const data = capture(exec, 3);
   CHECK(taken_by<gart::primitive_strategy>(exec, data, 0) == "primitive");

@@ -80,7 +80,7 @@ class fake_session : public gart::session {
   void set_state(gart::training_state const&) override {}
   gart::profiler& profile() override { return profile_; }
   std::size_t peak_bytes() const override { return 0; }
-  std::size_t lt_bytes() const override { return 0; }
+  std::size_t hit_buffer_bytes() const override { return 0; }
   gart::configuration_info configuration() const override { return {}; }
 
  private:

@@ -4,7 +4,7 @@
 ///
 ///   backward_pass<frame<E, Traits, Tracer>, primitive_strategy> pass(exec);
 ///   frame.prepare(scene, view, options);
-///   pass.prepare(frame);                                       // footprints, lists and LT buffer, where it records
+///   pass.prepare(frame);                                       // footprints, lists and hit buffer, where it records
 ///   pass.render(frame, {.color = color});                      // the forward pass, with what the strategy records
 ///   differentiate(frame, pass, color_gradient, gradients);     // overwrites `gradients`
 ///
@@ -15,7 +15,7 @@
 /// A pass knows which preparation of which frame it stands at: out of this order it throws invalid_argument.
 /// backward/fallback.hpp takes a strategy that needs less where there is no room.
 ///
-/// Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, the LT buffer, 4 or
+/// Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, the hit buffer, 4 or
 /// 16 bytes for each pixel of each box (4 more with depth), and where the tracer has none to lend, footprints of 36
 /// bytes a Gaussian and lists of 8 a (primitive, tile) pair.
 
@@ -58,8 +58,8 @@ class backward_pass {
       : moments_(exec), own_footprints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec), depths_(exec) {}
 
   /// After the frame's preparation: a tracer that has the view's footprints lends them. False, and nothing allocated,
-  /// where the LT buffer would take more than byte_budget (0: no limit) or have more slots than there are numbers of 32
-  /// bits, by which hits know theirs.
+  /// where the hit buffer would take more than byte_budget (0: no limit) or have more slots than there are numbers of
+  /// 32 bits, by which hits know theirs.
   [[nodiscard]] bool prepare(Frame const& frame, u64 byte_budget = 0) {
     stands_at_ = nothing, frame_ = &frame, preparation_ = frame.preparation();
     if constexpr (records) {
@@ -126,13 +126,13 @@ class backward_pass {
   /// Where the rows of each primitive begin.
   span<u64 const> pair_offsets() const requires ordered { return footprints_->pair_offsets(); }
 
-  /// Bytes of the LT buffer for the view last prepared; 0 where the strategy records nothing.
-  std::size_t lt_bytes() const { return records ? slots_.size() * slot_bytes : 0; }
+  /// Bytes of the hit buffer for the view last prepared; 0 where the strategy records nothing.
+  std::size_t hit_buffer_bytes() const { return records ? slots_.size() * slot_bytes : 0; }
 
   /// The error to throw when prepare() returns false without a budget.
   out_of_memory out_of_memory_error() const {
     u64 const slots = footprints_ ? footprints_->slots() : 0;
-    return out_of_memory("LT buffer", slots * slot_bytes, 0,
+    return out_of_memory("hit buffer", slots * slot_bytes, 0,
                          std::to_string(slots) +
                              " slots, and there are numbers for 2^32: render smaller, with fewer Gaussians, or take "
                              "configuration_request.backward = pixel, which needs none");

@@ -2,10 +2,10 @@
 /// \file
 /// What the gradient of an image's depth needs besides that of its colour (backward/terms.hpp). Depth is composited as
 /// a fourth channel whose colour is a hit's t, so a hit's alpha needs the depth that the pixel would have if the hit
-/// were opaque: one float a slot, in an array beside the LT buffer, written and read at a slot's number. The gradient
+/// were opaque: one float a slot, in an array beside the hit buffer, written and read at a slot's number. The gradient
 /// by the transmittance comes with it at no cost a hit, as that of a channel that only the background has.
 
-#include <gart/backward/lt_layout.hpp>
+#include <gart/backward/hit_layout.hpp>
 #include <gart/render/record.hpp>
 
 #include <cstddef>
@@ -19,7 +19,7 @@ struct depth_image {
   float const* transmittance = nullptr;           ///< after the last hit
   float const* depth_gradient = nullptr;          ///< dL/d depth
   float const* transmittance_gradient = nullptr;  ///< dL/d transmittance
-  float const* slots = nullptr;                   ///< beside the LT buffer, a float a slot, where geometry is gathered
+  float const* slots = nullptr;                   ///< beside the hit buffer, a float a slot, where geometry is gathered
 
   /// dL/d depth of a pixel.
   GART_HD GART_INLINE float gradient(std::size_t pixel) const { return depth_gradient ? depth_gradient[pixel] : 0.0f; }
@@ -32,13 +32,13 @@ struct depth_image {
   }
 };
 
-/// A slot of the LT buffer with the depth beside it.
+/// A slot of the hit buffer with the depth beside it.
 template <class Entry>
 struct entry_with_depth : Entry {
   float depth;  ///< that the pixel would have if the hit were opaque
 };
 
-/// A record of the LT buffer (backward/record_lt.hpp) that also keeps depths.
+/// A record of the hit buffer (backward/record_slots.hpp) that also keeps depths.
 template <class Record>
 struct record_with_depth : Record {
   float* depths = nullptr;             ///< a float a slot

@@ -26,7 +26,7 @@ class backward_passes {
   /// Allocates nothing; `exec` must outlive it.
   explicit backward_passes(typename Frame::execution_type& exec) : pass_(exec), rest_(exec) {}
 
-  /// Calls f with the first pass whose LT buffer has room (backward_pass.prepare), prepared. Errors: out_of_memory
+  /// Calls f with the first pass whose hit buffer has room (backward_pass.prepare), prepared. Errors: out_of_memory
   /// where none has.
   template <class F>
   void with_room(Frame const& frame, u64 byte_budget, F&& f) {

@@ -6,12 +6,12 @@
 /// scratch. This is the plain form, for tiles of any size: what backward/packet_gather.hpp on a host and
 /// backward/matrix_gather.hpp on a device compute in theirs.
 ///
-/// Whether a slot is a hit is told by the slot itself (backward/lt_slot.hpp); its t, offset and alpha are evaluated
+/// Whether a slot is a hit is told by the slot itself (backward/hit_slot.hpp); its t, offset and alpha are evaluated
 /// again by the function the forward pass used, so they are the same bits.
 
 #include <gart/backward/depth.hpp>
 #include <gart/backward/gather_configuration.hpp>
-#include <gart/backward/record_lt.hpp>
+#include <gart/backward/record_slots.hpp>
 #include <gart/backward/terms.hpp>
 #include <gart/math/hit_gradient.hpp>
 #include <gart/math/sh.hpp>
@@ -32,7 +32,7 @@ struct pair_gradient {
 template <gather_configuration C>
 struct gather_kernel {
   using response_type = typename C::response;                                   ///< of the Gaussians
-  using entry_type = typename C::entry;                                         ///< of the LT buffer
+  using entry_type = typename C::entry;                                         ///< of the hit buffer
   static constexpr bool recomputed = C::validity == slot_validity::recomputed;  ///< whether hits are decided again
   static constexpr int block_size = 64,                                         ///< lanes of a team
       min_blocks = C::terms::geometry ? 8 : 10;                                 ///< teams a multiprocessor holds
@@ -69,7 +69,7 @@ struct gather_kernel {
   tile_map_view map;      ///< the tiles' lists
   /// [N]: boxes, and where their slots begin.
   footprint_slots const* ranges = nullptr;
-  entry_type const* slots = nullptr;  ///< the LT buffer
+  entry_type const* slots = nullptr;  ///< the hit buffer
   /// [N], in the view's frame.
   ray_gaussian const* records = nullptr;
   int active_degree = C::sh_degree;       ///< bands above it have no gradient

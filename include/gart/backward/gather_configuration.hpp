@@ -5,7 +5,7 @@
 ///   response   how the Gaussians fall from their centres (math/response.hpp)
 ///   terms      what it sums up: terms<color>, terms<geometry> or both, terms<geometry, depth> where depth has a
 ///              gradient
-///   entry      what a slot of the LT buffer holds of a hit (backward/lt_slot.hpp)
+///   entry      what a slot of the hit buffer holds of a hit (backward/hit_slot.hpp)
 ///   sh_degree  that the coefficients are stored with
 ///   tile_size  side of a tile, in pixels
 ///   sums       where a pair's sums go
@@ -52,7 +52,7 @@ struct strategy_gather {
   using policy = E;                                                   ///< on which it runs
   using response = Response;                                          ///< of the Gaussians
   using terms = typename Strategy::gather;                            ///< what is gathered
-  using entry = typename Strategy::template record<TileSize>::entry;  ///< a slot of the LT buffer
+  using entry = typename Strategy::template record<TileSize>::entry;  ///< a slot of the hit buffer
   static constexpr int sh_degree = ShDegree,                          ///< of the coefficients
       tile_size = TileSize;                                           ///< side of a tile, in pixels
   /// In an order or atomically.

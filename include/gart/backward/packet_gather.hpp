@@ -21,7 +21,7 @@ template <gather_configuration C>
 struct packet_gather {
   using gather_type = gather_kernel<C>;                        ///< the plain form, whose members it has
   using response_type = typename C::response;                  ///< of the Gaussians
-  using entry_type = typename C::entry;                        ///< of the LT buffer
+  using entry_type = typename C::entry;                        ///< of the hit buffer
   static constexpr int block_size = 1;                         ///< a host's team has one lane
   static constexpr bool recomputed = gather_type::recomputed;  ///< whether hits are decided again
   static constexpr int bands = gather_type::bands,             ///< SH functions

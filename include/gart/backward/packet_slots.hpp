@@ -1,10 +1,10 @@
 #pragma once
 /// \file
-/// The slots (backward/lt_slot.hpp) of a Gaussian's hits with a packet's rays (trace/packet_walk.hpp): those of a row
+/// The slots (backward/hit_slot.hpp) of a Gaussian's hits with a packet's rays (trace/packet_walk.hpp): those of a row
 /// of pixels lie one after another, rows the width of the cell apart.
 
-#include <gart/backward/lt_layout.hpp>
-#include <gart/backward/lt_slot.hpp>
+#include <gart/backward/hit_layout.hpp>
+#include <gart/backward/hit_slot.hpp>
 #include <gart/trace/packet_cell.hpp>
 
 #include <type_traits>
@@ -68,7 +68,7 @@ class packet_slots {
   GART_INLINE void write(Entry* slots, lane_mask hits, vec3_of<lanes> const& opaque, lanes weight,
                          vec3_of<lanes> const& unclamped) const {
     hits &= inside;
-    if constexpr (std::is_same_v<Entry, lt_entry>) {
+    if constexpr (std::is_same_v<Entry, hit_entry>) {
       lanes const from[4] = {Entry::signed_by(opaque.x, unclamped.x), Entry::signed_by(opaque.y, unclamped.y),
                              Entry::signed_by(opaque.z, unclamped.z), weight};
       write_fours(reinterpret_cast<float*>(slots) + 4 * first_, std::ptrdiff_t{4} * width_, hits, from);
@@ -102,7 +102,7 @@ class packet_slots {
   template <bool Geometry, class Entry>
   GART_INLINE packet_entries read(Entry const* slots, lane_mask hits) const {
     packet_entries out;
-    if constexpr (std::is_same_v<Entry, lt_entry>) {
+    if constexpr (std::is_same_v<Entry, hit_entry>) {
       lanes to[4];
       read_fours(reinterpret_cast<float const*>(slots) + 4 * first_, std::ptrdiff_t{4} * width_, hits, to);
       for (int c = 0; c < 3; ++c) out.opaque[c] = magnitude(to[c]), out.clamped[c] = negative(to[c]);

@@ -3,7 +3,7 @@
 /// The backward strategies, and the one list of them: the program, the benchmarks and the tests take them from here.
 
 #include <gart/backward/depth.hpp>
-#include <gart/backward/record_lt.hpp>
+#include <gart/backward/record_slots.hpp>
 #include <gart/backward/strategy.hpp>
 
 #include <array>
@@ -29,7 +29,7 @@ struct hybrid_strategy : strategy_base {
   static constexpr char const* name = "hybrid";  ///< as requests have it
   /// The weight.
   template <int Size>
-  using record = record_lt<weight_entry, Size>;
+  using record = record_slots<weight_entry, Size>;
   using gather = terms<color>;      ///< by primitive
   using scatter = terms<geometry>;  ///< by pixel
   using fallback = pixel_strategy;  ///< it needs no room
@@ -41,18 +41,18 @@ struct primitive_strategy : strategy_base {
   static constexpr slot_validity validity = slot_validity::recomputed;  ///< nothing is cleared
   /// V and the weight.
   template <int Size>
-  using record = record_lt<lt_entry, Size>;
+  using record = record_slots<hit_entry, Size>;
   using gather = terms<color, geometry>;  ///< all
   using scatter = terms<>;                ///< nothing
   using fallback = hybrid_strategy;       ///< a quarter of the room
 };
 
-/// The primitive strategy with slots of another format (backward/lt_slot.hpp): less memory for less exact gradients.
+/// The primitive strategy with slots of another format (backward/hit_slot.hpp): less memory for less exact gradients.
 template <class Entry>
 struct primitive_strategy_in : primitive_strategy {
   /// Of that format.
   template <int Size>
-  using record = record_lt<Entry, Size>;
+  using record = record_slots<Entry, Size>;
 };
 
 /// The primitive strategy with its sums in a fixed order.
@@ -103,6 +103,6 @@ using strategies = strategy_list<pixel_strategy, hybrid_strategy, deterministic_
 /// Their names, in that order.
 inline std::vector<std::string> strategy_names() { return {strategies::names.begin(), strategies::names.end()}; }
 
-static_assert(strategy<primitive_strategy_in<lt_half_entry>>);
+static_assert(strategy<primitive_strategy_in<half_hit_entry>>);
 
 }}  // namespace gart::GART_ISA

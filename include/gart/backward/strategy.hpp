@@ -11,10 +11,10 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// How a slot of the LT buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN before
-/// every forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held against the
-/// last hit of its ray: the same decision, bit for bit, with nothing to clear. It measured better on a device and on a
-/// host (docs/backward.md).
+/// How a slot of the hit buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN
+/// before every forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held
+/// against the last hit of its ray: the same decision, bit for bit, with nothing to clear. It measured better on a
+/// device and on a host (docs/backward.md).
 enum class slot_validity { cleared, recomputed };
 
 /// What a strategy has unless it says otherwise.
@@ -22,7 +22,7 @@ struct strategy_base {
   static constexpr bool ordered = false;       ///< sums in a fixed order: the same bits in every run
   static constexpr bool lane_by_lane = false;  ///< by the plain gather, whatever the policy (backward/gather_form.hpp)
   static constexpr slot_validity validity = slot_validity::cleared;  ///< how slots that are hits are told
-  using fallback = void;  ///< the strategy that a step is done by where the LT buffer has no room
+  using fallback = void;  ///< the strategy that a step is done by where the hit buffer has no room
 };
 
 /// A backward strategy, by these members.

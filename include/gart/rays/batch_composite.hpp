@@ -4,7 +4,7 @@
 /// (render/composite.hpp), with the distances and Gaussians that a sensor asks for besides. One program serves all SH
 /// degrees: coefficients are read in their stride.
 
-#include <gart/backward/lt_slot.hpp>
+#include <gart/backward/hit_slot.hpp>
 #include <gart/channels/hit_table.hpp>
 #include <gart/math/blend.hpp>
 #include <gart/math/sh.hpp>
@@ -49,16 +49,16 @@ struct keep_hits {
     u64 at = 0;    ///< place
     u32 left = 0;  ///< places
   };
-  u64* keys = nullptr;          ///< [capacity]: Gaussian << ray_bits | ray
-  lt_entry* entries = nullptr;  ///< [capacity]
-  float* depths = nullptr;      ///< [capacity]: the depth that the ray would have if the hit were opaque
-  u64* used = nullptr;          ///< places that rays have taken
-  u64 capacity = 0;             ///< a multiple of run
-  int ray_bits = 0;             ///< of a ray's number
-  u64 no_key = 0;               ///< of a place without a hit; past all others
+  u64* keys = nullptr;           ///< [capacity]: Gaussian << ray_bits | ray
+  hit_entry* entries = nullptr;  ///< [capacity]
+  float* depths = nullptr;       ///< [capacity]: the depth that the ray would have if the hit were opaque
+  u64* used = nullptr;           ///< places that rays have taken
+  u64 capacity = 0;              ///< a multiple of run
+  int ray_bits = 0;              ///< of a ray's number
+  u64 no_key = 0;                ///< of a place without a hit; past all others
 
   /// Keeps a hit of a ray.
-  GART_KERNEL GART_INLINE void keep(state& s, index_t ray_number, u32 id, lt_entry const& entry, float depth) const {
+  GART_KERNEL GART_INLINE void keep(state& s, index_t ray_number, u32 id, hit_entry const& entry, float depth) const {
     if (s.left == 0) s.at = E::atomic_add(used, u64{run}), s.left = run;
     if (s.at < capacity) {
       keys[s.at] = u64{id} << ray_bits | ray_number;
@@ -118,7 +118,7 @@ struct batch_composite : ray_program_base {
     [[maybe_unused]] vec3 const opaque = opaque_color(c, s.color, s.transmittance);
     [[maybe_unused]] float const depth = opaque_depth(h.t, s.depth, s.transmittance);
     float const weight = blend(h.alpha, h.t, c, s.color, s.depth, s.transmittance);
-    if constexpr (Keep::any) keep.keep(s.kept, s.number, h.id, lt_entry::of(opaque, weight, unclamped), depth);
+    if constexpr (Keep::any) keep.keep(s.kept, s.number, h.id, hit_entry::of(opaque, weight, unclamped), depth);
     if (s.hits++ == 0) s.first = h.t, s.first_id = h.id;
     if (s.median_id == no_gaussian && s.transmittance < 0.5f) s.median = h.t, s.median_id = h.id;
     if (weight > s.top_weight) s.top_weight = weight, s.top_id = h.id;

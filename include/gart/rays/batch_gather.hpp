@@ -23,14 +23,14 @@ struct kept_batch {
   /// None yet.
   explicit kept_batch(E& exec) : keys(exec), entries(exec), depths(exec), places(exec), used(exec) {}
 
-  buffer<u64, E> keys;          ///< Gaussian << ray_bits | ray
-  buffer<lt_entry, E> entries;  ///< by place
-  buffer<float, E> depths;      ///< by place
-  buffer<u32, E> places;        ///< by sorted position
-  buffer<u64, E> used;          ///< [1]: places that rays took
-  u64 count = 0;                ///< places, with those that hold no hit
-  int ray_bits = 0;             ///< of a key
-  bool sorted = false;          ///< keys are in order, and places with them
+  buffer<u64, E> keys;           ///< Gaussian << ray_bits | ray
+  buffer<hit_entry, E> entries;  ///< by place
+  buffer<float, E> depths;       ///< by place
+  buffer<u32, E> places;         ///< by sorted position
+  buffer<u64, E> used;           ///< [1]: places that rays took
+  u64 count = 0;                 ///< places, with those that hold no hit
+  int ray_bits = 0;              ///< of a key
+  bool sorted = false;           ///< keys are in order, and places with them
 };
 
 namespace ray_kernels {
@@ -81,7 +81,7 @@ struct sum_piece {
   static constexpr int bands = sh_basis<color_rows::most>::size;
   u64 const* keys;
   u32 const* places;
-  lt_entry const* entries;
+  hit_entry const* entries;
   float const* depths;
   u32 const *firsts, *ends;
   int ray_bits;
@@ -115,7 +115,7 @@ struct sum_piece {
   GART_HD GART_INLINE void add(u32 k, ray_gaussian const& gaussian, float (&color)[3 * bands],
                                float (&moment)[moment_stride]) const {
     u32 const place = places[k];
-    lt_entry const entry = entries[place];
+    hit_entry const entry = entries[place];
     differentiated_ray const from = rays[keys[k] & ((u64{1} << ray_bits) - 1)];
     vec3 const g = from.by_color, opaque = entry.color();
     float const w = entry.weight();

@@ -4,7 +4,7 @@
 /// gradient to its Gaussian, atomically, and keeps the sums that are its own: dL/d its origin and its direction, which
 /// colours turn with. Formulas are those of math/hit_gradient.hpp and math/sh_turn.hpp.
 
-#include <gart/backward/lt_slot.hpp>
+#include <gart/backward/hit_slot.hpp>
 #include <gart/math/hit_gradient.hpp>
 #include <gart/math/sh_turn.hpp>
 #include <gart/rays/batch_composite.hpp>

@@ -48,7 +48,7 @@ class compiled_session final : public session {
     return exec_.profile;
   }
   std::size_t peak_bytes() const override { return exec_.memory.peak; }
-  std::size_t lt_bytes() const override { return trainer_.lt_bytes(); }
+  std::size_t hit_buffer_bytes() const override { return trainer_.hit_buffer_bytes(); }
   u64 sent_bytes() const override { return trainer_.sent_bytes(); }
   configuration_info configuration() const override {
     return configuration_of<E, Traits, Tracer, Strategy, Comm>(trainer_.degree());

@@ -168,7 +168,7 @@ class compiled_renderer final : public renderer {
     return exec_.profile;
   }
   std::size_t peak_bytes() const override { return exec_.memory.peak + (rays_ ? rays_->peak_bytes() : 0); }
-  std::size_t lt_bytes() const override { return pass_.lt_bytes(); }
+  std::size_t hit_buffer_bytes() const override { return pass_.hit_buffer_bytes(); }
   configuration_info configuration() const override { return configuration_of<E, Traits, Tracer, Strategy>(degree_); }
 
  private:

@@ -22,8 +22,8 @@ configuration_info configuration_of(int sh_degree = Traits::sh_degree) {
   configuration.backward = Strategy::name;
   configuration.sh_degree = sh_degree, configuration.stored_degree = Traits::sh_degree;
   configuration.kernel_degree = response::degree;
-  configuration.lt_format =
-      from_string(Strategy::template record<Tracer::tile_size>::entry::name, lt_format_kind::none);
+  configuration.hit_format =
+      from_string(Strategy::template record<Tracer::tile_size>::entry::name, hit_format_kind::none);
   configuration.depth = has_depth<Strategy>;
   configuration.ranks = !Comm::alone;
   if constexpr (!E::device) configuration.instruction_set = instruction_set;

@@ -25,12 +25,12 @@ constexpr auto names_of(tracer_kind) {
       {{automatic, "auto"}, {bvh, "bvh"}, {embree, "embree"}, {tiles, "tiles"}, {own, "own"}}};
 }
 
-/// What the forward pass leaves of a hit (backward/lt_slot.hpp): nothing for pixel, its weight for hybrid.
-enum class lt_format_kind { automatic, float4, half, weight, none };
+/// What the forward pass leaves of a hit (backward/hit_slot.hpp): nothing for pixel, its weight for hybrid.
+enum class hit_format_kind { automatic, float4, half, weight, none };
 /// Their names.
-constexpr auto names_of(lt_format_kind) {
-  using enum lt_format_kind;
-  return std::array<name_of<lt_format_kind>, 5>{
+constexpr auto names_of(hit_format_kind) {
+  using enum hit_format_kind;
+  return std::array<name_of<hit_format_kind>, 5>{
       {{automatic, "auto"}, {float4, "float4"}, {half, "half"}, {weight, "weight"}, {none, "none"}}};
 }
 

@@ -102,7 +102,8 @@ class renderer {
   virtual profiler& profile() = 0;
   /// Most bytes of the policy's memory that were in use at a time.
   virtual std::size_t peak_bytes() const = 0;
-  virtual std::size_t lt_bytes() const = 0;  ///< of the last differentiate; 0 where the strategy records nothing
+  virtual std::size_t hit_buffer_bytes()
+      const = 0;  ///< of the last differentiate; 0 where the strategy records nothing
   /// What was chosen for the request.
   virtual configuration_info configuration() const = 0;
 };

@@ -20,7 +20,7 @@ struct configuration_request {
   std::string backward = "auto";  ///< a strategy by its name (backward/strategies.hpp), or one of a program's own
   int sh_degree = 3;              ///< of the spherical harmonics of colour, 0 to 3
   int kernel_degree = 2;          ///< of the generalised Gaussians (math/response.hpp)
-  lt_format_kind lt_format = lt_format_kind::automatic;  ///< of the slots of the LT buffer
+  hit_format_kind hit_format = hit_format_kind::automatic;  ///< of the slots of the hit buffer
   bool depth = false;  ///< gradients of depth and transmittance too; training by depth_weight asks for it itself
   int threads = 0;     ///< of the openmp policy; 0: as many as OpenMP gives
   int device = 0;      ///< of the cuda policy; ranks take a host's GPUs in turn
@@ -39,9 +39,9 @@ struct configuration_info {
   int sh_degree = 3;      ///< of the model's coefficients; of compiled_configurations() the highest
   int stored_degree = 3;  ///< that rows of coefficients have room for in the policy's memory
   int kernel_degree = 2;  ///< of the generalised Gaussians
-  lt_format_kind lt_format = lt_format_kind::none;  ///< of the slots of the LT buffer
-  bool depth = false;                               ///< gradients of depth and transmittance too
-  bool ranks = false;                               ///< trains on several ranks
+  hit_format_kind hit_format = hit_format_kind::none;  ///< of the slots of the hit buffer
+  bool depth = false;                                  ///< gradients of depth and transmittance too
+  bool ranks = false;                                  ///< trains on several ranks
   std::string instruction_set = "";  ///< that a host configuration was compiled for (core/isa.hpp); empty on a device
 };
 

@@ -70,8 +70,8 @@ class session {
   virtual profiler& profile() = 0;
   /// Most bytes of the policy's memory that were in use at a time.
   virtual std::size_t peak_bytes() const = 0;
-  virtual std::size_t lt_bytes() const = 0;     ///< of the last step; 0 where the strategy records nothing
-  virtual u64 sent_bytes() const { return 0; }  ///< sent by this rank to others in its steps
+  virtual std::size_t hit_buffer_bytes() const = 0;  ///< of the last step; 0 where the strategy records nothing
+  virtual u64 sent_bytes() const { return 0; }       ///< sent by this rank to others in its steps
   /// What was chosen for the request.
   virtual configuration_info configuration() const = 0;
 };

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The footprints of all Gaussians in one view: boxes with their place in the LT buffer, near depths, and how many
+/// The footprints of all Gaussians in one view: boxes with their place in the hit buffer, near depths, and how many
 /// (primitive, tile) pairs they make. Cost: one launch of double arithmetic over the Gaussians, and through a lens
 /// another over what it shows large, two prefix sums, and one read of two totals by the host, from which buffers are
 /// sized.

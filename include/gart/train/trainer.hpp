@@ -143,8 +143,8 @@ class basic_trainer {
     for (auto const& part : parts_) view = part->through(view);
     return view;
   }
-  std::size_t lt_bytes() const { return progress_.lt_bytes; }  ///< of the last step
-  u64 sent_bytes() const { return progress_.sent; }            ///< sent by this rank to others in its steps
+  std::size_t hit_buffer_bytes() const { return progress_.hit_buffer_bytes; }  ///< of the last step
+  u64 sent_bytes() const { return progress_.sent; }  ///< sent by this rank to others in its steps
   /// The Gaussians, in the policy's memory, in rows of sh_degree.
   gaussians<E> const& scene() const { return gaussians_.model; }
   /// The same, to be changed.
@@ -222,7 +222,7 @@ class basic_trainer {
   };
   struct progress {
     int step = 0;
-    std::size_t lt_bytes = 0;
+    std::size_t hit_buffer_bytes = 0;
     u64 sent = 0;
     training_hooks<E> hooks = {};
   };

@@ -93,7 +93,7 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_on(Plan& plan
   learning_rates rates = rates_at(options_.rates, data_.extent, before, iterations);
   if (progress_.hooks.rates) progress_.hooks.rates(rates, before);
   step_report report;
-  progress_.lt_bytes = 0;
+  progress_.hit_buffer_bytes = 0;
   plan.begin_step();
   std::size_t const width = numbers(parts_.size());
   image_.numbers.resize(width * static_cast<std::size_t>(batch)), image_.numbers.zero();
@@ -256,7 +256,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace(Plan& plan, loss_fu
     plan.sum(frame, pass, image_, gaussians_.gradients);
     after_backward(&frame);
     plan.give_back(frame, pass, render.antialias);
-    progress_.lt_bytes = std::max(progress_.lt_bytes, pass.lt_bytes()), report.backward = Pass::strategy_type::name;
+    progress_.hit_buffer_bytes = std::max(progress_.hit_buffer_bytes, pass.hit_buffer_bytes()),
+    report.backward = Pass::strategy_type::name;
   });
 }
 

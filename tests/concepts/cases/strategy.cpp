@@ -4,7 +4,7 @@
 struct colors : gart::strategy_base {
   static constexpr char const* name = "colors";
   template <int Size>
-  using record = gart::record_lt<gart::lt_entry, Size>;
+  using record = gart::record_slots<gart::hit_entry, Size>;
   using gather = gart::terms<gart::color>;
 #ifdef GART_WHOLE
   using scatter = gart::terms<gart::geometry>;

@@ -5,7 +5,7 @@
 struct twice : gart::strategy_base {
   static constexpr char const* name = "twice";
   template <int Size>
-  using record = gart::record_lt<gart::lt_entry, Size>;
+  using record = gart::record_slots<gart::hit_entry, Size>;
   using gather = gart::terms<gart::color, gart::geometry>;
 #ifdef GART_WHOLE
   using scatter = gart::terms<>;

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Where the slot of (primitive, tile, pixel) lies in the LT buffer: primitive-major, then tile, then pixel,
+/// Where the slot of (primitive, tile, pixel) lies in the hit buffer: primitive-major, then tile, then pixel,
 ///   idx(i, t, p) = O_primitive(i) + O_tile(i, t) + O_pixel(i, t, p).
 /// O_primitive is a prefix sum of box areas in 64 bits; the rest is a closed form of the box: the tiles of a box are
 /// its cells cut by the grid's lines, row by row, and each holds its pixels row by row. A bijection onto [0, sum of
@@ -67,7 +67,7 @@ GART_HD constexpr pixel_box cell_of(footprint_slots const& range, u32 x, u32 y) 
 
 /// The slot of pixel (x, y), which must lie in the box.
 template <int Size>
-GART_HD constexpr u64 lt_index(footprint_slots const& range, u32 x, u32 y) {
+GART_HD constexpr u64 hit_slot_index(footprint_slots const& range, u32 x, u32 y) {
   pixel_box const cell = cell_of<Size>(range, x, y);
   return range.offset + tile_offset(range, cell) + pixel_offset(cell, x, y);
 }

@@ -1,4 +1,4 @@
-// What a slot of the LT buffer keeps of a hit in each format, and what that costs in gradients, against the oracle.
+// What a slot of the hit buffer keeps of a hit in each format, and what that costs in gradients, against the oracle.
 #include <render/agreement.hpp>
 #include <support/trace_scene.hpp>
 
@@ -92,26 +92,26 @@ void check_gradients(E& exec, double usual, double opaque) {
 
 TEST_CASE("a slot keeps what its format says") {
   CAPTURE(seed());
-  auto const exact = slot_error<gart::lt_entry>(1e6f, 1e-6f);
+  auto const exact = slot_error<gart::hit_entry>(1e6f, 1e-6f);
   CHECK(exact.color == 0);
   CHECK(exact.weight == 0);
   CHECK(exact.clamps);
-  auto const half = slot_error<gart::lt_half_entry>(60000.0f, std::exp2(-14.0f));
+  auto const half = slot_error<gart::half_hit_entry>(60000.0f, std::exp2(-14.0f));
   CHECK(half.color <= std::exp2(-11.0));
   CHECK(half.weight <= std::exp2(-11.0));
   CHECK(half.clamps);
-  CHECK(gart::lt_half_entry::of(gart::vec3(1e30f), 1, gart::vec3(1.0f)).color().x == 65504.0f);
-  CHECK(cleared_is_not_written<gart::lt_entry>());
-  CHECK(cleared_is_not_written<gart::lt_half_entry>());
+  CHECK(gart::half_hit_entry::of(gart::vec3(1e30f), 1, gart::vec3(1.0f)).color().x == 65504.0f);
+  CHECK(cleared_is_not_written<gart::hit_entry>());
+  CHECK(cleared_is_not_written<gart::half_hit_entry>());
   CHECK(cleared_is_not_written<gart::weight_entry>());
-  CHECK(sizeof(gart::lt_half_entry) == 8);
+  CHECK(sizeof(gart::half_hit_entry) == 8);
 }
 
-TEST_CASE_TEMPLATE("gradients by each LT format hold the error it is known for", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("gradients by each hit format hold the error it is known for", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
   // Over 60 seeds the worst were 2.3e-4 and 1.4e-4, 4.4e-3 and 0.07.
-  check_gradients<gart::lt_entry>(exec, 5e-4, 5e-4);
-  check_gradients<gart::lt_half_entry>(exec, 1e-2, 0.15);
+  check_gradients<gart::hit_entry>(exec, 5e-4, 5e-4);
+  check_gradients<gart::half_hit_entry>(exec, 1e-2, 0.15);
 }

@@ -1,23 +1,23 @@
 #pragma once
 /// \file
-/// What the primitive and hybrid strategies record of a hit: a slot (backward/lt_slot.hpp) at its place in the LT
-/// buffer (backward/lt_layout.hpp).
+/// What the primitive and hybrid strategies record of a hit: a slot (backward/hit_slot.hpp) at its place in the hit
+/// buffer (backward/hit_layout.hpp), which the 3DGART paper calls LT.
 
-#include <gart/backward/lt_layout.hpp>
-#include <gart/backward/lt_slot.hpp>
+#include <gart/backward/hit_layout.hpp>
+#include <gart/backward/hit_slot.hpp>
 #include <gart/backward/packet_slots.hpp>
 #include <gart/render/record.hpp>
 
 namespace gart { inline namespace GART_ISA {
 
-/// The record of an LT buffer with slots of Entry, of tiles of Size pixels a side.
+/// The record of a hit buffer with slots of Entry, of tiles of Size pixels a side.
 template <class Entry, int Size>
-struct record_lt {
+struct record_slots {
   using entry = Entry;      ///< a slot
   using cell = tile_slots;  ///< finds a pair's slots
   /// [N]: boxes, and where their slots begin.
   footprint_slots const* ranges = nullptr;
-  Entry* slots = nullptr;  ///< the LT buffer
+  Entry* slots = nullptr;  ///< the hit buffer
 
   static constexpr bool any = true;     ///< something is left
   static constexpr bool depth = false;  ///< of depth nothing
@@ -27,7 +27,7 @@ struct record_lt {
     pixel_box const& b = range.box;
     u32 const x = static_cast<u32>(at.x), y = static_cast<u32>(at.y), column = x + range.columns_past(x + 1);
     if (column < b.x0 || column >= b.x1 || y < b.y0 || y >= b.y1) return tile_slots::none;
-    return static_cast<u32>(lt_index<Size>(range, x, y));
+    return static_cast<u32>(hit_slot_index<Size>(range, x, y));
   }
   /// Writes the slot of a hit: the opaque colour V, the weight and the clamps.
   GART_HD GART_INLINE void operator()(u32 place, vec3 const& opaque, float weight, vec3 const& unclamped) const {
@@ -51,6 +51,6 @@ struct record_lt {
   }
 #endif
 };
-static_assert(hit_record<record_lt<lt_entry, 8>>);
+static_assert(hit_record<record_slots<hit_entry, 8>>);
 
 }}  // namespace gart::GART_ISA

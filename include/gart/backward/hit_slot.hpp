@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// What a slot of the LT buffer holds of a hit, one struct a format: the forward pass packs (of), the gather unpacks.
+/// What a slot of the hit buffer holds of a hit, one struct a format: the forward pass packs (of), the gather unpacks.
 /// V, the colour that the pixel would have if the hit were opaque, is what the gradient of alpha needs
 /// (math/hit_gradient.hpp); the weight w = T alpha what the gradient of colour needs, with, for each channel of the
 /// hit's colour, whether it was clamped at zero.
@@ -40,13 +40,13 @@ GART_HD GART_INLINE float from_half(u32 half) {
 }  // namespace detail
 
 /// The format float4: exact.
-struct alignas(16) lt_entry {
+struct alignas(16) hit_entry {
   static constexpr char const* name = "float4";  ///< in configurations and reports
   float r, g, b;                                 ///< V; negative where the hit's colour was clamped
   float w;                                       ///< the weight; a NaN: not written
 
   /// Packs V, the weight and the clamps of the colour `c`, which is that before the clamp.
-  GART_HD GART_INLINE static lt_entry of(vec3 const& v, float weight, vec3 const& c) {
+  GART_HD GART_INLINE static hit_entry of(vec3 const& v, float weight, vec3 const& c) {
     return {signed_by(v.x, c.x), signed_by(v.y, c.y), signed_by(v.z, c.z), weight};
   }
   /// Whether a hit wrote it, of a buffer that was cleared.
@@ -69,12 +69,12 @@ struct alignas(16) lt_entry {
 };
 
 /// The format half.
-struct alignas(8) lt_half_entry {
+struct alignas(8) half_hit_entry {
   static constexpr char const* name = "half";  ///< in configurations and reports
   u32 rg, bw;  ///< r in the low half of rg, b in that of bw, the weight in its high half; sign bits of r, g, b: clamped
 
-  /// As lt_entry::of.
-  GART_HD GART_INLINE static lt_half_entry of(vec3 const& v, float weight, vec3 const& c) {
+  /// As hit_entry::of.
+  GART_HD GART_INLINE static half_hit_entry of(vec3 const& v, float weight, vec3 const& c) {
     u32 const clamps = detail::clamps_of(c);
     return {half_of(v.x) | half_of(v.y) << 16 | (clamps & 1u) << 15 | (clamps & 2u) << 30,
             half_of(v.z) | half_of(mul(weight, 32768.0f)) << 16 | (clamps & 4u) << 13};
