@@ -27,7 +27,8 @@ bool progress::due(double share) const {
   if (last_share_ < 0 || share < last_share_) return true;
   double const seconds = std::chrono::duration<double>(clock::now() - last_time_).count();
   if (terminal_) return seconds >= 0.1 || share >= 1;
-  return seconds >= 30 || share - last_share_ >= 0.1 - 1e-9 || (share >= 1 && last_share_ < 1);
+  // A log has a line each tenth of the work, but none for what takes no time.
+  return seconds >= 30 || (seconds >= 1 && share - last_share_ >= 0.1 - 1e-9) || (share >= 1 && last_share_ < 1);
 }
 
 void progress::state(std::string const& text, double share) {

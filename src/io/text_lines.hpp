@@ -70,7 +70,9 @@ class text_lines {
   // Nothing is left of the line; `record` says what ends here.
   void end(std::string const& record) {
     std::string_view const w = next_word(line_);
-    if (!w.empty()) refuse(record + " ends before '" + std::string(w.substr(0, 40)) + "'");
+    if (!w.empty())
+      refuse(record + " is followed by '" + std::string(w.substr(0, 40)) + "'",
+             "take out what follows, or export the file again");
   }
   [[noreturn]] void refuse(std::string const& what,
                            std::string const& remedy = "the file is truncated or damaged: export it again") const {

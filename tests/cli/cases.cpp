@@ -215,7 +215,7 @@ TEST_CASE("captures as people have them") {
     c.lens = "1 RADIAL 24 18 20 12 9 0 0 0.3";
     c.write(at);
     std::string const what = refused([&] { load(at); });
-    CHECK_MESSAGE(has(what, "cameras.txt, line 2: camera 1, RADIAL of 5 parameters, ends before '0.3'"), what);
+    CHECK_MESSAGE(has(what, "cameras.txt, line 2: camera 1, RADIAL of 5 parameters, is followed by '0.3'"), what);
     auto const run = here.gart("train capture --out run --iterations 1 --backend serial");
     CHECK(run.code == 1);
     CHECK(has(run.err, "RADIAL"));
