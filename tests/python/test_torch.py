@@ -10,6 +10,7 @@ if importlib.util.find_spec("torch") is None:
     raise unittest.SkipTest("no torch (python3-torch)")
 import gart.torch
 import torch
+from gart.torch import _rasterization
 
 
 
@@ -120,10 +121,89 @@ class Torch(unittest.TestCase):
                     return loss(*[values if j == k else r.detach() for j, r in enumerate(rays)]).item()
             self.assert_close(rays[k].grad, finite_differences(moved, rays[k], 5e-3), 0.05)
 
+    def test_gradients_of_features_are_finite_differences(self):
+        """Of features of any sign beside colour, transmittance and depth, by every input. By definition features are
+        colours of degree 0 that were shifted to be positive."""
+        arrays, view, wide = tensors(n=4, degree=0), scenes.camera(24, 20), 5
+        with torch.no_grad():
+            arrays[0][:, 2] = torch.tensor([2.0, -1.5, 0.5, 4.0])
+            arrays[1] -= 0.3
+        random = np.random.default_rng(8)
+        arrays.append(torch.from_numpy(random.uniform(-1, 1, (4, wide)).astype(np.float32)).requires_grad_())
+        weights = [random.normal(0, 1, s) for s in ((20, 24, 3), (20, 24), (20, 24), (20, 24, wide))]
+
+        def loss(images):
+            return sum((torch.from_numpy(w) * image.double()).sum() for w, image in zip(weights, images))
+
+        def by_definition(values=None, at=None):
+            *numbers, features = [values if k == at else a.detach() for k, a in enumerate(arrays)]
+            got = gart.reference(gart.Model(*numbers), view, **scenes.SMOOTH)
+            out = sum((w * got[name]).sum() for w, name in zip(weights, ("color", "transmittance", "depth")))
+            for first in (0, wide - 3):
+                shifted = (features[:, first:first + 3] + 2 - 0.5) / 0.28209479177387814
+                numbers[4] = shifted.unsqueeze(1).contiguous()
+                seen = gart.reference(gart.Model(*numbers), view, **{**scenes.SMOOTH, "background": (0, 0, 0)})
+                image = seen["color"] - 2 * (1 - seen["transmittance"][..., None])
+                part = weights[3][..., first:first + 3] * ([1, 1, 1] if first == 0 else [0, 1, 1])
+                out += (part * image).sum()
+            return out
+
+        images = gart.torch.render(*arrays[:5], view, features=arrays[5], **scenes.SMOOTH)
+        self.assertEqual(images[3].shape, (20, 24, wide))
+        self.assertAlmostEqual(loss(images).item(), float(by_definition()), delta=2e-3)
+        loss(images).backward()
+        for k, array in enumerate(arrays):
+            self.assert_close(array.grad, finite_differences(lambda v: by_definition(v, k), array, 2e-3))
+
+        # The same rays as a batch, and features alone.
+        whole = [a.grad.double() for a in arrays]
+        for a in arrays:
+            a.grad = None
+        rays = _rasterization._rays(self.matrix_and_pose(view)[0], torch.from_numpy(scenes.C2W), 24, 20)
+        seen = gart.torch.trace(*arrays[:5], *rays, features=arrays[5], **scenes.SMOOTH)
+        loss([s.reshape(20, 24, *s.shape[1:]) for s in seen]).backward()
+        for array, expected in zip(arrays, whole):
+            self.assert_close(array.grad, expected, 2e-3)
+        alone = arrays[5].detach().clone().requires_grad_()
+        loss(gart.torch.render(*[a.detach() for a in arrays[:5]], view, features=alone, **scenes.SMOOTH)).backward()
+        self.assert_close(alone.grad, whole[5], 1e-4)
+
+    def test_rays_have_gradients_by_features(self):
+        arrays = tensors(n=4, degree=0)
+        with torch.no_grad():
+            arrays[0][:, 2] = torch.tensor([2.0, -1.5, 0.5, 4.0])
+            arrays[1] += 0.5
+        random = np.random.default_rng(6)
+        origins = torch.tensor(random.normal(0, 0.3, (12, 3)) - [0, 0, 5], dtype=torch.float32)
+        directions = torch.tensor(random.normal(0, 0.1, (12, 3)) + [0, 0, 1.3], dtype=torch.float32)
+        weight = torch.from_numpy(random.normal(0, 1, (12, 7)))
+        features = torch.from_numpy(random.normal(0, 1, (4, 7)).astype(np.float32))
+
+        def loss(directions, origins):
+            seen = gart.torch.trace(*arrays, directions, origins, features=features, **scenes.SMOOTH)
+            return (weight * seen[3].double()).sum()
+
+        rays = [directions.requires_grad_(), origins.requires_grad_()]
+        loss(*rays).backward()
+        for k in range(2):
+            def moved(values):
+                with torch.no_grad():
+                    return loss(*[values if j == k else r.detach() for j, r in enumerate(rays)]).item()
+            self.assert_close(rays[k].grad, finite_differences(moved, rays[k], 5e-3), 0.05)
+
     def test_tensors_are_refused_by_name(self):
         arrays = tensors()
         with self.assertRaisesRegex(gart.InvalidArgument, "log_scale must be float32"):
             gart.torch.render(arrays[0], arrays[1].double(), *arrays[2:], scenes.camera())
+        with self.assertRaisesRegex(gart.InvalidArgument, r"features must be \[N, F\] with the Gaussians' N, 40; they are"):
+            gart.torch.render(*arrays, scenes.camera(), features=torch.zeros(41, 4))
+        views, k = torch.eye(4).expand(2, 4, 4), torch.eye(3).expand(2, 3, 3)
+        gaussians = arrays[0], arrays[2], arrays[1].exp(), torch.sigmoid(arrays[3])
+        for shape in ((41, 4), (3, 40, 4), (40,)):
+            with self.assertRaisesRegex(gart.InvalidArgument, r"colors must be \[N, D\] or \[C, N, D\]"):
+                gart.torch.rasterization(*gaussians, torch.zeros(shape), views, k, 8, 8)
+        with self.assertRaisesRegex(gart.InvalidArgument, "sh_degree 2 needs colors of 9 coefficients"):
+            gart.torch.rasterization(*gaussians, arrays[4], views, k, 8, 8, sh_degree=2)
 
     def test_rasterization_is_render(self):
         mean, log_scale, quaternion, opacity, sh = tensors()
@@ -160,6 +240,20 @@ class Torch(unittest.TestCase):
         # A feature's gradient is the sum of its weights, alike for all of them.
         np.testing.assert_allclose(features.grad[:, 0], features.grad[:, 4], rtol=1e-3, atol=1e-3)
 
+        # Of any sign, of each view, and in more than one pass: all of them are linear in the features.
+        with torch.no_grad():
+            one = gart.torch.rasterization(*gaussians, features, w2c, k, 40, 32)[0]
+            shifts = torch.tensor([-3.0, 0.5])
+            each = torch.stack([features + shift for shift in shifts])
+            seen = gart.torch.rasterization(*gaussians, each, w2c, k, 40, 32, render_mode="RGB+D")[0]
+            self.assertEqual(seen.shape, (2, 32, 40, 6))
+            np.testing.assert_allclose(seen[..., :5], one + shifts[:, None, None, None] * alphas, atol=2e-5)
+            wide = torch.randn(40, 515, generator=torch.Generator().manual_seed(3))
+            seen = gart.torch.rasterization(*gaussians, wide, w2c[:1], k[:1], 40, 32)[0]
+            for channel in (0, 511, 514):
+                alone = gart.torch.rasterization(*gaussians, wide[:, channel:channel + 1], w2c[:1], k[:1], 40, 32)[0]
+                np.testing.assert_allclose(seen[..., channel:channel + 1], alone, atol=1e-6)
+
     def matrix_and_pose(self, view):
         k = torch.tensor([[view.fx, 0, view.cx], [0, view.fy, view.cy], [0, 0, 1]], dtype=torch.float64)
         return k, torch.from_numpy(np.linalg.inv(scenes.C2W))
@@ -172,7 +266,7 @@ class Torch(unittest.TestCase):
         weight = torch.from_numpy(np.random.default_rng(7).normal(0, 1, (20, 24, 3)))
         k, _ = self.matrix_and_pose(view)
         k.requires_grad_()
-        rays = gart.torch._rays(k, torch.from_numpy(scenes.C2W), 24, 20)
+        rays = _rasterization._rays(k, torch.from_numpy(scenes.C2W), 24, 20)
         color = gart.torch.trace(*arrays, *rays, **scenes.SMOOTH)[0].reshape(20, 24, 3)
         np.testing.assert_allclose(color.detach(), gart.torch.render(*arrays, view, **scenes.SMOOTH)[0].detach(), atol=1e-4)
         (weight * color.double()).sum().backward()
