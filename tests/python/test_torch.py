@@ -1,6 +1,7 @@
 """gart.torch against finite differences and against the renderer; skipped without torch."""
 import importlib.util
 import unittest
+from typing import List
 
 import gart
 import numpy as np
@@ -31,6 +32,50 @@ def finite_differences(loss, values, step):
         flat[k] = at
         to[k] = (both[0][1] - both[1][1]) / (both[0][0] - both[1][0])
     return out
+
+
+class OperatorsByHand:
+    """torch.library.custom_op as it is documented: of annotated arguments to new tensors, which the fake describes."""
+
+    def __init__(self, function):
+        self.function = function
+        for name, kind in function.__annotations__.items():
+            parts = kind.__args__ if name == "return" else (kind,)
+            assert all(part in (torch.Tensor, int, bool, float, str, List[float]) for part in parts), (name, kind)
+
+    @classmethod
+    def custom_op(cls, name, *, mutates_args):
+        assert name.startswith("gart::") and mutates_args == ()
+        return cls
+
+    def register_fake(self, fake):
+        self.fake = fake
+
+    def register_autograd(self, backward, *, setup_context):
+        class Function(torch.autograd.Function):
+            @staticmethod
+            def forward(ctx, *inputs):
+                output = self.of(inputs)
+                setup_context(ctx=ctx, inputs=inputs, output=output)
+                return output
+        Function.backward = staticmethod(backward)
+        self.of_autograd = Function.apply
+
+    of_autograd = None
+
+    def of(self, inputs):
+        with torch.no_grad():
+            output, fake = self.function(*inputs), self.fake(*inputs)
+        seen = {t.storage().data_ptr() for t in inputs if isinstance(t, torch.Tensor) and t.numel()}
+        for t, expected in zip(output, fake):
+            assert (t.shape, t.stride(), t.dtype) == (expected.shape, expected.stride(), expected.dtype)
+            assert t.storage().data_ptr() not in seen
+            seen |= {t.storage().data_ptr()} if t.numel() else set()
+        assert len(output) == len(fake)
+        return output
+
+    def __call__(self, *inputs):
+        return self.of_autograd(*inputs) if self.of_autograd else self.of(inputs)
 
 
 class Torch(unittest.TestCase):
@@ -375,15 +420,50 @@ class Torch(unittest.TestCase):
         renderer.render_to(scenes.camera(), color=color)
         self.assertGreater((color - before).abs().max(), 0.05)
 
+    def test_the_operator_is_the_function(self):
+        """With torch.library's part played by a stand-in, which any torch can run."""
+        from gart.torch import _operators
+        operator, view = _operators.make(OperatorsByHand), scenes.camera(16, 12)
+        features = torch.randn(6, 4, generator=torch.Generator().manual_seed(1))
+        numbers = _operators.numbers_of(None, {"near": 0.02, "background": (0.2, 0.5, 0.9)})
+        given = gart.RenderOptions(near=0.02, background=(0.2, 0.5, 0.9))
+        np.testing.assert_array_equal(np.float32(numbers), _operators.numbers_of(given, {}))
+        with self.assertRaisesRegex(TypeError, "no option 'nearr': there are .*near"):
+            _operators.numbers_of(None, {"nearr": 1})
+        for with_features, with_pose in ((False, False), (True, True)):
+            given = [[*tensors(n=6, degree=1), features.clone().requires_grad_(),
+                      torch.from_numpy(scenes.C2W.T.copy()).T.requires_grad_()] for _ in range(2)]
+            (*one, f, pose), (*other, g, same_pose) = given
+            expected = gart.torch.render(*one, view, features=f if with_features else None,
+                                         c2w=pose if with_pose else None, near=0.02, background=(0.2, 0.5, 0.9))
+            got = operator(*other, g if with_features else torch.empty(6, 0), same_pose if with_pose else torch.empty(0),
+                           view.json(), numbers, 2)
+            for a, b in zip(expected, got):
+                np.testing.assert_array_equal(a.detach(), b.detach())
+            for images in (expected, got):
+                sum((k + 1) * image.square().sum() for k, image in enumerate(images) if k != 1).backward()
+            for a, b in zip(*given):
+                self.assertEqual(a.grad is None, b.grad is None)
+                if a.grad is not None:
+                    np.testing.assert_allclose(a.grad, b.grad, rtol=1e-4, atol=1e-5 * float(a.grad.abs().max()))
+
     @unittest.skipUnless(hasattr(torch.library, "custom_op"), "torch has no custom_op: the operators are not there")
     def test_operators_pass_torchs_own_check(self):
+        from gart.torch import _operators
         arrays, view = tensors(n=6, degree=0), scenes.camera(16, 12)
-        c2w = torch.from_numpy(scenes.C2W).requires_grad_()
-        numbers = [1 / 255, 1e-4, 0.01, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-        torch.library.opcheck(torch.ops.gart.render.default,
-                              (*arrays, c2w, view.json(), numbers, 2, view.height, view.width))
-        compiled = torch.compile(lambda *a: gart.torch.render(*a, view)[0])
-        torch.testing.assert_close(compiled(*arrays), gart.torch.render(*arrays, view)[0])
+        features = torch.randn(6, 4, generator=torch.Generator().manual_seed(1)).requires_grad_()
+        pose = torch.from_numpy(scenes.C2W).requires_grad_()
+        for f, c2w in ((features, pose), (torch.empty(6, 0), torch.empty(0))):
+            torch.library.opcheck(torch.ops.gart.render.default,
+                                  (*arrays, f, c2w, view.json(), _operators.numbers_of(None, {}), 2))
+        text = view.json()
+        compiled = torch.compile(lambda *a: gart.torch.render(*a[:5], text, features=a[5], near=0.02), fullgraph=True,
+                                 backend="aot_eager")
+        expected = gart.torch.render(*arrays, view, features=features, near=0.02)
+        for a, b in zip(compiled(*arrays, features), expected):
+            torch.testing.assert_close(a, b)
+        broken = torch.compile(lambda *a: gart.torch.render(*a, view, c2w=pose)[0], backend="aot_eager")
+        torch.testing.assert_close(broken(*arrays), gart.torch.render(*arrays, view, c2w=pose)[0])
 
 
 if __name__ == "__main__":

@@ -74,7 +74,7 @@ def make(library):
                                gradients, wanted)
         turned = out.pop("pose", None)
         return (*(out[name] for name in _passes.PARAMETERS), out.get("features", torch.empty_like(gaussians[5])),
-                torch.empty_like(c2w) if turned is None else _passes.by_c2w(c2w.detach(), turned))
+                torch.empty_like(c2w) if turned is None else _passes.by_c2w(*plain(c2w), turned))
 
     @back.register_fake
     def _(mean, log_scale, quaternion, opacity, sh, features, c2w, camera, options, kernel_degree, by_color,
