@@ -12,6 +12,7 @@ struct context {
   std::unique_ptr<gart::forward_context> it;
   std::vector<std::int64_t> shape;  // of what was shown: [H, W], or [R]
   std::vector<lent> rays;           // are read again
+  lent bound_features;              // the same
   std::int64_t features = 0;        // of a Gaussian
   ~context() {
     std::lock_guard<std::mutex> const one(owner->mutex);
@@ -35,7 +36,8 @@ std::unique_ptr<context> forward(shared_renderer const& r, gart::camera const& v
   std::vector<lent> kept;
   gart::render_targets const to = targets_of(*r, view, "Renderer.forward", targets, kept);
   auto out = std::make_unique<context>();
-  out->owner = r, out->shape = {view.height, view.width}, out->features = r->features;
+  out->owner = r, out->shape = {view.height, view.width};
+  out->features = r->features, out->bound_features = r->bound_features;
   out->it = without_gil(r->mutex, [&] { return r->it->forward(view, o, to); });
   return out;
 }
@@ -60,7 +62,7 @@ std::unique_ptr<context> forward_rays(shared_renderer const& r, py::object const
                                       py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r->usual);
   auto out = std::make_unique<context>();
-  out->owner = r, out->features = r->features;
+  out->owner = r, out->features = r->features, out->bound_features = r->bound_features;
   gart::ray_batch const rays = rays_of("Renderer.forward_rays", directions, origins, t_max, frame, r->where, out->rays);
   out->shape = {rays.count()};
   std::int64_t const n = rays.count();
@@ -145,8 +147,8 @@ void bind_contexts(py::module_& m) {
   py::class_<context>(m, "Context",
                       R"(What a forward pass leaves for its backward pass, of Renderer.forward or forward_rays.
 
-Others may run in between. Bound Gaussians and rays must stay as they are until the last backward; where the renderer has
-another model by then it raises InvalidArgument.)")
+Others may run in between. Bound Gaussians, features and rays must stay as they are until the last backward; where the
+renderer has another model by then it raises InvalidArgument.)")
       .def(
           "backward",
           [](context& c, py::object const& color, py::object const& depth, py::object const& transmittance,

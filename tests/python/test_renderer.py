@@ -1,4 +1,5 @@
 """Images and gradients against their definition in double, cameras, files, errors, threads."""
+import gc
 import pathlib
 import tempfile
 import threading
@@ -216,6 +217,25 @@ class Renderer(unittest.TestCase):
             renderer.bind_features(learned[:50])
         renderer.bind_features(None)
         self.assertNotIn("features", renderer.render(view, features=True))
+
+    def test_contexts_keep_their_features(self):
+        """Also where others were bound since, and nobody else holds those that were shown."""
+        view, renderer = scenes.camera(), gart.Renderer(sh_degree=1, backend="serial")
+        renderer.bind(*scenes.parameters())
+        gradient = np.random.default_rng(3).normal(size=(32, 40, 75)).astype(np.float32)
+        got = []
+        for others in (False, True):
+            renderer.bind_features(np.random.default_rng(4).normal(size=(40, 75)).astype(np.float32))
+            context = renderer.forward(view, features=np.empty((32, 40, 75), np.float32))
+            if others:
+                renderer.bind_features(np.zeros((40, 2), np.float32))
+                gc.collect()
+                kept = [np.full((40, 75), np.nan, np.float32) for _ in range(8)]  # where those were
+            out = {name: np.empty_like(a) for name, a in zip(NAMES, scenes.parameters())}
+            context.backward(features_gradient=gradient, **out)
+            got.append(out)
+        for name in NAMES:
+            np.testing.assert_array_equal(got[0][name], got[1][name])
 
     def test_tracking_finds_the_camera(self):
         model, truth = scenes.model(n=60), scenes.camera(80, 64)

@@ -1,6 +1,7 @@
 """gart.torch against finite differences and against the renderer; skipped without torch."""
 import importlib.util
 import unittest
+from typing import List
 
 import gart
 import numpy as np
@@ -10,6 +11,7 @@ if importlib.util.find_spec("torch") is None:
     raise unittest.SkipTest("no torch (python3-torch)")
 import gart.torch
 import torch
+from gart.torch import _rasterization
 
 
 
@@ -30,6 +32,50 @@ def finite_differences(loss, values, step):
         flat[k] = at
         to[k] = (both[0][1] - both[1][1]) / (both[0][0] - both[1][0])
     return out
+
+
+class OperatorsByHand:
+    """torch.library.custom_op as it is documented: of annotated arguments to new tensors, which the fake describes."""
+
+    def __init__(self, function):
+        self.function = function
+        for name, kind in function.__annotations__.items():
+            parts = kind.__args__ if name == "return" else (kind,)
+            assert all(part in (torch.Tensor, int, bool, float, str, List[float]) for part in parts), (name, kind)
+
+    @classmethod
+    def custom_op(cls, name, *, mutates_args):
+        assert name.startswith("gart::") and mutates_args == ()
+        return cls
+
+    def register_fake(self, fake):
+        self.fake = fake
+
+    def register_autograd(self, backward, *, setup_context):
+        class Function(torch.autograd.Function):
+            @staticmethod
+            def forward(ctx, *inputs):
+                output = self.of(inputs)
+                setup_context(ctx=ctx, inputs=inputs, output=output)
+                return output
+        Function.backward = staticmethod(backward)
+        self.of_autograd = Function.apply
+
+    of_autograd = None
+
+    def of(self, inputs):
+        with torch.no_grad():
+            output, fake = self.function(*inputs), self.fake(*inputs)
+        seen = {t.storage().data_ptr() for t in inputs if isinstance(t, torch.Tensor) and t.numel()}
+        for t, expected in zip(output, fake):
+            assert (t.shape, t.stride(), t.dtype) == (expected.shape, expected.stride(), expected.dtype)
+            assert t.storage().data_ptr() not in seen
+            seen |= {t.storage().data_ptr()} if t.numel() else set()
+        assert len(output) == len(fake)
+        return output
+
+    def __call__(self, *inputs):
+        return self.of_autograd(*inputs) if self.of_autograd else self.of(inputs)
 
 
 class Torch(unittest.TestCase):
@@ -120,10 +166,89 @@ class Torch(unittest.TestCase):
                     return loss(*[values if j == k else r.detach() for j, r in enumerate(rays)]).item()
             self.assert_close(rays[k].grad, finite_differences(moved, rays[k], 5e-3), 0.05)
 
+    def test_gradients_of_features_are_finite_differences(self):
+        """Of features of any sign beside colour, transmittance and depth, by every input. By definition features are
+        colours of degree 0 that were shifted to be positive."""
+        arrays, view, wide = tensors(n=4, degree=0), scenes.camera(24, 20), 5
+        with torch.no_grad():
+            arrays[0][:, 2] = torch.tensor([2.0, -1.5, 0.5, 4.0])
+            arrays[1] -= 0.3
+        random = np.random.default_rng(8)
+        arrays.append(torch.from_numpy(random.uniform(-1, 1, (4, wide)).astype(np.float32)).requires_grad_())
+        weights = [random.normal(0, 1, s) for s in ((20, 24, 3), (20, 24), (20, 24), (20, 24, wide))]
+
+        def loss(images):
+            return sum((torch.from_numpy(w) * image.double()).sum() for w, image in zip(weights, images))
+
+        def by_definition(values=None, at=None):
+            *numbers, features = [values if k == at else a.detach() for k, a in enumerate(arrays)]
+            got = gart.reference(gart.Model(*numbers), view, **scenes.SMOOTH)
+            out = sum((w * got[name]).sum() for w, name in zip(weights, ("color", "transmittance", "depth")))
+            for first in (0, wide - 3):
+                shifted = (features[:, first:first + 3] + 2 - 0.5) / 0.28209479177387814
+                numbers[4] = shifted.unsqueeze(1).contiguous()
+                seen = gart.reference(gart.Model(*numbers), view, **{**scenes.SMOOTH, "background": (0, 0, 0)})
+                image = seen["color"] - 2 * (1 - seen["transmittance"][..., None])
+                part = weights[3][..., first:first + 3] * ([1, 1, 1] if first == 0 else [0, 1, 1])
+                out += (part * image).sum()
+            return out
+
+        images = gart.torch.render(*arrays[:5], view, features=arrays[5], **scenes.SMOOTH)
+        self.assertEqual(images[3].shape, (20, 24, wide))
+        self.assertAlmostEqual(loss(images).item(), float(by_definition()), delta=2e-3)
+        loss(images).backward()
+        for k, array in enumerate(arrays):
+            self.assert_close(array.grad, finite_differences(lambda v: by_definition(v, k), array, 2e-3))
+
+        # The same rays as a batch, and features alone.
+        whole = [a.grad.double() for a in arrays]
+        for a in arrays:
+            a.grad = None
+        rays = _rasterization._rays(self.matrix_and_pose(view)[0], torch.from_numpy(scenes.C2W), 24, 20)
+        seen = gart.torch.trace(*arrays[:5], *rays, features=arrays[5], **scenes.SMOOTH)
+        loss([s.reshape(20, 24, *s.shape[1:]) for s in seen]).backward()
+        for array, expected in zip(arrays, whole):
+            self.assert_close(array.grad, expected, 2e-3)
+        alone = arrays[5].detach().clone().requires_grad_()
+        loss(gart.torch.render(*[a.detach() for a in arrays[:5]], view, features=alone, **scenes.SMOOTH)).backward()
+        self.assert_close(alone.grad, whole[5], 1e-4)
+
+    def test_rays_have_gradients_by_features(self):
+        arrays = tensors(n=4, degree=0)
+        with torch.no_grad():
+            arrays[0][:, 2] = torch.tensor([2.0, -1.5, 0.5, 4.0])
+            arrays[1] += 0.5
+        random = np.random.default_rng(6)
+        origins = torch.tensor(random.normal(0, 0.3, (12, 3)) - [0, 0, 5], dtype=torch.float32)
+        directions = torch.tensor(random.normal(0, 0.1, (12, 3)) + [0, 0, 1.3], dtype=torch.float32)
+        weight = torch.from_numpy(random.normal(0, 1, (12, 7)))
+        features = torch.from_numpy(random.normal(0, 1, (4, 7)).astype(np.float32))
+
+        def loss(directions, origins):
+            seen = gart.torch.trace(*arrays, directions, origins, features=features, **scenes.SMOOTH)
+            return (weight * seen[3].double()).sum()
+
+        rays = [directions.requires_grad_(), origins.requires_grad_()]
+        loss(*rays).backward()
+        for k in range(2):
+            def moved(values):
+                with torch.no_grad():
+                    return loss(*[values if j == k else r.detach() for j, r in enumerate(rays)]).item()
+            self.assert_close(rays[k].grad, finite_differences(moved, rays[k], 5e-3), 0.05)
+
     def test_tensors_are_refused_by_name(self):
         arrays = tensors()
         with self.assertRaisesRegex(gart.InvalidArgument, "log_scale must be float32"):
             gart.torch.render(arrays[0], arrays[1].double(), *arrays[2:], scenes.camera())
+        with self.assertRaisesRegex(gart.InvalidArgument, r"features must be \[N, F\] with the Gaussians' N, 40; they are"):
+            gart.torch.render(*arrays, scenes.camera(), features=torch.zeros(41, 4))
+        views, k = torch.eye(4).expand(2, 4, 4), torch.eye(3).expand(2, 3, 3)
+        gaussians = arrays[0], arrays[2], arrays[1].exp(), torch.sigmoid(arrays[3])
+        for shape in ((41, 4), (3, 40, 4), (40,)):
+            with self.assertRaisesRegex(gart.InvalidArgument, r"colors must be \[N, D\] or \[C, N, D\]"):
+                gart.torch.rasterization(*gaussians, torch.zeros(shape), views, k, 8, 8)
+        with self.assertRaisesRegex(gart.InvalidArgument, "sh_degree 2 needs colors of 9 coefficients"):
+            gart.torch.rasterization(*gaussians, arrays[4], views, k, 8, 8, sh_degree=2)
 
     def test_rasterization_is_render(self):
         mean, log_scale, quaternion, opacity, sh = tensors()
@@ -160,6 +285,20 @@ class Torch(unittest.TestCase):
         # A feature's gradient is the sum of its weights, alike for all of them.
         np.testing.assert_allclose(features.grad[:, 0], features.grad[:, 4], rtol=1e-3, atol=1e-3)
 
+        # Of any sign, of each view, and in more than one pass: all of them are linear in the features.
+        with torch.no_grad():
+            one = gart.torch.rasterization(*gaussians, features, w2c, k, 40, 32)[0]
+            shifts = torch.tensor([-3.0, 0.5])
+            each = torch.stack([features + shift for shift in shifts])
+            seen = gart.torch.rasterization(*gaussians, each, w2c, k, 40, 32, render_mode="RGB+D")[0]
+            self.assertEqual(seen.shape, (2, 32, 40, 6))
+            np.testing.assert_allclose(seen[..., :5], one + shifts[:, None, None, None] * alphas, atol=2e-5)
+            wide = torch.randn(40, 515, generator=torch.Generator().manual_seed(3))
+            seen = gart.torch.rasterization(*gaussians, wide, w2c[:1], k[:1], 40, 32)[0]
+            for channel in (0, 511, 514):
+                alone = gart.torch.rasterization(*gaussians, wide[:, channel:channel + 1], w2c[:1], k[:1], 40, 32)[0]
+                np.testing.assert_allclose(seen[..., channel:channel + 1], alone, atol=1e-6)
+
     def matrix_and_pose(self, view):
         k = torch.tensor([[view.fx, 0, view.cx], [0, view.fy, view.cy], [0, 0, 1]], dtype=torch.float64)
         return k, torch.from_numpy(np.linalg.inv(scenes.C2W))
@@ -172,7 +311,7 @@ class Torch(unittest.TestCase):
         weight = torch.from_numpy(np.random.default_rng(7).normal(0, 1, (20, 24, 3)))
         k, _ = self.matrix_and_pose(view)
         k.requires_grad_()
-        rays = gart.torch._rays(k, torch.from_numpy(scenes.C2W), 24, 20)
+        rays = _rasterization._rays(k, torch.from_numpy(scenes.C2W), 24, 20)
         color = gart.torch.trace(*arrays, *rays, **scenes.SMOOTH)[0].reshape(20, 24, 3)
         np.testing.assert_allclose(color.detach(), gart.torch.render(*arrays, view, **scenes.SMOOTH)[0].detach(), atol=1e-4)
         (weight * color.double()).sum().backward()
@@ -281,15 +420,50 @@ class Torch(unittest.TestCase):
         renderer.render_to(scenes.camera(), color=color)
         self.assertGreater((color - before).abs().max(), 0.05)
 
+    def test_the_operator_is_the_function(self):
+        """With torch.library's part played by a stand-in, which any torch can run."""
+        from gart.torch import _operators
+        operator, view = _operators.make(OperatorsByHand), scenes.camera(16, 12)
+        features = torch.randn(6, 4, generator=torch.Generator().manual_seed(1))
+        numbers = _operators.numbers_of(None, {"near": 0.02, "background": (0.2, 0.5, 0.9)})
+        given = gart.RenderOptions(near=0.02, background=(0.2, 0.5, 0.9))
+        np.testing.assert_array_equal(np.float32(numbers), _operators.numbers_of(given, {}))
+        with self.assertRaisesRegex(TypeError, "no option 'nearr': there are .*near"):
+            _operators.numbers_of(None, {"nearr": 1})
+        for with_features, with_pose in ((False, False), (True, True)):
+            given = [[*tensors(n=6, degree=1), features.clone().requires_grad_(),
+                      torch.from_numpy(scenes.C2W.T.copy()).T.requires_grad_()] for _ in range(2)]
+            (*one, f, pose), (*other, g, same_pose) = given
+            expected = gart.torch.render(*one, view, features=f if with_features else None,
+                                         c2w=pose if with_pose else None, near=0.02, background=(0.2, 0.5, 0.9))
+            got = operator(*other, g if with_features else torch.empty(6, 0), same_pose if with_pose else torch.empty(0),
+                           view.json(), numbers, 2)
+            for a, b in zip(expected, got):
+                np.testing.assert_array_equal(a.detach(), b.detach())
+            for images in (expected, got):
+                sum((k + 1) * image.square().sum() for k, image in enumerate(images) if k != 1).backward()
+            for a, b in zip(*given):
+                self.assertEqual(a.grad is None, b.grad is None)
+                if a.grad is not None:
+                    np.testing.assert_allclose(a.grad, b.grad, rtol=1e-4, atol=1e-5 * float(a.grad.abs().max()))
+
     @unittest.skipUnless(hasattr(torch.library, "custom_op"), "torch has no custom_op: the operators are not there")
     def test_operators_pass_torchs_own_check(self):
+        from gart.torch import _operators
         arrays, view = tensors(n=6, degree=0), scenes.camera(16, 12)
-        c2w = torch.from_numpy(scenes.C2W).requires_grad_()
-        numbers = [1 / 255, 1e-4, 0.01, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-        torch.library.opcheck(torch.ops.gart.render.default,
-                              (*arrays, c2w, view.json(), numbers, 2, view.height, view.width))
-        compiled = torch.compile(lambda *a: gart.torch.render(*a, view)[0])
-        torch.testing.assert_close(compiled(*arrays), gart.torch.render(*arrays, view)[0])
+        features = torch.randn(6, 4, generator=torch.Generator().manual_seed(1)).requires_grad_()
+        pose = torch.from_numpy(scenes.C2W).requires_grad_()
+        for f, c2w in ((features, pose), (torch.empty(6, 0), torch.empty(0))):
+            torch.library.opcheck(torch.ops.gart.render.default,
+                                  (*arrays, f, c2w, view.json(), _operators.numbers_of(None, {}), 2))
+        text = view.json()
+        compiled = torch.compile(lambda *a: gart.torch.render(*a[:5], text, features=a[5], near=0.02), fullgraph=True,
+                                 backend="aot_eager")
+        expected = gart.torch.render(*arrays, view, features=features, near=0.02)
+        for a, b in zip(compiled(*arrays, features), expected):
+            torch.testing.assert_close(a, b)
+        broken = torch.compile(lambda *a: gart.torch.render(*a, view, c2w=pose)[0], backend="aot_eager")
+        torch.testing.assert_close(broken(*arrays), gart.torch.render(*arrays, view, c2w=pose)[0])
 
 
 if __name__ == "__main__":
