@@ -185,3 +185,49 @@ TEST_CASE_TEMPLATE("triangles that are none are never met", E, GART_TEST_POLICIE
   CHECK(got.nearest[0].t == 2);
   CHECK(trace(exec, {}, rays).nearest[0].id == gart::triangle_hit::none);
 }
+
+TEST_CASE_TEMPLATE("layers and twins are told apart, whatever their order", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  // Sheets a few roundings behind each other, three of each.
+  int const sheets = 64;
+  auto const depth = [](double sheet) { return static_cast<float>(1 + sheet / 1048576); };
+  std::vector<int> sheet_of;
+  for (int i = 0; i < 3 * sheets; ++i) sheet_of.push_back(i / 3);
+  std::mt19937_64 engine(seed);
+  std::shuffle(sheet_of.begin(), sheet_of.end(), engine);
+  std::vector<triangle> all;
+  for (int const s : sheet_of) all.push_back({{{-3, -3, depth(s)}, {3, -3, depth(s)}, {0, 4, depth(s)}}});
+  E exec;
+  std::vector<gart::ray> const rays{{vec3(0.0f), vec3(0, 0, 1)}, {vec3(0.3f, -0.7f, 0), vec3(0, 0, 1)}};
+  for (int s = 0; s < sheets; s += 5) {
+    auto const first = std::find(sheet_of.begin(), sheet_of.end(), s) - sheet_of.begin();
+    for (auto const& h : trace(exec, all, rays, depth(s - 0.5)).nearest) CHECK(h.id == static_cast<u32>(first));
+  }
+}
+
+TEST_CASE_TEMPLATE("an edge that floats cannot tell from the ray", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  std::mt19937_64 engine(seed);
+  // In whole numbers across a ray along z, whose products 64 bits hold: the edge b c passes by the ray at almost none.
+  struct whole {
+    std::int64_t x, y;
+  };
+  auto const cross = [](whole const& p, whole const& q) { return p.x * q.y - p.y * q.x; };
+  auto const corner = [](whole const& p) { return vec3(static_cast<float>(p.x), static_cast<float>(p.y), 1); };
+  E exec;
+  int met = 0, missed = 0;
+  for (int i = 0; i < 60; ++i) {
+    std::int64_t const p = (1 << 22) + static_cast<std::int64_t>(engine() >> 42), q = p + i % 7 - 3;
+    whole const a = i % 2 ? whole{-q, p} : whole{q, -p}, b{p, q}, c{1 - p, 1 - q};
+    if (static_cast<float>(c.x * b.y) != static_cast<float>(c.y * b.x)) continue;
+    std::int64_t const u = cross(c, b), v = cross(a, c), w = cross(b, a);
+    bool const meets = (u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0);
+    auto const got = trace(exec, {{{corner(a), corner(b), corner(c)}}}, {{vec3(0.0f), vec3(0, 0, 1)}});
+    CHECK((got.nearest[0].id == 0) == meets);
+    ++(meets ? met : missed);
+  }
+  CHECK(met > 10);
+  CHECK(missed > 10);
+}

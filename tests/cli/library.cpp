@@ -8,6 +8,7 @@
 
 #include <support/policies.hpp>
 
+#include <memory>
 #include <set>
 
 using namespace cli_test;
@@ -15,17 +16,24 @@ using gart::u8;
 
 namespace {
 
-// The whole of such a program.
-gart::recommendation train(fs::path const& capture, gart::train_options const& options, fs::path const& model) {
-  gart::dataset const data = gart::load_dataset(capture);
-  gart::configuration_request request;
-  request.backend = gart::backend_kind::serial;
-  gart::recommendation const use = gart::recommended(options, data, request);
-  auto const training = gart::make_session(use.request, use.options, data);
-  while (training->steps_done() < use.options.iterations) training->step();
-  training->save_model(model, gart::traits_of(gart::render_options_of(use.options, data.extent), 2));
-  return use;
-}
+// The whole of such a program; what it saves after so many steps.
+struct own_program {
+  gart::dataset data;
+  gart::recommendation use;
+  std::unique_ptr<gart::session> training;
+
+  own_program(fs::path const& capture, gart::train_options const& options) : data(gart::load_dataset(capture)) {
+    gart::configuration_request request;
+    request.backend = gart::backend_kind::serial;
+    use = gart::recommended(options, data, request);
+    training = gart::make_session(use.request, use.options, data);
+  }
+  std::string model_after(int steps, fs::path const& file) {
+    while (training->steps_done() < steps) training->step();
+    training->save_model(file, gart::traits_of(gart::render_options_of(use.options, data.extent), 2));
+    return text_of(file);
+  }
+};
 
 // Each image of the capture as `paint` leaves it, by its number in its split.
 template <class Paint>
@@ -62,12 +70,12 @@ TEST_CASE("a short program over the library and gart train give the same bits") 
   options.max_gaussians = 60;
   auto const same = [&](std::string const& capture) {
     CAPTURE(capture);
-    gart::recommendation const use = train(here / capture, options, here / (capture + ".ply"));
+    own_program own(here / capture, options);
     auto const run = here.gart("train " + capture + " --out " + capture +
                                "_run --iterations 700 --max-gaussians 60 --backend serial --quiet");
     REQUIRE_MESSAGE(run.code == 0, run.err);
-    CHECK(text_of(here / (capture + ".ply")) == text_of(here / (capture + "_run/model.ply")));
-    return use.options;
+    CHECK(own.model_after(options.iterations, here / "own.ply") == text_of(here / (capture + "_run/model.ply")));
+    return own.use.options;
   };
   write_capture(here / "black");
   CHECK(same("black").background == gart::background_kind::black);
@@ -93,35 +101,39 @@ TEST_CASE("what the library measures is what gart train does, recorded, and the 
   fill_images(here / "capture", true);
   gart::train_options options;
   options.iterations = 15000, options.max_gaussians = 30;
-  auto const use = train(here / "capture", options, here / "mine.ply");
-  REQUIRE_FALSE(use.measured.trials.empty());
-  std::string const run = "train capture --iterations 15000 --max-gaussians 30 --backend serial --out ";
-  auto const whole = here.gart(run + "whole");
-  REQUIRE_MESSAGE(whole.code == 0, whole.err);
-  CHECK_MESSAGE(has(whole.err, "measuring what the capture asks for: "), whole.err);
-  CHECK(text_of(here / "mine.ply") == text_of(here / "whole/model.ply"));
-  auto const metrics = here.json("whole/metrics.json");
-  REQUIRE(metrics["measured"]["trials"].size() == use.measured.trials.size());
-  for (std::size_t i = 0; i < use.measured.trials.size(); ++i) {
-    CHECK(metrics["measured"]["trials"][i]["psnr"] == use.measured.trials[i].psnr);
-    CHECK(metrics["measured"]["trials"][i]["taken"] == use.measured.trials[i].taken);
+  own_program own(here / "capture", options);
+  auto const& trials = own.use.measured.trials;
+  REQUIRE_FALSE(trials.empty());
+  // Stopped twice, so that a few steps show what the settings and the resumed run make; its end has the report.
+  auto const begun =
+      here.gart("train capture --iterations 15000 --max-gaussians 30 --backend serial --out run --stop-at 250");
+  REQUIRE_MESSAGE(begun.code == 130, begun.err);
+  CHECK_MESSAGE(has(begun.err, "measuring what the capture asks for: "), begun.err);
+  CHECK(own.model_after(250, here / "mine.ply") == text_of(here / "run/model.ply"));
+  auto const measured = here.json("run/config.json")["measured"];
+  REQUIRE(measured["trials"].size() == trials.size());
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    CHECK(measured["trials"][i]["psnr"] == trials[i].psnr);
+    CHECK(measured["trials"][i]["taken"] == trials[i].taken);
   }
-  CHECK(metrics["measured"] == here.json("whole/config.json")["measured"]);
-  CHECK(metrics["wall_seconds"]["measuring"] > 0);
-  CHECK(has(text_of(here / "whole/report.html"), "Tried before the run: "));
 
-  CHECK(here.gart(run + "parts --quiet --stop-at 250").code == 130);
-  auto const resumed = here.gart("train --resume --out parts --quiet");
-  REQUIRE_MESSAGE(resumed.code == 0, resumed.err);
-  CHECK(text_of(here / "parts/model.ply") == text_of(here / "whole/model.ply"));
-  CHECK(here.json("parts/metrics.json")["measured"] == metrics["measured"]);
-  CHECK(here.json("parts/metrics.json")["chosen"] == metrics["chosen"]);
+  CHECK(here.gart("train --resume --out run --quiet --stop-at 500").code == 130);
+  CHECK(own.model_after(500, here / "mine.ply") == text_of(here / "run/model.ply"));
+  auto const chosen = here.json("run/config.json")["chosen"];
+  auto const whole = here.gart("train --resume --out run --quiet");
+  REQUIRE_MESSAGE(whole.code == 0, whole.err);
+  auto const metrics = here.json("run/metrics.json");
+  CHECK(metrics["measured"] == measured);
+  CHECK(here.json("run/config.json")["measured"] == measured);
+  CHECK(metrics["chosen"] == chosen);
+  CHECK(metrics["wall_seconds"]["measuring"] > 0);
+  CHECK(has(text_of(here / "run/report.html"), "Tried before the run: "));
 }
 
 TEST_CASE("what is given is not measured, and --no-auto takes the usual settings") {
   folder const here;
   write_capture(here / "capture", 24);
-  std::string const run = "train capture --iterations 30000 --max-gaussians 30 --backend serial --stop-at 1 ";
+  std::string const run = "train capture --iterations 21000 --max-gaussians 30 --backend serial --stop-at 1 ";
   auto const tried = [&](std::string const& more) {
     auto const made = here.gart(run + more + " --out run");
     CHECK_MESSAGE(made.code == 130, made.err);

@@ -55,12 +55,13 @@ class folder {
     return outcome_of(status);
   }
   // Interrupts the program as Ctrl-C does, or by another signal, once `sign` stands in what it has said; waits at most
-  // two minutes for that.
+  // two minutes for that, and two for its end.
   outcome gart_interrupted_at(std::string const& sign, std::string const& arguments, int signal = SIGINT) const {
     std::string const command =
         "cd '" + path_.string() + "' && exec '" GART_PROGRAM "' " + arguments + " >stdout.txt 2>stderr.txt";
     pid_t const child = fork();
     if (child == 0) {
+      std::signal(signal, SIG_DFL);  // whatever began the tests: nohup ignores SIGHUP, and so would the program
       execl("/bin/sh", "sh", "-c", command.c_str(), static_cast<char*>(nullptr));
       _exit(127);
     }
@@ -76,6 +77,11 @@ class folder {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
       if (waitpid(child, &status, WNOHANG) == child) return outcome_of(status);
     }
+    for (int waited_ms = 0; waited_ms < 120'000; waited_ms += 20) {
+      if (waitpid(child, &status, WNOHANG) == child) return outcome_of(status);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    kill(child, SIGKILL);
     waitpid(child, &status, 0);
     return outcome_of(status);
   }
