@@ -87,7 +87,7 @@ results by(E& exec, rolling_scene const& r, std::vector<float> const& weights) {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("image, gradients and pose through a rolling shutter are the oracle's", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a rolling shutter's image and gradients match the oracle", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;

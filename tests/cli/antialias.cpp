@@ -29,7 +29,7 @@ int difference(fs::path const& a, fs::path const& b) {
 
 }  // namespace
 
-TEST_CASE("an antialiased model says so in its file, and every command shows it as it was trained") {
+TEST_CASE("every command shows an antialiased model as it was trained") {
   folder const here;
   write_capture(here / "capture");
   auto const run = here.gart("train capture --out run --iterations 20 --antialias --stop-at 10" + small);

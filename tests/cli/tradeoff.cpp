@@ -80,7 +80,7 @@ TEST_CASE("tradeoff reports the errors that can be worked out by hand") {
   CHECK(half["gradient_worst"].get<double>() < 1e-4);
 }
 
-TEST_CASE("tradeoff measures every knob, names those it has not, and finds the front") {
+TEST_CASE("tradeoff measures all knobs and finds the front") {
   folder const here;
   write_capture(here / "capture");
   gart::write_splat_ply(here / "cloud.ply", cloud());
@@ -145,7 +145,7 @@ TEST_CASE("tradeoff measures every knob, names those it has not, and finds the f
   CHECK_FALSE(has(page, "http"));
 }
 
-TEST_CASE("tradeoff takes cameras without photographs, and refuses what it cannot do") {
+TEST_CASE("tradeoff takes cameras alone and refuses what it cannot do") {
   folder const here;
   gart::write_splat_ply(here / "cloud.ply", cloud());
   gart::write_file(here / "path.json",
@@ -171,7 +171,7 @@ TEST_CASE("tradeoff takes cameras without photographs, and refuses what it canno
   CHECK_FALSE(fs::exists(here / "none"));
 }
 
-TEST_CASE("a preset sets what the command line does not, and the run says so") {
+TEST_CASE("a preset sets what the command line leaves open") {
   folder const here;
   write_capture(here / "capture");
   std::string const tiny = " --backend serial --max-gaussians 60 --sh-degree 1 --quiet --no-auto --stop-at 1";
@@ -187,7 +187,7 @@ TEST_CASE("a preset sets what the command line does not, and the run says so") {
   CHECK(has(text_of(here / "own/report.html"), "preset quick"));
 }
 
-TEST_CASE("what a run leaves out of images is in its model and its report") {
+TEST_CASE("a model and its report say what a run left out of images") {
   folder const here;
   write_capture(here / "capture");
   std::string const small = " --backend serial --max-gaussians 60 --sh-degree 1 --quiet --iterations 2 ";

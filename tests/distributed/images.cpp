@@ -54,7 +54,7 @@ struct capture_folder {
 
 }  // namespace
 
-TEST_CASE("the ranks of a host decode each photograph once, and have the images that one reads alone") {
+TEST_CASE("ranks of a host decode each photograph once") {
   capture_folder const here;
   mpi_comm ranks = here.ranks;
   dataset_options options;
@@ -109,7 +109,7 @@ TEST_CASE("the ranks of a host decode each photograph once, and have the images 
   for_each_array([](parameter_array const&, auto const& x, auto const& y) { CHECK(x == y); }, a, b);
 }
 
-TEST_CASE("where a host has no memory that its ranks share, each reads all and says so") {
+TEST_CASE("without shared memory each rank reads all and says so") {
   // The ranks of a host of which none has any.
   struct crowded final : host_group {
     std::shared_ptr<host_group> of;
@@ -134,7 +134,7 @@ TEST_CASE("where a host has no memory that its ranks share, each reads all and s
   CHECK(all.notes.front().find("/dev/shm") != std::string::npos);
 }
 
-TEST_CASE("a photograph that one rank cannot decode ends the loading on all, by its name") {
+TEST_CASE("one photograph that cannot be decoded ends loading on all") {
   capture_folder const here;
   mpi_comm ranks = here.ranks;
   if (ranks.rank() == 0) {

@@ -71,7 +71,7 @@ gaussian_model all_gradients(Trainer& run, exec_type& exec, index_t block) {
 
 }  // namespace
 
-TEST_CASE("by strips the bits are those of one rank, whatever the number of ranks") {
+TEST_CASE("strips give the bits of one rank") {
   exec_type exec = gart_test::make_exec();
   dataset const data = gart_test::capture(exec, 3);
   for (densify_kind const densify : {densify_kind::error, densify_kind::mcmc, densify_kind::adc}) {
@@ -132,7 +132,7 @@ TEST_CASE("with sums in any order, gradients are as near as rounding") {
     check(pixel_strategy(), std::type_identity<bvh_tracer<exec_type>>());
 }
 
-TEST_CASE("a batch is the mean of its views, the same for any number of ranks") {
+TEST_CASE("a batch is the mean of its views on any number of ranks") {
   exec_type exec = gart_test::make_exec();
   dataset const data = gart_test::capture(exec, 5);
   train_options options = short_run(densify_kind::none);
@@ -259,7 +259,7 @@ TEST_CASE("depth and lenses are learned as by one rank, bit by bit") {
   }
 }
 
-TEST_CASE("a checkpoint is one file of today's format, and goes on with any number of ranks") {
+TEST_CASE("a checkpoint continues on any number of ranks") {
   exec_type exec = gart_test::make_exec();
   mpi_comm ranks;
   dataset const data = gart_test::capture(exec, 6);
@@ -285,7 +285,7 @@ TEST_CASE("a checkpoint is one file of today's format, and goes on with any numb
   if (ranks.rank() == 0) ::unlink(by_all.c_str());
 }
 
-TEST_CASE("more ranks than Gaussians, than rows of tiles, than anything to see") {
+TEST_CASE("more ranks than Gaussians, rows of tiles or views") {
   exec_type exec = gart_test::make_exec();
   dataset data = gart_test::capture(exec, 7);
   train_options options = short_run(densify_kind::none);
@@ -312,7 +312,7 @@ TEST_CASE("more ranks than Gaussians, than rows of tiles, than anything to see")
   check(gart_test::cloud(16, 0.5f), 5);
 }
 
-TEST_CASE("a Gaussian that no view shows takes the bytes that were told before, and hardly more") {
+TEST_CASE("a Gaussian that no view shows takes the bytes told before") {
   constexpr index_t unseen = 40'000;
   int const ranks = mpi_comm().size();
   for (auto const& [batch, antialias] : {std::pair{1, 0.0f}, {ranks, 0.0f}, {1, 0.3f}, {ranks, 0.3f}}) {
@@ -338,7 +338,7 @@ TEST_CASE("a Gaussian that no view shows takes the bytes that were told before, 
   }
 }
 
-TEST_CASE("a run that grows has the memory of its end from the start, and no more of it") {
+TEST_CASE("a run that grows reserves the memory of its end") {
   row_owners const owners{mpi_comm().size(), mpi_comm().rank(), 8};
   for (densify_kind const kind : {densify_kind::error, densify_kind::mcmc}) {
     CAPTURE(static_cast<int>(kind));

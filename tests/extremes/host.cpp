@@ -25,7 +25,7 @@ static_assert(gart::host_execution<limited_exec>);
 
 }  // namespace
 
-TEST_CASE("memory that ends at any allocation is an error, and the next try with more succeeds") {
+TEST_CASE("memory may end at any allocation; the next try succeeds") {
   gart_test::number_source random(7);
   gart::gaussian_model const model = gart_test::cloud(random, 30);
   gart::camera const view = gart_test::looking_along_z(17, 13, 16);
@@ -51,7 +51,7 @@ TEST_CASE("memory that ends at any allocation is an error, and the next try with
   CHECK(got.gradients.mean == expected.gradients.mean);
 }
 
-TEST_CASE("starting points in one place are found in time, and make Gaussians of a finite size") {
+TEST_CASE("starting points in one place give finite Gaussians, in time") {
   gart::point_cloud points;
   for (int i = 0; i < 100000; ++i) {
     float const at = i % 2 ? 1.0f : 1e7f;
@@ -78,7 +78,7 @@ TEST_CASE("black points start where their colour has a gradient") {
   }
 }
 
-TEST_CASE("nothing is stored in less than 32 bits but the place of boxes") {
+TEST_CASE("only places of boxes take less than 32 bits") {
   using namespace gart;
   static_assert(std::is_same_v<decltype(gaussian_model::mean)::value_type, float>);
   static_assert(std::is_same_v<decltype(gaussians<serial_exec>::log_scale), buffer<float, serial_exec>>);

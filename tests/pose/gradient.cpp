@@ -114,7 +114,7 @@ std::vector<expectation> const& expectations() {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("gradients of poses agree with differences of the oracle's images", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("pose gradients match differences of the oracle's images", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   double worst = 0;
@@ -131,8 +131,7 @@ TEST_CASE_TEMPLATE("gradients of poses agree with differences of the oracle's im
   MESSAGE("worst relative error " << worst);
 }
 
-TEST_CASE_TEMPLATE("sums over any number of Gaussians are those in double, broken ones left out", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("sums over Gaussians match double, broken ones left out", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);

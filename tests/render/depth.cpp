@@ -80,7 +80,7 @@ TEST_CASE_TEMPLATE("gradients of depth agree with the oracle", E, GART_TEST_POLI
 }
 
 // One opaque Gaussian on the ray: its depth is w t, and moving it away moves that by w.
-TEST_CASE_TEMPLATE("a Gaussian alone on its ray has the depth's gradient in closed form", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a Gaussian alone has a depth gradient in closed form", E, GART_TEST_POLICIES) {
   gart::camera view;
   view.width = view.height = 1, view.fx = view.fy = 1, view.cx = view.cy = 0.5f;
   gart::gaussian_model m;
@@ -98,7 +98,7 @@ TEST_CASE_TEMPLATE("a Gaussian alone on its ray has the depth's gradient in clos
   for (float const c : got.sh) CHECK(c == 0);
 }
 
-TEST_CASE_TEMPLATE("gradients by depth are refused where nothing was made ready for them", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("depth gradients without preparation are refused", E, GART_TEST_POLICIES) {
   using frame_type = frame_by<3, gart::tile_tracer<E>, E>;
   auto const& s = expectations().front().scene;
   E exec;

@@ -52,8 +52,7 @@ TEST_CASE_TEMPLATE("depth comes nearer to the maps", E, GART_TEST_POLICIES) {
   CHECK(with < 0.7 * without);
 }
 
-TEST_CASE_TEMPLATE("an image smaller than its map is compared with the means of what the map knows", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a smaller image is compared with means of its depth map", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);
@@ -104,7 +103,7 @@ TEST_CASE_TEMPLATE("a loss of one's own may add to the gradient of depth", E, GA
   CHECK(sum > 0);
 }
 
-TEST_CASE_TEMPLATE("a weight of depth without maps or without its gradients is refused", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a depth weight without maps or gradients is refused", E, GART_TEST_POLICIES) {
   E exec;
   gart::dataset data = capture(exec, 1);
   gart::gaussian_model const start = cloud(2, 0.8f);

@@ -26,7 +26,7 @@ std::string taken_by(E& exec, gart::dataset const& data, gart::u64 hit_memory) {
 
 }  // namespace
 
-TEST_CASE("without a budget the hit buffer takes no more than half of what is free, but for sums in a fixed order") {
+TEST_CASE("without a budget the hit buffer takes half of free memory") {
   gart::serial_exec exec;
   auto const data = capture(exec, 3);
   CHECK(taken_by<gart::primitive_strategy>(exec, data, 0) == "primitive");
@@ -36,7 +36,7 @@ TEST_CASE("without a budget the hit buffer takes no more than half of what is fr
   CHECK(taken_by<gart::deterministic_strategy>(poor, data, 0) == "deterministic");
 }
 
-TEST_CASE("a run that cannot have its Gaussians is refused in bytes before it starts") {
+TEST_CASE("a run without room for its Gaussians is refused in bytes") {
   gart::serial_exec exec;
   auto const data = capture(exec, 3);
   poor_exec poor;
