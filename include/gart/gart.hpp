@@ -28,7 +28,7 @@
 #include <gart/rays/ray_tracer.hpp>
 #include <gart/reference/reference.hpp>
 #include <gart/render/frame.hpp>
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/initial.hpp>
 #include <gart/runtime/model_file.hpp>

@@ -1,6 +1,6 @@
 #include <gart/core/error.hpp>
 #include <gart/io/image_file.hpp>
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/session.hpp>
 #include <gart/runtime/validation.hpp>

@@ -2,7 +2,7 @@
 
 #include "program.hpp"
 
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/runtime/session.hpp>
 

@@ -101,8 +101,7 @@ TEST_CASE("ranks of a host decode each photograph once") {
   train_options run;
   run.iterations = 40, run.densify = densify_kind::none, run.shard_block = 8;
   gaussian_model const start = gart_test::cloud(3, 0.5f);
-  using trainer_type =
-      trainer<serial_exec, scene_traits<1>, tile_tracer<serial_exec>, deterministic_strategy, mpi_comm>;
+  using trainer_type = trainer<serial_exec, scene_traits<1>, tile_tracer<serial_exec>, deterministic_method, mpi_comm>;
   trainer_type by_own(exec, run, alone, start, ranks), by_shared(exec, run, shared, start, ranks);
   for (int i = 0; i < 40; ++i) REQUIRE(by_own.step().loss == by_shared.step().loss);
   gaussian_model const a = by_own.model(), b = by_shared.model();

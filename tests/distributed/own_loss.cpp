@@ -15,7 +15,7 @@ namespace {
 
 using gart_test::every_rank, gart_test::exec_type, gart_test::rank_comm;
 template <class Comm>
-using trainer_of = trainer<exec_type, scene_traits<1>, tile_tracer<exec_type>, deterministic_strategy, Comm>;
+using trainer_of = trainer<exec_type, scene_traits<1>, tile_tracer<exec_type>, deterministic_method, Comm>;
 
 struct twice_over_values {
   float const* image;

@@ -21,10 +21,10 @@ namespace {
 
 using gart_test::every_rank, gart_test::exec_type, gart_test::rank_comm;
 using tiles = tile_tracer<exec_type>;
-template <class Strategy, class Comm = self_comm, class Tracer = tiles>
-using trainer_of = trainer<exec_type, scene_traits<1>, Tracer, Strategy, Comm>;
-using plain = trainer_of<deterministic_strategy>;
-using shared = trainer_of<deterministic_strategy, rank_comm>;
+template <class Method, class Comm = self_comm, class Tracer = tiles>
+using trainer_of = trainer<exec_type, scene_traits<1>, Tracer, Method, Comm>;
+using plain = trainer_of<deterministic_method>;
+using shared = trainer_of<deterministic_method, rank_comm>;
 
 // One rank that does all that several do.
 struct lone_comm : self_comm {
@@ -66,7 +66,7 @@ double largest_difference(std::vector<float> const& a, std::vector<float> const&
 // The gradients of all ranks' rows, in the order of numbers.
 template <class Trainer>
 gaussian_model all_gradients(Trainer& run, exec_type& exec, index_t block) {
-  return sharded_rows<exec_type, rank_comm>(exec, every_rank(), block).whole_of(run.gradients().to_host());
+  return sharded_rows<exec_type, rank_comm>(exec, every_rank(), block).gather_all(run.gradients().to_host());
 }
 
 }  // namespace
@@ -114,9 +114,9 @@ TEST_CASE("with sums in any order, gradients are as near as rounding") {
   dataset const data = gart_test::capture(exec, 4);
   train_options const options = short_run(densify_kind::none);
   gaussian_model const start = gart_test::cloud(12, 0.5f);
-  auto const check = [&]<class Strategy, class Tracer>(Strategy, std::type_identity<Tracer>) {
-    trainer_of<Strategy, self_comm, Tracer> one(exec, options, data, start);
-    trainer_of<Strategy, rank_comm, Tracer> all(exec, options, data, start, every_rank());
+  auto const check = [&]<class Method, class Tracer>(Method, std::type_identity<Tracer>) {
+    trainer_of<Method, self_comm, Tracer> one(exec, options, data, start);
+    trainer_of<Method, rank_comm, Tracer> all(exec, options, data, start, every_rank());
     one.step(), all.step();
     gaussian_model const a = all_gradients(all, exec, options.shard_block), b = one.gradients().to_host();
     REQUIRE(a.size() == b.size());
@@ -127,9 +127,9 @@ TEST_CASE("with sums in any order, gradients are as near as rounding") {
         },
         a, b);
   };
-  check(primitive_strategy(), std::type_identity<tiles>());
+  check(primitive_method(), std::type_identity<tiles>());
   if constexpr (!exec_type::device)  // the same rows by their tracer's rays
-    check(pixel_strategy(), std::type_identity<bvh_tracer<exec_type>>());
+    check(pixel_method(), std::type_identity<bvh_tracer<exec_type>>());
 }
 
 TEST_CASE("a batch is the mean of its views on any number of ranks") {
@@ -172,7 +172,7 @@ TEST_CASE("a batch is the mean of its views on any number of ranks") {
     CAPTURE(batch);
     train_options grown = short_run(densify);
     grown.batch = batch, grown.iterations = 150, grown.exposure = true;
-    trainer_of<deterministic_strategy, lone_comm> one(exec, grown, data, start);
+    trainer_of<deterministic_method, lone_comm> one(exec, grown, data, start);
     shared many(exec, grown, data, start, every_rank());
     while (many.steps_done() < grown.iterations) REQUIRE(one.step().loss == many.step().loss);
     if (densify != densify_kind::adc) CHECK(many.model().size() == 230);
@@ -193,7 +193,7 @@ TEST_CASE("exposures and poses are learned as by one rank, bit by bit") {
   for (int const batch : {1, 3}) {
     CAPTURE(batch);
     options.batch = batch;
-    trainer_of<deterministic_strategy, lone_comm> one(exec, options, data, start);
+    trainer_of<deterministic_method, lone_comm> one(exec, options, data, start);
     shared all(exec, options, data, start, every_rank());
     while (all.steps_done() < options.iterations) REQUIRE(one.step().loss == all.step().loss);
     training_state const a = one.state(), b = all.state();
@@ -226,7 +226,7 @@ TEST_CASE("depth and lenses are learned as by one rank, bit by bit") {
   options.resolution = {0.2f, 0.5f, 1};
   options.lens.warm_up = 0;
   gaussian_model const start = gart_test::cloud(18, 0.5f);
-  using deep = with_depth<deterministic_strategy>;
+  using deep = with_depth<deterministic_method>;
   for (int const batch : {1, 3}) {
     CAPTURE(batch);
     options.batch = batch;

@@ -32,7 +32,7 @@ TEST_CASE("memory may end at any allocation; the next try succeeds") {
   std::vector<float> const gradient(std::size_t{3} * view.width * view.height, 0.5f);
   using tracer = gart::tile_tracer<limited_exec>;
   limited_exec exec;
-  auto const run = [&] { return gart_test::run_by<gart::primitive_strategy, tracer>(exec, model, view, {}, gradient); };
+  auto const run = [&] { return gart_test::run_by<gart::primitive_method, tracer>(exec, model, view, {}, gradient); };
   exec.most = std::size_t{1} << 30;
   auto const expected = run();
   std::size_t const needed = static_cast<std::size_t>(exec.memory.peak);

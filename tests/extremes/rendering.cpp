@@ -1,4 +1,4 @@
-// Every extreme scene by every tracer and strategy: finite, the same image bit for bit, and the oracle's image and
+// Every extreme scene by every tracer and method: finite, the same image bit for bit, and the oracle's image and
 // gradients within what float can do. Broken, huge and tiny parameters. How far float is off, and why.
 #include <extremes/scenes.hpp>
 #include <extremes/ways.hpp>
@@ -201,7 +201,7 @@ TEST_CASE_TEMPLATE("extremes through the filter are finite for all tracers", E, 
 }
 
 // Prints what docs/accuracy.md quotes: GART_TEST_SEED=1 test_extremes --test-case=*budget*
-TEST_CASE_TEMPLATE("error budget: every extreme by every tracer and strategy", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("error budget: every extreme by every tracer and method", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;

@@ -105,7 +105,7 @@ TEST_CASE("each format returns what it was given within its quantum") {
       gart::write_splats(path, model);
       auto const back = gart::read_splats(path);
       REQUIRE(back.size() == model.size());
-      CHECK(back.sh_degree == std::min(degree, format->room.sh_degree));
+      CHECK(back.sh_degree == std::min(degree, format->capabilities.sh_degree));
       auto const e = difference(model, back);
       auto most = quantum.at(format->name);
       // Its means have 24 bits in all, of which at most 20 are behind the point.

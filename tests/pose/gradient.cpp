@@ -73,18 +73,18 @@ struct stored {
   gart::camera const& view() const { return seen_by; }
 };
 
-// By the gradients of each tracer and strategy.
+// By the gradients of each tracer and method.
 template <class E, class F>
 void by_all(expectation const& e, F const& check) {
   E exec;
   auto const& s = e.scene;
   gart::gaussians<E> const scene(exec, s.model);
   for (tracer_kind const kind : {tracer_kind::bvh, tracer_kind::tiles})
-    for (std::string const& strategy : strategies_for(kind, s.model.sh_degree)) {
+    for (std::string const& method : methods_for(kind, s.model.sh_degree)) {
       CAPTURE(gart::to_string(kind));
-      CAPTURE(strategy);
+      CAPTURE(method);
       gart::gaussians<E> const gradients(
-          exec, scene_gradients(exec, s.model, s.view, s.options, s.active_degree, kind, strategy, e.weights));
+          exec, scene_gradients(exec, s.model, s.view, s.options, s.active_degree, kind, method, e.weights));
       detail::with_degree(s.model.sh_degree, [&](auto degree) {
         check(gart::differentiate_pose(stored<E, degree>{&exec, scene.view(), s.view}, gradients.view()));
       });

@@ -156,7 +156,7 @@ TEST_CASE_TEMPLATE("a camera is tracked from 2 degrees off to 0.02", E, GART_TES
   E exec;
   auto const data = capture(exec, seed);
   gart::camera truth = gart::resized(data.train[0].view, 58, 44);
-  gart::compiled_renderer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::pixel_strategy> renderer(
+  gart::compiled_renderer<E, gart::scene_traits<1>, gart::tile_tracer<E>, gart::pixel_method> renderer(
       {.sh_degree = 1});
   renderer.set_model(cloud(seed, 0.6f));
   CHECK_THROWS_AS(renderer.differentiate_pose(), gart::invalid_argument);

@@ -7,7 +7,7 @@ using namespace gart_test;
 namespace {
 
 template <class E>
-using run = run_of<E, gart::deterministic_strategy>;
+using run = run_of<E, gart::deterministic_method>;
 
 gart::train_options options_with(float dropout, gart::densify_kind densify = gart::densify_kind::none) {
   gart::train_options options;

@@ -8,7 +8,7 @@ namespace {
 constexpr int steps = 60;
 
 template <class E, int Degree>
-using run_in_rows = gart::trainer<E, gart::scene_traits<Degree>, gart::tile_tracer<E>, gart::deterministic_strategy>;
+using run_in_rows = gart::trainer<E, gart::scene_traits<Degree>, gart::tile_tracer<E>, gart::deterministic_method>;
 
 gart::train_options growing() {
   gart::train_options options;

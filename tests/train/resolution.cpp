@@ -12,7 +12,7 @@ using namespace gart_test;
 namespace {
 
 template <class E>
-using run = run_of<E, gart::deterministic_strategy>;
+using run = run_of<E, gart::deterministic_method>;
 
 std::size_t at(int width, int x, int y) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);

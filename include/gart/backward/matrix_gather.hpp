@@ -26,7 +26,8 @@ namespace detail {
 
 template <gather_configuration C>
 struct without_color : C {
-  using geometry_terms = std::conditional_t<C::terms::depth, gart::terms<geometry, depth>, gart::terms<geometry>>;
+  using geometry_terms = std::conditional_t<C::terms::depth, gart::terms<gart::term::geometry, gart::term::depth>,
+                                            gart::terms<gart::term::geometry>>;
   using terms = std::conditional_t<C::terms::geometry, geometry_terms, gart::terms<>>;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// What the primitive and hybrid strategies record of a hit: a slot (backward/hit_slot.hpp) at its place in the hit
+/// What the primitive and hybrid methods record of a hit: a slot (backward/hit_slot.hpp) at its place in the hit
 /// buffer (backward/hit_layout.hpp), which the 3DGART paper calls LT.
 
 #include <gart/backward/hit_layout.hpp>

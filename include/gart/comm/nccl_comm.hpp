@@ -7,7 +7,7 @@
 ///   mpi_comm ranks;
 ///   cuda_exec exec(nccl_comm::device_of(ranks));
 ///   nccl_comm all(ranks, nccl_comm::device_of(ranks));
-///   trainer<cuda_exec, traits, tracer, primitive_strategy, nccl_comm> run(exec, options, data, start, all);
+///   trainer<cuda_exec, traits, tracer, primitive_method, nccl_comm> run(exec, options, data, start, all);
 ///
 /// NCCL wants a GPU for each rank. Where two ranks have the same one, all messages go through pinned host memory and
 /// MPI (`transport` says so): right, and slow. A rank's messages to itself are copies. What is sent and received has no

@@ -36,7 +36,7 @@ struct splat_packing {
 };
 
 /// What a format has room for, besides means, scales, rotations, opacities and a colour.
-struct splat_room {
+struct format_capabilities {
   int sh_degree = 3;       ///< of its spherical harmonics
   bool strays = true;      ///< means far beyond the others (256 times the reach of 99 of 100), without loss to these
   bool traits = false;     ///< keys and values
@@ -52,7 +52,7 @@ struct splat_room {
 struct splat_format {
   char const* name;                        ///< as people call it
   char const* extension;                   ///< with its dots, in lower case
-  splat_room room;                         ///< `write` is given no more than that
+  format_capabilities capabilities;        ///< `write` is given no more than that
   bool (*begins)(std::string_view first);  ///< whether its files begin so; null: known by the ending alone
   gaussian_model (*read)(std::filesystem::path const& path, splat_traits* to,
                          std::vector<std::string>* notes);  ///< either only where it is not null

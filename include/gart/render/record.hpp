@@ -1,8 +1,9 @@
 #pragma once
 /// \file
-/// What the forward pass leaves of each hit for the backward pass to find; part of a strategy (backward/strategy.hpp).
-/// A record says where a hit belongs when it is found, and is called once a hit, after it has been composited. On hosts
-/// it also takes the hits of one Gaussian with a packet of rays at once (trace/packet_walk.hpp).
+/// What the forward pass leaves of each hit for the backward pass to find; part of a method
+/// (backward/gradient_method.hpp). A record says where a hit belongs when it is found, and is called once a hit, after
+/// it has been composited. On hosts it also takes the hits of one Gaussian with a packet of rays at once
+/// (trace/packet_walk.hpp).
 
 #include <gart/render/pixels.hpp>
 #include <gart/trace/hit.hpp>

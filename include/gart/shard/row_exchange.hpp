@@ -16,7 +16,7 @@
 /// Gaussians' numbers, so images have the bits of a single rank. Colours and their gradients, four fifths of the
 /// traffic, travel while lists are made and while owners finish the gradients of geometry. A rank that traces a whole
 /// view finishes those itself, and sends them in place of moments. Sums are added in the order of ranks. An `ordered`
-/// strategy also gets the bits of a single rank: pairs that began in an earlier strip travel one by one, and the owner
+/// method also gets the bits of a single rank: pairs that began in an earlier strip travel one by one, and the owner
 /// adds them to that strip's sum.
 ///
 /// Traffic a row and unit: 4 (row width + 1) bytes out, up to a multiple of 16, and 4 (3 K + 12) back: 240 each at

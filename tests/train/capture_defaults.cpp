@@ -2,7 +2,7 @@
 #include <support/policies.hpp>
 
 #include <gart/camera/models.hpp>
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/initial.hpp>
 
 #include <algorithm>
