@@ -15,9 +15,9 @@
 /// A pass knows which preparation of which frame it stands at: out of this order it throws invalid_argument.
 /// backward/fallback.hpp takes a method that needs less where there is no room.
 ///
-/// Memory beside the gradients: 48 bytes a Gaussian for the moments; where the method records, the hit buffer, 4 or
-/// 16 bytes for each pixel of each box (4 more with depth), and where the tracer has none to lend, footprints of 36
-/// bytes a Gaussian and lists of 8 a (primitive, tile) pair.
+/// Memory beside the gradients: 48 bytes a Gaussian for the moments. A method that records also needs the hit buffer: 4
+/// or 16 bytes for each pixel of each box (4 more with depth). Where the tracer has no lists to lend, footprints take
+/// 36 bytes a Gaussian and lists 8 a (primitive, tile) pair.
 
 #include <gart/backward/finish.hpp>
 #include <gart/backward/gather_form.hpp>
@@ -58,8 +58,7 @@ class backward_pass {
       : moments_(exec), own_footprints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec), depths_(exec) {}
 
   /// After the frame's preparation: a tracer that has the view's footprints lends them. False, and nothing allocated,
-  /// where the hit buffer would take more than byte_budget (0: no limit) or have more slots than there are numbers of
-  /// 32 bits, by which hits know theirs.
+  /// where the hit buffer would take more than byte_budget (0: no limit) or have more slots than 32 bits can number.
   [[nodiscard]] bool prepare(Frame const& frame, u64 byte_budget = 0) {
     stands_at_ = nothing, frame_ = &frame, preparation_ = frame.preparation();
     if constexpr (records) {
@@ -118,8 +117,8 @@ class backward_pass {
   span<float const> moments() const { return moments_; }
   /// The same, for gradients of other channels to be added to before finish_gradients.
   span<float> moments() { return moments_; }
-  /// Of a method with sums in a fixed order, after differentiate(): what was summed, a row of
-  /// pair_gradient<sh_degree>::quads for each (primitive, tile) pair, those of primitive i from pair_offsets()[i] on.
+  /// After differentiate(), by a method with sums in a fixed order: the summed rows, pair_gradient<sh_degree>::quads
+  /// for each (primitive, tile) pair. Those of primitive i begin at pair_offsets()[i].
   span<quad const> pair_rows() const requires ordered { return rows_; }
   /// The boxes, cut to what was traced.
   span<footprint_slots const> ranges() const requires ordered { return footprints_->ranges(); }
@@ -251,8 +250,8 @@ class backward_pass {
 };
 
 /// From the gradients of the image that the pass rendered to those of the scene's parameters, without the filter of the
-/// pixels. Given an error a pixel, [H][W], it also attributes that to the Gaussians: the sum over a Gaussian's hits of
-/// weight times error (backward_pass.moments).
+/// pixels. Given an error a pixel, [H][W], it also attributes the errors to the Gaussians: the sum over a Gaussian's
+/// hits of weight times error (backward_pass.moments).
 template <class Frame, gradient_method Method>
 void differentiate(Frame& frame, backward_pass<Frame, Method>& pass, image_gradients const& image,
                    gaussians_view<float> gradients, span<float const> error = {}) {

@@ -23,8 +23,8 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// Where a lane's sums go: added to the Gaussian atomically, or kept as one row a (primitive, tile) pair, in
-/// primitive-major order, for sum_pairs to add up in that order: the same bits in every run.
+/// Where a lane's sums go. They are added to the Gaussian atomically, or kept as one row a (primitive, tile) pair, in
+/// primitive-major order. sum_pairs adds rows in that order: the same bits in every run.
 enum class gather_sums { atomic, ordered };
 
 /// A struct with these members.

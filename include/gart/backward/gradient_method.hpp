@@ -1,9 +1,8 @@
 #pragma once
 /// \file
-/// What a gradient method is: what the forward pass records of a hit, which terms of the gradient are gathered by
-/// primitive and which are scattered by pixel. It derives from gradient_method_base, which has what most do not say; a
-/// program static_asserts `gradient_method` of its own where it defines it, so that a name that is misspelt is found
-/// there.
+/// A gradient method says what the forward pass records of a hit, which terms of the gradient are gathered by
+/// primitive, and which are scattered by pixel. It derives from gradient_method_base, which has defaults. A program
+/// static_asserts `gradient_method` of its own where it defines it; a misspelt name is found there.
 
 #include <gart/backward/terms.hpp>
 #include <gart/render/record.hpp>
@@ -12,10 +11,10 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// How a slot of the hit buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN
-/// before every forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held
-/// against the last hit of its ray: the same decision, bit for bit, with nothing to clear. It measured better on a
-/// device and on a host (docs/backward.md).
+/// How a slot that no hit wrote is told from a hit. `cleared`: the buffer holds NaN before every forward pass.
+/// `recomputed`: the same function evaluates each pixel of a box again, and compares it with the last hit of its ray.
+/// The decision is the same, bit for bit, and nothing is cleared. It measured better on a device and on a host
+/// (docs/backward.md).
 enum class slot_validity { cleared, recomputed };
 
 /// What a method has unless it says otherwise.

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Ranks that each compute on a GPU: messages of device memory by NCCL, on a stream of its own that waits for the
-/// policy's and is waited for, and everything small by MPI, which also started the ranks. Compiled into gart::nccl; a
-/// program needs no header of NCCL or MPI.
+/// Ranks that each compute on a GPU. NCCL carries messages of device memory, on its own stream that waits for the
+/// policy's and is waited for. MPI carries everything small, and started the ranks. Compiled into gart::nccl; a program
+/// needs no header of NCCL or MPI.
 ///
 ///   mpi_comm ranks;
 ///   cuda_exec exec(nccl_comm::device_of(ranks));

@@ -51,9 +51,9 @@ class renderer {
   /// between two views counts for the second, on the same stream.
   virtual void bind(gaussians_view<float const> parameters) = 0;
 
-  /// Features in memory of the policy, in place of those that the model came with; they must stay until others are
-  /// bound, or another model is set or bound. What is written to them between two views counts for the second. Errors:
-  /// invalid_argument where they are not of each Gaussian, or more than 512.
+  /// Features in memory of the policy, in place of the model's own. They must stay until others are bound, or another
+  /// model is set or bound. What is written to them between two views counts for the second. Errors: invalid_argument
+  /// where they are not of each Gaussian, or more than 512.
   virtual void bind_channels(gaussian_channels const& channels) = 0;
 
   /// A view to host memory; its features too where they are asked for, and there are any.

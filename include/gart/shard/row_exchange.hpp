@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Sends the rows that a round of a step needs from their owners to the ranks that trace them (work_units.hpp), and the
-/// sums of their gradients back.
+/// Sends the rows that a round of a step needs from their owners to the ranks that trace them (work_units.hpp), and
+/// sums of gradients back.
 ///
 ///   row_exchange<E, Comm, 8, 3, response> rows(exec, comm, block);
 ///   rows.fetch(scene, views, names, options);  // `scene`: the rows of this rank
@@ -16,7 +16,7 @@
 /// Gaussians' numbers, so images have the bits of a single rank. Colours and their gradients, four fifths of the
 /// traffic, travel while lists are made and while owners finish the gradients of geometry. A rank that traces a whole
 /// view finishes those itself, and sends them in place of moments. Sums are added in the order of ranks. An `ordered`
-/// method also gets the bits of a single rank: pairs that began in an earlier strip travel one by one, and the owner
+/// method also gets the bits of a single rank. Pairs that began in an earlier strip travel one by one, and the owner
 /// adds them to that strip's sum.
 ///
 /// Traffic a row and unit: 4 (row width + 1) bytes out, up to a multiple of 16, and 4 (3 K + 12) back: 240 each at
@@ -116,8 +116,8 @@ class row_exchange {
   void share_image(void* image, camera const& view, std::size_t bytes, auto const& reads) {
     messages_.add_traffic(share_strips(*exec_, messages_.comm(), units(), image, view, bytes, reads));
   }
-  /// Sends rows of `arrays`, in parallel with queued work until give_back, from the rank that `has` them to all ranks
-  /// of the same view.
+  /// Sends rows of `arrays` from the rank that `has` them to all ranks of the same view. It runs in parallel with
+  /// queued work until give_back.
   void begin_sharing(std::initializer_list<span<float>> arrays, int rows, auto const& has) {
     messages_.add_traffic(begin_sharing_rows(*exec_, messages_.comm(), units(), arrays, rows, has));
   }

@@ -209,8 +209,8 @@ struct keep_sums {
   }
 };
 
-// Finished gradients of a row from the received messages, four places a lane: the sum over units, each a whole view,
-// times the share. Errors are not scaled, and are added one by one, in the order of rounds.
+// Packs finished gradients of a row, four places a lane: the sum over units, each a whole view, times the share. Errors
+// are not scaled, and are added one by one, in the order of rounds.
 struct add_finished_body {
   returned_unit const* units;
   index_t count;

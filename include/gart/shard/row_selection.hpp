@@ -72,7 +72,8 @@ struct select_kernel {
   }
 };
 
-// The pairs of a box that began above the rows, or begins with them, 0 for others; of `range`, cut to the rows or not.
+// The number of a box's pairs that began above the rows; 0 for boxes that begin with them. `range` may be cut to the
+// rows.
 template <int Size>
 GART_HD inline u32 continued_pairs(footprint_slots range, image_rows const& rows) {
   range.box = cut(range.box, rows);
@@ -170,8 +171,9 @@ class row_selection {
   }
 
  private:
-  // Finds the boxes of this rank's rows in each view, and the units of all ranks, from the views' costs at their last
-  // trace, or now for a new view. Present costs come with the counts. A view that one rank traces alone needs no cost.
+  // Finds the boxes of this rank's rows in each view, and the units of all ranks. Units follow from the views' costs at
+  // their last trace, or now for a new view. Present costs come with the counts. A view that one rank traces alone
+  // needs no cost.
   void measure(gaussians_view<float const> scene, std::vector<camera> const& views,
                std::vector<std::size_t> const& names, render_options const& options) {
     bool const shared = views.size() < static_cast<std::size_t>(owners_.ranks);

@@ -1,8 +1,7 @@
 #pragma once
 /// \file
-/// A pixel program whose rays can meet a Gaussian together (trace/warp_walk.hpp): what a hit shows is asked for where
-/// it is found, from a row of floats of the Gaussian that the whole warp has read; it is composited when its turn
-/// comes.
+/// A pixel program whose rays can meet a Gaussian together (trace/warp_walk.hpp). It asks for what a hit shows where
+/// the hit is found, from a row of floats that the whole warp has read. It composites the hit in its turn.
 
 #include <gart/math/glm.hpp>
 #include <gart/tiles/footprint_slots.hpp>

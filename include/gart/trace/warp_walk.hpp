@@ -1,14 +1,14 @@
 #pragma once
 /// \file
-/// The walk of tile lists on a device: a warp takes a block of 8 x 4 pixels of a tile, a lane a ray. The same as
-/// walk_tiles (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that all rays of the warp meet a
-/// candidate together. So candidates that miss the block are left out by one vote, the others come through shared
-/// memory, read ahead while the ones before are evaluated. Of each group of four a ray then takes its own hits, one
-/// after the other, and computes what they show: few lanes are idle where a candidate is a hit of some rays alone. A
-/// ray's pending hits are in a queue (trace/warp_hit_queue.hpp). Hits are passed on when the window of some ray's queue
-/// is full: many rays then have some to pass on, and do it together. Where a queue loses a hit the ray passes on what
-/// lies before it, and walks the list again, strictly after its last hit. The queues take 4.7 KB of device memory for
-/// each ray that the device holds at a time: 298 MB on 132 multiprocessors.
+/// The walk of tile lists on a device: a warp takes a block of 8 x 4 pixels of a tile, a lane a ray. It does the same
+/// as walk_tiles (trace/tile_tracer.hpp), hit by hit and bit by bit. All rays of the warp meet a candidate together. So
+/// one vote leaves out candidates that miss the block. The others come through shared memory, read ahead while earlier
+/// ones are evaluated. Of each group of four a ray then takes its own hits, one after the other, and computes what they
+/// show. So few lanes idle where a candidate is a hit of some rays alone. A ray's pending hits are in a queue
+/// (trace/warp_hit_queue.hpp). Hits are passed on when the window of some ray's queue is full: many rays then have some
+/// to pass on, and do it together. Where a queue loses a hit the ray passes on the hits before it, and walks the list
+/// again, strictly after its last hit. The queues take 4.7 KB of device memory for each ray that the device holds at a
+/// time: 298 MB on 132 multiprocessors.
 
 #include <gart/camera/ray_depth.hpp>
 #include <gart/math/ray_gaussian.hpp>
