@@ -1,14 +1,14 @@
-// The backward pass by strategy and tile size, and what it asks of the step before it: footprints and the hit buffer.
+// The backward pass by method and tile size, and what it asks of the step before it: footprints and the hit buffer.
 #include "support/frame.hpp"
 
 #include <gart/backward/backward.hpp>
 
 namespace {
 
-template <gart::execution E, class By, class Strategy>
+template <gart::execution E, class By, class Method>
 struct backward_frame {
   gart_bench::frame<E, By> frame;
-  gart::backward_pass<typename gart_bench::frame<E, By>::traced_type, Strategy> pass;
+  gart::backward_pass<typename gart_bench::frame<E, By>::traced_type, Method> pass;
   gart::gaussians<E> gradients;
   gart::buffer<float, E> color, color_gradient, depth, depth_gradient;
 
@@ -24,15 +24,15 @@ struct backward_frame {
     prepare();
     pass.render(frame.traced, {.color = color.data(), .depth = of_depth ? depth.data() : nullptr});
   }
-  static constexpr bool of_depth = gart::has_depth<Strategy>;
+  static constexpr bool of_depth = gart::has_depth<Method>;
   void prepare() {
     if (!pass.prepare(frame.traced)) throw pass.out_of_memory_error();
   }
 };
 
-template <class By, class Strategy, gart::execution E>
+template <class By, class Method, gart::execution E>
 void backward(benchmark::State& state, E& exec) {
-  backward_frame<E, By, Strategy> f(exec);
+  backward_frame<E, By, Method> f(exec);
   gart_bench::measure(state, exec, [&] {
     gart::differentiate(f.frame.traced, f.pass, {f.color_gradient, f.depth_gradient}, f.gradients);
   });
@@ -40,33 +40,33 @@ void backward(benchmark::State& state, E& exec) {
 }
 
 // The tile lists and the clear of the hit buffer, and footprints where no tracer lends them.
-template <class By, class Strategy, gart::execution E>
+template <class By, class Method, gart::execution E>
 void prepare(benchmark::State& state, E& exec) {
-  backward_frame<E, By, Strategy> f(exec);
+  backward_frame<E, By, Method> f(exec);
   gart_bench::measure(state, exec, [&] { f.prepare(); });
   state.counters["hit_buffer_bytes"] = static_cast<double>(f.pass.hit_buffer_bytes());
 }
 
-template <class By, class Strategy>
+template <class By, class Method>
 void add(std::string const& name) {
-  gart_bench::add(name.c_str(), [](benchmark::State& state, auto& exec) { backward<By, Strategy>(state, exec); });
+  gart_bench::add(name.c_str(), [](benchmark::State& state, auto& exec) { backward<By, Method>(state, exec); });
 }
 
 using gart_bench::by_bvh;
 using gart_bench::by_tiles;
 
-// Every strategy on tile lists; on the BVH those without ordered sums. `/8`: the tiles that footprints are cut into.
+// Every method on tile lists; on the BVH those without ordered sums. `/8`: the tiles that footprints are cut into.
 bool const added = [] {
-  gart::strategies::for_each([]<class Strategy>(Strategy) {
-    std::string const name = Strategy::name, cut = Strategy::gather::any ? "/8" : "";
-    add<by_tiles<8>, Strategy>("backward/tiles/" + name + cut);
-    if constexpr (!Strategy::ordered) add<by_bvh, Strategy>("backward/bvh/" + name + cut);
+  gart::gradient_methods::for_each([]<class Method>(Method) {
+    std::string const name = Method::name, cut = Method::gather::any ? "/8" : "";
+    add<by_tiles<8>, Method>("backward/tiles/" + name + cut);
+    if constexpr (!Method::ordered) add<by_bvh, Method>("backward/bvh/" + name + cut);
   });
   return true;
 }();
 
 }  // namespace
 
-GART_BENCH("backward/tiles/primitive_depth/8", backward<by_tiles<8>, gart::with_depth<gart::primitive_strategy>>)
-GART_BENCH("prepare/bvh/primitive/8", prepare<by_bvh, gart::primitive_strategy>)
-GART_BENCH("prepare/tiles/primitive/8", prepare<by_tiles<8>, gart::primitive_strategy>)
+GART_BENCH("backward/tiles/primitive_depth/8", backward<by_tiles<8>, gart::with_depth<gart::primitive_method>>)
+GART_BENCH("prepare/bvh/primitive/8", prepare<by_bvh, gart::primitive_method>)
+GART_BENCH("prepare/tiles/primitive/8", prepare<by_tiles<8>, gart::primitive_method>)

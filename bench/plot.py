@@ -15,7 +15,7 @@ import re
 from charts import bars, lines
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-STRATEGIES = ("pixel", "hybrid", "primitive")
+METHODS = ("pixel", "hybrid", "primitive")
 
 
 def table(header, rows):
@@ -47,8 +47,8 @@ class Pages:
     def figure(self, name):
         return os.path.join(self.docs, "figures", name + ".svg")
 
-    def strategies(self):
-        result = self.load("strategies")
+    def methods(self):
+        result = self.load("methods")
         if not result:
             return
         rows, good = [], [r for r in result["runs"] if "error" not in r]
@@ -63,16 +63,16 @@ class Pages:
                          f"{run['hit_buffer_bytes'] / 1e9:.2f}", f"{run['peak_bytes'] / 1e9:.2f}"])
         first = good[0] if good else None
         size = f"{first['width']} x {first['height']}, mean of {first['views']} views" if first else ""
-        self.tables["strategies"] = table(
-            ["scene", "tracer", "strategy", "forward, ms", "backward, ms", "against pixel", "step, ms", "hit buffer, GB",
+        self.tables["methods"] = table(
+            ["scene", "tracer", "method", "forward, ms", "backward, ms", "against pixel", "step, ms", "hit buffer, GB",
              "peak, GB"], rows) + ["", f"{size}, medians of {first['repeats'] if first else 0}; {source(result)}."]
         if not good:
             return
         tracers = list(dict.fromkeys(r["tracer"] for r in good))
         scenes = list(dict.fromkeys(r["scene"] for r in good))
-        pick = lambda scene, tracer: [r for s in STRATEGIES for r in good
+        pick = lambda scene, tracer: [r for s in METHODS for r in good
                                       if (r["scene"], r["tracer"], r["backward"]) == (scene, tracer, s)]
-        bars(self.figure("backward"), "Backward pass by strategy", "ms",
+        bars(self.figure("backward"), "Backward pass by gradient method", "ms",
              [(f"{scene}, {tracer}", [(r["backward"], backward_ms(r)) for r in pick(scene, tracer)])
               for tracer in tracers for scene in scenes if pick(scene, tracer)], source(result))
 
@@ -149,7 +149,7 @@ def main():
     parser.add_argument("--docs", default=os.path.join(os.path.dirname(HERE), "docs"))
     a = parser.parse_args()
     pages = Pages(a.results, a.docs)
-    pages.strategies()
+    pages.methods()
     pages.memory()
     pages.ranks()
     pages.leave_one_out()

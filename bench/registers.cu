@@ -28,12 +28,12 @@ struct gather_row {
 };
 
 template <int ShDegree, class Response, class Entry, gather_sums Sums = gather_sums::atomic,
-          class Terms = terms<color, geometry>>
+          class Terms = terms<term::color, term::geometry>>
 using backward_kernel = gather_of<gather_row<ShDegree, Response, Entry, Sums, Terms>>;
 
 template <int ShDegree, class Response, class Entry>
 using backward_depth_kernel =
-    backward_kernel<ShDegree, Response, Entry, gather_sums::atomic, terms<color, geometry>::with_depth>;
+    backward_kernel<ShDegree, Response, Entry, gather_sums::atomic, terms<term::color, term::geometry>::with_depth>;
 
 }  // namespace
 

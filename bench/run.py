@@ -5,14 +5,14 @@
 
 What (comma-separated; default tests and paper):
   tests       every CUDA test of the build
-  sanitize    compute-sanitizer memcheck and racecheck over a training step of each strategy
+  sanitize    compute-sanitizer memcheck and racecheck over a training step of each method
   stages      gart_bench_cuda on the first scene: each stage on its own, and tile sizes 4, 8 and 16
   cpu         gart_bench: the same stages on the host policies, on a small scene; a minute or two
-  strategies  `gart bench`: a training step by strategy and tracer, on the first two scenes
+  methods     `gart bench`: a training step by method and tracer, on the first two scenes
   memory      `gart bench`: hit buffer and peak memory against the number of Gaussians, at two resolutions
   traits      `gart bench`: a training step by row (docs/performance.md): SH and kernel degree, hit format,
               determinism; on --backend, a host by one thread, and bytes a Gaussian. Needs -DGART_VARIANTS=ON
-  paper       strategies, memory and stages
+  paper       methods, memory and stages
   tradeoff    `gart tradeoff` on the first scene and on every --model: what each approximation costs and buys
   formats     every --model in each format and setting, by its test views: bytes, PSNR, SSIM (bench/formats.py)
   view        every --model served by `gart view`, and what a viewer takes from training every --capture (bench/view.py)
@@ -20,7 +20,7 @@ What (comma-separated; default tests and paper):
               a file rules_NAME.json a capture, written after each rule
   leave-one-out  every --capture by what `gart train` chooses and by each fixed setting: a setting tuned on all captures
               but one, scored on that one, stands against the choices (docs/training.md); leave_one_out.json
-  curves      a short training of every --capture by each strategy, same seed: the loss curves against each other and
+  curves      a short training of every --capture by each method, same seed: the loss curves against each other and
               against the noise from run to run, the test scores, and whether deterministic gives the same bits twice
   long        a full training of every --capture: every step checked (gart train --check-finite), five seeds, and
               deterministic twice; --long names those to run. long.json is written after each, and what is in it already
@@ -53,7 +53,7 @@ from training import LONG_PARTS, RULES, Trainings
 from view import View
 
 TRAININGS = ("rules", "leave-one-out", "curves", "long")
-PARTS = ("tests", "sanitize", "stages", "cpu", "strategies", "memory", "traits", "tradeoff", "formats",
+PARTS = ("tests", "sanitize", "stages", "cpu", "methods", "memory", "traits", "tradeoff", "formats",
          "view") + TRAININGS
 
 # Rows of docs/performance.md: name, SH degree, kernel degree, options of gart bench.
@@ -174,7 +174,7 @@ class Bench(Checks, Trainings, Formats, View):
     def cpu(self):
         self.google_benchmark("cpu", "gart_bench", ["--gaussians", "5000", "--size", "160x120"], scene="discs_5k")
 
-    def strategies(self):
+    def methods(self):
         runs = []
         for thousands in self.a.counts[:2]:
             name, ply, cameras = self.scene(thousands)
@@ -185,7 +185,7 @@ class Bench(Checks, Trainings, Formats, View):
                     if "error" not in result:
                         self.say(f"{name}, {tracer}, {backward}: step {result['step_ms']:.2f} ms, backward "
                                  f"{result['stages_ms']['backward']:.2f} ms")
-        self.write("strategies", runs)
+        self.write("methods", runs)
 
     def memory(self):
         runs = []
@@ -281,11 +281,11 @@ def arguments():
     parser.add_argument("--sanitize", action="store_true", help="the part sanitize besides")
     parser.add_argument("--generator", help="command that makes a missing scene: {dir} {name} {count}")
     parser.add_argument("--counts", type=lambda t: [int(x) for x in listed(t)], default=[1000, 2000, 3000, 4000, 5000],
-                        help="thousands of Gaussians; strategies take the first two, stages and tradeoff the first; '' "
+                        help="thousands of Gaussians; methods take the first two, stages and tradeoff the first; '' "
                              "for no scene in tradeoff")
     parser.add_argument("--tracers", type=listed, default=["tiles", "bvh"], help="memory takes the first")
     parser.add_argument("--backwards", type=listed, default=["pixel", "hybrid", "primitive"])
-    parser.add_argument("--views", type=int, default=4, help="cameras of the strategies")
+    parser.add_argument("--views", type=int, default=4, help="cameras of the methods")
     parser.add_argument("--repeats", type=int, default=20, help="measured steps a camera; the median counts")
     parser.add_argument("--backend", default="cuda", help="of traits, tradeoff and the trainings")
     parser.add_argument("--filter", default=".", help="stages and cpu: benchmarks, formats: settings, by regular expression")
@@ -310,7 +310,7 @@ def arguments():
     a = parser.parse_args()
     wanted = a.what + (["sanitize"] if a.sanitize else [])
     if "paper" in wanted:
-        wanted += ["stages", "strategies", "memory"]
+        wanted += ["stages", "methods", "memory"]
     unknown = [w for w in wanted if w not in PARTS + ("paper",)]
     if unknown:
         parser.error(f"--what {unknown[0]}: not one of {', '.join(PARTS)}, paper")

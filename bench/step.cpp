@@ -1,11 +1,11 @@
-// A whole training step on one view, by tracer and strategy. Rates of zero keep the scene as it is.
+// A whole training step on one view, by tracer and method. Rates of zero keep the scene as it is.
 #include "support/frame.hpp"
 
 #include <gart/train/trainer.hpp>
 
 namespace {
 
-template <class By, class Strategy, gart::execution E>
+template <class By, class Method, gart::execution E>
 void step(benchmark::State& state, E& exec) {
   auto const& scene = gart_bench::the_scene();
   gart::dataset data;
@@ -20,7 +20,7 @@ void step(benchmark::State& state, E& exec) {
   options.rates = {0, 0, 0, 0, 0, 0, 0};
   using tracer = typename By::template tracer<E>;
   using traits = gart::scene_traits<gart_bench::sh_degree>;
-  gart::trainer<E, traits, tracer, Strategy> trainer(exec, options, data, scene.model);
+  gart::trainer<E, traits, tracer, Method> trainer(exec, options, data, scene.model);
   gart_bench::measure(state, exec, [&] { trainer.step(); });
   state.counters["hit_buffer_bytes"] = static_cast<double>(trainer.hit_buffer_bytes());
   state.counters["peak_bytes"] = static_cast<double>(exec.memory.peak);
@@ -28,10 +28,10 @@ void step(benchmark::State& state, E& exec) {
 
 template <class By>
 void add_steps(std::string const& tracer) {
-  gart::strategies::for_each([&]<class Strategy>(Strategy) {
-    if constexpr (!Strategy::ordered)
-      gart_bench::add(("step/" + tracer + "/" + Strategy::name).c_str(),
-                      [](benchmark::State& state, auto& exec) { step<By, Strategy>(state, exec); });
+  gart::gradient_methods::for_each([&]<class Method>(Method) {
+    if constexpr (!Method::ordered)
+      gart_bench::add(("step/" + tracer + "/" + Method::name).c_str(),
+                      [](benchmark::State& state, auto& exec) { step<By, Method>(state, exec); });
   });
 }
 

@@ -18,7 +18,7 @@ FULL_STEPS = 30000
 GAUSSIANS = {"lego": 300000, "bonsai": 1000000, "tandt_train": 1000000, "fox": 500000, "many_cameras": 500000}
 
 CURVE_STEPS, CURVE_WINDOW, CURVE_POINTS = 1000, 50, 100
-# Strategy and number of the run; the two of `primitive` are the noise from run to run.
+# Method and number of the run; the two of `primitive` are the noise from run to run.
 CURVE_RUNS = (("primitive", 1), ("primitive", 2), ("pixel", 1), ("hybrid", 1), ("deterministic", 1),
               ("deterministic", 2))
 LONG_PARTS = ("finite", "seeds", "deterministic")
@@ -224,20 +224,20 @@ class Trainings:
     def curves(self):
         for name, capture in self.a.capture:
             options, rows, courses = self.train_options(name, CURVE_STEPS), [], {}
-            for strategy, number in CURVE_RUNS:
-                row, course = self.training(f"{name}, {strategy}, run {number}", capture, options,
-                                            "--backward", strategy, "--seed", 1)
+            for method, number in CURVE_RUNS:
+                row, course = self.training(f"{name}, {method}, run {number}", capture, options,
+                                            "--backward", method, "--seed", 1)
                 if course:
-                    courses[strategy, number] = smoothed(course, CURVE_WINDOW)
-                rows.append({"strategy": strategy, "run": number, **row})
+                    courses[method, number] = smoothed(course, CURVE_WINDOW)
+                rows.append({"method": method, "run": number, **row})
             first, second = (courses.get(("primitive", n), []) for n in (1, 2))
             mean = [(step, (value + dict(second)[step]) / 2) for step, value in first if step in dict(second)]
             for row in rows:
-                course = courses.get((row["strategy"], row["run"]), [])
+                course = courses.get((row["method"], row["run"]), [])
                 every = max(1, math.ceil(len(course) / CURVE_POINTS))
                 row["difference"] = difference(course, mean, mean)
                 row["curve"] = [[step, float(f"{value:.6g}")] for step, value in course[::-1][::every][::-1]]
-            twice = [r for r in rows if r["strategy"] == "deterministic" and "error" not in r]
+            twice = [r for r in rows if r["method"] == "deterministic" and "error" not in r]
             bits = {"same_model": same(twice, "model_sha256"), "same_losses": same(twice, "losses_sha256")}
             if False in bits.values():
                 self.fail(f"{name}: two deterministic runs differ: {bits}")

@@ -147,10 +147,10 @@ void add_bench(CLI::App& app, command& selected) {
   bench->add_option("CAMERAS", a->cameras, "A dataset, or a camera JSON as for gart render")->type_name("")->required();
   bench
       ->add_option("--backward", a->backward,
-                   "Backward strategy: auto, pixel, hybrid, primitive or\ndeterministic (sums in a fixed order)")
+                   "Gradient method: auto, pixel, hybrid, primitive or\ndeterministic (sums in a fixed order)")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(one_of_strategies());
+      ->check(one_of_methods());
   bench->add_option("--views", a->views, "The first so many cameras")
       ->type_name("N")
       ->capture_default_str()

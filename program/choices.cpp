@@ -17,7 +17,7 @@ namespace {
 char const* const by_option = "given";
 
 // Until which step images are smaller than their photographs: the largest photographs'.
-gart::chosen<std::string> sizes_in_words(gart::dataset const& data, gart::train_options const& options) {
+gart::decision<std::string> sizes_in_words(gart::dataset const& data, gart::train_options const& options) {
   int most = 1;
   for (auto const& v : data.train) most = std::max(most, gart::shrink_of(v.view, 4, options.resolution));
   auto const until = [&](int shrink) {
@@ -44,7 +44,7 @@ std::string* option_of(train_arguments& a, std::string const& setting) {
 
 }  // namespace
 
-gart::chosen<std::string> background_for(gart::capture_traits const& traits) {
+gart::decision<std::string> background_for(gart::capture_traits const& traits) {
   auto const choice = gart::choose_background(traits);
   return {gart::to_string(choice.value), choice.why};
 }
@@ -55,7 +55,7 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   auto const say = [&](std::string const& what, std::string const& value, std::string const& why) {
     all.push_back({{"option", what}, {"value", value}, {"why", why}});
   };
-  auto const settle = [&](std::string const& what, std::string& value, gart::chosen<std::string> const& choice) {
+  auto const settle = [&](std::string const& what, std::string& value, gart::decision<std::string> const& choice) {
     bool const given = value != "auto";
     if (!given) value = choice.value;
     say(what, value, given ? by_option : choice.why);

@@ -4,7 +4,7 @@
 
 #include "train/train_arguments.hpp"
 
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 
 #include <nlohmann/json.hpp>
 
@@ -13,7 +13,7 @@
 namespace gart_cli {
 
 // "white" or "black".
-gart::chosen<std::string> background_for(gart::capture_traits const& traits);
+gart::decision<std::string> background_for(gart::capture_traits const& traits);
 
 // Replaces what is "auto" in `a` by what suits the capture; a list of {"option", "value", "why"}. Where an option was
 // given, "why" says so.

@@ -50,8 +50,8 @@ nlohmann::json recorded_options::continue_from(nlohmann::json const& saved, std:
   return raised;
 }
 
-CLI::Validator one_of_strategies() {
-  std::vector<std::string> names = gart::strategy_names();
+CLI::Validator one_of_methods() {
+  std::vector<std::string> names = gart::gradient_method_names();
   names.insert(names.begin(), "auto");
   return one_of(names);
 }
@@ -131,7 +131,7 @@ gart::configuration_request configuration_request_for(gart::model_file const& fi
 
 nlohmann::json approximations_of(gart::render_options const& render, gart::configuration_info const& configuration) {
   return {{"alpha_min", render.alpha_min},
-          {"t_min", render.transmittance_min},
+          {"transmittance_min", render.transmittance_min},
           {"max_hits", render.max_hits},
           {"antialias", render.antialias},
           {"hit_format", gart::to_string(configuration.hit_format)}};

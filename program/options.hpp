@@ -3,7 +3,7 @@
 
 #include "help.hpp"
 
-#include <gart/backward/strategies.hpp>
+#include <gart/backward/gradient_methods.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/runtime/renderer.hpp>
@@ -88,8 +88,8 @@ template <gart::named E>
 CLI::Validator name_of_a() {
   return one_of(gart::list_of_names<E>());
 }
-// "auto", or a strategy.
-CLI::Validator one_of_strategies();
+// "auto", or a method.
+CLI::Validator one_of_methods();
 CLI::Validator kernel_degree_names();
 
 gart::vec3 background_color(std::string const& name);

@@ -1,6 +1,6 @@
 #pragma once
 // `gart info --self-test`: compares the image and gradients of a small scene, by every configuration that runs here,
-// with their definition in double (gart/reference/reference.hpp).
+// with the reference in double (gart/reference/reference.hpp).
 
 namespace gart_cli {
 

@@ -11,8 +11,9 @@ namespace gart_cli {
 int processors_of_quota(std::filesystem::path const& mount, std::string const& own);
 
 // Threads of OpenMP: as many as affinity and quota allow, or OMP_NUM_THREADS, up to sixteen times as many. They wait
-// without spinning, which on a machine with other work takes the time of those that are waited for: OpenMP reads that
-// when it is loaded, so the program begins anew with it in its environment. An OMP_WAIT_POLICY of the user's stays.
+// without spinning: on a machine with other work, spinning takes the time of the threads waited for. OpenMP reads the
+// setting when it is loaded, so the program starts itself again with it in its environment. An OMP_WAIT_POLICY of the
+// user's stays.
 void bound_threads(char** argv);
 
 }  // namespace gart_cli

@@ -7,4 +7,4 @@ namespace {
 using tracer = gart::bvh_tracer<gart::serial_exec>;
 }  // namespace
 
-GART_REGISTER_CONFIGURATIONS(gart_serial_configurations, gart::register_strategies<gart::serial_exec, tracer>(0))
+GART_REGISTER_CONFIGURATIONS(gart_serial_configurations, gart::register_methods<gart::serial_exec, tracer>(0))

@@ -7,4 +7,4 @@ namespace {
 using tracer = gart::tile_tracer<gart::openmp_exec>;
 }  // namespace
 
-GART_REGISTER_CONFIGURATIONS(gart_openmp_tile_configurations, gart::register_strategies<gart::openmp_exec, tracer>(16))
+GART_REGISTER_CONFIGURATIONS(gart_openmp_tile_configurations, gart::register_methods<gart::openmp_exec, tracer>(16))

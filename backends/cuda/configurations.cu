@@ -9,4 +9,4 @@ bool device_available(std::string* reason) { return !gart::cuda_devices(reason).
 }  // namespace
 
 GART_REGISTER_CONFIGURATIONS(gart_cuda_configurations,
-                             gart::register_strategies<gart::cuda_exec, tracer>(20, device_available))
+                             gart::register_methods<gart::cuda_exec, tracer>(20, device_available))

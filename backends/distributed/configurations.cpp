@@ -8,13 +8,13 @@ namespace {
 
 using namespace gart;
 
-template <strategy Strategy>
+template <gradient_method Method>
 void register_on_ranks(int rank) {
-  register_configurations<openmp_exec, tile_tracer<openmp_exec>, Strategy, mpi_comm>(rank);
+  register_configurations<openmp_exec, tile_tracer<openmp_exec>, Method, mpi_comm>(rank);
 }
 
 }  // namespace
 
-GART_REGISTER_CONFIGURATIONS(gart_rank_configurations, register_on_ranks<deterministic_strategy>(16),
-                             register_on_ranks<primitive_strategy>(17),
-                             register_on_ranks<with_depth<primitive_strategy>>(17))
+GART_REGISTER_CONFIGURATIONS(gart_rank_configurations, register_on_ranks<deterministic_method>(16),
+                             register_on_ranks<primitive_method>(17),
+                             register_on_ranks<with_depth<primitive_method>>(17))

@@ -10,13 +10,13 @@ using namespace gart;
 
 bool device_available(std::string* reason) { return !cuda_devices(reason).empty(); }
 
-template <strategy Strategy>
+template <gradient_method Method>
 void register_on_devices(int rank) {
-  register_configurations<cuda_exec, tile_tracer<cuda_exec>, Strategy, nccl_comm>(rank, device_available);
+  register_configurations<cuda_exec, tile_tracer<cuda_exec>, Method, nccl_comm>(rank, device_available);
 }
 
 }  // namespace
 
-GART_REGISTER_CONFIGURATIONS(gart_device_rank_configurations, register_on_devices<deterministic_strategy>(36),
-                             register_on_devices<primitive_strategy>(37),
-                             register_on_devices<with_depth<primitive_strategy>>(37))
+GART_REGISTER_CONFIGURATIONS(gart_device_rank_configurations, register_on_devices<deterministic_method>(36),
+                             register_on_devices<primitive_method>(37),
+                             register_on_devices<with_depth<primitive_method>>(37))

@@ -7,4 +7,4 @@ namespace {
 using tracer = gart::embree_tracer<gart::openmp_exec>;
 }  // namespace
 
-GART_REGISTER_CONFIGURATIONS(gart_embree_configurations, gart::register_strategies<gart::openmp_exec, tracer>(13))
+GART_REGISTER_CONFIGURATIONS(gart_embree_configurations, gart::register_methods<gart::openmp_exec, tracer>(13))

@@ -5,4 +5,4 @@
 
 GART_REGISTER_CONFIGURATIONS(gart_openmp_variants, gart::register_variants<gart::openmp_exec>();
                              gart::register_variant<gart::openmp_exec, gart::generalized_gaussian<>,
-                                                    gart::deterministic_strategy>(gart::always_available))
+                                                    gart::deterministic_method>(gart::always_available))

@@ -1,5 +1,5 @@
 // Trains on a capture (COLMAP, Blender, nerfstudio) and writes the scene: train_scene DATASET MODEL.ply [ITERATIONS]
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/runtime/session.hpp>
 

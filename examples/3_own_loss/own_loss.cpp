@@ -1,7 +1,7 @@
 // Training with a loss of one's own: own_loss DATASET MODEL.ply [ITERATIONS]
 // Charbonnier's, the mean of sqrt(d^2 + e^2) - e over pixels and channels: quadratic for small differences, L1 for
 // large ones. The trainer is a template here, compiled for OpenMP, SH degree 1, the BVH and the pixel backward pass.
-#include <gart/backward/strategies.hpp>
+#include <gart/backward/gradient_methods.hpp>
 #include <gart/exec/parallel.hpp>
 #include <gart/io/ply.hpp>
 #include <gart/runtime/initial.hpp>
@@ -48,7 +48,7 @@ int main(int argc, char** argv) try {
 
   using exec = gart::openmp_exec;
   exec queue;
-  gart::trainer<exec, gart::scene_traits<1>, gart::bvh_tracer<exec>, gart::pixel_strategy> training(
+  gart::trainer<exec, gart::scene_traits<1>, gart::bvh_tracer<exec>, gart::pixel_method> training(
       queue, options, data, gart::initial_model(data, options, 1));
 
   gart::buffer<float, exec> loss(queue), squared(queue);

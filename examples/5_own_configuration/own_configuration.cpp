@@ -16,7 +16,7 @@ using response = gart::generalized_gaussian<4>;
 GART_REGISTER_CONFIGURATIONS(
     own_configurations,
     gart::register_configuration_of<gart::openmp_exec, gart::scene_traits<1, response>,
-                                    gart::tile_tracer<gart::openmp_exec, 8, response>, gart::primitive_strategy>(0))
+                                    gart::tile_tracer<gart::openmp_exec, 8, response>, gart::primitive_method>(0))
 
 int main(int argc, char** argv) try {
   if (argc < 3) return std::fprintf(stderr, "usage: own_configuration DATASET MODEL.ply [ITERATIONS]\n"), 2;

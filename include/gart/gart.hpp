@@ -1,8 +1,7 @@
 #pragma once
 /// \file
-/// Everything that is safe in any host translation unit: captures and models in and out, training and rendering over
-/// rows chosen at run time, and the templates on the host policies. Kernels on CUDA need nvcc and exec/cuda_launch.cuh
-/// first.
+/// Everything that is safe in any host translation unit: captures and models in and out, training and rendering chosen
+/// at run time, and the templates on the host policies. Kernels on CUDA need nvcc and exec/cuda_launch.cuh first.
 
 #include <gart/backward/backward.hpp>
 #include <gart/bvh/walk.hpp>
@@ -28,7 +27,7 @@
 #include <gart/rays/ray_tracer.hpp>
 #include <gart/reference/reference.hpp>
 #include <gart/render/frame.hpp>
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/initial.hpp>
 #include <gart/runtime/model_file.hpp>

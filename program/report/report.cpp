@@ -163,7 +163,8 @@ std::string settings(json const& m, json const& config) {
           " test views. Images resized: " + text_of(m, "resize_filter") + ". Background: " + text_of(m, "background") +
           ". Approximations: preset " + text_of(m["approximations"], "preset") +
           "; a Gaussian is hit where its alpha is at least " + fixed(number_of(m["approximations"], "alpha_min"), 6) +
-          ", and a ray ends below a transmittance of " + fixed(number_of(m["approximations"], "t_min"), 6) + cap +
+          ", and a ray ends below a transmittance of " + fixed(number_of(m["approximations"], "transmittance_min"), 6) +
+          cap +
           ". PSNR and SSIM (11 x 11 Gaussian window, sigma 1.5) are taken per view on [0, 1] and averaged over views.";
   if (m.contains("psnr_own_colours")) {
     html += m.value("exposure", false)

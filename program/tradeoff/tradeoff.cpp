@@ -166,7 +166,7 @@ class tradeoff_run {
             {"clock", a_.clock},
             {"background", background_},
             {"gradient_of", first.truth.empty() ? "a random weight of every colour" : "the training loss"},
-            {"reference", {{"alpha_min", reference_.alpha_min}, {"t_min", reference_.transmittance_min}}}};
+            {"reference", {{"alpha_min", reference_.alpha_min}, {"transmittance_min", reference_.transmittance_min}}}};
   }
 
   // Takes the model through a file of the setting's format, which may hold fewer bands.
@@ -315,9 +315,10 @@ void add_tradeoff(CLI::App& app, command& selected) {
       ->type_name("DIR")
       ->required();
   tradeoff
-      ->add_option("--settings", a->settings,
-                   "Only these knobs or settings, comma-separated: t_min,\ntracer=bvh and so on; exact is always "
-                   "measured")
+      ->add_option(
+          "--settings", a->settings,
+          "Only these knobs or settings, comma-separated: transmittance_min,\ntracer=bvh and so on; exact is always "
+          "measured")
       ->type_name("A,B")
       ->delimiter(',');
   tradeoff->add_option("--views", a->views.count, "Views, evenly spread; more for a mean over more of the scene")
@@ -345,10 +346,10 @@ void add_tradeoff(CLI::App& app, command& selected) {
   tradeoff
       ->add_option(
           "--backward", a->backward,
-          "Backward strategy of all settings that do not name one:\nauto, pixel, hybrid, primitive or deterministic")
+          "Gradient method of all settings that do not name one:\nauto, pixel, hybrid, primitive or deterministic")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(one_of_strategies());
+      ->check(one_of_methods());
   tradeoff
       ->add_option("--reference-alpha-min", a->reference_alpha_min,
                    "Opacity below which the reference sees no hit, 0: the\nmodel's own, with which it was trained; "
@@ -376,7 +377,7 @@ void add_tradeoff(CLI::App& app, command& selected) {
       "  tradeoff.json   everything, every stage's time included\n"
       "\nExamples:\n"
       "  gart tradeoff run/model.ply lego --out trade\n"
-      "  gart tradeoff scene.ply path.json --out trade --settings alpha_min,t_min --views 4 --repeats 20");
+      "  gart tradeoff scene.ply path.json --out trade --settings alpha_min,transmittance_min --views 4 --repeats 20");
   tradeoff->callback([a, &selected] { selected = [a] { return tradeoff_run(*a).run(); }; });
 }
 

@@ -62,8 +62,8 @@ row cells_of(json const& s) {
 
 std::string reference_of(json const& result) {
   char text[160];
-  std::snprintf(text, sizeof text, "the reference in double (alpha_min %.3g, t_min %.3g)",
-                number(result["reference"]["alpha_min"]), number(result["reference"]["t_min"]));
+  std::snprintf(text, sizeof text, "the reference in double (alpha_min %.3g, transmittance_min %.3g)",
+                number(result["reference"]["alpha_min"]), number(result["reference"]["transmittance_min"]));
   return text;
 }
 

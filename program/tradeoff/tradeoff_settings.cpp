@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <gart/backward/strategies.hpp>
+#include <gart/backward/gradient_methods.hpp>
 #include <iterator>
 
 namespace gart_cli {
@@ -58,7 +58,7 @@ std::vector<setting> settings_of(configuration const& exact) {
       "alpha_min", [](c& x) -> float& { return x.render.alpha_min; },
       std::vector<float>{0.5f / 255, 1.0f / 255, 2.0f / 255, 4.0f / 255, 0.02f, 0.05f});
   t.sweep(
-      "t_min", [](c& x) -> float& { return x.render.transmittance_min; },
+      "transmittance_min", [](c& x) -> float& { return x.render.transmittance_min; },
       std::vector<float>{0.0f, 1e-5f, 1e-4f, 1e-3f, 1e-2f, 0.05f});
   t.sweep(
       "max_hits", [](c& x) -> gart::u32& { return x.render.max_hits; }, std::vector<gart::u32>{64, 32, 16, 8});
@@ -72,7 +72,7 @@ std::vector<setting> settings_of(configuration const& exact) {
       "hit_format", [](c & x) -> auto& { return x.configuration.hit_format; },
       std::vector{gart::hit_format_kind::half});
   t.sweep(
-      "backward", [](c& x) -> std::string& { return x.configuration.backward; }, gart::strategy_names());
+      "backward", [](c& x) -> std::string& { return x.configuration.backward; }, gart::gradient_method_names());
   t.sweep(
       "tracer", [](c & x) -> auto& { return x.configuration.tracer; },
       std::vector{gart::tracer_kind::tiles, gart::tracer_kind::bvh, gart::tracer_kind::embree});
@@ -88,9 +88,9 @@ std::vector<setting> settings_of(configuration const& exact) {
       t.add("format", std::string(f->extension).substr(1), [&](c& x) { x.format = f->extension; });
   t.add("together", "format=spz+sh_bits=8",
         [](c& x) { x.format = ".spz", x.packing.sh1_bits = x.packing.sh_bits = 8; });
-  t.add("together", "alpha_min=0.02+t_min=0.01",
+  t.add("together", "alpha_min=0.02+transmittance_min=0.01",
         [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f; });
-  t.add("together", "alpha_min=0.02+t_min=0.01+resolution=1/2",
+  t.add("together", "alpha_min=0.02+transmittance_min=0.01+resolution=1/2",
         [](c& x) { x.render.alpha_min = 0.02f, x.render.transmittance_min = 0.01f, x.shrink = 2; });
   return t.take();
 }
@@ -111,7 +111,7 @@ std::vector<setting> selected_settings(std::vector<setting> const& all, std::vec
     }
     if (!found) {
       throw usage_error("--settings " + word + ": no such knob or setting; there are " + knobs +
-                        ", and their values as in tradeoff.json, such as t_min=0.01");
+                        ", and their values as in tradeoff.json, such as transmittance_min=0.01");
     }
   }
   return out;

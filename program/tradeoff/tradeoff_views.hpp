@@ -22,8 +22,8 @@ struct tradeoff_view {
   gart::reference_image reference;
 };
 
-// `count` views, evenly spread over the training views of a capture or the cameras of a camera JSON, and at most
-// `pixels` pixels of each, at random (always the same ones); from the model's origin.
+// `count` views, evenly spread over the training views of a capture or the cameras of a camera JSON. Of each at most
+// `pixels` pixels at random (always the same ones); from the model's origin.
 struct view_choice {
   int count = 2, pixels = 4096, downscale = 1;
 };

@@ -8,7 +8,7 @@
 #include <gart/core/version.hpp>
 #include <gart/io/crc32c.hpp>
 #include <gart/io/file.hpp>
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/train/option_fields.hpp>
 
 #include <cmath>
@@ -171,7 +171,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--backward", a.backward, "NAME",
                  "How gradients are summed: primitive (one sum a Gaussian and\ntile), hybrid (a quarter of the "
                  "memory), pixel, or\ndeterministic (the same bits in every run); auto: the fastest"))
-      ->check(one_of_strategies());
+      ->check(one_of_methods());
   in_group(r.add(train, "--hit-memory", a.hit_memory_gb, "GB",
                  "Memory for what the forward pass records; a step that\nneeds more is done by hybrid, which needs a "
                  "quarter, and where\nthat is too much by pixel, which needs none. 0: half of what\nis free "

@@ -5,7 +5,7 @@
 #include "train_fields.hpp"
 #include "view_options.hpp"
 
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/session.hpp>
 #include <gart/train/options.hpp>
 

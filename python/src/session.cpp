@@ -1,7 +1,7 @@
 // Training.
 #include "bindings.hpp"
 
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/session.hpp>
 

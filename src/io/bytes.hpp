@@ -1,6 +1,6 @@
 #pragma once
-// Reading numbers out of bytes that may be anything: every read is checked, and a count is believed only where the
-// bytes for it are there. Errors: io_error naming the file, the field and the byte.
+// Reads numbers out of bytes that may be anything. Every read is checked, and a count is believed only where its bytes
+// are there. Errors: io_error naming the file, the field and the byte.
 
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>

@@ -28,7 +28,7 @@ void frame::set_size(int width, int height) {
 
 void check_camera(camera const& c, std::string const& where) {
   if (camera_fault const fault = fault_of(c); fault.what) throw io_error(where, fault.what, fault.remedy);
-  // A distorted pinhole that folds can still be traced along its rays (runtime/choose.hpp says so).
+  // A distorted pinhole that folds can still be traced along its rays (runtime/capture_defaults.hpp says so).
   bool const bends = c.kind != camera_kind::perspective || c.lens.more();
   if (bends && !visit_camera(c, [](auto const& model) { return model.one_to_one(); }))
     throw io_error(where, "the lens is not one to one over a quarter of its image or more",

@@ -1,6 +1,5 @@
-// PlayCanvas' compressed PLY: Gaussians in chunks of 256, each number in a share of a 32-bit word between the least and
-// the greatest of its chunk; spherical harmonics a byte each, from -4 to 4.
-// https://github.com/playcanvas/splat-transform
+// PlayCanvas' compressed PLY: Gaussians in chunks of 256, each number a share of a 32-bit word between the chunk's
+// least and greatest. Spherical harmonics take a byte each, from -4 to 4. https://github.com/playcanvas/splat-transform
 
 #include "bulk.hpp"
 #include "bytes.hpp"

@@ -58,7 +58,7 @@ image8 decode_jpeg(std::vector<u8> const& bytes, std::string const& where) {
   if (colorspace == TJCS_CMYK || colorspace == TJCS_YCCK) {
     throw io_error(where, "is a CMYK JPEG", "convert it to RGB");
   }
-  // A block of 64 pixels costs a Huffman coder at least a bit, 512 pixels a byte: a size beyond twice that is a lie,
+  // A block of 64 pixels costs a Huffman coder at least a bit, 512 pixels a byte. A size beyond twice that is a lie,
   // and must not be allocated.
   if (static_cast<u64>(size.width) * static_cast<u64>(size.height) > static_cast<u64>(bytes.size()) * 1024) {
     refuse(where, "the size in its header is larger than its data can hold");

@@ -1,6 +1,6 @@
 #pragma once
-// Strict readings of a record's fields: each is checked against its range or its names, and what is wrong is said with
-// the remedy. A field that is absent has the value that is given for that.
+// Strict readings of a record's fields. Each is checked against its range or its names; errors give the remedy. A field
+// that is absent has the value that is given for that.
 
 #include "json_record.hpp"
 

@@ -62,7 +62,7 @@ splat_format const& written_as(std::filesystem::path const& path) {
 }
 
 // Whether the trait stays, whole or as a mark.
-bool keeps(splat_room const& room, std::string const& trait) {
+bool keeps(format_capabilities const& room, std::string const& trait) {
   return room.traits || (room.kernel && trait == "kernel_degree") || (room.antialias && trait == "antialias") ||
          (room.origin && trait == "origin");
 }
@@ -114,21 +114,21 @@ void write_splats(std::filesystem::path const& path, gaussian_model const& model
   auto const bits = [](int n) { return n >= 1 && n <= 8; };
   if (!bits(packing.sh1_bits) || !bits(packing.sh_bits) || packing.palette < 0 || packing.palette > 65536)
     throw invalid_argument("splat_packing: bits are 1 to 8, and a palette has 65536 rows at the most");
-  if (another_kernel(traits) && !format.room.kernel)
+  if (another_kernel(traits) && !format.capabilities.kernel)
     throw io_error(path.string(),
                    std::string(format.name) + " has no word for the kernel degree " + traits.at("kernel_degree") +
                        " that the model was trained with, and would show Gaussians",
                    "write a .ply or a .compressed.ply, or train with kernel degree 2");
-  if (packing.world && !format.room.world)
+  if (packing.world && !format.capabilities.world)
     throw io_error(path.string(), std::string(format.name) + " has no room for coordinates in double",
                    "write a .ply or a .glb in the capture's coordinates, or keep the origin");
-  if (packing.spz && !format.room.spz)
+  if (packing.spz && !format.capabilities.spz)
     throw io_error(path.string(), std::string(format.name) + " has no SPZ inside", "write a .glb");
   splat_traits kept;
   for (auto const& trait : traits)
-    if (keeps(format.room, trait.first)) kept.insert(trait);
-  if (model.sh_degree > format.room.sh_degree)
-    format.write(path, with_sh_degree(model, format.room.sh_degree), kept, packing);
+    if (keeps(format.capabilities, trait.first)) kept.insert(trait);
+  if (model.sh_degree > format.capabilities.sh_degree)
+    format.write(path, with_sh_degree(model, format.capabilities.sh_degree), kept, packing);
   else
     format.write(path, model, kept, packing);
 }
@@ -137,19 +137,19 @@ std::vector<std::string> left_out(std::filesystem::path const& path, gaussian_mo
                                   splat_traits const& traits, splat_packing const& packing) {
   splat_format const& format = written_as(path);
   std::vector<std::string> lines;
-  if (model.sh_degree > format.room.sh_degree)
-    lines.push_back("spherical harmonics above degree " + std::to_string(format.room.sh_degree) +
+  if (model.sh_degree > format.capabilities.sh_degree)
+    lines.push_back("spherical harmonics above degree " + std::to_string(format.capabilities.sh_degree) +
                     " (the model has degree " + std::to_string(model.sh_degree) + ")");
-  if (model.feature_count > 0 && !format.room.features)
+  if (model.feature_count > 0 && !format.capabilities.features)
     lines.push_back(io::counted(static_cast<std::size_t>(model.feature_count), "feature") + " of each Gaussian");
-  if (std::size_t const strays = format.room.strays && !packing.spz ? 0 : io::bulk_of(model).strays.size())
+  if (std::size_t const strays = format.capabilities.strays && !packing.spz ? 0 : io::bulk_of(model).strays.size())
     lines.push_back("the distance of " + io::counted(strays, "Gaussian") + ", over " +
                     std::to_string(static_cast<int>(io::far_reach)) +
                     " times as far out as 99 of 100: nearer, and as much smaller, they look the same from the middle");
   for (auto const& [key, value] : traits) {
-    if (!keeps(format.room, key))
+    if (!keeps(format.capabilities, key))
       lines.push_back(key + " " + value);
-    else if (key == "antialias" && !format.room.traits && !value.empty())
+    else if (key == "antialias" && !format.capabilities.traits && !value.empty())
       lines.push_back("the width of antialias, " + value + ", of which the mark stays");
   }
   return lines;

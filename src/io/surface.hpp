@@ -38,7 +38,7 @@ struct mesh_place {
   vec3d origin{0.0};
 };
 // Adds it to the meshes. Triangles with a corner that is not finite or further than 1e15 away, and those without an
-// area, are left out and counted in a note; a mesh of which nothing is left is too. Corners must be vertices.
+// area, are left out and counted in a note; so is a mesh without any left. Corners must be vertices.
 void add_placed(light::scene& to, raw_mesh const& raw, mesh_place const& place, std::string const& file,
                 std::vector<std::string>& notes);
 // io_error, naming `file` and the last note, where there is no mesh.

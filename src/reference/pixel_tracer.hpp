@@ -1,6 +1,6 @@
 #pragma once
-// Traces pixels in double (reference.hpp has the definitions). It has the Gaussians relative to the camera, a cone that
-// culls most of them for a block of pixels, a ray's hits in order, compositing and its gradient.
+// Traces pixels in double (reference.hpp has the definitions). It has the Gaussians relative to the camera, and a cone
+// that culls most of them for a block of pixels. It has a ray's hits in order, compositing and its gradient.
 
 #include "rays.hpp"
 

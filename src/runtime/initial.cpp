@@ -2,7 +2,7 @@
 #include <gart/core/error.hpp>
 #include <gart/math/sh.hpp>
 #include <gart/optim/random.hpp>
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/initial.hpp>
 
 #include <algorithm>

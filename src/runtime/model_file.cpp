@@ -40,7 +40,8 @@ model_file load_model(std::filesystem::path const& path, row_owners const& owner
     value = parsed;
   };
   number("alpha_min", file.render.alpha_min);
-  number("t_min", file.render.transmittance_min);
+  number("t_min", file.render.transmittance_min);  // its name in older files
+  number("transmittance_min", file.render.transmittance_min);
   number("near", file.render.near, 3e38f);
   if (auto const found = traits.find("antialias"); found != traits.end() && found->second.empty())
     file.render.antialias = default_antialias;  // another program's, which does not say how wide
@@ -99,7 +100,7 @@ splat_traits traits_of(render_options const& render, int kernel_degree) {
     traits[key] = text;
   };
   put("alpha_min", render.alpha_min, defaults.alpha_min);
-  put("t_min", render.transmittance_min, defaults.transmittance_min);
+  put("transmittance_min", render.transmittance_min, defaults.transmittance_min);
   put("near", render.near, defaults.near);
   put("antialias", render.antialias, defaults.antialias);
   if (kernel_degree != 2) traits["kernel_degree"] = std::to_string(kernel_degree);

@@ -1,6 +1,6 @@
 #include <gart/core/error.hpp>
 #include <gart/io/image_file.hpp>
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/session.hpp>
 #include <gart/runtime/validation.hpp>
@@ -111,10 +111,10 @@ void run_trials(validation_plan const& plan, validation_progress const& progress
   for (std::future<void>& t : trials) t.get();  // throws what a trial threw
 }
 
-// A trial's options: as many Gaussians a pixel as in the run, and all counts of steps shortened alike. The rate of the
-// bands above the first is raised like those of geometry in short runs (optim/schedule.hpp), at most to the first
-// band's; else a fast rate would seem to pay. A step has one view, without learned poses or depth: held-out views have
-// no learned pose, and shrunk ones no depth map.
+// A trial's options: as many Gaussians a pixel as in the run, and all counts of steps shortened alike. Short runs raise
+// the rate of the bands above the first like those of geometry (optim/schedule.hpp), at most to the first band's.
+// Otherwise a fast rate would seem to pay. A step has one view, without learned poses or depth: held-out views have no
+// learned pose, and shrunk ones no depth map.
 train_options of_trial(train_options options, validation_plan const& plan) {
   int const area = plan.shrink * plan.shrink;
   double const shorter = static_cast<double>(plan.steps) / options.iterations;

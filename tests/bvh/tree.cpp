@@ -350,7 +350,7 @@ TEST_CASE_TEMPLATE("a box without an end is met wherever the ray goes", E, GART_
   check_walk(exec, tree, boxes, rays, 0, 1e9f);
 }
 
-TEST_CASE("a grid's planes are floats, close to the sides and outside of them") {
+TEST_CASE("planes of a grid lie close outside the sides") {
   CAPTURE(gart_test::seed());
   random_boxes source(gart_test::seed() + 5);
   auto const any = [&] {

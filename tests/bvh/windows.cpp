@@ -118,7 +118,7 @@ TEST_CASE_TEMPLATE("thousands of coincident Gaussians, and groups of them", E, G
   check_rays(exec, model, {along_z()}, 0.01f, model.size());
 }
 
-TEST_CASE_TEMPLATE("random scenes, hits behind the origin and at the near distance left out", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("random scenes leave out hits behind the origin and too near", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed() + 2);
   std::uniform_real_distribution<float> at(-3, 3), size(-3, 0);

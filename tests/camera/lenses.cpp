@@ -26,7 +26,7 @@ TEST_CASE_TEMPLATE("lenses and the sphere are traced through the seam", E, GART_
   }
 }
 
-TEST_CASE_TEMPLATE("what a lens shows large is measured later, to the same boxes", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a lens that shows much measures boxes later, to the same", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   std::normal_distribution<float> normal;
@@ -73,7 +73,7 @@ TEST_CASE_TEMPLATE("what a lens shows large is measured later, to the same boxes
   }
 }
 
-TEST_CASE("rays are their models', in double, and where there is none it is zero") {
+TEST_CASE("rays are their models' in double; where none is, zero") {
   for (auto const& lens : gart_test::lenses()) {
     CAPTURE(std::string(lens.name));
     gart::camera const c = gart_test::camera_of(lens, 300);
@@ -112,7 +112,7 @@ TEST_CASE("rays are their models', in double, and where there is none it is zero
   CHECK(gart::ray_direction(c, 50.5f + 12 * static_cast<float>(1.001 * last), 50.5f) == gart::vec3(0.0f));
 }
 
-TEST_CASE("the pixels of a lens and of the sphere have the solid angles that its filter takes") {
+TEST_CASE("pixels of lenses and sphere have the filter's solid angle") {
   for (auto const& lens : gart_test::lenses()) {
     CAPTURE(std::string(lens.name));
     gart::camera const c = gart_test::camera_of(lens, 200);
@@ -148,7 +148,7 @@ TEST_CASE("the pixels of a lens and of the sphere have the solid angles that its
   }
 }
 
-TEST_CASE_TEMPLATE("a camera that turns half round rolls its image of the sphere", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a camera that turns half round rolls its sphere's image", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   std::normal_distribution<float> normal;

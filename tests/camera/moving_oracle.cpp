@@ -70,13 +70,13 @@ struct results {
   gart::pose_gradient pose;
 };
 
-template <class Tracer, class Strategy, class E>
+template <class Tracer, class Method, class E>
 results by(E& exec, rolling_scene const& r, std::vector<float> const& weights) {
   using frame_type = gart::frame<E, gart::scene_traits<degree>, Tracer>;
   gart::gaussians<E> const scene(exec, r.s.model);
   gart::gaussians<E> gradients(exec, scene.size(), degree);
   frame_type frame(exec);
-  gart::backward_pass<frame_type, Strategy> pass(exec);
+  gart::backward_pass<frame_type, Method> pass(exec);
   gart::buffer<float, E> color(exec, weights.size()), by_color(exec, weights);
   frame.prepare(scene.view(), r.s.view, r.s.options, degree);
   REQUIRE(pass.prepare(frame));
@@ -87,7 +87,7 @@ results by(E& exec, rolling_scene const& r, std::vector<float> const& weights) {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("image, gradients and pose through a rolling shutter are the oracle's", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a rolling shutter's image and gradients match the oracle", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
@@ -151,8 +151,8 @@ TEST_CASE_TEMPLATE("image, gradients and pose through a rolling shutter are the 
     }
     CHECK(std::sqrt(error / norm) < 1e-4);
   };
-  check(by<gart::tile_tracer<E>, gart::primitive_strategy>(exec, r, weights));
-  check(by<gart::tile_tracer<E>, gart::hybrid_strategy>(exec, r, weights));
-  check(by<gart::bvh_tracer<E>, gart::pixel_strategy>(exec, r, weights));
-  check(by<gart::bvh_tracer<E>, gart::primitive_strategy>(exec, r, weights));
+  check(by<gart::tile_tracer<E>, gart::primitive_method>(exec, r, weights));
+  check(by<gart::tile_tracer<E>, gart::hybrid_method>(exec, r, weights));
+  check(by<gart::bvh_tracer<E>, gart::pixel_method>(exec, r, weights));
+  check(by<gart::bvh_tracer<E>, gart::primitive_method>(exec, r, weights));
 }

@@ -29,7 +29,7 @@ TEST_CASE_TEMPLATE("an orthographic camera is traced through the seam", E, GART_
   }
 }
 
-TEST_CASE("a point lies where its parallel ray begins, and boxes are the ellipsoid's extent in front of the camera") {
+TEST_CASE("parallel rays pass their points, and boxes hold ellipsoids") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   std::normal_distribution<double> normal;

@@ -175,7 +175,7 @@ std::optional<seen_box> seen_around(moving_case const& c) {
 
 }  // namespace
 
-TEST_CASE("no silhouette leaves its box while the camera moves, and boxes are tight") {
+TEST_CASE("no silhouette leaves its tight box while the camera moves") {
   char const* const text = std::getenv("GART_TEST_COUNT");
   // A mean of few varies by more than the bars leave.
   long const count = text ? std::atol(text) : 120, averaged = std::max(count, 2400l);

@@ -46,7 +46,7 @@ TEST_CASE_TEMPLATE("lenses with a rolling shutter are traced through the seam", 
   }
 }
 
-TEST_CASE("a line of a rolling shutter has the rays of a camera that stands still where the line is read") {
+TEST_CASE("each line of a rolling shutter has the rays of its moment") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   std::vector<gart::camera> still{pinhole(40)};

@@ -181,10 +181,10 @@ class seam_scene {
   }
 
   // Of the sum of the image's colours, through a filter of so many pixels.
-  template <class Tracer, class Strategy>
+  template <class Tracer, class Method>
   gart::gaussian_model gradients(float antialias) {
     frame_by<Tracer> frame(exec_);
-    gart::backward_pass<frame_by<Tracer>, Strategy> pass(exec_);
+    gart::backward_pass<frame_by<Tracer>, Method> pass(exec_);
     gart::render_options o = options();
     o.antialias = antialias;
     std::size_t const floats = std::size_t{3} * view_.width * view_.height;
@@ -316,8 +316,8 @@ template <class E, class Model>
 void check_gradients(E& exec, Model const& view, gart::gaussian_model const& model) {
   seam_scene<E, Model> scene(exec, model, view);
   for (float antialias : {0.0f, 0.3f}) {
-    auto const a = scene.template gradients<gart::tile_tracer<E>, gart::primitive_strategy>(antialias);
-    auto const b = scene.template gradients<gart::bvh_tracer<E>, gart::pixel_strategy>(antialias);
+    auto const a = scene.template gradients<gart::tile_tracer<E>, gart::primitive_method>(antialias);
+    auto const b = scene.template gradients<gart::bvh_tracer<E>, gart::pixel_method>(antialias);
     auto const apart = [](std::vector<float> const& x, std::vector<float> const& y) {
       double difference = 0, size = 0;
       for (std::size_t k = 0; k < x.size(); ++k)

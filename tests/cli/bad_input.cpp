@@ -31,7 +31,7 @@ TEST_CASE("a capture that is not there, or has no images") {
   CHECK_FALSE(fs::exists(here / "run"));
 }
 
-TEST_CASE("an out that is no folder is found before training, and left as it is") {
+TEST_CASE("an --out that is no folder is refused before training") {
   folder const here;
   write_capture(here / "capture");
   gart::write_file(here / "taken", "mine");
@@ -69,7 +69,7 @@ TEST_CASE("splat files with values that are not numbers, or cut short") {
   }
 }
 
-TEST_CASE("a model that was trained with another kernel is not drawn with this one") {
+TEST_CASE("a model of another kernel is not drawn with this one") {
   folder const here;
   write_capture(here / "capture");
   gart::write_splat_ply(here / "k6.ply", one_gaussian(), {{"kernel_degree", "6"}});

@@ -413,7 +413,7 @@ TEST_CASE("captures as people have them") {
   }
 }
 
-TEST_CASE("a run goes on with the capture that it began with, and clears what a killed one left") {
+TEST_CASE("resuming checks the capture and clears a killed run's files") {
   folder const here;
   colmap_text c;
   c.write(here / "capture");
@@ -546,7 +546,7 @@ TEST_CASE("models with a Gaussian that is none") {
   }
 }
 
-TEST_CASE("one Gaussian far away costs the others nothing, in any format") {
+TEST_CASE("one Gaussian far away costs others nothing in any format") {
   folder const here;
   write_capture(here / "capture");
   auto near = ball(2400), far = near;

@@ -24,7 +24,7 @@ std::string row(std::string const& page, std::string const& first) {
 
 }  // namespace
 
-TEST_CASE("compare puts scores, options, curves and views of runs on one page") {
+TEST_CASE("compare puts scores, options, curves and views on one page") {
   folder const here;
   write_capture(here / "capture", 4, 3);
   REQUIRE(here.gart("train capture --out runs/short --iterations 4 --eval-every 2" + small).code == 0);

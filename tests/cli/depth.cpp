@@ -33,7 +33,7 @@ void add_maps(fs::path const& at, int views) {
 
 }  // namespace
 
-TEST_CASE("train goes by depth maps where it is asked to, and says what is missing") {
+TEST_CASE("train uses depth maps on request and says what is missing") {
   folder const here;
   write_capture(here / "capture");
   auto const without = here.gart("train capture --out none --depth-weight 1" + fast);

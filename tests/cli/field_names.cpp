@@ -33,7 +33,7 @@ TEST_CASE("a message names options where the library names fields") {
   }
 }
 
-TEST_CASE("every option that a field is shown as is one of train or of view") {
+TEST_CASE("options that fields are shown as belong to train or view") {
   folder const here;
   std::string const help = here.gart("train --help-all").out + here.gart("view --help").out;
   for (auto const& [field, option] : gart_cli::field_names()) {
@@ -50,7 +50,7 @@ TEST_CASE("every option that a field is shown as is one of train or of view") {
   }
 }
 
-TEST_CASE("settings are recorded as numbers, and read from the text of earlier runs") {
+TEST_CASE("settings are recorded as numbers and read from older text") {
   using gart_cli::field_values;
   auto const values = field_values::of_text("rates.mean=0,error.growth_end=0.25");
   gart::train_options options;

@@ -13,7 +13,7 @@ std::string const small = " --backend serial --max-gaussians 60 --sh-degree 1 --
 
 }  // namespace
 
-TEST_CASE("--check-finite counts the steps that it checked, and changes no bit of the run") {
+TEST_CASE("--check-finite counts its steps and changes no bit") {
   folder const here;
   write_capture(here / "capture");
   REQUIRE(here.gart("train capture --out plain --iterations 20" + small).code == 0);
@@ -26,7 +26,7 @@ TEST_CASE("--check-finite counts the steps that it checked, and changes no bit o
   CHECK(text_of(here / "plain/model.ply") == text_of(here / "checked/model.ply"));
 }
 
-TEST_CASE("--check-finite stops with 1 and names the step, the group, the Gaussian and the checkpoint") {
+TEST_CASE("--check-finite stops with 1 and names the place") {
   folder const here;
   write_capture(here / "capture");
   CHECK(here.gart("train capture --out run --iterations 20 --stop-at 10" + small).code == 130);

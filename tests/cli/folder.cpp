@@ -39,7 +39,7 @@ TEST_CASE("a run that replaces another leaves nothing of it") {
   CHECK(std::distance(fs::directory_iterator(here / "run/renders"), fs::directory_iterator()) == 5);
 }
 
-TEST_CASE("files of a run's names that no run left are refused, and left as they are") {
+TEST_CASE("files that no run left are refused and kept") {
   folder const here;
   write_capture(here / "capture");
   for (std::string const name : {"model.ply", "config.json", "metrics.json", "renders/a.png"}) {
@@ -138,7 +138,7 @@ TEST_CASE("where the disk is full at the end the model is there") {
   CHECK(gart::read_splat_ply(here / "run/model.ply").size() == 40);
 }
 
-TEST_CASE("a run that was over goes on where iterations are raised, and says that it did") {
+TEST_CASE("a finished run continues where iterations are raised") {
   folder const here;
   write_capture(here / "capture");
   REQUIRE(here.gart("train capture --out run --iterations 10" + small).code == 0);
@@ -157,7 +157,7 @@ TEST_CASE("a run that was over goes on where iterations are raised, and says tha
   CHECK(here.json("run/history.json")["train"].back()[0] == 25);
 }
 
-TEST_CASE("a time budget ends the run, with its tests spread over the time, and goes on over a stop") {
+TEST_CASE("a time budget ends the run and survives a stop") {
   folder const here;
   write_capture(here / "capture");
   std::string const run = "train capture --iterations 100000000 --time-budget 2 --backend serial --max-gaussians 60";

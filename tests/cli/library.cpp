@@ -2,7 +2,7 @@
 
 #include "program.hpp"
 
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/runtime/session.hpp>
 
@@ -63,7 +63,7 @@ void fill_images(fs::path const& capture, bool uneven) {
 
 }  // namespace
 
-TEST_CASE("a short program over the library and gart train give the same bits") {
+TEST_CASE("a short program and gart train give the same bits") {
   folder const here;
   gart::train_options options;
   options.iterations = 700;  // past the first densification
@@ -95,7 +95,7 @@ TEST_CASE("a short program over the library and gart train give the same bits") 
   same("uneven");
 }
 
-TEST_CASE("what the library measures is what gart train does, recorded, and the same after resuming") {
+TEST_CASE("the library measures what gart train does, and records it") {
   folder const here;
   write_capture(here / "capture", 24);
   fill_images(here / "capture", true);
@@ -130,7 +130,7 @@ TEST_CASE("what the library measures is what gart train does, recorded, and the 
   CHECK(has(text_of(here / "run/report.html"), "Tried before the run: "));
 }
 
-TEST_CASE("what is given is not measured, and --no-auto takes the usual settings") {
+TEST_CASE("given options are not measured; --no-auto takes the usual") {
   folder const here;
   write_capture(here / "capture", 24);
   std::string const run = "train capture --iterations 21000 --max-gaussians 30 --backend serial --stop-at 1 ";
@@ -156,7 +156,7 @@ TEST_CASE("what is given is not measured, and --no-auto takes the usual settings
   CHECK(here.json("run/config.json")["options"]["exposure"] == "on");
 }
 
-TEST_CASE("a run from before the penalty on bands of colour keeps its rates") {
+TEST_CASE("a run from before the penalty on bands keeps its rates") {
   folder const here;
   write_capture(here / "capture");
   fill_images(here / "capture", true);

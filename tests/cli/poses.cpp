@@ -22,7 +22,7 @@ double largest_difference(nlohmann::json const& a, nlohmann::json const& b) {
 
 }  // namespace
 
-TEST_CASE("a run begins at the poses that another one found, by name and whatever the size of the images") {
+TEST_CASE("a run begins at another run's poses, by name") {
   folder const here;
   write_capture(here / "capture");
   auto const found = here.gart("train capture --out first --refine-poses --set poses.rate=0.05,poses.warm_up=0" + fast);
@@ -50,7 +50,7 @@ TEST_CASE("a run begins at the poses that another one found, by name and whateve
   CHECK_MESSAGE(has(changed.err, "poses.json: is not what the run to be resumed began at"), changed.err);
 }
 
-TEST_CASE("poses that a run cannot begin at are refused by file and view") {
+TEST_CASE("poses that a run cannot begin at are refused by view") {
   folder const here;
   write_capture(here / "capture");
   REQUIRE(here.gart("train capture --out first" + still + fast).code == 0);

@@ -31,7 +31,7 @@ std::vector<std::string> files_in(fs::path const& folder) {
 
 }  // namespace
 
-TEST_CASE("training views are scored beside test views, evenly spread, and eval finds the same") {
+TEST_CASE("train and eval score the same training views, evenly spread") {
   folder const here;
   write_capture(here / "capture", 6, 2);
   REQUIRE(here.gart("train capture --out run --iterations 40" + small).code == 0);
@@ -68,7 +68,7 @@ TEST_CASE("training views are scored beside test views, evenly spread, and eval 
   }
 }
 
-TEST_CASE("the affine colour forgives an exposure of the photographs, and PSNR does not") {
+TEST_CASE("affine colour forgives an exposure, PSNR does not") {
   folder const here;
   write_capture(here / "capture");
   REQUIRE(here.gart("train capture --out run --iterations 40 --test-every 0" + small).code == 0);
@@ -87,7 +87,7 @@ TEST_CASE("the affine colour forgives an exposure of the photographs, and PSNR d
     for (auto const& view : scores["views"]) CHECK(view["psnr_affine_colour"] >= view["psnr"]);
 }
 
-TEST_CASE("PSNR over seconds: every test, in metrics.json and the report, over a stop and from files without seconds") {
+TEST_CASE("PSNR over seconds is complete over a stop and in old files") {
   folder const here;
   write_capture(here / "capture");
   std::string const run = "train capture --out run --iterations 30 --eval-every 10 --stop-at 21";
@@ -114,7 +114,7 @@ TEST_CASE("PSNR over seconds: every test, in metrics.json and the report, over a
   CHECK(has(text_of(here / "run/report.html"), "PSNR over training time"));
 }
 
-TEST_CASE("eval keeps pairs of images in two folders of equal names, and nothing else is scored with them") {
+TEST_CASE("eval scores pairs of images by names alone") {
   folder const here;
   write_capture(here / "capture");
   REQUIRE(here.gart("train capture --out run --iterations 5" + small).code == 0);
@@ -135,7 +135,7 @@ TEST_CASE("eval keeps pairs of images in two folders of equal names, and nothing
   CHECK_MESSAGE(has(refused.err, "pairs/truth/older.png: is no test view"), refused.err);
 }
 
-TEST_CASE("exposures, model and renders of test views are the same whatever the test photographs show") {
+TEST_CASE("test photographs change no exposure, model or render") {
   folder const here;
   write_capture(here / "capture");
   write_capture(here / "other");

@@ -28,7 +28,7 @@ TEST_CASE("a cgroup's quota is the least of those above it") {
   CHECK(gart_cli::processors_of_quota(here / "nowhere", "/a") == 0);
 }
 
-TEST_CASE("a number of threads that no machine has is no end of the program") {
+TEST_CASE("too large a number of threads does not end the program") {
   folder const here;
   write_capture(here / "capture");
   for (char const* before : {"OMP_NUM_THREADS=100000", "OMP_NUM_THREADS=2", "OMP_WAIT_POLICY=active"}) {

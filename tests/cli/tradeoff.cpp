@@ -55,7 +55,7 @@ TEST_CASE("tradeoff reports the errors that can be worked out by hand") {
   gart::write_splat_ply(here / "walls.ply", walls());
   auto const run = here.gart(
       "tradeoff walls.ply capture --out trade --backend serial --views 1 --repeats 1 --quiet "
-      "--settings t_min,resolution=1/2");
+      "--settings transmittance_min,resolution=1/2");
   REQUIRE_MESSAGE(run.code == 0, run.err);
   auto const result = here.json("trade/tradeoff.json");
   CHECK(result["pixels"] == 256);
@@ -67,12 +67,12 @@ TEST_CASE("tradeoff reports the errors that can be worked out by hand") {
   CHECK(exact["total_ms"].get<double>() > 0);
 
   // The ray ends at the first wall: 0.01 of 0.99 white is lost, and with it the second wall's share of the gradient.
-  auto const ended = setting(result, "t_min=0.05");
+  auto const ended = setting(result, "transmittance_min=0.05");
   CHECK(ended["image"]["max"].get<double>() == doctest::Approx(0.0099).epsilon(1e-4));
   CHECK(ended["image"]["rms"].get<double>() == doctest::Approx(0.0099).epsilon(1e-4));
   CHECK(ended["image"]["psnr"].get<double>() == doctest::Approx(-20 * std::log10(0.0099)).epsilon(1e-4));
   CHECK(ended["gradients"]["sh"].get<double>() == doctest::Approx(0.01 / std::sqrt(1.0001)).epsilon(1e-3));
-  CHECK(setting(result, "t_min=0")["image"]["max"].get<double>() < 1e-6);
+  CHECK(setting(result, "transmittance_min=0")["image"]["max"].get<double>() < 1e-6);
 
   // What is the same everywhere loses nothing by being traced at half the size, nor does its gradient.
   auto const half = setting(result, "resolution=1/2");
@@ -80,7 +80,7 @@ TEST_CASE("tradeoff reports the errors that can be worked out by hand") {
   CHECK(half["gradient_worst"].get<double>() < 1e-4);
 }
 
-TEST_CASE("tradeoff measures every knob, names those it has not, and finds the front") {
+TEST_CASE("tradeoff measures all knobs and finds the front") {
   folder const here;
   write_capture(here / "capture");
   gart::write_splat_ply(here / "cloud.ply", cloud());
@@ -94,8 +94,8 @@ TEST_CASE("tradeoff measures every knob, names those it has not, and finds the f
 
   auto const error = [&](std::string const& name) { return setting(result, name)["image"]["rms"].get<double>(); };
   CHECK(error("exact") < 1e-4);
-  CHECK(error("t_min=0.01") < error("t_min=0.05"));
-  CHECK(error("exact") < error("t_min=0.01"));
+  CHECK(error("transmittance_min=0.01") < error("transmittance_min=0.05"));
+  CHECK(error("exact") < error("transmittance_min=0.01"));
   CHECK(error("exact") < error("max_hits=8"));
   CHECK(error("alpha_min=0.02") < error("alpha_min=0.05"));
   CHECK(error("exact") < error("resolution=1/2"));
@@ -145,14 +145,14 @@ TEST_CASE("tradeoff measures every knob, names those it has not, and finds the f
   CHECK_FALSE(has(page, "http"));
 }
 
-TEST_CASE("tradeoff takes cameras without photographs, and refuses what it cannot do") {
+TEST_CASE("tradeoff takes cameras alone and refuses what it cannot do") {
   folder const here;
   gart::write_splat_ply(here / "cloud.ply", cloud());
   gart::write_file(here / "path.json",
                    R"([{"name": "a", "width": 12, "height": 10, "fx": 12, "fy": 12, "cx": 6, "cy": 5,
                         "c2w": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -4], [0, 0, 0, 1]]}])");
-  auto const run =
-      here.gart("tradeoff cloud.ply path.json --out trade --backend serial --settings t_min=0.05 --repeats 1");
+  auto const run = here.gart(
+      "tradeoff cloud.ply path.json --out trade --backend serial --settings transmittance_min=0.05 --repeats 1");
   REQUIRE_MESSAGE(run.code == 0, run.err);
   auto const result = here.json("trade/tradeoff.json");
   CHECK(result["settings"].size() == 2);
@@ -171,7 +171,7 @@ TEST_CASE("tradeoff takes cameras without photographs, and refuses what it canno
   CHECK_FALSE(fs::exists(here / "none"));
 }
 
-TEST_CASE("a preset sets what the command line does not, and the run says so") {
+TEST_CASE("a preset sets what the command line leaves open") {
   folder const here;
   write_capture(here / "capture");
   std::string const tiny = " --backend serial --max-gaussians 60 --sh-degree 1 --quiet --no-auto --stop-at 1";
@@ -187,17 +187,17 @@ TEST_CASE("a preset sets what the command line does not, and the run says so") {
   CHECK(has(text_of(here / "own/report.html"), "preset quick"));
 }
 
-TEST_CASE("what a run leaves out of images is in its model and its report") {
+TEST_CASE("a model and its report say what a run left out of images") {
   folder const here;
   write_capture(here / "capture");
   std::string const small = " --backend serial --max-gaussians 60 --sh-degree 1 --quiet --iterations 2 ";
   REQUIRE(here.gart("train capture --out plain" + small).code == 0);
   auto const plain = here.json("plain/metrics.json")["approximations"];
   CHECK(plain["alpha_min"].get<double>() == doctest::Approx(1.0 / 255));
-  CHECK(plain["t_min"].get<double>() == doctest::Approx(1e-4));
+  CHECK(plain["transmittance_min"].get<double>() == doctest::Approx(1e-4));
   REQUIRE(here.gart("train capture --out run --alpha-min 0.01 --transmittance-min 0.125" + small).code == 0);
   auto const left_out = here.json("run/metrics.json")["approximations"];
-  CHECK(left_out["t_min"] == 0.125);
+  CHECK(left_out["transmittance_min"] == 0.125);
   CHECK(left_out["alpha_min"].get<double>() == doctest::Approx(0.01));
   CHECK(has(text_of(here / "run/model.ply"), "comment gart alpha_min"));
 }

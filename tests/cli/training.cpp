@@ -93,7 +93,7 @@ TEST_CASE("a run that was stopped and resumed ends with the same bytes") {
   CHECK(here.json("parts/history.json")["train"].size() == here.json("whole/history.json")["train"].size());
 }
 
-TEST_CASE("what a capture asks for is said with its reasons, and an option that is given is not chosen") {
+TEST_CASE("choices are said with reasons; given options are kept") {
   folder const here;
   write_capture(here / "capture", 20, 2);
   std::string const run = "train capture --iterations 60 --backend serial --max-gaussians 40 --densify none --out ";
@@ -114,7 +114,7 @@ TEST_CASE("what a capture asks for is said with its reasons, and an option that 
   CHECK(here.json("run/metrics.json")["background"] == "white");
 }
 
-TEST_CASE("SIGINT, SIGTERM or SIGHUP ends the run after a step, saved, and says how to go on") {
+TEST_CASE("signals end a run after a step, saved") {
   folder const here;
   write_capture(here / "capture");
   int signal = 0;
@@ -132,7 +132,7 @@ TEST_CASE("SIGINT, SIGTERM or SIGHUP ends the run after a step, saved, and says 
   CHECK(step > 0);
 }
 
-TEST_CASE("resuming refuses what contradicts the run, and a run that is not there") {
+TEST_CASE("resuming refuses contradictions and a missing run") {
   folder const here;
   write_capture(here / "capture");
   write_capture(here / "other", 5);
@@ -154,7 +154,7 @@ TEST_CASE("resuming refuses what contradicts the run, and a run that is not ther
   CHECK(here.gart("train --resume --out run --iterations 20 --quiet").code == 0);
 }
 
-TEST_CASE("eval scores a trained model as train did, and render draws the same image") {
+TEST_CASE("train, eval and render agree on a model") {
   folder const here;
   write_capture(here / "capture");
   auto const trained = here.gart(
@@ -197,7 +197,7 @@ TEST_CASE("eval scores a trained model as train did, and render draws the same i
   CHECK(has(here.gart("render run/model.ply capture --out none --downscale 32").err, "leaves nothing of the camera"));
 }
 
-TEST_CASE("an ordinary model's header says how near it was traced, and --start takes it at another degree") {
+TEST_CASE("a model's header keeps the near distance; --start reads it") {
   folder const here;
   write_capture(here / "capture");
   gart::write_splat_ply(here / "start.ply", one_gaussian());
@@ -225,7 +225,7 @@ TEST_CASE("a run without test views says so instead of scoring nothing") {
   CHECK_FALSE(fs::exists(here / "scores.json"));
 }
 
-TEST_CASE("exposures are learned, said, saved, resumed and used again by eval and render") {
+TEST_CASE("exposures are learned, saved, resumed and used again") {
   folder const here;
   write_capture(here / "capture");
   std::string const train = "train capture --out run --iterations 60 --exposure on" + small;
@@ -266,7 +266,7 @@ TEST_CASE("exposures are learned, said, saved, resumed and used again by eval an
   CHECK(here.json("run/metrics.json")["exposure"] == false);
 }
 
-TEST_CASE("the falloff of a lens is learned without exposures, said, saved, resumed and used again by eval") {
+TEST_CASE("a lens's falloff is learned, saved, resumed and used again") {
   folder const here;
   write_capture(here / "capture");
   std::string const train = " --iterations 60 --exposure off --vignetting on" + small;

@@ -24,7 +24,7 @@ TEST_CASE("SH degree 0 stores and optimises 14 floats a Gaussian") {
   CHECK(fs::file_size(here / "run/checkpoint.gart") < 40 * 3 * 4 * 14 + 1000);
 }
 
-TEST_CASE("a configuration that is not compiled is refused with those that are") {
+TEST_CASE("a configuration not compiled is refused with those that are") {
   folder const here;
   write_capture(here / "capture");
   auto const run = here.gart("train capture --out run --sh-degree 1 --kernel-degree 8 --backend serial");
@@ -41,7 +41,7 @@ namespace {
 std::string const openmp = " --iterations 10 --backend openmp --max-gaussians 60 --quiet ";
 }  // namespace
 
-TEST_CASE("a model of another kernel degree says so in its file and is rendered as one") {
+TEST_CASE("a model's file keeps its kernel degree") {
   folder const here;
   write_capture(here / "capture");
   auto const run = here.gart("train capture --out run --kernel-degree 4" + openmp);

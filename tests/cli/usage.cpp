@@ -6,7 +6,7 @@
 
 using namespace cli_test;
 
-TEST_CASE("every command's help teaches: a sentence, what it writes, two examples, defaults") {
+TEST_CASE("every command's help has a sentence, examples and defaults") {
   folder const here;
   for (std::string const command : {"train", "render", "view", "eval", "tradeoff", "synth", "info"}) {
     CAPTURE(command);
@@ -74,7 +74,7 @@ TEST_CASE("train --help is short, and --help-all has the rest") {
   CHECK(has(brief, "--help-all"));
 }
 
-TEST_CASE("wrong command lines exit with 2, say what is wrong, and make nothing") {
+TEST_CASE("wrong command lines exit with 2 and make nothing") {
   folder const here;
   struct line {
     char const *arguments, *says;
@@ -124,7 +124,7 @@ TEST_CASE("wrong command lines exit with 2, say what is wrong, and make nothing"
   CHECK(has(bare.err, "train"));
 }
 
-TEST_CASE("rules are set by name, kept, and refused where there are none") {
+TEST_CASE("rules are set by name and kept; unknown ones are refused") {
   folder const here;
   write_capture(here / "capture");
   std::string const run = "train capture --backend serial --iterations 2 --max-gaussians 20 --quiet --out ";

@@ -100,7 +100,7 @@ TEST_CASE("render goes along a smooth path through keyframes") {
   }
 }
 
-TEST_CASE("a training is watched, paused, stepped, saved and stopped by a viewer") {
+TEST_CASE("a viewer watches, pauses, steps, saves and stops a training") {
   folder const here;
   write_capture(here / "capture");
   outcome ended;
@@ -152,7 +152,7 @@ TEST_CASE("a training is watched, paused, stepped, saved and stopped by a viewer
   CHECK(has(ended.err, "Stopped after step"));
 }
 
-TEST_CASE("the background that a model was trained on is known by the config.json beside it") {
+TEST_CASE("view takes its background from a model's config.json") {
   folder const here;
   auto const background_with = [&](std::string const& config) {
     std::ofstream(here / "config.json") << config;
@@ -218,7 +218,7 @@ TEST_CASE("a view at rest is what render writes, before it is a JPEG") {
   }
 }
 
-TEST_CASE("--open leads the browser to the address by a file, which no other user may read") {
+TEST_CASE("--open leads the browser by a file for its user alone") {
   folder const here;
   gart::write_splat_ply(here / "model.ply", one_gaussian());
   std::string const script = (here / "browser").string(), opened = (here / "opened.html").string();
@@ -237,7 +237,7 @@ TEST_CASE("--open leads the browser to the address by a file, which no other use
   CHECK((fs::status(opened).permissions() & fs::perms::all) == (fs::perms::owner_read | fs::perms::owner_write));
 }
 
-TEST_CASE("view serves a model until Ctrl-C, and refuses what it cannot listen at") {
+TEST_CASE("view serves until Ctrl-C and refuses unusable addresses") {
   folder const here;
   gart::write_splat_ply(here / "model.ply", one_gaussian());
   auto const wrong = here.gart("view model.ply --listen nowhere.invalid");

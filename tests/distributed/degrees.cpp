@@ -9,7 +9,7 @@
 
 using namespace gart;
 
-TEST_CASE("where ranks train, they do so at every degree, in rows of degree 0 or 3") {
+TEST_CASE("ranks train at every degree, in rows of degree 0 or 3") {
   std::map<std::string, std::set<int>> degrees;
   for (configuration_info const& c : compiled_configurations())
     if (c.ranks) degrees[std::string(to_string(c.backend)) + " " + c.backward].insert(c.sh_degree);

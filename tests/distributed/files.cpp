@@ -135,7 +135,7 @@ bool holds(std::string const& text, std::string const& part) { return text.find(
 
 }  // namespace
 
-TEST_CASE("what any number of ranks write of a checkpoint is the file of one, and any number read their rows of it") {
+TEST_CASE("any ranks write one checkpoint and read their rows of it") {
   fs::path const name = "distributed_rows_" + std::to_string(::getpid()) + ".gart";
   for (std::size_t const n : {0u, 1u, 8u, 9u, 100u})
     for (bool const statistics : {false, true}) {
@@ -177,7 +177,7 @@ TEST_CASE("what any number of ranks write of a checkpoint is the file of one, an
   ::unlink(name.c_str());
 }
 
-TEST_CASE("what any number of ranks write of a splat PLY is the file of one, and any number read their rows of it") {
+TEST_CASE("any ranks write one splat PLY and read their rows of it") {
   fs::path const name = "distributed_rows_" + std::to_string(::getpid()) + ".ply";
   splat_traits const traits{{"near", "0.5"}};
   for (int degree = 0; degree <= 3; ++degree)
@@ -257,7 +257,7 @@ TEST_CASE("ranks write and read a checkpoint together") {
   }
 }
 
-TEST_CASE("where one rank cannot write, all say which and why, and the last file is whole") {
+TEST_CASE("where one rank cannot write, all fail; the old file stays") {
   folder const here;
   mpi_comm ranks = here.ranks;
   row_owners const owners{ranks.size(), ranks.rank(), block};

@@ -54,7 +54,7 @@ struct capture_folder {
 
 }  // namespace
 
-TEST_CASE("the ranks of a host decode each photograph once, and have the images that one reads alone") {
+TEST_CASE("ranks of a host decode each photograph once") {
   capture_folder const here;
   mpi_comm ranks = here.ranks;
   dataset_options options;
@@ -101,15 +101,14 @@ TEST_CASE("the ranks of a host decode each photograph once, and have the images 
   train_options run;
   run.iterations = 40, run.densify = densify_kind::none, run.shard_block = 8;
   gaussian_model const start = gart_test::cloud(3, 0.5f);
-  using trainer_type =
-      trainer<serial_exec, scene_traits<1>, tile_tracer<serial_exec>, deterministic_strategy, mpi_comm>;
+  using trainer_type = trainer<serial_exec, scene_traits<1>, tile_tracer<serial_exec>, deterministic_method, mpi_comm>;
   trainer_type by_own(exec, run, alone, start, ranks), by_shared(exec, run, shared, start, ranks);
   for (int i = 0; i < 40; ++i) REQUIRE(by_own.step().loss == by_shared.step().loss);
   gaussian_model const a = by_own.model(), b = by_shared.model();
   for_each_array([](parameter_array const&, auto const& x, auto const& y) { CHECK(x == y); }, a, b);
 }
 
-TEST_CASE("where a host has no memory that its ranks share, each reads all and says so") {
+TEST_CASE("without shared memory each rank reads all and says so") {
   // The ranks of a host of which none has any.
   struct crowded final : host_group {
     std::shared_ptr<host_group> of;
@@ -134,7 +133,7 @@ TEST_CASE("where a host has no memory that its ranks share, each reads all and s
   CHECK(all.notes.front().find("/dev/shm") != std::string::npos);
 }
 
-TEST_CASE("a photograph that one rank cannot decode ends the loading on all, by its name") {
+TEST_CASE("one photograph that cannot be decoded ends loading on all") {
   capture_folder const here;
   mpi_comm ranks = here.ranks;
   if (ranks.rank() == 0) {

@@ -15,7 +15,7 @@ namespace {
 
 using gart_test::every_rank, gart_test::exec_type, gart_test::rank_comm;
 template <class Comm>
-using trainer_of = trainer<exec_type, scene_traits<1>, tile_tracer<exec_type>, deterministic_strategy, Comm>;
+using trainer_of = trainer<exec_type, scene_traits<1>, tile_tracer<exec_type>, deterministic_method, Comm>;
 
 struct twice_over_values {
   float const* image;
@@ -35,7 +35,7 @@ void mean_square(loss_input<exec_type> const& in) {
 
 }  // namespace
 
-TEST_CASE("a loss of one's own sees the whole image, on any number of ranks") {
+TEST_CASE("an own loss sees the whole image on any number of ranks") {
   exec_type exec = gart_test::make_exec();
   dataset const data = gart_test::capture(exec, 4);
   train_options options;

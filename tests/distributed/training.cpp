@@ -21,10 +21,10 @@ namespace {
 
 using gart_test::every_rank, gart_test::exec_type, gart_test::rank_comm;
 using tiles = tile_tracer<exec_type>;
-template <class Strategy, class Comm = self_comm, class Tracer = tiles>
-using trainer_of = trainer<exec_type, scene_traits<1>, Tracer, Strategy, Comm>;
-using plain = trainer_of<deterministic_strategy>;
-using shared = trainer_of<deterministic_strategy, rank_comm>;
+template <class Method, class Comm = self_comm, class Tracer = tiles>
+using trainer_of = trainer<exec_type, scene_traits<1>, Tracer, Method, Comm>;
+using plain = trainer_of<deterministic_method>;
+using shared = trainer_of<deterministic_method, rank_comm>;
 
 // One rank that does all that several do.
 struct lone_comm : self_comm {
@@ -66,12 +66,12 @@ double largest_difference(std::vector<float> const& a, std::vector<float> const&
 // The gradients of all ranks' rows, in the order of numbers.
 template <class Trainer>
 gaussian_model all_gradients(Trainer& run, exec_type& exec, index_t block) {
-  return sharded_rows<exec_type, rank_comm>(exec, every_rank(), block).whole_of(run.gradients().to_host());
+  return sharded_rows<exec_type, rank_comm>(exec, every_rank(), block).gather_all(run.gradients().to_host());
 }
 
 }  // namespace
 
-TEST_CASE("by strips the bits are those of one rank, whatever the number of ranks") {
+TEST_CASE("strips give the bits of one rank") {
   exec_type exec = gart_test::make_exec();
   dataset const data = gart_test::capture(exec, 3);
   for (densify_kind const densify : {densify_kind::error, densify_kind::mcmc, densify_kind::adc}) {
@@ -114,9 +114,9 @@ TEST_CASE("with sums in any order, gradients are as near as rounding") {
   dataset const data = gart_test::capture(exec, 4);
   train_options const options = short_run(densify_kind::none);
   gaussian_model const start = gart_test::cloud(12, 0.5f);
-  auto const check = [&]<class Strategy, class Tracer>(Strategy, std::type_identity<Tracer>) {
-    trainer_of<Strategy, self_comm, Tracer> one(exec, options, data, start);
-    trainer_of<Strategy, rank_comm, Tracer> all(exec, options, data, start, every_rank());
+  auto const check = [&]<class Method, class Tracer>(Method, std::type_identity<Tracer>) {
+    trainer_of<Method, self_comm, Tracer> one(exec, options, data, start);
+    trainer_of<Method, rank_comm, Tracer> all(exec, options, data, start, every_rank());
     one.step(), all.step();
     gaussian_model const a = all_gradients(all, exec, options.shard_block), b = one.gradients().to_host();
     REQUIRE(a.size() == b.size());
@@ -127,12 +127,12 @@ TEST_CASE("with sums in any order, gradients are as near as rounding") {
         },
         a, b);
   };
-  check(primitive_strategy(), std::type_identity<tiles>());
+  check(primitive_method(), std::type_identity<tiles>());
   if constexpr (!exec_type::device)  // the same rows by their tracer's rays
-    check(pixel_strategy(), std::type_identity<bvh_tracer<exec_type>>());
+    check(pixel_method(), std::type_identity<bvh_tracer<exec_type>>());
 }
 
-TEST_CASE("a batch is the mean of its views, the same for any number of ranks") {
+TEST_CASE("a batch is the mean of its views on any number of ranks") {
   exec_type exec = gart_test::make_exec();
   dataset const data = gart_test::capture(exec, 5);
   train_options options = short_run(densify_kind::none);
@@ -172,7 +172,7 @@ TEST_CASE("a batch is the mean of its views, the same for any number of ranks") 
     CAPTURE(batch);
     train_options grown = short_run(densify);
     grown.batch = batch, grown.iterations = 150, grown.exposure = true;
-    trainer_of<deterministic_strategy, lone_comm> one(exec, grown, data, start);
+    trainer_of<deterministic_method, lone_comm> one(exec, grown, data, start);
     shared many(exec, grown, data, start, every_rank());
     while (many.steps_done() < grown.iterations) REQUIRE(one.step().loss == many.step().loss);
     if (densify != densify_kind::adc) CHECK(many.model().size() == 230);
@@ -193,7 +193,7 @@ TEST_CASE("exposures and poses are learned as by one rank, bit by bit") {
   for (int const batch : {1, 3}) {
     CAPTURE(batch);
     options.batch = batch;
-    trainer_of<deterministic_strategy, lone_comm> one(exec, options, data, start);
+    trainer_of<deterministic_method, lone_comm> one(exec, options, data, start);
     shared all(exec, options, data, start, every_rank());
     while (all.steps_done() < options.iterations) REQUIRE(one.step().loss == all.step().loss);
     training_state const a = one.state(), b = all.state();
@@ -226,7 +226,7 @@ TEST_CASE("depth and lenses are learned as by one rank, bit by bit") {
   options.resolution = {0.2f, 0.5f, 1};
   options.lens.warm_up = 0;
   gaussian_model const start = gart_test::cloud(18, 0.5f);
-  using deep = with_depth<deterministic_strategy>;
+  using deep = with_depth<deterministic_method>;
   for (int const batch : {1, 3}) {
     CAPTURE(batch);
     options.batch = batch;
@@ -259,7 +259,7 @@ TEST_CASE("depth and lenses are learned as by one rank, bit by bit") {
   }
 }
 
-TEST_CASE("a checkpoint is one file of today's format, and goes on with any number of ranks") {
+TEST_CASE("a checkpoint continues on any number of ranks") {
   exec_type exec = gart_test::make_exec();
   mpi_comm ranks;
   dataset const data = gart_test::capture(exec, 6);
@@ -285,7 +285,7 @@ TEST_CASE("a checkpoint is one file of today's format, and goes on with any numb
   if (ranks.rank() == 0) ::unlink(by_all.c_str());
 }
 
-TEST_CASE("more ranks than Gaussians, than rows of tiles, than anything to see") {
+TEST_CASE("more ranks than Gaussians, rows of tiles or views") {
   exec_type exec = gart_test::make_exec();
   dataset data = gart_test::capture(exec, 7);
   train_options options = short_run(densify_kind::none);
@@ -312,7 +312,7 @@ TEST_CASE("more ranks than Gaussians, than rows of tiles, than anything to see")
   check(gart_test::cloud(16, 0.5f), 5);
 }
 
-TEST_CASE("a Gaussian that no view shows takes the bytes that were told before, and hardly more") {
+TEST_CASE("a Gaussian that no view shows takes the bytes told before") {
   constexpr index_t unseen = 40'000;
   int const ranks = mpi_comm().size();
   for (auto const& [batch, antialias] : {std::pair{1, 0.0f}, {ranks, 0.0f}, {1, 0.3f}, {ranks, 0.3f}}) {
@@ -338,7 +338,7 @@ TEST_CASE("a Gaussian that no view shows takes the bytes that were told before, 
   }
 }
 
-TEST_CASE("a run that grows has the memory of its end from the start, and no more of it") {
+TEST_CASE("a run that grows reserves the memory of its end") {
   row_owners const owners{mpi_comm().size(), mpi_comm().rank(), 8};
   for (densify_kind const kind : {densify_kind::error, densify_kind::mcmc}) {
     CAPTURE(static_cast<int>(kind));

@@ -13,7 +13,7 @@
 
 using namespace gart;
 
-TEST_CASE("every Gaussian has one owner and one row there, in the order of numbers") {
+TEST_CASE("every Gaussian has one owner and one row, in order") {
   for (int ranks = 1; ranks <= 7; ++ranks)
     for (index_t const block : {1u, 3u, 16u})
       for (u64 total = 0; total < 200; total += 7) {
@@ -81,7 +81,7 @@ TEST_CASE("ranks share the views of a round, and strips their costs") {
   CHECK_THROWS_AS(divide_work({{1}, {1}, {1}}, 2, 8), invalid_argument);
 }
 
-TEST_CASE("what views cost comes as steps from row to row, and is known by their names the next time") {
+TEST_CASE("view costs are steps between rows, remembered by name") {
   std::mt19937_64 engine(6);
   std::vector<camera> views(3);
   for (camera& view : views) view.width = 8, view.height = 1 + static_cast<int>(engine() % 40);
@@ -106,7 +106,7 @@ TEST_CASE("what views cost comes as steps from row to row, and is known by their
   CHECK(!known.knows({}));
 }
 
-TEST_CASE("each rank gets of an array the rows that it reads, from the rank that has them") {
+TEST_CASE("each rank gets the rows that it reads from their owner") {
   std::mt19937_64 engine(7);
   for (int trial = 0; trial < 200; ++trial) {
     int const ranks = 1 + static_cast<int>(engine() % 6),

@@ -144,7 +144,7 @@ TEST_CASE_TEMPLATE("many uploads in a row each arrive", E, GART_TEST_POLICIES) {
   for (u32 k = 0; k < 24; ++k) CHECK(buffers[k].to_host() == std::vector<u32>(host.size(), k));
 }
 
-TEST_CASE_TEMPLATE("a buffer grows with slack, never shrinks, and accounts for its bytes", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a buffer grows with slack, never shrinks, counts its bytes", E, GART_TEST_POLICIES) {
   E exec;
   {
     buffer<u64, E> a(exec, 1000);
@@ -188,8 +188,7 @@ TEST_CASE_TEMPLATE("resize_keep keeps what there was", E, GART_TEST_POLICIES) {
   CHECK(empty.capacity() == 3);  // a first size is exact
 }
 
-TEST_CASE_TEMPLATE("what is reserved is exact, keeps what there was, and is grown into where it lies", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("reserving is exact, keeps contents and grows in place", E, GART_TEST_POLICIES) {
   E exec;
   auto const host = numbers(1000);
   buffer<u32, E> a(exec, host);

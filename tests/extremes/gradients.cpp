@@ -8,7 +8,7 @@
 
 using namespace gart_test;
 
-TEST_CASE_TEMPLATE("opacity's gradient keeps its digits while sigma has none left", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("opacity's gradient keeps its digits at the ends of sigma", E, GART_TEST_POLICIES) {
   // One Gaussian a pixel, its ray at |p| of 1 to 2 in the mean: alpha is below its clamp whatever sigma is.
   float const logits[] = {3, 6, 9, 12, 15, 17, 20, 30, 40, 60, 80};
   int const n = static_cast<int>(std::size(logits));
@@ -115,7 +115,7 @@ TEST_CASE_TEMPLATE("error budget: derivatives by alpha along a ray", E, GART_TES
   }
 }
 
-TEST_CASE_TEMPLATE("error budget: atomics in any order against sums in one order", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("error budget: atomics in any order against ordered sums", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   number_source random(seed + 7);

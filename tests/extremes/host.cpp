@@ -25,14 +25,14 @@ static_assert(gart::host_execution<limited_exec>);
 
 }  // namespace
 
-TEST_CASE("memory that ends at any allocation is an error, and the next try with more succeeds") {
+TEST_CASE("memory may end at any allocation; the next try succeeds") {
   gart_test::number_source random(7);
   gart::gaussian_model const model = gart_test::cloud(random, 30);
   gart::camera const view = gart_test::looking_along_z(17, 13, 16);
   std::vector<float> const gradient(std::size_t{3} * view.width * view.height, 0.5f);
   using tracer = gart::tile_tracer<limited_exec>;
   limited_exec exec;
-  auto const run = [&] { return gart_test::run_by<gart::primitive_strategy, tracer>(exec, model, view, {}, gradient); };
+  auto const run = [&] { return gart_test::run_by<gart::primitive_method, tracer>(exec, model, view, {}, gradient); };
   exec.most = std::size_t{1} << 30;
   auto const expected = run();
   std::size_t const needed = static_cast<std::size_t>(exec.memory.peak);
@@ -51,7 +51,7 @@ TEST_CASE("memory that ends at any allocation is an error, and the next try with
   CHECK(got.gradients.mean == expected.gradients.mean);
 }
 
-TEST_CASE("starting points in one place are found in time, and make Gaussians of a finite size") {
+TEST_CASE("starting points in one place give finite Gaussians, in time") {
   gart::point_cloud points;
   for (int i = 0; i < 100000; ++i) {
     float const at = i % 2 ? 1.0f : 1e7f;
@@ -78,7 +78,7 @@ TEST_CASE("black points start where their colour has a gradient") {
   }
 }
 
-TEST_CASE("nothing is stored in less than 32 bits but the place of boxes") {
+TEST_CASE("only places of boxes take less than 32 bits") {
   using namespace gart;
   static_assert(std::is_same_v<decltype(gaussian_model::mean)::value_type, float>);
   static_assert(std::is_same_v<decltype(gaussians<serial_exec>::log_scale), buffer<float, serial_exec>>);

@@ -91,7 +91,7 @@ TEST_CASE_TEMPLATE("sums past 2^32 and pairs past 2^31", E, GART_TEST_POLICIES) 
   using frame_type = gart::frame<E, gart::scene_traits<0>, no_tracer<E>>;
   frame_type frame(exec);
   frame.prepare(scene.view(), view);
-  gart::backward_pass<frame_type, gart::primitive_strategy> pass(exec);
+  gart::backward_pass<frame_type, gart::primitive_method> pass(exec);
   CHECK_FALSE(pass.prepare(frame, u64{1} << 40));
   CHECK(pass.hit_buffer_bytes() == 0);
   // Nor are slots that have no number of 32 bits.

@@ -1,4 +1,4 @@
-// Every extreme scene by every tracer and strategy: finite, the same image bit for bit, and the oracle's image and
+// Every extreme scene by every tracer and method: finite, the same image bit for bit, and the oracle's image and
 // gradients within what float can do. Broken, huge and tiny parameters. How far float is off, and why.
 #include <extremes/scenes.hpp>
 #include <extremes/ways.hpp>
@@ -182,8 +182,7 @@ void check_same(number_source& random, gart::gaussian_model const& model, std::v
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("every extreme through the filter of its pixels: finite, and one image by every tracer", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("extremes through the filter are finite for all tracers", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
@@ -202,7 +201,7 @@ TEST_CASE_TEMPLATE("every extreme through the filter of its pixels: finite, and 
 }
 
 // Prints what docs/accuracy.md quotes: GART_TEST_SEED=1 test_extremes --test-case=*budget*
-TEST_CASE_TEMPLATE("error budget: every extreme by every tracer and strategy", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("error budget: every extreme by every tracer and method", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
@@ -242,8 +241,7 @@ TEST_CASE_TEMPLATE("error budget: every extreme by every tracer and strategy", E
   }
 }
 
-TEST_CASE_TEMPLATE("NaN and infinity in every slot of the geometry, and quaternions without a direction", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("NaN and infinity in geometry; quaternions without direction", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   number_source random(seed + 2);
@@ -270,7 +268,7 @@ TEST_CASE_TEMPLATE("NaN and infinity in every slot of the geometry, and quaterni
   check_same<E>(random, mixed, broken, good);
 }
 
-TEST_CASE_TEMPLATE("NaN and infinity in every slot of the colour: black, and nothing else", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("NaN and infinity in colours show black alone", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   number_source random(seed + 3);
@@ -285,7 +283,7 @@ TEST_CASE_TEMPLATE("NaN and infinity in every slot of the colour: black, and not
   check_same<E>(random, broken, std::vector<bool>(broken.size(), false), black);
 }
 
-TEST_CASE_TEMPLATE("the largest and the smallest finite numbers in every slot of the geometry", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("largest and smallest finite numbers in the geometry", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   number_source random(seed + 4);

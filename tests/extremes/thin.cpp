@@ -1,5 +1,5 @@
 // Gaussians far thinner than the float spacing of their distance: the response and its gradients against the oracle, by
-// every tracer and strategy, where the distance is 1e3 to 1e9 of the thinnest axis.
+// every tracer and method, where the distance is 1e3 to 1e9 of the thinnest axis.
 #include <extremes/scenes.hpp>
 #include <extremes/ways.hpp>
 

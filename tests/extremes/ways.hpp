@@ -1,6 +1,6 @@
 #pragma once
-// One scene through every tracer and every strategy: the image of the forward pass and the gradients of the backward
-// pass. Strategies that change the gather alone, which does not know the tracer, run on tile lists. SH degree 1, the
+// One scene through every tracer and every method: the image of the forward pass and the gradients of the backward
+// pass. Methods that change the gather alone, which does not know the tracer, run on tile lists. SH degree 1, the
 // least that has a direction. Bodies are in ways.cpp, compiled once (gart_test's BODIES extremes_ways).
 
 #include <extremes/scenes.hpp>
@@ -15,14 +15,14 @@
 namespace gart_test {
 
 struct outcome {
-  std::string way;  // "tracer, strategy"
+  std::string way;  // "tracer, method"
   std::vector<float> color, transmittance, depth;
   std::vector<gart::u32> hits;
   gart::gaussian_model gradients;
 };
 
 template <class E>
-outcome run_one(E& exec, tracer_kind kind, std::string const& strategy, gart::gaussian_model const& model,
+outcome run_one(E& exec, tracer_kind kind, std::string const& method, gart::gaussian_model const& model,
                 gart::camera const& view, gart::render_options const& options,
                 std::vector<float> const& color_gradient);
 

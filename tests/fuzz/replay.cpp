@@ -66,7 +66,7 @@ std::vector<fs::path> inputs_of(char const* name) {
 
 }  // namespace
 
-TEST_CASE("every input of the corpus is read or refused by an error that names the file") {
+TEST_CASE("every corpus input is read or refused by its file's name") {
   for (reader const& r : readers) {
     CAPTURE(std::string(r.name));
     int accepted = 0, refused = 0;

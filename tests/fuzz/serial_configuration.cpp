@@ -8,4 +8,4 @@ using serial_tracer = gart::bvh_tracer<gart::serial_exec>;
 
 GART_REGISTER_CONFIGURATIONS(gart_fuzz_configuration,
                              gart::register_configuration_of<gart::serial_exec, gart::scene_traits<0>, serial_tracer,
-                                                             gart::pixel_strategy>(0, gart::always_available))
+                                                             gart::pixel_method>(0, gart::always_available))

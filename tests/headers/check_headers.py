@@ -87,10 +87,10 @@ TEMPLATES = """#include <gart/exec/parallel.hpp>
 #include <gart/train/trainer_impl.hpp>
 namespace gart {
 using shape = generalized_gaussian<4>;
-template class basic_trainer<openmp_exec, scene_traits<1>, tile_tracer<openmp_exec>, primitive_strategy, self_comm>;
-template class basic_trainer<openmp_exec, scene_traits<3, shape>, bvh_tracer<openmp_exec, shape>, hybrid_strategy, self_comm>;
-template class basic_trainer<serial_exec, scene_traits<0>, tile_tracer<serial_exec>, deterministic_strategy, self_comm>;
-template class basic_trainer<serial_exec, scene_traits<2>, bvh_tracer<serial_exec>, pixel_strategy, self_comm>;
+template class basic_trainer<openmp_exec, scene_traits<1>, tile_tracer<openmp_exec>, primitive_method, self_comm>;
+template class basic_trainer<openmp_exec, scene_traits<3, shape>, bvh_tracer<openmp_exec, shape>, hybrid_method, self_comm>;
+template class basic_trainer<serial_exec, scene_traits<0>, tile_tracer<serial_exec>, deterministic_method, self_comm>;
+template class basic_trainer<serial_exec, scene_traits<2>, bvh_tracer<serial_exec>, pixel_method, self_comm>;
 }  // namespace gart
 """
 

@@ -7,7 +7,7 @@
 
 using namespace gart_test;
 
-TEST_CASE("cameras of every model are written to a camera JSON and read back") {
+TEST_CASE("cameras of every model survive a camera JSON") {
   scratch_folder const folder;
   std::vector<gart::named_camera> cameras;
   auto const add = [&](gart::camera_kind kind, gart::distortion const& lens) {

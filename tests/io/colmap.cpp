@@ -228,7 +228,7 @@ TEST_CASE("every COLMAP model is read, binary and text") {
     }
 }
 
-TEST_CASE("photos of another size scale the intrinsics, and of another shape are refused") {
+TEST_CASE("photos of another size scale intrinsics; other shapes fail") {
   scratch_folder const folder;
   put_model(folder, binary_model(), "sparse/0/", ".bin");
   put_photos(folder);
@@ -258,7 +258,7 @@ TEST_CASE("a missing photo is counted, all missing are an error") {
   CHECK(gart::load_cameras(folder.path).size() == 2);  // the files state the sizes
 }
 
-TEST_CASE("points in a camera's centre and points that are not finite are left out") {
+TEST_CASE("points at a camera's centre or not finite are left out") {
   scratch_folder const folder;
   put_photos(folder);
   test_model m = text_model();
@@ -308,7 +308,7 @@ TEST_CASE("values that no camera can have are refused") {
   CHECK(holds(refused([&](test_model& m) { m.images = "# none\n"; }), "lists no image"));
 }
 
-TEST_CASE("damaged COLMAP files are refused and never crash or allocate without end") {
+TEST_CASE("damaged COLMAP files are refused without great allocations") {
   gart::dataset_options options = all_train();
   for (bool text : {false, true}) {
     scratch_folder const folder;

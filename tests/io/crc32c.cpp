@@ -34,7 +34,7 @@ TEST_CASE("CRC-32C gives the values of RFC 3720") {
   CHECK(of({}) == 0);
 }
 
-TEST_CASE("CRC-32C of any length, in one part or in two, is the long division's") {
+TEST_CASE("CRC-32C in one part or two equals long division") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   for (std::size_t size = 0; size < 70; ++size) {

@@ -80,7 +80,7 @@ TEST_CASE("a depth map goes there and back") {
   CHECK(gart::read_depth(folder.path / "odd.png", 1).data == std::vector<float>{0, 0, 65535, 2});
 }
 
-TEST_CASE("a depth map that cannot be is refused by what is wrong with it") {
+TEST_CASE("an impossible depth map is refused by its fault") {
   scratch_folder const folder;
   auto const says = [&](std::string const& bytes) { return refusal(folder.put("a.npy", bytes)); };
   std::string const good = "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), }";
@@ -132,7 +132,7 @@ TEST_CASE("a capture's depth maps are distances along the rays") {
   CHECK(half.at(3, 3, 0) == 3);
 }
 
-TEST_CASE("where a map of z says nothing there is no depth, whatever the ray") {
+TEST_CASE("a map of z without a value has no depth on any ray") {
   // To 189 degrees from the axis: behind the camera, and at the corners past what a fisheye has rays for.
   one_view const wide(R"(, "camera_model": "OPENCV_FISHEYE", "fl_y": 1.5, "k1": 0)");
   std::string text;
@@ -147,7 +147,7 @@ TEST_CASE("where a map of z says nothing there is no depth, whatever the ray") {
     for (int x = 0; x < 8; ++x) CHECK((x == 4 && y == 4 ? got.at(x, y, 0) > 2 : got.at(x, y, 0) == 0));
 }
 
-TEST_CASE("a capture's depth map that does not fit is refused by its file") {
+TEST_CASE("a depth map that does not fit is refused by file") {
   one_view const view;
   CHECK(holds(view.refused(), "a.png: the depth map of images/a.png is not there"));
   gart::write_npy(view.folder.path / "depths" / "a.npy", gart::image_float(8, 7, 1, 1.0f));

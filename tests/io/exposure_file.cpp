@@ -53,7 +53,7 @@ TEST_CASE("exposures come back from their file with every bit") {
   CHECK(gart::read_exposures(path).lenses().size() == 2);
 }
 
-TEST_CASE("a file that holds no exposures is refused by name, view and field") {
+TEST_CASE("a file without exposures is refused by view and field") {
   scratch_folder folder;
   CHECK(gart::read_exposures(folder.put("sound.json", sound)).views().size() == 1);
   auto const refused = [&](std::string const& what, std::string const& with, std::string const& expected) {

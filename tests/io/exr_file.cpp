@@ -118,7 +118,7 @@ TEST_CASE("an image of floats is what its EXR file holds") {
   CHECK(other == 0);
 }
 
-TEST_CASE("lines of an EXR file that zlib makes no smaller are stored as they are") {
+TEST_CASE("EXR lines that zlib cannot shrink are stored plain") {
   scratch_folder const folder;
   fs::path const path = folder.path / "noise.exr";
   std::mt19937 random(3);

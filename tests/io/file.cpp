@@ -40,7 +40,7 @@ TEST_CASE("a body that fails leaves the old file and no temporary one") {
   CHECK(files_in(folder.path) == 1);
 }
 
-TEST_CASE("a disk without space is reported, and nothing is left half-written") {
+TEST_CASE("a full disk is reported and leaves no half-written file") {
   scratch_folder const folder;
   fs::path const path = folder.put("a.bin", "old");
   rlimit before{};

@@ -84,7 +84,7 @@ bool without(std::string const& name) {
   return name.empty();
 }
 
-TEST_CASE("each format gives back what it was given, within its quantum") {
+TEST_CASE("each format returns what it was given within its quantum") {
   CAPTURE(seed());
   // Half a step of each number, and a rounding; codebooks and palettes have no such bound, theirs is of these numbers.
   std::map<std::string, error_of_format> const quantum = {
@@ -105,7 +105,7 @@ TEST_CASE("each format gives back what it was given, within its quantum") {
       gart::write_splats(path, model);
       auto const back = gart::read_splats(path);
       REQUIRE(back.size() == model.size());
-      CHECK(back.sh_degree == std::min(degree, format->room.sh_degree));
+      CHECK(back.sh_degree == std::min(degree, format->capabilities.sh_degree));
       auto const e = difference(model, back);
       auto most = quantum.at(format->name);
       // Its means have 24 bits in all, of which at most 20 are behind the point.
@@ -137,7 +137,7 @@ TEST_CASE("SPZ's coefficients have the bits that are asked for") {
   CHECK(holds(error_of([&] { gart::write_splats(folder.path / "m.spz", model, {}, {.sh_bits = 9}); }), "1 to 8"));
 }
 
-TEST_CASE("SOG's palette has the rows that there are, and is nearer the more it has") {
+TEST_CASE("SOG's palette has all rows and gains by more") {
   if (without("SOG")) return;
   scratch_folder const folder;
   std::mt19937_64 random(seed());
@@ -303,7 +303,7 @@ TEST_CASE("a GLB is read where its nodes place it, or refused") {
   CHECK(holds(error_of([&] { gart::read_splats(placed("\"scale\":[2,1,1]")); }), "node 0"));
 }
 
-TEST_CASE("what a small file says of much memory is refused before there is any") {
+TEST_CASE("counts that a small file cannot hold are refused") {
   scratch_folder const folder;
   gart::write_splats(folder.path / "a.glb", random_model(4000, 0));
   std::string const whole = text_of(folder.path / "a.glb");

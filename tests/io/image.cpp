@@ -63,7 +63,7 @@ TEST_CASE("PNG returns what was written, for 1, 3 and 4 channels") {
   CHECK_THROWS_AS(gart::encode_png(image8()), gart::invalid_argument);
 }
 
-TEST_CASE("the kinds of PNG: 16 bits, palette, gray with alpha, interlaced") {
+TEST_CASE("PNG of 16 bits, palette, gray with alpha, interlaced") {
   scratch_folder const folder;
   fs::path const path = folder.path / "a.png";
   write_kind(path, 2, 1, PNG_COLOR_TYPE_GRAY, 16, false, std::string("\xff\xff\x80\x00", 4), false);
@@ -85,7 +85,7 @@ TEST_CASE("the kinds of PNG: 16 bits, palette, gray with alpha, interlaced") {
   CHECK(gart::read_image(path).data.size() == 16000000);  // the best compression there is
 }
 
-TEST_CASE("JPEG keeps a smooth image within its loss, and gray stays gray") {
+TEST_CASE("JPEG keeps a smooth image, and gray stays gray") {
   scratch_folder const folder;
   for (int channels : {1, 3}) {
     image8 image(64, 48, channels);
@@ -119,7 +119,7 @@ TEST_CASE("damaged images are refused and never crash") {
   CHECK(holds(error_of([&] { gart::read_image(folder.put("text.png", "hello")); }), "neither PNG, JPEG nor WebP"));
 }
 
-TEST_CASE("a size that the data cannot hold is refused before it is allocated") {
+TEST_CASE("a size that the data cannot hold is refused first") {
   scratch_folder const folder;
   auto bytes = gart::encode_png(image8(4, 4, 3));
   // IHDR's width and height, and its checksum.
@@ -136,7 +136,7 @@ TEST_CASE("a size that the data cannot hold is refused before it is allocated") 
   CHECK(holds(error_of([&] { gart::read_image(path); }), "larger than its data"));
 }
 
-TEST_CASE("box_downscale is the mean of whole blocks, weighted by alpha") {
+TEST_CASE("box_downscale is the mean of blocks, weighted by alpha") {
   image8 image(5, 3, 1);
   for (int i = 0; i < 15; ++i) image.data[static_cast<std::size_t>(i)] = static_cast<u8>(10 * i);
   image8 const half = gart::box_downscale(image, 2);

@@ -102,7 +102,7 @@ TEST_CASE("gart's traits travel as comments, and others are ignored") {
   CHECK(back == gart::splat_traits{{"alpha_min", "0.0039215689 exactly"}, {"kernel_degree", "2"}});
 }
 
-TEST_CASE("an antialiased model is marked as other programs mark theirs, and theirs are read") {
+TEST_CASE("antialiased models carry the mark of other programs") {
   std::mt19937_64 random(1);
   scratch_folder const folder;
   fs::path const path = folder.path / "model.ply";
@@ -129,7 +129,7 @@ TEST_CASE("an antialiased model is marked as other programs mark theirs, and the
   CHECK(antialias_in("") == "none");
 }
 
-TEST_CASE("any order, encoding and type, with properties, lists and elements that are not ours") {
+TEST_CASE("any order, encoding and type of properties is read") {
   CAPTURE(seed());
   std::mt19937_64 random(seed());
   scratch_folder const folder;
@@ -201,7 +201,7 @@ TEST_CASE("any order, encoding and type, with properties, lists and elements tha
   }
 }
 
-TEST_CASE("what is not a 3D Gaussian model is refused, naming the property") {
+TEST_CASE("a PLY that is no 3D Gaussian model names the property") {
   std::mt19937_64 random(2);
   scratch_folder const folder;
   gaussian_model const m = random_model(5, 1, random);
@@ -237,7 +237,7 @@ TEST_CASE("what is not a 3D Gaussian model is refused, naming the property") {
   CHECK(holds(refused("element vertex 5\n", "element vertex 18446744073709551615\nelement nothing 5\n"), "missing"));
 }
 
-TEST_CASE("NaN, infinity and a zero rotation are left out, and named with their vertex") {
+TEST_CASE("NaN, infinity and zero rotations are left out and named") {
   std::mt19937_64 random(3);
   scratch_folder const folder;
   fs::path const path = folder.path / "model.ply";
@@ -282,7 +282,7 @@ TEST_CASE("a damaged splat file is refused and never crashes") {
   maltreat(folder.put("list.ply", list), list, false, [&] { gart::read_point_ply(folder.path / "list.ply"); });
 }
 
-TEST_CASE("points keep position and colour; other colour types are scaled; none is grey") {
+TEST_CASE("points keep position and colour; grey where none") {
   scratch_folder const folder;
   fs::path const path = folder.path / "points.ply";
   gart::point_cloud const points{{1, -2, 3.5f, 4, 5, 6}, {0, 127, 255, 10, 20, 30}};

@@ -14,7 +14,7 @@ gart::gaussian_model one() {
   return m;
 }
 
-TEST_CASE("a file of Gaussians is known by its first bytes, whatever its name") {
+TEST_CASE("a file of Gaussians is known by its first bytes") {
   scratch_folder const folder;
   gart::write_splats(folder.path / "model.PLY", one(), {{"kernel_degree", "4"}});
   for (char const* name : {"model.bin", "model", "model.jpg"}) {
@@ -43,7 +43,7 @@ TEST_CASE("what is in no format is refused with the list of formats") {
   CHECK(holds(error_of([&] { gart::write_splats(folder.path / "model.xyz", one()); }), "PLY (.ply)"));
 }
 
-TEST_CASE("the formats have a name, an ending and a reader, and each knows what it writes") {
+TEST_CASE("formats have names, endings and readers, and know their own") {
   CHECK(gart::splat_formats().size() >= 1);
   scratch_folder const folder;
   for (gart::splat_format const* format : gart::splat_formats()) {

@@ -33,7 +33,7 @@ std::string const lens =
 
 }  // namespace
 
-TEST_CASE("Blender: the field of view, axes, alpha, and the files' own split") {
+TEST_CASE("Blender: field of view, axes, alpha, the files' own split") {
   scratch_folder const folder;
   double const angle = 0.7;
   std::string const keys = "\"camera_angle_x\": 0.7";
@@ -70,7 +70,7 @@ TEST_CASE("Blender: the field of view, axes, alpha, and the files' own split") {
   CHECK(gart::load_dataset(folder.path).points.size() == 1);
 }
 
-TEST_CASE("nerfstudio: intrinsics of file and frame, masks, points, missing photos, the every-8th rule") {
+TEST_CASE("nerfstudio: intrinsics, masks, points, lost photos, split") {
   scratch_folder const folder;
   std::string frames;
   for (int i = 0; i < 18; ++i) {
@@ -216,7 +216,7 @@ TEST_CASE("20,000 cameras of one name are told apart in little time") {
   CHECK(names.count("a_20000"));
 }
 
-TEST_CASE("a folder with COLMAP and transforms.json uses COLMAP and says so") {
+TEST_CASE("COLMAP beside transforms.json is used and said") {
   scratch_folder const folder;
   folder.put_image("images/a.png", 16, 12);
   folder.put("sparse/0/cameras.txt", "1 PINHOLE 16 12 20 20 8 6\n");
@@ -349,7 +349,7 @@ TEST_CASE("transforms.json names its lenses") {
   }
 }
 
-TEST_CASE("a rolling shutter is read with the poses of its first and last line, and what is wrong is named") {
+TEST_CASE("a rolling shutter is read with two poses or refused") {
   scratch_folder const folder;
   folder.put_image("a.png", 16, 12);
   fs::path const path = folder.path / "transforms.json";
@@ -403,7 +403,7 @@ TEST_CASE("a rolling shutter is read with the poses of its first and last line, 
               "half a turn"));
 }
 
-TEST_CASE("a sector keeps cameras that stand beside each other for testing, whatever their order") {
+TEST_CASE("a sector tests cameras that stand beside each other") {
   scratch_folder const folder;
   constexpr int cameras = 24;
   std::string frames;

@@ -142,8 +142,7 @@ double worst_of(oracle::scene const& s) {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("gradients of lenses agree with differences of the reference, through every camera that has one", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("lens gradients match the reference through every camera", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   oracle::scene const s = scene();
@@ -155,8 +154,7 @@ TEST_CASE_TEMPLATE("gradients of lenses agree with differences of the reference,
   MESSAGE("worst relative error " << worst);
 }
 
-TEST_CASE_TEMPLATE("a camera without a focal length, and a filter of the pixels, are refused by name", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("no focal length, or pixel filters: refused by name", E, GART_TEST_POLICIES) {
   E exec;
   oracle::scene s = scene();
   gart::camera sphere = s.view;

@@ -83,7 +83,7 @@ double worst_of(expectation const& e) {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("gradients of rays agree with differences of the oracle's images", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("ray gradients match differences of the oracle's images", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);

@@ -37,7 +37,7 @@ std::pair<Eigen::MatrixXd, Eigen::MatrixXd> system_of(image_float const& render,
 
 }  // namespace
 
-TEST_CASE("the fit is Eigen's least squares, and the PSNR that of its clamped colours") {
+TEST_CASE("the fit is Eigen's least squares; PSNR clamps colours") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   for (bool const masked : {false, true}) {
@@ -64,7 +64,7 @@ TEST_CASE("the fit is Eigen's least squares, and the PSNR that of its clamped co
   }
 }
 
-TEST_CASE("an error of exposure and white balance alone is found again, and nothing is left of it") {
+TEST_CASE("an error of exposure and white balance alone is undone") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   image_float const render = random_image(random, 24, 24, 0, 1);
@@ -86,7 +86,7 @@ TEST_CASE("an error of exposure and white balance alone is found again, and noth
   CHECK(psnr_affine_color(render, truth) > 120);
 }
 
-TEST_CASE("grey, constant and hidden renders leave directions open, and the rest is fitted") {
+TEST_CASE("grey, constant and hidden renders leave directions open") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   image_float const truth = random_image(random, 20, 20, 0, 1);

@@ -8,8 +8,7 @@
 
 using namespace gart;
 
-TEST_CASE_TEMPLATE("the depth's loss is the definition, and its gradients are those of differences", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("the depth loss is its definition, gradients its differences", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);

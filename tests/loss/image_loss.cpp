@@ -113,7 +113,7 @@ TEST_CASE_TEMPLATE("loss and gradient are those of the definition", E, GART_TEST
   }
 }
 
-TEST_CASE_TEMPLATE("an image that equals the truth has no loss and no gradient at all", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("an image equal to the truth has no loss and no gradient", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   E exec;
@@ -151,8 +151,7 @@ TEST_CASE_TEMPLATE("a mask weighs gradients in parts of 255", E, GART_TEST_POLIC
     REQUIRE(got.gradient[i] == doctest::Approx(unweighted.gradient[i] * (i / 3 % 2 ? 0.2f : 1.0f)).epsilon(1e-6));
 }
 
-TEST_CASE_TEMPLATE("the same image gives the same bits, and the object serves images of any size", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("the same image gives the same bits, at any size", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   E exec;
@@ -173,8 +172,7 @@ TEST_CASE_TEMPLATE("the same image gives the same bits, and the object serves im
   }
 }
 
-TEST_CASE_TEMPLATE("a strip has the bits of the whole image, and reads no row but those that it says", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a strip has the whole image's bits and reads its rows alone", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   E exec;

@@ -6,7 +6,7 @@
 
 using namespace gart;
 
-TEST_CASE("psnr and ssim are those of the definitions, of the clamped render") {
+TEST_CASE("psnr and ssim follow definitions, of the clamped render") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   std::uniform_real_distribution<float> u(0, 1);
@@ -20,7 +20,7 @@ TEST_CASE("psnr and ssim are those of the definitions, of the clamped render") {
   CHECK(ssim(render, truth) == doctest::Approx(expected.ssim).epsilon(1e-10));
 }
 
-TEST_CASE("psnr over the pixels that a mask leaves, of a truth composited over its background") {
+TEST_CASE("psnr counts the pixels of a mask over a background") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   std::uniform_real_distribution<float> u(0, 1);

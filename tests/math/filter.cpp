@@ -136,7 +136,7 @@ parameters gaussian(source& from, double r) {
 
 }  // namespace
 
-TEST_CASE("the filter is as wide as a pixel reaches, whatever the lens, and changes with the mean as it says") {
+TEST_CASE("a filter is as wide as a pixel reaches through any lens") {
   CAPTURE(gart_test::seed());
   source from(gart_test::seed());
   double worst = 0, worst_slope = 0;
@@ -170,7 +170,7 @@ TEST_CASE("the filter is as wide as a pixel reaches, whatever the lens, and chan
   CHECK(worst_slope < 1e-4);
 }
 
-TEST_CASE("beside the image and behind the camera a filter is that of the nearest border, and finite") {
+TEST_CASE("beside and behind the image a filter is its border's") {
   CAPTURE(gart_test::seed());
   source from(gart_test::seed() + 1);
   for (int trial = 0; trial < 200; ++trial) {
@@ -190,7 +190,7 @@ TEST_CASE("beside the image and behind the camera a filter is that of the neares
   CHECK(gart::pinhole(from.camera(false)).filter(0.3f).at(gart::vec3(0.0f)).sigma == 0);
 }
 
-TEST_CASE("a widened Gaussian covers what it did, and grows by the filter") {
+TEST_CASE("a widened Gaussian covers its old extent plus the filter") {
   CAPTURE(gart_test::seed());
   source from(gart_test::seed() + 2);
   double worst_scale = 0, worst_sigma = 0;
@@ -208,7 +208,7 @@ TEST_CASE("a widened Gaussian covers what it did, and grows by the filter") {
   CHECK(worst_sigma < 2e-5);
 }
 
-TEST_CASE("a filter leaves most of what is seen along its shortest axis") {
+TEST_CASE("a filter acts most along a Gaussian's shortest axis") {
   CAPTURE(gart_test::seed());
   source from(gart_test::seed() + 5);
   for (int trial = 0; trial < 300; ++trial) {
@@ -232,7 +232,7 @@ TEST_CASE("a filter leaves most of what is seen along its shortest axis") {
   CHECK(gart::largest_share_left(gart::vec3(-INFINITY), 1.0f) == 0);
 }
 
-TEST_CASE("the way back through the filter is the derivative of the way there") {
+TEST_CASE("the filter's backward pass is the derivative of its forward") {
   CAPTURE(gart_test::seed());
   source from(gart_test::seed() + 3);
   constexpr struct {

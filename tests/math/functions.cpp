@@ -157,7 +157,7 @@ TEST_CASE("quaternions of any norm against Eigen") {
   CHECK(worst < 1e-6);
 }
 
-TEST_CASE("pull_back of a rotation's gradient against differences through the normalisation") {
+TEST_CASE("a rotation's gradient against differences when normalised") {
   CAPTURE(gart_test::seed());
   numbers_source source(gart_test::seed() + 3);
   for (int trial = 0; trial < 300; ++trial) {
@@ -187,7 +187,7 @@ TEST_CASE("pull_back of a rotation's gradient against differences through the no
   }
 }
 
-TEST_CASE("spherical harmonics: the real ones with the Condon-Shortley phase, in the files' order") {
+TEST_CASE("real spherical harmonics with Condon-Shortley phase") {
   CAPTURE(gart_test::seed());
   numbers_source source(gart_test::seed() + 4);
   for (int trial = 0; trial < 200; ++trial) {
@@ -239,7 +239,7 @@ void check_active_degrees() {
 
 }  // namespace
 
-TEST_CASE("colour: bands above the active degree left out, clamped at zero") {
+TEST_CASE("colour leaves out inactive bands and clamps at zero") {
   check_active_degrees<0>();
   check_active_degrees<1>();
   check_active_degrees<2>();

@@ -194,7 +194,7 @@ TEST_CASE_TEMPLATE("moments become the gradients of a weighted sum of alphas", R
   }
 }
 
-TEST_CASE("the cusp of degree 1: a gradient of one size from every side, and none at the centre") {
+TEST_CASE("degree 1's cusp: gradients of one size, none in the middle") {
   using cusp = gart::generalized_gaussian<1>;
   gart::gaussian_parameters const g{{0, 0, 2}, {0, 0, 0}, {1, 0, 0, 0}, 0};
   gart::ray_gaussian const record = gart::prepare<cusp>(g, gart::vec3d(0.0), 1.0f / 255);
@@ -227,7 +227,7 @@ TEST_CASE("no gradient passes a clamp") {
   CHECK(c == gart::vec3(0.0f, 0.0f, 0.5f));
 }
 
-TEST_CASE("the walk along a ray gives the derivative of its colour by each alpha") {
+TEST_CASE("the walk along a ray gives its colour's slope by each alpha") {
   double const alphas[] = {0.3, 0.8, 0.99, 0.1}, grey[] = {0.2, 0.9, 0.5, 0.7}, background = 0.4, weight = 1.7;
   auto const color = [&](double const* a) {
     double sum = 0, t = 1;

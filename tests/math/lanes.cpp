@@ -103,7 +103,7 @@ TEST_CASE("lanes: numbers in turns and in fours") {
   }
 }
 
-TEST_CASE("a packet's rays have the bits of single ones, through lenses too") {
+TEST_CASE("a packet's rays have the bits of single rays") {
   gart::camera view;
   view.width = 64, view.height = 48, view.fx = 40, view.fy = 41, view.cx = 31, view.cy = 25;
   gart::serial_exec exec;

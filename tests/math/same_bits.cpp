@@ -142,7 +142,7 @@ TEST_CASE_TEMPLATE("the same rays on every policy, whatever the lens", E, GART_T
   }
 }
 
-TEST_CASE_TEMPLATE("reciprocals of several numbers at once are correctly rounded", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("reciprocals of several numbers are correctly rounded", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   constexpr int fours = 1 << 19;

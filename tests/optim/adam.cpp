@@ -139,7 +139,7 @@ TEST_CASE_TEMPLATE("elements whose gradient is not finite stay, and are counted"
   CHECK(got.opacity[298] != start.opacity[298]);
 }
 
-TEST_CASE_TEMPLATE("what a step did not show stays, if so asked, and all else moves as ever", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("sparse steps leave unseen rows and move all others", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   E exec;
@@ -179,8 +179,7 @@ TEST_CASE_TEMPLATE("what a step did not show stays, if so asked, and all else mo
   }
 }
 
-TEST_CASE_TEMPLATE("a step in two launches, the colours by gradients in no memory, has the bits of one", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("Adam in two launches has the bits of one", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   E exec;

@@ -26,7 +26,7 @@ bool left_out(float logit) { return sigmoid(logit) < 1e-12; }
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("a share of the Gaussians is left out, and the rest is as much more opaque", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("dropout leaves out a share and makes the rest more opaque", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);

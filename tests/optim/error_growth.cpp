@@ -40,7 +40,7 @@ index_t tag_of(gaussian_model const& m, index_t i) { return static_cast<index_t>
 
 }  // namespace
 
-TEST_CASE("children end where the whole ended, and are as thick in their middles as it was there") {
+TEST_CASE("children end where their parent ended, as thick as it was") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   std::uniform_real_distribution<float> uniform(-1, 1);
@@ -86,8 +86,7 @@ TEST_CASE("children end where the whole ended, and are as thick in their middles
   }
 }
 
-TEST_CASE_TEMPLATE("the dead give their rows to children of those that the error is seen through", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("dead Gaussians give rows to children by the error seen", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   index_t const n = 2000, most = 2300;
@@ -143,8 +142,7 @@ TEST_CASE_TEMPLATE("the dead give their rows to children of those that the error
   CHECK(densifier.error_sum.size() == most);
 }
 
-TEST_CASE_TEMPLATE("sources are drawn in proportion to the error seen through them, and their opacity", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("sources are drawn by error seen through them and opacity", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   index_t const n = 40000, drawn = 800;
@@ -209,7 +207,7 @@ TEST_CASE_TEMPLATE("nothing to draw from", E, GART_TEST_POLICIES) {
   densifier.penalty(t, 0);
 }
 
-TEST_CASE_TEMPLATE("the statistic adds up steps, and the penalty is that of the mean opacity", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("the statistic adds up steps; the penalty is mean opacity's", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   index_t const n = 50;
@@ -262,7 +260,7 @@ TEST_CASE("growth ends where the capture has too few pixels for more") {
   CHECK(budget(1'000'000, 912'384) == 1'000'000);
 }
 
-TEST_CASE("children are nearer where the capture has pixels for all of the Gaussians, or as the options say") {
+TEST_CASE("children are nearer where the capture has pixels for them") {
   gart::error_growth_options options;
   auto const share = [&](gart::index_t most, gart::u64 pixels) { return gart::split_offset(options, most, pixels); };
   CHECK(share(1'000'000, 22'809'600) == 0.4f);

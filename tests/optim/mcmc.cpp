@@ -60,7 +60,7 @@ TEST_CASE("relocated copies render what their source did") {
   CHECK(relocation(0.7, 1000).opacity == relocation(0.7, 51).opacity);
 }
 
-TEST_CASE_TEMPLATE("every dead Gaussian moves onto a live one, which shares with it", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("every dead Gaussian moves onto a live one and shares it", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   index_t const n = 3000;
@@ -202,7 +202,7 @@ TEST_CASE_TEMPLATE("growth reaches the budget exactly and stops", E, GART_TEST_P
   CHECK(one.model.size() == 5);
 }
 
-TEST_CASE_TEMPLATE("nothing alive, nothing at all, and weights that are no numbers", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("nothing alive, nothing at all, weights that are no numbers", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   for (float const opacity : {-200.0f, NAN, INFINITY}) {
@@ -231,7 +231,7 @@ TEST_CASE_TEMPLATE("densification runs between its limits", E, GART_TEST_POLICIE
   CHECK(!densifier.due(1000));
 }
 
-TEST_CASE_TEMPLATE("noise has the covariance of the Gaussian, squared, and spares the opaque", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("noise has the squared covariance and spares the opaque", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   index_t const n = 40000;

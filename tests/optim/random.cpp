@@ -88,7 +88,7 @@ TEST_CASE("the rate of the means decays exponentially") {
   CHECK(rates_at(usual, 3.0f, 0, 10).opacity == doctest::Approx(4 * usual.opacity));
 }
 
-TEST_CASE("the SH degree rises every so many steps, sooner in short runs") {
+TEST_CASE("the SH degree rises in steps, sooner in short runs") {
   CHECK(sh_degree_at(999, 3, 1000, 30000) == 0);
   CHECK(sh_degree_at(1000, 3, 1000, 30000) == 1);
   CHECK(sh_degree_at(29999, 3, 1000, 30000) == 3);

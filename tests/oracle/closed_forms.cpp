@@ -109,7 +109,7 @@ TEST_CASE("what rounding could turn is marked") {
   CHECK(pixel_of(twice, options()).list[0].id == 0);
 }
 
-TEST_CASE("a ray goes through the point that the lens sends to its pixel") {
+TEST_CASE("a ray meets the point that the lens sends to its pixel") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   for (auto const& s : oracle::scenes(seed)) {

@@ -98,7 +98,7 @@ TEST_CASE("gradients agree with central differences") {
   }
 }
 
-TEST_CASE("gradients agree with central differences for every kernel degree") {
+TEST_CASE("gradients match central differences at every kernel degree") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   // A difference across the cusp of degree 1 is off where a ray passes the centre closely.
@@ -117,7 +117,7 @@ TEST_CASE("gradients agree with central differences for needles") {
   }
 }
 
-TEST_CASE("gradients agree with central differences through the filter of the pixels") {
+TEST_CASE("gradients match central differences through pixel filters") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   for (float aspect : {2.0f, 30.0f}) {
@@ -128,7 +128,7 @@ TEST_CASE("gradients agree with central differences through the filter of the pi
   }
 }
 
-TEST_CASE("bands above the active degree get no gradient and change nothing") {
+TEST_CASE("bands above the active degree have no gradient or effect") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   auto s = oracle::smooth_scene(seed, 3, 2.0f);

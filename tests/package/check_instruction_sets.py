@@ -5,7 +5,7 @@ How many lanes the host policies have, and whether a fused multiply-add is one r
 and the library share each inline function and template of one name: where the name does not tell the two apart, one
 runs the other's, and its images are black, or it crashes.
 
-A program trains with the templates of the README (every strategy, SH 3) beside every configuration of
+A program trains with the templates of the README (every method, SH 3) beside every configuration of
 make_renderer and make_session. By default: the library that was built here, and one for another instruction set;
 consumers for none, x86-64-v3 and native at -O0, and at -O2 those that are no library's, and nvcc's host code, where
 there is an nvcc; the linker finding the library first, and last.
@@ -137,7 +137,7 @@ with tempfile.TemporaryDirectory() as temporary:
 for name in [p for p in programs if "_alone_" in p]:
     if not isinstance(said[name], dict):
         sys.exit(f"{name}: {said[name]}")
-    # Instruction sets differ in roundings, and strategies and policies too.
+    # Instruction sets differ in roundings, and methods and policies too.
     for what, (total, _) in said[name].items():
         if not total > 0:
             failures.append(f"{name}: {what} is {total}")

@@ -73,18 +73,18 @@ struct stored {
   gart::camera const& view() const { return seen_by; }
 };
 
-// By the gradients of each tracer and strategy.
+// By the gradients of each tracer and method.
 template <class E, class F>
 void by_all(expectation const& e, F const& check) {
   E exec;
   auto const& s = e.scene;
   gart::gaussians<E> const scene(exec, s.model);
   for (tracer_kind const kind : {tracer_kind::bvh, tracer_kind::tiles})
-    for (std::string const& strategy : strategies_for(kind, s.model.sh_degree)) {
+    for (std::string const& method : methods_for(kind, s.model.sh_degree)) {
       CAPTURE(gart::to_string(kind));
-      CAPTURE(strategy);
+      CAPTURE(method);
       gart::gaussians<E> const gradients(
-          exec, scene_gradients(exec, s.model, s.view, s.options, s.active_degree, kind, strategy, e.weights));
+          exec, scene_gradients(exec, s.model, s.view, s.options, s.active_degree, kind, method, e.weights));
       detail::with_degree(s.model.sh_degree, [&](auto degree) {
         check(gart::differentiate_pose(stored<E, degree>{&exec, scene.view(), s.view}, gradients.view()));
       });
@@ -114,7 +114,7 @@ std::vector<expectation> const& expectations() {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("gradients of poses agree with differences of the oracle's images", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("pose gradients match differences of the oracle's images", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   double worst = 0;
@@ -131,8 +131,7 @@ TEST_CASE_TEMPLATE("gradients of poses agree with differences of the oracle's im
   MESSAGE("worst relative error " << worst);
 }
 
-TEST_CASE_TEMPLATE("sums over any number of Gaussians are those in double, broken ones left out", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("sums over Gaussians match double, broken ones left out", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);

@@ -44,7 +44,7 @@ gart::camera some_camera(std::mt19937_64& random) {
 
 }  // namespace
 
-TEST_CASE("a turn is the series of the exponential, and comes back from its matrix") {
+TEST_CASE("a turn is the exponential's series and inverts") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);
@@ -65,7 +65,7 @@ TEST_CASE("a turn is the series of the exponential, and comes back from its matr
   }
 }
 
-TEST_CASE("a camera that was moved is as far from where it was as it was moved") {
+TEST_CASE("a moved camera is as far away as it was moved") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);
@@ -81,7 +81,7 @@ TEST_CASE("a camera that was moved is as far from where it was as it was moved")
   }
 }
 
-TEST_CASE("gradients by a pose's numbers are those of the function, at any distance from where it started") {
+TEST_CASE("pose gradients are the function's, at any distance") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);

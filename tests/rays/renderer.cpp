@@ -205,7 +205,7 @@ TEST_CASE_TEMPLATE("gradients of depth: a view's and its rays' agree", E, GART_T
   gart::buffer<float, E> const by_color(exec, picture.directions), by_depth(exec, picture.transmittance),
       by_transmittance(exec, picture.depth);
   gart::output_gradients const by{by_color, by_depth, by_transmittance};
-  // By the strategy's own pass, and over the hits where it has none.
+  // By the method's own pass, and over the hits where it has none.
   for (bool const fused : {true, false}) {
     CAPTURE(fused);
     auto const renderer = gart::make_renderer(request_of(exec, 3, fused));

@@ -72,7 +72,7 @@ gart::configuration_request by(gart::tracer_kind tracer, char const* backward) {
 
 }  // namespace
 
-TEST_CASE("images and gradients through every camera are the reference's, and all tracers' the same") {
+TEST_CASE("images and gradients of all cameras match the reference") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   std::uniform_real_distribution<float> uniform(-1, 1);
@@ -141,7 +141,7 @@ TEST_CASE("images and gradients through every camera are the reference's, and al
   }
 }
 
-TEST_CASE("the reference has a filter of pixels for pinholes and OpenCV's lenses alone, and says so") {
+TEST_CASE("the reference filters pinholes and OpenCV lenses alone") {
   gart::camera c;
   c.kind = gart::camera_kind::fisheye, c.width = c.height = 4, c.fx = c.fy = 2, c.cx = c.cy = 2;
   gart::gaussian_model model;

@@ -110,7 +110,7 @@ TEST_CASE("images and gradients are the oracle's") {
   }
 }
 
-TEST_CASE("a few pixels in any order are those of the image, and their gradient is theirs alone") {
+TEST_CASE("pixels in any order are the image's, as their gradients") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   auto const s = from_afar();

@@ -1,4 +1,4 @@
-// The error of the pixels that the backward pass attributes to the Gaussians: by every strategy the sum of weight times
+// The error of the pixels that the backward pass attributes to the Gaussians: by every method the sum of weight times
 // error over a Gaussian's hits, as the hit lists have them.
 #include <render/expected.hpp>
 
@@ -35,10 +35,10 @@ TEST_CASE_TEMPLATE("a pixel's error goes to the Gaussians that show in it", E, G
           largest = std::max(largest, expected[h.id]);
         }
       }
-      for (std::string const& strategy : strategies_for(kind, s.model.sh_degree)) {
-        CAPTURE(strategy);
+      for (std::string const& method : methods_for(kind, s.model.sh_degree)) {
+        CAPTURE(method);
         error.of_gaussians.clear();
-        scene_gradients(exec, s.model, s.view, s.options, s.active_degree, kind, strategy, gradient, &error);
+        scene_gradients(exec, s.model, s.view, s.options, s.active_degree, kind, method, gradient, &error);
         REQUIRE(error.of_gaussians.size() == expected.size());
         double worst = 0;
         for (std::size_t i = 0; i < expected.size(); ++i)

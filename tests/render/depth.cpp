@@ -44,15 +44,15 @@ std::vector<weighted_depth> const& weights() {
   return all;
 }
 
-template <class Tracer, class E, class Strategy>
-void check_scene(E& exec, expectation const& e, weighted_depth const& w, Strategy) {
-  CAPTURE(std::string(Strategy::name));
+template <class Tracer, class E, class Method>
+void check_scene(E& exec, expectation const& e, weighted_depth const& w, Method) {
+  CAPTURE(std::string(Method::name));
   auto const& s = e.scene;
   detail::with_degree(s.model.sh_degree, [&](auto degree) {
-    // At other degrees one strategy stands for all: geometry does not know them.
-    if constexpr (degree == 3 || std::same_as<Strategy, gart::primitive_strategy>) {
-      auto const got = depth_gradients_by<degree, Strategy, Tracer>(exec, s.model, s.view, s.options, s.active_degree,
-                                                                    w.color, w.depth, w.transmittance);
+    // At other degrees one method stands for all: geometry does not know them.
+    if constexpr (degree == 3 || std::same_as<Method, gart::primitive_method>) {
+      auto const got = depth_gradients_by<degree, Method, Tracer>(exec, s.model, s.view, s.options, s.active_degree,
+                                                                  w.color, w.depth, w.transmittance);
       for (auto const& g : gradient_groups) {
         CAPTURE(g.name);
         CHECK(relative_error(got.*g.got, w.gradients.*g.expected) <= 1e-4);
@@ -70,17 +70,17 @@ TEST_CASE_TEMPLATE("gradients of depth agree with the oracle", E, GART_TEST_POLI
   for (std::size_t i = 0; i < expectations().size(); ++i) {
     auto const& e = expectations()[i];
     CAPTURE(e.scene.name);
-    strategies::for_each(
-        [&]<class Strategy>(Strategy s) { check_scene<gart::tile_tracer<E>>(exec, e, weights()[i], s); });
+    gradient_methods::for_each(
+        [&]<class Method>(Method s) { check_scene<gart::tile_tracer<E>>(exec, e, weights()[i], s); });
     if (e.scene.model.sh_degree == 3) {
-      check_scene<gart::bvh_tracer<E>>(exec, e, weights()[i], gart::primitive_strategy{});
-      check_scene<gart::bvh_tracer<E>>(exec, e, weights()[i], gart::pixel_strategy{});
+      check_scene<gart::bvh_tracer<E>>(exec, e, weights()[i], gart::primitive_method{});
+      check_scene<gart::bvh_tracer<E>>(exec, e, weights()[i], gart::pixel_method{});
     }
   }
 }
 
 // One opaque Gaussian on the ray: its depth is w t, and moving it away moves that by w.
-TEST_CASE_TEMPLATE("a Gaussian alone on its ray has the depth's gradient in closed form", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a Gaussian alone has a depth gradient in closed form", E, GART_TEST_POLICIES) {
   gart::camera view;
   view.width = view.height = 1, view.fx = view.fy = 1, view.cx = view.cy = 0.5f;
   gart::gaussian_model m;
@@ -89,8 +89,8 @@ TEST_CASE_TEMPLATE("a Gaussian alone on its ray has the depth's gradient in clos
   m.sh.assign(48, 0.1f);
   float const sigma = 1 / (1 + std::exp(-0.5f));
   E exec;
-  auto const got = depth_gradients_by<3, gart::primitive_strategy, gart::tile_tracer<E>>(exec, m, view, {}, 3,
-                                                                                         {0, 0, 0}, {2}, {0.5f});
+  auto const got =
+      depth_gradients_by<3, gart::primitive_method, gart::tile_tracer<E>>(exec, m, view, {}, 3, {0, 0, 0}, {2}, {0.5f});
   CHECK(got.mean[2] == doctest::Approx(2 * sigma).epsilon(1e-5));
   CHECK(got.mean[0] == doctest::Approx(0).epsilon(1e-6));
   CHECK(got.opacity[0] == doctest::Approx((2 * 4 - 0.5f) * sigma * (1 - sigma)).epsilon(1e-5));
@@ -98,7 +98,7 @@ TEST_CASE_TEMPLATE("a Gaussian alone on its ray has the depth's gradient in clos
   for (float const c : got.sh) CHECK(c == 0);
 }
 
-TEST_CASE_TEMPLATE("gradients by depth are refused where nothing was made ready for them", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("depth gradients without preparation are refused", E, GART_TEST_POLICIES) {
   using frame_type = frame_by<3, gart::tile_tracer<E>, E>;
   auto const& s = expectations().front().scene;
   E exec;
@@ -110,15 +110,15 @@ TEST_CASE_TEMPLATE("gradients by depth are refused where nothing was made ready 
   REQUIRE(s.model.sh_degree == 3);
   frame.prepare(scene.view(), s.view, s.options, s.active_degree);
 
-  gart::backward_pass<frame_type, gart::primitive_strategy> plain(exec);
+  gart::backward_pass<frame_type, gart::primitive_method> plain(exec);
   REQUIRE(plain.prepare(frame));
   plain.render(frame, {.color = color.data(), .depth = depth.data()});
   CHECK_THROWS_WITH_AS(gart::differentiate(frame, plain, {color, depth}, gradients),
-                       "differentiate: the strategy has no gradient of depth: take with_depth<strategy>",
+                       "differentiate: the method has no gradient of depth: take with_depth<method>",
                        gart::invalid_argument);
   std::size_t const bytes = plain.hit_buffer_bytes();
 
-  gart::backward_pass<frame_type, gart::with_depth<gart::primitive_strategy>> deep(exec);
+  gart::backward_pass<frame_type, gart::with_depth<gart::primitive_method>> deep(exec);
   REQUIRE(deep.prepare(frame));
   CHECK(deep.hit_buffer_bytes() == bytes / 16 * 20);
   deep.render(frame, {.color = color.data()});

@@ -34,7 +34,7 @@ gart::camera small_view() {
   return c;
 }
 
-template <class Tracer, class Strategy, class E>
+template <class Tracer, class Method, class E>
 void check_order(E& exec) {
   using frame_type = gart::frame<E, gart::scene_traits<0>, Tracer>;
   gart::gaussians<E> const scene(exec, one_gaussian());
@@ -44,7 +44,7 @@ void check_order(E& exec) {
   gart::buffer<float, E> too_small(exec, pixels), error(exec, std::vector<float>(3, 1.0f));
   gart::gaussians<E> gradients(exec, 1, 0), of_two(exec, 2, 0), of_degree_1(exec, 1, 1);
   frame_type frame(exec), other(exec);
-  gart::backward_pass<frame_type, Strategy> pass(exec);
+  gart::backward_pass<frame_type, Method> pass(exec);
   auto const differentiate = [&](frame_type& f) {
     return error_of([&] { gart::differentiate(f, pass, gradient, gradients); });
   };
@@ -100,8 +100,8 @@ void check_order(E& exec) {
 
 TEST_CASE_TEMPLATE("frames and passes out of order say which call is missing", E, GART_TEST_POLICIES) {
   E exec;
-  check_order<gart::tile_tracer<E>, gart::primitive_strategy>(exec);
-  check_order<gart::bvh_tracer<E>, gart::pixel_strategy>(exec);
+  check_order<gart::tile_tracer<E>, gart::primitive_method>(exec);
+  check_order<gart::bvh_tracer<E>, gart::pixel_method>(exec);
 }
 
 TEST_CASE_TEMPLATE("a frame takes scenes of its SH degree alone", E, GART_TEST_POLICIES) {

@@ -35,10 +35,10 @@ TEST_CASE_TEMPLATE("gradients agree with the oracle", E, GART_TEST_POLICIES) {
     for (auto kind : tracers<E>()) {
       int const tracer = static_cast<int>(kind);
       CAPTURE(tracer);
-      for (std::string const& strategy : strategies_for(kind, s.model.sh_degree)) {
-        CAPTURE(strategy);
+      for (std::string const& method : methods_for(kind, s.model.sh_degree)) {
+        CAPTURE(method);
         auto const got =
-            scene_gradients(exec, s.model, s.view, s.options, s.active_degree, kind, strategy, w.color_gradient);
+            scene_gradients(exec, s.model, s.view, s.options, s.active_degree, kind, method, w.color_gradient);
         for (auto const& g : gradient_groups) {
           CAPTURE(g.name);
           REQUIRE((got.*g.got).size() == (w.gradients.*g.expected).size());

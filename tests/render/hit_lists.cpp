@@ -33,8 +33,7 @@ TEST_CASE_TEMPLATE("hit lists agree with the oracle", E, GART_TEST_POLICIES) {
   CHECK(different <= 2 + rays / 100);
 }
 
-TEST_CASE_TEMPLATE("a ray ends after the hit that brings its transmittance below the threshold", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a ray ends after the hit below the transmittance threshold", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;

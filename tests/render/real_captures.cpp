@@ -72,7 +72,7 @@ comparison compare(lists const& a, lists const& b) {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("all tracers give the same hit lists on real captures, bit for bit", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("all tracers give the same hit lists on real captures", E, GART_TEST_POLICIES) {
   for (capture const& c : captures()) {
     CAPTURE(c.name);
     E exec;
@@ -87,7 +87,7 @@ TEST_CASE_TEMPLATE("all tracers give the same hit lists on real captures, bit fo
 }
 
 // Between policies a hit may differ where rounding decides: fewer than one in a million.
-TEST_CASE_TEMPLATE("every policy meets the hits that the serial one meets on real captures", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("every policy has the serial one's hits on real captures", E, GART_TEST_POLICIES) {
   for (capture const& c : captures()) {
     CAPTURE(c.name);
     E exec;

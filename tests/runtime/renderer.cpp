@@ -98,8 +98,7 @@ TEST_CASE_TEMPLATE("a view in memory of the policy is the view on the host", E, 
   }
 }
 
-TEST_CASE_TEMPLATE("Gaussians that somebody else owns are rendered and differentiated as one's own", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("Gaussians of another owner are rendered as one's own", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;

@@ -48,7 +48,7 @@ double value(std::vector<float> const& c, vec3d const& d) {
   return sum;
 }
 
-TEST_CASE("turned coefficients have in a turned direction what they had in it") {
+TEST_CASE("turned coefficients keep their values in turned directions") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   std::normal_distribution<double> normal;

@@ -1,5 +1,5 @@
 #pragma once
-// A small scene through a tracer and a strategy that are chosen at run time: templates over the policy, whose bodies
+// A small scene through a tracer and a method that are chosen at run time: templates over the policy, whose bodies
 // are in scene_images.cpp and scene_gradients.cpp, compiled once for all tests (gart_test's BODIES scene_by_kind).
 
 #include <gart/camera/models.hpp>
@@ -7,7 +7,7 @@
 #include <gart/runtime/kinds.hpp>
 #include <gart/scene/gaussians.hpp>
 #include <gart/trace/hit.hpp>
-#include <support/test_strategies.hpp>
+#include <support/test_methods.hpp>
 
 #include <concepts>
 #include <string>
@@ -47,25 +47,25 @@ struct attributed_error {
   std::vector<float> of_pixels, of_gaussians;
 };
 
-// Whether a strategy is compiled here for a tracer and a degree: at degree 3 all for tile lists, for a BVH those that
+// Whether a method is compiled here for a tracer and a degree: at degree 3 all for tile lists, for a BVH those that
 // record or scatter otherwise (others differ in the gather alone, which does not know the tracer); at other degrees one
 // for each tracer, for the sake of the compiler's time.
-template <class Strategy>
+template <class Method>
 inline constexpr bool differs_in_gather =
-    std::derived_from<Strategy, gart::primitive_strategy> && !std::same_as<Strategy, gart::primitive_strategy>;
+    std::derived_from<Method, gart::primitive_method> && !std::same_as<Method, gart::primitive_method>;
 
-template <class Strategy>
+template <class Method>
 constexpr bool compiled_for(tracer_kind kind, int degree) {
   if (kind == tracer_kind::embree || (kind == tracer_kind::bvh && degree != 3))
-    return std::same_as<Strategy, gart::pixel_strategy>;
-  if (kind == tracer_kind::bvh) return !differs_in_gather<Strategy>;
-  return degree == 3 || std::same_as<Strategy, gart::primitive_strategy>;
+    return std::same_as<Method, gart::pixel_method>;
+  if (kind == tracer_kind::bvh) return !differs_in_gather<Method>;
+  return degree == 3 || std::same_as<Method, gart::primitive_method>;
 }
 
-inline std::vector<std::string> strategies_for(tracer_kind kind, int degree) {
+inline std::vector<std::string> methods_for(tracer_kind kind, int degree) {
   std::vector<std::string> names;
-  strategies::for_each([&]<class Strategy>(Strategy) {
-    if (compiled_for<Strategy>(kind, degree)) names.emplace_back(Strategy::name);
+  gradient_methods::for_each([&]<class Method>(Method) {
+    if (compiled_for<Method>(kind, degree)) names.emplace_back(Method::name);
   });
   return names;
 }
@@ -77,7 +77,7 @@ traced<E> render_scene(E& exec, gart::gaussian_model const& model, gart::camera 
 template <class E>
 gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                                      gart::render_options const& options, int active_degree, tracer_kind kind,
-                                     std::string const& strategy, std::vector<float> const& color_gradient,
+                                     std::string const& method, std::vector<float> const& color_gradient,
                                      attributed_error* error = nullptr);
 
 // The hits of each pixel, in order.

@@ -9,16 +9,15 @@ namespace gart_test {
 template <class E>
 gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                                      gart::render_options const& options, int active_degree, tracer_kind kind,
-                                     std::string const& strategy, std::vector<float> const& color_gradient,
+                                     std::string const& method, std::vector<float> const& color_gradient,
                                      attributed_error* error) {
   std::optional<gart::gaussian_model> out;
   detail::with_degree(model.sh_degree, [&](auto degree) {
     auto const by = [&]<tracer_kind Kind, class Tracer>(std::integral_constant<tracer_kind, Kind>,
                                                         std::type_identity<Tracer>) {
-      strategies::with(strategy, [&]<class Strategy>(Strategy) {
-        if constexpr (compiled_for<Strategy>(Kind, degree))
-          out =
-              gradients_by<degree, Strategy, Tracer>(exec, model, view, options, active_degree, color_gradient, error);
+      gradient_methods::with(method, [&]<class Method>(Method) {
+        if constexpr (compiled_for<Method>(Kind, degree))
+          out = gradients_by<degree, Method, Tracer>(exec, model, view, options, active_degree, color_gradient, error);
       });
     };
     if (kind == tracer_kind::bvh)
@@ -31,7 +30,7 @@ gart::gaussian_model scene_gradients(E& exec, gart::gaussian_model const& model,
         by(std::integral_constant<tracer_kind, tracer_kind::embree>{}, std::type_identity<gart::embree_tracer<E>>{});
 #endif
   });
-  if (!out) throw std::runtime_error("not compiled here: " + strategy);
+  if (!out) throw std::runtime_error("not compiled here: " + method);
   return *out;
 }
 

@@ -83,14 +83,14 @@ traced<E> render_by(E& exec, gart::gaussian_model const& model, gart::camera con
   return {color.to_host(), transmittance.to_host(), depth.to_host(), hits.to_host()};
 }
 
-template <int Degree, class Strategy, class Tracer, class E>
+template <int Degree, class Method, class Tracer, class E>
 gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                                   gart::render_options const& options, int active_degree,
                                   std::vector<float> const& color_gradient, attributed_error* error = nullptr) {
   gart::gaussians<E> const scene(exec, model);
   gart::gaussians<E> gradients(exec, scene.size(), model.sh_degree);
   frame_by<Degree, Tracer, E> frame(exec);
-  gart::backward_pass<frame_by<Degree, Tracer, E>, Strategy> pass(exec);
+  gart::backward_pass<frame_by<Degree, Tracer, E>, Method> pass(exec);
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
   gart::buffer<float, E> color(exec, 3 * pixels), gradient(exec, color_gradient);
   frame.prepare(scene.view(), view, options, active_degree);
@@ -108,7 +108,7 @@ gart::gaussian_model gradients_by(E& exec, gart::gaussian_model const& model, ga
 }
 
 // The gradients by color_gradient, [H][W][3], and by those of depth and transmittance, [H][W] each.
-template <int Degree, class Strategy, class Tracer, class E>
+template <int Degree, class Method, class Tracer, class E>
 gart::gaussian_model depth_gradients_by(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                                         gart::render_options const& options, int active_degree,
                                         std::vector<float> const& color_gradient,
@@ -117,7 +117,7 @@ gart::gaussian_model depth_gradients_by(E& exec, gart::gaussian_model const& mod
   gart::gaussians<E> const scene(exec, model);
   gart::gaussians<E> gradients(exec, scene.size(), model.sh_degree);
   frame_by<Degree, Tracer, E> frame(exec);
-  gart::backward_pass<frame_by<Degree, Tracer, E>, gart::with_depth<Strategy>> pass(exec);
+  gart::backward_pass<frame_by<Degree, Tracer, E>, gart::with_depth<Method>> pass(exec);
   std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
   gart::buffer<float, E> color(exec, 3 * pixels), transmittance(exec, pixels), depth(exec, pixels);
   gart::buffer<float, E> const by_color(exec, color_gradient), by_depth(exec, depth_gradient),

@@ -101,7 +101,7 @@ TEST_CASE("the samples of a stream fill every pair's square evenly") {
     }
 }
 
-TEST_CASE("every mesh is finite, inside the bounds, with unit normals and indices in range") {
+TEST_CASE("every mesh is finite, bounded, with unit normals") {
   std::uint64_t const seed = gart_test::seed();
   CAPTURE(seed);
   for (synth_mesh const& mesh : make_synth_scene(seed)) {
@@ -132,7 +132,7 @@ TEST_CASE("the cameras look at the origin and share no position") {
   }
 }
 
-TEST_CASE("an image is the same for any number of threads, and another for another seed") {
+TEST_CASE("an image depends on its seed, not on threads") {
   if (!has_embree()) return;
   gart::camera const view = synth_cameras(3, 40, false)[1];
   synth_scene const scene = make_synth_scene(7);
@@ -145,7 +145,7 @@ TEST_CASE("an image is the same for any number of threads, and another for anoth
   CHECK(points.color == again.color);
 }
 
-TEST_CASE("many samples agree with few: no bias that one would see, and little noise") {
+TEST_CASE("many samples agree with few: no bias, little noise") {
   if (!has_embree()) return;
   gart::camera const view = synth_cameras(3, 48, false)[2];
   synth_renderer const renderer(make_synth_scene(1));
@@ -162,7 +162,7 @@ TEST_CASE("many samples agree with few: no bias that one would see, and little n
   CHECK(std::abs(sum) / count < 5e-3);
 }
 
-TEST_CASE("depth maps are distances to the surfaces that the pictures show") {
+TEST_CASE("depth maps are distances to the surfaces shown") {
   if (!has_embree()) return;
   scratch_folder folder;
   synth_options options = small(folder.path);
@@ -196,7 +196,7 @@ TEST_CASE("depth maps are distances to the surfaces that the pictures show") {
   CHECK(data.test[0].depth.empty());
 }
 
-TEST_CASE("a capture loads, with its split, its alpha, its cameras and its points") {
+TEST_CASE("a capture loads with split, alpha, cameras and points") {
   if (!has_embree()) return;
   scratch_folder folder;
   synth_options const options = small(folder.path);
@@ -248,7 +248,7 @@ TEST_CASE("a capture loads, with its split, its alpha, its cameras and its point
   CHECK(gart::read_file(folder.path / "train/r_3.png") == before);
 }
 
-TEST_CASE("a capture through a fisheye or of the sphere names its camera, and its distances are along the rays") {
+TEST_CASE("fisheye and spherical captures name camera and ray distance") {
   if (!has_embree()) return;
   for (char const* const model : {"OPENCV_FISHEYE,angle=60,k1=0.02", "EQUIRECTANGULAR"}) {
     CAPTURE(std::string(model));
@@ -296,7 +296,7 @@ TEST_CASE("a capture through a fisheye or of the sphere names its camera, and it
   CHECK(!fs::exists(options.out));
 }
 
-TEST_CASE("a capture of parallel rays or through a rolling shutter has distances along rays that begin where they do") {
+TEST_CASE("parallel and rolling captures have distances along rays") {
   if (!has_embree()) return;
   for (bool const rolls : {false, true}) {
     CAPTURE(rolls);
@@ -344,7 +344,7 @@ TEST_CASE("a capture of parallel rays or through a rolling shutter has distances
   CHECK(!fs::exists(options.out));
 }
 
-TEST_CASE("an option out of its range is refused by name, before anything is written") {
+TEST_CASE("an option out of range is refused before writing") {
   scratch_folder folder;
   for (auto const member : {&synth_options::train, &synth_options::test, &synth_options::size, &synth_options::samples,
                             &synth_options::points}) {

@@ -101,7 +101,7 @@ tally measure(placement p) {
 
 }  // namespace
 
-TEST_CASE("no hit outside its box or nearer than its depth, and boxes are tight") {
+TEST_CASE("no hit lies outside its box or nearer than its depth") {
   CAPTURE(gart_test::seed());
   // How much larger in the mean: the area of boxes with hits against that of their hits' bounds, and the area of boxes
   // without hits, in pixels a Gaussian (images have about 2,800). Hits lie where the response is largest, not

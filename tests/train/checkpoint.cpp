@@ -83,7 +83,7 @@ std::string in_first_format(std::string const& file) {
 
 }  // namespace
 
-TEST_CASE("a checkpoint comes back, and from a file of the first format too") {
+TEST_CASE("a checkpoint comes back, of the first format too") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   scratch_file const file;
@@ -94,7 +94,7 @@ TEST_CASE("a checkpoint comes back, and from a file of the first format too") {
   check_same(read_checkpoint(file.path()), state);
 }
 
-TEST_CASE("one flipped bit anywhere in a checkpoint is found, and so is what is cut off or added") {
+TEST_CASE("any flipped, missing or added bit of a checkpoint is found") {
   CAPTURE(gart_test::seed());
   std::mt19937_64 random(gart_test::seed());
   scratch_file const file;

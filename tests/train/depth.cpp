@@ -38,7 +38,7 @@ TEST_CASE_TEMPLATE("depth comes nearer to the maps", E, GART_TEST_POLICIES) {
   gart::dataset const data = mapped_capture(exec, seed);
   gart::gaussian_model const start = cloud(seed + 1, 0.8f);
   auto const after = [&](float weight) {
-    run_of<E, gart::with_depth<gart::primitive_strategy>> run(exec, options_of(weight), data, start);
+    run_of<E, gart::with_depth<gart::primitive_method>> run(exec, options_of(weight), data, start);
     double first = 0, last = 0;
     for (int i = 0; i < 60; ++i) {
       last = run.step().loss;
@@ -52,8 +52,7 @@ TEST_CASE_TEMPLATE("depth comes nearer to the maps", E, GART_TEST_POLICIES) {
   CHECK(with < 0.7 * without);
 }
 
-TEST_CASE_TEMPLATE("an image smaller than its map is compared with the means of what the map knows", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a smaller image is compared with means of its depth map", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);
@@ -80,7 +79,7 @@ TEST_CASE_TEMPLATE("an image smaller than its map is compared with the means of 
   }
   gart::train_options options = options_of(2);
   options.resolution = {0, 1, 1};
-  using deep = run_of<E, gart::with_depth<gart::primitive_strategy>>;
+  using deep = run_of<E, gart::with_depth<gart::primitive_method>>;
   deep shrunk(exec, options, data, cloud(seed + 1, 0.8f));
   options.resolution = {0, 0, 1};
   deep taken(exec, options, half, cloud(seed + 1, 0.8f));
@@ -92,7 +91,7 @@ TEST_CASE_TEMPLATE("a loss of one's own may add to the gradient of depth", E, GA
   CAPTURE(seed);
   E exec;
   gart::dataset const data = mapped_capture(exec, seed);
-  run_of<E, gart::with_depth<gart::pixel_strategy>> run(exec, options_of(0), data, cloud(seed + 1, 0.8f));
+  run_of<E, gart::with_depth<gart::pixel_method>> run(exec, options_of(0), data, cloud(seed + 1, 0.8f));
   run.step([&](gart::loss_input<E> const& in) {
     in.exec.zero(in.gradient.data(), in.gradient.size() * sizeof(float));
     in.exec.zero(in.value.data(), 2 * sizeof(float));
@@ -104,12 +103,12 @@ TEST_CASE_TEMPLATE("a loss of one's own may add to the gradient of depth", E, GA
   CHECK(sum > 0);
 }
 
-TEST_CASE_TEMPLATE("a weight of depth without maps or without its gradients is refused", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a depth weight without maps or gradients is refused", E, GART_TEST_POLICIES) {
   E exec;
   gart::dataset data = capture(exec, 1);
   gart::gaussian_model const start = cloud(2, 0.8f);
-  using deep = run_of<E, gart::with_depth<gart::primitive_strategy>>;
-  using plain = run_of<E, gart::primitive_strategy>;
+  using deep = run_of<E, gart::with_depth<gart::primitive_method>>;
+  using plain = run_of<E, gart::primitive_method>;
   CHECK_THROWS_WITH_AS(deep(exec, options_of(1), data, start),
                        "train_options.depth_weight: no training view has a depth map (dataset_options.depth)",
                        gart::invalid_argument);

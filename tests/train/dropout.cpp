@@ -7,7 +7,7 @@ using namespace gart_test;
 namespace {
 
 template <class E>
-using run = run_of<E, gart::deterministic_strategy>;
+using run = run_of<E, gart::deterministic_method>;
 
 gart::train_options options_with(float dropout, gart::densify_kind densify = gart::densify_kind::none) {
   gart::train_options options;
@@ -18,8 +18,7 @@ gart::train_options options_with(float dropout, gart::densify_kind densify = gar
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("a step's gradients are those of the scene that it shows, and the scene keeps what is left out", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a step's gradients are those of the Gaussians it shows", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
@@ -49,8 +48,7 @@ TEST_CASE_TEMPLATE("a step's gradients are those of the scene that it shows, and
   CHECK(out > 20);
 }
 
-TEST_CASE_TEMPLATE("with dropout a run learns, grows, and goes on from a state as if it had not been stopped", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a run with dropout learns, grows and resumes", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;

@@ -22,7 +22,7 @@ gart::train_options learning_exposures(int iterations) {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("the exposed image and both gradients are what the matrix says, in double", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("exposed images and gradients match the matrix in double", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);
@@ -74,7 +74,7 @@ TEST_CASE_TEMPLATE("the exposed image and both gradients are what the matrix say
   }
 }
 
-TEST_CASE_TEMPLATE("a gradient that is not finite leaves its number of the exposure as it is", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a non-finite gradient leaves its number of an exposure", E, GART_TEST_POLICIES) {
   E exec;
   gart::exposure_training<E> training(exec, 1);
   gart::buffer<float, E> const x(exec, std::vector<float>{0.5f, 0.25f, 0.75f});
@@ -112,7 +112,7 @@ TEST_CASE_TEMPLATE("gains of photographs are found, and the images then agree", 
   }
 }
 
-TEST_CASE_TEMPLATE("a state carries exposures, and one of another number of views is refused", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a state carries exposures; other view counts are refused", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;

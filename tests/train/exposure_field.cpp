@@ -24,7 +24,7 @@ gart::view_exposure exposed(gart::camera const& c, float gain, float offset) {
 
 }  // namespace
 
-TEST_CASE("without views every view has the identity, with one that one's") {
+TEST_CASE("without views all have the identity; with one, its own") {
   gart::exposure const identity;
   auto const none = gart::exposure_field().at(camera_at(0, 0, 0));
   for (int k = 0; k < gart::exposure::floats; ++k) CHECK(none.exposed.m[k] == identity.m[k]);
@@ -36,7 +36,7 @@ TEST_CASE("without views every view has the identity, with one that one's") {
   }
 }
 
-TEST_CASE("a training view keeps its own, one between two has what lies between, one far from all their mean") {
+TEST_CASE("between training views exposures mix; far off they average") {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);
@@ -75,7 +75,7 @@ TEST_CASE("views in one place, or one of them twice, are no difficulty") {
   CHECK(e.exposed.m[0] == doctest::Approx(0.9f).epsilon(1e-4));
 }
 
-TEST_CASE("a view has the falloff of the lens that is most like its own, whatever its size") {
+TEST_CASE("a view has the falloff of the lens most like its own") {
   std::vector<gart::lens_falloff> lenses;
   for (float const focal : {4.0f, 6.0f}) {
     gart::camera lens = camera_at(0, 0, 0);

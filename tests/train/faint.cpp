@@ -99,8 +99,7 @@ TEST_CASE_TEMPLATE("what alpha_min hides is removed by ADC", E, GART_TEST_POLICI
   CHECK(faint_ones(left) == 0);
 }
 
-TEST_CASE_TEMPLATE("what a filter hides in all views is relocated, gives its row to a half, or is removed", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("filtered Gaussians relocate, give up rows or are removed", E, GART_TEST_POLICIES) {
   CAPTURE(gart_test::seed());
   E exec;
   for (auto const densify : {gart::densify_kind::mcmc, gart::densify_kind::error, gart::densify_kind::adc}) {

@@ -36,8 +36,7 @@ bool has(std::string const& text, std::string const& part) { return text.find(pa
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("a sound training passes the check of every step, which is not launched where none is asked for", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a sound training passes the check; none unless asked", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
@@ -62,8 +61,7 @@ TEST_CASE_TEMPLATE("a sound training passes the check of every step, which is no
   }
 }
 
-TEST_CASE_TEMPLATE("one number that is not finite is found in every group of the parameters and of the moments", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("one non-finite number is found in every parameter group", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);

@@ -57,7 +57,7 @@ TEST_CASE("the share of the images that a capture fills") {
   CHECK(share_of(held, background_kind::black, {1}) == doctest::Approx(0.2));
 }
 
-TEST_CASE("penalties are as they are down to a quarter of the images, and follow the share below") {
+TEST_CASE("penalties follow the foreground below a quarter of images") {
   CHECK(penalty_scale(1) == 1);
   CHECK(penalty_scale(0.25) == 1);
   CHECK(penalty_scale(0.02) == doctest::Approx(0.08));

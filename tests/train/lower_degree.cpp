@@ -8,7 +8,7 @@ namespace {
 constexpr int steps = 60;
 
 template <class E, int Degree>
-using run_in_rows = gart::trainer<E, gart::scene_traits<Degree>, gart::tile_tracer<E>, gart::deterministic_strategy>;
+using run_in_rows = gart::trainer<E, gart::scene_traits<Degree>, gart::tile_tracer<E>, gart::deterministic_method>;
 
 gart::train_options growing() {
   gart::train_options options;
@@ -50,7 +50,7 @@ TEST_CASE_TEMPLATE("a run of degree 1 in rows of degree 3 has the same bits", E,
   CHECK(own.render(view, gart::vec3(0.0f)).color.data == resumed.render(view, gart::vec3(0.0f)).color.data);
 }
 
-TEST_CASE_TEMPLATE("a state of another degree is refused, and a start of a higher one", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("other degrees of states and higher starts are refused", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;

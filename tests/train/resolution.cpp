@@ -12,7 +12,7 @@ using namespace gart_test;
 namespace {
 
 template <class E>
-using run = run_of<E, gart::deterministic_strategy>;
+using run = run_of<E, gart::deterministic_method>;
 
 std::size_t at(int width, int x, int y) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
@@ -52,7 +52,7 @@ gart::resolution_options sizes(float quarter_until, float half_until) { return {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("a step by smaller images is one of a capture of that size, bit by bit", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a step by smaller images is a smaller capture's, bit by bit", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);
@@ -100,7 +100,7 @@ TEST_CASE_TEMPLATE("a step by smaller images is one of a capture of that size, b
   }
 }
 
-TEST_CASE_TEMPLATE("sizes follow each other, and a run that was stopped goes on with them", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("sizes follow each other and survive a stop", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
@@ -151,7 +151,7 @@ TEST_CASE("a long run has its smaller images in the first of its steps") {
   CHECK(gart::shrink_at(options, 400, 800) == 1);
 }
 
-TEST_CASE("an image is not made smaller than its camera or the options allow") {
+TEST_CASE("no image is smaller than its camera or options allow") {
   gart::camera c;
   c.width = 800, c.height = 600, c.fx = c.fy = 700;
   gart::resolution_options options;

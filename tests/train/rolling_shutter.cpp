@@ -64,8 +64,7 @@ double trained(E& exec, std::vector<gart::camera> const& taken_by, std::vector<g
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("a rolling shutter is learnt through, and ignoring it costs a decibel or more", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a rolling shutter is learned; ignoring it costs a decibel", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);

@@ -13,9 +13,9 @@ GART_TEST_EACH_POLICY(GART_TEST_PICTURED)
 
 }  // namespace gart_test
 
-#define GART_TEST_TRAINERS(E)                     \
-  GART_TEST_TRAINER(E, gart::primitive_strategy); \
-  GART_TEST_TRAINER(E, gart::hybrid_strategy);    \
-  GART_TEST_TRAINER(E, gart::pixel_strategy);     \
-  GART_TEST_TRAINER(E, gart::deterministic_strategy);
+#define GART_TEST_TRAINERS(E)                   \
+  GART_TEST_TRAINER(E, gart::primitive_method); \
+  GART_TEST_TRAINER(E, gart::hybrid_method);    \
+  GART_TEST_TRAINER(E, gart::pixel_method);     \
+  GART_TEST_TRAINER(E, gart::deterministic_method);
 GART_TEST_EACH_POLICY(GART_TEST_TRAINERS)

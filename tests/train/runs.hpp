@@ -9,8 +9,8 @@
 
 namespace gart_test {
 
-template <class E, class Strategy = gart::primitive_strategy>
-using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy>;
+template <class E, class Method = gart::primitive_method>
+using run_of = gart::trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Method>;
 
 // Numbers of either sign.
 inline std::vector<float> values(std::mt19937_64& random, std::size_t n) {
@@ -42,11 +42,11 @@ inline gart::train_options still(int iterations) {
 }  // namespace gart_test
 
 // Of a policy: `extern` in all files but one.
-#define GART_TEST_TRAINER(E, Strategy) \
-  template class gart::basic_trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Strategy, gart::self_comm>
-#define GART_TEST_TRAINERS_ELSEWHERE(E)                  \
-  extern GART_TEST_TRAINER(E, gart::primitive_strategy); \
-  extern GART_TEST_TRAINER(E, gart::hybrid_strategy);    \
-  extern GART_TEST_TRAINER(E, gart::pixel_strategy);     \
-  extern GART_TEST_TRAINER(E, gart::deterministic_strategy);
+#define GART_TEST_TRAINER(E, Method) \
+  template class gart::basic_trainer<E, gart::scene_traits<1>, gart::tile_tracer<E>, Method, gart::self_comm>
+#define GART_TEST_TRAINERS_ELSEWHERE(E)                \
+  extern GART_TEST_TRAINER(E, gart::primitive_method); \
+  extern GART_TEST_TRAINER(E, gart::hybrid_method);    \
+  extern GART_TEST_TRAINER(E, gart::pixel_method);     \
+  extern GART_TEST_TRAINER(E, gart::deterministic_method);
 GART_TEST_EACH_POLICY(GART_TEST_TRAINERS_ELSEWHERE)

@@ -16,27 +16,27 @@ struct poor_exec : gart::serial_exec {
 };
 static_assert(gart::host_execution<poor_exec>);
 
-template <class Strategy, class E>
+template <class Method, class E>
 std::string taken_by(E& exec, gart::dataset const& data, gart::u64 hit_memory) {
   gart::train_options options;
   options.hit_memory = hit_memory, options.densify = gart::densify_kind::none;
-  run_of<E, Strategy> run(exec, options, data, cloud(5, 0.7f));
+  run_of<E, Method> run(exec, options, data, cloud(5, 0.7f));
   return run.step().backward;
 }
 
 }  // namespace
 
-TEST_CASE("without a budget the hit buffer takes no more than half of what is free, but for sums in a fixed order") {
+TEST_CASE("without a budget the hit buffer takes half of free memory") {
   gart::serial_exec exec;
   auto const data = capture(exec, 3);
-  CHECK(taken_by<gart::primitive_strategy>(exec, data, 0) == "primitive");
+  CHECK(taken_by<gart::primitive_method>(exec, data, 0) == "primitive");
   poor_exec poor;
-  CHECK(taken_by<gart::primitive_strategy>(poor, data, 0) == "pixel");
-  CHECK(taken_by<gart::primitive_strategy>(poor, data, gart::u64{1} << 40) == "primitive");
-  CHECK(taken_by<gart::deterministic_strategy>(poor, data, 0) == "deterministic");
+  CHECK(taken_by<gart::primitive_method>(poor, data, 0) == "pixel");
+  CHECK(taken_by<gart::primitive_method>(poor, data, gart::u64{1} << 40) == "primitive");
+  CHECK(taken_by<gart::deterministic_method>(poor, data, 0) == "deterministic");
 }
 
-TEST_CASE("a run that cannot have its Gaussians is refused in bytes before it starts") {
+TEST_CASE("a run without room for its Gaussians is refused in bytes") {
   gart::serial_exec exec;
   auto const data = capture(exec, 3);
   poor_exec poor;

@@ -55,7 +55,7 @@ TEST_CASE_TEMPLATE("a densifier of one's own grows a run", E, GART_TEST_POLICIES
   gart::train_options options;
   options.iterations = 40, options.densify = gart::densify_kind::none;
   auto const run_of_own = [&] {
-    auto run = std::make_unique<run_of<E, gart::deterministic_strategy>>(exec, options, data, start);
+    auto run = std::make_unique<run_of<E, gart::deterministic_method>>(exec, options, data, start);
     run->densify_by(std::make_unique<doubles_largest<E>>(exec));
     return run;
   };

@@ -53,7 +53,7 @@ TEST_CASE_TEMPLATE("a part of one's own is learned", E, GART_TEST_POLICIES) {
   gart::dataset data = capture(exec, seed);
   for (auto& v : data.train)
     for (auto& x : v.image.data) x = static_cast<gart::u8>(x / 2);
-  using run_type = run_of<E, gart::deterministic_strategy>;
+  using run_type = run_of<E, gart::deterministic_method>;
   auto const made = [&] {
     auto run = std::make_unique<run_type>(exec, still(200), data, cloud(seed, 0.6f));
     run->learn(std::make_unique<learned_gain<typename run_type::frame_type>>(exec));

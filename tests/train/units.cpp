@@ -25,7 +25,7 @@ std::vector<float> losses(E& exec, gart::dataset data, gart::gaussian_model star
   options.error.from = options.mcmc.from = options.adc.from = 10;
   options.error.every = options.mcmc.every = options.adc.every = 10;
   options.adc.gradient = 2e-3f;
-  run_of<E, gart::deterministic_strategy> run(exec, options, data, start);
+  run_of<E, gart::deterministic_method> run(exec, options, data, start);
   std::vector<float> out;
   for (int i = 0; i < steps; ++i) out.push_back(run.step().loss);
   CHECK(run.scene().size() > 150);

@@ -2,7 +2,7 @@
 // taken for one, and nothing but the training views decides.
 #include <support/policies.hpp>
 
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/renderer.hpp>
 #include <gart/runtime/validation.hpp>
 

@@ -50,8 +50,7 @@ gart::train_options learning_falloffs(int iterations) {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("the shaded image and both gradients are what the polynomial says, in double", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("shaded images and gradients match the polynomial in double", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   std::mt19937_64 random(seed);
@@ -114,8 +113,7 @@ TEST_CASE_TEMPLATE("a gradient that is not finite leaves a falloff as it is", E,
   }
 }
 
-TEST_CASE_TEMPLATE("a lens's falloff is found, beside exposures too, and the images then agree", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a lens's falloff is found, beside exposures too", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
@@ -160,7 +158,7 @@ TEST_CASE_TEMPLATE("a lens's falloff is found, beside exposures too, and the ima
   CHECK(-10 * std::log10(square) > 34);
 }
 
-TEST_CASE_TEMPLATE("a state carries falloffs, and one of another number of lenses is refused", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a state carries falloffs; other lens counts are refused", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
@@ -196,8 +194,7 @@ TEST_CASE_TEMPLATE("a state carries falloffs, and one of another number of lense
                        gart::invalid_argument);
 }
 
-TEST_CASE_TEMPLATE("an exposure is of what the lens let through, and the falloff of the scene's own colours", E,
-                   GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("exposures act on what the lens let through", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;

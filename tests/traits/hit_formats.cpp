@@ -67,14 +67,14 @@ std::vector<case_of_formats> const& cases() {
 // Every group's error holds the bound: behind hits at the clamp, where 1 / (1 - alpha) is 100, another one.
 template <class Entry, class E>
 void check_gradients(E& exec, double usual, double opaque) {
-  using strategy = gart::primitive_strategy_in<Entry>;
+  using method = gart::primitive_method_in<Entry>;
   using tiles = gart::tile_tracer<E>;
   for (auto const& c : cases()) {
     auto const& s = c.scene;
     double const bound = s.name == "near-opaque stack" ? opaque : usual;
     std::string line = std::string(Entry::name) + ", " + s.name + ":";
     auto const got =
-        gradients_by<1, strategy, tiles>(exec, s.model, s.view, s.options, s.active_degree, c.weights.color_gradient);
+        gradients_by<1, method, tiles>(exec, s.model, s.view, s.options, s.active_degree, c.weights.color_gradient);
     CAPTURE(s.name);
     for (auto const& g : gradient_groups) {
       double const error = relative_error(got.*g.got, c.weights.gradients.*g.expected);

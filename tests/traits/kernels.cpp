@@ -33,10 +33,10 @@ expectation const& expected() {
 using by_group = std::vector<double>;
 
 // The gradients' relative errors, group by group.
-template <class Strategy, class Tracer, class E>
+template <class Method, class Tracer, class E>
 by_group gradient_errors(E& exec, expectation const& e) {
-  auto const got = gradients_by<0, Strategy, Tracer>(exec, e.scene.model, e.scene.view, e.scene.options, 0,
-                                                     e.weights.color_gradient);
+  auto const got =
+      gradients_by<0, Method, Tracer>(exec, e.scene.model, e.scene.view, e.scene.options, 0, e.weights.color_gradient);
   by_group errors;
   for (auto const& g : gradient_groups) errors.push_back(relative_error(got.*g.got, e.weights.gradients.*g.expected));
   return errors;
@@ -100,9 +100,9 @@ void check_degree(E& exec) {
   }
 
   CHECK(e.weights.aside <= 2 + e.picture.pixels.size() / 20);
-  check_below(gradient_errors<gart::primitive_strategy, tiles>(exec, e), 1e-4);
+  check_below(gradient_errors<gart::primitive_method, tiles>(exec, e), 1e-4);
   if constexpr (Degree == 1)
-    check_below(gradient_errors<gart::pixel_strategy, gart::bvh_tracer<E, response>>(exec, e), 1e-4);
+    check_below(gradient_errors<gart::pixel_method, gart::bvh_tracer<E, response>>(exec, e), 1e-4);
 }
 
 }  // namespace

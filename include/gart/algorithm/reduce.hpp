@@ -3,9 +3,9 @@
 /// One number of many: out[0] = the sum, minimum or maximum of in[0..n).
 ///
 /// in: n of float, double, u32 or u64. out: one element of the policy's memory. Sums of float are formed in double and
-/// rounded once; integers wrap. The order of additions depends on n only, never on threads, so that a policy gives the
-/// same bits at every run (CUDA: on the same device). n = 0 gives the neutral element: 0, or the largest or the lowest
-/// value (infinities for floating point). The minimum and maximum of NaN are unspecified.
+/// rounded once; integers wrap. The order of additions depends on n alone, never on threads. So a policy gives the same
+/// bits at every run (CUDA: on the same device). n = 0 gives the neutral element: 0, or the largest or the lowest value
+/// (infinities for floating point). The minimum and maximum of NaN are unspecified.
 /// Cost: reads `in` once. Errors: invalid_argument where `out` is empty.
 
 #include <gart/algorithm/exclusive_scan.hpp>

@@ -3,12 +3,12 @@
 /// Sorts keys, ascending, by their low `key_bits` bits, and moves each value with its key. Stable: equal keys keep
 /// their order, so every policy gives the same permutation.
 ///
-/// keys: n of u32 or u64, sorted in place. values: n of u32, permuted in place. key_bits: 0 to the bits of a key; fewer
-/// bits are fewer passes (8 bits a pass), so pass no more than the keys use.
-/// Memory: a second copy of keys and values, from the policy's workspace (hosts) or its pool (CUDA): nothing is
-/// allocated once the largest size has been seen. n = 0 is legal. Errors: invalid_argument for key_bits or a short
-/// span. Method: least significant digit radix sort, one histogram a block of the array, scattered digit by digit,
-/// block by block. A pass whose digit is the same in all keys is skipped.
+/// keys: n of u32 or u64, sorted in place. values: n of u32, permuted in place. key_bits: 0 to the bits of a key. Each
+/// 8 bits cost a pass, so pass no more than the keys use.
+/// Memory: a second copy of keys and values, from the policy's workspace (hosts) or its pool (CUDA). Once the largest
+/// size has been seen, nothing is allocated. n = 0 is legal. Errors: invalid_argument for key_bits or a short span.
+/// Method: least significant digit radix sort, one histogram a block of the array, scattered digit by digit, block by
+/// block. A pass whose digit is the same in all keys is skipped.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 

@@ -1,28 +1,28 @@
 #pragma once
 /// \file
-/// From the gradient of an image to the gradients of the parameters, by any strategy (backward/strategies.hpp):
+/// From the gradient of an image to the gradients of the parameters, by any method (backward/gradient_methods.hpp):
 ///
-///   backward_pass<frame<E, Traits, Tracer>, primitive_strategy> pass(exec);
+///   backward_pass<frame<E, Traits, Tracer>, primitive_method> pass(exec);
 ///   frame.prepare(scene, view, options);
 ///   pass.prepare(frame);                                       // footprints, lists and hit buffer, where it records
-///   pass.render(frame, {.color = color});                      // the forward pass, with what the strategy records
+///   pass.render(frame, {.color = color});                      // the forward pass, with what the method records
 ///   differentiate(frame, pass, color_gradient, gradients);     // overwrites `gradients`
 ///
-/// By with_depth<primitive_strategy> the gradient is of the image's depth and transmittance too:
+/// By with_depth<primitive_method> the gradient is of the image's depth and transmittance too:
 ///   pass.render(frame, {.color = color, .transmittance = transmittance, .depth = depth});
 ///   differentiate(frame, pass, {color_gradient, depth_gradient}, gradients);
 ///
 /// A pass knows which preparation of which frame it stands at: out of this order it throws invalid_argument.
-/// backward/fallback.hpp takes a strategy that needs less where there is no room.
+/// backward/fallback.hpp takes a method that needs less where there is no room.
 ///
-/// Memory beside the gradients: 48 bytes a Gaussian for the moments; where the strategy records, the hit buffer, 4 or
-/// 16 bytes for each pixel of each box (4 more with depth), and where the tracer has none to lend, footprints of 36
-/// bytes a Gaussian and lists of 8 a (primitive, tile) pair.
+/// Memory beside the gradients: 48 bytes a Gaussian for the moments. A method that records also needs the hit buffer: 4
+/// or 16 bytes for each pixel of each box (4 more with depth). Where the tracer has no lists to lend, footprints take
+/// 36 bytes a Gaussian and lists 8 a (primitive, tile) pair.
 
 #include <gart/backward/finish.hpp>
 #include <gart/backward/gather_form.hpp>
+#include <gart/backward/gradient_methods.hpp>
 #include <gart/backward/scatter.hpp>
-#include <gart/backward/strategies.hpp>
 #include <gart/render/frame.hpp>
 #include <gart/tiles/tile_map.hpp>
 
@@ -37,29 +37,28 @@ struct image_gradients {
   span<float const> transmittance = {};  ///< [H][W], or empty: zero
 };
 
-/// The backward pass of one frame by one strategy.
-template <class Frame, strategy Strategy>
+/// The backward pass of one frame by one method.
+template <class Frame, gradient_method Method>
 class backward_pass {
  public:
-  using frame_type = Frame;                                           ///< whose images it differentiates
-  using strategy_type = Strategy;                                     ///< how
-  using execution_type = typename Frame::execution_type;              ///< the policy
-  static constexpr int sh_degree = Frame::sh_degree;                  ///< of the coefficients that are stored
-  static constexpr int tile_size = Frame::tile_size;                  ///< side of a tile, in pixels
-  using record_type = typename Strategy::template record<tile_size>;  ///< what the forward pass leaves of a hit
-  static constexpr bool records = Strategy::gather::any;              ///< whether it leaves anything
-  static constexpr bool ordered = records && Strategy::ordered;  ///< sums in a fixed order: the same bits in every run
-  static constexpr slot_validity validity = Strategy::validity;  ///< how slots that are hits are told from others
-  static constexpr bool of_depth = has_depth<Strategy>;          ///< whether depth has a gradient
-  static constexpr bool records_depths = Strategy::gather::depth;  ///< whether the forward pass leaves a depth a hit
+  using frame_type = Frame;                                         ///< whose images it differentiates
+  using method_type = Method;                                       ///< how
+  using execution_type = typename Frame::execution_type;            ///< the policy
+  static constexpr int sh_degree = Frame::sh_degree;                ///< of the coefficients that are stored
+  static constexpr int tile_size = Frame::tile_size;                ///< side of a tile, in pixels
+  using record_type = typename Method::template record<tile_size>;  ///< what the forward pass leaves of a hit
+  static constexpr bool records = Method::gather::any;              ///< whether it leaves anything
+  static constexpr bool ordered = records && Method::ordered;    ///< sums in a fixed order: the same bits in every run
+  static constexpr slot_validity validity = Method::validity;    ///< how slots that are hits are told from others
+  static constexpr bool of_depth = has_depth<Method>;            ///< whether depth has a gradient
+  static constexpr bool records_depths = Method::gather::depth;  ///< whether the forward pass leaves a depth a hit
 
   /// Allocates nothing; `exec` must outlive it.
   explicit backward_pass(execution_type& exec)
       : moments_(exec), own_footprints_(exec), map_(exec), slots_(exec), rows_(exec), last_(exec), depths_(exec) {}
 
   /// After the frame's preparation: a tracer that has the view's footprints lends them. False, and nothing allocated,
-  /// where the hit buffer would take more than byte_budget (0: no limit) or have more slots than there are numbers of
-  /// 32 bits, by which hits know theirs.
+  /// where the hit buffer would take more than byte_budget (0: no limit) or have more slots than 32 bits can number.
   [[nodiscard]] bool prepare(Frame const& frame, u64 byte_budget = 0) {
     stands_at_ = nothing, frame_ = &frame, preparation_ = frame.preparation();
     if constexpr (records) {
@@ -98,7 +97,7 @@ class backward_pass {
     return true;
   }
 
-  /// The forward pass, with what the strategy records; `targets.last` is the pass's own. The colour is read again by
+  /// The forward pass, with what the method records; `targets.last` is the pass's own. The colour is read again by
   /// differentiate(), and so are depth and transmittance where there is a gradient by them.
   void render(Frame& frame, image_targets targets) {
     require(frame, prepared, "backward_pass.render: call backward_pass.prepare first, after frame.prepare");
@@ -118,15 +117,15 @@ class backward_pass {
   span<float const> moments() const { return moments_; }
   /// The same, for gradients of other channels to be added to before finish_gradients.
   span<float> moments() { return moments_; }
-  /// Of a strategy with sums in a fixed order, after differentiate(): what was summed, a row of
-  /// pair_gradient<sh_degree>::quads for each (primitive, tile) pair, those of primitive i from pair_offsets()[i] on.
+  /// After differentiate(), by a method with sums in a fixed order: the summed rows, pair_gradient<sh_degree>::quads
+  /// for each (primitive, tile) pair. Those of primitive i begin at pair_offsets()[i].
   span<quad const> pair_rows() const requires ordered { return rows_; }
   /// The boxes, cut to what was traced.
   span<footprint_slots const> ranges() const requires ordered { return footprints_->ranges(); }
   /// Where the rows of each primitive begin.
   span<u64 const> pair_offsets() const requires ordered { return footprints_->pair_offsets(); }
 
-  /// Bytes of the hit buffer for the view last prepared; 0 where the strategy records nothing.
+  /// Bytes of the hit buffer for the view last prepared; 0 where the method records nothing.
   std::size_t hit_buffer_bytes() const { return records ? slots_.size() * slot_bytes : 0; }
 
   /// The error to throw when prepare() returns false without a budget.
@@ -156,8 +155,8 @@ class backward_pass {
       throw invalid_argument("differentiate: the gradients must have the number and the SH degree of the Gaussians");
     moments_.resize(std::size_t{moment_stride} * scene.count);
     // The ordered sums write every Gaussian themselves.
-    if constexpr (!(ordered && Strategy::gather::geometry)) moments_.zero();
-    if constexpr (!(ordered && Strategy::gather::color))
+    if constexpr (!(ordered && Method::gather::geometry)) moments_.zero();
+    if constexpr (!(ordered && Method::gather::color))
       exec.zero(gradients.sh, sizeof(float) * scene.count * static_cast<std::size_t>(gradients.sh_stride()));
     if constexpr (records) {
       if constexpr (ordered) {
@@ -167,14 +166,14 @@ class backward_pass {
       gather(frame, image.color, error, gradients);
       if constexpr (ordered)
         parallel_for(exec, "backward/sum", scene.count * pair_gradient<sh_degree>::quads,
-                     sum_pairs<sh_degree, typename Strategy::gather>{footprints_->pair_offsets(), footprints_->pairs(),
-                                                                     rows_.data(), gradients.sh, moments_.data()});
+                     sum_pairs<sh_degree, typename Method::gather>{footprints_->pair_offsets(), footprints_->pairs(),
+                                                                   rows_.data(), gradients.sh, moments_.data()});
     }
-    if constexpr (Strategy::scatter::any) {
+    if constexpr (Method::scatter::any) {
       pixel_order const order{view.width, view.height, frame.options().rows};
       frame.with_rays([&]<class Rays>(Rays const& rays) {
         frame.trace("backward/scatter", order.launch_size(),
-                    scatter_program<sh_degree, response, typename Strategy::scatter, execution_type, Rays>{
+                    scatter_program<sh_degree, response, typename Method::scatter, execution_type, Rays>{
                         {},
                         rays,
                         order,
@@ -207,7 +206,7 @@ class backward_pass {
     for (span<float const> const& one : {image.depth, image.transmittance}) {
       if (one.empty()) continue;
       if (!of_depth)
-        throw invalid_argument("differentiate: the strategy has no gradient of depth: take with_depth<strategy>");
+        throw invalid_argument("differentiate: the method has no gradient of depth: take with_depth<method>");
       if (one.size() != pixels)
         throw invalid_argument("differentiate: a gradient by depth or transmittance must have a value for each pixel");
     }
@@ -224,7 +223,7 @@ class backward_pass {
               gaussians_view<float> gradients) {
     frame.with_rays([&]<class Rays>(Rays const& rays) {
       using kernel =
-          gather_of<strategy_gather<execution_type, sh_degree, typename Frame::response, Strategy, tile_size, Rays>>;
+          gather_of<method_gather<execution_type, sh_degree, typename Frame::response, Method, tile_size, Rays>>;
       parallel_for(
           frame.exec(), "backward/gather", tile_range{grid_.count(), kernel::block_size},
           kernel{rays, grid_, lists_, footprints_->ranges().data(), slots_.data(), frame.gaussians().data(),
@@ -251,10 +250,10 @@ class backward_pass {
 };
 
 /// From the gradients of the image that the pass rendered to those of the scene's parameters, without the filter of the
-/// pixels. Given an error a pixel, [H][W], it also attributes that to the Gaussians: the sum over a Gaussian's hits of
-/// weight times error (backward_pass.moments).
-template <class Frame, strategy Strategy>
-void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, image_gradients const& image,
+/// pixels. Given an error a pixel, [H][W], it also attributes the errors to the Gaussians: the sum over a Gaussian's
+/// hits of weight times error (backward_pass.moments).
+template <class Frame, gradient_method Method>
+void differentiate(Frame& frame, backward_pass<Frame, Method>& pass, image_gradients const& image,
                    gaussians_view<float> gradients, span<float const> error = {}) {
   stage_scope stage(frame.exec(), "backward");
   pass.sum(frame, image, gradients, error);
@@ -264,29 +263,29 @@ void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, image_gra
 
 /// The first part of it: gradients.sh, and pass.moments(), from which finish_gradients (backward/finish.hpp) makes the
 /// other gradients. Both are sums over pixels, which ranks that trace parts of an image add up in between.
-template <class Frame, strategy Strategy>
-void sum_gradients(Frame& frame, backward_pass<Frame, Strategy>& pass, image_gradients const& image,
+template <class Frame, gradient_method Method>
+void sum_gradients(Frame& frame, backward_pass<Frame, Method>& pass, image_gradients const& image,
                    gaussians_view<float> gradients, span<float const> error = {}) {
   stage_scope stage(frame.exec(), "backward");
   pass.sum(frame, image, gradients, error);
 }
 
 /// The same by colour alone, [H][W][3].
-template <class Frame, strategy Strategy>
-void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, span<float const> color_gradient,
+template <class Frame, gradient_method Method>
+void differentiate(Frame& frame, backward_pass<Frame, Method>& pass, span<float const> color_gradient,
                    gaussians_view<float> gradients, span<float const> error = {}) {
   differentiate(frame, pass, image_gradients{color_gradient}, gradients, error);
 }
 
 ///@{
 /// The same into Gaussians that own their memory.
-template <class Frame, strategy Strategy>
-void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, image_gradients const& image,
+template <class Frame, gradient_method Method>
+void differentiate(Frame& frame, backward_pass<Frame, Method>& pass, image_gradients const& image,
                    gaussians<typename Frame::execution_type>& gradients, span<float const> error = {}) {
   differentiate(frame, pass, image, gradients.view(), error);
 }
-template <class Frame, strategy Strategy>
-void differentiate(Frame& frame, backward_pass<Frame, Strategy>& pass, span<float const> color_gradient,
+template <class Frame, gradient_method Method>
+void differentiate(Frame& frame, backward_pass<Frame, Method>& pass, span<float const> color_gradient,
                    gaussians<typename Frame::execution_type>& gradients, span<float const> error = {}) {
   differentiate(frame, pass, color_gradient, gradients.view(), error);
 }

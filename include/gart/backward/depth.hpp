@@ -1,8 +1,8 @@
 #pragma once
 /// \file
 /// What the gradient of an image's depth needs besides that of its colour (backward/terms.hpp). Depth is composited as
-/// a fourth channel whose colour is a hit's t, so a hit's alpha needs the depth that the pixel would have if the hit
-/// were opaque: one float a slot, in an array beside the hit buffer, written and read at a slot's number. The gradient
+/// a fourth channel whose colour is a hit's t. So the gradient of alpha needs the depth that the pixel would have if
+/// the hit were opaque. That is one float a slot, in an array beside the hit buffer, at the slot's number. The gradient
 /// by the transmittance comes with it at no cost a hit, as that of a channel that only the background has.
 
 #include <gart/backward/hit_layout.hpp>
@@ -12,8 +12,8 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// Depth and transmittance of an image and the gradients by them, as kernels read them: [H][W] each, null where there
-/// is no such gradient.
+/// Depth and transmittance of an image and the gradients by them, for kernels: [H][W] each, null where there is no such
+/// gradient.
 struct depth_image {
   float const* depth = nullptr;                   ///< sum of weight * t
   float const* transmittance = nullptr;           ///< after the last hit

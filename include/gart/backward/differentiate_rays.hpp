@@ -7,10 +7,10 @@
 ///   differentiate_rays(frame, color, {.color = color_gradient}, {.direction = by_direction});
 ///
 /// what a lens is learned by (lens/differentiate_lens.hpp), a camera whose pixels each have a ray of their own, or rays
-/// that something in front of the camera bends. Every ray is walked once more as the pixel strategy does, with nothing
-/// to add to Gaussians: the sums stay with the ray. Colours turn with the ray's direction, and are in it
+/// that something in front of the camera bends. Every ray is walked once more as the pixel method does, with nothing to
+/// add to Gaussians: the sums stay with the ray. Colours turn with the ray's direction, and are in it
 /// (math/sh_turn.hpp). Hits, and so the gradient, are the forward pass's for every tracer and camera, through the
-/// filter of the pixels too, as it stands: how the filter changes with a ray is not in it.
+/// filter of the pixels too. The gradient does not contain how the filter changes with a ray.
 ///
 /// A direction is a unit, and its gradient stands across it. What a hit's threshold steps by has none.
 ///

@@ -1,18 +1,18 @@
 #pragma once
 /// \file
-/// A strategy and those that it falls back to, so that a step can be done in the memory there is.
+/// A method and those that it falls back to, so that a step can be done in the memory there is.
 ///
-///   backward_passes<frame<E, Traits, Tracer>, primitive_strategy> passes(exec);
+///   backward_passes<frame<E, Traits, Tracer>, primitive_method> passes(exec);
 ///   passes.with_room(frame, byte_budget, [&](auto& pass) { pass.render(frame, targets); ... });
 
 #include <gart/backward/backward.hpp>
 
 namespace gart { inline namespace GART_ISA {
 
-/// The passes of Strategy, of its fallback, of that one's and so on.
-template <class Frame, strategy Strategy>
+/// The passes of Method, of its fallback, of that one's and so on.
+template <class Frame, gradient_method Method>
 class backward_passes {
-  using fallback = typename Strategy::fallback;
+  using fallback = typename Method::fallback;
   static constexpr bool is_last = std::is_void_v<fallback>;
   struct none {
     explicit none(typename Frame::execution_type&) {}
@@ -39,7 +39,7 @@ class backward_passes {
   }
 
  private:
-  backward_pass<Frame, Strategy> pass_;
+  backward_pass<Frame, Method> pass_;
   typename std::conditional_t<is_last, std::type_identity<none>, rest_of<fallback>>::type rest_;
 };
 

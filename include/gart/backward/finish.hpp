@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The last step of the backward pass: from the moments of each Gaussian to the gradients of its mean, log-scale,
-/// quaternion and opacity (math/hit_gradient.hpp), back through the filter of the pixels where there is one.
+/// The last step of the backward pass turns the moments of each Gaussian into the gradients of its mean, log-scale,
+/// quaternion and opacity (math/hit_gradient.hpp). Where pixels have a filter, it goes back through that.
 
 #include <gart/camera/models.hpp>
 #include <gart/core/span.hpp>

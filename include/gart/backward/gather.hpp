@@ -1,13 +1,13 @@
 #pragma once
 /// \file
 /// The backward pass by primitive: a team takes a tile, its lanes take the primitives of the tile's list in turn. A
-/// lane walks the pixels that the primitive's box and the tile share, reads what the forward pass recorded there, sums
-/// the gradient in registers and adds it to the Gaussian once. Rays and their SH bases are computed once a tile, into
-/// scratch. This is the plain form, for tiles of any size: what backward/packet_gather.hpp on a host and
+/// lane walks the pixels that the primitive's box and the tile share. It reads the record of the forward pass there,
+/// sums the gradient in registers and adds it to the Gaussian once. Rays and their SH bases are computed once a tile,
+/// into scratch. This is the plain form, for tiles of any size: what backward/packet_gather.hpp on a host and
 /// backward/matrix_gather.hpp on a device compute in theirs.
 ///
-/// Whether a slot is a hit is told by the slot itself (backward/hit_slot.hpp); its t, offset and alpha are evaluated
-/// again by the function the forward pass used, so they are the same bits.
+/// The slot tells whether it is a hit (backward/hit_slot.hpp). The function that the forward pass used evaluates t,
+/// offset and alpha again, so they are the same bits.
 
 #include <gart/backward/depth.hpp>
 #include <gart/backward/gather_configuration.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The form of the gather that a configuration asks for: gather_of<C> is a tile kernel that begins with the members of
-/// gather_kernel<C> (backward/gather.hpp), to be launched with block_size lanes.
+/// The form of the gather that a configuration asks for. gather_of<C> is a tile kernel that begins with the members of
+/// gather_kernel<C> (backward/gather.hpp); it is launched with block_size lanes.
 
 #include <gart/backward/matrix_gather.hpp>
 #include <gart/backward/packet_gather.hpp>

@@ -2,9 +2,8 @@
 /// \file
 /// Where the slot of (primitive, tile, pixel) lies in the hit buffer: primitive-major, then tile, then pixel,
 ///   idx(i, t, p) = O_primitive(i) + O_tile(i, t) + O_pixel(i, t, p).
-/// O_primitive is a prefix sum of box areas in 64 bits; the rest is a closed form of the box: the tiles of a box are
-/// its cells cut by the grid's lines, row by row, and each holds its pixels row by row. A bijection onto [0, sum of
-/// areas).
+/// O_primitive is a prefix sum of box areas in 64 bits. The rest is a closed form of the box: its tiles are its cells
+/// cut by the grid's lines, row by row. Each holds its pixels row by row. A bijection onto [0, sum of areas).
 
 #include <gart/tiles/footprint_slots.hpp>
 

@@ -1,16 +1,16 @@
 #pragma once
 /// \file
-/// What a slot of the hit buffer holds of a hit, one struct a format: the forward pass packs (of), the gather unpacks.
-/// V, the colour that the pixel would have if the hit were opaque, is what the gradient of alpha needs
-/// (math/hit_gradient.hpp); the weight w = T alpha what the gradient of colour needs, with, for each channel of the
-/// hit's colour, whether it was clamped at zero.
+/// The content of a slot of the hit buffer, one struct a format: the forward pass packs (of), the gather unpacks. The
+/// gradient of alpha needs V, the colour that the pixel would have if the hit were opaque (math/hit_gradient.hpp). The
+/// gradient of colour needs the weight w = T alpha, and for each channel of the hit's colour whether it was clamped at
+/// zero.
 ///   float4   16 bytes  V, whose free sign bits hold the clamps; w
 ///   half      8 bytes  the same in four halves: V within 2^-11 relatively (2^-25 absolutely), at most 65504; 2^15 w,
 ///                      so that a weight keeps its 2^-11 down to 2e-9
 ///   weight    4 bytes  w, whose three lowest bits hold the clamps (a relative error of 2^-20); no V: enough for the
 ///                      gradient of colour (hybrid)
-/// The gradient of alpha is the difference of V and the pixel's colour, over 1 - alpha: an error of V counts by how
-/// little of the ray the hit and what lies behind it are. Relative errors of a whole gradient, group by group, against
+/// The gradient of alpha is the difference of V and the pixel's colour, over 1 - alpha. An error of V counts the more,
+/// the less of the ray the hit and those behind it are. Relative errors of a whole gradient, group by group, against
 /// double, at most (tests/traits): float4 5e-4 and half 1e-2 on clouds and long rays; on stacks of hits at the clamp
 /// 5e-4 and 0.15. Slots that no hit wrote hold what the clear left there, all bits set, which `written` tells.
 

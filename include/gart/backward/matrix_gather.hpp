@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The gather on a device: eight primitives a warp, four lanes a primitive, which take the tile's pixels eight at a
+/// The gather on a device: eight primitives a warp, four lanes a primitive. The lanes take the tile's pixels eight at a
 /// time, two a lane. What primitives sum up for colour is a product for each channel c,
 ///   sum[band][primitive] = Y[band][pixel] (w g_c)[pixel][primitive],
 ///   w = 0 where the channel is clamped or no hit is,
@@ -9,9 +9,9 @@
 /// neighbouring slots and add to neighbouring floats. Slots are copied to shared memory two rows ahead, which hides the
 /// latency of memory and takes no registers.
 ///
-/// A warp takes the rows of the tile that any of its primitives has, so a tile's list is put in order of rows first,
-/// 256 of it at a time. A pair's sums are of the terms of gather_kernel (backward/gather.hpp) in another order, the
-/// same in every run. Device only.
+/// A warp takes the rows of the tile that any of its primitives has. So a tile's list is sorted by rows first, 256
+/// entries at a time. A pair's sums are of the terms of gather_kernel (backward/gather.hpp) in another order, the same
+/// in every run. Device only.
 
 #include <gart/backward/gather.hpp>
 #include <gart/math/matrix_unit.hpp>
@@ -26,7 +26,8 @@ namespace detail {
 
 template <gather_configuration C>
 struct without_color : C {
-  using geometry_terms = std::conditional_t<C::terms::depth, gart::terms<geometry, depth>, gart::terms<geometry>>;
+  using geometry_terms = std::conditional_t<C::terms::depth, gart::terms<gart::term::geometry, gart::term::depth>,
+                                            gart::terms<gart::term::geometry>>;
   using terms = std::conditional_t<C::terms::geometry, geometry_terms, gart::terms<>>;
 };
 

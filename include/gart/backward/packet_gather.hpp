@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The gather on a host: as gather_kernel (backward/gather.hpp), with the pixels of a tile in packets, a lane a pixel
-/// (math/lanes.hpp), and a Gaussian's SH sums a lane a band. Sums are of the same terms in another order.
+/// The gather on a host does what gather_kernel does (backward/gather.hpp). It takes the pixels of a tile in packets, a
+/// lane a pixel (math/lanes.hpp), and a Gaussian's SH sums a lane a band. Sums are of the same terms in another order.
 
 #include <gart/backward/gather.hpp>
 #include <gart/backward/packet_slots.hpp>

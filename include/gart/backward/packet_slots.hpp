@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The slots (backward/hit_slot.hpp) of a Gaussian's hits with a packet's rays (trace/packet_walk.hpp): those of a row
-/// of pixels lie one after another, rows the width of the cell apart.
+/// The slots (backward/hit_slot.hpp) of a Gaussian's hits with a packet's rays (trace/packet_walk.hpp). Slots of a row
+/// of pixels are consecutive; rows are the width of the cell apart.
 
 #include <gart/backward/hit_layout.hpp>
 #include <gart/backward/hit_slot.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// What the primitive and hybrid strategies record of a hit: a slot (backward/hit_slot.hpp) at its place in the hit
-/// buffer (backward/hit_layout.hpp), which the 3DGART paper calls LT.
+/// The record of a hit by the methods primitive and hybrid: a slot (backward/hit_slot.hpp) at its place in the hit
+/// buffer (backward/hit_layout.hpp). The 3DGART paper calls the buffer LT.
 
 #include <gart/backward/hit_layout.hpp>
 #include <gart/backward/hit_slot.hpp>

@@ -1,11 +1,11 @@
 #pragma once
 /// \file
-/// Rays that stay close together, as one beam, and which children of a node it crosses: all that any of its rays does.
+/// Rays that stay close together, as one beam. A beam crosses every child of a node that one of its rays crosses.
 ///
 /// A beam runs along the axis that its rays run along most, all of them the same way. At depth s along that axis a ray
-/// stands at origin + s slope on each of the others, and the beam between the least and the greatest of these. Where
-/// that meets a box is an interval of s, cut by four planes: there is no division by a direction that changes its sign
-/// within the beam. Distances along a ray are s times 1 / |direction| on the beam's axis.
+/// stands at origin + s slope on each other axis. The beam lies between the least and the greatest of these. It meets a
+/// box in an interval of s, cut by four planes. So nothing is divided by a direction that changes its sign within the
+/// beam. Distances along a ray are s times 1 / |direction| on the beam's axis.
 
 #include <gart/bvh/cross.hpp>
 

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
 /// The binary tree that a wide one is made from (Karras, "Maximizing parallelism in the construction of BVHs, octrees,
-/// and k-d trees", HPG 2012): boxes sorted by the Morton codes of their centres, one thread an inner node, boxes fitted
-/// from the leaves up. Codes are made for the bulk of the centres: one far away would leave the others few bits. As
-/// they are fitted it is also worked out which nodes become wide ones (bvh/shares.hpp).
+/// and k-d trees", HPG 2012). Boxes are sorted by the Morton codes of their centres. One thread makes an inner node;
+/// boxes are fitted from the leaves up. Codes are made for the bulk of the centres: one far away would leave the others
+/// few bits. As they are fitted it is also worked out which nodes become wide ones (bvh/shares.hpp).
 
 #include <gart/bvh/morton.hpp>
 #include <gart/bvh/shares.hpp>
@@ -44,9 +44,9 @@ struct bound_centers {
   }
 };
 
-// The bulk of the centres, robust against strays, which spoil no more than the partial box that each is in: of an axis
-// the lower quartile of the partial boxes' least corners, and the upper quartile of their greatest. Thread i asks
-// whether one of them is the one wanted: its place is how many are less, of equal ones those before it.
+// The bulk of the centres, robust against strays, which spoil no more than their own partial box. Per axis: the lower
+// quartile of the partial boxes' least corners, and the upper quartile of their greatest. Thread i asks whether one of
+// them is the one wanted. Its place is the number of smaller ones, and of equal ones before it.
 struct find_bulk {
   span<box const> partial;
   span<box> bulk;

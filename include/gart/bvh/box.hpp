@@ -30,10 +30,9 @@ GART_HD GART_INLINE box join(box const& a, box const& b) {
   return out;
 }
 
-/// The box, in the frame, of all points where the Gaussian can be hit: centre and half-extent
-/// h_k = c sqrt(sum_j (R_kj s_j)^2), c^2 the cutoff. Evaluating a hit in float moves it by a few roundings of the
-/// distance to the frame, so the box is widened by 32 of them: a candidate is never missed for being just outside its
-/// own box.
+/// The box, in the frame, of all points where the Gaussian can be hit: centre and half-extent h_k = c sqrt(sum_j (R_kj
+/// s_j)^2), c^2 the cutoff. Evaluating a hit in float moves it by a few roundings of the distance to the frame. The box
+/// is widened by 32 of them, so no candidate just outside its own box is missed.
 template <class Response = generalized_gaussian<>>
 GART_HD GART_INLINE box ellipsoid_box(gaussian_parameters const& g, vec3d const& frame, float alpha_min) {
   float const cutoff = hit_cutoff<Response>(g, alpha_min);

@@ -1,13 +1,14 @@
 #pragma once
 /// \file
-/// A bounding volume hierarchy over boxes with wide, compressed nodes (bvh/node.hpp), on every policy: a binary tree by
-/// Morton codes and the policy's own sort (bvh/binary_tree.hpp), collapsed in one kernel (bvh/collapse.hpp). The same
+/// A bounding volume hierarchy over boxes with wide, compressed nodes (bvh/node.hpp), on every policy. A binary tree by
+/// Morton codes and the policy's sort (bvh/binary_tree.hpp) is collapsed in one kernel (bvh/collapse.hpp). The same
 /// boxes give the same tree on every policy. refit keeps the order of the boxes and fits the tree to where they are
 /// now.
 ///
 /// Shapes: n boxes make at most max(n - 1, 1) nodes, about n / 5 of them in use; node 0 is the root. Cost: O(n) work
-/// beside the sort, which refit goes without, and about 120 bytes a box of scratch; nothing waits for the device. Boxes
-/// that are empty (empty_box) are never met. Errors: invalid_argument where a refit brings another number of boxes.
+/// beside the sort, which a refit does without, and about 120 bytes a box of scratch. Nothing waits for the device.
+/// Boxes that are empty (empty_box) are never met. Errors: invalid_argument where a refit brings another number of
+/// boxes.
 
 #include <gart/bvh/binary_tree.hpp>
 #include <gart/exec/buffer.hpp>

@@ -148,7 +148,7 @@ GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, flo
       first[k][w] = r.inverse[k] < 0 ? upper : lower, last[k][w] = r.inverse[k] < 0 ? lower : upper;
     }
 #if defined(__CUDA_ARCH__)
-    // Planes are read as 1 + q / 2^15, which takes no conversion of a number; that costs 2^-9 of a step in roundings.
+    // Planes are read as 1 + q / 2^15, which needs no conversion of a number. That costs 2^-9 of a step in roundings.
     step[k] = 32768.0f * grid.step[k];
     float const slack = 0.01f * fabsf(grid.step[k]);
     enter[k] = grid.enter[k] - step[k] - slack, leave[k] = grid.leave[k] - step[k] + slack;

@@ -1,11 +1,11 @@
 #pragma once
 /// \file
-/// One node of the wide tree: up to bvh_width children, their boxes held in 8 bits a side on a grid of the node's own
-/// (Ylitie, Karras and Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", HPG 2017).
+/// One node of the wide tree: up to bvh_width children. Their boxes have 8 bits a side on the node's own grid (Ylitie,
+/// Karras and Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", HPG 2017).
 ///
-/// Plane q of an axis lies at origin + q * step, step a power of two and origin a multiple of it, such that every plane
-/// is a float exactly. Sides are rounded outward: a box lies in its child_box, whatever its size and place. An axis
-/// with a side beyond 2^126, or one that is not a number, has planes for "below 0", 0 and "above 0" only.
+/// Plane q of an axis lies at origin + q * step. The step is a power of two and the origin a multiple of it, so every
+/// plane is exactly a float. Sides are rounded outward: a box lies in its child_box, whatever its size and place. An
+/// axis with a side beyond 2^126, or one that is not a number, has planes for "below 0", 0 and "above 0" only.
 ///
 /// 96 bytes at width 8, three sectors of a GPU's memory; loaded as 16-byte words.
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Which nodes of a binary tree become wide ones: those with which rays cross the fewest wide nodes, a node's chance to
-/// be crossed being the area of its box (Ylitie, Karras and Laine 2017, section 3). From the leaves up, a node works
+/// Chooses the nodes of a binary tree that become wide ones, so that rays cross the fewest wide nodes. A node's chance
+/// to be crossed is the area of its box (Ylitie, Karras and Laine 2017, section 3). From the leaves up, a node works
 /// out what it costs to hand 1, 2, ... children to the wide node above: itself as a wide node, or what its two sides
 /// hand on, each its share. From the root down the shares are dealt out.
 

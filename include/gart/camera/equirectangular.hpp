@@ -4,8 +4,8 @@
 /// angle from straight up (-y) down the height (COLMAP's and nerfstudio's EQUIRECTANGULAR),
 ///   direction = (sin(phi) sin(theta), -cos(theta), cos(phi) sin(theta)),   phi = 2 pi (u / W - 1/2), theta = pi v / H.
 ///
-/// Boxes are exact in azimuth and all but exact in height (camera/seen_angles.hpp). One that crosses the seam at the
-/// left and right border goes on past the width (footprint::seam); one that holds a pole has all columns. Turning the
+/// Boxes are exact in azimuth and all but exact in height (camera/seen_angles.hpp). A box that crosses the seam at the
+/// left and right border goes on past the width (footprint::seam). A box that holds a pole has all columns. Turning the
 /// camera half about its y axis rolls the image by half its width, bit by bit where the width is even.
 
 #include <gart/camera/radial_lens.hpp>

@@ -225,8 +225,8 @@ class lens_bounds : public lens_image {
   float near_ = 0;
 };
 
-/// Of a camera's lens: its tables take milliseconds, and views share lenses, so they are made once a lens and program,
-/// of the latest thousands. Host side.
+/// Makes the bounds of a camera's lens. Their tables take milliseconds and views share lenses, so a program makes them
+/// once a lens and keeps the latest thousands. Host side.
 inline lens_bounds tabulated_bounds(camera_kind kind, distortion const& l, float fx, float fy, float cx, float cy,
                                     int width, int height) {
   static std::mutex guard;

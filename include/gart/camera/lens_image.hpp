@@ -1,8 +1,8 @@
 #pragma once
 /// \file
 /// A lens of any curve (camera/lens_curve.hpp) as an image: where a direction lies on it, up to which angle, and how
-/// fast it changes there, which is what boxes go by (camera/lens_bounds.hpp). Tables of derivatives are running maxima
-/// by the angle with the axis, made on the host in milliseconds: 1.5 KiB.
+/// fast it changes there. Boxes follow from these (camera/lens_bounds.hpp). Tables of derivatives are running maxima by
+/// the angle with the axis, made on the host in milliseconds: 1.5 KiB.
 
 #include <gart/camera/lens_curve.hpp>
 #include <gart/math/glm.hpp>
@@ -184,8 +184,8 @@ class lens_image {
     return end_;
   }
 
-  // Of an image coordinate distance(theta) cos(phi), whatever phi: how large its derivatives along a line of sight that
-  // turns from that angle are at most, in any direction.
+  // For an image coordinate distance(theta) cos(phi), whatever phi: bounds of its derivatives along a line of sight
+  // that turns from that angle in any direction.
   struct differences {
     double value = 0, first = 0, second = 0, third = 0;
   };

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The camera seam: what gart asks of a camera model. A model is a small struct of parameters, one header, and
-/// everything else follows from its members: tracers, tile lists, footprints, the backward passes and antialiasing know
-/// no model by name. camera/models.hpp goes from the run-time camera (scene/camera.hpp) to its model.
+/// The camera seam: what gart asks of a camera model. A model is a small struct of parameters in one header. Everything
+/// else follows from its members: tracers, tile lists, footprints, the backward passes and antialiasing know no model
+/// by name. camera/models.hpp goes from the run-time camera (scene/camera.hpp) to its model.
 ///
 /// A model derives from camera_base and has, F being float or, on hosts, lanes:
 ///   template <class F> primary_ray_of<F> ray(F u, F v) const

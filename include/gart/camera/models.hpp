@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The models there are, and the one place that goes from a run-time camera to its model: visit_camera(view, f) calls f
+/// The camera models, and the one place that goes from a run-time camera to its model: visit_camera(view, f) calls f
 /// with the model. A view that is a model already is taken as it is (camera/model.hpp).
 ///
 /// Errors: require_camera throws invalid_argument for what no ray can be cast by; everything that renders calls it.

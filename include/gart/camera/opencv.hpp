@@ -5,10 +5,10 @@
 ///   x_d = x (1 + k1 r2 + k2 r2^2) + 2 p1 x y + p2 (r2 + 2 x x),  y_d likewise with p1 and p2 exchanged;
 /// a ray inverts it by Newton's method (camera/undistort.hpp).
 ///
-/// A box is that of any curve of the angle with the axis (camera/lens_bounds.hpp). For what is seen large, or crosses
-/// the near plane, it is what that has in common with another: the rectangle of slopes is mapped to the image edge by
-/// edge: the map is one to one where the image is, so the image of the rectangle lies within the image of its border,
-/// which is sampled and widened by what a curved edge can bulge between samples.
+/// A box is that of any curve of the angle with the axis (camera/lens_bounds.hpp). For a Gaussian that is seen large,
+/// or crosses the near plane, the rectangle of slopes is mapped to the image edge by edge. The map is one to one where
+/// the image is. So the image of the rectangle lies within the image of its border. The border is sampled, and widened
+/// by the bulge of a curved edge between samples.
 
 #include <gart/camera/lens_bounds.hpp>
 #include <gart/camera/pinhole.hpp>
@@ -67,8 +67,7 @@ class opencv_bounds {
 
   GART_HD slope_box distorted(slope_box const& s) const {
     auto const clamp = [](double v, detail::interval const& to) { return v < to.lo ? to.lo : v > to.hi ? to.hi : v; };
-    // What lies outside the view is seen by no pixel; keeping the rectangle to it keeps it where the lens is one to
-    // one.
+    // No pixel sees what lies outside the view. Kept to the view, the rectangle stays where the lens is one to one.
     double const x0 = clamp(s.u.lo, u_), x1 = clamp(s.u.hi, u_), y0 = clamp(s.w.lo, w_), y1 = clamp(s.w.hi, w_);
     detail::interval u, v;
     constexpr int steps = 4;
@@ -82,7 +81,7 @@ class opencv_bounds {
         u.add(a), v.add(c);
       }
     }
-    // Second derivatives of the lens along an edge are at most this on the rectangle; a chord of length h bulges h^2 /
+    // Second derivatives of the lens along an edge are at most this on the rectangle. A chord of length h bulges h^2 /
     // 8 times as much.
     double const rx = fabs(x0) > fabs(x1) ? fabs(x0) : fabs(x1), ry = fabs(y0) > fabs(y1) ? fabs(y0) : fabs(y1);
     double const r = sqrt(rx * rx + ry * ry);

@@ -4,8 +4,8 @@
 ///   u = fx x + cx,   v = fy y + cy,
 /// fx and fy in pixels a world unit (nerfstudio's ORTHOPHOTO). Hits lie in front of that plane.
 ///
-/// The box of an ellipsoid m + A s is m_x +- |A_x|, exactly; where it crosses the plane at `near`, what lies in front
-/// of that: an extreme behind it gives way to that of the section, an ellipse.
+/// The box of an ellipsoid m + A s is m_x +- |A_x|, exactly. Where it crosses the plane at `near`, the part in front
+/// counts: the extreme of the section, an ellipse, takes the place of an extreme behind it.
 
 #include <gart/camera/lens_slopes.hpp>
 #include <gart/camera/model.hpp>

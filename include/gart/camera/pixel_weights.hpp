@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// What a camera's pixels count for in a training: those of the whole sphere by their solid angle, those of a lens that
-/// have no ray nothing. Host side; a byte a pixel, in parts of 255.
+/// The weights of a camera's pixels in training: those of the whole sphere by their solid angle, pixels without a ray
+/// zero. Host side; a byte a pixel, in parts of 255.
 
 #include <gart/camera/models.hpp>
 #include <gart/scene/image.hpp>

@@ -1,10 +1,10 @@
 #pragma once
 /// \file
 /// A camera whose lens is a curve of the angle with its axis (camera/lens_curve.hpp), with tangential and thin prism
-/// terms: fisheyes, FOV, EUCM, the division models and FULL_OPENCV; beyond 180 degrees where the curve goes there.
+/// terms: fisheyes, FOV, EUCM, the division models and FULL_OPENCV. Its view may pass 180 degrees.
 ///
-/// A pixel that the lens gives no ray, outside of its image circle or past where the distance from the axis grows with
-/// the angle, has a direction of zeros: such a ray hits nothing, the pixel shows the background and has no weight in a
+/// The lens gives some pixels no ray: those outside its image circle, or past where the distance from the axis stops
+/// growing with the angle. Their direction is zero. Such a ray hits nothing, shows the background and has no weight in
 /// training (camera/pixel_weights.hpp). Rays are worked out in double of fixed rounding: the same bits everywhere.
 
 #include <gart/camera/axial_filter.hpp>

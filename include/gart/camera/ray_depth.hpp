@@ -15,8 +15,8 @@ struct ray_depth {
   vec3 axis{0.0f};   ///< world axes; zero: the distance itself
   float offset = 1;  ///< of all directions
 
-  /// Depth over distance, of one ray or of one a lane; rounded up, so that what is said to lie nearer than a depth
-  /// does.
+  /// Depth over distance, of one ray or of one a lane. It is rounded up, so that hits said to lie nearer than a depth
+  /// do.
   template <class F>
   GART_HD GART_INLINE F per_distance(vec3_of<F> const& d) const {
     return (d.x * F(axis.x) + d.y * F(axis.y) + d.z * F(axis.z) + F(offset)) * F(1.000002f);

@@ -1,10 +1,10 @@
 #pragma once
 /// \file
-/// A lens whose image is exposed line by line while the camera moves (camera/shutter.hpp has how): each row, or column,
-/// has a pose, and its rays begin there. Any lens with one centre.
+/// A lens whose image is exposed line by line while the camera moves (camera/shutter.hpp). Each row, or column, has a
+/// pose, and its rays begin there. Any lens with one centre.
 ///
-/// Box: all that the ellipsoid is in the camera's axes while some lines are exposed lies in one larger ellipsoid, of
-/// which the lens has the box; only the lines of that box can hit it, and so again over these. Each round is
+/// Box: while some lines are exposed, the ellipsoid moves within one larger ellipsoid in the camera's axes. The lens
+/// has the box of that one. Only the lines of that box can hit it, and the same holds again over these. Each round is
 /// conservative, and the lines of a small ellipsoid are few. With c(s) its centre and A(s) its axes as the camera has
 /// them at time s, over [s - h, s + h]: q = h c'(s), and e what c and A are at most off by otherwise, rotation and
 /// second order,

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The angles that an ellipsoid m + A s, |s| <= 1, is seen under, from its centre m and its covariance C = A A^T in a
-/// camera's axes: what the boxes of lenses and of the sphere are made of. In a plane through the camera the ellipsoid
-/// is an ellipse, whose two tangents are exact; about an axis there are first the angles round it, then those with it.
+/// The angles under which an ellipsoid m + A s, |s| <= 1, is seen, from its centre m and its covariance C = A A^T in a
+/// camera's axes. The boxes of lenses and of the sphere are made of these. In a plane through the camera the ellipsoid
+/// is an ellipse with two exact tangents. About an axis there are first the angles round it, then those with it.
 ///
 /// All in double, and C is widened by a ten millionth of the reach: what is flat keeps an inside, and nothing cancels.
 
@@ -53,8 +53,8 @@ struct seen_ellipsoid {
   }
 };
 
-/// The ellipse that an ellipsoid's silhouette is in the plane across a direction v, at the distance 1: its middle, and
-/// the matrix of its half-widths squared, along two axes there.
+/// The ellipse of an ellipsoid's silhouette in the plane across a direction v, at the distance 1: its middle, and the
+/// matrix of its squared half-widths, along two axes there.
 struct flat_silhouette {
   double z1 = 0, z2 = 0;             ///< the middle
   double h11 = 0, h12 = 0, h22 = 0;  ///< half-widths squared

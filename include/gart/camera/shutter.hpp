@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The motion of a camera while its shutter goes over the image (scene/camera.hpp): from the poses of the first and the
-/// last line that are read, as files have them, and back. A camera holds the pose of the middle of the read-out, and
-/// what it moves by, in its own axes, while the shutter goes from border to border,
+/// The motion of a camera while its shutter goes over the image (scene/camera.hpp), from the poses of the first and the
+/// last line that are read, and back. Files have these poses. A camera holds the pose of the middle of the read-out,
+/// and what it moves by, in its own axes, while the shutter goes from border to border,
 ///   rotation(s) = R exp(s [turn]x),   position(s) = p + s R travel,   -1/2 <= s <= 1/2:
 /// linear in translation, slerp in rotation. So a camera that is moved as a whole takes its motion along, and an image
 /// of another size has the same.

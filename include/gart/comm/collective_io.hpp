@@ -54,7 +54,7 @@ std::string first_error(Comm& comm, std::string const& mine) {
 /// f() on every rank; io_error on all where one of them throws. `also`: another name that f's errors may have for the
 /// file.
 template <class Comm, class F>
-void together(Comm& comm, std::filesystem::path const& path, F const& f, std::filesystem::path const& also = {}) {
+void collective(Comm& comm, std::filesystem::path const& path, F const& f, std::filesystem::path const& also = {}) {
   std::string mine;
   try {
     f();
@@ -82,13 +82,13 @@ void write_collectively(Comm& comm, std::filesystem::path const& path, std::func
   std::unique_ptr<shared_file> file;
   bool made = false;
   try {
-    together(
+    collective(
         comm, path,
         [&] {
           if (first) file = comm.open_file(temporary, true), made = true;
         },
         temporary);
-    together(
+    collective(
         comm, path,
         [&] {
           if (!file) file = comm.open_file(temporary, false);
@@ -96,7 +96,7 @@ void write_collectively(Comm& comm, std::filesystem::path const& path, std::func
           file->close();
         },
         temporary);
-    together(comm, path, [&] {
+    collective(comm, path, [&] {
       std::error_code code;
       if (first) std::filesystem::rename(temporary, path, code);
       if (code)

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The ranks that are on one host, and memory that all of them have: what each would read for itself is read once, and
-/// held once (io/dataset.hpp). All of them make the same calls in the same order.
+/// The ranks on one host, and memory that they share: each photograph is read once and held once (io/dataset.hpp). All
+/// of them make the same calls in the same order.
 
 #include <gart/core/types.hpp>
 
@@ -21,7 +21,7 @@ class host_group {
   virtual void all_gather(void const* mine, void* all, std::size_t bytes) = 0;
   /// Waits for all; what they have written in memory that all have is seen after it.
   virtual void barrier() = 0;
-  /// The same memory on all of them, of so many bytes; null on all where the host has not so much of that kind. No rank
+  /// The same memory on all of them, of so many bytes; null on all where the host has too little of that kind. No rank
   /// waits for another to give it back: it stays while one of them runs. Errors: out_of_memory.
   virtual std::shared_ptr<void> allocate(u64 bytes) = 0;
 };

@@ -4,7 +4,7 @@
 /// MPI.
 ///
 ///   mpi_comm ranks;                                        // all that were started together
-///   trainer<openmp_exec, traits, tracer, deterministic_strategy, mpi_comm> run(exec, options, data, start, ranks);
+///   trainer<openmp_exec, traits, tracer, deterministic_method, mpi_comm> run(exec, options, data, start, ranks);
 ///
 /// The first one made starts MPI, unless the program has; the program's end ends it. A program that was started alone
 /// is one rank. MPI is called by one thread. Messages of any size go in pieces of at most 1 GiB.

@@ -1,13 +1,13 @@
 #pragma once
 /// \file
-/// Ranks that each compute on a GPU: messages of device memory by NCCL, on a stream of its own that waits for the
-/// policy's and is waited for, and everything small by MPI, which also started the ranks. Compiled into gart::nccl; a
-/// program needs no header of NCCL or MPI.
+/// Ranks that each compute on a GPU. NCCL carries messages of device memory, on its own stream that waits for the
+/// policy's and is waited for. MPI carries everything small, and started the ranks. Compiled into gart::nccl; a program
+/// needs no header of NCCL or MPI.
 ///
 ///   mpi_comm ranks;
 ///   cuda_exec exec(nccl_comm::device_of(ranks));
 ///   nccl_comm all(ranks, nccl_comm::device_of(ranks));
-///   trainer<cuda_exec, traits, tracer, primitive_strategy, nccl_comm> run(exec, options, data, start, all);
+///   trainer<cuda_exec, traits, tracer, primitive_method, nccl_comm> run(exec, options, data, start, all);
 ///
 /// NCCL wants a GPU for each rank. Where two ranks have the same one, all messages go through pinned host memory and
 /// MPI (`transport` says so): right, and slow. A rank's messages to itself are copies. What is sent and received has no

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// A file that several ranks write at once, each its own bytes of it, at whatever place: what open_file of a
-/// communicator gives (comm/communicator.hpp), and what compiled code takes that writes a rank's part of a file.
+/// A file that several ranks write at once, each its own bytes at any place. A communicator's open_file makes it
+/// (comm/communicator.hpp); compiled code that writes a rank's part takes it.
 
 #include <gart/core/types.hpp>
 

@@ -1,8 +1,7 @@
 #pragma once
 /// \file
-/// Annotations that let one body compile for the host and for a CUDA device.
-/// GART_HD marks a function both may call; GART_INLINE forces inlining, so that what decides a hit is compiled into
-/// every kernel from one source.
+/// Annotations that let one body compile for the host and for a CUDA device. GART_HD marks a function for both.
+/// GART_INLINE forces inlining: the code that decides a hit is compiled into every kernel from one source.
 
 #include <gart/core/isa.hpp>
 
@@ -16,9 +15,9 @@
 #define GART_INLINE inline __attribute__((always_inline))
 #endif
 
-// The body of a kernel, and what it calls of its policy: instantiated for one policy it calls that policy's functions
-// only, which nvcc cannot see from a template and would warn of. It stands right before the declaration, not behind
-// `template <...>`: a tile kernel takes `auto const& team`.
+// The body of a kernel, and the functions of its policy that it calls. Instantiated for one policy it calls that
+// policy's functions alone, which nvcc cannot see from a template and would warn of. It stands right before the
+// declaration, not behind `template <...>`: a tile kernel takes `auto const& team`.
 #if defined(__CUDACC__)
 #define GART_KERNEL _Pragma("nv_exec_check_disable") __host__ __device__
 #else

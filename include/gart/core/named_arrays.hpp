@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Arrays of numbers by name, in host memory: what the parts of a run put into its state (train/state.hpp), and read
-/// from it again. Errors: invalid_argument, naming the array, for one of another size than what reads it.
+/// Arrays of numbers by name, in host memory. The parts of a run write their state to them (train/state.hpp), and read
+/// it back. Errors: invalid_argument, naming the array, for one of another size than what reads it.
 
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>

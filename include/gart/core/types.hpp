@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The integer types of every index and count. Rays, Gaussians and tiles count in 32 bits; anything that is a product
-/// of two of them (pairs, hit slots, bytes) counts in 64.
+/// The integer types of every index and count. Rays, Gaussians and tiles count in 32 bits. Products of two of them
+/// (pairs, hit slots, bytes) count in 64.
 
 #include <cstddef>
 #include <cstdint>

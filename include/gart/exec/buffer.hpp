@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Memory of a policy, owned: move-only, growing only, with slack, so that a size that changes a little every step does
-/// not allocate. Its policy must outlive it.
+/// Memory that a policy owns: move-only, growing only, with slack. A size that changes a little every step does not
+/// allocate. Its policy must outlive it.
 ///
 /// A buffer converts to span<T> and span<T const>; where a function deduces T from a span, pass view().
 /// Errors: out_of_memory from the policy; the buffer is then empty.
@@ -73,8 +73,8 @@ class buffer {
     if (n > capacity_) reserve(static_cast<std::size_t>(static_cast<double>(n) * slack));
     size_ = n;
   }
-  /// Makes room for n elements in all, exactly, where there is less: what is known to grow so far does it without slack
-  /// and without a copy. Keeps what there is.
+  /// Makes room for exactly n elements in all, where there is less. An array whose final size is known grows without
+  /// slack and without a copy. Keeps what there is.
   void reserve(std::size_t n) {
     if (n <= capacity_) return;
     buffer grown(*exec_, n);
@@ -112,8 +112,8 @@ class buffer {
   }
 
  private:
-  // More than can be addressed is asked for as half of the address space, which no policy has: the product must not
-  // wrap to a size that can be had.
+  // A size beyond the address space becomes half of the address space, which no policy has: the product must not wrap
+  // to a size that can be allocated.
   static std::size_t bytes_of(std::size_t n) {
     std::size_t const half = static_cast<std::size_t>(-1) / 2;
     return n > half / sizeof(T) ? half : n * sizeof(T);

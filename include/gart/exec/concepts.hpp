@@ -29,7 +29,7 @@
 /// copy_out waits for the data; all else is ordered on the queue. The source of copy_in may be reused on return.
 /// end_stage never throws, because it runs in a destructor.
 ///
-/// Kernels are named, trivially copyable functors: void operator()(index_t) for an index kernel; a tile kernel names
+/// Kernels are named, trivially copyable functors. An index kernel has void operator()(index_t). A tile kernel names
 /// `using scratch = struct {...}` and takes a team (see parallel.hpp). Their bodies are GART_KERNEL (core/macros.hpp).
 
 #include <gart/core/types.hpp>
@@ -40,8 +40,9 @@
 
 namespace gart {
 
-/// The forms of a kernel that has several: the plain one, right everywhere, a lane after another; lanes as the numbers
-/// of a host's vector registers (math/lanes.hpp); lanes of a warp, which step together and share its matrix units.
+/// The forms of a kernel that has several. The plain one is right everywhere and runs one lane after another. Another
+/// has its lanes in a host's vector registers (math/lanes.hpp). The third has the lanes of a warp, which step together
+/// and share its matrix units.
 enum class kernel_form { plain, packet, warp };
 
 /// A policy.

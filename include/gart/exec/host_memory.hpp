@@ -78,8 +78,8 @@ class host_memory {
   /// Nothing is queued.
   void synchronize() {}
 
-  /// A block that the policy keeps and lends to the algorithm that is running, so that sorting at every step does not
-  /// allocate at every step. The next call lends the same block again; it grows only, and counts in `memory`.
+  /// A block that the policy keeps and lends to the running algorithm. So a sort at every step does not allocate at
+  /// every step. The next call lends the same block again; it grows only, and counts in `memory`.
   void* workspace(std::size_t bytes) {
     if (bytes > workspace_bytes_) {
       deallocate(std::exchange(workspace_, nullptr), std::exchange(workspace_bytes_, 0));

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Shared memory by an address that the compiler keeps, where it would work it out again at each use: a block's window,
-/// a lane's place in an array. Device only.
+/// Shared memory by an address that the compiler keeps: a block's window, a lane's place in an array. Otherwise it
+/// computes the address again at each use. Device only.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>

@@ -32,7 +32,7 @@ class openmp_exec : public host_memory {
     return old;
 #endif
   }
-  /// Calls f while no other thread is in a call for the same `what`. One lock from a striped table: x86 has no atomic
+  /// Calls f while no other thread is in a call for the same `what`. One lock from a striped table. x86 has no atomic
   /// float add, and a compare-and-swap for each of tens of floats costs more than the rest of a hit.
   template <class F>
   static void exclusively(void const* what, F&& f) {

@@ -3,7 +3,7 @@
 /// Labelled launches on the host policies: parallel_for over indices and over tiles. The CUDA twins are in
 /// cuda_launch.cuh; a tile kernel is the same source on both.
 ///
-/// A tile kernel is written in phases: team.for_each(n, f) shares f(0..n) out over the team's lanes, team.barrier()
+/// A tile kernel is written in phases. team.for_each(n, f) shares f(0..n) out over the team's lanes; team.barrier()
 /// makes what was written to team.scratch() visible to all. There is no lane id, so one lane is a correct host mapping.
 /// Scratch is undefined when a tile begins. Nothing to do is no launch, on every policy.
 ///
@@ -79,8 +79,8 @@ template <tile_kernel K>
 void parallel_for(openmp_exec& exec, char const* label, tile_range range, K const& kernel) {
   if (range.tiles == 0) return;
   stage_scope scope(exec, label);
-  // Tiles that lie together go to one thread: neighbours write to the same Gaussians, and cache lines shared by cores
-  // (false sharing among them) cost more than an uneven share of the work.
+  // Neighbouring tiles go to one thread. They write to the same Gaussians, and cache lines shared by cores cost more
+  // than an uneven share of the work.
   [[maybe_unused]] index_t const chunk = std::max<index_t>(1, range.tiles / static_cast<index_t>(16 * exec.threads()));
 #if defined(_OPENMP)
 #pragma omp parallel num_threads(exec.threads())

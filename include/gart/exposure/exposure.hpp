@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The exposure of a photograph relative to the scene's colours: x' = M x + b on the composited colour, M a 3 x 3
-/// matrix, as in 3DGS. Cameras with automatic exposure and white balance take neighbouring photographs of different
+/// The exposure of a photograph relative to the scene's colours: x' = M x + b on the composited colour, with a 3 x 3
+/// matrix M, as in 3DGS. Cameras with automatic exposure and white balance take neighbouring photographs of different
 /// brightness. Gaussians alone can only learn that as haze in front of the cameras.
 
 #include <gart/core/macros.hpp>

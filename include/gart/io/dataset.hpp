@@ -80,7 +80,7 @@ struct depth_map_options {
 };
 
 /// Which views are kept for testing. Each Nth by name lies between trained views. A sector of as many cameras lies on
-/// both sides of the first by name, around all cameras' mean: no trained view sees from there.
+/// both sides of the first by name, around all cameras' mean. No trained view sees from there.
 enum class split_kind { nth, sector };
 /// Their names.
 constexpr auto names_of(split_kind) {

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Images in PNG (libpng), JPEG (libjpeg-turbo) and, read alone, WebP (libwebp, where gart is built with it), 8 bits a
-/// channel; 16-bit PNG is reduced to 8. The kind is told by the file's first bytes, not by its name. Pixels stay as
-/// they are stored, whatever an EXIF orientation says. Errors: io_error with the file and what the decoder said.
+/// Images in PNG (libpng) and JPEG (libjpeg-turbo), 8 bits a channel. WebP is read where gart is built with libwebp.
+/// 16-bit PNG is reduced to 8. The kind is told by the file's first bytes, not by its name. Pixels stay as they are
+/// stored, whatever an EXIF orientation says. Errors: io_error with the file and what the decoder said.
 
 #include <gart/scene/image.hpp>
 

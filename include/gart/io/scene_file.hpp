@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Scenes of Gaussians, meshes and lights as files: scene.json (docs/light.md has its fields), and meshes by
-/// themselves, glTF 2.0 (.gltf, .glb), OBJ with its MTL, and PLY. Files that one names lie beside it. glTF's +y goes
-/// up: meshes are turned from it to `up`. Others stand in the world's axes.
+/// Scenes of Gaussians, meshes and lights as files: scene.json (docs/light.md has its fields). Meshes by themselves:
+/// glTF 2.0 (.gltf, .glb), OBJ with its MTL, and PLY. Files that one names lie beside it. glTF's +y goes up: meshes are
+/// turned from it to `up`. Others stand in the world's axes.
 ///
 /// Errors: io_error naming the file, the part, the field and the remedy: for what is damaged, missing, of an unknown
 /// field or of an extension that gart has not. Triangles without an area or with corners that are not finite are left

@@ -3,8 +3,8 @@
 /// Files of Gaussians in any format that gart knows: one table has them. A reader knows a file by its first bytes, a
 /// writer by the ending of its name. docs/formats.md has what each format holds, and what it costs.
 ///
-/// Every model is in the axes of a splat PLY; formats that keep others (SPZ: y up, z back; GLB: y up, x left) are
-/// turned as they are read and written, with the colours that depend on direction.
+/// Every model is in the axes of a splat PLY. Formats with other axes (SPZ: y up, z back; GLB: y up, x left) are turned
+/// as they are read and written, with the colours that depend on direction.
 ///
 /// Errors: io_error naming the file and the supported formats, where it has none of them; naming a property that
 /// changes the image and that the format cannot hold; naming the package to install, where gart was built without it;
@@ -36,7 +36,7 @@ struct splat_packing {
 };
 
 /// What a format has room for, besides means, scales, rotations, opacities and a colour.
-struct splat_room {
+struct format_capabilities {
   int sh_degree = 3;       ///< of its spherical harmonics
   bool strays = true;      ///< means far beyond the others (256 times the reach of 99 of 100), without loss to these
   bool traits = false;     ///< keys and values
@@ -52,7 +52,7 @@ struct splat_room {
 struct splat_format {
   char const* name;                        ///< as people call it
   char const* extension;                   ///< with its dots, in lower case
-  splat_room room;                         ///< `write` is given no more than that
+  format_capabilities capabilities;        ///< `write` is given no more than that
   bool (*begins)(std::string_view first);  ///< whether its files begin so; null: known by the ending alone
   gaussian_model (*read)(std::filesystem::path const& path, splat_traits* to,
                          std::vector<std::string>* notes);  ///< either only where it is not null
@@ -65,10 +65,10 @@ struct splat_format {
 span<splat_format const* const> splat_formats();
 
 /// Reads a file of Gaussians; its traits into `traits`, where that is not null. A Gaussian with a number that is not
-/// finite, or a rotation of zeros, is left out: `notes`, where it is not null, says how many, and what is wrong with
-/// the first. A file of no other is refused. An opacity with an infinite logit becomes 1 or 0, a scale with the
-/// logarithm -inf 0: the model has finite numbers for these. A quaternion too short or too long to be drawn gets the
-/// length 1. Of SOG `path` may be a folder, or the meta.json in it.
+/// finite, or a rotation of zeros, is left out. `notes`, if not null, says how many, and what is wrong with the first.
+/// A file of no other is refused. An opacity with an infinite logit becomes 1 or 0, a scale with the logarithm -inf
+/// becomes 0. The model has finite numbers for these. A quaternion too short or too long to be drawn gets the length 1.
+/// Of SOG `path` may be a folder, or the meta.json in it.
 gaussian_model read_splats(std::filesystem::path const& path, splat_traits* traits = nullptr,
                            std::vector<std::string>* notes = nullptr);
 /// A rank's rows of a whole model.

@@ -13,7 +13,7 @@
 /// length.
 ///
 /// Sums in double, in an order that depends on the number of pixels only. Cost: a trace of the view. Memory: 40 bytes a
-/// pixel. Errors: invalid_argument for a camera without a focal length, and for a view with antialiasing: the sums do
+/// pixel. Errors: invalid_argument for a camera without a focal length, and for a view with antialiasing. The sums do
 /// not contain the filter's dependence on the focal length.
 
 #include <gart/algorithm/reduce.hpp>

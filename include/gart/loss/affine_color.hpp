@@ -2,9 +2,9 @@
 /// \file
 /// The PSNR that a render would have after the affine map of colours that brings it nearest to its photograph,
 ///   minimise over M (3 x 3) and b:  sum over pixels |M render + b - truth|^2,
-/// in double on the host's cores. A diagnostic, no score: it looks at the photograph that it is held against, so it
+/// in double on the host's cores. A diagnostic, not a score: it looks at the photograph that it is compared with. It
 /// says how much of an error is one of exposure and white balance. Renders and mapped colours are clamped to [0, 1], as
-/// for PSNR, so that it is never below the PSNR of the same render (the map may be the identity). Pixels that a mask
+/// for PSNR. So it is never below the PSNR of the same render (the map may be the identity). Pixels that a mask
 /// excludes (0) do not count. Three channels. Errors: invalid_argument where the sizes differ or an image is empty.
 
 #include <gart/loss/metrics.hpp>

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The loss of an image's depth against a map of distances along the rays, and its gradients by the depth D (the sum of
+/// The loss of an image's depth against a map of distances along the rays. Its gradients are by the depth D (the sum of
 /// w t) and by the transmittance T that the renderer leaves. With A = 1 - T, what a pixel sees is at the mean distance
 /// D / A, and the loss is
 ///   L = scale / pixels * sum over pixels with a distance z > 0 of  A |D / A - z|,

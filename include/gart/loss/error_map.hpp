@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The error of each pixel of an image, the mean over its channels of |image - truth|: what growth by error
-/// (train/densify/error_growth.hpp) attributes to the Gaussians. image: [H][W][3]; error: [H][W], resized; 0 where a
+/// The error of each pixel of an image: the mean over its channels of |image - truth|. Growth by error
+/// (train/densify/error_growth.hpp) attributes it to the Gaussians. image: [H][W][3]; error: [H][W], resized; 0 where a
 /// mask excludes the pixel. One launch, 20 bytes a pixel.
 
 #include <gart/loss/image_loss.hpp>

@@ -7,8 +7,8 @@
 /// SSIM is written in d = x - y, because near the optimum x and y agree and their difference is what must not cancel:
 ///   SSIM = (1 - m_d^2 / B1) (1 - s_dd / B2),  B1 = m_x^2 + m_y^2 + C1,  B2 = s_xx + s_yy + C2
 /// with m the window's means and s its variances, which is the usual formula, as 2ab = a^2 + b^2 - (a - b)^2. Four
-/// convolutions are then enough (y, d, x^2 + y^2, d^2), taken of x - 1/2 and y - 1/2 so that the variances of bright
-/// flat areas survive float; where x = y in the whole window the gradient is exactly zero. With S = l c the two
+/// convolutions are then enough (y, d, x^2 + y^2, d^2). They are taken of x - 1/2 and y - 1/2, so that the variances of
+/// bright flat areas survive float. Where x = y in the whole window the gradient is exactly zero. With S = l c the two
 /// factors,
 ///   dS/dm_x = 2 l (m_d - (1 - c)(m_x - 1/2)) / B2 - 2 c (m_d - (1 - l) m_x) / B1,
 ///   dS/de = l (1 - c) / B2,  dS/df = -l / B2  for e, f the windowed means of x^2 + y^2 and d^2,

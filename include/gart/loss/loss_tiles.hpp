@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// How the loss divides an image among teams (loss/image_loss.hpp): tiles of one channel with a halo of SSIM's window,
-/// and that window's sums along rows and down columns. Columns and rows are pixels, planes [3][H][W].
+/// How the loss divides an image among teams (loss/image_loss.hpp): tiles of one channel with a halo of SSIM's window.
+/// Sums over the window run along rows, then down columns. Columns and rows are pixels, planes [3][H][W].
 
 #include <gart/exec/concepts.hpp>
 #include <gart/loss/ssim_window.hpp>
@@ -18,10 +18,10 @@ struct loss_image {
   GART_HD std::size_t pixels() const { return static_cast<std::size_t>(width) * height; }
 };
 
-// Tiles of one channel, with a halo of the window's radius. A lane of a host takes 16 pixels beside each other, which
-// its compiler puts in vector registers, and its tiles are large: long runs of memory, little halo. One of a device
-// takes four: beside each other along rows, below each other down columns, so that neighbouring windows share what they
-// read of shared memory. It loads one at a time, as memory is read.
+// Tiles of one channel, with a halo of the window's radius. A lane of a host takes 16 adjacent pixels, which its
+// compiler puts in vector registers. Its tiles are large: long runs of memory, little halo. A lane of a device takes
+// four: adjacent along rows, below each other down columns. So neighbouring windows share reads of shared memory. It
+// loads one at a time, as memory is read.
 template <execution E>
 struct loss_tiles {
   static constexpr int block = E::device ? 4 : 16, load_block = E::device ? 1 : 16;

@@ -2,7 +2,7 @@
 /// \file
 /// How good a render is, against the truth, in double on the host's cores: PSNR and SSIM as papers report them. Renders
 /// are clamped to [0, 1] first. Straight alpha of a photograph is composited on the background. Pixels that a mask
-/// excludes count in neither sum of PSNR; for SSIM, whose windows need them, they are made to hold the truth.
+/// excludes count in neither sum of PSNR. For SSIM, whose windows need them, they are set to the truth.
 /// Errors: invalid_argument where the sizes differ or an image is empty.
 
 #include <gart/core/error.hpp>
@@ -87,8 +87,8 @@ inline double psnr(image_float const& render, image_float const& truth) {
                  : std::numeric_limits<double>::infinity();
 }
 
-/// Of a render whose excluded pixels equal the truth, `share` of the pixels being left: the mean of the squares over
-/// all pixels is `share` times the mean over those that count.
+/// For a render whose excluded pixels equal the truth and a `share` of counted pixels: the mean square over all pixels
+/// is `share` times the mean over those that count.
 inline double masked_psnr(image_float const& render, image_float const& truth, double share) {
   return psnr(render, truth) + 10 * std::log10(share);
 }

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// Float arithmetic whose rounding is fixed by the source, not by the compiler's choice to contract a*b+c.
-/// Whatever decides a hit, an order or an address is written in these, so forward and backward, every traverser and (on
-/// hosts with FMA) every policy compute the same bits. Host code that uses gart is built with -ffp-contract=off, which
-/// the CMake target carries; on a device the intrinsics are never contracted.
+/// Float arithmetic whose rounding is fixed by the source, not by the compiler's choice to contract a*b+c. Code that
+/// decides a hit, an order or an address uses these. So forward and backward, every traverser and (on hosts with FMA)
+/// every policy compute the same bits. Host code that uses gart is built with -ffp-contract=off, which the CMake target
+/// carries; on a device the intrinsics are never contracted.
 
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "gart decides hits by IEEE arithmetic: compile what includes it without -ffast-math and -ffinite-math-only"
@@ -95,9 +95,9 @@ GART_HD GART_INLINE u32 float_to_bits(float f) {
 #endif
 }
 
-/// Reciprocals of several numbers, the bits of reciprocal(). A device's is an estimate and a Newton step, and a branch
-/// where the number or its reciprocal is not normal, for which everything around it waits. Here the steps are taken for
-/// all of them, and one branch is left.
+/// Reciprocals of several numbers, the bits of reciprocal(). A device's is an estimate and a Newton step. Where the
+/// number or its reciprocal is not normal it branches, and everything around it waits. Here the steps are taken for all
+/// of them, and one branch is left.
 template <int N>
 GART_HD GART_INLINE void reciprocals(float (&a)[N]) {
 #if defined(__CUDA_ARCH__)

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Double arithmetic whose rounding is fixed by the source, as math/arith.hpp has it for floats: for what is worked out
-/// in double and decides hits, such as the rays of lenses. Products and sums are rounded one by one on every machine.
-/// Formulas are templates over the number, and take double itself where bits do not count.
+/// Double arithmetic whose rounding is fixed by the source, the counterpart of math/arith.hpp for floats. It serves
+/// values in double that decide hits, such as the rays of lenses. Products and sums are rounded one by one on every
+/// machine. Formulas are templates over the number, and take double itself where bits do not count.
 
 #include <gart/core/macros.hpp>
 
@@ -78,8 +78,8 @@ GART_HD inline sine_cosine turned(sine_cosine const& s, double quarters) {
   }
 }
 
-/// Of `part` / `whole` quarters of a turn, which are whole numbers or halves: angles that lie a quarter apart have the
-/// same bits, but for their places and signs.
+/// Of `part` / `whole` quarters of a turn, whole numbers or halves. Angles that lie a quarter apart have the same bits,
+/// but for their places and signs.
 GART_HD inline sine_cosine sine_cosine_of_quarters(double part, double whole) {
   double const quarters = floor(part / whole + 0.5);
   return turned(small_sine_cosine(fixed_double(part - quarters * whole) / fixed_double(whole) * 1.5707963267948966),

@@ -1,18 +1,18 @@
 #pragma once
 /// \file
-/// Where on the image a Gaussian can be hit: its ellipsoid |p|^2 <= cutoff, which the bounds of a camera are of
-/// (camera/model.hpp), and the perspective-correct bounds of one for a pinhole.
+/// Where on the image a Gaussian can be hit: its ellipsoid |p|^2 <= cutoff, which a camera bounds (camera/model.hpp),
+/// and its perspective-correct bounds for a pinhole.
 ///
-/// In camera space the ellipsoid is m + A s, |s| <= 1, A = c W R S with c^2 the cutoff and rows A_x, A_y, A_z. Planes
-/// x = u z through the camera touch it where (m_x - u m_z)^2 = |A_x - u A_z|^2, a quadratic in u: the roots are the
+/// In camera space the ellipsoid is m + A s, |s| <= 1, A = c W R S with c^2 the cutoff and rows A_x, A_y, A_z. Planes x
+/// = u z through the camera touch it where (m_x - u m_z)^2 = |A_x - u A_z|^2, a quadratic in u. The roots are the
 /// bounds of x / z when the ellipsoid lies in front of the camera (the paper's centre p and half-extent h in another
-/// form). When it crosses the near plane z = n only the part in front counts: a root is a bound if it touches at z >=
-/// n, and the section with the near plane, an ellipse, gives the others. So a Gaussian beside the camera, or around it,
-/// gets the box of what can be seen of it, never more than the section demands.
+/// form). When it crosses the near plane z = n only the part in front counts. A root is a bound if it touches at z >=
+/// n; the section with the near plane, an ellipse, gives the others. So a Gaussian beside or around the camera gets the
+/// box of its visible part, never more than the section demands.
 ///
-/// All in double: the quadratic of a small far ellipsoid cancels to a few digits in float. Then widened by what float
-/// arithmetic can move a hit (32 roundings of the distance) and a hundredth of a pixel: no pixel that hits lies
-/// outside.
+/// All in double: the quadratic of a small far ellipsoid cancels to a few digits in float. The box is then widened by
+/// what float arithmetic can move a hit (32 roundings of the distance) and a hundredth of a pixel. No pixel that hits
+/// lies outside.
 
 #include <gart/math/ray_gaussian.hpp>
 
@@ -37,8 +37,8 @@ struct pixel_box {
 struct footprint {
   pixel_box box;    ///< empty where it cannot be
   float depth = 0;  ///< no hit has a smaller one, along what its camera measures depth: conservative near depth
-  /// Of an image whose right border goes on at its left one: its width where the box goes on past it, its columns from
-  /// there on the image's from 0 on; else 0. Such a box leaves out seam_room columns or more.
+  /// For an image whose right border goes on at its left one: its width where the box goes on past it, and the box's
+  /// columns from there on are the image's from 0 on. Else 0. Such a box leaves out seam_room columns or more.
   u16 seam = 0;
 
   static constexpr int seam_room = 32;  ///< as wide as the widest tile: no tile holds both ends of a box

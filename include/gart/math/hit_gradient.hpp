@@ -29,9 +29,9 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy; then the error that is seen through the
-/// Gaussian, the sum over its hits of w times the pixel's error, by which densification finds where more are needed;
-/// and one of padding (16-byte words).
+/// The ten sums, as floats in memory: m0, m1 xyz, m2 xx yy zz yz xz xy. Then the error seen through the Gaussian, the
+/// sum over its hits of w times the pixel's error, by which densification finds where more are needed. Then one of
+/// padding (16-byte words).
 inline constexpr int moment_count = 11;
 inline constexpr int error_place = 10;    ///< the place of the error
 inline constexpr int moment_stride = 12;  ///< floats a Gaussian

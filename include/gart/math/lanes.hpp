@@ -1,11 +1,11 @@
 #pragma once
 /// \file
-/// Several floats at a time, one a lane, for the host policies: the formulas of math/ are templates over the number,
-/// and give a lane the bits they give a float. As many lanes as the widest registers of the instruction set that is
-/// compiled for hold: 16, 8 or 4 (core/isa.hpp has the one with 16).
+/// Several floats at a time, one a lane, for the host policies. The formulas of math/ are templates over the number,
+/// and give a lane the bits of a float. As many lanes as the widest registers of the instruction set that is compiled
+/// for hold: 16, 8 or 4 (core/isa.hpp has the one with 16).
 ///
-/// A comparison gives a lane_mask, one bit a lane where the machine has such registers, else all bits of a lane set or
-/// none; select takes the place of ?:. The vectors are the compiler's (GCC, Clang); intrinsics stand only where the
+/// A comparison gives a lane_mask: one bit a lane where the machine has such registers, else all bits of a lane set or
+/// none. select takes the place of ?:. The vectors are the compiler's (GCC, Clang). Intrinsics serve only where the
 /// language has no word: masks, fused multiply-add, and the transposition of four numbers a lane.
 
 #include <gart/math/arith.hpp>

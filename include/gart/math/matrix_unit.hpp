@@ -1,8 +1,8 @@
 #pragma once
 /// \file
 /// Products of small matrices by a GPU's matrix units, from floats to floats. A unit takes numbers of 11 significant
-/// bits (tf32); a float is the sum of two such and of less than 2^-20 of it, and of the four products of two such sums
-/// the least is left out. So a product is within 2^-19 of itself, as good as one of floats where many are summed.
+/// bits (tf32). A float is the sum of two such, to 2^-20 of it. Of the four products of two such sums the least is left
+/// out. So a product is within 2^-19 of itself, as good as one of floats where many are summed.
 ///
 /// A warp multiplies together: with `row` = lane / 4 and `column` = lane % 4, a lane holds
 ///   a  16 x 8, elements (row, column), (row + 8, column), (row, column + 4), (row + 8, column + 4)

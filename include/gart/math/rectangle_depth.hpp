@@ -1,18 +1,18 @@
 #pragma once
 /// \file
-/// How near rays from one point can hit a Gaussian where they pass through a parallelogram of a plane: of all points
-/// d = u x + v y + z of it, u and v of a rectangle, a lower bound of the factor by which the ray reaches the hit from
-/// d. For the axes x, y, z of a camera u and v are slopes, and the factor is the hit's depth in camera space.
+/// How near rays from one point can hit a Gaussian where they pass through a parallelogram of a plane. For all points d
+/// = u x + v y + z, u and v of a rectangle: a lower bound of the factor by which the ray reaches the hit from d. For
+/// the axes x, y, z of a camera u and v are slopes, and the factor is the hit's depth in camera space.
 ///
 /// With rows m_k of M the factor at the largest response is
 ///   N / Q,  N = -sum_k o_k (m_k . d),  Q = sum_k (m_k . d)^2.
-/// N is linear in u and v and Q convex, so {N >= c Q} is convex for c >= 0: N / Q is quasi-concave where it is
+/// N is linear in u and v and Q convex, so {N >= c Q} is convex for c >= 0. So N / Q is quasi-concave where it is
 /// positive, and its least value over a rectangle lies at a corner. What rounding can move it, at a corner or at a hit,
 /// is taken off N and added to |m_k . d| in a way that leaves the one linear and the other convex: the bound holds for
 /// every ray.
 ///
 /// Where the rays' origins are o + s h, -1 <= s <= 1, the bound is (N - k sqrt(Q)) / Q, k = |M h|, with N of rays from
-/// o: sqrt(Q) is convex too, and the least value still lies at a corner.
+/// o. Since sqrt(Q) is convex too, the least value still lies at a corner.
 
 #include <gart/math/ray_gaussian.hpp>
 

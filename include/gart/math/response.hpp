@@ -3,8 +3,8 @@
 /// How the response of a Gaussian falls from its centre: the generalised Gaussians of 3DGRT (Moenne-Loccoz et al.
 /// 2024),
 ///   rho = exp(s |p|^n),  s = -4.5 / 3^n,  n in {1, 2, 3, 4, 5, 8},
-/// equal at the centre and at three standard deviations. n = 2 is the Gaussian, a larger n flatter inside and steeper
-/// at the rim, so that fewer Gaussians cover a surface and rays meet fewer of them; n = 1 has a cusp at its centre.
+/// equal at the centre and at three standard deviations. n = 2 is the Gaussian. A larger n is flatter inside and
+/// steeper at the rim, so fewer Gaussians cover a surface and rays meet fewer of them. n = 1 has a cusp at its centre.
 /// Everything else that asks for a Response takes one of these types. A response offers, all of the squared distance
 /// |p|^2:
 ///   response(d2)   rho

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Real spherical harmonics to degree 3 with the signs and order of the 3DGS files: colour is
-/// max(0, 0.5 + sum_k c_k Y_k(d)), d the unit direction of the ray. A sum that is no finite number is as black as a
-/// negative one: one broken Gaussian must not spoil every ray that meets it.
+/// Real spherical harmonics to degree 3 with the signs and order of the 3DGS files: colour is max(0, 0.5 + sum_k c_k
+/// Y_k(d)), d the unit direction of the ray. A sum that is no finite number is black, like a negative one: one broken
+/// Gaussian must not spoil every ray that meets it.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
@@ -22,8 +22,8 @@ struct sh_basis {
   F y[size];                                                ///< their values
 
   sh_basis() = default;
-  /// At a unit direction. The arithmetic is fixed (math/arith.hpp): a compiler that contracts products and sums does so
-  /// otherwise in each kernel, and tracers would differ in the last bits of a colour.
+  /// At a unit direction. The arithmetic is fixed (math/arith.hpp). A compiler that contracts products and sums does so
+  /// differently in each kernel, and colours of tracers would differ in the last bits.
   GART_HD GART_INLINE explicit sh_basis(vec3_of<F> const& d) {
     y[0] = static_cast<float>(sh_constant);
     if constexpr (Degree >= 1) {
@@ -84,7 +84,7 @@ struct sh_basis {
   }
 };
 
-/// The coefficients of one Gaussian, [size][3] from `from`; those above the active degree as zero: a schedule raises
+/// The coefficients of one Gaussian, [size][3] from `from`; those above the active degree as zero. A schedule raises
 /// the degree while the storage stays, and loops over bands stay straight. Rows of a multiple of 16 bytes are read as
 /// such.
 template <int Degree>

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// Spherical harmonics turned: the coefficients c' of the function that in direction R d has what those of c have in
-/// d, for any rotation R. A band of degree l goes to itself by a matrix of 2 l + 1 rows; an entry is the integral over
-/// the sphere of Y_j(d) Y_k(R^-1 d), taken by a quadrature that is exact for polynomials of degree 7, from the basis of
-/// math/sh.hpp itself, to its roundings. Making one takes a few thousand operations, applying it 249 at degree 3.
+/// Spherical harmonics turned: the function of coefficients c' has in direction R d the value that the function of c
+/// has in d, for any rotation R. A matrix of 2 l + 1 rows maps a band of degree l to itself. An entry is the integral
+/// over the sphere of Y_j(d) Y_k(R^-1 d). A quadrature that is exact for polynomials of degree 7 takes it, from the
+/// basis of math/sh.hpp, to its roundings. Making one takes a few thousand operations, applying it 249 at degree 3.
 
 #include <gart/math/glm.hpp>
 #include <gart/math/sh.hpp>

@@ -8,9 +8,9 @@
 ///   {c + L s, |s| <= 1},  S = L L^T = (b_i . b_j) / W + e_i e_j,  W = m_z^2 - |A_z|^2,
 ///   c = m / m_z + e,      e_i = -(b_i . A_z) / W:
 /// sums of what does not cancel. It holds L as Cholesky has it, L^-1 q = (q_x / l_xx, (q_y - (S_xy / S_xx) q_x) /
-/// l_yy). What float arithmetic can move a hit is added to it as to a box (math/footprint.hpp): an ellipse of (1 + k) S
-/// + (1 + 1 / k) pad^2 holds one of S widened by pad. All in double; what is asked of each rectangle is in float. Where
-/// some of the ellipsoid is not in front of the point every rectangle meets it.
+/// l_yy). As for a box (math/footprint.hpp), the movement of a hit by float arithmetic is added: an ellipse of (1 + k)
+/// S + (1 + 1 / k) pad^2 holds one of S widened by pad. All in double; what is asked of each rectangle is in float.
+/// Where some of the ellipsoid is not in front of the point every rectangle meets it.
 
 #include <gart/math/footprint.hpp>
 

@@ -1,17 +1,17 @@
 #pragma once
 /// \file
-/// A Gaussian as a filter of standard deviation r sees it from the frame's origin: every axis widened by r, the
-/// response lowered so that what it covers, seen from there, stays the same.
+/// A Gaussian as a filter of standard deviation r sees it from the frame's origin. Every axis is widened by r, and the
+/// response is lowered so that the covered area, seen from there, keeps its sum.
 ///   S'^2 = S^2 + r^2,   sigma' = sigma sqrt(F),   F = prod S^2 d^T C^-1 d / (prod S'^2 d^T C'^-1 d),
 /// C = R S^2 R^T the covariance in world axes, d the direction of the mean. For the largest response along rays of
-/// direction d is a Gaussian of the plane across d whose covariance is what C leaves there, of determinant
-/// det C d^T C^-1 d; a filter adds r^2 to it, and F is the ratio of the determinants, the square of that of the areas.
-/// With u the direction in the Gaussian's axes and a_k = s_k^2 / r^2 both are sums of positive terms:
+/// direction d is a Gaussian of the plane across d. Its covariance is the section of C there, of determinant det C d^T
+/// C^-1 d. A filter adds r^2 to it. F is the ratio of the determinants, the square of that of the areas. With u the
+/// direction in the Gaussian's axes and a_k = s_k^2 / r^2 both are sums of positive terms:
 ///   F = N / N',   N = sum u_k^2 a_i a_j,   N' = sum u_k^2 (1 + a_i)(1 + a_j)   ({i, j, k} all three axes).
 /// Responses of another degree than 2 keep their own shape, and so what they cover, not the filter's.
 ///
-/// The result is a gaussian_parameters again, so that whatever takes those (records, boxes, footprints) takes one and
-/// the same widened Gaussian; its arithmetic is fixed. Where it would be no Gaussian it is left alone, to be culled.
+/// The result is a gaussian_parameters again, so records, boxes and footprints take one and the same widened Gaussian.
+/// Its arithmetic is fixed. Where it would be no Gaussian it is left alone, to be culled.
 
 #include <gart/math/hit_gradient.hpp>
 
@@ -81,8 +81,8 @@ GART_HD GART_INLINE gaussian_parameters widened(gaussian_parameters const& g, ve
   return out;
 }
 
-/// The largest share of its opacity that a Gaussian keeps under a filter, of all directions it may be seen from: along
-/// its shortest axis, where the other two are widened. F is a mean of such products, weighted by the direction.
+/// The largest share of its opacity that a Gaussian keeps under a filter, over all directions: along its shortest axis,
+/// where the other two are widened. F is a mean of such products, weighted by the direction.
 GART_HD GART_INLINE float largest_share_left(vec3 const& log_scale, float r) {
   float left[3];
   for (int k = 0; k < 3; ++k) {

@@ -1,19 +1,19 @@
 #pragma once
 /// \file
-/// Adam (Kingma and Ba, 2015) over every parameter of every Gaussian in one launch, with a rate per group; the colour's
-/// constant term has a rate of its own. With g the gradient and t the step, counted from 1,
+/// Adam (Kingma and Ba, 2015) over every parameter of every Gaussian in one launch, with a rate per group. The colour's
+/// constant term has its own rate. With g the gradient and t the step, counted from 1,
 ///   m = b1 m + (1 - b1) g,  v = b2 v + (1 - b2) g^2,  p -= rate * m / (1 - b1^t) / (sqrt(v / (1 - b2^t)) + epsilon).
 /// An element whose gradient (or update) is not finite keeps its value and moments, and is counted. Bound by memory:
 /// 28 bytes moved an element.
 ///
-/// With options.sparse a Gaussian whose mean has no gradient, one that no ray of the step met, keeps its parameters
-/// and moments: 12 bytes of it are read for each of five groups, and none written. Its moments wait until it is seen
-/// again instead of fading, and so do penalties on it.
+/// With options.sparse a Gaussian whose mean has no gradient (no ray of the step met it) keeps its parameters and
+/// moments. Of each of its five groups 12 bytes are read, and none written. Its moments wait until it is seen again
+/// instead of fading, and so do penalties on it.
 ///
-/// options.sh_pull is the derivative of a penalty on the square of the bands of colour above the first: fast rates make
-/// them follow the noise of single views, which the pull takes out (L2 regularization). It joins the gradient here,
-/// where the coefficient is read anyway. A coefficient without a gradient is not pulled: what a view does not show, it
-/// does not fade, however many views there are.
+/// options.sh_pull is the derivative of a penalty on the square of the bands of colour above the first. Fast rates make
+/// them follow the noise of single views, which the pull removes (L2 regularization). It joins the gradient here, where
+/// the coefficient is read anyway. A coefficient without a gradient is not pulled: what a view does not show, it does
+/// not fade, however many views there are.
 
 #include <gart/exec/concepts.hpp>
 #include <gart/math/arith.hpp>
@@ -52,10 +52,9 @@ struct adam_element {
 struct adam_rule {
   float beta1 = 0, beta2 = 0, epsilon = 0, second_correction = 1;  ///< 1 / sqrt(1 - b2^t)
 
-  ///@{
-  /// Of a step, counted from 1; of steps of a batch of images `step` counts images. A batch is as many steps of one
-  /// image at once, where these are small: betas^batch, epsilon / sqrt(batch), and rates times sqrt(batch), which are
-  /// the caller's (Malladi et al., On the SDEs and Scaling Rules for Adaptive Gradient Algorithms, 2022).
+  /// @{ Of a step, counted from 1; of steps of a batch of images `step` counts images. A batch equals as many steps of
+  /// one image, where these are small: betas^batch, epsilon / sqrt(batch), and rates times sqrt(batch), which the
+  /// caller applies (Malladi et al., On the SDEs and Scaling Rules for Adaptive Gradient Algorithms, 2022).
   adam_rule() = default;
   adam_rule(adam_options const& o, int step, int batch = 1)
       : beta1(batch == 1 ? o.beta1 : std::pow(o.beta1, static_cast<float>(batch))),
@@ -303,8 +302,8 @@ class adam_pass {
   void all(E& exec) const { launch(exec, 0); }
   /// All but the colours, whose gradient need not be there yet.
   void geometry(E& exec) const { launch(exec, with_.group_of(sh_array) + 1); }
-  /// The colours, by gradients that are in no memory: calls launch(take), whose kernel is to call take(row, first,
-  /// piece) for all floats of each Gaussian's colours: a quad of them, or one in piece.v, from number `first` on.
+  /// The colours, by gradients that lie in no memory. Calls launch(take), whose kernel calls take(row, first, piece)
+  /// for all floats of each Gaussian's colours: a quad of them, or one in piece.v, from number `first` on.
   template <class Launch>
   void colors(Launch&& launch) const {
     with_kernel([&]<class Kernel>(Kernel const& k) { launch(detail::adam_colors<Kernel>{k}); });

@@ -12,8 +12,8 @@
 ///   dL/dw = sum_i [ -(mean_i - p) x dL/dmean_i - torque_i + turn_i ]
 /// torque_i is the gradient by a small turn of the Gaussian in the world, half the vector part of dL/dq q*
 /// (math/quaternion.hpp). turn_i is that of its colours (math/sh_turn.hpp). No ray is traced again. It holds for every
-/// strategy, any function of the image, with or without the filter of the pixels, and any camera whose rays all move
-/// with its pose.
+/// method and any function of the image, with or without the filter of the pixels, and for any camera whose rays all
+/// move with its pose.
 ///
 /// Gaussians whose mean and first band have no gradient were not seen, and only cost their reads. Numbers that are not
 /// finite are skipped. Sums over lanes are in double, in an order that depends on the number of Gaussians only. Several

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// What the renderer is held against: the definition of an image and of its gradients, evaluated in double with nothing
-/// that makes it fast but one test that leaves out what cannot be met. It shares no code with the kernels.
+/// The reference of the renderer: the definition of an image and of its gradients, in double. One test alone makes it
+/// faster: it leaves out Gaussians that cannot be met. It shares no code with the kernels.
 ///
 /// For a ray o + t d, |d| = 1, and a Gaussian with M = S^-1 R^T:
 ///   o_g = M (o - mean), d_g = M d, t = -o_g.d_g / d_g.d_g, p = o_g + t d_g,
@@ -50,11 +50,11 @@ struct reference_image {
 std::vector<u32> all_pixels(camera const& view);
 
 /// The pixels `pixels` of a view, each at most once; bands above `active_degree` are not evaluated. With a
-/// `color_gradient`, dL/dcolour as [n][3], also the gradient of every parameter, summed over these pixels; with a
-/// `depth_gradient`, dL/ddepth as [n], that of the depth besides. Errors:
-/// invalid_argument for a pixel outside the image or named twice, a gradient of another size, a degree the model does
-/// not have, and a pixel at which a lens of k1, k2, p1 and p2 cannot be inverted; unsupported for a filter of pixels
-/// through any camera but a pinhole and such a lens.
+/// `color_gradient`, dL/dcolour as [n][3], also the gradient of every parameter, summed over these pixels. A
+/// `depth_gradient`, dL/ddepth as [n], adds that of the depth. Errors: invalid_argument for a pixel outside the image
+/// or named twice, a gradient of another size, a degree the model does not have, and a pixel where a lens of k1, k2, p1
+/// and p2 cannot be inverted. unsupported for a filter of pixels through any other camera than a pinhole and such a
+/// lens.
 reference_image trace_reference(gaussian_model const& model, camera const& view, render_options const& options,
                                 int active_degree, std::vector<u32> const& pixels,
                                 std::vector<double> const& color_gradient = {}, int kernel_degree = 2,

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// An image's colour in 8 bits a channel, made where it was rendered: [H][W][3] in floats to [H][W][3], or to
-/// [H][W][4] with 255 after red, green and blue. Clamped and rounded as to_8bit (io/image_file.hpp) does it; NaN
-/// becomes 0. Cost: a launch over the pixels.
+/// An image's colour in 8 bits a channel, made where it was rendered: floats [H][W][3] to [H][W][3], or to [H][W][4]
+/// with 255 after red, green and blue. Clamped and rounded as to_8bit (io/image_file.hpp) does it; NaN becomes 0. Cost:
+/// a launch over the pixels.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>
@@ -28,8 +28,8 @@ struct color_to_bytes {
 
 }  // namespace render_kernels
 
-/// Colours [pixels][3], floats, to `bytes`, [pixels][channels], 3 or 4 of them: 0 to 1 becomes 0 to 255, rounded, what
-/// lies outside is clamped; a fourth channel is 255.
+/// Colours [pixels][3], floats, to `bytes`, [pixels][channels], 3 or 4 channels. 0 to 1 becomes 0 to 255, rounded and
+/// clamped; a fourth channel is 255.
 template <execution E>
 void color_to_bytes(E& exec, float const* color, index_t pixels, u8* bytes, int channels) {
   parallel_for(exec, "8 bits", pixels, render_kernels::color_to_bytes{color, bytes, channels});

@@ -94,8 +94,8 @@ struct composite : ray_program_base {
 
   /// The same in steps, for rays that meet a Gaussian together (trace/warp_walk.hpp).
   static constexpr int row_floats = 3 * sh_basis<ShDegree>::size;
-  static constexpr bool places_hits = Record::any;  ///< hits are told apart by places
-  using cell = typename Record::cell;               ///< finds them
+  static constexpr bool uses_slots = Record::any;  ///< hits are told apart by places
+  using cell = typename Record::cell;              ///< finds them
   /// Where the rows of coefficients begin.
   GART_HD float const* rows_from() const { return sh; }
   /// Floats of a row that the active degree needs.

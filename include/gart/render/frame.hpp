@@ -9,8 +9,8 @@
 ///
 /// The scene's arrays and the policy must outlive what is done with the frame. Cost of prepare: a launch over the
 /// Gaussians and the tracer's own preparation; of render: a ray a pixel. Memory: 64 bytes a Gaussian, 16 more where the
-/// options have a filter of the pixels, and the tracer's. Errors: invalid_argument for a camera or options that no ray
-/// can be traced by, and for what needs a frame that was not prepared.
+/// options have a filter of the pixels, and the tracer's. Errors: invalid_argument for a camera or options that rays
+/// cannot be traced by, and for calls that need a prepared frame.
 
 #include <gart/exec/stage.hpp>
 #include <gart/render/antialiased.hpp>

@@ -1,8 +1,9 @@
 #pragma once
 /// \file
-/// What the forward pass leaves of each hit for the backward pass to find; part of a strategy (backward/strategy.hpp).
-/// A record says where a hit belongs when it is found, and is called once a hit, after it has been composited. On hosts
-/// it also takes the hits of one Gaussian with a packet of rays at once (trace/packet_walk.hpp).
+/// What the forward pass leaves of each hit for the backward pass to find; part of a method
+/// (backward/gradient_method.hpp). A record says where a hit belongs when it is found, and is called once a hit, after
+/// it has been composited. On hosts it also takes the hits of one Gaussian with a packet of rays at once
+/// (trace/packet_walk.hpp).
 
 #include <gart/render/pixels.hpp>
 #include <gart/trace/hit.hpp>
@@ -42,8 +43,8 @@ concept hit_record = std::is_trivially_copyable_v<R> &&
   typename R::entry;                            // what a place holds, with a `name`
   typename R::cell;                             // as warp_program has it
   { r.place_of(id, at) } -> std::same_as<u32>;  // where the hit of Gaussian `id` at that pixel belongs
-  // The colour that the pixel would have if the hit were opaque, the hit's weight T alpha, its colour before the clamp;
-  // of a record with depth the depth that it would have.
+  // The colour that the pixel would have if the hit were opaque, the hit's weight T alpha, its colour before the clamp.
+  // A record with depth also has the pixel's depth if the hit were opaque.
   r(place, color, weight, color);
 } && detail::packet_record<R>;
 

@@ -33,7 +33,7 @@ rendered render_image(Frame& frame) {
   return rendered_of(view, color, transmittance, depth, hits);
 }
 
-/// The colours of a frame that is prepared, as to_8bit makes them of render_image's, made before they are copied: 3
+/// The colours of a prepared frame, the same as to_8bit of render_image's. They are made before they are copied: 3
 /// bytes a pixel, where those images have 24.
 template <class Frame>
 image8 render_image_8bit(Frame& frame) {

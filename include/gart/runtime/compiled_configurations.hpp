@@ -1,13 +1,13 @@
 #pragma once
 /// \file
-/// Turns templates into configurations: sessions and renderers of a policy, traits, a tracer and a strategy. Include it
+/// Turns templates into configurations: sessions and renderers of a policy, traits, a tracer and a method. Include it
 /// where the policy's kernels can be compiled. In GART_REGISTER_CONFIGURATIONS call register_configurations for all SH
 /// degrees, or register_configuration_of for one configuration, which takes models up to its degree:
 ///   using response = gart::generalized_gaussian<4>;
 ///   GART_REGISTER_CONFIGURATIONS(my_configurations,
 ///                                gart::register_configuration_of<gart::openmp_exec, gart::scene_traits<3, response>,
 ///                                                                gart::tile_tracer<gart::openmp_exec, 8, response>,
-///                                                                gart::primitive_strategy>(-1))
+///                                                                gart::primitive_method>(-1))
 
 #include <gart/runtime/compiled_renderer.hpp>
 #include <gart/runtime/registry.hpp>
@@ -16,7 +16,7 @@
 namespace gart { inline namespace GART_ISA {
 
 /// A session of one configuration.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
+template <execution E, class Traits, class Tracer, gradient_method Method, class Comm = self_comm>
 class compiled_session final : public session {
  public:
   /// For make_session; `start` has the request's degree.
@@ -51,48 +51,48 @@ class compiled_session final : public session {
   std::size_t hit_buffer_bytes() const override { return trainer_.hit_buffer_bytes(); }
   u64 sent_bytes() const override { return trainer_.sent_bytes(); }
   configuration_info configuration() const override {
-    return configuration_of<E, Traits, Tracer, Strategy, Comm>(trainer_.degree());
+    return configuration_of<E, Traits, Tracer, Method, Comm>(trainer_.degree());
   }
 
  private:
   E exec_;
-  trainer<E, Traits, Tracer, Strategy, Comm> trainer_;
+  trainer<E, Traits, Tracer, Method, Comm> trainer_;
 };
 
 /// One configuration; with a communicator other than self_comm for training on several ranks.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
+template <execution E, class Traits, class Tracer, gradient_method Method, class Comm = self_comm>
 void register_configuration_of(int rank, bool (*available)(std::string*) = always_available) {
-  register_configuration({configuration_of<E, Traits, Tracer, Strategy, Comm>(), rank, available,
+  register_configuration({configuration_of<E, Traits, Tracer, Method, Comm>(), rank, available,
                           [](configuration_request const& request) -> std::unique_ptr<renderer> {
-                            return std::make_unique<compiled_renderer<E, Traits, Tracer, Strategy>>(request);
+                            return std::make_unique<compiled_renderer<E, Traits, Tracer, Method>>(request);
                           },
                           [](configuration_request const& request, train_options const& options, dataset const& data,
                              start_model const& start) -> std::unique_ptr<session> {
-                            return std::make_unique<compiled_session<E, Traits, Tracer, Strategy, Comm>>(
-                                request, options, data, start);
+                            return std::make_unique<compiled_session<E, Traits, Tracer, Method, Comm>>(request, options,
+                                                                                                       data, start);
                           }});
 }
 
 /// For SH degree 0, and for 1 to 3 in rows of degree 3.
-template <execution E, class Tracer, strategy Strategy, class Comm = self_comm>
+template <execution E, class Tracer, gradient_method Method, class Comm = self_comm>
 void register_configurations(int rank, bool (*available)(std::string*) = always_available) {
-  register_configuration_of<E, scene_traits<0>, Tracer, Strategy, Comm>(rank, available);
-  register_configuration_of<E, scene_traits<3>, Tracer, Strategy, Comm>(rank, available);
+  register_configuration_of<E, scene_traits<0>, Tracer, Method, Comm>(rank, available);
+  register_configuration_of<E, scene_traits<3>, Tracer, Method, Comm>(rank, available);
 }
 
-/// Configurations with depth gradients: the primitive strategy for all SH degrees.
+/// Configurations with depth gradients: the primitive method for all SH degrees.
 template <execution E, class Tracer>
 void register_depth(int rank, bool (*available)(std::string*) = always_available) {
-  register_configurations<E, Tracer, with_depth<primitive_strategy>>(rank, available);
+  register_configurations<E, Tracer, with_depth<primitive_method>>(rank, available);
 }
 
-/// All strategies, ranked from first_rank in the list's order. On hosts those with ordered sums are left to the
+/// All methods, ranked from first_rank in the list's order. On hosts those with ordered sums are left to the
 /// variants.
 template <execution E, class Tracer>
-void register_strategies(int first_rank, bool (*available)(std::string*) = always_available) {
+void register_methods(int first_rank, bool (*available)(std::string*) = always_available) {
   int rank = first_rank;
-  strategies::for_each([&]<strategy Strategy>(Strategy) {
-    if constexpr (E::device || !Strategy::ordered) register_configurations<E, Tracer, Strategy>(rank++, available);
+  gradient_methods::for_each([&]<gradient_method Method>(Method) {
+    if constexpr (E::device || !Method::ordered) register_configurations<E, Tracer, Method>(rank++, available);
   });
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The renderer (runtime/renderer.hpp) of a policy, traits, a tracer and a strategy. It holds a frame, a backward pass,
+/// The renderer (runtime/renderer.hpp) of a policy, traits, a tracer and a method. It holds a frame, a backward pass,
 /// and memory for arrays that the caller does not give. Contexts of views have frames and passes of their own, which
 /// the renderer lends and gets back.
 
@@ -21,7 +21,7 @@
 namespace gart { inline namespace GART_ISA {
 
 /// The renderer of one configuration.
-template <execution E, class Traits, class Tracer, strategy Strategy>
+template <execution E, class Traits, class Tracer, gradient_method Method>
 class compiled_renderer final : public renderer {
  public:
   static constexpr int sh_degree = Traits::sh_degree;  ///< that rows of coefficients have room for
@@ -169,11 +169,11 @@ class compiled_renderer final : public renderer {
   }
   std::size_t peak_bytes() const override { return exec_.memory.peak + (rays_ ? rays_->peak_bytes() : 0); }
   std::size_t hit_buffer_bytes() const override { return pass_.hit_buffer_bytes(); }
-  configuration_info configuration() const override { return configuration_of<E, Traits, Tracer, Strategy>(degree_); }
+  configuration_info configuration() const override { return configuration_of<E, Traits, Tracer, Method>(degree_); }
 
  private:
   using frame_type = frame<E, Traits, Tracer>;
-  using pass_type = backward_pass<frame_type, Strategy>;
+  using pass_type = backward_pass<frame_type, Method>;
   using shown_type = shown_view<frame_type, pass_type>;
 
   class view_context final : public forward_context {

@@ -2,7 +2,7 @@
 /// \file
 /// What templates are as a configuration, and the policy that a request asks for.
 
-#include <gart/backward/strategies.hpp>
+#include <gart/backward/gradient_methods.hpp>
 #include <gart/comm/self_comm.hpp>
 #include <gart/core/isa.hpp>
 #include <gart/exec/concepts.hpp>
@@ -13,18 +13,18 @@
 namespace gart { inline namespace GART_ISA {
 
 /// What the templates are called at run time, for a model of a degree up to theirs.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
+template <execution E, class Traits, class Tracer, gradient_method Method, class Comm = self_comm>
 configuration_info configuration_of(int sh_degree = Traits::sh_degree) {
   using response = typename Traits::response;
   configuration_info configuration;
   configuration.backend = from_string(E::name, backend_kind::automatic);
   configuration.tracer = from_string(Tracer::name, tracer_kind::own);
-  configuration.backward = Strategy::name;
+  configuration.backward = Method::name;
   configuration.sh_degree = sh_degree, configuration.stored_degree = Traits::sh_degree;
   configuration.kernel_degree = response::degree;
   configuration.hit_format =
-      from_string(Strategy::template record<Tracer::tile_size>::entry::name, hit_format_kind::none);
-  configuration.depth = has_depth<Strategy>;
+      from_string(Method::template record<Tracer::tile_size>::entry::name, hit_format_kind::none);
+  configuration.depth = has_depth<Method>;
   configuration.ranks = !Comm::alone;
   if constexpr (!E::device) configuration.instruction_set = instruction_set;
   return configuration;

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Scores of rendered views against photographs: PSNR and SSIM (gart/loss/metrics.hpp), and as a diagnostic PSNR after
-/// each view's best affine colour (gart/loss/affine_color.hpp); the mean over views.
+/// Scores of rendered views against photographs: PSNR and SSIM (gart/loss/metrics.hpp), means over views. A diagnostic
+/// is PSNR after each view's best affine colour (gart/loss/affine_color.hpp).
 /// Errors: gart::error, naming the view, where the render has another size than the photograph.
 
 #include <gart/exposure/exposure_field.hpp>

@@ -1,7 +1,8 @@
 #pragma once
 /// \file
 /// The kinds that choose a configuration, with their names (core/names.hpp). `automatic` is the best on this machine.
-/// `own` is a tracer that a program wrote for itself. Backward strategies go by their names (backward/strategies.hpp).
+/// `own` is a tracer that a program wrote for itself. Gradient methods go by their names
+/// (backward/gradient_methods.hpp).
 
 #include <gart/core/names.hpp>
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Light among the Gaussians behind one host-safe interface: a model, a scene of meshes and lights, and pictures of
-/// them that grow better by the sample.
+/// Light among the Gaussians behind one host-safe interface: a model, a scene of meshes and lights, and pictures that
+/// improve with each sample.
 ///
 ///   auto tracer = make_path_renderer(request);
 ///   tracer->set_model(model);
@@ -11,8 +11,8 @@
 ///   image_float picture = tracer->picture();
 ///
 /// Memory: the tree over the Gaussians as for batches, 150 bytes a triangle, 150 bytes a pixel.
-/// Errors: unsupported where light is not compiled for the backend; invalid_argument for options, scenes and cameras
-/// that nothing can be traced by, and for a picture before there is a sample; out_of_memory.
+/// Errors: unsupported where light is not compiled for the backend. invalid_argument for options, scenes and cameras
+/// that cannot be traced, and for a picture before there is a sample. out_of_memory.
 
 #include <gart/exec/profile.hpp>
 #include <gart/light/path_options.hpp>

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Batches of rays for renderers. One compiled service for each policy and response serves all tracers, strategies and
+/// Batches of rays for renderers. One compiled service for each policy and response serves all tracers, methods and
 /// SH degrees. A library registers its services when it is loaded. A program adds one for its own response by
 /// register_rays (runtime/compiled_rays.hpp).
 

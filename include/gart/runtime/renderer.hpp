@@ -51,9 +51,9 @@ class renderer {
   /// between two views counts for the second, on the same stream.
   virtual void bind(gaussians_view<float const> parameters) = 0;
 
-  /// Features in memory of the policy, in place of those that the model came with; they must stay until others are
-  /// bound, or another model is set or bound. What is written to them between two views counts for the second. Errors:
-  /// invalid_argument where they are not of each Gaussian, or more than 512.
+  /// Features in memory of the policy, in place of the model's own. They must stay until others are bound, or another
+  /// model is set or bound. What is written to them between two views counts for the second. Errors: invalid_argument
+  /// where they are not of each Gaussian, or more than 512.
   virtual void bind_channels(gaussian_channels const& channels) = 0;
 
   /// A view to host memory; its features too where they are asked for, and there are any.
@@ -64,7 +64,7 @@ class renderer {
   /// A view to memory of the policy.
   virtual void render_to(camera const& view, render_options const& options, render_targets const& targets) = 0;
 
-  /// The forward and the backward pass of a view by the configuration's strategy, for dL/dcolour [H][W][3]. The
+  /// The forward and the backward pass of a view by the configuration's method, for dL/dcolour [H][W][3]. The
   /// gradients stay where the policy computes until they are fetched. The profiler's stage "gradients" holds both
   /// passes and their preparation. Errors: invalid_argument for a gradient of another size than the view.
   virtual void differentiate(camera const& view, render_options const& options, image_float const& color_gradient) = 0;
@@ -102,8 +102,7 @@ class renderer {
   virtual profiler& profile() = 0;
   /// Most bytes of the policy's memory that were in use at a time.
   virtual std::size_t peak_bytes() const = 0;
-  virtual std::size_t hit_buffer_bytes()
-      const = 0;  ///< of the last differentiate; 0 where the strategy records nothing
+  virtual std::size_t hit_buffer_bytes() const = 0;  ///< of the last differentiate; 0 where the method records nothing
   /// What was chosen for the request.
   virtual configuration_info configuration() const = 0;
 };

@@ -17,7 +17,7 @@ class mpi_comm;
 struct configuration_request {
   backend_kind backend = backend_kind::automatic;  ///< where it computes
   tracer_kind tracer = tracer_kind::automatic;     ///< what finds the hits
-  std::string backward = "auto";  ///< a strategy by its name (backward/strategies.hpp), or one of a program's own
+  std::string backward = "auto";  ///< a method by its name (backward/gradient_methods.hpp), or one of a program's own
   int sh_degree = 3;              ///< of the spherical harmonics of colour, 0 to 3
   int kernel_degree = 2;          ///< of the generalised Gaussians (math/response.hpp)
   hit_format_kind hit_format = hit_format_kind::automatic;  ///< of the slots of the hit buffer
@@ -35,7 +35,7 @@ struct configuration_request {
 struct configuration_info {
   backend_kind backend = backend_kind::automatic;  ///< where it computes
   tracer_kind tracer = tracer_kind::automatic;     ///< what finds the hits
-  std::string backward;                            ///< the strategy's name
+  std::string backward;                            ///< the method's name
   int sh_degree = 3;      ///< of the model's coefficients; of compiled_configurations() the highest
   int stored_degree = 3;  ///< that rows of coefficients have room for in the policy's memory
   int kernel_degree = 2;  ///< of the generalised Gaussians

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Training behind one host-safe interface. The configuration (policy, SH degree, tracer, backward strategy) is chosen
+/// Training behind one host-safe interface. The configuration (policy, SH degree, tracer, gradient method) is chosen
 /// at run time from the compiled ones. Code that no device compiler sees, such as the `gart` program, uses it.
 ///
 /// Errors: unsupported where no compiled configuration meets the request, naming those that exist and how to compile
@@ -70,7 +70,7 @@ class session {
   virtual profiler& profile() = 0;
   /// Most bytes of the policy's memory that were in use at a time.
   virtual std::size_t peak_bytes() const = 0;
-  virtual std::size_t hit_buffer_bytes() const = 0;  ///< of the last step; 0 where the strategy records nothing
+  virtual std::size_t hit_buffer_bytes() const = 0;  ///< of the last step; 0 where the method records nothing
   virtual u64 sent_bytes() const { return 0; }       ///< sent by this rank to others in its steps
   /// What was chosen for the request.
   virtual configuration_info configuration() const = 0;

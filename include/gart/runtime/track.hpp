@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The pose of a photograph, from a model of the scene and a guess: the pose whose image is nearest to the photograph.
+/// The pose of a photograph, from a model of the scene and a guess: it makes the image nearest to the photograph.
 ///
 ///   auto const renderer = make_renderer({});
 ///   renderer->set_model(model);

@@ -52,8 +52,8 @@ struct validation_plan {
   std::string why;                         ///< in words
 };
 
-/// A plan for at most so many candidates: fewer where the run is too short for all, none where it is too short for one
-/// or has too few training views. `beside`: trials may run in parallel.
+/// A plan for at most so many candidates. A short run tries fewer. A run that is too short, or has too few training
+/// views, tries none. `beside`: trials may run in parallel.
 validation_plan plan_validation(train_options const& options, dataset const& data, std::size_t candidates,
                                 bool beside = false);
 

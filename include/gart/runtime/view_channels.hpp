@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The channels of a renderer's views (channels/): what its Gaussians have of them, and the passes over the hits of a
-/// view, which follow those of its colours.
+/// The channels of a renderer's views (channels/): the values of its Gaussians, and the passes over the hits of a view,
+/// which follow those of its colours.
 
 #include <gart/channels/passes.hpp>
 #include <gart/channels/pixel_hits.hpp>

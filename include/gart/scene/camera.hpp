@@ -13,8 +13,8 @@
 
 namespace gart {
 
-/// The models. What is between perspective and equirectangular is camera/radial_lens.hpp, each with its own distance of
-/// an image point from the principal point by the angle with the axis.
+/// The models. The models between perspective and equirectangular are camera/radial_lens.hpp. Each has its own distance
+/// of an image point from the principal point by the angle with the axis.
 enum class camera_kind {
   perspective,      ///< camera/pinhole.hpp; with k1, k2, p1 or p2 camera/opencv.hpp; with more camera/radial_lens.hpp
   fisheye,          ///< the distance is the angle: Kannala and Brandt's, COLMAP's and OpenCV's fisheyes

@@ -6,8 +6,8 @@
 ///   quaternion  [N][4]     w, x, y, z; any norm, normalised where it is used
 ///   opacity     [N]        logit
 ///   sh          [N][K][3]  coefficient-major, colours interleaved (splat files are channel-major; io converts)
-/// gaussian_model holds them on the host, gaussians<E> in a policy's memory; gradients and Adam's moments have the same
-/// shape, and what is done to all five arrays walks scene/parameter_table.hpp. Errors: invalid_argument for more
+/// gaussian_model holds them on the host, gaussians<E> in a policy's memory. Gradients and Adam's moments have the same
+/// shape. Code that handles all five arrays walks scene/parameter_table.hpp. Errors: invalid_argument for more
 /// Gaussians than 32-bit indices can serve; out_of_memory.
 
 #include <gart/core/error.hpp>
@@ -56,8 +56,8 @@ struct gaussian_model {
   }
 };
 
-/// f(floats a Gaussian, member of every model...) for each array of models of the same degree and features: what moves
-/// whole Gaussians walks these.
+/// f(floats a Gaussian, member of every model...) for each array of models of the same degree and features. Code that
+/// moves whole Gaussians walks these.
 inline void for_each_row_array(auto&& f, gaussian_model const& of, auto&&... models) {
   for_each_array([&](parameter_array const& a, auto&&... values) { f(std::size_t{a.width(of.sh_degree)}, values...); },
                  models...);

@@ -32,8 +32,8 @@ inline constexpr int parameter_arrays = 5;
 inline constexpr int mean_array = 0, sh_array = parameter_arrays - 1;
 ///@}
 
-/// Calls f(parameter_array, set.member...) for each array, in order, with that member of every set: of anything that
-/// has the members mean, log_scale, quaternion, opacity and sh.
+/// Calls f(parameter_array, set.member...) for each array, in order, with that member of every set. A set has the
+/// members mean, log_scale, quaternion, opacity and sh.
 GART_KERNEL constexpr void for_each_array(auto&& f, auto&&... sets) {
   f(parameter_array{"mean", "mean", mean_array, 3}, sets.mean...);
   f(parameter_array{"log_scale", "log-scale", 1, 3}, sets.log_scale...);

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The values of an image: an array of its own, as std::vector, or memory that others hold too, as the ranks of a host
+/// The values of an image: an array of its own, like std::vector, or memory that others hold too. The ranks of a host
 /// hold a capture's images once (comm/host_group.hpp).
 
 #include <gart/core/span.hpp>

@@ -3,102 +3,12 @@
 /// The kernels of row_exchange.hpp.
 
 #include <gart/backward/gather.hpp>
-#include <gart/camera/models.hpp>
 #include <gart/optim/rows.hpp>
-#include <gart/scene/image_rows.hpp>
-#include <gart/tiles/footprint_slots.hpp>
+#include <gart/shard/row_selection.hpp>
 
 #include <type_traits>
 
 namespace gart { inline namespace GART_ISA { namespace detail {
-
-// The box of a row in a view. cost: for each row of tiles, its pairs less those of the row above. Only one row in
-// `every` is counted, with 0 none: many atomic additions to few addresses are slow.
-template <class Response, class E, int Size, class Bounds>
-struct box_kernel {
-  gaussians_view<float const> scene;
-  Bounds bounds;
-  vec3d frame;
-  float alpha_min;
-  footprint_slots* boxes;
-  u64* cost;
-  index_t every;
-  GART_KERNEL void operator()(index_t i) const {
-    footprint const f = footprint_of<Response>(bounds, load_parameters(scene, i), frame, alpha_min);
-    footprint_slots const range(0, f.box, f.seam);
-    boxes[i] = range;
-    if (every == 0 || i % every != 0 || f.box.empty()) return;
-    pixel_box const tiles = tiles_of<Size>(range);
-    u64 const pairs = u64{tiles.width()} * every;
-    E::atomic_add(cost + tiles.y0, pairs);
-    E::atomic_add(cost + tiles.y1, ~pairs + 1);
-  }
-};
-
-// The part of a box in some rows, as footprints cut it.
-GART_HD inline pixel_box cut(pixel_box box, image_rows const& rows) {
-  if (box.y0 < rows.first) box.y0 = static_cast<u16>(rows.first);
-  if (box.y1 > rows.end) box.y1 = static_cast<u16>(rows.end);
-  return box;
-}
-
-// A unit takes the rows whose boxes in its view meet its own rows of the image.
-struct taken_unit {
-  footprint_slots const* boxes;
-  image_rows rows;
-};
-
-// Whether each row goes to each unit, [units][rows]: one launch for all units, since the latency dominates.
-struct select_kernel {
-  taken_unit const* units;
-  index_t count, rows;
-  u32* flags;
-  GART_KERNEL void operator()(index_t i) const {
-    for (index_t u = 0; u < count; ++u)
-      flags[std::size_t{u} * rows + i] = !cut(units[u].boxes[i].box, units[u].rows).empty();
-  }
-};
-
-// The pairs of a box that began above the rows, or begins with them, 0 for others; of `range`, cut to the rows or not.
-template <int Size>
-GART_HD inline u32 continued_pairs(footprint_slots range, image_rows const& rows) {
-  range.box = cut(range.box, rows);
-  return rows.first > 0 && range.box.y0 == rows.first ? tiles_of<Size>(range).area() : 0;
-}
-
-// The place of a row that does not go to a unit.
-inline constexpr u32 not_sent = ~u32{0};
-
-// The exchange's bytes for each row of a rank, sent or not: a box a view, a place and its sum a unit.
-constexpr u64 exchange_bytes_of_row(int views, int units) {
-  return static_cast<u64>(views) * sizeof(footprint_slots) + static_cast<u64>(units) * (sizeof(u32) + sizeof(u64));
-}
-
-// The k-th count of the rows before each unit, and of all.
-struct unit_ends_kernel {
-  u64 const* places;
-  index_t rows;
-  u64* ends;
-  GART_KERNEL void operator()(index_t k) const { ends[k] = places[std::size_t{k} * rows]; }
-};
-
-// place_of is select_kernel's flags, and becomes places among those that go to a unit: its first is ends[u] of all.
-template <int Size>
-struct list_kernel {
-  taken_unit const* units;
-  index_t count, rows;
-  u64 const *places, *ends;
-  u32 *list, *pairs, *place_of;
-  GART_KERNEL void operator()(index_t i) const {
-    for (index_t u = 0; u < count; ++u) {
-      std::size_t const at = std::size_t{u} * rows + i;
-      u64 const place = places[at];
-      bool const goes = place_of[at];
-      place_of[at] = goes ? static_cast<u32>(place - ends[u]) : not_sent;
-      if (goes) list[place] = i, pairs[place] = continued_pairs<Size>(units[u].boxes[i], units[u].rows);
-    }
-  }
-};
 
 // A row travels in two parts: geometry, with the Gaussian's number last, and colours. A rank makes its lists from the
 // first while the second is under way.
@@ -253,13 +163,6 @@ struct pack_pairs_body {
   }
 };
 
-// The sums that a rank sent back for its unit, from `first` on among all received.
-struct returned_unit {
-  int view;
-  u64 first;
-  u32 const* place_of;  // of each row of this rank's, in the unit
-};
-
 // One kind of a row's sums, `Width` pieces, which begin at `From` in pairs. They are added over views and over the
 // ranks that traced a view, in order, or pair by pair. Rows that no unit had are zero. Take receives take(row, first
 // float of the piece, piece).
@@ -306,8 +209,8 @@ struct keep_sums {
   }
 };
 
-// Finished gradients of a row from the received messages, four places a lane: the sum over units, each a whole view,
-// times the share. Errors are not scaled, and are added one by one, in the order of rounds.
+// Packs finished gradients of a row, four places a lane: the sum over units, each a whole view, times the share. Errors
+// are not scaled, and are added one by one, in the order of rounds.
 struct add_finished_body {
   returned_unit const* units;
   index_t count;

@@ -122,7 +122,7 @@ class sharded_rows final : public all_rows<E> {
 
   /// Runs must be whole blocks.
   std::vector<double> sums_of_runs(std::vector<double> const& mine, index_t run, std::size_t width) override {
-    return sharded_rows(gathered_.exec(), comm_, std::max<index_t>(owners_.block / run, 1)).whole_of(mine, width);
+    return sharded_rows(gathered_.exec(), comm_, std::max<index_t>(owners_.block / run, 1)).gather_all(mine, width);
   }
 
   /// Sends rows leave[r] of `from` to rank r, and rows of rank s to arrive[s] of `to`, in the same order.
@@ -143,7 +143,7 @@ class sharded_rows final : public all_rows<E> {
 
   /// This rank's part of values of all Gaussians, `width` a row.
   template <class T>
-  std::vector<T> part_of(std::vector<T> const& all, std::size_t width) const {
+  std::vector<T> local_part(std::vector<T> const& all, std::size_t width) const {
     std::vector<T> mine;
     owners_.for_each_run(all.size() / width, [&](u64 first, u64 count, u64) {
       mine.insert(mine.end(), all.begin() + offset(first * width), all.begin() + offset((first + count) * width));
@@ -151,18 +151,18 @@ class sharded_rows final : public all_rows<E> {
     return mine;
   }
   /// This rank's rows of a whole model.
-  gaussian_model part_of(gaussian_model const& all) const {
+  gaussian_model local_part(gaussian_model const& all) const {
     gaussian_model mine;
     mine.sh_degree = all.sh_degree;
     for_each_array(
-        [&](parameter_array const& a, auto& to, auto const& from) { to = part_of(from, a.width(all.sh_degree)); }, mine,
-        all);
+        [&](parameter_array const& a, auto& to, auto const& from) { to = local_part(from, a.width(all.sh_degree)); },
+        mine, all);
     return mine;
   }
 
   /// Gathers the rows of all ranks, on all ranks or on `root` alone.
   template <class T>
-  std::vector<T> whole_of(std::vector<T> const& mine, std::size_t width, int root = -1) {
+  std::vector<T> gather_all(std::vector<T> const& mine, std::size_t width, int root = -1) {
     u64 total = mine.size() / width;
     comm_.all_reduce(span<u64>(&total, 1));
     std::vector<u64> counts = counts_of(total);
@@ -186,11 +186,11 @@ class sharded_rows final : public all_rows<E> {
     return all;
   }
   /// The same for a model.
-  gaussian_model whole_of(gaussian_model const& mine, int root = -1) {
+  gaussian_model gather_all(gaussian_model const& mine, int root = -1) {
     gaussian_model all;
     all.sh_degree = mine.sh_degree;
     for_each_array([&](parameter_array const& a, auto& to,
-                       auto const& from) { to = whole_of(from, a.width(mine.sh_degree), root); },
+                       auto const& from) { to = gather_all(from, a.width(mine.sh_degree), root); },
                    all, mine);
     return all;
   }

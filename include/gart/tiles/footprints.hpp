@@ -1,9 +1,8 @@
 #pragma once
 /// \file
 /// The footprints of all Gaussians in one view: boxes with their place in the hit buffer, near depths, and how many
-/// (primitive, tile) pairs they make. Cost: one launch of double arithmetic over the Gaussians, and through a lens
-/// another over what it shows large, two prefix sums, and one read of two totals by the host, from which buffers are
-/// sized.
+/// (primitive, tile) pairs they make. Cost: one launch of double arithmetic over the Gaussians, through a lens another
+/// over those that it shows large, and two prefix sums. The host reads two totals, which size the buffers.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/camera/models.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// The tile-primitive map: for every tile, the primitives that its pixels may hit. A pair is emitted for each tile that
-/// a primitive's box overlaps, in primitive order, and radix sorted by tile; those that fail the test of pairs
+/// a primitive's box overlaps, in primitive order, and radix sorted by tile. Pairs that fail the test
 /// (tiles/pair_test.hpp) come last, in no tile. A tile's list begins where its number first stands in a key.
 ///
 /// One 32-bit key sorts by tile, and within a tile by an order (tiles/tile_order.hpp) in the bits that the tile's
@@ -109,8 +109,9 @@ struct emit_pairs {
   }
 };
 
-// Of sorted keys: where a tile's list begins, the first key that is not of a tile before it. Each looks for its own,
-// since most tiles may have no list, as in a strip of an image, and whoever found the next one would fill all of them.
+// Of sorted keys: where a tile's list begins, the first key that is not of a tile before it. Each lane looks for its
+// own tile: most tiles may have no list, as in a strip of an image, and whoever found the next one would fill all of
+// them.
 struct begin_lists {
   span<u32 const> keys;
   int order_bits;

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The rays of a beam and the Gaussians that it comes across (trace/beam_walk.hpp): each ray evaluates all of them, and
+/// The rays of a beam and the Gaussians that it comes across (trace/beam_walk.hpp). Each ray evaluates all of them and
 /// keeps its hits. On a device a lane is a ray, and Gaussians are read once for all; on a host rays fill registers.
 
 #include <gart/math/ray_gaussian.hpp>

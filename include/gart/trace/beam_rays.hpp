@@ -14,8 +14,8 @@ struct made_beam {
   beam bounds;  ///< of its rays
 };
 
-/// Rays of a beam differ by this much in slope, all in all: above it a beam meets so many boxes that none of its rays
-/// does that rays are faster one by one. Their origins differ by a 128th of that, in sizes of the tree.
+/// Rays of a beam may differ by this much in slope. Wider beams meet so many boxes that miss all their rays that single
+/// rays are faster. Their origins differ by a 128th of that, in sizes of the tree.
 inline constexpr float widest_beam = 0.25f;
 
 /// Of the rays of all lanes that have one; `placed` gives a lane's in the frame of the tree. One at least has.

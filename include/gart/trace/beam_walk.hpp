@@ -1,14 +1,14 @@
 #pragma once
 /// \file
-/// The walk of a tree by 32 rays that stay close together, as one beam (bvh/beam.hpp): on every policy one source, a
-/// warp on a device. A node is visited once for all rays, in the order of its entry, the four nearest at a time; what
-/// its leaves propose each ray evaluates by itself. A ray's hits wait in a short queue (trace/lane_hits.hpp) and are
-/// passed on once they lie before all nodes that are left: so no ray walks again for more hits than a window holds.
+/// The walk of a tree by 32 close rays as one beam (bvh/beam.hpp): one source on every policy, a warp on a device. A
+/// node is visited once for all rays, in the order of its entry, the four nearest at a time. Each ray evaluates the
+/// leaves' candidates by itself. A ray's hits wait in a short queue (trace/lane_hits.hpp). They are passed on once they
+/// lie before all nodes that are left. So no ray walks again for more hits than a window holds.
 ///
 /// Memory a beam: 24 hits a ray, 224 nodes. A ray that loses hits walks again, strictly after its last, with the others
-/// that did. Where nodes run out of room the walk goes on depth first, and where that does not help, which takes a tree
-/// of a depth that no scene has, rays are traced one by one from where they are. Rays that are no beam, for they go
-/// apart, are left to walk_alone: one by one, a window of the nearest hits each, walked again for more.
+/// that did. Where nodes run out of room the walk goes on depth first. If that does not help (only trees of a depth
+/// that no scene has), rays are traced one by one from where they are. Rays that go apart make no beam. walk_alone
+/// takes them one by one, a window of the nearest hits each, and walks again for more.
 
 #include <gart/trace/beam_meet.hpp>
 #include <gart/trace/beam_nodes.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// The traverser on gart's own BVH, on every policy: rays of 8 x 4 pixels go through the tree as one beam
-/// (trace/beam_walk.hpp). prepare() fits the tree to the Gaussians of a frame: built anew, or refitted when their
+/// (trace/beam_walk.hpp). prepare() fits the tree to the Gaussians of a frame. It builds anew, or refits where their
 /// number has not changed and trace_options.rebuild_every says so.
 
 #include <gart/camera/pixel_rays.hpp>

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The traverser on Embree, for the host policies: user geometry over the ellipsoids' boxes, a window of the nearest
-/// hits a ray, resumed until the ray ends. Embree proposes, math/ray_gaussian.hpp decides: the hits are those of the
-/// BVH tracer, bit for bit. Link gart::embree; this header itself needs no Embree.
+/// The traverser on Embree, for the host policies: user geometry over the ellipsoids' boxes. A ray takes a window of
+/// the nearest hits and resumes until it ends. Embree proposes, math/ray_gaussian.hpp decides: the hits are those of
+/// the BVH tracer, bit for bit. Link gart::embree; this header itself needs no Embree.
 
 #include <gart/bvh/box.hpp>
 #include <gart/scene/parameters.hpp>

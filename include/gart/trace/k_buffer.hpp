@@ -1,8 +1,7 @@
 #pragma once
 /// \file
-/// The nearest Capacity hits of a ray seen so far, sorted by (t, id). When it is full, what lies behind its last is
-/// dropped, to be found again by resuming the traversal strictly after the last hit passed on: exact for any number of
-/// hits.
+/// The nearest Capacity hits of a ray seen so far, sorted by (t, id). When it is full, hits behind its last are
+/// dropped. The traversal finds them again, strictly after the last hit passed on: exact for any number of hits.
 
 #include <gart/core/macros.hpp>
 #include <gart/math/glm.hpp>

@@ -34,8 +34,8 @@ struct k_buffer_visitor {
   }
 };
 
-/// Feeds `program` the hits of ray i; `gather` proposes candidates to the visitor (at least all whose hits lie in
-/// [near(), far()]) and is called again until a window is not full.
+/// Feeds `program` the hits of ray i. `gather` proposes candidates to the visitor (at least all whose hits lie in
+/// [near(), far()]). It is called again until a window is not full.
 template <int Capacity, class Response = generalized_gaussian<>, ray_program P, class Gather>
 GART_HD GART_INLINE void trace_windows(traced_scene const& scene, P const& program, index_t i, Gather const& gather) {
   auto state = program.begin(i);

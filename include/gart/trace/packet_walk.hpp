@@ -1,10 +1,10 @@
 #pragma once
 /// \file
-/// The walk of tile lists on a host: rays in packets, a lane a pixel (math/lanes.hpp). The same as walk_tiles
-/// (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that a candidate is evaluated for all rays of a
-/// packet at once, and that its hits stay together: what waits for its turn is a list of groups, each one Gaussian's
-/// hits with some of the rays, in an order that sorts the hits of each ray by (t, id). Where rays meet two Gaussians in
-/// opposite orders no one place suits all hits of a candidate, and it takes two groups.
+/// The walk of tile lists on a host: rays in packets, a lane a pixel (math/lanes.hpp). It does the same as walk_tiles
+/// (trace/tile_tracer.hpp), hit by hit and bit by bit. A candidate is evaluated for all rays of a packet at once, and
+/// its hits stay together. They wait in a list of groups, each one Gaussian's hits with some of the rays. The list's
+/// order sorts the hits of each ray by (t, id). Where rays meet two Gaussians in opposite orders no one place suits all
+/// hits of a candidate, and it takes two groups.
 ///
 /// A packet that has more hits waiting than there are groups for says so, and its rays are traced one by one.
 
@@ -18,8 +18,8 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// A packet keeps 32 times the hits of a ray traced alone, in groups: what runs over is traced again from the start,
-/// not resumed.
+/// A packet keeps 32 times the hits of a ray traced alone, in groups. Packets that run over are traced again from the
+/// start, not resumed.
 template <class Response, int Size, packet_program P>
 class packet_walk {
  public:
@@ -96,8 +96,8 @@ class packet_walk {
     return static_cast<int>(n);
   }
 
-  // The hits of the batch's n candidates. All are evaluated before the first is put in its place: the latency of one
-  // evaluation is hidden by the next, and where a hit goes is a branch that is predicted badly.
+  // The hits of the batch's n candidates. All are evaluated before the first is put in its place. The next evaluation
+  // hides the latency of one, and the place of a hit is a branch that is predicted badly.
   template <class State>
   GART_INLINE bool take(P const& program, traced_scene const& scene, State const& state, vec3_of<lanes> const& d,
                         int n) {

@@ -1,10 +1,10 @@
 #pragma once
 /// \file
 /// The traverser on tile lists, for the rays of a camera's pixels: no tree. A tile's list holds every Gaussian that any
-/// of its pixels can hit, sorted by how near it can be hit there (tiles/tile_order.hpp). A pixel walks the list and
-/// keeps the hits found in a small window sorted by (t, id); the first of them is next as soon as it lies nearer than
-/// all that is left of the list can. When the window overflows its nearest are kept, and the ray resumes strictly after
-/// its last hit from the first candidate whose hit was dropped: exact for any number of hits. The hits are those of the
+/// of its pixels can hit, sorted by its nearest possible hit there (tiles/tile_order.hpp). A pixel walks the list and
+/// keeps the hits found in a small window sorted by (t, id). The first of them is next once it lies nearer than all
+/// that is left of the list can. When the window overflows it keeps the nearest. The ray resumes strictly after its
+/// last hit from the first candidate whose hit was dropped: exact for any number of hits. The hits are those of the
 /// other tracers, bit for bit.
 ///
 /// Rays that meet the same Gaussians are walked together where their program can: packets of lanes on a host
@@ -29,8 +29,8 @@ template <class Response, int Size, pixel_program P>
 struct walk_tiles {
   static constexpr int capacity = 32;  ///< hits that a ray keeps at most, a power of two; more are walked again
   static constexpr int block_size = 64, min_blocks = 8;
-  /// Candidates between two looks at what has become certain: the rays of a warp then pass on several hits at a time
-  /// together, with less divergence.
+  /// The number of candidates between two looks at which hits have become certain. The rays of a warp then pass on
+  /// several hits at a time together, with less divergence.
   static constexpr u32 stride = 8;
   tile_grid<Size> grid;
   tile_map_view map;

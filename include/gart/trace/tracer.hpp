@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// What a tracer is: it is prepared for the Gaussians of one view, and feeds a ray program the hits of each of its rays
-/// in order, until the program has had enough. Its structure yields candidates only: what is a hit, its t and its alpha
-/// come from math/ray_gaussian.hpp, so all tracers give the same hits in the same order, bit for bit.
+/// A tracer is prepared for the Gaussians of one view. It feeds a ray program the hits of each of its rays in order,
+/// until the program has had enough. Its structure yields candidates only. Which are hits, their t and their alpha come
+/// from math/ray_gaussian.hpp, so all tracers give the same hits in the same order, bit for bit.
 ///
 /// A tracer derives from tracer_base and is held to the concept where it is defined. render/frame.hpp has one, and
 /// calls it in the right order.

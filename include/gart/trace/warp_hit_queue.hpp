@@ -2,7 +2,7 @@
 /// \file
 /// The pending hits of one ray of a warp (trace/warp_walk.hpp), in the order (t, id). The latest 15 lie in a window in
 /// shared memory, each lane in a bank of its own, their order a register of 4-bit numbers. A full window is spilled,
-/// all but its first hit, as a run, in order, to memory of its own; of each run the next hit's t is in a register. The
+/// all but its first hit, as a run, in order, to its own memory. For each run the next hit's t is in a register. The
 /// next hit of all is the window's first or that of a run. So a hit is spilled once at most, and the order of others is
 /// never made anew for it.
 ///

@@ -1,8 +1,7 @@
 #pragma once
 /// \file
-/// A pixel program whose rays can meet a Gaussian together (trace/warp_walk.hpp): what a hit shows is asked for where
-/// it is found, from a row of floats of the Gaussian that the whole warp has read; it is composited when its turn
-/// comes.
+/// A pixel program whose rays can meet a Gaussian together (trace/warp_walk.hpp). It asks for what a hit shows where
+/// the hit is found, from a row of floats that the whole warp has read. It composites the hit in its turn.
 
 #include <gart/math/glm.hpp>
 #include <gart/tiles/footprint_slots.hpp>
@@ -27,9 +26,9 @@ concept warp_program = pixel_program<P> &&
   { p.add(s, x, x, shown, place) } -> std::same_as<bool>;  // composites a hit (t, alpha); false ends the ray
   // Whether hits have places: numbers of 32 bits that order a pixel's hits as their Gaussians' ids do. They are then
   // found by cells: cell(footprint_slots, tile's box), cell::read from shared memory, cell.place_of(x, y).
-  { P::places_hits } -> std::convertible_to<bool>;
+  { P::uses_slots } -> std::convertible_to<bool>;
   typename P::cell;
-  requires !P::places_hits || std::constructible_from<typename P::cell, footprint_slots const&, pixel_box const&>;
+  requires !P::uses_slots || std::constructible_from<typename P::cell, footprint_slots const&, pixel_box const&>;
 };
 
 }}  // namespace gart::GART_ISA

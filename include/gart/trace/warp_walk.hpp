@@ -1,14 +1,14 @@
 #pragma once
 /// \file
-/// The walk of tile lists on a device: a warp takes a block of 8 x 4 pixels of a tile, a lane a ray. The same as
-/// walk_tiles (trace/tile_tracer.hpp), hit by hit and bit by bit; what differs is that all rays of the warp meet a
-/// candidate together. So candidates that miss the block are left out by one vote, the others come through shared
-/// memory, read ahead while the ones before are evaluated. Of each group of four a ray then takes its own hits, one
-/// after the other, and computes what they show: few lanes are idle where a candidate is a hit of some rays alone. A
-/// ray's pending hits are in a queue (trace/warp_hit_queue.hpp). Hits are passed on when the window of some ray's queue
-/// is full: many rays then have some to pass on, and do it together. Where a queue loses a hit the ray passes on what
-/// lies before it, and walks the list again, strictly after its last hit. The queues take 4.7 KB of device memory for
-/// each ray that the device holds at a time: 298 MB on 132 multiprocessors.
+/// The walk of tile lists on a device: a warp takes a block of 8 x 4 pixels of a tile, a lane a ray. It does the same
+/// as walk_tiles (trace/tile_tracer.hpp), hit by hit and bit by bit. All rays of the warp meet a candidate together. So
+/// one vote leaves out candidates that miss the block. The others come through shared memory, read ahead while earlier
+/// ones are evaluated. Of each group of four a ray then takes its own hits, one after the other, and computes what they
+/// show. So few lanes idle where a candidate is a hit of some rays alone. A ray's pending hits are in a queue
+/// (trace/warp_hit_queue.hpp). Hits are passed on when the window of some ray's queue is full: many rays then have some
+/// to pass on, and do it together. Where a queue loses a hit the ray passes on the hits before it, and walks the list
+/// again, strictly after its last hit. The queues take 4.7 KB of device memory for each ray that the device holds at a
+/// time: 298 MB on 132 multiprocessors.
 
 #include <gart/camera/ray_depth.hpp>
 #include <gart/math/ray_gaussian.hpp>
@@ -34,9 +34,9 @@ class walk_tile_warps {
  public:
   static constexpr int block_size = warps * lanes,  ///< lanes of a team
       min_blocks = 5;  ///< teams a multiprocessor holds: as many warps as its shared memory has room for
-  static constexpr u32 tile_parts = tile_blocks;                                   ///< parts of a tile, a warp each
-  using key_order = std::conditional_t<P::places_hits, place_order, entry_order>;  ///< the order of hits at one t
-  using queue = warp_hit_queue<key_order>;                                         ///< of a lane's ray
+  static constexpr u32 tile_parts = tile_blocks;                                  ///< parts of a tile, a warp each
+  using key_order = std::conditional_t<P::uses_slots, place_order, entry_order>;  ///< the order of hits at one t
+  using queue = warp_hit_queue<key_order>;                                        ///< of a lane's ray
   static constexpr std::size_t spill_floats = queue::spill_floats_a_lane * block_size;  ///< of a team's rays
 
   tile_grid<Size> grid;  ///< of the view
@@ -66,7 +66,7 @@ class walk_tile_warps {
   struct warp_scratch {
     candidate staged[2][group];
     // Of the candidates that 32 entries of the list leave.
-    typename P::cell cell[P::places_hits ? lanes : 1];
+    typename P::cell cell[P::uses_slots ? lanes : 1];
     u32 id[lanes], entry[lanes];
     float depth[lanes];
     typename queue::scratch pending;
@@ -167,7 +167,7 @@ class walk_tile_warps {
       if (wanted) {
         int const to = __popc(all & ((1u << lane_) - 1));
         s_.id[to] = id, s_.entry[to] = entry, s_.depth[to] = depth;
-        if constexpr (P::places_hits) s_.cell[to] = typename P::cell(range, area_);
+        if constexpr (P::uses_slots) s_.cell[to] = typename P::cell(range, area_);
       }
       __syncwarp();
       return __popc(all);
@@ -299,7 +299,7 @@ class walk_tile_warps {
     }
 
     __device__ GART_INLINE u32 key_of(int number) const {
-      if constexpr (P::places_hits)
+      if constexpr (P::uses_slots)
         return P::cell::read(s_.cell[number]).place_of(at_.x, at_.y);
       else
         return s_.entry[number];
@@ -310,12 +310,12 @@ class walk_tile_warps {
       if (!alive_) return;
       pending_.pass_on(depth, depth_of_t_, [this](waiting_hit const& h) {
         last_t_ = h.t, last_key_ = h.key;
-        return alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::places_hits ? h.key : 0);
+        return alive_ = k_.program.add(state_, h.t, h.alpha, h.shown, P::uses_slots ? h.key : 0);
       });
     }
 
     __device__ GART_INLINE static key_order order_of(walk_tile_warps const& k) {
-      if constexpr (P::places_hits)
+      if constexpr (P::uses_slots)
         return {};
       else
         return {k.map.primitives.data()};

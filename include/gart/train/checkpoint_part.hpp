@@ -30,9 +30,9 @@ training_state read_checkpoint_collectively(Comm& comm, row_owners const& owners
   if (comm.size() == 1) return read_checkpoint(path);
   training_state mine;
   std::optional<checkpoint_rows_reader> reader;
-  together(comm, path, [&] { mine = reader.emplace(path, owners).state(); });
+  collective(comm, path, [&] { mine = reader.emplace(path, owners).state(); });
   std::vector<u32> const checksums = checksums_of(comm, reader->checksum_shares());
-  together(comm, path, [&] { reader->require(checksums); });
+  collective(comm, path, [&] { reader->require(checksums); });
   return mine;
 }
 

@@ -15,7 +15,7 @@
 #include <gart/io/dataset.hpp>
 #include <gart/math/hit_gradient.hpp>
 #include <gart/scene/gaussians.hpp>
-#include <gart/shard/row_exchange_kernels.hpp>
+#include <gart/shard/row_selection.hpp>
 #include <gart/train/densify/error_growth.hpp>
 #include <gart/train/options.hpp>
 

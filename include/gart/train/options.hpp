@@ -52,7 +52,7 @@ struct train_options {
   int sh_every = 1000;  ///< a degree more after so many steps (or iterations / (10 * degrees) in shorter runs)
   std::vector<std::size_t> held_out = {};               ///< training views, by index, that are not trained on
   background_kind background = background_kind::black;  ///< behind the scene
-  /// The first Gaussians' opacity. 0: a value that suits the start (runtime/choose.hpp).
+  /// The first Gaussians' opacity. 0: a value that suits the start (runtime/capture_defaults.hpp).
   float initial_opacity = 0;
   float initial_scale = 0;   ///< the first scale over the distance to the neighbours; 0 as above
   float ssim_weight = 0.2f;  ///< share of D-SSIM in the loss, the rest is L1
@@ -66,7 +66,7 @@ struct train_options {
   bool refine_poses = false;  ///< learn the pose of each training view (pose/pose_training.hpp)
   bool refine_lens = false;   ///< learn the focal length and centre of each camera (lens/lens_training.hpp)
   /// Largest bytes of the hit buffer; a step that needs more computes with less memory. 0: half of the memory that is
-  /// free at the start, and no limit for strategies with ordered sums.
+  /// free at the start, and no limit for methods with ordered sums.
   u64 hit_memory = 0;
   /// Whether each step ends with a search for numbers that are not finite, in parameters and Adam's moments. The first
   /// one found throws not_finite (optim/finite.hpp).

@@ -1,10 +1,10 @@
 #pragma once
 /// \file
-/// Training, one step at a time: a view, the forward pass, the loss, the backward pass by the strategy, Adam,
+/// Training, one step at a time: a view, the forward pass, the loss, the backward pass by the method, Adam,
 /// densification. Each of these parts can be replaced.
 ///
 ///   openmp_exec exec;
-///   trainer<openmp_exec, scene_traits<3>, bvh_tracer<openmp_exec>, pixel_strategy> run(exec, options, data, start);
+///   trainer<openmp_exec, scene_traits<3>, bvh_tracer<openmp_exec>, pixel_method> run(exec, options, data, start);
 ///   while (run.steps_done() < options.iterations) run.step();
 ///   write_splat_ply("model.ply", run.model());
 ///
@@ -13,12 +13,12 @@
 ///
 /// A step is a plan of units: on one rank a whole view (train/plan/whole_view.hpp). Several ranks share the Gaussians
 /// and their moments (comm/row_owners.hpp). Each rank takes a part of every step: strips of one view, or views of a
-/// batch (train/plan/rank_units.hpp). With an `ordered` strategy the bits do not depend on the number of ranks. All
+/// batch (train/plan/rank_units.hpp). With an `ordered` method the bits do not depend on the number of ranks. All
 /// ranks make the same calls. Results describe all Gaussians; scene(), edit() and gradients() concern this rank's rows.
 /// docs/backends.md has more.
 ///
 ///   mpi_comm ranks;
-///   trainer<openmp_exec, traits, tracer, deterministic_strategy, mpi_comm> run(exec, options, data, start, ranks);
+///   trainer<openmp_exec, traits, tracer, deterministic_method, mpi_comm> run(exec, options, data, start, ranks);
 ///
 /// The policy, the options' dataset and its images must outlive the trainer. Randomness is a function of (seed, step).
 
@@ -34,6 +34,7 @@
 #include <gart/scene/traits.hpp>
 #include <gart/train/checkpoint_part.hpp>
 #include <gart/train/densify/densifiers.hpp>
+#include <gart/train/hooks.hpp>
 #include <gart/train/learned/parts.hpp>
 #include <gart/train/memory_need.hpp>
 #include <gart/train/min_pixel_filter.hpp>
@@ -49,36 +50,8 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// What a loss sees: the rendered image and its view, in the policy's memory. It writes dL/d image and, into
-/// value[0..1], the loss and the mean squared error.
-template <execution E>
-struct loss_input {
-  E& exec;                   ///< the policy
-  dataset_view const& view;  ///< the step's view, with the capture's camera
-  truth_view truth;          ///< the photograph at the image's size, in the policy's memory
-  int width, height;         ///< the image's size in pixels
-  span<float const> image;   ///< [H][W][3]
-  span<float> gradient;      ///< [H][W][3]
-  span<float> value;         ///< [2]
-  depth_pixels depth;        ///< to add to, for strategies with_depth; else empty
-};
-
-/// A loss, called once a step. A function object: a template parameter would compile the trainer again for each loss.
-template <execution E>
-using loss_function = std::function<void(loss_input<E> const&)>;
-
-/// A program's calls between the parts of a step; `step` counts the images before it. An empty hook costs nothing.
-template <execution E>
-struct training_hooks {
-  std::function<void(learning_rates&, int step)> rates = {};  ///< changes the rates of a step
-  /// Changes the complete gradients, penalties included; the number of Gaussians must stay.
-  std::function<void(gaussians_view<float const> const& model, gaussians_view<float> const& gradients, int step)>
-      before_optimizer = {};
-  std::function<void(step_report const&)> after_step = {};  ///< the trainer may be changed
-};
-
-/// A training run on one policy, by one tracer and one strategy, on the ranks of a communicator.
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
+/// A training run on one policy, by one tracer and one method, on the ranks of a communicator.
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
 class basic_trainer {
  public:
   static constexpr int sh_degree = Traits::sh_degree;  ///< the largest degree that rows of coefficients hold
@@ -116,7 +89,7 @@ class basic_trainer {
   int steps_done() const { return progress_.step; }
   void set_iterations(int iterations);  ///< as session::set_iterations
   /// The Gaussians, in host memory.
-  gaussian_model model() const { return whole_of(gaussians_.to_host(gaussians_.model)); }
+  gaussian_model model() const { return gather_all(gaussians_.to_host(gaussians_.model)); }
   /// Renders a view to host memory.
   rendered render(camera const& view, vec3 background);
   /// The view's colours in 8 bits a channel: [H][W][3].
@@ -194,22 +167,22 @@ class basic_trainer {
   static train_options const& checked(E& exec, Comm& comm, train_options const& options, dataset const& data,
                                       start_model const& start);
   static u64 total_of(Comm& comm, start_model const& start);
-  decltype(auto) part_of(start_model const& start) {
+  decltype(auto) local_part(start_model const& start) {
     if constexpr (Comm::alone)
       return (start.rows);
     else
-      return start.is_part ? start.rows : plans_.ranks.rows().part_of(start.rows);
+      return start.is_part ? start.rows : plans_.ranks.rows().local_part(start.rows);
   }
   training_state here() const;
   void take_up(training_state const& mine);
-  gaussian_model whole_of(gaussian_model mine, int root = -1) const;
+  gaussian_model gather_all(gaussian_model mine, int root = -1) const;
 
   struct no_ranks {
     no_ranks(E&, Comm const&, index_t) {}
   };
   struct plans {
     whole_view<E> whole;
-    std::conditional_t<Comm::alone, no_ranks, rank_units<E, Comm, Traits, Tracer, Strategy::ordered>> ranks;
+    std::conditional_t<Comm::alone, no_ranks, rank_units<E, Comm, Traits, Tracer, Method::ordered>> ranks;
   };
   struct training_views {
     training_images<E> photos;
@@ -218,7 +191,7 @@ class basic_trainer {
   };
   struct tracing {
     frame_type frame;
-    backward_passes<frame_type, Strategy> passes;
+    backward_passes<frame_type, Method> passes;
   };
   struct progress {
     int step = 0;
@@ -245,8 +218,8 @@ class basic_trainer {
 
 /// A trainer; without a communicator, on one rank. An alias, since nvcc would copy a class's default argument to each
 /// member template.
-template <execution E, class Traits, class Tracer, strategy Strategy, class Comm = self_comm>
-using trainer = basic_trainer<E, Traits, Tracer, Strategy, Comm>;
+template <execution E, class Traits, class Tracer, gradient_method Method, class Comm = self_comm>
+using trainer = basic_trainer<E, Traits, Tracer, Method, Comm>;
 
 }}  // namespace gart::GART_ISA
 

@@ -10,17 +10,16 @@
 
 namespace gart { inline namespace GART_ISA {
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_options const& options,
-                                                                dataset const& data, start_model const& start,
-                                                                Comm comm)
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+basic_trainer<E, Traits, Tracer, Method, Comm>::basic_trainer(E& exec, train_options const& options,
+                                                              dataset const& data, start_model const& start, Comm comm)
     : exec_(exec),
       options_(checked(exec, comm, options, data, start)),
       data_(data),
       comm_(std::move(comm)),
       plans_{{}, {exec, comm_, options.shard_block}},
-      gaussians_(exec, part_of(start), sh_degree),
-      tracing_{frame_type(exec), backward_passes<frame_type, Strategy>(exec)},
+      gaussians_(exec, local_part(start), sh_degree),
+      tracing_{frame_type(exec), backward_passes<frame_type, Method>(exec)},
       views_{{exec, data}, {data.train.size(), options.held_out, options.seed}, min_pixel_filter<E>(exec)},
       image_(exec),
       dropout_(exec, options.dropout, options.dropout_until, options.seed) {
@@ -34,15 +33,15 @@ basic_trainer<E, Traits, Tracer, Strategy, Comm>::basic_trainer(E& exec, train_o
       finite_.emplace(exec, plans_.ranks.rows().owners());
   }
   // Sums in a fixed order were asked for: no budget of our own takes them away.
-  if (options.hit_memory == 0 && !Strategy::ordered)
+  if (options.hit_memory == 0 && !Method::ordered)
     options_.hit_memory = exec.free_bytes() / 2 / static_cast<u64>(comm_.sharers());
-  parts_ = make_learned_parts<frame_type, has_depth<Strategy>>(exec, options, data, in_ranks());
+  parts_ = make_learned_parts<frame_type, has_depth<Method>>(exec, options, data, in_ranks());
   densify_by(make_densifier(exec, density_setup{options, data, gaussians_.total, Traits::response::degree}));
 }
 
 // For all that the run is to grow to, at once.
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::make_room() {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+void basic_trainer<E, Traits, Tracer, Method, Comm>::make_room() {
   u64 here = gaussians_at_end(options_, data_, gaussians_.total);
   if constexpr (!Comm::alone) here = plans_.ranks.rows().owners().owned(here);
   gaussians_.reserve(here);
@@ -50,22 +49,22 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::make_room() {
   if (options_.render.antialias > 0) views_.filter.reserve(here);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::densify_by(std::unique_ptr<densifier<E>> own) {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+void basic_trainer<E, Traits, Tracer, Method, Comm>::densify_by(std::unique_ptr<densifier<E>> own) {
   if (!own) throw invalid_argument("trainer.densify_by: there is no densifier; give one that does nothing");
   densifier_ = std::move(own);
   densifier_->set_batch(options_.batch);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_iterations(int iterations) {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+void basic_trainer<E, Traits, Tracer, Method, Comm>::set_iterations(int iterations) {
   if (iterations == options_.iterations) return;
   options_.iterations = iterations;
   densifier_->set_iterations(iterations);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::resize(index_t total) {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+void basic_trainer<E, Traits, Tracer, Method, Comm>::resize(index_t total) {
   index_t const before = gaussians_.size();
   index_t here = total;
   if constexpr (!Comm::alone) here = plans_.ranks.rows().here(total), plans_.ranks.end_step(true);
@@ -73,8 +72,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::resize(index_t total) {
   gaussians_.clear_from(exec_, before);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_function<E> const* loss) {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+step_report basic_trainer<E, Traits, Tracer, Method, Comm>::step_by(loss_function<E> const* loss) {
   step_report const report = [&] {
     if constexpr (!Comm::alone)
       if (in_ranks()) return step_on(plans_.ranks, loss);
@@ -85,9 +84,9 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_by(loss_funct
 }
 
 // A step over options.batch views, in as many rounds as it takes all ranks to trace them.
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
 template <class Plan>
-step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_on(Plan& plan, loss_function<E> const* loss) {
+step_report basic_trainer<E, Traits, Tracer, Method, Comm>::step_on(Plan& plan, loss_function<E> const* loss) {
   int const before = progress_.step, batch = options_.batch, iterations = options_.iterations;
   int const degree = sh_degree_at(before, gaussians_.degree, options_.sh_every, iterations);
   learning_rates rates = rates_at(options_.rates, data_.extent, before, iterations);
@@ -180,8 +179,8 @@ step_report basic_trainer<E, Traits, Tracer, Strategy, Comm>::step_on(Plan& plan
 }
 
 // An image of the step that begins after `before` images.
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-step_view basic_trainer<E, Traits, Tracer, Strategy, Comm>::view_of(int before, int image) {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+step_view basic_trainer<E, Traits, Tracer, Method, Comm>::view_of(int before, int image) {
   step_view v;
   v.index = views_.order.at(before + image);
   v.step = before, v.iterations = options_.iterations;
@@ -193,10 +192,10 @@ step_view basic_trainer<E, Traits, Tracer, Strategy, Comm>::view_of(int before, 
 }
 
 // Traces this rank's unit of a round, and sums its gradients. The loss is that of the whole image.
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
 template <class Plan>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace(Plan& plan, loss_function<E> const* loss, step_view& v,
-                                                             int image, int degree, step_report& report) {
+void basic_trainer<E, Traits, Tracer, Method, Comm>::trace(Plan& plan, loss_function<E> const* loss, step_view& v,
+                                                           int image, int degree, step_report& report) {
   part_needs needs;
   for (auto const& part : parts_) {
     part_needs const of = part->needs(v.index, v.step, v.iterations);
@@ -205,7 +204,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace(Plan& plan, loss_fu
   std::size_t const width = numbers(parts_.size());
   span<float> const row = image_.numbers.view().subspan(static_cast<std::size_t>(image) * width, width);
   image_targets const targets =
-      image_.begin(static_cast<std::size_t>(v.seen.width) * v.seen.height, needs.depth, has_depth<Strategy>);
+      image_.begin(static_cast<std::size_t>(v.seen.width) * v.seen.height, needs.depth, has_depth<Method>);
   v.color = image_.color, v.depth = image_.depth(), v.by_image = image_.gradients();
   v.model = plan.scene(), v.degree = degree;
   v.share = [&](float* plane) { plan.share(plane, v.seen, sizeof(float)); };
@@ -223,7 +222,7 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace(Plan& plan, loss_fu
     for (std::size_t i = 0; i < parts_.size(); ++i) photo = parts_[i]->before_loss(v, photo, numbers_of(row, i));
     if (loss)
       (*loss)({exec_, data_.train[v.index], v.truth, v.seen.width, v.seen.height, photo, image_.by_color,
-               row.subspan(0, 2), has_depth<Strategy> ? v.depth : depth_pixels{}});
+               row.subspan(0, 2), has_depth<Method> ? v.depth : depth_pixels{}});
     else
       image_.loss.evaluate(photo, v.truth, v.seen.width, v.seen.height, options_.ssim_weight, image_.by_color,
                            row.subspan(0, 2));
@@ -257,14 +256,14 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::trace(Plan& plan, loss_fu
     after_backward(&frame);
     plan.give_back(frame, pass, render.antialias);
     progress_.hit_buffer_bytes = std::max(progress_.hit_buffer_bytes, pass.hit_buffer_bytes()),
-    report.backward = Pass::strategy_type::name;
+    report.backward = Pass::method_type::name;
   });
 }
 
 // The optimizer's step and what grows, moves and prunes the Gaussians.
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
 template <class Plan>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(Plan& plan, learning_rates const& rates, int degree) {
+void basic_trainer<E, Traits, Tracer, Method, Comm>::optimize(Plan& plan, learning_rates const& rates, int degree) {
   trained_gaussians<E>& g = gaussians_;
   int const step = progress_.step;
   densifier_->penalty(g, g.total);
@@ -292,8 +291,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::optimize(Plan& plan, lear
   plan.end_step(change.added || change.removed);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-vec3 basic_trainer<E, Traits, Tracer, Strategy, Comm>::background_of(int step) const {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+vec3 basic_trainer<E, Traits, Tracer, Method, Comm>::background_of(int step) const {
   switch (options_.background) {
     case background_kind::black:
       return vec3(0.0f);
@@ -306,8 +305,8 @@ vec3 basic_trainer<E, Traits, Tracer, Strategy, Comm>::background_of(int step) c
   }
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& view, vec3 background) {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+rendered basic_trainer<E, Traits, Tracer, Method, Comm>::render(camera const& view, vec3 background) {
   render_options const options = render_options_of(options_, data_.extent, background);
   if constexpr (!Comm::alone)
     if (in_ranks()) return plans_.ranks.render(tracing_.frame, gaussians_, view, options, gaussians_.degree);
@@ -322,8 +321,8 @@ rendered basic_trainer<E, Traits, Tracer, Strategy, Comm>::render(camera const& 
   return out;
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-image8 basic_trainer<E, Traits, Tracer, Strategy, Comm>::render_8bit(camera const& view, vec3 background) {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+image8 basic_trainer<E, Traits, Tracer, Method, Comm>::render_8bit(camera const& view, vec3 background) {
   if constexpr (!Comm::alone)
     if (in_ranks()) return to_8bit(render(view, background).color);
   if (shows_more()) return to_8bit(render(view, background).color);

@@ -6,11 +6,11 @@
 
 namespace gart { inline namespace GART_ISA {
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-train_options const& basic_trainer<E, Traits, Tracer, Strategy, Comm>::checked(E& exec, Comm& comm,
-                                                                               train_options const& options,
-                                                                               dataset const& data,
-                                                                               start_model const& start) {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+train_options const& basic_trainer<E, Traits, Tracer, Method, Comm>::checked(E& exec, Comm& comm,
+                                                                             train_options const& options,
+                                                                             dataset const& data,
+                                                                             start_model const& start) {
   require_options(options);
   if (Comm::alone && options.batch > 1)
     throw invalid_argument("train_options.batch needs a trainer that has a communicator");
@@ -18,8 +18,8 @@ train_options const& basic_trainer<E, Traits, Tracer, Strategy, Comm>::checked(E
   return options;
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-u64 basic_trainer<E, Traits, Tracer, Strategy, Comm>::total_of(Comm& comm, start_model const& start) {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+u64 basic_trainer<E, Traits, Tracer, Method, Comm>::total_of(Comm& comm, start_model const& start) {
   if (start.rows.sh_degree > sh_degree)
     throw invalid_argument("trainer: the model to start from has a higher SH degree than the trainer's traits");
   u64 total = start.rows.size();
@@ -27,17 +27,17 @@ u64 basic_trainer<E, Traits, Tracer, Strategy, Comm>::total_of(Comm& comm, start
   return total;
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-gaussian_model basic_trainer<E, Traits, Tracer, Strategy, Comm>::whole_of(gaussian_model mine, int root) const {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+gaussian_model basic_trainer<E, Traits, Tracer, Method, Comm>::gather_all(gaussian_model mine, int root) const {
   if constexpr (Comm::alone)
     return mine;
   else
-    return plans_.ranks.rows().whole_of(mine, root);
+    return plans_.ranks.rows().gather_all(mine, root);
 }
 
 // This rank's rows, and what all ranks have of the rest.
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::here() const {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+training_state basic_trainer<E, Traits, Tracer, Method, Comm>::here() const {
   training_state s;
   s.scene = gaussians_.to_host(gaussians_.model);
   s.first = gaussians_.to_host(gaussians_.moments.first), s.second = gaussians_.to_host(gaussians_.moments.second);
@@ -47,8 +47,8 @@ training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::here() const {
   return s;
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_up(training_state const& s) {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+void basic_trainer<E, Traits, Tracer, Method, Comm>::take_up(training_state const& s) {
   if (s.scene.sh_degree != gaussians_.degree) throw invalid_argument("trainer: the state has another SH degree");
   if (s.origin != data_.origin)
     throw invalid_argument("trainer: the state is from the origin " + to_text(s.origin) + ", the capture from " +
@@ -62,40 +62,40 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::take_up(training_state co
   progress_.step = s.step;
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-training_state basic_trainer<E, Traits, Tracer, Strategy, Comm>::state() const {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+training_state basic_trainer<E, Traits, Tracer, Method, Comm>::state() const {
   training_state s = here();
   if constexpr (!Comm::alone) {
-    for (gaussian_model* each : {&s.scene, &s.first, &s.second}) *each = whole_of(std::move(*each));
+    for (gaussian_model* each : {&s.scene, &s.first, &s.second}) *each = gather_all(std::move(*each));
     for (auto& [name, values] : s.parts.bytes)
-      if (of_gaussians(name)) values = plans_.ranks.rows().whole_of(values, sizeof(u32));
+      if (of_gaussians(name)) values = plans_.ranks.rows().gather_all(values, sizeof(u32));
   }
   return s;
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::set_state(training_state const& all) {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+void basic_trainer<E, Traits, Tracer, Method, Comm>::set_state(training_state const& all) {
   if constexpr (Comm::alone) {
     take_up(all);
   } else {
     training_state mine = all;
-    for (gaussian_model* each : {&mine.scene, &mine.first, &mine.second}) *each = plans_.ranks.rows().part_of(*each);
+    for (gaussian_model* each : {&mine.scene, &mine.first, &mine.second}) *each = plans_.ranks.rows().local_part(*each);
     for (auto& [name, values] : mine.parts.bytes)
-      if (of_gaussians(name)) values = plans_.ranks.rows().part_of(values, sizeof(u32));
+      if (of_gaussians(name)) values = plans_.ranks.rows().local_part(values, sizeof(u32));
     take_up(mine);
   }
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::save(std::filesystem::path const& path) const {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+void basic_trainer<E, Traits, Tracer, Method, Comm>::save(std::filesystem::path const& path) const {
   if constexpr (Comm::alone)
     write_checkpoint(path, here());
   else
     write_checkpoint_collectively(comm_, plans_.ranks.rows().owners(), path, here());
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::load(std::filesystem::path const& path) {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+void basic_trainer<E, Traits, Tracer, Method, Comm>::load(std::filesystem::path const& path) {
   training_state const mine = [&] {
     if constexpr (Comm::alone)
       return read_checkpoint(path);
@@ -106,9 +106,9 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::load(std::filesystem::pat
   take_up(mine);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-void basic_trainer<E, Traits, Tracer, Strategy, Comm>::save_model(std::filesystem::path const& path,
-                                                                  splat_traits const& given) const {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+void basic_trainer<E, Traits, Tracer, Method, Comm>::save_model(std::filesystem::path const& path,
+                                                                splat_traits const& given) const {
   splat_traits const traits = with_origin(given, data_.origin);
   gaussian_model const mine = gaussians_.to_host(gaussians_.model);
   if constexpr (!Comm::alone) {
@@ -117,8 +117,8 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::save_model(std::filesyste
         write_splat_ply_rows(file, path, mine, plans_.ranks.rows().owners(), gaussians_.total, traits);
       });
     if (comm_.size() > 1) {
-      gaussian_model const all = whole_of(mine, 0);
-      return together(comm_, path, [&] {
+      gaussian_model const all = gather_all(mine, 0);
+      return collective(comm_, path, [&] {
         if (comm_.rank() == 0) write_splats(path, all, traits);
       });
     }
@@ -126,15 +126,15 @@ void basic_trainer<E, Traits, Tracer, Strategy, Comm>::save_model(std::filesyste
   write_splats(path, mine, traits);
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-exposure_field basic_trainer<E, Traits, Tracer, Strategy, Comm>::exposures() const {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+exposure_field basic_trainer<E, Traits, Tracer, Method, Comm>::exposures() const {
   learned_colors all;
   for (auto const& part : parts_) part->tell(all);
   return exposure_field(std::move(all.views), std::move(all.falloffs));
 }
 
-template <execution E, class Traits, class Tracer, strategy Strategy, communicator<E> Comm>
-std::vector<named_camera> basic_trainer<E, Traits, Tracer, Strategy, Comm>::poses() const {
+template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
+std::vector<named_camera> basic_trainer<E, Traits, Tracer, Method, Comm>::poses() const {
   std::vector<named_camera> out;
   bool const moved = std::any_of(parts_.begin(), parts_.end(), [](auto const& part) { return part->moves_cameras(); });
   for (std::size_t i = 0; moved && i < data_.train.size(); ++i) out.push_back({data_.train[i].name, seen_by(i)});

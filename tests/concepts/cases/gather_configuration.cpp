@@ -5,7 +5,7 @@
 struct half_colors {
   using policy = gart::serial_exec;
   using response = gart::generalized_gaussian<>;
-  using terms = gart::terms<gart::color>;
+  using terms = gart::terms<gart::term::color>;
   using entry = gart::half_hit_entry;
   using rays = gart::pixel_rays;
   static constexpr int sh_degree = 1, tile_size = 8;

@@ -4,7 +4,7 @@
 #include <gart/trace/tile_tracer.hpp>
 
 struct flat : gart::ray_program_base {
-  static constexpr bool has_warps = true, places_hits = false;
+  static constexpr bool has_warps = true, uses_slots = false;
 #ifdef GART_WHOLE
   static constexpr int row_floats = 3;
 #else

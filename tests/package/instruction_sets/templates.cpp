@@ -1,4 +1,4 @@
-// What the templates compute where they are instantiated, as the README shows it: every strategy at SH degree 3,
+// What the templates compute where they are instantiated, as the README shows it: every method at SH degree 3,
 // and with EVERY_DEGREE at 0, 1 and 2 too.
 #include "scene.hpp"
 
@@ -6,13 +6,13 @@
 
 namespace {
 
-template <class E, class Tracer, class Strategy, int Degree>
+template <class E, class Tracer, class Method, int Degree>
 void train() {
   E exec;
   gart::dataset const data = some_capture();
   gart::train_options const options = some_options(Degree);
-  gart::trainer<E, gart::scene_traits<Degree>, Tracer, Strategy> run(exec, options, data, some_model(Degree));
-  std::string const name = std::string("template/") + E::name + "/" + Tracer::name + "/" + Strategy::name + "/SH" +
+  gart::trainer<E, gart::scene_traits<Degree>, Tracer, Method> run(exec, options, data, some_model(Degree));
+  std::string const name = std::string("template/") + E::name + "/" + Tracer::name + "/" + Method::name + "/SH" +
                            std::to_string(Degree) + "/";
   gart::camera const& view = data.train[1].view;
   tell(name + "image", run.render(view, gart::vec3(0.0f)).color.data);
@@ -29,9 +29,9 @@ void train() {
 }
 
 template <class E, class Tracer, int Degree>
-void every_strategy() {
-  gart::strategies::for_each([]<class Strategy>(Strategy) {
-    if constexpr (!Strategy::ordered) train<E, Tracer, Strategy, Degree>();
+void every_method() {
+  gart::gradient_methods::for_each([]<class Method>(Method) {
+    if constexpr (!Method::ordered) train<E, Tracer, Method, Degree>();
   });
 }
 
@@ -39,13 +39,13 @@ void every_strategy() {
 
 void use_templates() {
   using tiles = gart::tile_tracer<gart::openmp_exec>;
-  every_strategy<gart::openmp_exec, tiles, 3>();
+  every_method<gart::openmp_exec, tiles, 3>();
 #if defined(EVERY_DEGREE)
-  every_strategy<gart::openmp_exec, tiles, 0>();
-  every_strategy<gart::openmp_exec, tiles, 1>();
-  every_strategy<gart::openmp_exec, tiles, 2>();
+  every_method<gart::openmp_exec, tiles, 0>();
+  every_method<gart::openmp_exec, tiles, 1>();
+  every_method<gart::openmp_exec, tiles, 2>();
 #endif
-  every_strategy<gart::serial_exec, gart::bvh_tracer<gart::serial_exec>, 1>();
+  every_method<gart::serial_exec, gart::bvh_tracer<gart::serial_exec>, 1>();
 
   // Functions that are no templates.
   gart::camera view = some_capture().train[0].view;

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Adaptive density control (Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023):
-/// Gaussians with a large mean gradient in image space are cloned if small, and split in two if large. Transparent and
+/// Adaptive density control (Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023). A
+/// Gaussian with a large mean gradient in image space is cloned if small, and split in two if large. Transparent and
 /// oversized ones are removed; opacities are reset from time to time.
 ///
 /// The statistic. 3DGS compares a threshold with the loss's gradient by the mean's screen position, in coordinates -1

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Training by depth maps besides colour (loss/depth_loss.hpp) as a part of a training: of a strategy with_depth. Its
+/// Training by depth maps besides colour (loss/depth_loss.hpp) as a part of a training: of a method with_depth. Its
 /// gradients by depth and transmittance stand beside those of the colours; a caller's loss may add to them. Memory: on
 /// a device 4 bytes a pixel of each view that was seen.
 
@@ -13,7 +13,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// Errors: invalid_argument where a weight asks for what the strategy or the dataset does not have.
+/// Errors: invalid_argument where a weight asks for what the method or the dataset does not have.
 template <bool Depth>
 void require_depth(train_options const& options, dataset const& data) {
   if (!(options.depth_weight > 0)) return;
@@ -21,7 +21,7 @@ void require_depth(train_options const& options, dataset const& data) {
   if (!Depth)
     throw invalid_argument(
         "train_options.depth_weight needs gradients of depth: set configuration_request.depth, or train by "
-        "with_depth<strategy>");
+        "with_depth<method>");
   if (!mapped)
     throw invalid_argument("train_options.depth_weight: no training view has a depth map (dataset_options.depth)");
 }

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Mirrors that are known to be in a capture (dataset.mirrors) as a part of a training: the pixels that meet one first
-/// are traced by rays that it throws back, and their gradients go to the Gaussians that it shows. Nothing is learned of
-/// the mirror. These pixels have no filter of antialiasing. Cost: a batch of rays of those pixels, a bounce each.
+/// Known mirrors of a capture (dataset.mirrors) as a part of a training. Pixels that meet a mirror first are traced by
+/// the rays that it throws back. Their gradients go to the Gaussians in the mirror. Nothing is learned of the mirror.
+/// These pixels have no filter of antialiasing. Cost: a batch of rays of those pixels, a bounce each.
 
 #include <gart/core/isa.hpp>
 #include <gart/light/mirror_service.hpp>

@@ -33,7 +33,7 @@ struct step_view {
   camera seen = {}, captured = {};         ///< the camera that is traced, and the capture's; both of the image's size
   truth_view truth = {};                   ///< the photograph
   span<float const> color = {};            ///< [H][W][3]
-  depth_pixels depth = {};                 ///< where a part needs it; gradients only with a strategy with_depth
+  depth_pixels depth = {};                 ///< where a part needs it; gradients only with a method with_depth
   image_gradients by_image = {};           ///< dL/d image
   render_options options = {};             ///< that it is traced by
   gaussians_view<float const> model = {};  ///< that it is traced of, on this rank

@@ -17,7 +17,7 @@ namespace gart { inline namespace GART_ISA {
 template <class Frame>
 using learned_parts = std::vector<std::unique_ptr<learned_part<Frame>>>;
 
-/// In the order in which they see an image. Depth: whether the strategy has depth gradients; spread: whether several
+/// In the order in which they see an image. Depth: whether the method has depth gradients; spread: whether several
 /// ranks share the Gaussians.
 template <class Frame, bool Depth>
 learned_parts<Frame> make_learned_parts(typename Frame::execution_type& exec, train_options const& options,

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// What a backward strategy is: what the forward pass records of a hit, which terms of the gradient are gathered by
-/// primitive and which are scattered by pixel. It derives from strategy_base, which has what most do not say; a program
-/// static_asserts `strategy` of its own where it defines it, so that a name that is misspelt is found there.
+/// A gradient method says what the forward pass records of a hit, which terms of the gradient are gathered by
+/// primitive, and which are scattered by pixel. It derives from gradient_method_base, which has defaults. A program
+/// static_asserts `gradient_method` of its own where it defines it; a misspelt name is found there.
 
 #include <gart/backward/terms.hpp>
 #include <gart/render/record.hpp>
@@ -11,28 +11,28 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// How a slot of the hit buffer that no hit wrote is told from one that is a hit: `cleared`, the buffer holds NaN
-/// before every forward pass; `recomputed`, each pixel of a box is evaluated again, by the same function, and held
-/// against the last hit of its ray: the same decision, bit for bit, with nothing to clear. It measured better on a
-/// device and on a host (docs/backward.md).
+/// How a slot that no hit wrote is told from a hit. `cleared`: the buffer holds NaN before every forward pass.
+/// `recomputed`: the same function evaluates each pixel of a box again, and compares it with the last hit of its ray.
+/// The decision is the same, bit for bit, and nothing is cleared. It measured better on a device and on a host
+/// (docs/backward.md).
 enum class slot_validity { cleared, recomputed };
 
-/// What a strategy has unless it says otherwise.
-struct strategy_base {
+/// What a method has unless it says otherwise.
+struct gradient_method_base {
   static constexpr bool ordered = false;       ///< sums in a fixed order: the same bits in every run
   static constexpr bool lane_by_lane = false;  ///< by the plain gather, whatever the policy (backward/gather_form.hpp)
   static constexpr slot_validity validity = slot_validity::cleared;  ///< how slots that are hits are told
-  using fallback = void;  ///< the strategy that a step is done by where the hit buffer has no room
+  using fallback = void;  ///< the method that a step is done by where the hit buffer has no room
 };
 
-/// A backward strategy, by these members.
+/// A gradient method, by these members.
 template <class S>
-concept strategy = requires {
+concept gradient_method = requires {
   { S::name } -> std::convertible_to<char const*>;  // what programs and reports call it
   typename S::template record<8>;                   // by tile size: a hit_record (render/record.hpp)
   typename S::gather;                               // terms<...>: summed by primitive, from what was recorded
   typename S::scatter;                              // terms<...>: added by pixel, as the rays are traced again
-  // From strategy_base:
+  // From gradient_method_base:
   { S::ordered } -> std::convertible_to<bool>;
   { S::lane_by_lane } -> std::convertible_to<bool>;
   { S::validity } -> std::convertible_to<slot_validity>;

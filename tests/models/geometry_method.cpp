@@ -1,5 +1,5 @@
-// A strategy that the library has not: its gradients against the oracle, and a training by it.
-#include <models/geometry_strategy.hpp>
+// A method that the library has not: its gradients against the oracle, and a training by it.
+#include <models/geometry_method.hpp>
 #include <render/expected.hpp>
 #include <support/trace_scene.hpp>
 #include <train/runs.hpp>
@@ -14,7 +14,7 @@ void check_gradients(E& exec, expectation const& e) {
   std::mt19937_64 engine(seed() + 1);
   auto const w = weighted(s, e.parameters, e.picture, engine);
   auto const got =
-      gradients_by<1, geometry_strategy, Tracer>(exec, s.model, s.view, s.options, s.active_degree, w.color_gradient);
+      gradients_by<1, geometry_method, Tracer>(exec, s.model, s.view, s.options, s.active_degree, w.color_gradient);
   for (auto const& g : gradient_groups) {
     CAPTURE(g.name);
     CHECK(relative_error(got.*g.got, w.gradients.*g.expected) <= 1e-4);
@@ -26,12 +26,12 @@ struct course {
   std::string backward;  // of the last step
 };
 
-template <class Strategy, class E>
+template <class Method, class E>
 course train(E& exec, gart::dataset const& data, gart::u64 seed, gart::u64 hit_memory = 0) {
   gart::train_options options;
   options.hit_memory = hit_memory, options.iterations = 40;
   options.densify = gart::densify_kind::none;
-  run_of<E, Strategy> run(exec, options, data, cloud(seed + 1, 0.7f));
+  run_of<E, Method> run(exec, options, data, cloud(seed + 1, 0.7f));
   course out;
   while (run.steps_done() < options.iterations) {
     auto const report = run.step();
@@ -42,7 +42,7 @@ course train(E& exec, gart::dataset const& data, gart::u64 seed, gart::u64 hit_m
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("a strategy of a program's own has the oracle's gradients", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a method of a program's own has the oracle's gradients", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
@@ -54,14 +54,14 @@ TEST_CASE_TEMPLATE("a strategy of a program's own has the oracle's gradients", E
   }
 }
 
-TEST_CASE_TEMPLATE("a strategy of a program's own trains as the library's do", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("a method of a program's own trains as the library's do", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
   auto const data = capture(exec, seed);
-  auto const expected = train<gart::primitive_strategy>(exec, data, seed);
-  auto const got = train<geometry_strategy>(exec, data, seed);
-  auto const without_room = train<geometry_strategy>(exec, data, seed, 1);
+  auto const expected = train<gart::primitive_method>(exec, data, seed);
+  auto const got = train<geometry_method>(exec, data, seed);
+  auto const without_room = train<geometry_method>(exec, data, seed, 1);
   CHECK(got.backward == "geometry");
   CHECK(without_room.backward == "pixel");
   for (std::size_t i = 0; i < expected.loss.size(); ++i) {

@@ -39,19 +39,19 @@ capture_traits inspect(dataset const& data);
 
 /// A choice and its reason.
 template <class T>
-struct chosen {
+struct decision {
   T value;          ///< what is chosen
   std::string why;  ///< in words, for reports
 };
 
 /// White for transparent images, as published results have it, and for plain white borders; else black.
-chosen<background_kind> choose_background(capture_traits const& traits);
+decision<background_kind> choose_background(capture_traits const& traits);
 
-/// The tiles tracer and every strategy but pixel need footprints, and so a lens that is one to one over the image.
+/// The tiles tracer and every method but pixel need footprints, and so a lens that is one to one over the image.
 /// Where a lens folds: bvh and pixel. Else "auto", the fastest.
-chosen<tracer_kind> choose_tracer(capture_traits const& traits);
-/// The strategy for choose_tracer's tracer.
-chosen<std::string> choose_backward(capture_traits const& traits);
+decision<tracer_kind> choose_tracer(capture_traits const& traits);
+/// The method for choose_tracer's tracer.
+decision<std::string> choose_backward(capture_traits const& traits);
 
 /// The capture's points; without points, those that depth maps measured where depth is trained on; else random ones in
 /// the capture's bounds. A capture's points lie on surfaces. Opacity 0.1 and a scale of 1.0 (times the distance to the
@@ -65,10 +65,10 @@ struct starting_points {
       scale = 0;          ///< times the distance to the neighbours
 };
 /// Where training starts; the reason names the numbers.
-chosen<starting_points> choose_start(dataset const& data, train_options const& options);
+decision<starting_points> choose_start(dataset const& data, train_options const& options);
 
 /// The largest number of Gaussians: max_gaussians, or the budget by pixels for growth by error (growth_budget).
-chosen<index_t> choose_budget(dataset const& data, train_options const& options);
+decision<index_t> choose_budget(dataset const& data, train_options const& options);
 
 /// All choices for a capture, as `gart train` takes them. Callers may change them afterwards.
 struct recommendation {

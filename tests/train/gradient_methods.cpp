@@ -1,4 +1,4 @@
-// Training by each strategy: the same loss curve, also where a step has to do with less memory, and with sums in a
+// Training by each method: the same loss curve, also where a step has to do with less memory, and with sums in a
 // fixed order the same bits twice.
 #include "runs.hpp"
 
@@ -20,13 +20,13 @@ struct course {
   gart::gaussian_model model;
 };
 
-template <class Strategy, class E>
+template <class Method, class E>
 course train(E& exec, gart::dataset const& data, u64 seed, u64 hit_memory = 0) {
   gart::train_options options;
   options.hit_memory = hit_memory;
   options.iterations = steps;
   options.densify = gart::densify_kind::none;
-  run_of<E, Strategy> run(exec, options, data, cloud(seed + 1, 0.7f));
+  run_of<E, Method> run(exec, options, data, cloud(seed + 1, 0.7f));
   course out;
   for (int i = 0; i < steps; ++i) {
     auto const report = run.step();
@@ -43,25 +43,24 @@ bool same_bits(gart::gaussian_model const& a, gart::gaussian_model const& b) {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("every strategy trains along the same loss curve", E, GART_TEST_POLICIES) {
+TEST_CASE_TEMPLATE("every method trains along the same loss curve", E, GART_TEST_POLICIES) {
   auto const seed = gart_test::seed();
   CAPTURE(seed);
   E exec;
   auto const data = capture(exec, seed);
-  auto const reference = train<gart::primitive_strategy>(exec, data, seed);
+  auto const reference = train<gart::primitive_method>(exec, data, seed);
   CHECK(reference.loss.back() < 0.8f * reference.loss.front());
   CHECK(reference.backward == "primitive");
   // Where the hit buffer has no room a step is done with less.
-  auto const with_less = train<gart::primitive_strategy>(exec, data, seed, reference.hit_buffer_bytes / 2);
+  auto const with_less = train<gart::primitive_method>(exec, data, seed, reference.hit_buffer_bytes / 2);
   CHECK(with_less.backward == "hybrid");
   CHECK(with_less.hit_buffer_bytes <= reference.hit_buffer_bytes / 2);
-  auto const with_none = train<gart::primitive_strategy>(exec, data, seed, 1);
+  auto const with_none = train<gart::primitive_method>(exec, data, seed, 1);
   CHECK(with_none.backward == "pixel");
   CHECK(with_none.hit_buffer_bytes == 0);
   std::vector<course> others{with_less, with_none};
-  gart::strategies::for_each([&]<class Strategy>(Strategy) {
-    if constexpr (!std::same_as<Strategy, gart::primitive_strategy>)
-      others.push_back(train<Strategy>(exec, data, seed));
+  gart::gradient_methods::for_each([&]<class Method>(Method) {
+    if constexpr (!std::same_as<Method, gart::primitive_method>) others.push_back(train<Method>(exec, data, seed));
   });
   for (auto const& other : others) {
     CAPTURE(other.backward);
@@ -77,8 +76,8 @@ TEST_CASE_TEMPLATE("sums in a fixed order give the same bits twice", E, GART_TES
   CAPTURE(seed);
   E exec;
   auto const data = capture(exec, seed);
-  auto const first = train<gart::deterministic_strategy>(exec, data, seed);
-  auto const second = train<gart::deterministic_strategy>(exec, data, seed);
+  auto const first = train<gart::deterministic_method>(exec, data, seed);
+  auto const second = train<gart::deterministic_method>(exec, data, seed);
   CHECK(first.loss == second.loss);
   CHECK(same_bits(first.model, second.model));
 }

@@ -2,7 +2,7 @@
 #include <support/policies.hpp>
 
 #include <gart/camera/models.hpp>
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/runtime/initial.hpp>
 
 #include <algorithm>
@@ -83,7 +83,7 @@ TEST_CASE("a scene that fills the images is unbounded") {
   CHECK(background_of(noisy) == background_kind::white);
 }
 
-TEST_CASE("masks are counted, and a capture without images has nothing to tell") {
+TEST_CASE("masks are counted; a capture without images says nothing") {
   auto data = capture(3, 90);
   data.train[2].mask = gart::image8(width, height, 1, 255);
   CHECK(gart::inspect(data).masked == 1);
@@ -91,7 +91,7 @@ TEST_CASE("masks are counted, and a capture without images has nothing to tell")
   CHECK_FALSE(gart::inspect(none).bounded());
 }
 
-TEST_CASE("a lens is traced by tiles where it is one to one over the image, else by what needs no footprints") {
+TEST_CASE("a lens that is one to one is traced by tiles") {
   auto data = capture(3, 90);
   CHECK(gart::choose_tracer(gart::inspect(data)).value == gart::tracer_kind::automatic);
   data.train[0].view.lens.k1 = -0.1f, data.train[0].view.lens.p1 = 0.01f;
@@ -108,7 +108,7 @@ TEST_CASE("a lens is traced by tiles where it is one to one over the image, else
   CHECK(gart::choose_backward(strong).value == "pixel");
 }
 
-TEST_CASE("training starts from the capture's points, or from random ones as MCMC wants them") {
+TEST_CASE("training starts from the capture's points or random ones") {
   auto data = capture(3, 90);
   gart::train_options options;
   options.random_points = 500;
@@ -129,7 +129,7 @@ TEST_CASE("training starts from the capture's points, or from random ones as MCM
   CHECK(start.count == 4);
 }
 
-TEST_CASE("training on depth starts from what the maps measured, where the capture has no points of its own") {
+TEST_CASE("training on depth starts from what the maps measured") {
   // A pinhole at the origin and one beside it look at the plane z = 3, of which the left half is measured.
   gart::dataset data;
   for (int v = 0; v < 2; ++v) {

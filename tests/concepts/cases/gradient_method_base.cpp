@@ -1,11 +1,11 @@
-// A strategy that trains: the trainer asks for what most strategies leave to their base.
+// A method that trains: the trainer asks for what most methods leave to their base.
 // expects: S::ordered
 #include <gart/exec/parallel.hpp>
 #include <gart/trace/bvh_tracer.hpp>
 #include <gart/train/trainer.hpp>
 
 #ifdef GART_WHOLE
-struct again : gart::strategy_base {
+struct again : gart::gradient_method_base {
 #else
 struct again {
 #endif
@@ -13,7 +13,7 @@ struct again {
   template <int Size>
   using record = gart::record_none;
   using gather = gart::terms<>;
-  using scatter = gart::terms<gart::color, gart::geometry>;
+  using scatter = gart::terms<gart::term::color, gart::term::geometry>;
 };
 
 using exec = gart::serial_exec;

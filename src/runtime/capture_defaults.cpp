@@ -1,5 +1,5 @@
 #include <gart/camera/models.hpp>
-#include <gart/runtime/choose.hpp>
+#include <gart/runtime/capture_defaults.hpp>
 #include <gart/train/densify/error_growth.hpp>
 
 #include <algorithm>
@@ -100,7 +100,7 @@ capture_traits inspect(dataset const& data) {
   return traits;
 }
 
-chosen<background_kind> choose_background(capture_traits const& t) {
+decision<background_kind> choose_background(capture_traits const& t) {
   if (t.transparent > 0) {
     return {background_kind::white,
             percent(t.transparent) + " of the pixels are transparent, and published results have white there"};
@@ -115,17 +115,17 @@ chosen<background_kind> choose_background(capture_traits const& t) {
           "the images' borders are plain (" + color + "), neither white nor black: Gaussians show it"};
 }
 
-chosen<tracer_kind> choose_tracer(capture_traits const& t) {
+decision<tracer_kind> choose_tracer(capture_traits const& t) {
   if (t.folding) return {tracer_kind::bvh, folds(t)};
   return {tracer_kind::automatic, lenses(t)};
 }
 
-chosen<std::string> choose_backward(capture_traits const& t) {
+decision<std::string> choose_backward(capture_traits const& t) {
   if (t.folding) return {"pixel", folds(t)};
   return {"auto", "the fastest there is"};
 }
 
-chosen<starting_points> choose_start(dataset const& data, train_options const& options) {
+decision<starting_points> choose_start(dataset const& data, train_options const& options) {
   starting_points start;
   bool const mapped = options.depth_weight > 0 && std::any_of(data.train.begin(), data.train.end(),
                                                               [](dataset_view const& v) { return !v.depth.empty(); });
@@ -141,7 +141,7 @@ chosen<starting_points> choose_start(dataset const& data, train_options const& o
                                  : "random points"};
 }
 
-chosen<index_t> choose_budget(dataset const& data, train_options const& options) {
+decision<index_t> choose_budget(dataset const& data, train_options const& options) {
   index_t const most = options.max_gaussians;
   if (options.densify != densify_kind::error) return {most, "as many as there may be"};
   index_t const budget = growth_budget(options.error, most, data.training_pixels());
