@@ -1,5 +1,6 @@
 #include "commands.hpp"
 #include "help.hpp"
+#include "options.hpp"
 #include "synth_capture.hpp"
 
 #include <unistd.h>
@@ -92,10 +93,14 @@ void add_synth(CLI::App& app, command& selected) {
                   "Also a depth map of each view, r_N_depth.png: distances along\nthe rays, for gart train "
                   "--depth-weight");
   synth->add_flag("--mesh", options->mesh, "Also the scene itself, mesh.ply, for gart mesh --against");
-  synth->add_flag(
-      "--mirror", options->mirror,
-      "A flat mirror stands in the scene; also scene.json and mirror.ply,\nwhich say where, for gart render "
-      "--scene");
+  auto const mirror = std::make_shared<std::string>("none");
+  synth
+      ->add_option("--mirror", *mirror,
+                   "A mirror stands in the scene, plane or ball; also scene.json, which\nsays where, for gart train "
+                   "--scene and gart render --scene")
+      ->type_name("KIND")
+      ->capture_default_str()
+      ->check(name_of_a<synth_mirror>());
   synth->add_flag("--quiet", *quiet, "Print nothing but errors");
   synth->footer(
       "Writes DIR/transforms_train.json and DIR/transforms_test.json (Blender's layout), DIR/train/r_N.png and\n"
@@ -105,7 +110,10 @@ void add_synth(CLI::App& app, command& selected) {
       "      the capture of the quick start; then: gart train out/still --out out/model\n"
       "  gart synth --out out/large --train 120 --test 20 --size 400 --samples 256 --points 50000\n"
       "      more, larger and cleaner views, for a GPU\n");
-  synth->callback([options, quiet, &selected] { selected = [options, quiet] { return run_synth(*options, *quiet); }; });
+  synth->callback([options, quiet, mirror, &selected] {
+    options->mirror = gart::from_string<synth_mirror>(*mirror);
+    selected = [options, quiet] { return run_synth(*options, *quiet); };
+  });
 }
 
 }  // namespace gart_cli

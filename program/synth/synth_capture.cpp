@@ -152,14 +152,25 @@ gart::triangle_mesh mesh_of(synth_scene const& scene) {
 namespace {
 
 // A ray that misses all is as white in the mirror as the photographs' background.
-constexpr char scene_with_mirror[] = R"({
+std::string scene_with(synth_mirror mirror, gart::vec3d const& origin) {
+  std::string mesh = R"("file": "mirror.ply")";
+  if (mirror == synth_mirror::ball) {
+    gart::vec3d const at = gart::vec3d(ball_center) + origin;
+    char text[160];
+    std::snprintf(text, sizeof text, R"("shape": "sphere", "scale": %.9g, "translation": [%.17g, %.17g, %.17g])",
+                  double{ball_radius}, at.x, at.y, at.z);
+    mesh = text;
+  }
+  return R"({
   "up": [0, 0, 1],
   "background": [1, 1, 1],
   "environment": {"color": [1, 1, 1]},
   "materials": [{"name": "mirror", "kind": "mirror"}],
-  "meshes": [{"file": "mirror.ply", "material": "mirror"}]
+  "meshes": [{)" +
+         mesh + R"(, "material": "mirror"}]
 }
 )";
+}
 
 }  // namespace
 
@@ -226,10 +237,10 @@ void write_synth_capture(synth_options const& options, std::function<void(int do
   }
   gart::write_point_ply(options.out / "points3d.ply", renderer.points(train, options.points, options.seed), origin);
   if (options.mesh) gart::write_mesh_ply(options.out / "mesh.ply", mesh_of(scene), origin);
-  if (options.mirror) {
+  if (options.mirror == synth_mirror::plane)
     gart::write_mesh_ply(options.out / "mirror.ply", mesh_of({scene.back()}), origin);
-    gart::write_file(options.out / "scene.json", std::string_view(scene_with_mirror));
-  }
+  if (options.mirror != synth_mirror::none)
+    gart::write_file(options.out / "scene.json", std::string_view(scene_with(options.mirror, origin)));
   gart::write_file(options.out / "transforms_test.json", transforms_json(test, "test", options.depth, origin));
   gart::write_file(options.out / "transforms_train.json", transforms_json(train, "train", options.depth, origin));
   std::error_code ignored;

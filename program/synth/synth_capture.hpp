@@ -5,7 +5,8 @@
 //   DIR/train/r_N_depth.png and so on                     where asked for: distances along the rays, 16 bits
 //   DIR/points3d.ply                                      starting points on the surfaces, coloured; in double where
 //                                                         an origin is added to all coordinates
-//   DIR/scene.json, DIR/mirror.ply                        where asked for: the mirror that stands in the scene
+//   DIR/scene.json                                        where asked for: the mirror that stands in the scene;
+//                                                         a flat one is in DIR/mirror.ply
 //   DIR/mesh.ply                                          where asked for: the scene itself, as triangles
 // A training view through a rolling shutter has the poses of its first and last row. Through another camera than a
 // pinhole the transforms name its model and parameters in place of camera_angle_x. The transforms are written last,
@@ -28,12 +29,12 @@ struct synth_options {
   int size = 160;            // pixels a side
   int samples = 32;          // paths a pixel
   int points = 10000;
-  std::string camera;   // as gart::seen_through has it; empty: a pinhole
-  bool depth = false;   // depth maps too
-  bool mesh = false;    // the scene's own mesh too
-  bool mirror = false;  // a flat mirror in the scene, and the file that says so
-  std::string origin;   // "x,y,z", added to all coordinates
-  double rolling = 0;   // degrees that the camera turns by while a training view is read; 0: it stands still
+  std::string camera;                        // as gart::seen_through has it; empty: a pinhole
+  bool depth = false;                        // depth maps too
+  bool mesh = false;                         // the scene's own mesh too
+  synth_mirror mirror = synth_mirror::none;  // in the scene, and the file that says so
+  std::string origin;                        // "x,y,z", added to all coordinates
+  double rolling = 0;  // degrees that the camera turns by while a training view is read; 0: it stands still
   u64 seed = 1;
   int threads = 0;  // 0: all
 };

@@ -231,27 +231,19 @@ synth_mesh make_coil(vec3 base) {
   return mesh;
 }
 
-// Upright, towards the middle, as high as the vase.
-synth_mesh make_mirror() {
+// Flat: upright, towards the middle, as high as the vase. A ball has the grid of a scene.json's sphere.
+synth_mesh make_mirror(synth_mirror kind) {
   synth_mesh mesh{.material = {[](vec3, vec2) { return vec3(1.0f); }}, .point_density = 0};
   mesh.material.mirror = true;
-  add_surface(mesh, 1, 1, [](float u, float v) { return vec3(-0.92f, 1.2f * (u - 0.5f), ground + 0.95f * v); });
+  if (kind == synth_mirror::ball)
+    add_surface(mesh, 128, 64, ball(ball_center, ball_radius));
+  else
+    add_surface(mesh, 1, 1, [](float u, float v) { return vec3(-0.92f, 1.2f * (u - 0.5f), ground + 0.95f * v); });
   return mesh;
 }
 
-}  // namespace
-
-synth_scene make_synth_scene(u64 seed, bool mirror) {
-  synth_scene scene;
-  scene.push_back(make_disc());
-  vec3 const vase(-0.30f, 0.34f, ground);
-  scene.push_back(make_vase(vase));
-  scene.push_back(make_leaves(vase + vec3(0, 0, 0.56f), seed));
-  scene.push_back(make_knot({-0.30f, -0.52f, ground + 0.34f}));
-  vec3 const box(0.50f, -0.36f, ground + 0.215f);
-  scene.push_back(make_box(box, 0.215f, 0.055f, 0.45f));
-  scene.push_back(make_coil(box + vec3(0, 0, 0.215f)));
-
+// A copper ball in thin brass rings.
+void add_globe(synth_scene& scene) {
   vec3 const globe(0.46f, 0.46f, ground + 0.44f);
   synth_mesh core{.material = {copper, 0, 0.28f, true}};
   add_surface(core, 72, 36, ball(globe, 0.20f));
@@ -265,7 +257,22 @@ synth_scene make_synth_scene(u64 seed, bool mirror) {
               revolution({{0.0f, 0.0f}, {0.15f, 0.0f}, {0.15f, 0.025f}, {0.05f, 0.04f}, {0.03f, 0.085f}, {0.0f, 0.09f}},
                          {globe.x, globe.y, ground}, true));
   scene.push_back(std::move(rings));
-  if (mirror) scene.push_back(make_mirror());
+}
+
+}  // namespace
+
+synth_scene make_synth_scene(u64 seed, synth_mirror mirror) {
+  synth_scene scene;
+  scene.push_back(make_disc());
+  vec3 const vase(-0.30f, 0.34f, ground);
+  scene.push_back(make_vase(vase));
+  scene.push_back(make_leaves(vase + vec3(0, 0, 0.56f), seed));
+  scene.push_back(make_knot({-0.30f, -0.52f, ground + 0.34f}));
+  vec3 const box(0.50f, -0.36f, ground + 0.215f);
+  scene.push_back(make_box(box, 0.215f, 0.055f, 0.45f));
+  scene.push_back(make_coil(box + vec3(0, 0, 0.215f)));
+  if (mirror != synth_mirror::ball) add_globe(scene);
+  if (mirror != synth_mirror::none) scene.push_back(make_mirror(mirror));
   return scene;
 }
 

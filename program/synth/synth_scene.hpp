@@ -4,6 +4,7 @@
 // rounded box with a wire coil, a copper ball in thin brass rings. Units are those of NeRF-Synthetic: everything lies
 // within 1.3 of the origin, z up.
 
+#include <gart/core/names.hpp>
 #include <gart/core/types.hpp>
 #include <gart/math/glm.hpp>
 
@@ -35,8 +36,16 @@ struct synth_mesh {
 
 using synth_scene = std::vector<synth_mesh>;
 
-// The seed places the leaves. About 60,000 triangles. With a mirror a flat one stands at the disc's edge, the last
-// mesh.
-synth_scene make_synth_scene(u64 seed, bool mirror = false);
+// A mirror that stands in the scene: upright at the disc's edge, or a ball in the place of the copper one.
+enum class synth_mirror { none, plane, ball };
+constexpr auto names_of(synth_mirror) {
+  using enum synth_mirror;
+  return std::array<gart::name_of<synth_mirror>, 3>{{{none, "none"}, {plane, "plane"}, {ball, "ball"}}};
+}
+inline constexpr vec3 ball_center{0.42f, 0.42f, 0.0f};
+inline constexpr float ball_radius = 0.42f;
+
+// The seed places the leaves. About 60,000 triangles. A mirror is the last mesh.
+synth_scene make_synth_scene(u64 seed, synth_mirror mirror = synth_mirror::none);
 
 }  // namespace gart_cli

@@ -173,7 +173,9 @@ struct synth_renderer::implementation {
       surface_point const p = resolve(direction, hit);
       synth_material const& m = *p.material;
       if (m.mirror && mirrors++ < most_mirrors) {
-        direction -= 2 * glm::dot(direction, p.geometric) * p.geometric;
+        vec3 const along = glm::reflect(direction, p.normal);
+        // At a silhouette the smooth normal may send it into the mirror.
+        direction = glm::dot(along, p.geometric) > 0 ? along : glm::reflect(direction, p.geometric);
         origin = p.position + offset * p.geometric;
         --vertex;  // as if seen from behind it
         continue;

@@ -360,8 +360,8 @@ TEST_CASE("an option out of range is refused before writing") {
 
 TEST_CASE("a mirror shows what a camera behind it would see") {
   if (!has_embree()) return;
-  synth_renderer const with(make_synth_scene(3, true), 2), without(make_synth_scene(3), 2);
-  double const plane = make_synth_scene(3, true).back().position[0].x;
+  synth_renderer const with(make_synth_scene(3, synth_mirror::plane), 2), without(make_synth_scene(3), 2);
+  double const plane = make_synth_scene(3, synth_mirror::plane).back().position[0].x;
   gart::camera front;
   front.width = front.height = 48, front.fx = front.fy = 90, front.cx = front.cy = 24;
   gart::vec3d const at(1.9, 0.3, 0.75), to(plane, 0.1, 0.1),
@@ -390,10 +390,21 @@ TEST_CASE("a capture with a mirror says where it stands") {
   if (!has_embree()) return;
   scratch_folder const folder;
   synth_options options = small(folder.path / "mirror");
-  options.mirror = true;
+  options.mirror = synth_mirror::plane;
   write_synth_capture(options);
   gart::scene_file const file = gart::read_scene(options.out / "scene.json");
   REQUIRE(file.scene.meshes.size() == 1);
   CHECK(file.scene.meshes[0].triangles.size() == 6);
   CHECK(file.scene.materials.at(file.scene.meshes[0].triangle_material[0]).kind == gart::light::material_kind::mirror);
+
+  options.mirror = synth_mirror::ball, options.origin = "5000,-300,20";
+  write_synth_capture(options);
+  gart::vec3d const origin(5000, -300, 20);
+  gart::light::mesh const ball = gart::read_scene(options.out / "scene.json", origin).scene.meshes.at(0);
+  synth_mesh const traced = make_synth_scene(options.seed, synth_mirror::ball).back();
+  CHECK(ball.positions.size() == traced.position.size());
+  for (gart::vec3 const& p : ball.positions) {
+    float const nearest = glm::length(p - gart::vec3(ball_center));
+    if (std::abs(nearest - ball_radius) > 1e-4f) FAIL_CHECK("a corner is off the ball by " << nearest - ball_radius);
+  }
 }
