@@ -125,7 +125,7 @@ TEST_CASE("the distance of two spheres is that of their radii") {
   // Half of the sphere: what is there is right, half of what is seen is not there.
   auto half = sphere(1);
   half.triangle.resize(half.triangle.size() / 2);
-  auto const part = gart_cli::score_mesh(half, sphere(1), views, 0.02);
+  auto const part = gart_cli::score_mesh(half, sphere(1), views, 0.005);
   CHECK(part.precision == 1);
   CHECK(part.recall == doctest::Approx(0.5).epsilon(0.1));
   // What no camera sees counts for nothing: a small sphere within.

@@ -137,6 +137,24 @@ TEST_CASE("SPZ's coefficients have the bits that are asked for") {
   CHECK(holds(error_of([&] { gart::write_splats(folder.path / "m.spz", model, {}, {.sh_bits = 9}); }), "1 to 8"));
 }
 
+TEST_CASE("SPZ's positions have the bits that their extent leaves") {
+  if (without("SPZ")) return;
+  scratch_folder const folder;
+  // 24 bits with their sign, of which 20 are a fraction at most: the farthest decides, on both sides of each power
+  // of 2.
+  for (int power = 1; power < 22; ++power) {
+    for (float const part : {0.51f, 0.99f}) {
+      gart::gaussian_model m = random_model(4, 0);
+      float const most = std::ldexp(part, power);
+      m.mean = {most, 0, -most, most / 3, most, 0, 0, -most, most / 7, -most, most, most};
+      CAPTURE(most);
+      gart::write_splats(folder.path / "m.spz", m);
+      double const step = std::ldexp(1.0, -std::min(20, 23 - power));
+      CHECK(difference(m, gart::read_splats(folder.path / "m.spz")).mean <= 0.51 * step + 1e-7 * double{most});
+    }
+  }
+}
+
 TEST_CASE("SOG's palette has all rows and gains by more") {
   if (without("SOG")) return;
   scratch_folder const folder;
