@@ -64,7 +64,7 @@ int run_bench(bench_arguments const& a) {
   options.sh_every = 1;
   options.render = file.render;
   options.render.near = gart::render_options().near;  // training has its own
-  // Rates of zero keep the model as it is; Adam's work is the same.
+  // Rates of zero do not change the model; Adam's work is the same.
   options.rates = {0, 0, 0, 0, 0, 0, 0};
 
   std::map<std::string, double> stages;

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// The option of a field that has one. Looking for what is not finite changes no result, and is not recorded.
+// The option of a field that has one. A search for numbers that are not finite changes no result, and is not recorded.
 void add_field(CLI::App& train, train_arguments& a, gart::option_field const& field) {
   std::string const flag = flag_of(field);
   std::string const help =
@@ -308,7 +308,7 @@ nlohmann::json config_of(train_arguments const& a, gart::dataset const& data) {
                         {"checksums", checksums_of(data)},
                         {"origin", {data.origin.x, data.origin.y, data.origin.z}},
                         {"options", a.recorded.values()}};
-  // A run that goes on must begin at the same: what it has learned is from there.
+  // A resumed run must begin at the same poses: its learned ones are from there.
   if (!a.poses.empty()) {
     std::vector<gart::u8> const file = gart::read_file(a.poses);
     config["poses_checksum"] = gart::crc32c(file.data(), file.size());

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The numbers and switches of train_options, once: each with its name, its place, its range and what it is. A
-/// program's options, what it records of them, and the checks of a run come from this table. Errors: require_options
-/// throws invalid_argument, naming the field, its value and its range.
+/// The numbers and switches of train_options, once: each with its name, its place, its range and its help. A program's
+/// options, its records of them, and the checks of a run come from this table. Errors: require_options throws
+/// invalid_argument, naming the field, its value and its range.
 
 #include <gart/core/error.hpp>
 #include <gart/train/options.hpp>
@@ -27,7 +27,7 @@ struct option_field {
   place of;                ///< the member
   double low, high;        ///< its range
   std::string_view group;  ///< heading in the help
-  std::string_view help;   ///< what it is, and in which unit
+  std::string_view help;   ///< help, with the unit
 
   /// Its value.
   double get(train_options const& options) const {
