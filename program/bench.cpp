@@ -64,7 +64,7 @@ int run_bench(bench_arguments const& a) {
   options.sh_every = 1;
   options.render = file.render;
   options.render.near = gart::render_options().near;  // training has its own
-  // Rates of zero keep the model as it is; Adam's work is the same.
+  // Rates of zero do not change the model; Adam's work is the same.
   options.rates = {0, 0, 0, 0, 0, 0, 0};
 
   std::map<std::string, double> stages;
@@ -166,7 +166,7 @@ void add_bench(CLI::App& app, command& selected) {
   bench->add_option("--json", a->json, "Write the figures to this file")->type_name("FILE");
   bench->add_flag("--quiet", a->quiet, "No progress line");
   add_configuration_options(*bench, a->configuration);
-  bench->add_option("--hit-format", a->hit_format, "What the forward pass leaves of a hit: float4 or half")
+  bench->add_option("--hit-format", a->hit_format, "Record of a hit: float4 or half")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(name_of_a<gart::hit_format_kind>());

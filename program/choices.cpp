@@ -70,7 +70,7 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   settle("--tracer", a.tracer, {gart::to_string(tracer.value), tracer.why});
   settle("--backward", a.backward, gart::choose_backward(traits));
   say("masks", traits.masked ? std::to_string(traits.masked) + " of " + std::to_string(traits.views) : "none",
-      traits.masked ? "what they exclude counts in no loss" : "the capture has none");
+      traits.masked ? "excluded pixels count in no loss" : "the capture has none");
 
   if (a.start.empty()) {
     auto const start = gart::choose_start(data, train_options_of(a));

@@ -15,16 +15,17 @@ namespace gart_cli {
 // "white" or "black".
 gart::decision<std::string> background_for(gart::capture_traits const& traits);
 
-// Replaces what is "auto" in `a` by what suits the capture; a list of {"option", "value", "why"}. Where an option was
+// Replaces "auto" in `a` by the choices for the capture; a list of {"option", "value", "why"}. Where an option was
 // given, "why" says so.
 nlohmann::json choose(train_arguments& a, gart::dataset const& data);
 
 // The choices of a resumed run, from its config.json; `now` where that does not say.
 nlohmann::json chosen_before(nlohmann::json const& config, nlohmann::json const& now);
 
-// Tries in short trainings what the command line leaves open (gart/runtime/validation.hpp): how, and each trial.
+// Tries settings that the command line leaves open in short trainings (gart/runtime/validation.hpp); returns how, and
+// each trial.
 nlohmann::json measure(train_arguments a, gart::dataset const& data, gart::validation_progress const& progress);
-// Settles in `a` what was measured, and adds it to the choices.
+// Applies the measured settings to `a`, and adds them to the choices.
 void settle(train_arguments& a, nlohmann::json const& measured, nlohmann::json& chosen);
 
 }  // namespace gart_cli

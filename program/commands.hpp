@@ -26,9 +26,9 @@ using command = std::function<int()>;
 
 inline constexpr int exit_failed = 1;
 inline constexpr int exit_usage = 2;
-inline constexpr int exit_interrupted = 130;  // what a shell reports of a program that Ctrl-C ended
+inline constexpr int exit_interrupted = 130;  // the exit code that shells report for a program that Ctrl-C ended
 
-// A command line whose options contradict each other or what they meet on disk.
+// A command line whose options contradict each other or the files on disk.
 struct usage_error : gart::error {
   using gart::error::error;
 };

@@ -167,8 +167,8 @@ void add_convert(CLI::App& app, command& selected) {
       ->check(between(0, 1));
   convert
       ->add_option("--transform", a->transform,
-                   "Turn, scale and move: a 4x4 matrix row by row, or a quaternion and\na translation "
-                   "w,x,y,z,X,Y,Z, and a scale after them where it is not 1")
+                   "Turn, scale and move: a 4x4 matrix row by row, or a quaternion,\na translation "
+                   "and perhaps a scale: w,x,y,z,X,Y,Z,S")
       ->type_name("NUMBERS");
   convert
       ->add_option("--origin", a->origin,
@@ -189,8 +189,8 @@ void add_convert(CLI::App& app, command& selected) {
       ->check(between(1, 65536));
   convert->add_flag("--quiet", a->quiet, "Say nothing but errors");
   convert->footer(
-      "\nWrites OUT whole or not at all. The box and the opacity are IN's own; what is kept is moved after. What OUT's "
-      "format\nhas no room for is said, or refused where the image would be another one without it.\n"
+      "\nWrites OUT whole or not at all. The box and the opacity are IN's own; the rest is moved after.\n"
+      "Properties that OUT's format cannot hold are reported, or refused where the image would change without them.\n"
       "\nExamples:\n"
       "  gart convert run/model.ply scene.spz\n"
       "  gart convert scene.sog part.glb --crop -1,-1,-1,1,1,1 --prune 0.02\n"

@@ -16,7 +16,7 @@ struct field_name {
 
 // Of fields that are not in the table of train/option_fields.hpp, which has its own.
 std::vector<field_name> const& field_names();
-// "train_options.seed" to "--seed"; empty where there is no such field.
+// "train_options.seed" to "--seed"; empty for an unknown field.
 std::string option_of(std::string_view field);
 
 // A message of the library with each field as its option, and `field = value` as `--option value`. One that the command

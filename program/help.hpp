@@ -1,5 +1,6 @@
 #pragma once
-// How options look in --help ("--iterations N   Steps (default: 30000)"), and checks whose messages say what is wanted.
+// How options look in --help ("--iterations N   Steps (default: 30000)"), and checks whose messages name the valid
+// values.
 
 #include <CLI/CLI.hpp>
 

@@ -81,7 +81,7 @@ void print_ranks(std::vector<std::string> const& places) {
   std::printf("           a GPU each: NCCL %s; gart train --gpus N\n", gart::nccl_comm::version().c_str());
   bool const shared = std::set<std::string>(places.begin(), places.end()).size() < places.size();
   if (shared && !gart::cuda_devices().empty())
-    std::puts("           two of these share a GPU: what they exchange goes through the host, slowly");
+    std::puts("           two of these share a GPU: their messages pass through the host, slowly");
 #endif
 #else
   static_cast<void>(places);
@@ -213,9 +213,9 @@ void add_info(CLI::App& app, command& selected) {
   info->add_flag("--self-test", *tests, "Try every configuration that runs here; exit code 1 where one is wrong");
   info->footer(
       "\nPrints the version, the devices found, and the configurations that were compiled: which backend, tracer and\n"
-      "backward pass go together, for which degrees of spherical harmonics. Writes nothing. Of several GPUs it\n"
-      "says how they reach each other's memory, and of several ranks where each is and what it would train on.\n"
-      "Of a file of Gaussians, or a capture, it says what is in it, and which origin its coordinates are from.\n"
+      "backward pass go together, for which degrees of spherical harmonics. Writes nothing. For several GPUs it\n"
+      "says how they reach each other's memory, for several ranks the host and device of each.\n"
+      "For a file of Gaussians, or a capture, it lists the contents, and the origin of the coordinates.\n"
       "\nExamples:\n"
       "  gart info\n"
       "  gart info run/model.ply\n"

@@ -20,7 +20,7 @@
 
 namespace {
 
-// What CLI11 met on the line and could not place. It reports what is missing first, and not these.
+// What CLI11 met on the line and could not place. It reports missing options first, without these.
 std::string not_understood(CLI::App const& app) {
   std::string words;
   for (std::string const& word : app.remaining(true))

@@ -7,7 +7,7 @@
 namespace gart_cli {
 
 // While it exists, a file that only this user can read leads to the address. All users can read a browser's command
-// line, and the address is a key. Where there is no display or no browser, `said` tells so and nothing else happens.
+// line, and the address is a key. Without a display or browser, `said` tells so and nothing else happens.
 class opened_browser {
  public:
   explicit opened_browser(std::string const& address);

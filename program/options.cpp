@@ -78,13 +78,11 @@ void add_threads(CLI::App& app, int& threads) {
 }
 
 void add_configuration_options(CLI::App& app, configuration_options& options) {
-  app.add_option("--backend", options.backend,
-                 "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is")
+  app.add_option("--backend", options.backend, "Backend: serial, openmp (CPU) or cuda;\nauto: the fastest there is")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(name_of_a<gart::backend_kind>());
-  app.add_option("--tracer", options.tracer,
-                 "What finds the hits: tiles, bvh, or embree (CPU);\nthe images are the same")
+  app.add_option("--tracer", options.tracer, "Tracer: tiles, bvh, or embree (CPU);\nthe images are the same")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(name_of_a<gart::tracer_kind>());

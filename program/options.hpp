@@ -102,10 +102,10 @@ struct photo_options {
 };
 void add_photo_options(CLI::App& command, photo_options& o);
 
-// The configuration for a model; unsupported, naming its file, where there is none of its degrees.
+// The configuration for a model; unsupported, naming its file, if no configuration has its degrees.
 gart::configuration_request configuration_request_for(gart::model_file const& file, std::filesystem::path const& path,
                                                       gart::configuration_request wanted);
-// What a run left out or computed shorter, as every report tells it.
+// The parts that a run left out or shortened, for every report.
 nlohmann::json approximations_of(gart::render_options const& render, gart::configuration_info const& configuration);
 
 }  // namespace gart_cli

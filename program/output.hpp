@@ -8,13 +8,13 @@
 
 namespace gart_cli {
 
-// Makes the folder where there is none. io_error, naming it, where files cannot be put there.
+// Makes a missing folder. io_error, naming it, where files cannot be put there.
 void prepare_folder(std::filesystem::path const& folder);
 // The same for the folder of a file that will be written.
 void prepare_file(std::filesystem::path const& file);
 
 void write_json(std::filesystem::path const& file, nlohmann::json const& value);
-// io_error, naming the file and the place in it, for what is not JSON.
+// io_error, naming the file and the place in it, for invalid JSON.
 nlohmann::json read_json(std::filesystem::path const& file);
 
 }  // namespace gart_cli

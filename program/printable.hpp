@@ -6,7 +6,7 @@
 
 namespace gart_cli {
 
-// With what a terminal takes for commands, control characters but ends of lines and tabs, as \x1b.
+// Control characters, which a terminal takes for commands, become \x1b and the like; ends of lines and tabs stay.
 inline std::string printable(std::string const& text) {
   std::string out;
   out.reserve(text.size());

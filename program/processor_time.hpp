@@ -1,5 +1,5 @@
 #pragma once
-// Processor time: what a step costs where other programs share the machine, and wall time says little.
+// Processor time: the cost of a step where other programs share the machine, and wall time says little.
 
 #include <ctime>
 

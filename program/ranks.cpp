@@ -56,7 +56,7 @@ void share_cores(gart::mpi_comm& all) {
   std::strncpy(mine.host, all.host().c_str(), sizeof mine.host - 1);
   CPU_ZERO(&mine.cores);
   ::sched_getaffinity(0, sizeof mine.cores, &mine.cores);
-  std::vector<seat> const seats = gart::gathered(all, mine);  // by all, since hosts may differ in what is said
+  std::vector<seat> const seats = gart::gathered(all, mine);  // on all ranks: hosts may differ in their messages
   if (std::getenv("OMP_NUM_THREADS")) return;
   auto const sharers = std::count_if(seats.begin(), seats.end(), [&](seat const& s) {
     cpu_set_t both;

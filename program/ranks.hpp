@@ -18,7 +18,8 @@ namespace gart_cli {
 
 class ranks {
  public:
-  // How many the launcher says it has started, and which one this is: 1 and 0 where there is none. Starts nothing.
+  // The number of processes that the launcher has started, and this one's number; without a launcher 1 and 0. Starts
+  // nothing.
   static int launched();
   static int launched_rank();
 
@@ -36,7 +37,7 @@ class ranks {
   static int rank();
   // The ranks of this host where there are several; else null.
   static gart::host_group* on_host();
-  // Whether this one takes part i of what is dealt out in turn.
+  // Whether this rank takes part i of work dealt out in turn.
   static bool takes(std::size_t i) { return i % static_cast<std::size_t>(size()) == static_cast<std::size_t>(rank()); }
   // "rank 2 of 4 (node1): " where there are several, else nothing.
   static std::string name();
@@ -61,7 +62,7 @@ class ranks {
     gather(&mine, all.data(), sizeof mine);
     return all;
   }
-  // What each has to say, on all of them.
+  // The messages of all ranks, on all ranks.
   static std::vector<std::string> gathered(std::string const& mine);
   // The largest of all.
   static gart::u64 largest(gart::u64 value);

@@ -28,10 +28,10 @@ void refuse_foreign_files(std::filesystem::path const& folder);
 // The background that a run's model was trained on, from the config.json beside it; empty without one.
 std::string background_of_run(std::filesystem::path const& model);
 
-// What a run that was killed had begun to write, in the folder and its renders/. For who holds the folder's lock.
+// The unfinished files of a killed run, in the folder and its renders/. For who holds the folder's lock.
 void remove_temporary_files(std::filesystem::path const& folder);
 
-// What a run leaves at its end: metrics, the report, the test views' poses and the images of renders/.
+// The files that a run leaves at its end: metrics, the report, the test views' poses and the images of renders/.
 void remove_results(std::filesystem::path const& folder);
 // Removes the intermediate files too: model, exposures, poses, checkpoint and history. config.json stays, so that the
 // folder is always known as gart's.

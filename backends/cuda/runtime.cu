@@ -155,7 +155,7 @@ void* cuda_exec::allocate(std::size_t bytes) {
   };
   cudaError_t code = attempt();
   if (code == cudaErrorMemoryAllocation && resources_->pool) {
-    // What the pool keeps may be in the wrong pieces: give it back to the driver and ask once more.
+    // The pool may keep memory in the wrong pieces: give it back to the driver and ask once more.
     cudaGetLastError();
     synchronize();
     check_cuda(cudaMemPoolTrimTo(resources_->pool, 0), "trimming the memory pool");

@@ -1,46 +1,9 @@
 #pragma once
 /// \file
-/// Everything that is safe in any host translation unit: captures and models in and out, training and rendering chosen
-/// at run time, and the templates on the host policies. Kernels on CUDA need nvcc and exec/cuda_launch.cuh first.
+/// Everything that is safe in any host translation unit, in four parts. io.hpp and runtime.hpp serve programs that use
+/// compiled configurations, in half the compile time of templates.hpp; view.hpp is the viewer.
 
-#include <gart/backward/backward.hpp>
-#include <gart/bvh/walk.hpp>
-#include <gart/camera/models.hpp>
-#include <gart/comm/mpi_comm.hpp>
-#include <gart/comm/self_comm.hpp>
-#include <gart/core/version.hpp>
-#include <gart/exec/cuda.hpp>
-#include <gart/exec/parallel.hpp>
-#include <gart/io/camera_file.hpp>
-#include <gart/io/dataset.hpp>
-#include <gart/io/image_file.hpp>
-#include <gart/io/mesh_file.hpp>
-#include <gart/io/origin.hpp>
-#include <gart/io/ply.hpp>
-#include <gart/io/scene_file.hpp>
-#include <gart/io/splat_file.hpp>
-#include <gart/lens/differentiate_lens.hpp>
-#include <gart/light/path_tracer.hpp>
-#include <gart/loss/affine_color.hpp>
-#include <gart/loss/metrics.hpp>
-#include <gart/pose/differentiate_pose.hpp>
-#include <gart/rays/ray_tracer.hpp>
-#include <gart/reference/reference.hpp>
-#include <gart/render/frame.hpp>
-#include <gart/runtime/capture_defaults.hpp>
-#include <gart/runtime/evaluate.hpp>
-#include <gart/runtime/initial.hpp>
-#include <gart/runtime/model_file.hpp>
-#include <gart/runtime/path_renderer.hpp>
-#include <gart/runtime/renderer.hpp>
-#include <gart/runtime/session.hpp>
-#include <gart/runtime/track.hpp>
-#include <gart/runtime/validation.hpp>
-#include <gart/scene/similarity.hpp>
-#include <gart/trace/bvh_tracer.hpp>
-#include <gart/trace/tile_tracer.hpp>
-#include <gart/train/trainer.hpp>
-#include <gart/view/camera_path.hpp>
-#include <gart/view/image_modes.hpp>
-#include <gart/view/pacing.hpp>
-#include <gart/view/server.hpp>
+#include <gart/io.hpp>
+#include <gart/runtime.hpp>
+#include <gart/templates.hpp>
+#include <gart/view.hpp>

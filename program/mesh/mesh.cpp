@@ -119,7 +119,7 @@ void add_mesh(CLI::App& app, command& selected) {
   mesh->add_option("CAMERAS", a->cameras, "A dataset (all its views), or a camera JSON, as for gart render")
       ->type_name("")
       ->required();
-  mesh->add_option("--out", a->out, "Where the mesh goes, a PLY of triangles")->type_name("MESH.ply")->required();
+  mesh->add_option("--out", a->out, "The mesh to write, a PLY of triangles")->type_name("MESH.ply")->required();
   mesh->add_option(
           "--voxel", a->fusion.voxel,
           "Side of a voxel, in the capture's units (default: a pixel's width\nwhere the first camera meets the "
@@ -139,8 +139,8 @@ void add_mesh(CLI::App& app, command& selected) {
       ->capture_default_str()
       ->check(between(1, 64));
   mesh->add_option("--against", a->against,
-                   "Say how far it is from this mesh, both ways, and from what the\ncameras see of it; gart synth "
-                   "--mesh writes the one of its scene")
+                   "Measure its distance to this mesh, both ways, where the cameras\nsee it; gart synth "
+                   "--mesh writes the mesh of its scene")
       ->type_name("REFERENCE.ply");
   mesh->add_option("--threshold", a->threshold,
                    "Distance within which the F-score takes a point for right\n(default: 0.005 of the extent of the "
@@ -150,8 +150,8 @@ void add_mesh(CLI::App& app, command& selected) {
   mesh->add_option("--json", a->json, "Write these scores")->type_name("FILE");
   mesh->add_flag("--quiet", a->quiet, "Say nothing but errors");
   mesh->footer(
-      "\nEach ray meets the scene at the hit behind which less than half of its light is left, in the exact order of\n"
-      "hits. Distances are averaged a voxel, and the mesh is where they are zero. Runs on the CPU; needs OpenVDB.\n"
+      "\nA ray meets the scene at its median hit: behind it less than half of the light is left.\n"
+      "Distances are averaged a voxel, and the mesh is where they are zero. Runs on the CPU; needs OpenVDB.\n"
       "\nExamples:\n"
       "  gart mesh run/model.ply capture --out mesh.ply\n"
       "  gart synth --out still --mesh\n"

@@ -155,7 +155,7 @@ std::vector<vec3> seen_points(gart::triangle_mesh const& mesh, std::vector<gart:
 // Mean distance, and the part that is within the threshold.
 std::pair<double, double> to_mesh(std::vector<vec3> const& points, gart::triangle_mesh const& mesh, double threshold) {
   nearest_triangle const nearest(mesh);
-  // What is farther counts as so far: one lost point is no mean's worth.
+  // Farther distances count as this one: one lost point must not spoil a mean.
   float const most = static_cast<float>(20 * threshold);
   double sum = 0, within = 0;
 #pragma omp parallel for schedule(dynamic, 256) reduction(+ : sum, within)

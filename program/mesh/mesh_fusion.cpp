@@ -65,7 +65,7 @@ gart::triangle_mesh fusion::mesh() const {
   std::vector<openvdb::Vec3s> points;
   std::vector<openvdb::Vec4I> quads;
   openvdb::tools::volumeToMesh(*grids_->distance, points, quads, 0.0);
-  // A zero between what rays have passed and what they have not is none.
+  // A zero between seen and unseen space is no surface.
   auto const weight = grids_->weight->getConstAccessor();
   auto const seen = [&](openvdb::Vec3s const& p) {
     openvdb::Coord const at = below({p.x(), p.y(), p.z()});

@@ -38,9 +38,9 @@ void add_compare(CLI::App& app, command& selected) {
   compare->add_option("--out", a->out, "The page")->type_name("FILE")->capture_default_str();
   compare->add_flag("--quiet", a->quiet, "Say nothing but errors");
   compare->footer(
-      "\nThe page needs no other file and no network. It has the scores side by side, the options that were not the "
-      "same, curves over\nsteps and seconds, and the test views that all runs have, first those on which they differ "
-      "most.\n"
+      "\nThe page needs no other file and no network. It shows the scores side by side, the options that "
+      "differ, and curves over\nsteps and seconds. Test views that all runs have follow, the most different "
+      "first.\n"
       "\nExamples:\n"
       "  gart train lego --out plain && gart train lego --out long --iterations 60000\n"
       "  gart compare plain long --out compare.html");

@@ -1,5 +1,5 @@
 #pragma once
-// compare.html: several training runs in one page that needs no other file and no network. What it says is from their
+// compare.html: several training runs in one page that needs no other file and no network. Its contents are from their
 // metrics.json, config.json and history.json, and the images of their renders/.
 
 #include "history.hpp"

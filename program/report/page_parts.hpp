@@ -10,11 +10,11 @@
 
 namespace gart_cli {
 
-// Not a number where there is none.
+// Not a number if absent.
 double number_of(nlohmann::json const& all, char const* key);
-// Escaped; "" where there is none.
+// Escaped; "" if absent.
 std::string text_of(nlohmann::json const& all, char const* key);
-// With commas; "-" where there is none.
+// With commas; "-" if absent.
 std::string count_of(nlohmann::json const& all, char const* key);
 
 // Scaled down by a whole factor where it is wider than that.

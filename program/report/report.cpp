@@ -48,8 +48,8 @@ std::string comparison(json const& m) {
   row("Training, " + count_of(training, "scored_views") + " of " + count_of(m, "train_views") + ", evenly spread",
       training);
   return html +
-         "</table></div><p class=\"soft\">The last column is a diagnostic, no score: PSNR after the affine map of "
-         "colours that brings each render nearest to its own photograph, which tells how much of the error is one of "
+         "</table></div><p class=\"soft\">The last column is a diagnostic, not a score: PSNR after the affine map of "
+         "colours that brings each render nearest to its photograph. It tells how much of the error is "
          "exposure and white balance.</p>";
 }
 
@@ -108,7 +108,7 @@ std::string costs(json const& m) {
   double const step = number_of(m, "profiled_step_ms");
   std::string html = "<h2>Where the time and memory went</h2>";
   if (!stage_rows.empty()) {
-    html += "<p class=\"soft\">Stages of one training step, in the mean over " + count_of(m, "profiled_steps") +
+    html += "<p class=\"soft\">Stages of a training step, the mean of " + count_of(m, "profiled_steps") +
             " steps that were timed; such a step took " + fixed(step, 2) +
             " ms. A stage that contains others is counted with them.</p><div class=\"box\">" +
             bars(stage_rows, "ms", std::isfinite(step) ? step : stages) + "</div>";
@@ -169,7 +169,7 @@ std::string settings(json const& m, json const& config) {
   if (m.contains("psnr_own_colours")) {
     html += m.value("exposure", false)
                 ? " Each test view has the exposure of the training views about it, not of its own photograph"
-                : " Each test view is darker towards its corners, as the training views say of its lens";
+                : " Each test view is darker towards its corners, by the falloff learned on the training views";
     html += "; without, in the scene's own colours, PSNR is " + fixed(number_of(m, "psnr_own_colours"), 2) + " dB.";
   }
   html += "</p>";

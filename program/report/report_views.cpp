@@ -104,8 +104,8 @@ std::string report_pictures(json const& m, std::vector<report_view> const& shown
   std::string html = "<h2>Test views</h2>";
   if (total == 0) {
     return html +
-           "<p class=\"soft\">The capture has no test views, so nothing here tells how well the model does on "
-           "photographs that it was not trained on.</p>";
+           "<p class=\"soft\">The capture has no test views, so nothing here tells how well the model shows "
+           "other photographs.</p>";
   }
   html += "<p class=\"soft\">" +
           (shown.size() < total ? std::to_string(shown.size()) + " of " + std::to_string(total) +

@@ -23,7 +23,7 @@ struct report_view {
 report_view make_report_view(std::string const& name, double psnr, double ssim, gart::image_float const& render,
                              gart::image_float const& truth);
 
-// What the model looks like, at the top of the page; no JPEG where nothing was rendered.
+// A picture of the model, at the top of the page; no JPEG where nothing was rendered.
 struct report_cover {
   std::string name;
   std::vector<gart::u8> jpeg;

@@ -89,7 +89,7 @@ std::string to_svg(scatter const& plot) {
   svg += "<text class=\"tick\" text-anchor=\"end\" x=\"" + number(width - right) + "\" y=\"" + number(height - 6) +
          "\">" + html_escape(plot.x_label) + "</text>";
 
-  // A step for each point of the front: what is reached in that time.
+  // A step for each point of the front: the value reached in that time.
   std::string front;
   double last = 0;
   for (auto const& p : points) {

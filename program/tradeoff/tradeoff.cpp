@@ -311,9 +311,7 @@ void add_tradeoff(CLI::App& app, command& selected) {
                    "render")
       ->type_name("")
       ->required();
-  tradeoff->add_option("--out", a->out, "Folder of the results; made where there is none")
-      ->type_name("DIR")
-      ->required();
+  tradeoff->add_option("--out", a->out, "Folder of the results; made if missing")->type_name("DIR")->required();
   tradeoff
       ->add_option(
           "--settings", a->settings,
@@ -359,8 +357,8 @@ void add_tradeoff(CLI::App& app, command& selected) {
       ->check(between(0, 0.99));
   tradeoff
       ->add_option("--clock", a->clock,
-                   "What the fronts are drawn over: wall, or processor, the time\nof all threads together, for a CPU "
-                   "that has other work")
+                   "Time axis of the fronts: wall, or processor, the time of all\nthreads together, for a CPU "
+                   "with other work")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(one_of({"wall", "processor"}));
@@ -373,7 +371,7 @@ void add_tradeoff(CLI::App& app, command& selected) {
       "pass of a view with all that prepares them.\n"
       "\nWrites into DIR:\n"
       "  tradeoff.html   one page: error against time, settings that another one beats in both greyed, and the table\n"
-      "  table.txt       the table, as it is printed\n"
+      "  table.txt       the table as printed\n"
       "  tradeoff.json   everything, every stage's time included\n"
       "\nExamples:\n"
       "  gart tradeoff run/model.ply lego --out trade\n"

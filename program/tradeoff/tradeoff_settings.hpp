@@ -27,7 +27,7 @@ struct setting {
   }
 };
 
-// The first is `exact` as it stands; values that are already its own are left out.
+// The first is `exact` itself; values that it already has are left out.
 std::vector<setting> settings_of(configuration const& exact);
 
 // The settings whose knob or name is in `wanted`, and always the first; all if it is empty. usage_error for a word that

@@ -1,5 +1,5 @@
 #pragma once
-// What a run that goes on must find again: the checksums of a capture's names, cameras and images.
+// The checksums of a capture's names, cameras and images, which a resumed run must find again.
 
 #include <gart/io/dataset.hpp>
 

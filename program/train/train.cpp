@@ -38,7 +38,7 @@ void add_train(CLI::App& app, command& selected) {
   train->callback([a, train, &selected] {
     fill_in(*train, *a);
     selected = [a] {
-      train_options_of(*a);  // says what is wrong with a setting before anything is read
+      train_options_of(*a);  // reports a wrong setting before anything is read
       return training_run(*a).run();
     };
   });

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// The option of a field that has one. Looking for what is not finite changes no result, and is not recorded.
+// The option of a field that has one. A search for numbers that are not finite changes no result, and is not recorded.
 void add_field(CLI::App& train, train_arguments& a, gart::option_field const& field) {
   std::string const flag = flag_of(field);
   std::string const help =
@@ -70,7 +70,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                   "Capture: a folder with COLMAP's sparse/ and images/, Blender's\n"
                   "transforms_train.json, or a transforms.json; or such a file")
       ->type_name("");
-  train.add_option("--out", a.out, "Folder of the results; made where there is none")->type_name("DIR")->required();
+  train.add_option("--out", a.out, "Folder of the results; made if missing")->type_name("DIR")->required();
   train.add_flag("--resume", a.resume,
                  "Continue the run in DIR from its last checkpoint, with its\noptions; DATASET may be left out");
   train.add_flag("--quiet", a.quiet, "Say nothing but errors");
@@ -150,31 +150,28 @@ void add_arguments(CLI::App& train, train_arguments& a) {
             "more of a scene"))
       ->check(name_of_a<gart::split_kind>());
 
-  in_group(
-      r.add(train, "--depth-kind", a.depth_kind, "NAME",
-            "What the maps measure: z, along the camera's axis, or\ndistance, along the ray; auto: what the capture "
-            "says, else z"))
+  in_group(r.add(train, "--depth-kind", a.depth_kind, "NAME",
+                 "Quantity of the maps: z, along the camera's axis, or\ndistance, along the ray; auto: the capture's "
+                 "own, else z"))
       ->check(name_of_a<gart::depth_kind>());
-  in_group(
-      r.add(train, "--depth-unit", a.depth_unit, "U",
-            "Length of a step of the maps, in units of the cameras'\npositions; 0: what the capture says, else 0.001 "
-            "for a PNG and 1\nfor a .npy"))
+  in_group(r.add(train, "--depth-unit", a.depth_unit, "U",
+                 "Length of a step of the maps, in units of the cameras'\npositions; 0: the capture's own, else 0.001 "
+                 "for a PNG and 1\nfor a .npy"))
       ->check(between(0, 1e9));
 
   group = "Machine";
   in_group(r.add(train, "--backend", a.backend, "NAME",
-                 "What computes: serial, openmp (CPU) or cuda;\nauto: the fastest there is"))
+                 "Backend: serial, openmp (CPU) or cuda;\nauto: the fastest there is"))
       ->check(name_of_a<gart::backend_kind>());
-  in_group(r.add(train, "--tracer", a.tracer, "NAME",
-                 "What finds the hits: tiles, bvh, or embree (CPU);\nthe images are the same"))
+  in_group(r.add(train, "--tracer", a.tracer, "NAME", "Tracer: tiles, bvh, or embree (CPU);\nthe images are the same"))
       ->check(name_of_a<gart::tracer_kind>());
   in_group(r.add(train, "--backward", a.backward, "NAME",
                  "How gradients are summed: primitive (one sum a Gaussian and\ntile), hybrid (a quarter of the "
                  "memory), pixel, or\ndeterministic (the same bits in every run); auto: the fastest"))
       ->check(one_of_methods());
   in_group(r.add(train, "--hit-memory", a.hit_memory_gb, "GB",
-                 "Memory for what the forward pass records; a step that\nneeds more is done by hybrid, which needs a "
-                 "quarter, and where\nthat is too much by pixel, which needs none. 0: half of what\nis free "
+                 "Memory for the records of the forward pass. A step that\nneeds more is done by hybrid, which needs a "
+                 "quarter, or else\nby pixel, which needs none. 0: half of the memory free\n"
                  "at the start (deterministic: no limit)"))
       ->check(between(0, 1e6));
   in_group(
@@ -199,7 +196,7 @@ void add_arguments(CLI::App& train, train_arguments& a) {
       ->check(one_of({"exact", "quick"}));
 
   in_group(r.add(train, "--hit-format", a.hit_format, "NAME",
-                 "What the forward pass leaves of a hit for primitive: float4,\nor half (half the memory, less exact "
+                 "Record of a hit for primitive: float4, or half (half the\nmemory, less exact "
                  "gradients)"))
       ->check(name_of_a<gart::hit_format_kind>());
 
@@ -308,7 +305,7 @@ nlohmann::json config_of(train_arguments const& a, gart::dataset const& data) {
                         {"checksums", checksums_of(data)},
                         {"origin", {data.origin.x, data.origin.y, data.origin.z}},
                         {"options", a.recorded.values()}};
-  // A run that goes on must begin at the same: what it has learned is from there.
+  // A resumed run must begin at the same poses: its learned ones are from there.
   if (!a.poses.empty()) {
     std::vector<gart::u8> const file = gart::read_file(a.poses);
     config["poses_checksum"] = gart::crc32c(file.data(), file.size());

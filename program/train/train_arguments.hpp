@@ -38,7 +38,7 @@ struct train_arguments {
               scene;
   std::string hit_format = "auto";
   std::string preset = "exact";
-  gart::train_options options;  // by the table of fields; what is "auto" here is open there
+  gart::train_options options;  // by the table of fields; "auto" here is open there
   double time_budget = 0;       // seconds of training; 0: none
   int kernel_degree = 2;
   bool automatic = true;
@@ -74,14 +74,14 @@ struct train_arguments {
 };
 
 void add_arguments(CLI::App& train, train_arguments& a);
-// Sets what the command line leaves open and the preset says.
+// Sets the options of the preset that the command line leaves open.
 void fill_in(CLI::App const& train, train_arguments& a);
 // Takes the options and the origin of the run in `out`, and its dataset if none was named. io_error without such a run.
 void continue_run(train_arguments& a);
 gart::configuration_request configuration_request_of(train_arguments const& a);
 // `background` is a colour's name or "random".
 gart::train_options train_options_of(train_arguments const& a);
-// With "auto" replaced by what it came to, so that a resumed run cannot come to anything else.
+// With "auto" replaced by its result, so that a resumed run cannot choose otherwise.
 nlohmann::json config_of(train_arguments const& a, gart::dataset const& data);
 // usage_error where the dataset is not the one that config.json tells of.
 void check_same_dataset(train_arguments const& a, gart::dataset const& data);

@@ -27,7 +27,7 @@ gart::scores training_run::score(gart::some_views const& views, gart::keep_view 
       place);
 }
 
-// Each test view at the pose where the model, which stays as it is, agrees best with its photograph.
+// Each test view at the pose where the unchanged model agrees best with its photograph.
 gart::place_view training_run::aligned_to_photographs(std::vector<gart::named_camera>& found) {
   auto request = configuration_request_of(a_);
   request.sh_degree = session_->configuration().sh_degree;

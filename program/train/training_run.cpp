@@ -27,7 +27,7 @@ int training_run::run() {
   if (view_)
     view_->end(finished ? "The training is done, and saved in " + a_.out.string() + "."
                         : "The training was stopped, and saved: gart train --resume --out " + a_.out.string() +
-                              " goes on with it.");
+                              " continues it.");
   view_.reset();  // there is nothing to see any more
   if (!finished) {
     say_.note("Stopped after step " + with_commas(static_cast<std::uint64_t>(session_->steps_done())) + ". Saved " +
@@ -47,7 +47,7 @@ void training_run::prepare() {
   share_out();
   if (a_.dataset.empty()) throw usage_error("DATASET is missing (see gart train --help)");
   check_poses();
-  configuration_ = gart::resolve(request());  // what is not there is known before images are read
+  configuration_ = gart::resolve(request());  // a missing file is known before images are read
   course_ = course_of(a_);
   load();
   chosen_ = choose(a_, data_);
@@ -108,7 +108,7 @@ void training_run::read_mirrors() {
   data_.mirrors = std::move(file.scene);
 }
 
-// What is said of --poses; recorded as a whole path, since a run may be resumed from anywhere.
+// The message about --poses; recorded as a whole path, since a run may be resumed from anywhere.
 void training_run::check_poses() {
   if (a_.poses.empty()) return;
   if (!a_.options.refine_poses)
@@ -126,7 +126,7 @@ void training_run::share_out() {
   if (a_.parallel == "views" && a_.options.batch == 1 && !a_.resume) a_.options.batch = ranks::size();
   ranks::start(a_.options.batch > 1);
   if (ranks::size() == 1) return;
-  if (a_.viewed) throw usage_error("--view shows the training of one rank: leave it out, or start one rank");
+  if (a_.viewed) throw usage_error("--view needs a single rank: leave it out, or start one rank");
   say_.note(std::to_string(ranks::size()) + " ranks, each a part of the Gaussians and of every step: " +
             (a_.options.batch == 1 ? "strips of a view" : "a batch of " + std::to_string(a_.options.batch) + " views"));
 }
@@ -142,7 +142,7 @@ gart::row_owners training_run::owners() const {
   return {ranks::size(), ranks::rank(), train_options_of(a_).shard_block};
 }
 
-// What the ranks will need, before they do.
+// The ranks' needs, before they take memory.
 void training_run::say_memory() {
   gart::train_options const options = train_options_of(a_);
   gart::u64 const begin = a_.start.empty() ? gart::choose_start(data_, options).value.count : start_total_;
@@ -150,10 +150,10 @@ void training_run::say_memory() {
   say_.note(
       "each rank needs " +
       as_bytes(static_cast<double>(gart::least_bytes(options, most, configuration_.stored_degree, ranks::size()))) +
-      " at the least, for its part of " + with_commas(most) + " Gaussians, and what the views take");
+      " at the least, for its part of " + with_commas(most) + " Gaussians, and the memory of the views");
 }
 
-// Rank 0 measures, and all take what it found. For a run that ends at a time it is at most a tenth of that time.
+// Rank 0 measures, and all take its result. For a run with a time limit it is at most a tenth of that time.
 void training_run::measure_capture() {
   stopwatch const measuring;
   if (writes_) {

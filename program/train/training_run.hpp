@@ -85,7 +85,7 @@ class training_run {
   gart::scores test(int step, gart::keep_view const& keep = {}, gart::place_view const& place = {});
   gart::place_view aligned_to_photographs(std::vector<gart::named_camera>& found);
   gart::place_view as_learned() const;
-  // In the coordinates of the capture, as files have them.
+  // In the coordinates of the capture and its files.
   std::vector<gart::named_camera> from_zero(std::vector<gart::named_camera> cameras) const;
   void save_checkpoint();
   void save();

@@ -29,7 +29,7 @@ class training_view {
   // the training is to stop.
   bool attend(double step_seconds, gart::view_status status, interrupt_guard const& interrupt,
               std::function<std::string()> const& save);
-  // What the pages are told when the viewer ends.
+  // The message to the pages when the viewer ends.
   void end(std::string const& why);
   void set_scores(gart::dataset const& data, gart::scores const& test);
   void set_curve(gart::view_curve const& curve) { server_.set_curve(curve); }

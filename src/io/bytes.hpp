@@ -86,7 +86,7 @@ inline std::string_view next_word(std::string_view& text) {
   return word;
 }
 
-// Takes the next line off the front of `text`, without its end; false where there is none.
+// Takes the next line off the front of `text`, without its end; false at the end.
 inline bool next_line(std::string_view& text, std::string_view& line) {
   if (text.empty()) return false;
   std::size_t const end = text.find('\n');

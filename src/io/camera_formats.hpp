@@ -24,14 +24,14 @@ struct camera_format {
   bool has(std::string_view name) const;
 };
 
-// Null where there is no such model.
+// Null for an unknown model.
 camera_format const* camera_format_of(int number);
 camera_format const* camera_format_of(std::string_view name);
 
 // "A, B and C": all that are traced, for errors.
 std::string traced_camera_formats();
 
-// A camera's parameter by its member's name. A name that there is not is passed over.
+// A camera's parameter by its member's name. Unknown names are passed over.
 void set_member(camera& c, std::string_view member, double value);
 float member_of(camera const& c, std::string_view member);
 

@@ -1,4 +1,4 @@
-// gart's camera JSON, there and back; and what a camera's model and lens are in JSON of any kind.
+// gart's camera JSON, there and back; a camera's model and lens in JSON of any kind.
 
 #include "bytes.hpp"
 #include "camera_formats.hpp"

@@ -70,8 +70,8 @@ void set_pose(camera& view, mat3d const& axes, vec3d const& center, std::string 
 }
 
 namespace {
-// File systems take 255 bytes, of which endings and temporary names have some. The end of a long name tells it from
-// others, its start whose it is. No character of UTF-8 is cut.
+// File systems take 255 bytes; endings and temporary names need some. The end of a long name tells it from others, its
+// start whose it is. No character of UTF-8 is cut.
 std::string short_name(std::string name) {
   constexpr std::size_t most = 160, head = 40;
   if (name.size() <= most) return name;
@@ -133,7 +133,7 @@ std::optional<colmap_place> colmap_in(fs::path const& folder) {
   return std::nullopt;
 }
 
-// COLMAP numbers the parts that it could not join: the one of most images, and what to say of the others.
+// COLMAP numbers the parts that it could not join: takes the part with most images, and a note about the others.
 std::optional<colmap_place> largest_colmap_below(fs::path const& sparse, std::vector<std::string>& notes) {
   std::error_code code;
   std::vector<fs::path> folders;

@@ -1,5 +1,5 @@
 #pragma once
-// A capture as its files describe it, before any photo is opened: what the format readers hand to load_dataset.
+// A capture as its files describe it, before any photo is opened. The format readers hand it to load_dataset.
 
 #include "unusable.hpp"
 
@@ -30,7 +30,7 @@ struct frame {
   void set_size(int width, int height);
 };
 
-// Points as files have them.
+// Points in the file's coordinates.
 struct exact_points {
   std::vector<double> position;  // [N][3]
   std::vector<u8> color;         // [N][3], or empty

@@ -20,7 +20,7 @@ std::vector<u8> inflated(u8 const* bytes, std::size_t size, int window, std::siz
   std::size_t used = 0;
   int code = Z_OK;
   while (out.size() < most && code == Z_OK) {
-    // In steps, so that what a file promises takes no more memory than it holds.
+    // In steps, so that a false count takes no more memory than the file holds.
     std::size_t const at = out.size();
     out.resize(std::min(most, at + std::max<std::size_t>(at, std::size_t{1} << 16)));
     stream.next_in = const_cast<Bytef*>(bytes + used);

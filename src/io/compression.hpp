@@ -24,7 +24,7 @@ u32 zip_checksum(u8 const* bytes, std::size_t size);
 std::vector<u8> zstd_compressed(std::vector<u8> const& bytes, std::string const& file);
 std::vector<u8> zstd_decompressed(u8 const* bytes, std::size_t packed, std::size_t size, std::string const& file);
 
-// What a format needs that this build lacks.
+// A package that a format needs and this build lacks.
 [[noreturn]] inline void refuse_without(std::string const& file, char const* format, char const* library,
                                         char const* package) {
   throw io_error(file, std::string(format) + " needs " + library + ", which this build of gart lacks",

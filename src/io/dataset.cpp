@@ -101,7 +101,7 @@ image8 three_channels(image8 image) {
   return result;
 }
 
-// A folder of photos, and what it has that is nearest to a name that was not found.
+// A folder of photos, and its entry nearest to a name that was not found.
 std::string what_is_in(fs::path const& folder, std::string const& name) {
   file_names names(folder);
   if (names.size() == 0) return folder.string() + ", where no photo is";
@@ -284,7 +284,7 @@ std::vector<dataset_view> load_views(capture& c, dataset_options const& options,
   return views;
 }
 
-// Cameras and points from the origin; what it is.
+// Moves cameras and points to the origin, and returns it.
 vec3d set_origin(capture& c, dataset_options const& options) {
   vec3d origin(0.0);
   if (options.origin) {

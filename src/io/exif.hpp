@@ -1,5 +1,5 @@
 #pragma once
-// What a JPEG says of how it was held.
+// How a JPEG's EXIF says the camera was held.
 
 #include <gart/core/types.hpp>
 

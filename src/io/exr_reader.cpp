@@ -167,7 +167,7 @@ class exr_reader {
     u64 const whole = line * std::min<u64>(lines_, static_cast<u64>(height_ - y));
     u8 const* const data = bytes_.data() + offset + 8;
     auto const n = static_cast<std::size_t>(size);
-    if (n == whole) return {data, data + n};  // as it is, since packing made it no smaller
+    if (n == whole) return {data, data + n};  // stored, since packing made it no smaller
     if (packing_ == 0 || n > whole) refuse("the block of line " + std::to_string(y) + " is of another size");
     std::vector<u8> packed = packing_ == 1 ? run_lengths(data, n, whole) : inflated(data, n, zlib_window, whole, name_);
     if (packed.size() != whole) refuse("the block of line " + std::to_string(y) + " unpacks to another size");

@@ -35,7 +35,7 @@ class file_names {
 
   std::filesystem::path const& folder() const { return folder_; }
   std::size_t size();
-  // The file whose name is least different; empty where there is none.
+  // The file whose name is least different; empty without one.
   std::string nearest(std::string const& name);
 
  private:

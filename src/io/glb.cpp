@@ -72,7 +72,7 @@ class glb_reader {
     if (depth > deepest_gltf_node)
       refuse("has nodes within each other more than " + std::to_string(deepest_gltf_node) + " deep");
     json const& node = document_->at("nodes").at(number);
-    // glTF's nodes are trees; what is no tree can have as many ways through it as there are names.
+    // glTF's nodes are trees; in a graph that is no tree, paths can be as many as names.
     visited_.resize(document_->at("nodes").size());
     if (visited_[number]) refuse("node " + std::to_string(number) + " is below two others, or itself");
     visited_[number] = true;
@@ -140,7 +140,7 @@ class glb_reader {
       part.quaternion[4 * i + (c + 1) % 4] = static_cast<float>(v);
     });
     values(attribute("SCALE"), 3, [&](std::size_t i, std::size_t c, double v) {
-      part.log_scale[3 * i + c] = static_cast<float>(std::log(v));  // of what is no length not finite
+      part.log_scale[3 * i + c] = static_cast<float>(std::log(v));  // not finite for a vector without length
     });
     values(attribute("OPACITY"), 1, [&](std::size_t i, std::size_t, double v) {
       part.opacity[i] = v >= 0 && v <= 1 ? opacity_logit(v) : std::numeric_limits<float>::quiet_NaN();
@@ -188,7 +188,7 @@ class glb_reader {
     return placed;
   }
 
-  // What stands where it is keeps its bits.
+  // A Gaussian that is not moved keeps its bits.
   static void apply_placement(similarity const& placed, gaussian_model& part) {
     if (placed.rotation != mat3d(1.0) || placed.scale != 1 || placed.translation != vec3d(0.0)) apply(placed, part);
   }

@@ -1,7 +1,7 @@
 #pragma once
 // GLB with KHR_gaussian_splatting: a glTF mesh of points whose attributes are Gaussians', unpacked, or packed as SPZ
-// (KHR_gaussian_splatting_compression_spz_2). Axes: x left, y up, z forward. What the reader (glb.cpp) and the writer
-// (glb_writer.cpp) share.
+// (KHR_gaussian_splatting_compression_spz_2). Axes: x left, y up, z forward. The parts that the reader (glb.cpp) and
+// the writer (glb_writer.cpp) share.
 // https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_gaussian_splatting
 
 #include <gart/io/splat_file.hpp>

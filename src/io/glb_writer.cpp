@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 constexpr int array_buffer = 34962;
 
-// Attributes one after the other: their bytes, and what glTF says of them.
+// Attributes one after the other: their bytes, and their description in glTF.
 struct glb_buffer {
   std::string bytes;
   json accessors = json::array(), views = json::array(), attributes = json::object();

@@ -19,7 +19,7 @@ int digit_of(char c, std::string_view digits) {
   return at == std::string_view::npos ? -1 : static_cast<int>(at);
 }
 
-// Up to what is no base64.
+// Up to the first character outside base64.
 std::vector<u8> from_base64(std::string_view text) {
   constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::vector<u8> out;

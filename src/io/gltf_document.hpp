@@ -1,7 +1,7 @@
 #pragma once
 // What readers of glTF 2.0 share (https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html): a file's JSON and its
-// buffers, within a GLB, in the JSON as base64, or beside it; the numbers of accessors. What the JSON is not is an
-// exception of its library, which readers make an error of the file.
+// buffers, within a GLB, in the JSON as base64, or beside it; the numbers of accessors. A wrong type in the JSON is an
+// exception of its library; readers make it an error of the file.
 
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>
@@ -39,11 +39,11 @@ class gltf_document {
     throw io_error(name_, what, remedy);
   }
 
-  // The bytes of a buffer view; `what` is what lies there.
+  // The bytes of a buffer view; `what` names their content.
   std::pair<u8 const*, std::size_t> view(nlohmann::json const& number, std::string const& what);
-  // What "uri" names, beside the file or within the text; `what` is what has it.
+  // The data of a "uri", beside the file or within the text; `what` names its owner.
   std::vector<u8> uri_bytes(std::string const& uri, std::string const& what) const;
-  // The path that it is of, for errors; the file itself for what lies within.
+  // Its path, for errors; the file itself for data within.
   std::string uri_name(std::string const& uri) const;
 
   // How many elements an accessor has.

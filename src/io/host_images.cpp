@@ -11,7 +11,7 @@ namespace gart::io {
 
 namespace {
 
-// What a view has of images, as all ranks need to know it.
+// The images of a view, as all ranks need to know them.
 struct shape {
   int width = 0, height = 0, channels = 0;
 };

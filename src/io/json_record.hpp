@@ -1,5 +1,5 @@
 #pragma once
-// What the readers of JSON share: a file, an object whose fields are named in errors, a pose.
+// The parts that the readers of JSON share: a file, an object whose fields are named in errors, a pose.
 
 #include "capture.hpp"
 
@@ -117,7 +117,7 @@ void read_shutter(record const& r, char const* key, bool opengl_axes, camera& vi
 // The model that 'camera_model' names; refuses one that is not traced.
 camera_format const* camera_model_of(record const& r, char const* otherwise);
 
-// The parameters of its lens, all but focal lengths and principal point; refuses what the model has not.
+// The parameters of its lens, all but focal lengths and principal point; refuses those that the model lacks.
 void read_lens_members(record const& r, camera_format const& model, camera& view);
 
 }  // namespace gart::io

@@ -49,12 +49,12 @@ std::array<double, 4> unit(float const* q);
 // The largest component by magnitude of four, made positive by the sign of all.
 int largest_positive(std::array<double, 4>& q);
 
-// The Gaussians by their place on a curve through space, neighbours near each other: what is alike stands together.
+// The Gaussians by their place on a curve through space: neighbours stand together, and so do like values.
 std::vector<u32> along_a_curve(gaussian_model const& model);
 gaussian_model in_order(gaussian_model const& model, std::vector<u32> const& order);
 
-// Turned by half a turn about an axis (0, 1, 2: x, y, z), with the colours that depend on direction. Twice is nothing;
-// every number keeps its bits but for signs.
+// Turned by half a turn about an axis (0, 1, 2: x, y, z), with the colours that depend on direction. Applied twice it
+// changes nothing; every number keeps its bits, to signs.
 void half_turn(gaussian_model& model, int axis);
 
 // f(first, last) over parts of [0, n) on as many threads as there are, f free of shared writes.

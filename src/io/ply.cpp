@@ -93,7 +93,7 @@ struct splat_store {
   }
 };
 
-// Means in double are from an origin of their own, where floats would lose what they have.
+// Means in double have an origin of their own, where floats would lose digits.
 vec3d set_exact_means(gaussian_model& model, std::vector<double> const& exact) {
   std::vector<vec3d> places;
   for (std::size_t i = 0; i < model.size(); ++i) {
@@ -106,8 +106,8 @@ vec3d set_exact_means(gaussian_model& model, std::vector<double> const& exact) {
   return origin;
 }
 
-// Mip-splatting's Gaussians as it draws them: s^2 becomes s^2 + f^2 along each axis, and the opacity is less by what
-// the density loses. https://github.com/autonomousvision/mip-splatting
+// Mip-splatting's Gaussians the way it draws them: s^2 becomes s^2 + f^2 along each axis, and the opacity falls with
+// the density. https://github.com/autonomousvision/mip-splatting
 void fuse_filter(gaussian_model& model, std::vector<double> const& filter) {
   for (std::size_t i = 0; i < model.size(); ++i) {
     if (!(filter[i] > 0) || !std::isfinite(filter[i])) continue;
@@ -122,7 +122,7 @@ void fuse_filter(gaussian_model& model, std::vector<double> const& filter) {
   }
 }
 
-// `origin`: what is added to that of the traits.
+// `origin`: added to that of the traits.
 gaussian_model splats_of(ply_file const& file, std::vector<std::string>* notes, vec3d& origin) {
   element const& e = vertices(file);
   if (!find(e, "f_dc_0") && (find(e, "red") || !find(e, "opacity"))) {

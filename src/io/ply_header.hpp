@@ -1,6 +1,6 @@
 #pragma once
-// A PLY file in memory, its header read: which elements it has, of which properties, in which encoding. What follows
-// the header is not looked at.
+// A PLY file in memory, its header read: its elements, their properties and encoding. What follows the header is not
+// looked at.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/core/error.hpp>
@@ -32,7 +32,7 @@ struct element {
   std::string name;
   u64 count = 0;
   std::vector<property> properties;
-  // What a record needs at the least: bytes, or in ascii one digit and one separator a value.
+  // The least size of a record: bytes, or in ascii one digit and one separator a value.
   u64 smallest(encoding e) const {
     u64 bytes = 0;
     for (property const& p : properties)

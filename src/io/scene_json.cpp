@@ -1,4 +1,4 @@
-// scene.json: models, meshes, materials, lights, what lies around them, cameras, options.
+// scene.json: models, meshes, materials, lights, surroundings, cameras, options.
 
 #include "capture.hpp"
 #include "json_checks.hpp"
@@ -73,7 +73,7 @@ class scene_reader {
   }
 
  private:
-  // f(record) for what a list has; the place of an element names it.
+  // f(record) for each element of a list; its place names it.
   template <class F>
   void each(char const* list, char const* noun, F const& f) const {
     json const* const all = top_.find(list);

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr double root = 1.41421356237309504880;
 constexpr std::size_t palette_columns = 64, most_rows = 65536, gaussians_a_row = 4;
-// Steps of logarithms of scales and of the coefficients of degree 0. Bands above have a step that adds so much to the
+// Steps of logarithms of scales and of the coefficients of degree 0. Bands above have a step that adds this much to the
 // squared error of their palette.
 constexpr double scale_step = 1.0 / 16, base_step = 0.03, error_added = 0.2;
 constexpr u8 first_tag = 252;  // of the largest component w; then x, y, z
@@ -83,7 +83,7 @@ class sog_entries {
     return read_file(folder_ / entry);
   }
 
-  // What the zip file is around, where it is no SOG.
+  // The folder within the zip file, where it is no SOG.
   void require_meta() const {
     if (!zip_) return;
     std::string models;
@@ -280,7 +280,7 @@ class sog_writer {
     return {{"mins", mins}, {"maxs", maxs}, {"files", {put("means_l.webp", low), put("means_u.webp", high)}}};
   }
 
-  // What is hardly ever seen still has a hundredth of what hides all behind it.
+  // Gaussians that are hardly ever seen still count a hundredth of those that hide all behind them.
   std::vector<float> weights() const {
     std::vector<float> all(m_.size());
     for (std::size_t i = 0; i < m_.size(); ++i) all[i] = std::max(0.01f, opacity_byte(m_.opacity[i]) / 255.0f);

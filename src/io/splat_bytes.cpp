@@ -29,7 +29,7 @@ gaussian_model read_splat_bytes(fs::path const& path, splat_traits*, std::vector
     for (std::size_t c = 0; c < 3; ++c) m.mean[3 * i + c] = in.get<float>("a position");
     for (std::size_t c = 0; c < 3; ++c) {
       float const scale = in.get<float>("a scale");
-      m.log_scale[3 * i + c] = std::log(scale);  // of what is no length not finite
+      m.log_scale[3 * i + c] = std::log(scale);  // not finite for a vector without length
     }
     for (std::size_t c = 0; c < 3; ++c) m.sh[3 * i + c] = base_coefficient(in.get<u8>("a colour") / 255.0);
     m.opacity[i] = opacity_logit(in.get<u8>("an opacity"));

@@ -41,7 +41,7 @@ struct mesh_place {
 // area, are left out and counted in a note; so is a mesh without any left. Corners must be vertices.
 void add_placed(light::scene& to, raw_mesh const& raw, mesh_place const& place, std::string const& file,
                 std::vector<std::string>& notes);
-// io_error, naming `file` and the last note, where there is no mesh.
+// io_error, naming `file` and the last note, if there is no mesh.
 void require_meshes(light::scene const& scene, std::string const& file, std::vector<std::string> const& notes);
 
 // An image of 1, 3 or 4 channels; `colours` are in sRGB's curve.

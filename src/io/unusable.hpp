@@ -1,6 +1,6 @@
 #pragma once
-// Records of a file that cannot be used: left out, counted and said, with what is wrong with the first. A file that has
-// no other is refused.
+// Records of a file that cannot be used: left out, counted and said, with the fault of the first. A file that has no
+// other is refused.
 
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>
@@ -27,7 +27,7 @@ class unusable {
   std::vector<std::size_t> const& records() const { return records_; }
   std::string const& first() const { return first_; }
 
-  // What is left of `all` records, by their numbers; a note of the others where `notes` is not null.
+  // The usable ones of `all` records, by their numbers; a note of the others if `notes` is not null.
   std::vector<u32> others(std::size_t all, char const* noun, std::string const& file,
                           std::vector<std::string>* notes) const {
     std::vector<char> out(all, 0);

@@ -1,5 +1,5 @@
 #pragma once
-// What a capture has of a view beside its photo, at the size that the photo is made smaller to.
+// The maps of a view beside its photo, at the size of the shrunk photo.
 
 #include "capture.hpp"
 #include "codec.hpp"
@@ -10,7 +10,7 @@
 
 namespace gart::io {
 
-// Reads the mask of a photo of that size. A block of which any pixel is ignored is ignored.
+// Reads the mask of a photo of that size. A block with any ignored pixel is ignored.
 image8 read_mask(std::filesystem::path const& path, image_size size, int factor);
 
 // Reads distances along the rays of `view`, the photo's camera after options.downscale; 0: not measured. Each block

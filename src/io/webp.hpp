@@ -19,7 +19,7 @@ struct texture {
   std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
 };
 
-// io_error naming the package, where gart was built without libwebp; for more than `most` pixels; for what is none.
+// io_error naming the package, where gart was built without libwebp; also for more than `most` pixels, or no WebP.
 std::vector<u8> encode_webp(texture const& image, std::string const& file);
 texture decode_webp(std::vector<u8> const& bytes, std::size_t most, std::string const& file, std::string const& entry);
 

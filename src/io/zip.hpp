@@ -1,6 +1,6 @@
 #pragma once
-// Zip files: entries by name, stored or deflated; written stored, for what is compressed already. No encryption, no
-// archives of several parts or past 4 GB. https://pkware.cachefly.net/webdocs/APPNOTE/APPNOTE-6.3.9.TXT
+// Zip files: entries by name, stored or deflated. Data that is compressed already is stored. No encryption, no archives
+// of several parts or past 4 GB. https://pkware.cachefly.net/webdocs/APPNOTE/APPNOTE-6.3.9.TXT
 
 #include <gart/core/types.hpp>
 

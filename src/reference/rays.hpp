@@ -69,7 +69,7 @@ inline lens_point unbent(distortion const& l, bool tangential_last, double u, do
   return {x, y, true};
 }
 
-// In the camera's axes, of any length; false where there is none.
+// In the camera's axes, of any length; false without one.
 inline bool direction_in_camera(camera const& c, double u, double v, vec3d& out) {
   constexpr double pi = 3.14159265358979323846;
   if (c.kind == camera_kind::equirectangular) {

@@ -161,7 +161,7 @@ checkpoint_rows_reader::checkpoint_rows_reader(std::filesystem::path const& path
   }
   std::vector<int> const degree = get<int>("sh_degree");
   if (degree.size() != 1 || degree[0] < 0 || degree[0] > 3) fail("is damaged: it is of no SH degree from 0 to 3");
-  // All of a state, of which the names and the rows are wanted.
+  // All of a state; the names and the rows are used.
   training_state like;
   like.scene.sh_degree = like.first.sh_degree = like.second.sh_degree = degree[0];
   for (auto const& [name, array] : arrays_)

@@ -20,7 +20,7 @@ bool matches(E wanted, E there) {
   return wanted == E::automatic || wanted == there;
 }
 
-// What a configuration has that the ordinary one has not.
+// The words that tell a configuration from the ordinary one.
 std::string peculiarities(configuration_info const& r) {
   std::string out;
   auto const add = [&out](std::string const& text) { out += ", " + text; };

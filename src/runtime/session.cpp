@@ -19,7 +19,7 @@ std::unique_ptr<renderer> make_renderer(configuration_request const& request) {
 std::unique_ptr<session> make_session(configuration_request const& request, train_options const& options,
                                       dataset const& data, gaussian_model const* start) {
   if (start) return make_session(request, options, data, start_model(*start));
-  resolve(with_depth_of(request, options));  // what is not there is known before anything is made
+  resolve(with_depth_of(request, options));  // missing parts are known before anything is made
   return make_session(request, options, data, start_model(initial_model(data, options, request.sh_degree)));
 }
 

@@ -203,7 +203,7 @@ class tracker {
   }
   double loss_of(image_float const& image) const { return mean_square(blurred(difference(image), sigma_)); }
 
-  // The next blur, at which the best image has another loss; false where there is none.
+  // The next blur, at which the best image has another loss; false at the end.
   bool finer() {
     if (sigma_ == 0) return false;
     sigma_ = sigma_ > 1.5 ? sigma_ / 2 : 0;

@@ -108,7 +108,7 @@ void run_trials(validation_plan const& plan, validation_progress const& progress
   end_all_on_failure const guard{ended};
   for (std::future<void>& t : trials)
     while (t.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) report();
-  for (std::future<void>& t : trials) t.get();  // throws what a trial threw
+  for (std::future<void>& t : trials) t.get();  // throws the error of a trial
 }
 
 // A trial's options: as many Gaussians a pixel as in the run, and all counts of steps shortened alike. Short runs raise

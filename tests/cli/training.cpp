@@ -284,7 +284,7 @@ TEST_CASE("a lens's falloff is learned, saved, resumed and used again") {
   for (auto const& k : file["lenses"][0]["falloff"]) corner += k.get<double>() / 3;
   REQUIRE(metrics["corner_gains"].size() == 1);
   CHECK(metrics["corner_gains"][0].get<double>() == doctest::Approx(corner).epsilon(1e-5));
-  CHECK(has(text_of(here / "run/report.html"), "as the training views say of its lens"));
+  CHECK(has(text_of(here / "run/report.html"), "by the falloff learned on the training views"));
 
   std::string const eval = "eval run/model.ply capture --backend serial --out ";
   REQUIRE(here.gart(eval + "with.json --quiet --exposures run/exposures.json").code == 0);

@@ -14,7 +14,7 @@
 
 namespace gart {
 
-/// What a reduction makes of the elements: their sum, the least or the largest of them.
+/// What a reduction computes of the elements: their sum, minimum or maximum.
 enum class reduction { sum, min, max };
 
 /// The numbers that can be reduced.

@@ -12,8 +12,8 @@
 ///   pass.render(frame, {.color = color, .transmittance = transmittance, .depth = depth});
 ///   differentiate(frame, pass, {color_gradient, depth_gradient}, gradients);
 ///
-/// A pass knows which preparation of which frame it stands at: out of this order it throws invalid_argument.
-/// backward/fallback.hpp takes a method that needs less where there is no room.
+/// A pass remembers which preparation of which frame it follows. Out of this order it throws invalid_argument. Where
+/// memory is short, backward/fallback.hpp takes a method that needs less.
 ///
 /// Memory beside the gradients: 48 bytes a Gaussian for the moments. A method that records also needs the hit buffer: 4
 /// or 16 bytes for each pixel of each box (4 more with depth). Where the tracer has no lists to lend, footprints take
@@ -97,7 +97,7 @@ class backward_pass {
     return true;
   }
 
-  /// The forward pass, with what the method records; `targets.last` is the pass's own. The colour is read again by
+  /// The forward pass, with the record of the method; `targets.last` belongs to the pass. The colour is read again by
   /// differentiate(), and so are depth and transmittance where there is a gradient by them.
   void render(Frame& frame, image_targets targets) {
     require(frame, prepared, "backward_pass.render: call backward_pass.prepare first, after frame.prepare");

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// What the gradient of an image's depth needs besides that of its colour (backward/terms.hpp). Depth is composited as
-/// a fourth channel whose colour is a hit's t. So the gradient of alpha needs the depth that the pixel would have if
+/// The needs of the gradient of an image's depth, besides those of its colour (backward/terms.hpp). Depth is composited
+/// as a fourth channel whose colour is a hit's t. So the gradient of alpha needs the depth that the pixel would have if
 /// the hit were opaque. That is one float a slot, in an array beside the hit buffer, at the slot's number. The gradient
-/// by the transmittance comes with it at no cost a hit, as that of a channel that only the background has.
+/// by the transmittance comes with it at no cost a hit: it is that of a channel of the background alone.
 
 #include <gart/backward/hit_layout.hpp>
 #include <gart/render/record.hpp>
@@ -23,7 +23,7 @@ struct depth_image {
 
   /// dL/d depth of a pixel.
   GART_HD GART_INLINE float gradient(std::size_t pixel) const { return depth_gradient ? depth_gradient[pixel] : 0.0f; }
-  /// What a pixel's depth and transmittance add to C.g (math/hit_gradient.hpp).
+  /// The share of a pixel's depth and transmittance in C.g (math/hit_gradient.hpp).
   GART_HD GART_INLINE float total(std::size_t pixel) const {
     float sum = 0;
     if (depth_gradient) sum += depth[pixel] * depth_gradient[pixel];

@@ -12,10 +12,10 @@
 /// (math/sh_turn.hpp). Hits, and so the gradient, are the forward pass's for every tracer and camera, through the
 /// filter of the pixels too. The gradient does not contain how the filter changes with a ray.
 ///
-/// A direction is a unit, and its gradient stands across it. What a hit's threshold steps by has none.
+/// A direction is a unit, and its gradient stands across it. The step at a hit's threshold has no gradient.
 ///
 /// Cost: a trace of the view; nothing where it is not called. One kernel for each policy, tracer and response, whatever
-/// the degree, the camera and what is asked for. Errors: invalid_argument for gradients or images of another size.
+/// the degree, the camera and the outputs. Errors: invalid_argument for gradients or images of another size.
 
 #include <gart/backward/backward.hpp>
 #include <gart/math/sh_turn.hpp>
@@ -108,7 +108,7 @@ struct ray_gradients : ray_program_base {
   GART_HD void end(index_t i, state const& s) const {
     std::size_t const at = 3 * order.address(order.at(i));
     vec3 const &d = s.own.direction, &w = s.by_turn;
-    // A turn w moves the direction by w x d; what stands along it changes its length alone.
+    // A turn w moves the direction by w x d; a component along it changes its length alone.
     vec3 by = s.by_direction + glm::cross(w, d);
     by -= d * glm::dot(by, d);
     for (int k = 0; k < 3; ++k) {

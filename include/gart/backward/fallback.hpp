@@ -9,7 +9,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// The passes of Method, of its fallback, of that one's and so on.
+/// The passes of Method, of its fallback, of the fallback's fallback and so on.
 template <class Frame, gradient_method Method>
 class backward_passes {
   using fallback = typename Method::fallback;

@@ -45,8 +45,8 @@ struct gather_kernel {
 
   static constexpr bool central = C::rays::central;  ///< whether all rays begin at the frame's origin
 
-  /// What a lane needs of a pixel: direction and (colour . gradient), gradient, SH basis. Records are an odd number of
-  /// 16-byte words apart where they can be, so that lanes on neighbouring pixels read different banks.
+  /// The values of a pixel that a lane needs: direction and (colour . gradient), gradient, SH basis. Records are an odd
+  /// number of 16-byte words apart where they can be, so that lanes on neighbouring pixels read different banks.
   struct pixel_data {
     /// Of degree 0 it is a constant.
     static constexpr int basis_quads = !C::terms::color || C::sh_degree == 0 ? 0 : (bands + 3) / 4;
@@ -101,7 +101,7 @@ struct gather_kernel {
     team.barrier();
   }
 
-  /// What a primitive's walk of a tile has summed goes to the Gaussian, or to its row.
+  /// Adds the sums of a primitive's walk of a tile to the Gaussian, or to its row.
   GART_KERNEL GART_INLINE void finish(footprint_slots const& range, pixel_box const& area, u32 id,
                                       float const (&sh_sum)[sh_stride],
                                       float const (&moment_sum)[moment_stride]) const {
@@ -145,7 +145,7 @@ struct gather_kernel {
     }
   }
 
-  /// What the lanes need of pixel `at`.
+  /// The values of pixel `at` that the lanes need.
   GART_HD void load_pixel(pixel_data& out, pixel const& at) const {
     std::size_t const a = 3 * (static_cast<std::size_t>(at.y) * rays.view.width + at.x);
     auto const r = pixel_ray(rays, at);
@@ -209,7 +209,7 @@ struct gather_kernel {
       return (slots + first)[k];
   }
 
-  /// What a lane keeps of its Gaussian: colour alone needs nothing but the slots.
+  /// The values of its Gaussian that a lane keeps: colour alone needs nothing but the slots.
   struct no_data {
     /// Reads nothing.
     GART_HD no_data(gather_kernel const&, u32) {}
@@ -220,10 +220,10 @@ struct gather_kernel {
     /// Of Gaussian `id`.
     GART_HD record_data(gather_kernel const& k, u32 id) : gaussian(k.records[id]) {}
   };
-  /// Of the two, what the terms need.
+  /// The ones of the two that the terms need.
   using lane_data = std::conditional_t<C::terms::geometry || recomputed, record_data, no_data>;
 
-  /// What the Gaussian has of the rays of N pixels at once.
+  /// The Gaussian's values for the rays of N pixels at once.
   template <int N, class F>
   GART_HD GART_INLINE void peaks_at(ray_peak (&out)[N], lane_data const& data, F&& pixel_of) const {
     if constexpr (std::is_same_v<lane_data, record_data>)

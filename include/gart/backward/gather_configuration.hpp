@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// What a gather (backward/gather.hpp) is compiled for, one struct of these members:
+/// The choices that a gather (backward/gather.hpp) is compiled for, one struct of these members:
 ///   policy     the execution policy on which it runs
 ///   response   how the Gaussians fall from their centres (math/response.hpp)
 ///   terms      the terms that it sums (backward/terms.hpp)

@@ -17,7 +17,7 @@ namespace gart { inline namespace GART_ISA {
 /// (docs/backward.md).
 enum class slot_validity { cleared, recomputed };
 
-/// What a method has unless it says otherwise.
+/// The defaults of a method.
 struct gradient_method_base {
   static constexpr bool ordered = false;       ///< sums in a fixed order: the same bits in every run
   static constexpr bool lane_by_lane = false;  ///< by the plain gather, whatever the policy (backward/gather_form.hpp)

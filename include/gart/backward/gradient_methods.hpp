@@ -16,7 +16,7 @@ namespace gart { inline namespace GART_ISA {
 
 /// Nothing recorded; every ray is traced again and scatters.
 struct pixel_method : gradient_method_base {
-  static constexpr char const* name = "pixel";  ///< as requests have it
+  static constexpr char const* name = "pixel";  ///< its name in requests
   /// Nothing.
   template <int Size>
   using record = record_none;
@@ -26,7 +26,7 @@ struct pixel_method : gradient_method_base {
 
 /// One channel: the colour gradient of a hit needs only its weight. Geometry by pixel.
 struct hybrid_method : gradient_method_base {
-  static constexpr char const* name = "hybrid";  ///< as requests have it
+  static constexpr char const* name = "hybrid";  ///< its name in requests
   /// The weight.
   template <int Size>
   using record = record_slots<weight_entry, Size>;
@@ -37,7 +37,7 @@ struct hybrid_method : gradient_method_base {
 
 /// Four channels; no ray is traced twice.
 struct primitive_method : gradient_method_base {
-  static constexpr char const* name = "primitive";                      ///< as requests have it
+  static constexpr char const* name = "primitive";                      ///< its name in requests
   static constexpr slot_validity validity = slot_validity::recomputed;  ///< nothing is cleared
   /// V and the weight.
   template <int Size>
@@ -57,7 +57,7 @@ struct primitive_method_in : primitive_method {
 
 /// The primitive method with its sums in a fixed order.
 struct deterministic_method : primitive_method {
-  static constexpr char const* name = "deterministic";  ///< as requests have it
+  static constexpr char const* name = "deterministic";  ///< its name in requests
   static constexpr bool ordered = true;                 ///< by a second launch
 };
 

@@ -12,7 +12,7 @@
 /// The gradient of alpha is the difference of V and the pixel's colour, over 1 - alpha. An error of V counts the more,
 /// the less of the ray the hit and those behind it are. Relative errors of a whole gradient, group by group, against
 /// double, at most (tests/traits): float4 5e-4 and half 1e-2 on clouds and long rays; on stacks of hits at the clamp
-/// 5e-4 and 0.15. Slots that no hit wrote hold what the clear left there, all bits set, which `written` tells.
+/// 5e-4 and 0.15. Slots that no hit wrote keep the bits of the clear, all set; `written` tells them.
 
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>

@@ -31,7 +31,7 @@ struct packet_gather {
   /// Lanes' groups that hold the SH functions.
   static constexpr int band_groups = (bands + lane_count - 1) / lane_count;
 
-  /// What is needed of a packet's pixels.
+  /// The needed values of a packet's pixels.
   struct packet_data {
     int x, y;                                       ///< in the tile
     vec3_of<lanes> direction,                       ///< of the rays, unit length

@@ -13,7 +13,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// What the slots of a packet hold.
+/// The slots of a packet.
 struct packet_entries {
   vec3_of<lanes> opaque;  ///< V
   lanes weight;           ///< the weights

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// The backward pass by pixel: every ray is traced again and adds each hit's gradient to its Gaussian, atomically.
-/// What it adds is chosen by terms: 3 K floats of colour (K SH coefficients a channel), the 10 moments of geometry
+/// Terms choose what it adds: 3 K floats of colour (K SH coefficients a channel), the 10 moments of geometry
 /// (math/hit_gradient.hpp). Cost: a second trace, and a row of atomics a hit and term.
 
 #include <gart/backward/depth.hpp>
@@ -26,7 +26,7 @@ struct scatter_program : ray_program_base {
     vec3 direction;  ///< of the ray, unit length
     /// SH functions of the direction.
     sh_basis<ShDegree> basis;
-    ray_gradient gradient;                       ///< what is left behind the hit
+    ray_gradient gradient;                       ///< light behind the hit
     float error;                                 ///< of the pixel
     u32 left;                                    ///< hits until the cap; from 0, no cap, it counts down past it
     float depth_gradient[Terms::depth ? 1 : 0];  ///< of the pixel, where there is one

@@ -49,7 +49,7 @@ template <class F>
 struct beam_depths {
   F from, to;  ///< the beam is in the box nowhere else
 
-  /// The sides of the boxes on axis k of the beam. What is added makes up for all roundings, here and in the bounds: a
+  /// The sides of the boxes on axis k of the beam. The addition makes up for all roundings, here and in the bounds: a
   /// few of each number's size.
   GART_HD GART_INLINE void cut(beam const& b, int k, F lower, F upper, float extent) {
     float const least = b.least_origin[k], greatest = b.greatest_origin[k];

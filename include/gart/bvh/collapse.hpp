@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// From a binary tree to the wide one: which nodes become wide, then what stands in them. One thread a node for each.
+/// From the binary tree to the wide one: which nodes become wide, then their contents. One thread a node for each.
 
 #include <gart/bvh/binary_tree.hpp>
 

@@ -179,7 +179,7 @@ GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, flo
 }
 #endif
 
-/// Where the ray enters child c, at least near: what cross_children gave for it, but for a rounding.
+/// Where the ray enters child c, at least near: the value of cross_children, to a rounding.
 GART_HD GART_INLINE float enter_child(bvh_node const& n, int c, slab_ray const& r, float near) {
   grid_crossing const grid(n, r);
   float from = near;

@@ -48,7 +48,7 @@ struct alignas(32) bvh_node {
   GART_HD u32 inner_mask() const { return (1u << inner_count()) - 1u; }
   /// Bit c is child c.
   GART_HD u32 leaf_mask() const { return ((1u << leaf_count()) - 1u) << (bvh_width - leaf_count()); }
-  /// What a ray is tested against in place of the child's own box.
+  /// A ray is tested against this in place of the child's own box.
   GART_HD box child_box(int c) const {
     box out;
     for (int k = 0; k < 3; ++k) {
@@ -90,7 +90,7 @@ GART_HD GART_INLINE bvh_axis axis_between(float lo, float hi) {
   }
 }
 
-/// The planes that hold [lo, hi], which lies within what the axis was made for; a side that is not a number holds all.
+/// The planes that hold [lo, hi], which lies within the axis's range; a side that is not a number holds all.
 GART_HD GART_INLINE u32 plane_below(bvh_axis const& a, float lo) {
   if (a.exponent == bvh_axis::unbounded) return lo >= 0.0f ? 1 : 0;
   float const step = a.step(), per_step = bits_to_float((254 - a.exponent) << 23);

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
 /// Chooses the nodes of a binary tree that become wide ones, so that rays cross the fewest wide nodes. A node's chance
-/// to be crossed is the area of its box (Ylitie, Karras and Laine 2017, section 3). From the leaves up, a node works
-/// out what it costs to hand 1, 2, ... children to the wide node above: itself as a wide node, or what its two sides
-/// hand on, each its share. From the root down the shares are dealt out.
+/// to be crossed is the area of its box (Ylitie, Karras and Laine 2017, section 3). From the leaves up, a node finds
+/// the cost of handing 1, 2, ... children to the wide node above: itself as a wide node, or what its two sides hand on,
+/// each its share. From the root down the shares are dealt out.
 
 #include <gart/bvh/node.hpp>
 
@@ -21,7 +21,7 @@ GART_HD GART_INLINE float half_area(box const& b) {
   return size.x * size.y + size.y * size.z + size.z * size.x;
 }
 
-// What a node does with its share of a wide node's children.
+// A node's use of its share of a wide node's children.
 struct wide_shares {
   static_assert(bvh_width <= 8);
   u32 bits = 0;  // 3 a number k of children from 2 up: how many the first side hands on; then one: k beats k - 1
@@ -35,7 +35,7 @@ struct wide_shares {
   GART_HD GART_INLINE int first(int k) const { return static_cast<int>(bits >> 3 * (k - 2) & 7u); }
 };
 
-// The costs of a node of that area over those of its two sides.
+// The costs of a node of this area over those of its two sides.
 GART_HD GART_INLINE wide_costs costs_of(float area, wide_costs const& a, wide_costs const& b, wide_shares& shares) {
   float split[bvh_width + 1];
   GART_UNROLL

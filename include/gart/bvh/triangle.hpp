@@ -2,7 +2,8 @@
 /// \file
 /// Triangles under the tree: the nearest that a ray meets, or whether there is any. Watertight: a ray between two
 /// triangles that share an edge, or through their corner, meets one of them (Woop, Benthin and Wald, "Watertight
-/// ray/triangle intersection", JCGT 2013). Triangles without an area, or of what is no number, are never met.
+/// ray/triangle intersection", JCGT 2013). Triangles without an area, or with a corner that is not finite, are never
+/// met.
 ///
 /// Both sides count. Of equally near ones the first is met, so that the order of the tree decides nothing.
 /// Cost: a walk of the tree; 36 bytes a triangle beside it.
@@ -87,7 +88,7 @@ struct triangles_view {
   triangle const* triangles = nullptr;  ///< [tree.count]
 };
 
-/// Takes every triangle for what it is.
+/// Takes every triangle.
 struct all_there {
   /// Whether a hit counts.
   GART_HD bool operator()(triangle_hit const&) const { return true; }
@@ -114,7 +115,7 @@ struct triangle_visitor {
 
 }  // namespace bvh_kernels
 
-/// The nearest triangle in (near, far) that `accept` takes; hit.t is far where there is none.
+/// The nearest triangle in (near, far) that `accept` takes; without one hit.t is far.
 template <class Accept = all_there>
 GART_HD GART_INLINE triangle_hit nearest_triangle(triangles_view const& in, ray const& r, float near, float far,
                                                   Accept const& accept = {}) {

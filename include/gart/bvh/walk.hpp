@@ -1,11 +1,11 @@
 #pragma once
 /// \file
-/// Visits the leaves of a BVH that a ray may meet between two distances, nearer nodes first. The visitor says what is
-/// of interest, and may narrow it as it goes:
+/// Visits the leaves of a BVH that a ray may meet between two distances, nearer nodes first. The visitor chooses the
+/// children to enter, and may narrow its choice as it goes:
 ///   float near(), far();    only boxes the ray crosses somewhere in [near, far] are entered; 0 or more
 ///   void leaf(u32 box);     every box that the ray crosses there, once, and some that it just misses
-/// Any ray type with a unit `direction` and an origin_of(ray). Who asks for the boxes themselves tests what is proposed
-/// with crosses(box, ...).
+/// Any ray type with a unit `direction` and an origin_of(ray). Callers that want the boxes themselves test the
+/// proposals with crosses(box, ...).
 
 #include <gart/bvh/bvh.hpp>
 #include <gart/bvh/cross.hpp>

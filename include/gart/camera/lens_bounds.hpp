@@ -103,13 +103,13 @@ class lens_bounds : public lens_image {
     return out;
   }
 
-  // u and v, in units of the focal lengths, cut by what they are at most by their gradients at the centre.
+  // u and v, in units of the focal lengths, cut by their bounds from the gradients at the centre.
   template <bool Polygon>
   GART_HD void cut_by_gradient(seen_ellipsoid const& s, double least, detail::interval& u, detail::interval& v,
                                bool& wide) const {
     vec3d const& m = s.center;
     if (!(s.distance > 0)) return;
-    // About the middle of the silhouette as it is across the centre's direction.
+    // About the middle of the silhouette across the centre's direction.
     vec3d w = m / s.distance;
     vec3d const side = fabs(w.x) < 0.6 ? vec3d(1, 0, 0) : vec3d(0, 1, 0), a1 = glm::normalize(glm::cross(side, w)),
                 a2 = glm::cross(w, a1);
@@ -122,7 +122,7 @@ class lens_bounds : public lens_image {
     flat_silhouette const f(s, {cosine * cp, cosine * sp, -sine}, {-sp, cp, 0}, w);
     if (!f.whole) return;
     double const error = s.error / least, d = atan(sqrt(f.z1 * f.z1 + f.z2 * f.z2) + sqrt(f.major2())) + error;
-    // Not about what lies behind, where the image has all of its outermost ring.
+    // Ellipsoids behind the camera have no such bound: the image has all of its outermost ring there.
     if (d > wide_from && theta + 1.02 * d < 3.1) {
       wide = true;
       if constexpr (Polygon)
@@ -149,7 +149,7 @@ class lens_bounds : public lens_image {
       x += t.x, y += t.y;
     }
     changes_up_to const by = changes(theta + d);
-    // What is left out by gradients alone; and by second derivatives too, where these are as below.
+    // The error of bounds by gradients alone, and with second derivatives too, where these are as below.
     double const bend = 0.5 * d * d * by.second;
     bool const bent = sine > 1e-3 && d < 1.2;
     double const slope_s = tan(d), shrunk = d > 1e-4 ? 1 - d / slope_s : 1e-8;
@@ -188,7 +188,7 @@ class lens_bounds : public lens_image {
     cut(u, x, gx1, gx2, cp, sp), cut(v, y, gy1, gy2, sp, -cp);
   }
 
-  // u and v cut by what they are on a polygon about the silhouette f, which is in the plane across w.
+  // u and v cut by their values on a polygon about the silhouette f, which lies in the plane across w.
   GART_HD void cut_by_polygon(flat_silhouette const& f, vec3d const& e1, vec3d const& e2, vec3d const& w, double error,
                               detail::interval& u, detail::interval& v) const {
     double const l11 = sqrt(f.h11), l21 = l11 > 0 ? f.h12 / l11 : 0.0, left = f.h22 - l21 * l21,

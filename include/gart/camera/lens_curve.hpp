@@ -52,7 +52,7 @@ class lens_curve {
 
   /// Whether there are tangential or thin prism terms.
   GART_HD bool beside() const { return beside_; }
-  /// Whether these are of what the radial terms give.
+  /// Whether these are derivatives of the radial terms.
   GART_HD bool after() const { return after_; }
 
   /// q and its derivative by the angle; not finite where the kind says nothing.

@@ -46,7 +46,7 @@ class lens_image {
     r = q * value, slope = by_theta * (value + 2 * q * q * by_square);
   }
 
-  /// What the curve alone gives.
+  /// The values of the curve alone.
   GART_HD double q_at(double theta) const {
     double q, ignored;
     curve_.curve(theta, q, ignored);
@@ -126,7 +126,7 @@ class lens_image {
   }
 
   void tabulate() {
-    // Beyond the last angle what is seen of an ellipsoid may still be bounded by where the curve goes.
+    // Beyond the last angle, the end of the curve may still bound the visible part of an ellipsoid.
     end_ = last_;
     for (double const step = 1.0 / 64; end_ + step < last_ + 1 && end_ + step < 3.12; end_ += step) {
       double r, slope;
@@ -156,7 +156,7 @@ class lens_image {
         beside = std::fmax(beside, curve_.steepest_beside(reach) * of_q.second +
                                        curve_.most_bent_beside(reach) * of_q.first * of_q.first);
       }
-      // A tenth for what lies between samples.
+      // A tenth for the curve between samples.
       beside_[cell] = static_cast<float>(1.1 * beside);
       first_[cell] = static_cast<float>(1.1 * first + 1e-6);
       bend_[cell] = static_cast<float>(1.1 * (bend + beside) + 1e-6), twist_[cell] = static_cast<float>(1.1 * twist);

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// How a ray changes as its image point moves under it: what is needed to learn a focal length or a principal point.
-/// A camera that has these casts its rays by x = (u - cx) / fx and y = (v - cy) / fy alone, so that with the ray's
-/// derivatives by x and y
+/// How a ray changes as its image point moves: this is needed to learn a focal length or a principal point. A camera
+/// that has these casts its rays by x = (u - cx) / fx and y = (v - cy) / fy alone, so that with the ray's derivatives
+/// by x and y
 ///   d ray / d cx = -(d ray / d x) / fx,   d ray / d fx = -x (d ray / d x) / fx,   and y likewise.
 /// A model says so by a member (camera/model.hpp)
 ///   slopes() const: a trivially copyable ray_slopes operator()(float u, float v, vec3 direction) const

@@ -49,7 +49,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// What all models have.
+/// The members that all models have.
 struct camera_base {
   int width = 0, height = 0;  ///< pixels
   vec3d position{0.0};        ///< the frame's origin: all else is relative to it
@@ -119,7 +119,7 @@ decltype(auto) visit_camera(M const& model, F&& f) {
   return f(model);
 }
 
-/// What no ray can be cast by.
+/// A camera by which no ray can be cast.
 template <camera_model M>
 camera_fault fault_of(M const& model) {
   return model.fault();

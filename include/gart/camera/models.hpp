@@ -1,9 +1,10 @@
 #pragma once
 /// \file
 /// The camera models, and the one place that goes from a run-time camera to its model: visit_camera(view, f) calls f
-/// with the model. A view that is a model already is taken as it is (camera/model.hpp).
+/// with the model. A view that is a model already is passed on (camera/model.hpp).
 ///
-/// Errors: require_camera throws invalid_argument for what no ray can be cast by; everything that renders calls it.
+/// Errors: require_camera throws invalid_argument for a camera by which no ray can be cast; everything that renders
+/// calls it.
 
 #include <gart/camera/equirectangular.hpp>
 #include <gart/camera/opencv.hpp>
@@ -33,7 +34,7 @@ decltype(auto) visit_camera(camera const& c, F&& f) {
   return !c.lens.any() ? f(pinhole(c)) : c.lens.more() ? f(radial_lens(c)) : f(opencv(c));
 }
 
-/// What no ray can be cast by.
+/// A camera by which no ray can be cast.
 inline camera_fault fault_of(camera const& c) {
   return visit_camera(c, [](auto const& model) { return model.fault(); });
 }

@@ -21,7 +21,7 @@ namespace gart { inline namespace GART_ISA {
 /// Boxes of ellipsoids through the lens.
 class opencv_bounds {
  public:
-  /// Host side: the bounds of what the image sees, in slopes, by sampling its border.
+  /// Host side: bounds of the image's view, in slopes, by sampling its border.
   opencv_bounds(pinhole const& c, distortion const& lens, seen_slopes const& seen, float near)
       : lens_(lens),
         curved_(tabulated_bounds(camera_kind::perspective, lens, c.fx, c.fy, c.cx, c.cy, c.width, c.height)
@@ -53,7 +53,7 @@ class opencv_bounds {
     footprint const curved = curved_box(e);
     if (curved.box.empty()) return {};
     out.depth = curved.depth > out.depth ? curved.depth : out.depth;  // a distance, which z is at most
-    // From what is seen small the slopes take nothing off.
+    // The slopes take nothing off small ellipsoids.
     if (small * curved.box.width() < u32(view_.width) && small * curved.box.height() < u32(view_.height)) {
       out.box = curved.box;
       return out;
@@ -67,7 +67,7 @@ class opencv_bounds {
 
   GART_HD slope_box distorted(slope_box const& s) const {
     auto const clamp = [](double v, detail::interval const& to) { return v < to.lo ? to.lo : v > to.hi ? to.hi : v; };
-    // No pixel sees what lies outside the view. Kept to the view, the rectangle stays where the lens is one to one.
+    // No pixel sees beyond the view. Kept to the view, the rectangle stays where the lens is one to one.
     double const x0 = clamp(s.u.lo, u_), x1 = clamp(s.u.hi, u_), y0 = clamp(s.w.lo, w_), y1 = clamp(s.w.hi, w_);
     detail::interval u, v;
     constexpr int steps = 4;

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// How near a hit lies, as tile lists are sorted by it: distance times what a ray's direction says,
+/// How near a hit lies, the order of tile lists: distance times a factor of the ray's direction,
 ///   depth = t (direction . axis + offset).
 /// The default is the distance itself, an order for rays of any directions; a pinhole's is z, which its bounds are
 /// tighter in.

@@ -4,9 +4,9 @@
 /// pose, and its rays begin there. Any lens with one centre.
 ///
 /// Box: while some lines are exposed, the ellipsoid moves within one larger ellipsoid in the camera's axes. The lens
-/// has the box of that one. Only the lines of that box can hit it, and the same holds again over these. Each round is
-/// conservative, and the lines of a small ellipsoid are few. With c(s) its centre and A(s) its axes as the camera has
-/// them at time s, over [s - h, s + h]: q = h c'(s), and e what c and A are at most off by otherwise, rotation and
+/// bounds the larger one. Only the lines of the lens's box can hit it, and the same holds again over these. Each round
+/// is conservative, and the lines of a small ellipsoid are few. With c(s) its centre and A(s) its axes as the camera
+/// has them at time s, over [s - h, s + h]: q = h c'(s), and e what c and A are at most off by otherwise, rotation and
 /// second order,
 ///   C' = (1 + k2) [(1 + k1) A A^T + (1 + 1/k1) e^2] + (1 + 1/k2) q q^T,
 /// the outer ellipsoid of a Minkowski sum, for any k1, k2 > 0.
@@ -86,7 +86,7 @@ struct rolling_bounds {
       double const own = glm::dot(e.axes[k], e.axes[k]);
       trace += c[k][k], longest2 = own > longest2 ? own : longest2;
     }
-    // Of what is not orthogonal to the last digit the longest axis is no bound.
+    // For axes that are not orthogonal to the last digit the longest axis is no bound.
     double const longest = sqrt(longest2) * (1 + 1e-5);
     double const far = glm::length(e.center) + speed;
     double const rest = 0.5 * h * h * (spin * spin * far + 2 * spin * speed) + h * spin * longest +

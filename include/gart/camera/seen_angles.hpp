@@ -4,7 +4,7 @@
 /// camera's axes. The boxes of lenses and of the sphere are made of these. In a plane through the camera the ellipsoid
 /// is an ellipse with two exact tangents. About an axis there are first the angles round it, then those with it.
 ///
-/// All in double, and C is widened by a ten millionth of the reach: what is flat keeps an inside, and nothing cancels.
+/// All in double. C is widened by a ten millionth of the reach: flat ellipsoids keep an inside, and nothing cancels.
 
 #include <gart/math/footprint.hpp>
 

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// What a camera's image sees, in slopes x / z and y / z: the rectangle about it, by sampling the image's border. For
+/// The slopes x / z and y / z that a camera's image sees: the rectangle about them, by sampling the image's border. For
 /// models that project slopes to the image. Host side, in double.
 
 #include <gart/core/isa.hpp>

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
 /// The motion of a camera while its shutter goes over the image (scene/camera.hpp), from the poses of the first and the
-/// last line that are read, and back. Files have these poses. A camera holds the pose of the middle of the read-out,
-/// and what it moves by, in its own axes, while the shutter goes from border to border,
+/// last line that are read, and back. Files have these poses. A camera holds its pose at the middle of the read-out,
+/// and its motion, in its own axes, while the shutter goes from border to border,
 ///   rotation(s) = R exp(s [turn]x),   position(s) = p + s R travel,   -1/2 <= s <= 1/2:
 /// linear in translation, slerp in rotation. So a camera that is moved as a whole takes its motion along, and an image
 /// of another size has the same.
@@ -22,7 +22,7 @@ inline mat3d axes_of(camera const& view) {
   return out;
 }
 
-/// What a shutter exposes when.
+/// The lines that a shutter exposes, and when.
 struct shutter_lines_of {
   int count = 1;          ///< lines
   bool columns = false;   ///< rather than rows
@@ -46,7 +46,7 @@ struct shutter_lines_of {
 /// How many lines the shutter passes one after another.
 inline int shutter_lines(camera const& view) { return shutter_lines_of(view).count; }
 
-/// The camera as it stands at a time of the read-out, -1/2 to 1/2, without a motion.
+/// The camera at a time of the read-out, -1/2 to 1/2, without a motion.
 inline camera at_time(camera view, double s) {
   mat3d const axes = axes_of(view), turned = axes * turn_of(vec3d(view.turn) * s);
   view.position += axes * vec3d(view.travel) * s;

@@ -6,7 +6,7 @@
 ///   write_collectively(comm, path, [&](shared_file& file) { file.write(place_of_mine, mine.data(), bytes); });
 ///
 /// All ranks make the same calls. Cost: messages of a few bytes. Errors: io_error naming the file, the rank with its
-/// host, the cause and the remedy; then the temporary file is gone, and what was there before is whole.
+/// host, the cause and the remedy. Then the temporary file is gone, and an older file is whole.
 
 #include <gart/comm/communicator.hpp>
 #include <gart/core/error.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Ranks that train together: processes of one host or of several, of which each has a part of the Gaussians. A
-/// communicator is a handle, cheap to copy, with the members
+/// Ranks that train together: processes of one host or of several. Each has a part of the Gaussians. A communicator is
+/// a handle, cheap to copy, with the members
 ///   static constexpr bool alone;      there is one rank, known when compiled: nothing is exchanged
 ///   int rank(); int size();           which one this is, 0 to size() - 1
 ///   int sharers();                    ranks that have their memory from where this one has it, with it
@@ -20,9 +20,9 @@
 ///   barrier()                         waits for all ranks
 ///   open_file(path, create)           where there are several: a file that this rank writes at any place, while others
 ///                                     write at theirs (comm/shared_file.hpp); `create` makes it, empty
-/// All but the first exchange are for what is small, and of host memory. Every rank makes the same calls in the same
-/// order, but for open_file, which waits for nobody. Errors: invalid_argument for a rank that there is not; io_error
-/// for a file; what else the transport finds ends all ranks.
+/// All but the first exchange serve small messages in host memory. Every rank makes the same calls in the same order.
+/// Only open_file waits for nobody. Errors: invalid_argument for a rank that does not exist, io_error for a file. Other
+/// errors of the transport end all ranks.
 
 #include <gart/comm/shared_file.hpp>
 #include <gart/core/span.hpp>

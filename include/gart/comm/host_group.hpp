@@ -13,13 +13,13 @@ namespace gart {
 /// Ranks of one host.
 class host_group {
  public:
-  /// What was allocated stays.
+  /// Older allocations stay.
   virtual ~host_group() = default;
   virtual int rank() const = 0;  ///< which one this is, 0 to size() - 1
   virtual int size() const = 0;  ///< ranks on this host
   /// `bytes` of each, in the order of ranks, to all.
   virtual void all_gather(void const* mine, void* all, std::size_t bytes) = 0;
-  /// Waits for all; what they have written in memory that all have is seen after it.
+  /// Waits for all ranks. Then all see what each has written to shared memory.
   virtual void barrier() = 0;
   /// The same memory on all of them, of so many bytes; null on all where the host has too little of that kind. No rank
   /// waits for another to give it back: it stays while one of them runs. Errors: out_of_memory.

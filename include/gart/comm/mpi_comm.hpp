@@ -9,8 +9,8 @@
 /// The first one made starts MPI, unless the program has; the program's end ends it. A program that was started alone
 /// is one rank. MPI is called by one thread. Messages of any size go in pieces of at most 1 GiB.
 ///
-/// Errors: invalid_argument for a rank that there is not. What MPI itself finds wrong, a rank that is gone for one, it
-/// says and ends all ranks.
+/// Errors: invalid_argument for a rank that does not exist. What MPI itself finds wrong, a rank that is gone for one,
+/// it says and ends all ranks.
 
 #include <gart/comm/communicator.hpp>
 #include <gart/comm/host_group.hpp>
@@ -70,7 +70,7 @@ class mpi_comm {
   /// By MPI-IO, which takes care of hosts that share a folder: NFS alone would write whole pages, over what others
   /// have written there.
   std::unique_ptr<shared_file> open_file(std::filesystem::path const& path, bool create);
-  /// Ends all ranks at once with that exit code: what a rank does that cannot go on. Says nothing itself.
+  /// Ends all ranks at once with that exit code, for a rank that cannot go on. Says nothing itself.
   [[noreturn]] void abort(int code);
 
  private:

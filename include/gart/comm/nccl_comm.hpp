@@ -10,13 +10,13 @@
 ///   trainer<cuda_exec, traits, tracer, primitive_method, nccl_comm> run(exec, options, data, start, all);
 ///
 /// NCCL wants a GPU for each rank. Where two ranks have the same one, all messages go through pinned host memory and
-/// MPI (`transport` says so): right, and slow. A rank's messages to itself are copies. What is sent and received has no
-/// sums in it, so that both transports give the same bits.
+/// MPI (`transport` says so): right, and slow. A rank's messages to itself are copies. Messages contain no sums, so
+/// both transports give the same bits.
 ///
 /// Memory: NCCL's buffers, some hundred MB of each device; by the host, pinned memory for one group of messages.
-/// Errors: invalid_argument for a rank that there is not, or a transport that there cannot be; gart::error with NCCL's
-/// own words. NCCL's environment variables hold, but for multicast (NCCL_NVLS_ENABLE), off where they do not say: it
-/// serves sums that are not asked for here.
+/// Errors: invalid_argument for a rank that does not exist, or a transport that is not available; gart::error with
+/// NCCL's own words. NCCL's environment variables hold. Multicast (NCCL_NVLS_ENABLE) is off by default: it serves sums,
+/// which are not used here.
 
 #include <gart/comm/mpi_comm.hpp>
 #include <gart/exec/cuda.hpp>
@@ -25,7 +25,7 @@
 
 namespace gart {
 
-/// What carries messages of device memory from rank to rank: NCCL; pinned host memory and MPI; or what there can be.
+/// The carrier of messages of device memory between ranks: NCCL, pinned host memory and MPI, or the best available.
 enum class device_transport { automatic, nccl, host };
 
 /// All ranks of an MPI job, with a GPU each.

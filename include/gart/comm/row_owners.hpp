@@ -17,7 +17,7 @@ struct row_owners {
   int ranks = 1, rank = 0;                        ///< in all, and which one this is
   index_t block = default_block;                  ///< rows that stay together
 
-  /// Who has Gaussian g.
+  /// The owner of Gaussian g.
   GART_HD constexpr int owner(u64 g) const { return static_cast<int>(g / block % static_cast<u64>(ranks)); }
   /// Whether this rank has it.
   GART_HD constexpr bool owns(u64 g) const { return ranks == 1 || owner(g) == rank; }

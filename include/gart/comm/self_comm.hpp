@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The communicator of one rank by itself: it has nobody to wait for. What is for several ranks is left out where
-/// `alone` says so (if constexpr), and costs nothing.
+/// The communicator of one rank by itself: it has nobody to wait for. `alone` (if constexpr) leaves out everything for
+/// several ranks, so it costs nothing.
 
 #include <gart/comm/communicator.hpp>
 #include <gart/core/error.hpp>
@@ -44,8 +44,7 @@ class self_comm {
   void all_gather(void const* mine, void* all, std::size_t bytes) {
     if (bytes) std::memcpy(all, mine, bytes);
   }
-  ///@{
-  /// The sum of one.
+  /// @{ Sums over a single rank.
   void all_reduce(span<double>) {}
   void all_reduce(span<u64>) {}
   ///@}

@@ -12,7 +12,7 @@ namespace gart {
 /// One rank's handle of it. Closes without a word where it was not closed.
 class shared_file {
  public:
-  /// Nothing of it is renamed or removed.
+  /// No part of it is renamed or removed.
   virtual ~shared_file() = default;
   /// `bytes` of them, from byte `at` of the file on. Errors: io_error naming the file and the cause, for a full disk.
   virtual void write(u64 at, void const* data, std::size_t bytes) = 0;

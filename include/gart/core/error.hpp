@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// The errors gart throws. Each message says what was wrong, where, and what to do about it; the types let a program
-/// react without reading the text. A setting is named by its field, `struct.field`, with ` = value` after it where the
-/// remedy is a value: "raise dataset_options.downscale", "use configuration_request.backend = openmp". A program whose
-/// settings have other names replaces these in what it shows (program/field_names.hpp).
+/// The errors gart throws. Each message says what was wrong, where, and what to do. The types let a program react
+/// without reading the text. A setting is named by its field, `struct.field`, with ` = value` after it where the remedy
+/// is a value: "raise dataset_options.downscale", "use configuration_request.backend = openmp". A program whose
+/// settings have other names replaces them in the messages it shows (program/field_names.hpp).
 
 #include <cstddef>
 #include <stdexcept>
@@ -38,8 +38,8 @@ struct invalid_argument : error {
   using error::error;
 };
 
-/// Memory that could not be had. `advice` names the fields that lower the need. 0 free bytes: not a matter of what is
-/// free.
+/// Memory that could not be had. `advice` names the fields that lower the need. 0 free bytes: free memory was not the
+/// reason.
 struct out_of_memory : error {
   /// In bytes; `where` is whose memory, "host" for one.
   out_of_memory(std::string const& where, std::size_t asked_bytes, std::size_t free_bytes, std::string const& advice)

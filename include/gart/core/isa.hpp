@@ -13,7 +13,7 @@
 /// (cmake/interface.txt has the headers). Their layout is the same everywhere, and an inline function there that needs
 /// fma or lanes is forced inline. tests/package links objects and libraries of different instruction sets.
 ///
-/// The name also has gart's version, so objects of two versions do not share what lies there. The compiled libraries of
+/// The name also has gart's version, so objects of two versions do not share its contents. The compiled libraries of
 /// two versions are in one process as shared objects: their symbols carry the version (backends/CMakeLists.txt).
 
 #include <gart/core/version.hpp>

@@ -31,6 +31,6 @@
 #else
 /// Before a loop: unrolled on a device.
 #define GART_UNROLL
-/// Before a loop: left as it is on a device.
+/// Before a loop: a device does not change it.
 #define GART_NO_UNROLL
 #endif

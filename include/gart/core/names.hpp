@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Enumerations that have names: what a program's options, its files and the library's messages all call a value.
-/// An enumeration gets them by a function beside it, in the order in which a user reads them:
+/// Enumerations with names: one word for a value in a program's options, its files and the library's messages. An
+/// enumeration gets them by a function beside it, in the order in which a user reads them:
 ///   enum class fruit { apple, pear };
 ///   constexpr auto names_of(fruit) { return std::array<name_of<fruit>, 2>{{{fruit::apple, "apple"}, ...}}; }
 /// Errors: from_string throws invalid_argument with the names there are.
@@ -15,7 +15,7 @@
 
 namespace gart {
 
-/// A value of an enumeration and what it is called.
+/// A value of an enumeration and its name.
 template <class E>
 struct name_of {
   E value;           ///< of the enumeration

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The name that was meant: of those that there are, the nearest to what was typed.
+/// The name that was meant: the known name nearest to what was typed.
 
 #include <algorithm>
 #include <numeric>

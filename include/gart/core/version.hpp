@@ -9,7 +9,7 @@
 #define GART_VERSION_PATCH 0
 ///@}
 
-/// Training and rendering of ray-traced 3D Gaussians; what lies in `detail` is not for users.
+/// Training and rendering of ray-traced 3D Gaussians; `detail` is not for users.
 namespace gart {
 
 /// The version, as text.

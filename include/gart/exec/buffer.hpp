@@ -42,7 +42,7 @@ class buffer {
 
   /// Elements.
   std::size_t size() const { return size_; }
-  /// Elements that there is memory for.
+  /// The number of elements that memory suffices for.
   std::size_t capacity() const { return capacity_; }
   /// In the policy's memory; null where nothing was allocated.
   T* data() const { return data_; }
@@ -67,14 +67,14 @@ class buffer {
     }
     size_ = n;
   }
-  /// Keeps what there is; the rest is undefined.
+  /// Keeps the contents; the rest is undefined.
   void resize_keep(std::size_t n) {
     if (size_ == 0) return resize(n);
     if (n > capacity_) reserve(static_cast<std::size_t>(static_cast<double>(n) * slack));
     size_ = n;
   }
   /// Makes room for exactly n elements in all, where there is less. An array whose final size is known grows without
-  /// slack and without a copy. Keeps what there is.
+  /// slack and without a copy. Keeps the contents.
   void reserve(std::size_t n) {
     if (n <= capacity_) return;
     buffer grown(*exec_, n);

@@ -36,7 +36,7 @@ std::vector<cuda_device_info> cuda_devices(std::string* reason = nullptr);
 /// How two devices of a host reach each other's memory: through the host's, directly, or so that atomic operations work
 /// there too (NVLink).
 enum class device_link { host, direct, direct_atomic };
-/// Of two devices, by index. Errors: gart::error, with the driver's words, for a device that there is not.
+/// Of two devices, by index. Errors: gart::error, with the driver's words, for a device that does not exist.
 device_link link_between(int one, int other);
 
 /// A policy: a stream and its pool of memory.
@@ -48,7 +48,7 @@ class cuda_exec {
   profiler profile;                                       ///< times of stages
   memory_use memory;                                      ///< bytes of buffers
 
-  /// `stream`, a cudaStream_t of that device, stays its owner's and must outlive this; null: one of its own.
+  /// `stream`, a cudaStream_t of that device, stays its owner's and must outlive this; null: one of the policy's own.
   explicit cuda_exec(int device_index = 0, void* stream = nullptr);
   ~cuda_exec();
   cuda_exec(cuda_exec const&) = delete;
@@ -56,7 +56,7 @@ class cuda_exec {
 
   /// Bytes of the device's memory, from the pool; out_of_memory.
   void* allocate(std::size_t bytes);
-  /// Back to the pool, after what is queued.
+  /// Back to the pool, after queued work.
   void deallocate(void* p, std::size_t bytes);
   /// From the host.
   void copy_in(void* dst, void const* src, std::size_t bytes);
@@ -119,7 +119,7 @@ class cuda_exec {
         if (i < n) atomic_add(row + i, values[i]);
     }
   }
-  /// In kernels: what was written before is seen by who sees what comes after.
+  /// In kernels: a thread that sees a later write sees all earlier ones.
   GART_HD static void fence() {
 #if defined(__CUDA_ARCH__)
     __threadfence();

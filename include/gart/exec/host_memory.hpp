@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// What the two host policies share: memory is the host's, copies are memcpy, stage times are wall times.
-/// A policy is used by one thread at a time; what it runs may use many.
+/// The parts that the two host policies share: memory is the host's, copies are memcpy, stage times are wall times. One
+/// thread at a time uses a policy; its work may use many.
 
 #include <gart/core/error.hpp>
 #include <gart/core/isa.hpp>

@@ -49,7 +49,7 @@ class openmp_exec : public host_memory {
       for (int i = 0; i < n; ++i) row[i] += values[i];
     });
   }
-  /// What was written before is seen by who sees what comes after.
+  /// A thread that sees a later write sees all earlier ones.
   static void fence() { std::atomic_thread_fence(std::memory_order_seq_cst); }
 
  private:

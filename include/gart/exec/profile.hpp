@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// What a launch cost: wall time (CPU) or device time (events) summed per label. Off by default; when off it costs one
-/// branch a launch. Labels are the ones given to parallel_for and to stage scopes.
+/// The cost of launches: wall time (CPU) or device time (events) summed per label. Off by default; when off it costs
+/// one branch a launch. Labels are the ones given to parallel_for and to stage scopes.
 
 #include <cstddef>
 #include <map>
@@ -32,7 +32,7 @@ class profiler {
   std::map<std::string, stage_time> const& stages() const { return stages_; }
   /// Forgets all that was measured.
   void clear() { stages_.clear(); }
-  /// Adds what the other has measured, and leaves it empty.
+  /// Adds the other's measurements, and leaves it empty.
   void take(profiler& other) {
     for (auto const& [label, time] : other.stages_) {
       stages_[label].milliseconds += time.milliseconds;

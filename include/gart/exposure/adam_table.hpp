@@ -5,7 +5,7 @@
 ///
 /// Buffers: 3 Floats + 1 words a row, and a few sums. Cost: a pass over the image and three launches over a few numbers
 /// a step; no host read. The order of all sums depends on the image's size only. A number whose gradient is not finite
-/// stays as it is.
+/// keeps its value.
 
 #include <gart/algorithm/segmented_reduce.hpp>
 #include <gart/core/named_arrays.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// The exposure of any view, predicted from the learned exposures of the training views. A camera sets its exposure by
-/// what it sees, and sees about the same from about the same pose. Photographs kept for testing are not used.
+/// the scene before it, and sees about the same from about the same pose. Photographs kept for testing are not used.
 ///
 /// A view's place is six numbers: the camera's position over the median distance of a training view to its nearest, and
 /// its axis over 0.1. For each of the twelve numbers of the exposure

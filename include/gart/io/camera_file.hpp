@@ -26,14 +26,14 @@ struct camera_fields {
 /// Of a camera.
 camera_fields fields_of(camera const& view);
 
-/// "GLOBAL", "ROLLING_TOP_TO_BOTTOM" and so on, as files have it.
+/// "GLOBAL", "ROLLING_TOP_TO_BOTTOM" and so on, the names in files.
 std::string shutter_type_of(camera const& view);
 
 /// The same pose and height through another camera, given by COLMAP's name of its model and any parameters: "FISHEYE",
 /// "OPENCV_FISHEYE,k1=0.02,fx=90", "EQUIRECTANGULAR". Without focal lengths `angle` counts, the degrees across the
 /// image's shorter side: by default 180 for models that can see that, else 60. Parallel rays take `extent`, the world
-/// units across that side. The sphere is twice as wide as high. Errors: unsupported, invalid_argument for what is no
-/// such camera.
+/// units across that side. The sphere is twice as wide as high. Errors: unsupported; invalid_argument for text that
+/// names no camera.
 camera seen_through(camera const& view, std::string const& model);
 
 /// A camera as one object of such a list, on one line.

@@ -30,7 +30,7 @@ inline constexpr auto crc_tables = [] {
 
 }  // namespace detail
 
-/// Of `size` bytes; `before` is the checksum of what stands before them, to go on from.
+/// Of `size` bytes; `before` is the checksum of the bytes before them, to continue.
 inline u32 crc32c(void const* data, std::size_t size, u32 before = 0) {
   static_assert(std::endian::native == std::endian::little, "the lowest byte of a word is the first");
   auto const& table = detail::crc_tables;

@@ -101,7 +101,7 @@ struct dataset_options {
   /// Called from the loading threads, one at a time.
   std::function<void(std::size_t done, std::size_t total)> progress = {};
   /// The ranks of one host that load the same capture. They share the decoding of images, and hold them once where the
-  /// host can share memory. All call this together; an error of one is an error of all.
+  /// host can share memory. All call this together; an error of one rank is an error of all.
   host_group* host = nullptr;
 };
 

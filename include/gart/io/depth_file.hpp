@@ -2,8 +2,8 @@
 /// \file
 /// Depth maps in files: PNG with one channel of 16 bits: a step is `unit` in the scene's lengths, and 0 means not
 /// measured. Or .npy (NumPy, version 1 to 3) of little-endian float32 in C order, [H][W] or [H][W][1]. The kind is told
-/// by the first bytes. What a map measures, z or distance, its file does not say (io/dataset.hpp). Errors: io_error
-/// naming the file and what is wrong with it.
+/// by the first bytes. A file does not say whether its map measures z or distance (io/dataset.hpp). Errors: io_error
+/// naming the file and the fault.
 
 #include <gart/core/names.hpp>
 #include <gart/scene/image.hpp>
@@ -12,7 +12,8 @@
 
 namespace gart {
 
-/// What a depth map measures: along the camera's axis, or along the ray. `automatic`: what the capture says, else z.
+/// The quantity of a depth map: along the camera's axis, or along the ray. `automatic`: the quantity that the capture
+/// names, else z.
 enum class depth_kind { automatic, z, distance };
 /// Their names.
 constexpr auto names_of(depth_kind) {

@@ -17,12 +17,12 @@ namespace gart {
 void write_exr(std::filesystem::path const& path, image_float const& image, std::string_view channels);
 
 /// These channels of a file, in this order; of a file that has Y alone, Y for R, G and B. Numbers stay as they are, NaN
-/// too. Errors: io_error naming the file and the field, for what is damaged, tiled, deep, of several parts, of another
-/// compression, or without a channel.
+/// too. Errors: io_error naming the file and the field, for a file that is damaged, tiled, deep, of several parts, of
+/// another compression, or without a channel.
 image_float read_exr(std::filesystem::path const& path, std::string_view channels = "RGB");
 
-/// Linear RGB of all directions as EXR or Radiance HDR (RGBE), told by the first bytes. What is not finite or below 0
-/// becomes 0, what is above 65504 that. Errors: io_error naming the file and the remedy.
+/// Linear RGB of all directions as EXR or Radiance HDR (RGBE), told by the first bytes. Values that are not finite or
+/// below 0 become 0; values above 65504 become that. Errors: io_error naming the file and the remedy.
 image_float read_radiance(std::filesystem::path const& path);
 
 }  // namespace gart

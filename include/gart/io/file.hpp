@@ -19,7 +19,7 @@ namespace gart {
 std::vector<u8> read_file(std::filesystem::path const& path);
 /// Writes these bytes.
 void write_file(std::filesystem::path const& path, std::string_view bytes);
-/// For what is too large to hold: `body` writes to the stream; it is checked and renamed after.
+/// For contents too large to hold: `body` writes to the stream; it is checked and renamed after.
 void write_file(std::filesystem::path const& path, std::function<void(std::ostream&)> const& body);
 
 }  // namespace gart

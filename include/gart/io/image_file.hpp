@@ -2,7 +2,7 @@
 /// \file
 /// Images in PNG (libpng) and JPEG (libjpeg-turbo), 8 bits a channel. WebP is read where gart is built with libwebp.
 /// 16-bit PNG is reduced to 8. The kind is told by the file's first bytes, not by its name. Pixels stay as they are
-/// stored, whatever an EXIF orientation says. Errors: io_error with the file and what the decoder said.
+/// stored, whatever an EXIF orientation says. Errors: io_error with the file and the decoder's words.
 
 #include <gart/scene/image.hpp>
 

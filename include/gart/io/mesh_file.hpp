@@ -19,7 +19,7 @@ struct triangle_mesh {
   std::vector<std::array<u32, 3>> triangle;  ///< [T], counter-clockwise seen from outside
 };
 
-/// Of what stands in the file less the origin (io/origin.hpp).
+/// The file's coordinates less the origin (io/origin.hpp).
 triangle_mesh read_mesh_ply(std::filesystem::path const& path, vec3d const& origin = vec3d(0.0));
 /// Whole or not at all; in double, the origin added, where there is one.
 void write_mesh_ply(std::filesystem::path const& path, triangle_mesh const& mesh, vec3d const& origin = vec3d(0.0));

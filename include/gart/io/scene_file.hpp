@@ -4,9 +4,9 @@
 /// glTF 2.0 (.gltf, .glb), OBJ with its MTL, and PLY. Files that one names lie beside it. glTF's +y goes up: meshes are
 /// turned from it to `up`. Others stand in the world's axes.
 ///
-/// Errors: io_error naming the file, the part, the field and the remedy: for what is damaged, missing, of an unknown
-/// field or of an extension that gart has not. Triangles without an area or with corners that are not finite are left
-/// out, and said in a note. Memory is taken for what a file has bytes of.
+/// Errors: io_error naming the file, the part, the field and the remedy: for damaged or missing parts, unknown fields,
+/// and extensions that gart does not have. Triangles without an area or with corners that are not finite are left out,
+/// and said in a note. Memory is taken only for counts whose bytes the file has.
 
 #include <gart/light/path_options.hpp>
 #include <gart/light/scene.hpp>
@@ -28,7 +28,7 @@ struct placed_splats {
   vec3d translation{0.0};                      ///< world units
 };
 
-/// What a scene's file says besides its splats.
+/// The contents of a scene's file besides its splats.
 struct scene_file {
   light::scene scene;                 ///< its meshes and lights, less the origin
   light::path_options paths;          ///< by its "options", else the defaults

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// Files of Gaussians in any format that gart knows: one table has them. A reader knows a file by its first bytes, a
-/// writer by the ending of its name. docs/formats.md has what each format holds, and what it costs.
+/// writer by the ending of its name. docs/formats.md describes each format and its cost.
 ///
 /// Every model is in the axes of a splat PLY. Formats with other axes (SPZ: y up, z back; GLB: y up, x left) are turned
 /// as they are read and written, with the colours that depend on direction.
@@ -23,7 +23,7 @@
 
 namespace gart {
 
-/// What a model was trained with, key -> value, where a format has room for it.
+/// The settings that a model was trained with, key -> value, where a format has room for them.
 using splat_traits = std::map<std::string, std::string>;
 
 /// How the formats that pack their numbers are written.
@@ -35,7 +35,7 @@ struct splat_packing {
   bool world = false;  ///< PLY, GLB: in the capture's own coordinates, in double (io/origin.hpp)
 };
 
-/// What a format has room for, besides means, scales, rotations, opacities and a colour.
+/// The properties that a format can hold, besides means, scales, rotations, opacities and a colour.
 struct format_capabilities {
   int sh_degree = 3;       ///< of its spherical harmonics
   bool strays = true;      ///< means far beyond the others (256 times the reach of 99 of 100), without loss to these
@@ -65,10 +65,10 @@ struct splat_format {
 span<splat_format const* const> splat_formats();
 
 /// Reads a file of Gaussians; its traits into `traits`, where that is not null. A Gaussian with a number that is not
-/// finite, or a rotation of zeros, is left out. `notes`, if not null, says how many, and what is wrong with the first.
-/// A file of no other is refused. An opacity with an infinite logit becomes 1 or 0, a scale with the logarithm -inf
-/// becomes 0. The model has finite numbers for these. A quaternion too short or too long to be drawn gets the length 1.
-/// Of SOG `path` may be a folder, or the meta.json in it.
+/// finite, or a rotation of zeros, is left out. `notes`, if not null, says how many, and the fault of the first. A file
+/// of no other is refused. An opacity with an infinite logit becomes 1 or 0, a scale with the logarithm -inf becomes 0.
+/// The model has finite numbers for these. A quaternion too short or too long to be drawn gets the length 1. Of SOG
+/// `path` may be a folder, or the meta.json in it.
 gaussian_model read_splats(std::filesystem::path const& path, splat_traits* traits = nullptr,
                            std::vector<std::string>* notes = nullptr);
 /// A rank's rows of a whole model.
@@ -81,7 +81,7 @@ gaussian_model read_splat_rows(std::filesystem::path const& path, row_owners con
 void write_splats(std::filesystem::path const& path, gaussian_model const& model, splat_traits const& traits = {},
                   splat_packing const& packing = {});
 
-/// What the format of this name has no room for and write_splats leaves out of this model, a line each.
+/// The properties of this model that the named format cannot hold and write_splats leaves out, a line each.
 std::vector<std::string> left_out(std::filesystem::path const& path, gaussian_model const& model,
                                   splat_traits const& traits, splat_packing const& packing = {});
 

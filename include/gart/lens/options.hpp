@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// How the lenses of a capture are learned (lens/lens_training.hpp). docs/calibration.md has what was measured.
+/// How the lenses of a capture are learned (lens/lens_training.hpp). docs/calibration.md has the measurements.
 
 namespace gart {
 

@@ -59,7 +59,7 @@ inline void check_colors(image_float const& render, image_float const& truth, im
 /// Colours that the render does not vary in, a grey image's for one, leave M open: there it is zero.
 inline affine_color fit_affine_color(image_float const& render, image_float const& truth, image8 const& mask = {}) {
   detail::check_colors(render, truth, mask);
-  // Means first, so that what is left is small against nothing.
+  // Means first, so that the remainders are small.
   auto const sums = detail::sum_pixels<7>(truth, mask, [&](std::size_t at, auto& row) {
     for (std::size_t c = 0; c < 3; ++c)
       row[c] += detail::clamped(render.data[at + c]), row[3 + c] += static_cast<double>(truth.data[at + c]);
@@ -80,8 +80,8 @@ inline affine_color fit_affine_color(image_float const& render, image_float cons
   });
   std::array<std::array<double, 6>, 3> a{};
   for (std::size_t i = 0; i < 18; ++i) a[i / 6][i % 6] = products[i];
-  // Gauss-Jordan with the largest pivot of the diagonal, which serves a matrix without negative eigenvalues. What is
-  // left below rounding is no direction.
+  // Gauss-Jordan with the largest pivot of the diagonal, which serves a matrix without negative eigenvalues. A
+  // remainder below rounding is no direction.
   double const least = 1e-12 * (a[0][0] + a[1][1] + a[2][2]);
   std::array<bool, 3> used{};
   for (int round = 0; round < 3; ++round) {

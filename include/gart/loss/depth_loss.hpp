@@ -7,8 +7,8 @@
 /// where A weighs the pixel by how much of it is seen and has no gradient of its own: it could be made small by seeing
 /// less. So with s the sign of D / A - z
 ///   dL/dD = scale / pixels * s,   dL/dT = scale / pixels * s D / A,
-/// both bounded, however little is seen. What the map does not know (0), what a mask excludes and what sees nothing has
-/// no part in it. One launch and a sum; 20 bytes a pixel.
+/// both bounded, however little is seen. Pixels that the map does not know (0), that a mask excludes, or that see
+/// nothing count nothing. One launch and a sum; 20 bytes a pixel.
 
 #include <gart/algorithm/reduce.hpp>
 #include <gart/exec/buffer.hpp>

@@ -2,7 +2,7 @@
 /// \file
 /// The training loss of an image x against the truth y, and its gradient in x:
 ///   L = (1 - w) mean|x - y| + w (1 - mean SSIM(x, y)),
-/// means over all pixels and the three channels. The image is taken as it is, not clamped to [0, 1].
+/// means over all pixels and the three channels. The image is not clamped to [0, 1].
 ///
 /// SSIM is written in d = x - y, because near the optimum x and y agree and their difference is what must not cancel:
 ///   SSIM = (1 - m_d^2 / B1) (1 - s_dd / B2),  B1 = m_x^2 + m_y^2 + C1,  B2 = s_xx + s_yy + C2
@@ -233,7 +233,7 @@ class image_loss {
     total(loss);
   }
 
-  /// The gradient in some rows of the image, the same bits as of all; and what the loss sums there, in rows of tiles.
+  /// The gradient in some rows of the image, the same bits as of all, and the loss's sums there, in rows of tiles.
   void differentiate(span<float const> image, truth_view truth, int width, int height, float ssim_weight,
                      span<float> gradient, image_rows rows = {}) {
     E& exec = *exec_;
@@ -263,7 +263,7 @@ class image_loss {
   static image_rows reads(image_rows rows, int height) {
     return tiles::reached(tiles::around(tiles::rows_of(rows, height), height), height);
   }
-  /// What the last differentiate() has summed, [rows of tiles][tiles of a row], of L and of the squared error.
+  /// The sums of the last differentiate(), [rows of tiles][tiles of a row], of L and of the squared error.
   span<float> sums(int which) { return sums_.view().subspan(which * sums_.size() / 2, sums_.size() / 2); }
   /// The rows of tiles that begin in some rows of an image: whose sums those have who have the image in parts.
   static image_rows sums_of(image_rows rows, int height) {

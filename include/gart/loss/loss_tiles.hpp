@@ -121,7 +121,7 @@ struct loss_tiles {
     });
   }
 
-  // What a lane takes down columns: value v lies at (column, row) + v (dx, dy).
+  // The values that a lane takes down columns: value v lies at (column, row) + v (dx, dy).
   static constexpr int dx = !E::device, dy = E::device, items = width * height / block;
   struct item_place {
     int column, row;

@@ -124,8 +124,8 @@ GART_HD GART_INLINE void reciprocals(float (&a)[N]) {
 /// By the exponent bits, so that no fast-math switch can remove it.
 GART_HD GART_INLINE bool is_finite(float f) { return (float_to_bits(f) & 0x7f800000u) != 0x7f800000u; }
 
-/// For formulas over floats and over lanes of them (math/lanes.hpp): what a number's comparisons and counts are, and
-/// what they offer.
+/// For formulas over floats and over lanes of them (math/lanes.hpp): the types of a number's comparisons and counts,
+/// and their operations.
 template <class F>
 struct number;
 /// One float.

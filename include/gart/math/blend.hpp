@@ -17,8 +17,8 @@ GART_HD GART_INLINE F blend(F alpha, F t, vec3_of<F> const& c, vec3_of<F>& color
   return weight;
 }
 
-/// The colour that a ray with these values would have if a hit of colour c were opaque. What the hit's alpha decides is
-/// how far the pixel is from it (math/hit_gradient.hpp).
+/// The colour that a ray with these values would have if a hit of colour c were opaque. The hit's alpha decides the
+/// pixel's difference from it (math/hit_gradient.hpp).
 template <class F>
 GART_HD GART_INLINE vec3_of<F> opaque_color(vec3_of<F> const& c, vec3_of<F> const& color, F transmittance) {
   return {color.x + transmittance * c.x, color.y + transmittance * c.y, color.z + transmittance * c.z};

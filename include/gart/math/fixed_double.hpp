@@ -78,8 +78,8 @@ GART_HD inline sine_cosine turned(sine_cosine const& s, double quarters) {
   }
 }
 
-/// Of `part` / `whole` quarters of a turn, whole numbers or halves. Angles that lie a quarter apart have the same bits,
-/// but for their places and signs.
+/// Of `part` / `whole` quarters of a turn, whole numbers or halves. Angles that lie a quarter apart have the same bits
+/// in other places and with other signs.
 GART_HD inline sine_cosine sine_cosine_of_quarters(double part, double whole) {
   double const quarters = floor(part / whole + 0.5);
   return turned(small_sine_cosine(fixed_double(part - quarters * whole) / fixed_double(whole) * 1.5707963267948966),

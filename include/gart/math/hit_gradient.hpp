@@ -36,7 +36,7 @@ inline constexpr int moment_count = 11;
 inline constexpr int error_place = 10;    ///< the place of the error
 inline constexpr int moment_stride = 12;  ///< floats a Gaussian
 
-/// What one hit adds; of one hit, or of one a lane.
+/// The share of one hit in the sums; of one hit, or of one a lane.
 template <class F>
 struct moments_of {
   F v[moment_stride];  ///< as above
@@ -101,7 +101,7 @@ GART_HD GART_INLINE hit_terms<F> terms_of_hit(ray_gaussian const& gaussian, ray_
 
 }  // namespace detail
 
-/// What a hit adds to the moments; zeros where `hit` is false, whatever the rest is then.
+/// The share of a hit in the moments; zeros where `hit` is false, whatever the rest is then.
 template <class Response = generalized_gaussian<>, class F, class Mask>
 GART_HD GART_INLINE moments_of<F> hit_moments(ray_gaussian const& gaussian, ray_peak_of<F> const& r, F alpha_gradient,
                                               Mask hit) {
@@ -129,13 +129,13 @@ GART_HD GART_INLINE moments_of<F> hit_moments_with_depth(ray_gaussian const& gau
            p.x * h.z + p.z * v.x, p.x * h.y + p.y * v.x, 0.0f, 0.0f}};
 }
 
-/// M^T v: from the Gaussian's own space to the world, for what is pulled back through M.
+/// M^T v: from the Gaussian's own space to the world, for gradients that are pulled back through M.
 GART_HD GART_INLINE vec3 to_world(ray_gaussian const& g, float x, float y, float z) {
   return {g.m[0].x * x + g.m[1].x * y + g.m[2].x * z, g.m[0].y * x + g.m[1].y * y + g.m[2].y * z,
           g.m[0].z * x + g.m[1].z * y + g.m[2].z * z};
 }
 
-/// What one hit adds to the gradient of its ray.
+/// The share of one hit in the gradient of its ray.
 struct ray_part {
   vec3 origin, direction;  ///< dL/do, dL/dd
 };

@@ -23,7 +23,7 @@ GART_HD GART_INLINE float fresnel(float cosine, float ratio) {
   return 0.5f * (p * p + s * s);
 }
 
-/// n against the direction. Snell; where there is no total reflection.
+/// n against the direction. Snell's law, without total reflection.
 GART_HD GART_INLINE vec3 refracted(vec3 const& direction, vec3 const& n, float ratio) {
   float const cosine = -glm::dot(direction, n);
   float const other = square_root(fmaxf(0.0f, 1.0f - ratio * ratio * fmaxf(0.0f, 1.0f - cosine * cosine)));

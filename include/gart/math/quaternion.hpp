@@ -17,8 +17,8 @@ GART_HD GART_INLINE float norm2(quaternion const& q) {
   return fma(q.w, q.w, fma(q.x, q.x, fma(q.y, q.y, mul(q.z, q.z))));
 }
 
-/// Below this square of the norm a quaternion has no direction in float: its Gaussian is culled. Readers give what is
-/// shorter the length 1 (io/splat_file.hpp), and Adam lengthens them.
+/// Below this square of the norm a quaternion has no direction in float: its Gaussian is culled. Readers give shorter
+/// ones the length 1 (io/splat_file.hpp), and Adam lengthens them.
 inline constexpr float quaternion_norm2_min = 1e-8f;
 
 /// The rotation of the quaternion divided by its norm; columns are the images of the axes.

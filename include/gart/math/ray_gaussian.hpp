@@ -13,8 +13,8 @@
 /// within a few roundings of the distance, however thin the Gaussian, as the ray itself does.
 ///
 /// Everything is relative to a frame, a point of the world held in double (the camera's centre for primary rays). mu is
-/// subtracted from it in double, so scenes far from the origin lose nothing. This file is the only place that decides
-/// what is a hit, at which t and with which alpha; its arithmetic is fixed (arith.hpp).
+/// subtracted from it in double, so scenes far from the origin lose nothing. This file alone decides which candidates
+/// are hits, and their t and alpha. Its arithmetic is fixed (arith.hpp).
 
 #include <gart/math/arith.hpp>
 #include <gart/math/glm.hpp>
@@ -29,7 +29,7 @@ namespace gart { inline namespace GART_ISA {
 /// The largest alpha of a hit: above it alpha is clamped.
 inline constexpr float alpha_max = 0.99f;
 
-/// From the frame's origin: what a camera casts.
+/// A ray from the frame's origin, cast by a camera.
 template <class F>
 struct primary_ray_of {
   vec3_of<F> direction;  ///< unit
@@ -249,8 +249,7 @@ GART_HD GART_INLINE F estimated_unclamped_alpha(ray_gaussian const& g, F d2) {
 }
 ///@}
 
-///@{
-/// What a hit blends with: at most alpha_max.
+/// @{ The alpha that a hit blends with: at most alpha_max.
 template <class Response = generalized_gaussian<>, class F>
 GART_HD GART_INLINE F hit_alpha(ray_gaussian const& g, F d2) {
   return detail::clamped_alpha(unclamped_alpha<Response>(g, d2));

@@ -7,10 +7,10 @@
 /// slopes relative to its centre's, b_i = A_i - (m_i / m_z) A_z for i = x, y, the silhouette is the ellipse
 ///   {c + L s, |s| <= 1},  S = L L^T = (b_i . b_j) / W + e_i e_j,  W = m_z^2 - |A_z|^2,
 ///   c = m / m_z + e,      e_i = -(b_i . A_z) / W:
-/// sums of what does not cancel. It holds L as Cholesky has it, L^-1 q = (q_x / l_xx, (q_y - (S_xy / S_xx) q_x) /
-/// l_yy). As for a box (math/footprint.hpp), the movement of a hit by float arithmetic is added: an ellipse of (1 + k)
-/// S + (1 + 1 / k) pad^2 holds one of S widened by pad. All in double; what is asked of each rectangle is in float.
-/// Where some of the ellipsoid is not in front of the point every rectangle meets it.
+/// sums of what does not cancel. It holds Cholesky's L, L^-1 q = (q_x / l_xx, (q_y - (S_xy / S_xx) q_x) / l_yy). As for
+/// a box (math/footprint.hpp), the movement of a hit by float arithmetic is added: an ellipse of (1 + k) S + (1 + 1 /
+/// k) pad^2 holds one of S widened by pad. It is computed in double; questions about rectangles are in float. Where
+/// some of the ellipsoid is not in front of the point every rectangle meets it.
 
 #include <gart/math/footprint.hpp>
 

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// sRGB's curve (IEC 61966-2-1), of numbers in [0, 1]: what a screen is given, and the light that it then shows.
+/// sRGB's curve (IEC 61966-2-1), of numbers in [0, 1]: between values for a screen and the light that it shows.
 
 #include <gart/core/macros.hpp>
 #include <gart/math/arith.hpp>
@@ -9,15 +9,13 @@
 
 namespace gart { inline namespace GART_ISA {
 
-///@{
-/// Light from what is displayed; of floats the same bits on every policy.
+/// @{ Light from displayed values; of floats the same bits on every policy.
 inline double linear_light(double x) { return x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4); }
 GART_HD GART_INLINE float linear_light(float x) {
   if (!(x > 0.04045f)) return x * (1.0f / 12.92f);
   return exponential(2.4f * logarithm((x + 0.055f) * (1.0f / 1.055f)));
 }
-///@}
-/// What is displayed from light.
+/// @} Displayed values from light.
 inline float displayed(float x) { return x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1.0f / 2.4f) - 0.055f; }
 
 }}  // namespace gart::GART_ISA

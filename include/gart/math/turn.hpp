@@ -11,7 +11,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// v turned about a unit axis by an angle of that sine and cosine: Rodrigues' formula. F: double, or where bits count
+/// v turned about a unit axis by the angle of this sine and cosine: Rodrigues' formula. F: double, or where bits count
 /// fixed_double.
 template <class F>
 GART_HD vec3_of<F> turned_about(vec3_of<F> const& axis, F sine, F cosine, vec3_of<F> const& v) {

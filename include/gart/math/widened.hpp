@@ -8,7 +8,7 @@
 /// C^-1 d. A filter adds r^2 to it. F is the ratio of the determinants, the square of that of the areas. With u the
 /// direction in the Gaussian's axes and a_k = s_k^2 / r^2 both are sums of positive terms:
 ///   F = N / N',   N = sum u_k^2 a_i a_j,   N' = sum u_k^2 (1 + a_i)(1 + a_j)   ({i, j, k} all three axes).
-/// Responses of another degree than 2 keep their own shape, and so what they cover, not the filter's.
+/// Responses of another degree than 2 keep their own shape, and so their own covered area.
 ///
 /// The result is a gaussian_parameters again, so records, boxes and footprints take one and the same widened Gaussian.
 /// Its arithmetic is fixed. Where it would be no Gaussian it is left alone, to be culled.
@@ -23,7 +23,7 @@ struct filter_at {
   vec3 log_slope{0.0f};  ///< d ln sigma / d mean
 };
 
-/// What the direction of the mean makes of a Gaussian under a filter.
+/// The effect of the mean's direction on a Gaussian under a filter.
 struct filtered_area {
   mat3 rotation;           ///< columns are the Gaussian's axes
   vec3 u;                  ///< unit, towards the mean in the Gaussian's axes

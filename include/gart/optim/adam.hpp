@@ -12,8 +12,8 @@
 ///
 /// options.sh_pull is the derivative of a penalty on the square of the bands of colour above the first. Fast rates make
 /// them follow the noise of single views, which the pull removes (L2 regularization). It joins the gradient here, where
-/// the coefficient is read anyway. A coefficient without a gradient is not pulled: what a view does not show, it does
-/// not fade, however many views there are.
+/// the coefficient is read anyway. A coefficient without a gradient is not pulled: a view does not fade what it does
+/// not show.
 
 #include <gart/exec/concepts.hpp>
 #include <gart/math/arith.hpp>
@@ -48,7 +48,7 @@ struct adam_element {
   Number parameter, first, second;  ///< with m and v
 };
 
-/// What a step does to an element. `rate` carries first_correction.
+/// Adam's step of an element. `rate` carries first_correction.
 struct adam_rule {
   float beta1 = 0, beta2 = 0, epsilon = 0, second_correction = 1;  ///< 1 / sqrt(1 - b2^t)
 
@@ -169,8 +169,8 @@ struct adam_kernel : adam_arguments {
       group.parameter[i] = e.parameter, group.first[i] = e.first, group.second[i] = e.second;
   }
 
-  // Elements e to e + 3 of a tile, which begins at `base` with a row, by gradient(), which is asked for where any
-  // moves; what is not to move is written as it was.
+  // Elements e to e + 3 of a tile, which begins at `base` with a row, by gradient(), which is called where any moves.
+  // Elements that must not move keep their values.
   GART_KERNEL void update_quad(adam_group const& group, std::size_t base, index_t row, index_t e,
                                auto const& gradient) const {
     index_t columns[4];
@@ -265,7 +265,7 @@ struct adam_colors {
 
 }  // namespace detail
 
-/// A step of Adam, in one launch or in two. What it is made of must outlive it.
+/// A step of Adam, in one launch or in two. Its arguments must outlive it.
 template <execution E>
 class adam_pass {
  public:

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The options of the optimizer and of the three ways to densify. Where the defaults are not those of the literature
-/// (3DGS, 3DGS-MCMC, gsplat), docs/training.md has what was measured.
+/// The options of the optimizer and of the three ways to densify. docs/training.md has measurements for defaults that
+/// differ from the literature (3DGS, 3DGS-MCMC, gsplat).
 
 #include <algorithm>
 

@@ -12,7 +12,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// What a number is drawn for: draws for different purposes are independent.
+/// The purpose of a number: draws for different purposes are independent.
 enum class random_use : u32 { relocation = 1, growth, noise, split, dropout, user = 0x10000 };
 
 /// 128 random bits.

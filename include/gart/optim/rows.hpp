@@ -186,7 +186,7 @@ all_rows<E>& whole_scene() {
   return rows;
 }
 
-/// What a densification did. Where the count changed, gradients and other per-Gaussian buffers have a new size.
+/// The report of a densification. Where the count changed, gradients and other per-Gaussian buffers have a new size.
 struct density_change {
   index_t relocated = 0, added = 0, removed = 0;  ///< Gaussians
   /// Whether any Gaussian changed.

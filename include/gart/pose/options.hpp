@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// How the poses of training views are learned (pose/pose_training.hpp). docs/calibration.md has what was measured.
+/// How the poses of training views are learned (pose/pose_training.hpp). docs/calibration.md has the measurements.
 
 namespace gart {
 

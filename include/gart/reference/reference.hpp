@@ -9,10 +9,9 @@
 ///   a hit where alpha >= alpha_min and t > near,
 ///   colour = sum_i T_i alpha_i c_i + T background, T_(i+1) = T_i (1 - alpha_i), hits in the order (t, id), until
 ///   T < transmittance_min (the hit that crosses counts) or max_hits of them.
-/// Rays are those of any camera, in double: without one centre too, and none where a lens gives none.
-/// With options.antialias, the standard deviation of the pixels' filter, a Gaussian is first widened as in
-/// math/widened.hpp, by the definition there.
-/// Backwards, with g = dL/dcolour and B_i what is seen behind hit i with T = 1,
+/// Rays are those of any camera, in double: without one centre too, and none where a lens gives none. With
+/// options.antialias, the standard deviation of the pixels' filter, a Gaussian is first widened as in math/widened.hpp,
+/// by the definition there. Backwards, with g = dL/dcolour and B_i the colour behind hit i with T = 1,
 ///   dL/dalpha_i = T_i g.(c_i - B_i),
 /// the depth sum_i T_i alpha_i t_i likewise with t_i for c_i, where dL/dt_i = T_i alpha_i dL/ddepth besides,
 /// and a clamp that holds (alpha at 0.99, a colour at 0) passes nothing. Gaussians that the renderer culls (parameters

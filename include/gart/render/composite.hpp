@@ -3,8 +3,8 @@
 /// The forward ray program: front-to-back compositing of the hits of a pixel,
 ///   C += T alpha c,  T *= 1 - alpha,
 /// colour from spherical harmonics on the ray's direction, until T < transmittance_min (the hit that crosses counts),
-/// or until max_hits of them where there is such a cap. The background is added with what transmittance is left. What a
-/// hit does to a ray is a template over the number: render/packet_composite.hpp does it to a packet of rays.
+/// or until max_hits of them where there is such a cap. The background is added with what transmittance is left. The
+/// effect of a hit on a ray is a template over the number: render/packet_composite.hpp applies it to a packet of rays.
 
 #include <gart/math/blend.hpp>
 #include <gart/math/sh.hpp>
@@ -32,12 +32,12 @@ struct image_targets {
   last_hit* last = nullptr;        ///< the hit that the ray ended with
 };
 
-/// What the hits of a ray have added up to, or those of a ray a lane (math/lanes.hpp).
+/// The sums over the hits of a ray, or of a ray a lane (math/lanes.hpp).
 template <class F>
 struct composited_hits {
   using words = typename number<F>::words;      ///< whole numbers, one a ray
   vec3_of<F> color{F(0.0f), F(0.0f), F(0.0f)};  ///< colour so far, without the background
-  F transmittance = 1.0f;                       ///< what the hits so far let through, 1 to 0
+  F transmittance = 1.0f;                       ///< the light that the hits so far let through, 1 to 0
   F depth = 0.0f;                               ///< sum of weight * t
   words hits{};                                 ///< number of hits
   F last_t = last_hit{}.t;                      ///< t of the latest hit
@@ -104,13 +104,13 @@ struct composite : ray_program_base {
   GART_HD GART_INLINE vec3 shade(state const& s, float const* row) const {
     return s.basis.unclamped(*reinterpret_cast<float const(*)[row_floats]>(row));
   }
-  /// Composites a hit of that colour. False: the ray ends.
+  /// Composites a hit of this colour. False: the ray ends.
   GART_HD GART_INLINE bool add(state& s, float t, float alpha, vec3 const& unclamped, u32 place) const {
     return blend_hit(s, true, t, alpha, unclamped, place) && s.hits != options.max_hits;
   }
 
-  /// A hit with the rays of a mask, or with the one ray there is. `place` is what the record knows it by. The rays that
-  /// let through enough to go on, whatever the cap.
+  /// A hit with the rays of a mask, or with the one ray there is. The record identifies the hit by `place`. The rays
+  /// that let through enough to go on, whatever the cap.
   template <class F, class Place>
   GART_HD GART_INLINE auto blend_hit(composited_hits<F>& s, typename number<F>::mask now, F t, F alpha,
                                      vec3_of<F> const& unclamped, Place const& place) const {
@@ -119,7 +119,7 @@ struct composite : ray_program_base {
     vec3_of<F> const c = clamped_color(unclamped);
     [[maybe_unused]] vec3_of<F> const opaque = opaque_color(c, s.color, s.transmittance);
     [[maybe_unused]] F const depth = opaque_depth(t, s.depth, s.transmittance);
-    // A hit of no alpha leaves a ray as it is.
+    // A hit without alpha does not change a ray.
     F const weight = blend(select(now, alpha, zero), select(now, t, zero), c, s.color, s.depth, s.transmittance);
     auto const note = [&](auto const&... where) {
       if constexpr (Record::depth)
@@ -140,7 +140,7 @@ struct composite : ray_program_base {
   /// Writes the pixel.
   GART_HD void end(index_t, state const& s) const { write(s.at, s); }
 
-  /// What the hits have added up to, with the background, to the targets of pixel `at`.
+  /// Writes the sums over the hits, with the background, to the targets of pixel `at`.
   GART_HD void write(pixel at, composited_hits<float> const& s) const {
     std::size_t const a = order.address(at);
     if (out.color) {

@@ -1,16 +1,16 @@
 #pragma once
 /// \file
-/// A frame: the Gaussians of a scene as one view sees them, 64 bytes each, and a tracer's structure over them. What
-/// comes between a view and its images, and between a view and its gradients (backward/backward.hpp).
+/// A frame: the Gaussians of a scene as one view sees them, 64 bytes each, and a tracer's structure over them. The
+/// object between a view and its images, and between a view and its gradients (backward/backward.hpp).
 ///
 ///   frame<E, scene_traits<3>, tile_tracer<E>> frame(exec);
 ///   frame.prepare(scene, view, options);   // once a view, and again when scene, view or options change
 ///   frame.render({.color = color});        // as often as wanted
 ///
-/// The scene's arrays and the policy must outlive what is done with the frame. Cost of prepare: a launch over the
-/// Gaussians and the tracer's own preparation; of render: a ray a pixel. Memory: 64 bytes a Gaussian, 16 more where the
-/// options have a filter of the pixels, and the tracer's. Errors: invalid_argument for a camera or options that rays
-/// cannot be traced by, and for calls that need a prepared frame.
+/// The scene's arrays and the policy must outlive the use of the frame. Cost of prepare: a launch over the Gaussians
+/// and the tracer's own preparation; of render: a ray a pixel. Memory: 64 bytes a Gaussian, 16 more where the options
+/// have a filter of the pixels, and the tracer's. Errors: invalid_argument for a camera or options that rays cannot be
+/// traced by, and for calls that need a prepared frame.
 
 #include <gart/exec/stage.hpp>
 #include <gart/render/antialiased.hpp>
@@ -75,7 +75,7 @@ class frame {
     ++preparations_;
   }
 
-  /// The forward pass. `record` takes what a backward pass wants to find of each hit.
+  /// The forward pass. `record` takes the record of each hit for a backward pass.
   template <hit_record Record = record_none>
   void render(image_targets const& targets, Record const& record = {}) {
     require_prepared("render");
@@ -112,7 +112,7 @@ class frame {
   gaussians_view<float const> seen() const { return require_prepared("seen"), seen_; }  ///< through the pixels' filter
   /// The camera or camera model.
   View const& view() const { return require_prepared("view"), *view_; }
-  /// What it was prepared with.
+  /// The arguments of its preparation.
   render_options const& options() const { return require_prepared("options"), options_; }
   /// Bands above it are not evaluated.
   int active_degree() const { return require_prepared("active_degree"), active_degree_; }
@@ -124,7 +124,7 @@ class frame {
   Tracer const& tracer() const { return tracer_; }
   /// The policy.
   E& exec() const { return *exec_; }
-  /// Which preparation it stands at, from 1: what was made from another one does not fit this.
+  /// The number of its preparation, from 1. Results of another one do not fit.
   u64 preparation() const { return require_prepared("preparation"), preparations_; }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// What a render leaves out, and what shows where nothing is: the knobs that trade exactness for time.
+/// The parts that a render leaves out, and the background: the options that trade exactness for time.
 /// Errors: require_options throws invalid_argument, naming the option; frame.prepare calls it.
 
 #include <gart/core/error.hpp>
@@ -19,12 +19,12 @@ struct render_options {
   float transmittance_min = 1e-4f;  ///< a ray ends after the hit that brings T below this
   u32 max_hits = 0;                 ///< a ray ends after so many hits composited; 0: no cap
   float antialias = 0;              ///< standard deviation of the pixels' filter, in pixels (camera/model.hpp); 0: none
-  /// The BVH tracer builds its tree every so many views, else refits it: exact. Another tracer has no tree: sessions
-  /// and renderers refuse what is not 1 there.
+  /// The BVH tracer builds its tree every so many views, else refits it: exact. Other tracers have no tree: sessions
+  /// and renderers then refuse values other than 1.
   int rebuild_every = 1;
   float near = 0.01f;     ///< hits lie at t > near, world units along the ray
   vec3 background{0.0f};  ///< linear RGB behind the last hit
-  /// What is traced of the image; whole rows of tiles. Pixels of other rows are left as they are, or written without
+  /// The part of the image to trace; whole rows of tiles. Pixels of other rows are left as they are, or written without
   /// a hit.
   image_rows rows = {};
 };

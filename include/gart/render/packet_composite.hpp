@@ -12,7 +12,7 @@ namespace gart { inline namespace GART_ISA {
 /// The packet program of composite (trace/packet_program.hpp).
 template <int ShDegree, hit_record Record>
 struct packet_composite {
-  /// A Gaussian's box in the tile, with what the record needs of it.
+  /// A Gaussian's box in the tile, with the data for the record.
   using cell = typename Record::packet_cell;
   /// Where the record writes a Gaussian's hits.
   using note = typename Record::note;
@@ -46,7 +46,7 @@ struct packet_composite {
     return s;
   }
 
-  /// Where the record will write what the Gaussian of a cell hits.
+  /// The place where the record will write the hits of a cell's Gaussian.
   GART_INLINE note expect(state const& s, cell const& from) const { return program.record.expect(from, s.block); }
   /// Asks for the row of coefficients of Gaussian `id`.
   GART_INLINE void fetch(u32 id) const {

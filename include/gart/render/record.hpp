@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// What the forward pass leaves of each hit for the backward pass to find; part of a method
+/// The record of each hit that the forward pass leaves for the backward pass; part of a method
 /// (backward/gradient_method.hpp). A record says where a hit belongs when it is found, and is called once a hit, after
 /// it has been composited. On hosts it also takes the hits of one Gaussian with a packet of rays at once
 /// (trace/packet_walk.hpp).
@@ -34,7 +34,7 @@ concept packet_record = requires(R const& r, packet_block const& block, typename
 
 }  // namespace detail
 
-/// What the forward pass leaves of a hit.
+/// The data of a hit that the forward pass leaves.
 template <class R>
 concept hit_record = std::is_trivially_copyable_v<R> &&
     requires(R const& r, u32 id, pixel at, u32 place, vec3 const& color, float weight) {

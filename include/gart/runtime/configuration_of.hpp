@@ -12,7 +12,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// What the templates are called at run time, for a model of a degree up to theirs.
+/// The templates' arguments at run time, for a model of a degree up to theirs.
 template <execution E, class Traits, class Tracer, gradient_method Method, class Comm = self_comm>
 configuration_info configuration_of(int sh_degree = Traits::sh_degree) {
   using response = typename Traits::response;

@@ -47,7 +47,7 @@ some_views evenly_spread(std::vector<dataset_view> const& views, std::size_t cou
 using render_view = std::function<rendered(camera const&)>;  ///< one view to host memory
 /// A view's camera where it is not the capture's: learned, or aligned to its photograph.
 using place_view = std::function<camera(dataset_view const&)>;
-/// Sees each view as it was scored, in order.
+/// Sees each scored view, in order.
 using keep_view =
     std::function<void(std::size_t index, view_score const&, image_float const& render, image_float const& truth)>;
 

@@ -26,7 +26,7 @@ constexpr auto names_of(tracer_kind) {
       {{automatic, "auto"}, {bvh, "bvh"}, {embree, "embree"}, {tiles, "tiles"}, {own, "own"}}};
 }
 
-/// What the forward pass leaves of a hit (backward/hit_slot.hpp): nothing for pixel, its weight for hybrid.
+/// The record of a hit by the forward pass (backward/hit_slot.hpp): nothing for pixel, its weight for hybrid.
 enum class hit_format_kind { automatic, float4, half, weight, none };
 /// Their names.
 constexpr auto names_of(hit_format_kind) {

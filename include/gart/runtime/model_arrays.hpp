@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// What renderers ask of the arrays that they are given, before anything reads them.
-/// Errors: invalid_argument, naming the array, what it has and what it should have.
+/// Errors: invalid_argument, naming the array, its size and the right size.
 
 #include <gart/core/error.hpp>
 #include <gart/scene/features.hpp>

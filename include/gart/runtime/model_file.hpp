@@ -29,12 +29,12 @@ struct model_file {
   std::vector<std::string> notes = {};  ///< a line each: which of them were left out (io/splat_file.hpp)
 };
 
-/// Errors: io_error naming the file and what is wrong in it.
+/// Errors: io_error naming the file and its fault.
 model_file load_model(std::filesystem::path const& path);
 /// The same with this rank's rows alone. Of a binary splat PLY no other rows are read.
 model_file load_model(std::filesystem::path const& path, row_owners const& owners);
 /// Those of a scene, each in its place, as one model: with the origin and the rendering of the first. Errors:
-/// unsupported where their kernel degrees differ; a model without Gaussians where there are none.
+/// unsupported where their kernel degrees differ. Without files, a model without Gaussians.
 model_file load_models(std::vector<placed_splats> const& splats);
 /// Written to a temporary name, then renamed. Errors: io_error.
 void save_model(std::filesystem::path const& path, model_file const& file);

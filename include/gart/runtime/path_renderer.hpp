@@ -30,7 +30,8 @@ namespace gart {
 /// In place of a Gaussian, a mesh or a triangle, where a pixel has none.
 inline constexpr u32 no_number = 0xffffffffu;
 
-/// What a path through the middle of each pixel meets first. Of samples there are means in the colour alone.
+/// The first surface that a path through the middle of each pixel meets. Of samples there are means in the colour
+/// alone.
 struct path_layers {
   image_float albedo;         ///< [H][W][3]: base colours of Gaussians and surface, blended as colours are
   image_float normal;         ///< [H][W][3]: world, of the surface, times the transmittance before it
@@ -68,7 +69,7 @@ class path_renderer {
 
   /// Times of stages; waits for the policy.
   virtual profiler& profile() = 0;
-  /// What was chosen for the request.
+  /// The configuration chosen for the request.
   virtual configuration_info configuration() const = 0;
 
  protected:

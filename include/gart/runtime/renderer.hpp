@@ -47,12 +47,12 @@ class renderer {
 
   /// Copies the model, with its features; bound arrays are no longer used.
   virtual void set_model(gaussian_model const& model) = 0;
-  /// The arrays, in memory of the policy, must stay until another model is set or bound. What is written to them
-  /// between two views counts for the second, on the same stream.
+  /// The arrays, in memory of the policy, must stay until another model is set or bound. Values written to them between
+  /// two views count for the second, on the same stream.
   virtual void bind(gaussians_view<float const> parameters) = 0;
 
   /// Features in memory of the policy, in place of the model's own. They must stay until others are bound, or another
-  /// model is set or bound. What is written to them between two views counts for the second. Errors: invalid_argument
+  /// model is set or bound. Values written to them between two views count for the second. Errors: invalid_argument
   /// where they are not of each Gaussian, or more than 512.
   virtual void bind_channels(gaussian_channels const& channels) = 0;
 
@@ -103,7 +103,7 @@ class renderer {
   /// Most bytes of the policy's memory that were in use at a time.
   virtual std::size_t peak_bytes() const = 0;
   virtual std::size_t hit_buffer_bytes() const = 0;  ///< of the last differentiate; 0 where the method records nothing
-  /// What was chosen for the request.
+  /// The configuration chosen for the request.
   virtual configuration_info configuration() const = 0;
 };
 

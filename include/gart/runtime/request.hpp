@@ -26,8 +26,8 @@ struct configuration_request {
   int device = 0;      ///< of the cuda policy; ranks take a host's GPUs in turn
   /// The cuda policy's stream: the caller's cudaStream_t (cudaStreamLegacy for the default one), or null for its own.
   void* stream = nullptr;
-  /// The ranks that train together (comm/mpi_comm.hpp), all of which make the same calls; null: this process by itself.
-  /// Must outlive what is made for the request.
+  /// The ranks that train together (comm/mpi_comm.hpp); all make the same calls. Null: this process by itself. Must
+  /// outlive the session or renderer made for the request.
   mpi_comm const* ranks = nullptr;
 };
 

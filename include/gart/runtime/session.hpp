@@ -50,7 +50,7 @@ class session {
   /// The view's colours in 8 bits a channel (renderer::render_8bit).
   virtual image8 render_8bit(camera const& view, vec3 background) = 0;
   /// Writes everything the next step depends on: parameters, Adam's moments, step, random state. It is written
-  /// atomically. On the serial policy a resumed run has the bits of one that never stopped.
+  /// atomically. On the serial policy a resumed run has the bits of a run that never stopped.
   virtual void save(std::filesystem::path const& checkpoint) const = 0;
   /// Takes up a saved run. Errors: io_error for a checkpoint of another degree, a truncated or foreign file.
   virtual void load(std::filesystem::path const& checkpoint) = 0;
@@ -72,7 +72,7 @@ class session {
   virtual std::size_t peak_bytes() const = 0;
   virtual std::size_t hit_buffer_bytes() const = 0;  ///< of the last step; 0 where the method records nothing
   virtual u64 sent_bytes() const { return 0; }       ///< sent by this rank to others in its steps
-  /// What was chosen for the request.
+  /// The configuration chosen for the request.
   virtual configuration_info configuration() const = 0;
 };
 

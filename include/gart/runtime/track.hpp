@@ -14,7 +14,7 @@
 /// the camera moves by t and turns by w. Any camera with one centre.
 ///
 /// Cost of a step: two forward passes, a backward pass and a few passes over the image on the host. Errors:
-/// invalid_argument for a photograph, mask or camera of another size; what the renderer throws.
+/// invalid_argument for a photograph, mask or camera of another size; errors of the renderer.
 
 #include <gart/exposure/photo_response.hpp>
 #include <gart/runtime/renderer.hpp>
@@ -32,7 +32,7 @@ struct track_options {
   photo_response response = {};  ///< what the photograph shows of the scene's colours
 };
 
-/// What was found.
+/// The result of tracking.
 struct track_result {
   camera view;                   ///< the guess, with the pose that was found
   std::vector<float> residuals;  ///< root mean squared error of the best pose after each step, without blur

@@ -57,7 +57,7 @@ struct validation_plan {
 validation_plan plan_validation(train_options const& options, dataset const& data, std::size_t candidates,
                                 bool beside = false);
 
-/// What a trial gave.
+/// The result of a trial.
 struct trial {
   std::string setting;  ///< the candidate's; empty: the options as they came
   std::string value;    ///< the candidate's

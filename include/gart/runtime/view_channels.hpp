@@ -9,7 +9,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// What a view leaves of its hits.
+/// The data that a view keeps of its hits.
 template <execution E>
 struct view_hits {
   /// None yet.
@@ -19,7 +19,7 @@ struct view_hits {
   bool is_listed = false;      ///< they are those of the view
   gaussian_channels channels;  ///< that could be shown
 
-  /// A view whose hits are counted as it is rendered, to what this returns.
+  /// Views whose hits are counted as they are rendered, to what this returns.
   u32* count(E& exec, std::size_t pixels) {
     counts.resize(pixels);
     exec.zero(counts.data(), pixels * sizeof(u32));
@@ -50,7 +50,7 @@ class view_channels {
     require_channels(channels, gaussians, "renderer.bind_channels");
     now_ = channels;
   }
-  /// What the Gaussians have.
+  /// The values of the Gaussians.
   gaussian_channels const& now() const { return now_; }
 
   /// Shows them of a frame that is prepared; counted: by hits().count() of this view.

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The mean of a block of pixels, 8 bits a channel: what a smaller photograph has in its place. Pixels of 4 channels
-/// have straight alpha, and colours are weighted by it; a mask's weights weigh both.
+/// The mean of a block of pixels, 8 bits a channel: a pixel of a smaller photograph. Pixels of 4 channels have straight
+/// alpha, and colours are weighted by it; a mask's weights weigh both.
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// A camera as a program fills it in and files hold it: which model it is and that model's parameters. What a model
-/// makes of them is in camera/ (camera/model.hpp); camera/models.hpp goes from here to there.
+/// A camera as a program fills it in and files hold it: which model it is and that model's parameters. Models in
+/// camera/ give them their meaning (camera/model.hpp); camera/models.hpp goes from here to there.
 ///
 /// Axes are OpenCV's: x right, y down, z forward. Pixel (0, 0) is the top-left corner of the image, the ray of pixel
 /// (i, j) goes through (i + 0.5, j + 0.5).
@@ -57,7 +57,7 @@ struct camera {
   vec3d position{0.0};                   ///< the centre in the world, in double: everything else is relative to it
   camera_kind kind = camera_kind::perspective;  ///< its model
   shutter_kind shutter = shutter_kind::global;  ///< where the pose is that of the middle of the read-out
-  /// What the camera moves by, in its own axes, while its shutter goes from one border of the image to the other.
+  /// The camera's motion, in its own axes, while its shutter goes from one border of the image to the other.
   vec3 travel{0.0f};
   vec3 turn{0.0f};  ///< the same of its rotation: the axis times the angle, radians
 };
@@ -68,7 +68,7 @@ struct named_camera {
   camera view;       ///< the camera
 };
 
-/// What is wrong with a camera, and what to correct; null where nothing is.
+/// The fault of a camera and its remedy; null where there is none.
 struct camera_fault {
   char const* what = nullptr;    ///< null: nothing
   char const* remedy = nullptr;  ///< what to correct

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Features of Gaussians: N numbers each, 1 to 512, that are shown as colours are, without a direction. What they mean
+/// Features of Gaussians: N numbers each, 1 to 512, that are shown as colours are, without a direction. Their meaning
 /// is the caller's: classes, embeddings, intensities. Errors: invalid_argument naming what disagrees.
 
 #include <gart/core/error.hpp>
@@ -29,7 +29,7 @@ struct feature_view {
   GART_HD operator feature_view<T const>() const requires(!std::is_const_v<T>) { return {values, count, width}; }
 };
 
-/// Throws invalid_argument where there are features, and not of each of so many Gaussians; `call` names who asks.
+/// Throws invalid_argument where the features are not one set for each of so many Gaussians; `call` names the caller.
 template <class T>
 void require_features(feature_view<T> const& features, std::size_t gaussians, std::string const& call) {
   if (features.width == 0) return;

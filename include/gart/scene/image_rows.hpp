@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Some rows of an image: what one of several ranks traces of it, or all.
+/// Some rows of an image: those that one of several ranks traces, or all.
 
 #include <gart/core/macros.hpp>
 

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// What a scene requires, at compile time. Kernels choose code by it, so that what a scene does not need has no
+/// The requirements of a scene at compile time. Kernels choose code by it. Features that a scene does not need take no
 /// registers, no fields and no bytes. The rows that gart's libraries compile are listed by `gart info`;
 /// runtime/registry.hpp is how a program compiles its own (examples/5_own_configuration).
 

@@ -1,8 +1,8 @@
 #pragma once
 /// \file
 /// The cost of each row of tiles, from when ranks last traced the view; the same on all ranks. The next time, the view
-/// is cut by these costs (work_units.hpp). So no rank waits for the counts of others before it knows what it traces. A
-/// view changes little between two visits. Images and gradients do not depend on the cut.
+/// is cut by these costs (work_units.hpp). So no rank waits for the counts of others before it knows its part. A view
+/// changes little between two visits. Images and gradients do not depend on the cut.
 ///
 /// box_kernel gives the costs: for each view, the difference of each row's cost to the row above, in wrapping
 /// arithmetic, and one more number at the end. Views follow one another. Memory: 8 bytes a row of tiles.

@@ -109,7 +109,7 @@ class footprints {
       visit_camera(view, [&](auto const& model) {
         auto const bounds = model.bounds(near);
         using bounds_type = std::remove_const_t<decltype(bounds)>;
-        // What is left lies where the offsets will, and its count where the total will.
+        // The remaining ones lie where the offsets will, and their count where the total will.
         tile_kernels::measure<E, Response, Size, bounds_type> const kernel{
             scene,   bounds, model.position, alpha_min,     rows,          ranges_,
             depths_, areas_, tiles_,         area_offsets_, totals_.data()};

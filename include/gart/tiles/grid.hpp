@@ -40,7 +40,7 @@ GART_HD constexpr pixel_box tiles_of(pixel_box const& b) {
           static_cast<u16>((b.y1 - 1) / Size + 1)};
 }
 
-/// What lies in both.
+/// The intersection.
 GART_HD constexpr pixel_box intersect(pixel_box const& a, pixel_box const& b) {
   return {a.x0 > b.x0 ? a.x0 : b.x0, a.y0 > b.y0 ? a.y0 : b.y0, a.x1 < b.x1 ? a.x1 : b.x1, a.y1 < b.y1 ? a.y1 : b.y1};
 }

@@ -45,7 +45,7 @@ class depth_bits {
   int shift() const { return shift_; }
 
  protected:
-  // The larger of two bounds, the first of which may say nothing.
+  // The larger of two bounds; the first may be missing.
   GART_HD GART_INLINE u32 key_of(float bound, float anywhere) const {
     return depth_key(bound > anywhere && bound <= 3.402823466e38f ? bound : anywhere, shift_);
   }
@@ -54,8 +54,8 @@ class depth_bits {
 
 }  // namespace detail
 
-/// By how near the pair's pixels can hit the primitive: what the tile-list tracer reads. No hit of the pair has a
-/// smaller depth, as the camera measures it, than its key stands for. This one is a pinhole's, whose rays all lie on
+/// By how near the pair's pixels can hit the primitive; the tile-list tracer reads these lists. No hit of the pair has
+/// a smaller depth, as the camera measures it, than its key stands for. This one is a pinhole's, whose rays all lie on
 /// one plane's grid; others are of any_depth_order.
 class depth_order : public detail::depth_bits {
  public:
@@ -69,7 +69,7 @@ class depth_order : public detail::depth_bits {
     reach_ = 1.01f + u + v;
   }
 
-  /// What it needs of a primitive.
+  /// Its data of a primitive.
   struct primitive {
     rectangle_depth in;  ///< its bound; unused without Gaussians
     float depth;         ///< anywhere
@@ -98,11 +98,11 @@ class depth_order : public detail::depth_bits {
 template <int Size>
 class any_depth_order : public detail::depth_bits {
  public:
-  /// As depth_order's; planes: a tile each, null where there are none.
+  /// As depth_order's; planes: a tile each, or null.
   any_depth_order(float const* depths, ray_gaussian const* gaussians, tile_plane const* planes)
       : depths_(depths), gaussians_(gaussians), planes_(planes) {}
 
-  /// What it needs of a primitive.
+  /// Its data of a primitive.
   struct primitive {
     ray_gaussian gaussian;  ///< unused without planes
     float depth;            ///< anywhere
@@ -134,7 +134,7 @@ class moving_depth_order : public detail::depth_bits {
                      origin_rays const& rays)
       : depths_(depths), gaussians_(gaussians), planes_(planes), rays_(rays) {}
 
-  /// What it needs of a primitive.
+  /// Its data of a primitive.
   struct primitive {
     ray_gaussian gaussian;  ///< in the view's frame
     float depth;            ///< anywhere
@@ -174,7 +174,7 @@ class parallel_depth_order : public detail::depth_bits {
     far_ = norm1(corner_) + norm1(across_) * view.width + norm1(down_) * view.height;
   }
 
-  /// What it needs of a primitive: t = base + u across + v down, off by `loss` and a part of itself.
+  /// Its data of a primitive: t = base + u across + v down, off by `loss` and a part of itself.
   struct primitive {
     double base, across, down, loss, part;  ///< by pixels
     float depth;                            ///< anywhere

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The nodes of a tree that a beam has yet to visit (trace/beam_walk.hpp), in the memory that its lanes share. The
-/// nearest are taken, some at a time; where there is no room for all, the one that was found last.
+/// The nodes of a tree that a beam has yet to visit (trace/beam_walk.hpp), in the memory that its lanes share. Some of
+/// the nearest are taken at a time. Where room runs out, only the last one found is taken.
 
 #include <gart/bvh/walk.hpp>
 #include <gart/trace/lane_values.hpp>
@@ -38,7 +38,7 @@ class beam_node_queue {
   /// Puts nodes at the places from `places` on.
   GART_HD GART_INLINE void add(int count) { places += count, nodes += count; }
 
-  /// Bits of the distance of the nearest node; beyond all where there is none.
+  /// Bits of the distance of the nearest node; larger than all where there is none.
   GART_HD GART_INLINE u32 least_key(beam_nodes const& s) const { return least_of_all(s); }
 
   /// Takes nodes no farther than `reach`, as many as there is room for the children of; how many. Where it is

@@ -15,7 +15,7 @@ struct made_beam {
 };
 
 /// Rays of a beam may differ by this much in slope. Wider beams meet so many boxes that miss all their rays that single
-/// rays are faster. Their origins differ by a 128th of that, in sizes of the tree.
+/// rays are faster. Their origins differ by a 128th of this, in sizes of the tree.
 inline constexpr float widest_beam = 0.25f;
 
 /// Of the rays of all lanes that have one; `placed` gives a lane's in the frame of the tree. One at least has.

@@ -27,12 +27,12 @@ struct bound_ellipsoids {
 
 }  // namespace trace_kernels
 
-/// Response: what the scene's Gaussians are (math/response.hpp).
+/// Response: of the scene's Gaussians (math/response.hpp).
 template <execution E, class Response = generalized_gaussian<>>
 class bvh_tracer : public tracer_base {
  public:
   using response_type = Response;             ///< of the Gaussians
-  static constexpr char const* name = "bvh";  ///< as requests have it
+  static constexpr char const* name = "bvh";  ///< its name in requests
 
   /// Allocates nothing; `exec` must outlive it.
   explicit bvh_tracer(E& exec) : rays_(exec), boxes_(exec), tree_(exec), apart_(exec) {

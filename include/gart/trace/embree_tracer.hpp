@@ -76,7 +76,7 @@ template <host_execution E, class Response = generalized_gaussian<>>
 class embree_tracer : public tracer_base {
  public:
   using response_type = Response;                ///< of the Gaussians
-  static constexpr char const* name = "embree";  ///< as requests have it
+  static constexpr char const* name = "embree";  ///< its name in requests
 
   /// Allocates nothing of the policy; `exec` must outlive it.
   explicit embree_tracer(E& exec) : rays_(exec), boxes_(exec) { static_assert(tracer<embree_tracer, E>); }

@@ -7,7 +7,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// What a ray program is given of a hit.
+/// The data of a hit for a ray program.
 struct hit {
   float t = 0;      ///< distance along the unit ray of the point of largest response
   u32 id = 0;       ///< the Gaussian

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// What the 32 lanes of a beam (trace/beam_walk.hpp) each have, and what they find out together. On a device a lane is
-/// a thread of a warp with its own value in registers. On a host one thread is all lanes, one after the other.
+/// The values of the 32 lanes of a beam (trace/beam_walk.hpp), and what they find out together. On a device a lane is a
+/// thread of a warp with its own value in registers. On a host one thread is all lanes, one after the other.
 
 #include <gart/math/arith.hpp>
 

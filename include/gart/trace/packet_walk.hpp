@@ -63,7 +63,7 @@ class packet_walk {
  private:
   static constexpr int most_groups = 32 * 32;
   static constexpr int split_threshold = most_groups / 2;  // of groups, from which one may be passed on in parts
-  static constexpr int pass_threshold = 12;    // of groups, below which a look at what has become certain does not pay
+  static constexpr int pass_threshold = 12;    // of groups, below which looking for certain hits does not pay
   static constexpr int batch = 16;             // candidates between two such looks
   static constexpr u32 chunk = 256;            // candidates of a tile whose cells are kept at a time
   static constexpr u32 prefetch_distance = 6;  // in candidates
@@ -97,7 +97,7 @@ class packet_walk {
   }
 
   // The hits of the batch's n candidates. All are evaluated before the first is put in its place. The next evaluation
-  // hides the latency of one, and the place of a hit is a branch that is predicted badly.
+  // hides the latency of this one, and the place of a hit is a branch that is predicted badly.
   template <class State>
   GART_INLINE bool take(P const& program, traced_scene const& scene, State const& state, vec3_of<lanes> const& d,
                         int n) {

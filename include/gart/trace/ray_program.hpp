@@ -13,7 +13,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// What a ray program is unless it says otherwise.
+/// The defaults of a ray program.
 struct ray_program_base {
   /// Its rays can be walked in packets on a host: packets_of(program) is its packet_program (trace/packet_program.hpp).
   static constexpr bool has_packets = false;
@@ -36,7 +36,7 @@ concept ray_program = std::is_trivially_copyable_v<P> && requires(P const& p, in
   { P::has_warps } -> std::convertible_to<bool>;
 };
 
-/// A ray program whose rays are those of an image's pixels: what a tracer by tiles can follow.
+/// A ray program whose rays belong to an image's pixels, so that a tracer by tiles can follow.
 template <class P>
 concept pixel_program = ray_program<P> && requires(P const& p, index_t i) {
   { p.at(i) } -> std::same_as<pixel>;                      // of ray i

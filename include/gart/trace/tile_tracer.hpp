@@ -138,7 +138,7 @@ template <execution E, int Size = 8, class Response = generalized_gaussian<>>
 class tile_tracer : public tracer_base {
  public:
   using response_type = Response;                 ///< of the Gaussians
-  static constexpr char const* name = "tiles";    ///< as requests have it
+  static constexpr char const* name = "tiles";    ///< its name in requests
   static constexpr int tile_size = Size;          ///< side of a tile, in pixels
   static constexpr bool lends_footprints = true;  ///< to the backward pass
 

@@ -16,7 +16,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// What a tracer is told of the way to trace.
+/// The options of a tracer.
 struct trace_options {
   float alpha_min = 1.0f / 255.0f;  ///< a Gaussian is hit where sigma * rho >= alpha_min
   float near = 0.01f;               ///< hits lie at t > near
@@ -50,7 +50,7 @@ GART_HD GART_INLINE float end_of_ray(P const& program, index_t i) {
     return infinity;
 }
 
-/// What a tracer has unless it says otherwise.
+/// The defaults of a tracer.
 struct tracer_base {
   static constexpr int tile_size = 8;              ///< side of the tiles that footprints are cut into
   static constexpr bool lends_footprints = false;  ///< it has the view's footprints and lists, of its own tile_size

@@ -6,7 +6,7 @@
 /// next hit of all is the window's first or that of a run. So a hit is spilled once at most, and the order of others is
 /// never made anew for it.
 ///
-/// Where all runs are taken a hit is lost: what is passed on from then on lies before the nearest hit that was.
+/// Where all runs are taken a hit is lost. Hits passed on from then on lie before the nearest lost one.
 /// Memory: 24 bytes for each of 196 hits a lane. Device only.
 
 #include <gart/core/types.hpp>
@@ -132,11 +132,10 @@ class warp_hit_queue {
     return t != other_t ? t < other_t : before_(key, other);
   }
 
-  // The slot of the window's hit that has k behind it; no_slot where there is none.
+  // The slot of the window's hit that has k behind it; without one no_slot.
   __device__ GART_INLINE int slot_from_back(int k) const { return static_cast<int>(order_ >> (4 * k)) & 15; }
 
-  // Where some hit was lost or the window is full: whether there is a place for this one, nearer than what was lost or
-  // will be for it.
+  // Where some hit was lost or the window is full: whether there is a place for this one, nearer than all lost hits.
   __device__ GART_INLINE bool has_place(waiting_hit const& h) {
     if (lost() && !nearer(h.t, h.key, lost_t_, lost_key_)) return false;
     if (!full()) return true;

@@ -9,8 +9,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// The cell of a program whose hits have no places: a word, so that what lies beside it in shared memory is aligned as
-/// it is beside others.
+/// The cell of a program whose hits have no places: a word, to align its neighbours in shared memory.
 struct alignas(16) no_cell {};
 
 /// A pixel program for warps.

@@ -256,7 +256,7 @@ class walk_tile_warps {
       return true;
     }
 
-    // The same where a ray may have no room: what comes before the first of the hits left is passed on, to make some.
+    // The same where a ray may have no room: hits before the first remaining one are passed on, to make some.
     __device__ GART_INLINE bool add_crowded(candidate const (&from)[group], float const (&t)[group],
                                             float const (&d2)[group], u32 found, int first) {
       bool tried = false;

@@ -2,7 +2,7 @@
 /// \file
 /// A checkpoint (train/state.hpp) that several ranks write and read, each its own rows. The file is byte for byte that
 /// of one rank. A rank's rows lie in blocks of the file (comm/row_owners.hpp). An array's checksum combines those of
-/// its blocks (io/crc32c.hpp). Memory: what a rank has, and a few bytes an array.
+/// its blocks (io/crc32c.hpp). Memory: a rank's part, and a few bytes an array.
 ///
 /// Errors: io_error on all ranks, naming the file, the rank and the cause; the checkpoint that was there is whole.
 
@@ -11,7 +11,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// `mine`: this rank's rows of the Gaussians, and what all ranks have of the rest. All ranks call it.
+/// `mine`: this rank's rows of the Gaussians, and the shared rest. All ranks call it.
 template <class Comm>
 void write_checkpoint_collectively(Comm& comm, row_owners const& owners, std::filesystem::path const& path,
                                    training_state const& mine) {

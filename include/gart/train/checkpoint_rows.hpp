@@ -23,7 +23,7 @@
 
 namespace gart {
 
-/// What a rank writes. Rank 0 also writes what is not of Gaussians.
+/// A rank's writer. Rank 0 also writes the arrays that are not of Gaussians.
 class checkpoint_rows {
  public:
   /// The state must outlive it; of each Gaussian it has the rows of `owners`.
@@ -54,14 +54,14 @@ class checkpoint_rows {
   std::vector<array> arrays_;  // in the order of the file
 };
 
-/// What a rank reads.
+/// A rank's reader.
 class checkpoint_rows_reader {
  public:
   /// Reads where the arrays lie.
   checkpoint_rows_reader(std::filesystem::path const& path, row_owners const& owners);
-  /// This rank's rows of what is of each Gaussian, and all of the rest.
+  /// This rank's rows of arrays of Gaussians, and all of the rest.
   training_state state() const;
-  /// What the checksums of the arrays of rows have of this rank, once the state was read.
+  /// This rank's part in the checksums of the arrays of rows, once the state was read.
   std::vector<u32> const& checksum_shares() const { return shares_; }
   /// io_error where these are not the checksums of the file.
   void require(std::vector<u32> const& checksums) const;

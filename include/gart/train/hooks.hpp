@@ -14,7 +14,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// What a loss sees: the rendered image and its view, in the policy's memory. It writes dL/d image and, into
+/// The input of a loss: the rendered image and its view, in the policy's memory. It writes dL/d image and, into
 /// value[0..1], the loss and the mean squared error.
 template <execution E>
 struct loss_input {

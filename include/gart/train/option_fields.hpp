@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The numbers and switches of train_options, once: each with its name, its place, its range and what it is. A
-/// program's options, what it records of them, and the checks of a run come from this table. Errors: require_options
-/// throws invalid_argument, naming the field, its value and its range.
+/// The numbers and switches of train_options, once: each with its name, its place, its range and its help. A program's
+/// options, its records of them, and the checks of a run come from this table. Errors: require_options throws
+/// invalid_argument, naming the field, its value and its range.
 
 #include <gart/core/error.hpp>
 #include <gart/train/options.hpp>
@@ -27,7 +27,7 @@ struct option_field {
   place of;                ///< the member
   double low, high;        ///< its range
   std::string_view group;  ///< heading in the help
-  std::string_view help;   ///< what it is, and in which unit
+  std::string_view help;   ///< help, with the unit
 
   /// Its value.
   double get(train_options const& options) const {
@@ -58,7 +58,7 @@ inline constexpr option_field option_fields[] = {
      "Size of the first Gaussians over the distance to their\nneighbours; 0: 0.1 for random points with\nerror or "
      "mcmc, else 1"},
     {GART_FIELD(batch), 1, 4096, "Training",
-     "Views a step: the mean of their gradients, at rates times\nsqrt(N). What is counted in steps then counts images"},
+     "Views a step: the mean of their gradients, at rates times\nsqrt(N). Counts of steps then count images"},
     {GART_FIELD(seed), 0, 18446744073709551615.0, "Training",
      "Seed of everything random; on the serial backend the same\nseed gives the same bits"},
     {GART_FIELD(refine_poses), 0, 1, "Capture",
@@ -66,7 +66,7 @@ inline constexpr option_field option_fields[] = {
      "are then\naligned to their photographs before they are scored"},
     {GART_FIELD(refine_lens), 0, 1, "Capture",
      "Learn the focal length and the centre of each camera of the\ncapture with the Gaussians, for calibrations that "
-     "are a little\noff; test views are scored through what was learned"},
+     "are a little\noff; test views are scored through\nthe learned lenses"},
     {GART_FIELD(depth_weight), 0, 1e6, "Capture",
      "Train by the capture's depth maps too: weight of their mean\nerror, in units of the scene's extent, beside the "
      "colours' loss;\n0: none. Maps are depths/NAME.png (16 bits) or NAME.npy\n(float32) beside images/, or what "
@@ -74,7 +74,7 @@ inline constexpr option_field option_fields[] = {
     {GART_FIELD(render.rebuild_every), 1, 1e6, "Machine",
      "Steps between builds of the bvh tracer's tree, which is\nrefitted in between; the images are the same"},
     {GART_FIELD(render.alpha_min), 1e-6, 0.99, "Accuracy",
-     "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as others have it"},
+     "Opacity below which a Gaussian is not hit, 0 to 1;\n1/255 as elsewhere"},
     {GART_FIELD(render.transmittance_min), 0, 0.99, "Accuracy", "Transmittance below which a ray ends, 0 to 1"},
     {GART_FIELD(render.max_hits), 0, 1e9, "Accuracy", "Hits after which a ray ends, 0: no cap"},
     {GART_FIELD(check_finite), 0, 1, "Course",
@@ -123,7 +123,7 @@ inline constexpr option_field option_fields[] = {
     {GART_FIELD(error.dead_opacity), 0, 0.99, "Rules", "opacity below which a Gaussian is dead"},
     {GART_FIELD(error.opacity_penalty), 0, 1e6, "Rules", "weight of the mean opacity in the loss"},
     {GART_FIELD(error.split.offset), 0, 0.999, "Rules", "distance of split Gaussians; 0: by the capture's pixels"},
-    {GART_FIELD(error.split.opacity), 1e-6, 1, "Rules", "what a split multiplies opacity by"},
+    {GART_FIELD(error.split.opacity), 1e-6, 1, "Rules", "factor of opacity at a split"},
     {GART_FIELD(error.pixels_per_gaussian), 0, 1e9, "Rules", "training pixels to a Gaussian at least; 0: any"},
     {GART_FIELD(error.min_gaussians), 0, 2147483647.0, "Rules", "Gaussians that the smallest capture may have"},
     {GART_FIELD(mcmc.growth), 0, 10, "Rules", "growth a densification of mcmc"},

@@ -88,7 +88,7 @@ struct train_options {
   adc_options adc = {};                             ///< of adaptive density control
 };
 
-/// The render options for a scene of that extent.
+/// The render options for a scene of this extent.
 inline render_options render_options_of(train_options const& options, float extent, vec3 background = vec3(0.0f)) {
   render_options render = options.render;
   render.near = options.near * extent, render.background = background, render.rows = {};

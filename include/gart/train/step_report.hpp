@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// What a step of training says of itself.
+/// The report of a training step.
 
 #include <gart/core/types.hpp>
 
@@ -8,7 +8,7 @@
 
 namespace gart {
 
-/// What a step reports.
+/// The report of a step.
 struct step_report {
   int step = 0;           ///< steps done, this one included
   float loss = 0;         ///< of this step's training view

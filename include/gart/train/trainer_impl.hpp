@@ -120,7 +120,7 @@ step_report basic_trainer<E, Traits, Tracer, Method, Comm>::step_on(Plan& plan, 
     for (int v = 0; v < views; ++v) {
       step_view const& view = images[static_cast<std::size_t>(done + v)];
       cameras.push_back(view.seen);
-      // What a view costs is remembered of each size of its image.
+      // The cost of a view is remembered for each size of its image.
       names.push_back(view.index + data_.train.size() * static_cast<std::size_t>(view.shrink));
       for (auto const& part : parts_) round.gradients |= part->needs(view.index, before, iterations).gradients;
     }

@@ -35,7 +35,7 @@ gaussian_model basic_trainer<E, Traits, Tracer, Method, Comm>::gather_all(gaussi
     return plans_.ranks.rows().gather_all(mine, root);
 }
 
-// This rank's rows, and what all ranks have of the rest.
+// This rank's rows, and the shared rest.
 template <execution E, class Traits, class Tracer, gradient_method Method, communicator<E> Comm>
 training_state basic_trainer<E, Traits, Tracer, Method, Comm>::here() const {
   training_state s;

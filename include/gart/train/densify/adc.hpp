@@ -116,7 +116,7 @@ struct adc_demote_kernel {
   GART_KERNEL void operator()(index_t rank) const { outcome[id[first + rank]] = copies[id[first + rank]] = adc_stays; }
 };
 
-// Where each row of the new arrays comes from, and what it is.
+// The source of each row of the new arrays, and its kind.
 struct adc_place_kernel {
   u32 const* outcome;
   u64 const* offset;
@@ -130,7 +130,7 @@ struct adc_place_kernel {
   }
 };
 
-// What is new has no moments.
+// New rows have no moments.
 struct adc_clear_body {
   gaussians_view<float> first, second;
   u32 const* made;
@@ -174,7 +174,7 @@ struct adc_reset_kernel {
 template <execution E>
 class adaptive_density final : public densifier<E> {
  public:
-  /// The statistic since the last densification: what a checkpoint must hold. [N] each.
+  /// The statistic since the last densification, for checkpoints. [N] each.
   buffer<float, E> gradient_sum;
   buffer<u32, E> touched;  ///< steps that met it
 

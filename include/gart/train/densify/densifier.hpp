@@ -1,8 +1,8 @@
 #pragma once
 /// \file
 /// Densification: which Gaussians a training adds, moves and removes. A densifier derives from densifier<E>, whose
-/// members do nothing, and overrides what it needs. densifiers.hpp lists those of the library; a program gives its own
-/// to trainer::densify_by. In the order of a step:
+/// members do nothing, and overrides those that it needs. densifiers.hpp lists those of the library; a program gives
+/// its own to trainer::densify_by. In the order of a step:
 ///   1. observe: once for each view of the step, with that view's gradients; or error_sums, which the backward pass
 ///   adds.
 ///   2. penalty: adds to the gradients, before the optimizer.
@@ -32,7 +32,7 @@ struct density_setup {
   int kernel_degree;             ///< of their response
 };
 
-/// What a densifier gets in each step.
+/// A densifier's input in each step.
 template <execution E>
 struct density_step {
   int step = 0;                          ///< steps done, with this one; each image of a batch counts
@@ -70,7 +70,7 @@ class densifier {
   }
   /// Whether it needs the error seen through each Gaussian.
   virtual bool by_error() const { return false; }
-  /// The sums of that error, [n] for this rank's rows; backward passes add to them.
+  /// The sums of the error, [n] for this rank's rows; backward passes add to them.
   virtual span<float> error_sums(index_t /*n*/) { return {}; }
   /// Whether it needs the gradients of each view.
   virtual bool by_gradient() const { return false; }

@@ -20,8 +20,8 @@
 /// opacity or geometry is not finite counts as dead. Where no error is attributed, or none is alive, nothing is moved.
 ///
 /// Its only state is the statistic, [N] floats, which checkpoints hold. Draws depend on it, the seed and the step.
-/// Equal weights give the same draws on every policy but for the last bits of a logarithm. Cost: one small launch a
-/// step; a densification is a sort of N pairs, two scans and one host read.
+/// Equal weights give the same draws on every policy, to the last bits of a logarithm. Cost: one small launch a step; a
+/// densification is a sort of N pairs, two scans and one host read.
 
 #include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>
@@ -84,7 +84,7 @@ struct error_target_kernel {
   }
 };
 
-// Row k becomes a child of what it is.
+// Row k becomes a child of its Gaussian.
 struct error_split_kernel {
   gaussians_view<float> model;
   u32 const* rows;
@@ -131,7 +131,7 @@ inline float split_offset(error_growth_options const& options, index_t most, u64
 template <execution E>
 class error_growth final : public densifier<E> {
  public:
-  /// The error seen through each Gaussian since the last densification, [N]: what a checkpoint must hold.
+  /// The error seen through each Gaussian since the last densification, [N], for checkpoints.
   buffer<float, E> error_sum;
 
   /// For a run of so many steps, up to so many Gaussians (growth_budget), with the split's share given (split_offset).

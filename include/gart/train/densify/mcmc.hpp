@@ -4,7 +4,7 @@
 /// 2024; constants as in gsplat). Dead Gaussians move onto live ones, drawn in proportion to opacity; growth to the
 /// budget draws in the same way. Every step moves the means at random, and penalizes opacity and size a little.
 ///
-/// A Gaussian of opacity o that becomes N in one place (its copies and itself; N is cut at 51) keeps what they render:
+/// A Gaussian of opacity o that becomes N in one place (its copies and itself; N is cut at 51) keeps its image:
 ///   o' = 1 - (1 - o)^(1/N),  scale' = scale * o / sum_{j=1..N} C(N, j) (-1)^(j-1) o'^j / sqrt(j),
 /// which keeps the integral of the composited opacity across a line through the centre. (The paper's double sum, with
 /// sum_i C(i-1, j-1) = C(N, j).) For a generalised Gaussian of degree n (math/response.hpp) it is the n-th root of j.
@@ -172,7 +172,7 @@ inline float growth_for(mcmc_options const& options, index_t count, index_t max_
   return static_cast<float>(needed < given ? given : needed > limit ? limit : needed);
 }
 
-/// What it draws depends on the seed and the step only. Steps count from 1.
+/// Its draws depend on the seed and the step only. Steps count from 1.
 template <execution E>
 class mcmc final : public densifier<E> {
  public:

@@ -13,7 +13,7 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// Errors: invalid_argument where a weight asks for what the method or the dataset does not have.
+/// Errors: invalid_argument where a weight needs a gradient that the method lacks, or maps that the dataset lacks.
 template <bool Depth>
 void require_depth(train_options const& options, dataset const& data) {
   if (!(options.depth_weight > 0)) return;

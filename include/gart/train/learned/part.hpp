@@ -42,7 +42,7 @@ struct step_view {
   std::function<void(float*)> share = {};  ///< fills in the rows of other ranks, in an image of one float a pixel
 };
 
-/// What a part needs from a step.
+/// A part's input from a step.
 struct part_needs {
   bool image = false;      ///< the whole image on each rank that traces it
   bool depth = false;      ///< depth and transmittance too
@@ -101,7 +101,7 @@ class learned_part {
                     int /*degree*/, span<float> /*image*/) {}
   /// Takes the numbers, in host memory.
   virtual void found(step_view const&, span<float> /*numbers*/) {}
-  /// What the numbers add to the reported loss.
+  /// The share of the numbers in the reported loss.
   virtual float loss(span<float const> /*numbers*/) const { return 0; }
   /// After the optimizer, for each image of the step in order. `step`: images before it.
   virtual void step(std::size_t /*view*/, int /*shrink*/, span<float const> /*numbers*/, int /*step*/,
