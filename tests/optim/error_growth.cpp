@@ -101,7 +101,8 @@ TEST_CASE_TEMPLATE("the dead give their rows to children of those that the error
   }
   start.opacity[3] = NAN, start.mean[3 * 4] = INFINITY, start.log_scale[3 * 5 + 1] = NAN;
   for (index_t i : {3, 4, 5}) dead.insert(i);
-  error[6] = INFINITY, blind.insert(6);
+  error[6] = INFINITY, error[7] = NAN, error[8] = -1;
+  for (index_t i : {6, 7, 8}) blind.insert(i);
 
   training<E> t(start);
   auto densifier = t.densifier(most, error);
