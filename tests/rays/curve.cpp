@@ -1,5 +1,5 @@
-// The order of a batch's rays is a Hilbert curve: through the cells of a flat octahedron it goes from each to one beside
-// it, from the first to the last.
+// The order of a batch's rays is a Hilbert curve: through the cells of a flat octahedron it goes from each to one
+// beside it, from the first to the last.
 #include <rays/view_rays.hpp>
 
 #include <algorithm>
