@@ -96,7 +96,8 @@ TEST_CASE_TEMPLATE("the dead give their rows to children of those that the error
   std::set<index_t> dead, blind;
   for (index_t i = 0; i < n; ++i) {
     error[i] = 0.1f + static_cast<float>(random() % 100);
-    if (random() % 6 == 0) start.opacity[i] = logit(0.006), error[i] *= 50;  // a child's would be less than a dead one's
+    if (random() % 6 == 0)
+      start.opacity[i] = logit(0.006), error[i] *= 50;  // a child's would be less than a dead one's
     if (random() % 8 == 0) start.opacity[i] = -6, dead.insert(i);
     if (random() % 4 == 0) error[i] = 0, blind.insert(i);
   }
