@@ -89,6 +89,7 @@ TEST_CASE_TEMPLATE("the nearest triangle is that of all in double", E, GART_TEST
   CAPTURE(seed);
   random_triangles random(seed);
   E exec;
+  int met = 0;
   for (std::size_t const count : {1, 2, 9, 700}) {
     CAPTURE(count);
     std::vector<triangle> all(count);
@@ -105,7 +106,6 @@ TEST_CASE_TEMPLATE("the nearest triangle is that of all in double", E, GART_TEST
     }
     float const near = 0.5f, far = 9.0f;
     auto const got = trace(exec, all, rays, near, far);
-    int met = 0;
     for (std::size_t r = 0; r < rays.size(); ++r) {
       CAPTURE(r);
       double nearest = far;
@@ -129,8 +129,8 @@ TEST_CASE_TEMPLATE("the nearest triangle is that of all in double", E, GART_TEST
       vec3 const by_ray = rays[r].origin + got.nearest[r].t * rays[r].direction;
       CHECK(glm::length(by_weights - by_ray) < 2e-4f);
     }
-    CHECK(met > 10);
   }
+  CHECK(met > 100);
 }
 
 TEST_CASE_TEMPLATE("no ray slips through where triangles meet", E, GART_TEST_POLICIES) {

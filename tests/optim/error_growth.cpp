@@ -95,12 +95,15 @@ TEST_CASE_TEMPLATE("dead Gaussians give rows to children by the error seen", E, 
   std::set<index_t> dead, blind;
   for (index_t i = 0; i < n; ++i) {
     error[i] = 0.1f + static_cast<float>(random() % 100);
+    if (random() % 6 == 0)
+      start.opacity[i] = logit(0.006), error[i] *= 50;  // a child's would be less than a dead one's
     if (random() % 8 == 0) start.opacity[i] = -6, dead.insert(i);
     if (random() % 4 == 0) error[i] = 0, blind.insert(i);
   }
   start.opacity[3] = NAN, start.mean[3 * 4] = INFINITY, start.log_scale[3 * 5 + 1] = NAN;
   for (index_t i : {3, 4, 5}) dead.insert(i);
-  error[6] = INFINITY, blind.insert(6);
+  error[6] = INFINITY, error[7] = NAN, error[8] = -1;
+  for (index_t i : {6, 7, 8}) blind.insert(i);
 
   training<E> t(start);
   auto densifier = t.densifier(most, error);

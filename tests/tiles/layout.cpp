@@ -129,3 +129,29 @@ TEST_CASE("the tiles of a box are those that share a pixel with it") {
     CHECK(wrong == 0);
   }
 }
+
+TEST_CASE("the tiles of a box past a seam go on from the image's first") {
+  CAPTURE(gart_test::seed());
+  std::mt19937_64 random(gart_test::seed() + 2);
+  int past = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    auto const below = [&](int n) { return static_cast<int>(random() % static_cast<u64>(n)); };
+    int const width = 34 + below(90), columns = (width + 7) / 8;
+    int const first = 1 + below(width - 1), end = first + 1 + below(width - gart::footprint::seam_room);
+    if (end <= width) continue;
+    ++past;
+    CAPTURE(width);
+    CAPTURE(first);
+    CAPTURE(end);
+    gart::footprint_slots const range(0, {static_cast<gart::u16>(first), 3, static_cast<gart::u16>(end), 20},
+                                      static_cast<gart::u16>(width));
+    gart::pixel_box const tiles = gart::tiles_of<8>(range);
+    std::vector<int> listed(static_cast<std::size_t>(columns)), touched(listed);
+    for (int x = first; x < end; ++x) touched[static_cast<std::size_t>(x % width / 8)] = 1;
+    for (int column = tiles.x0; column < tiles.x1; ++column) ++listed[static_cast<std::size_t>(column % columns)];
+    CHECK(listed == touched);
+    CHECK(tiles.y0 == 0);
+    CHECK(tiles.y1 == 3);
+  }
+  CHECK(past > 100);
+}
