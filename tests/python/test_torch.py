@@ -213,6 +213,25 @@ class Torch(unittest.TestCase):
         loss(gart.torch.render(*[a.detach() for a in arrays[:5]], view, features=alone, **scenes.SMOOTH)).backward()
         self.assert_close(alone.grad, whole[5], 1e-4)
 
+    def test_what_needs_no_gradient_changes_none(self):
+        """Each input alone gets what it gets beside all others."""
+        view = scenes.camera(24, 20)
+        directions, origins = _rasterization._rays(self.matrix_and_pose(view)[0], torch.from_numpy(scenes.C2W), 24, 20)
+        features = torch.randn(40, 4, generator=torch.Generator().manual_seed(1))
+        given = [*[t.detach() for t in tensors()], features, torch.from_numpy(scenes.C2W), directions, origins]
+
+        def gradients(learned):
+            (*arrays, f, c2w, d, o) = [t.clone().requires_grad_(k in learned) for k, t in enumerate(given)]
+            seen = (*gart.torch.render(*arrays, view, features=f, c2w=c2w), *gart.torch.trace(*arrays, d, o, features=f))
+            sum(image.square().sum() for image in seen if image.requires_grad).backward()
+            return [t.grad for t in (*arrays, f, c2w, d, o)]
+
+        expected = gradients(set(range(9)))
+        for k in range(9):
+            got = gradients({k})
+            self.assertEqual([g is None for g in got], [j != k for j in range(9)])
+            self.assert_close(got[k], expected[k].double(), 1e-3)
+
     def test_rays_have_gradients_by_features(self):
         arrays = tensors(n=4, degree=0)
         with torch.no_grad():
