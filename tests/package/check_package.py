@@ -78,7 +78,7 @@ with tempfile.TemporaryDirectory() as temporary:
         binary = folder / project.name
         return run(a.cmake, "-S", project, "-B", binary, "-G", a.generator, f"-DCMAKE_PREFIX_PATH={prefix}",
                    f"-DCMAKE_CXX_COMPILER={a.cxx}", "-DCMAKE_BUILD_TYPE=Release",
-                   "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG", *options, env=env, fails=fails)
+                   "-DCMAKE_CXX_FLAGS_RELEASE=-O0 -DNDEBUG", *options, env=env, fails=fails)
 
     def build(project, *options, env=bare):
         configure(project, *options, env=env)

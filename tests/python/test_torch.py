@@ -213,6 +213,25 @@ class Torch(unittest.TestCase):
         loss(gart.torch.render(*[a.detach() for a in arrays[:5]], view, features=alone, **scenes.SMOOTH)).backward()
         self.assert_close(alone.grad, whole[5], 1e-4)
 
+    def test_what_needs_no_gradient_changes_none(self):
+        """Each input alone gets what it gets beside all others."""
+        view = scenes.camera(24, 20)
+        directions, origins = _rasterization._rays(self.matrix_and_pose(view)[0], torch.from_numpy(scenes.C2W), 24, 20)
+        features = torch.randn(40, 4, generator=torch.Generator().manual_seed(1))
+        given = [*[t.detach() for t in tensors()], features, torch.from_numpy(scenes.C2W), directions, origins]
+
+        def gradients(learned):
+            (*arrays, f, c2w, d, o) = [t.clone().requires_grad_(k in learned) for k, t in enumerate(given)]
+            seen = (*gart.torch.render(*arrays, view, features=f, c2w=c2w), *gart.torch.trace(*arrays, d, o, features=f))
+            sum(image.square().sum() for image in seen if image.requires_grad).backward()
+            return [t.grad for t in (*arrays, f, c2w, d, o)]
+
+        expected = gradients(set(range(9)))
+        for k in range(9):
+            got = gradients({k})
+            self.assertEqual([g is None for g in got], [j != k for j in range(9)])
+            self.assert_close(got[k], expected[k].double(), 1e-3)
+
     def test_rays_have_gradients_by_features(self):
         arrays = tensors(n=4, degree=0)
         with torch.no_grad():
@@ -419,6 +438,33 @@ class Torch(unittest.TestCase):
         arrays[4].fill_(0.5)
         renderer.render_to(scenes.camera(), color=color)
         self.assertGreater((color - before).abs().max(), 0.05)
+
+    @unittest.skipUnless(torch.cuda.is_available() and gart.resolve()["backend"] == "cuda", "no CUDA in torch or in gart")
+    def test_a_device_gives_what_the_host_does(self):
+        """Images and gradients of a view, of rays and by gsplat's names, on the default stream and on another."""
+        view = scenes.camera()
+        rays = _rasterization._rays(self.matrix_and_pose(view)[0], torch.from_numpy(scenes.C2W), 40, 32)
+        k, w2c = (t.float()[None] for t in self.matrix_and_pose(view))
+        features = torch.randn(40, 20, generator=torch.Generator().manual_seed(1))
+        given = [*[t.detach() for t in tensors()], features, torch.from_numpy(scenes.C2W), *rays]
+
+        def everything(device):
+            (*arrays, f, c2w, d, o) = learned = [t.clone().to(device).requires_grad_() for t in given]
+            mean, log_scale, quaternion, opacity, _ = arrays
+            seen = (*gart.torch.render(*arrays, view, features=f, c2w=c2w), *gart.torch.trace(*arrays, d, o, features=f),
+                    *gart.torch.rasterization(mean, quaternion, log_scale.exp(), torch.sigmoid(opacity), f, w2c.to(device),
+                                              k.to(device), 40, 32, render_mode="RGB+D")[:2])
+            sum(image.square().sum() for image in seen).backward()
+            return [t.detach().cpu() for t in seen], [t.grad.cpu() for t in learned]
+
+        images, gradients = everything("cpu")
+        for stream in (torch.cuda.current_stream(), torch.cuda.Stream()):
+            with torch.cuda.stream(stream):
+                got_images, got_gradients = everything("cuda")
+            for got, expected in zip(got_images, images):
+                np.testing.assert_allclose(got, expected, atol=1e-4 * max(1, float(expected.abs().max())))
+            for got, expected in zip(got_gradients, gradients):
+                self.assert_close(got, expected.double(), 2e-3)
 
     def test_the_operator_is_the_function(self):
         """With torch.library's part played by a stand-in, which any torch can run."""
