@@ -3,8 +3,9 @@
 What it asks for: every folder has a line in layers.txt; a header includes only folders its line names; nothing in
 include/gart includes a backend; GLM is included in math/glm.hpp alone; x.hpp, which must be safe for any host compiler,
 includes no .cuh; what is included is there; a header that opens namespace gart, outside of the instruction set's, has a
-line in interface.txt; no header is longer than 350 lines. The library speaks of fields, not of a program's options: no "--option" in its strings and comments,
-and each field that a string names as `struct.field` has an option in the program's table.
+line in interface.txt; no header has more than 350 lines. The library speaks of fields, not of a program's options: no "--
+option" in its strings and comments, and each field that a string names as `struct.field` has an option in the program's
+table.
 """
 import pathlib
 import re
