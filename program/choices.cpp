@@ -91,8 +91,8 @@ nlohmann::json choose(train_arguments& a, gart::dataset const& data) {
   if (options.densify == gart::densify_kind::error && !a.set.has("error.split.offset")) {
     float const share = gart::split_offset(options.error, options.max_gaussians, traits.pixels);
     say("--set error.split.offset", gart::short_number(share),
-        budget.value < options.max_gaussians ? "their pixels end growth, and nearer halves take more memory"
-                                             : "near halves fit what they share");
+        budget.value < options.max_gaussians ? "their pixels end growth, and nearer children take more memory"
+                                             : "near children fit their shared pixels");
   }
   return all;
 }

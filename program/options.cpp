@@ -99,7 +99,7 @@ void add_max_hits(CLI::App& app, int& max_hits) {
 void add_exposures(CLI::App& app, std::filesystem::path& file) {
   app.add_option("--exposures", file,
                  "exposures.json of the model's training: each view gets the exposure\nof the training views about it, "
-                 "and what its lens darkens")
+                 "and its lens's vignetting")
       ->type_name("FILE");
 }
 

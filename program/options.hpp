@@ -53,9 +53,9 @@ class recorded_options {
   }
   nlohmann::json values() const;
   // Takes the values of an earlier run as if they stood on the command line, by the same checks. usage_error for an
-  // option that was given and says otherwise; io_error, naming `file` and the option, for one that is missing or that
-  // the command line would refuse. Options of `may_rise` may be given a larger value, which then counts; the result
-  // names each with its earlier value.
+  // option that was given and says otherwise. io_error, naming `file` and the option, for one that is missing or
+  // invalid on the command line. Options of `may_rise` may be given a larger value, which then counts; the result names
+  // each with its earlier value.
   nlohmann::json continue_from(nlohmann::json const& saved, std::filesystem::path const& file,
                                std::vector<std::string> const& may_rise = {});
 

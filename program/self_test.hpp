@@ -1,5 +1,5 @@
 #pragma once
-// `gart info --self-test`: compares the image and gradients of a small scene, by every configuration that runs here,
+// `gart info --self-test` renders a small scene by every configuration that runs here. It compares image and gradients
 // with the reference in double (gart/reference/reference.hpp).
 
 namespace gart_cli {

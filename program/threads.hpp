@@ -6,8 +6,8 @@
 
 namespace gart_cli {
 
-// Processors that cgroup quotas leave, rounded up: the least over the group `own` (from /proc/self/cgroup) and its
-// parents, below the mount point; 0 for none.
+// Processors that cgroup quotas leave, rounded up; 0 for none. It is the least over the group `own` (from
+// /proc/self/cgroup) and its parents, below the mount point.
 int processors_of_quota(std::filesystem::path const& mount, std::string const& own);
 
 // Threads of OpenMP: as many as affinity and quota allow, or OMP_NUM_THREADS, up to sixteen times as many. They wait

@@ -1,6 +1,6 @@
 #pragma once
-// The distances at which a view's rays meet the scene: along each ray, in exact order, the hit behind which less than
-// half of the light is left.
+// The distances at which a view's rays meet the scene. A ray meets it at the hit behind which less than half of the
+// light is left.
 
 #include <gart/exec/openmp.hpp>
 #include <gart/render/options.hpp>

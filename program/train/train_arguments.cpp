@@ -111,19 +111,20 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add_flag(
       train, "--antialias", a.antialias,
       "Each pixel sees the Gaussians through a filter of its own\nwidth: for models that are shown smaller or from "
-      "farther away\nthan they were trained. The model says so to who renders it"));
+      "farther away\nthan they were trained. The model's file says so"));
 
   group = "Capture";
   in_group(r.add(train, "--exposure", a.exposure, "NAME",
                  "on: learn the exposure and white balance of each photograph;\ntest views get theirs from the "
                  "training views about them.\nauto: where --auto measures a gain"))
       ->check(one_of({"auto", "on", "off"}));
-  in_group(r.add(train, "--vignetting", a.vignetting, "NAME",
-                 "on: learn by how much each lens darkens the corners of its\nphotographs, three numbers for all of "
-                 "them, which test views\nhave too. auto: where --auto measures a gain"))
+  in_group(
+      r.add(train, "--vignetting", a.vignetting, "NAME",
+            "on: learn how much each lens darkens the corners of its\nphotographs; test views get it too. auto: where "
+            "--auto measures\na gain"))
       ->check(one_of({"auto", "on", "off"}));
   in_group(r.add(train, "--poses", a.poses, "FILE",
-                 "With --refine-poses: begin at the poses of this camera JSON,\nby the views' names, in place of the "
+                 "With --refine-poses: begin at the poses of this camera JSON,\nby the views' names, instead of the "
                  "capture's. The poses.json of\na run that found them makes a better scene, and better poses"));
   in_group(
       r.add(train, "--scene", a.scene, "FILE",

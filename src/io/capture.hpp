@@ -66,7 +66,7 @@ void find_photos(capture& c);
 // Masks in a folder `masks` beside that of the photos, where the files of the capture name none.
 void find_masks(capture& c);
 
-// The place of a kind of maps: a folder of that name beside the folder of photos, and the photo's path below the
+// The place of a kind of maps: a folder of that name beside the folder of photos, then the photo's path within the
 // latter.
 struct place_beside {
   std::filesystem::path folder, below;

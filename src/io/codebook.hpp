@@ -8,7 +8,7 @@
 
 namespace gart::io {
 
-// 256 numbers in ascending order, closer where the values are dense: their density is the cube root of the values',
+// 256 numbers in ascending order, closer where the values are dense. Their density is the cube root of the values',
 // which gives the least squared error. Then each moves to the mean of its nearest values.
 class codebook {
  public:

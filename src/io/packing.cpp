@@ -15,8 +15,8 @@ namespace gart::io {
 
 namespace {
 
-// Largest bytes of a model's floats over its file's bytes, so that a model and a copy take 64 times the file; and the
-// memory that any file may use.
+// Largest bytes of a model's floats over its file's bytes: a model and a copy take 64 times the file. Then the memory
+// that any file may use.
 constexpr u64 most_growth = 30, small_model = u64{1} << 20;
 constexpr float least_log_scale = -69;  // of a scale of about 1e-30
 

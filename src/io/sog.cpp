@@ -1,5 +1,5 @@
-// SOG, version 2: a zip file, or a folder, of lossless WebP textures, a pixel a Gaussian, and meta.json that says what
-// their bytes mean. Scales and colours are numbers of a codebook, spherical harmonics rows of a palette.
+// SOG, version 2: a zip file, or a folder, of lossless WebP textures, a pixel a Gaussian. meta.json says what their
+// bytes mean. Scales and colours are numbers of a codebook, spherical harmonics rows of a palette.
 // https://developer.playcanvas.com/user-manual/gaussian-splatting/formats/sog/
 
 #include "bulk.hpp"

@@ -1,6 +1,5 @@
-// The .splat files of antimatter15's viewer: 32 bytes a Gaussian, position and scale as floats, colour, opacity and
-// rotation as bytes; no spherical harmonics, no header.
-// https://github.com/antimatter15/splat
+// The .splat files of antimatter15's viewer: 32 bytes a Gaussian. Position and scale are floats; colour, opacity and
+// rotation are bytes. There are no spherical harmonics and no header. https://github.com/antimatter15/splat
 
 #include "bytes.hpp"
 #include "packing.hpp"

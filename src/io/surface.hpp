@@ -1,6 +1,6 @@
 #pragma once
-// What readers of meshes share: where a file's triangles are placed, which of them can be traced, and what their
-// images are as textures.
+// The parts that readers of meshes share: where a file's triangles are placed, which can be traced, and their images as
+// textures.
 
 #include <gart/light/scene.hpp>
 #include <gart/math/glm.hpp>
@@ -38,7 +38,7 @@ struct mesh_place {
   vec3d origin{0.0};
 };
 // Adds it to the meshes. Triangles with a corner that is not finite or further than 1e15 away, and those without an
-// area, are left out and counted in a note; so is a mesh without any left. Corners must be vertices.
+// area, are left out. A note counts them, and meshes without any left. Corners must be vertices.
 void add_placed(light::scene& to, raw_mesh const& raw, mesh_place const& place, std::string const& file,
                 std::vector<std::string>& notes);
 // io_error, naming `file` and the last note, if there is no mesh.

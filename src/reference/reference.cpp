@@ -140,7 +140,7 @@ body body_of(gaussian_model const& m, std::size_t i, vec3d const& camera, double
   return g;
 }
 
-// Turns the gradient by a Gaussian's filtered numbers into that by its stored ones: each stored number moves the
+// Turns the gradient by a Gaussian's filtered numbers into that by its stored ones. Each stored number moves the
 // filtered log-scales and logit.
 void pull_back(reference_gradients& g, std::size_t i, filter const& pixels, filter::parameters<double> const& stored) {
   using complex = std::complex<double>;

@@ -3,8 +3,9 @@
 What it asks for: every folder has a line in layers.txt; a header includes only folders its line names; nothing in
 include/gart includes a backend; GLM is included in math/glm.hpp alone; x.hpp, which must be safe for any host compiler,
 includes no .cuh; what is included is there; a header that opens namespace gart, outside of the instruction set's, has a
-line in interface.txt. The library speaks of fields, not of a program's options: no "--option" in its strings and comments,
-and each field that a string names as `struct.field` has an option in the program's table.
+line in interface.txt; no header has more than 350 lines. The library speaks of fields, not of a program's options: no "--
+option" in its strings and comments, and each field that a string names as `struct.field` has an option in the program's
+table.
 """
 import pathlib
 import re
@@ -17,6 +18,7 @@ OPTION = re.compile(r"""^"--|(?<![^\s(`"'])--[a-z"]""")
 FIELD = re.compile(r"\b(?:train_options|render_options|dataset_options|configuration_request)\.[a-z_]+")
 FIELD_TABLE = "program/field_names.cpp"
 TRAIN_TABLE = "include/gart/train/option_fields.hpp"  # whose fields all have an option, or are set by name
+LONGEST = 350  # lines of a header
 SUFFIXES = {".hpp", ".cuh", ".cpp", ".cu", ".h"}
 
 
@@ -77,7 +79,10 @@ def violations(root, layers, interface):
         if inside and str(relative) not in interface and opens_gart(path):
             found.append(f"{path}: lies in namespace gart: open the inline namespace GART_ISA (core/isa.hpp), or give it a line in "
                          "cmake/interface.txt where compiled libraries define or take what is in it")
-        for number, line in enumerate(path.read_text().splitlines(), 1):
+        lines = path.read_text().splitlines()
+        if inside and len(lines) > LONGEST:
+            found.append(f"{path}: has {len(lines)} lines, at most {LONGEST}: split it by ideas")
+        for number, line in enumerate(lines, 1):
             found += [f"{path}:{number}: {wrong}" for wrong in wrong_words(line, fields)]
             match = INCLUDE.match(line)
             if not match:
@@ -116,10 +121,11 @@ def self_check(layers):
         "include/gart/math/j.hpp": "namespace gart {}\n",
         "include/gart/math/k.hpp": 'f("lower " "--points");\n// (--points)\n--points;  // of "a--b"\n',
         "include/gart/math/l.hpp": 'f("raise train_options.points or train_options.seed");\n',
+        "include/gart/math/n.hpp": "\n" * (LONGEST + 1),
         FIELD_TABLE: '{GART_CLI_FIELD(train_options, points), "--points"},\n',
     }
     expected = {"core/a.hpp:1", "train/b.hpp:2", "math/c.hpp:1", "exec/e.hpp:1", "exec/f.cuh:1", "attic/g.hpp",
-                "math/h.hpp", "math/i.hpp", "math/k.hpp:1", "math/k.hpp:2", "math/l.hpp:1", "math/m.cpp:1"}
+                "math/h.hpp", "math/i.hpp", "math/k.hpp:1", "math/k.hpp:2", "math/l.hpp:1", "math/m.cpp:1", "math/n.hpp"}
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for name, text in wrong.items():

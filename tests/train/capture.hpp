@@ -1,5 +1,5 @@
 #pragma once
-// A capture so small that a training on it takes a moment: views of one cloud, to be learnt from another.
+// A capture so small that a training on it takes a moment: views of one cloud, to be learned from another.
 
 #include <support/policies.hpp>
 #include <support/scene_by_kind.hpp>

@@ -1,4 +1,4 @@
-// A capture through a rolling shutter is learnt as well as one of cameras that stand still; by who ignores it, worse.
+// A capture through a rolling shutter is learned as well as one of still cameras; ignoring it is worse.
 #include "runs.hpp"
 
 #include <gart/camera/models.hpp>

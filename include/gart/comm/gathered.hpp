@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// What each rank has, on all of them, in the order of ranks: values of one size, and words of any length. Every rank
-/// calls it. Of host memory; cost: an all-gather, of words two.
+/// Gathers each rank's data on all ranks, in their order: values of one size, and words of any length. Every rank calls
+/// it. Of host memory; cost: an all-gather, of words two.
 
 #include <gart/comm/communicator.hpp>
 

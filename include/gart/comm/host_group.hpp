@@ -21,7 +21,7 @@ class host_group {
   virtual void all_gather(void const* mine, void* all, std::size_t bytes) = 0;
   /// Waits for all ranks. Then all see what each has written to shared memory.
   virtual void barrier() = 0;
-  /// The same memory on all of them, of so many bytes; null on all where the host has too little of that kind. No rank
+  /// The same memory on all of them, of so many bytes. Null on all where the host has too little of that kind. No rank
   /// waits for another to give it back: it stays while one of them runs. Errors: out_of_memory.
   virtual std::shared_ptr<void> allocate(u64 bytes) = 0;
 };

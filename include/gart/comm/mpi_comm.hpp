@@ -67,8 +67,7 @@ class mpi_comm {
   void broadcast(void* data, std::size_t bytes, int root);
   /// Waits for all.
   void barrier();
-  /// By MPI-IO, which takes care of hosts that share a folder: NFS alone would write whole pages, over what others
-  /// have written there.
+  /// By MPI-IO, for hosts that share a folder: NFS alone would write whole pages over other ranks' bytes.
   std::unique_ptr<shared_file> open_file(std::filesystem::path const& path, bool create);
   /// Ends all ranks at once with that exit code, for a rank that cannot go on. Says nothing itself.
   [[noreturn]] void abort(int code);

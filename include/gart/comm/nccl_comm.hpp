@@ -9,9 +9,9 @@
 ///   nccl_comm all(ranks, nccl_comm::device_of(ranks));
 ///   trainer<cuda_exec, traits, tracer, primitive_method, nccl_comm> run(exec, options, data, start, all);
 ///
-/// NCCL wants a GPU for each rank. Where two ranks have the same one, all messages go through pinned host memory and
-/// MPI (`transport` says so): right, and slow. A rank's messages to itself are copies. Messages contain no sums, so
-/// both transports give the same bits.
+/// NCCL wants a GPU for each rank. Where two ranks share a device, all messages go through pinned host memory and MPI
+/// (`transport` says so): correct, but slow. A rank's messages to itself are copies. Messages contain no sums, so both
+/// transports give the same bits.
 ///
 /// Memory: NCCL's buffers, some hundred MB of each device; by the host, pinned memory for one group of messages.
 /// Errors: invalid_argument for a rank that does not exist, or a transport that is not available; gart::error with

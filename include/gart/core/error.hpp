@@ -1,9 +1,9 @@
 #pragma once
 /// \file
 /// The errors gart throws. Each message says what was wrong, where, and what to do. The types let a program react
-/// without reading the text. A setting is named by its field, `struct.field`, with ` = value` after it where the remedy
-/// is a value: "raise dataset_options.downscale", "use configuration_request.backend = openmp". A program whose
-/// settings have other names replaces them in the messages it shows (program/field_names.hpp).
+/// without reading the text. A setting is named by its field, `struct.field`. ` = value` follows where the remedy is a
+/// value: "raise dataset_options.downscale", "use configuration_request.backend = openmp". A program whose settings
+/// have other names replaces them in the messages it shows (program/field_names.hpp).
 
 #include <cstddef>
 #include <stdexcept>

@@ -1,10 +1,10 @@
 #pragma once
 /// \file
 /// GART_ISA: the inline namespace of everything whose layout, bits or code depend on the instruction set of a host
-/// translation unit. The number of lanes (math/lanes.hpp) and whether a*b + c is one rounding (math/arith.hpp) follow
-/// from -march; nvcc's host compiler has no lanes. Objects of one program may differ in these. They would share inline
-/// functions, templates and types of one name, and all would use one object's. With the instruction set in the name
-/// each has its own.
+/// translation unit. -march decides the number of lanes (math/lanes.hpp), and whether a*b + c is one rounding
+/// (math/arith.hpp). nvcc's host compiler has no lanes. Objects of one program may differ in these. They would share
+/// inline functions, templates and types of one name, and all would use one object's. With the instruction set in the
+/// name each has its own.
 ///
 ///   namespace gart { inline namespace GART_ISA {   // formulas, kernels, host policies, tracers, trainers
 ///   namespace gart {                    // what the compiled libraries define and take, and link by

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// parallel_for on cuda_exec: one thread an index, one block a tile. Needs nvcc.
-/// A kernel may name its launch bounds, both or neither: `static constexpr int block_size` (else 256: the threads of a
-/// block of an index kernel, the largest number of lanes of a tile kernel, to which tile_range::lanes is lowered) and
-/// `static constexpr int min_blocks` (else 1: blocks that a multiprocessor must have registers for).
+/// parallel_for on cuda_exec: one thread an index, one block a tile. Needs nvcc. A kernel may name its launch bounds,
+/// both or neither. `static constexpr int block_size` is the threads of a block of an index kernel, 256 by default. Of
+/// a tile kernel it is the largest number of lanes, which lowers tile_range::lanes. `static constexpr int min_blocks`,
+/// 1 by default, is the blocks whose registers a multiprocessor must hold.
 
 #include <gart/exec/cuda.hpp>
 #include <gart/exec/kept_address.hpp>

@@ -1,11 +1,12 @@
 #pragma once
 /// \file
-/// Cameras in files: the names of models, and the camera JSON that load_cameras (io/dataset.hpp) reads: [{"name",
-/// "width", "height", "fx", "fy", "cx", "cy", "c2w": 4 rows of 4}, ...] in pixels, c2w camera to world in OpenCV axes.
-/// Cameras other than pinholes have "camera_model", by COLMAP's name, and the parameters of the lens. A rolling shutter
-/// has its direction in "shutter_type", as "ROLLING_TOP_TO_BOTTOM". c2w is then the pose of the first line read, and
-/// "c2w_end" that of the last. An "origin" of three numbers is added to positions as they are read. Written whole or
-/// not at all, with every digit. Errors: io_error; unsupported for a lens with terms that no one model has.
+/// Cameras in files: the names of models, and the camera JSON of load_cameras (io/dataset.hpp). It is [{"name",
+/// "width", "height", "fx", "fy", "cx", "cy", "c2w": 4 rows of 4}, ...] in pixels, with c2w from camera to world in
+/// OpenCV axes. Cameras other than pinholes have "camera_model", by COLMAP's name, and the parameters of the lens. A
+/// rolling shutter has its direction in "shutter_type", as "ROLLING_TOP_TO_BOTTOM". c2w is then the pose of the first
+/// line read, and "c2w_end" that of the last. An "origin" of three numbers is added to positions as they are read.
+/// Written whole or not at all, with every digit. Errors: io_error; unsupported for a lens with terms that no one model
+/// has.
 
 #include <gart/scene/camera.hpp>
 
@@ -30,10 +31,10 @@ camera_fields fields_of(camera const& view);
 std::string shutter_type_of(camera const& view);
 
 /// The same pose and height through another camera, given by COLMAP's name of its model and any parameters: "FISHEYE",
-/// "OPENCV_FISHEYE,k1=0.02,fx=90", "EQUIRECTANGULAR". Without focal lengths `angle` counts, the degrees across the
-/// image's shorter side: by default 180 for models that can see that, else 60. Parallel rays take `extent`, the world
-/// units across that side. The sphere is twice as wide as high. Errors: unsupported; invalid_argument for text that
-/// names no camera.
+/// "OPENCV_FISHEYE,k1=0.02,fx=90", "EQUIRECTANGULAR". Without focal lengths `angle` counts: the degrees across the
+/// image's shorter side. Its default is 180 for models that can see that, else 60. Parallel rays take `extent`, the
+/// world units across that side. The sphere is twice as wide as high. Errors: unsupported; invalid_argument for text
+/// that names no camera.
 camera seen_through(camera const& view, std::string const& model);
 
 /// A camera as one object of such a list, on one line.

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
-/// Depth maps in files: PNG with one channel of 16 bits: a step is `unit` in the scene's lengths, and 0 means not
-/// measured. Or .npy (NumPy, version 1 to 3) of little-endian float32 in C order, [H][W] or [H][W][1]. The kind is told
-/// by the first bytes. A file does not say whether its map measures z or distance (io/dataset.hpp). Errors: io_error
-/// naming the file and the fault.
+/// Depth maps in files: PNG with one channel of 16 bits. A step is `unit` in the scene's lengths; 0 means not measured.
+/// Or .npy (NumPy, version 1 to 3) of little-endian float32 in C order, [H][W] or [H][W][1]. The kind is told by the
+/// first bytes. A file does not say whether its map measures z or distance (io/dataset.hpp). Errors: io_error naming
+/// the file and the fault.
 
 #include <gart/core/names.hpp>
 #include <gart/scene/image.hpp>

@@ -1,8 +1,7 @@
 #pragma once
 /// \file
 /// Files written whole or not at all: to a temporary name beside the target, flushed to the disk, then renamed. A full
-/// disk, or a folder that is missing or not writable, is an io_error naming the target, and leaves no half-written
-/// file.
+/// disk, or a folder that is missing or not writable, is an io_error naming the target. It leaves no half-written file.
 
 #include <gart/core/types.hpp>
 

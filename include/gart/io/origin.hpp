@@ -15,9 +15,9 @@
 
 namespace gart {
 
-/// The origin for some places: zero where floats resolve a hundred-thousandth of their spread, else their median,
-/// rounded to a power of ten within the spread. 99 of 100 places lie within the spread of the median. If it is zero,
-/// that of `others` counts, and else 1. O(places).
+/// The origin for some places. It is zero where floats resolve a hundred-thousandth of their spread. Else it is their
+/// median, rounded to a power of ten within the spread. 99 of 100 places lie within the spread of the median. If it is
+/// zero, that of `others` counts, and else 1. O(places).
 vec3d origin_for(std::vector<vec3d> const& places, std::vector<double> const& others = {});
 
 /// Of a model by its traits; `file` is what errors name.

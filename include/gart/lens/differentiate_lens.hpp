@@ -75,7 +75,7 @@ class lens_differentiation {
 
   /// Writes a lens_gradient's numbers in order to out, [4] in the policy's memory. Other arguments: as
   /// differentiate_rays. Where the frame has some rows only, share(float* plane) fills in other ranks' rows of an image
-  /// [H][W], once for each of the four numbers.
+  /// [H][W]. It is called once for each of the four numbers.
   template <class Frame, class Share = alone>
   void operator()(Frame& frame, span<float const> color, image_gradients const& image, span<float> out,
                   depth_image const& more = {}, Share&& share = {}) {

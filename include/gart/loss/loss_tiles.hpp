@@ -50,7 +50,7 @@ struct loss_tiles {
             static_cast<int>(tile / row_tiles()) * height};
   }
 
-  // The rows of tiles that rows of an image lie in; with those that a window of theirs reaches; and the rows of the
+  // Three functions: the rows of tiles that hold rows of an image, those that their windows reach, and the rows of the
   // image that windows of rows of tiles reach.
   static image_rows rows_of(image_rows rows, int image_height) {
     int const end = std::min(rows.end, image_height);

@@ -68,8 +68,8 @@ struct error_growth_options {
   float dead_opacity = 0.005f;     ///< least opacity at the default alpha_min (least_opacity)
   float opacity_penalty = 0.003f;  ///< times the mean opacity (and train/foreground_fraction.hpp)
   split_shape split;               ///< how one becomes two
-  /// The count ends at one Gaussian for so many pixels of the training views: more would overfit them, and take
-  /// time and memory. 0: at max_gaussians, whatever the capture.
+  /// The count ends at one Gaussian for this many pixels of the training views. More would overfit them, and take time
+  /// and memory. 0: at max_gaussians, whatever the capture.
   float pixels_per_gaussian = 200;
   int min_gaussians = 100'000;  ///< that pixels_per_gaussian leaves to the smallest capture
 };

@@ -4,7 +4,7 @@
 /// user gives none. Cameras and pixels decide some of them, each with its reason in words. Short trainings decide the
 /// others (runtime/validation.hpp).
 ///
-/// inspect() reads every pixel's alpha, and the outermost pixels of at most 64 training images, evenly spread: O(bytes
+/// inspect() reads every pixel's alpha, and the outermost pixels of at most 64 training images, evenly spread. O(bytes
 /// of the images). A border is plain where 95% of its pixels lie within 12 of 255 of their median in every channel.
 /// Bounded objects before a uniform background look like that; photographs of a scene do not.
 

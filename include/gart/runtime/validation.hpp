@@ -38,8 +38,8 @@ struct candidate {
   std::function<void(train_options&)> take;  ///< sets it
 };
 
-/// The candidates that pay on some captures and cost on others, most useful first. Those without effect on this capture
-/// are left out: images of the whole sphere have no vignetting, and some budgets do not depend on pixels.
+/// The candidates that pay on some captures and cost on others, most useful first. Candidates without effect on this
+/// capture are left out. Images of the whole sphere have no vignetting, and some budgets do not depend on pixels.
 std::vector<candidate> default_candidates(capture_traits const& traits, train_options const& options);
 
 /// How candidates are tried.

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The channels of a renderer's views (channels/): the values of its Gaussians, and the passes over the hits of a view,
-/// which follow those of its colours.
+/// The channels of a renderer's views (channels/): the values of its Gaussians, and the passes over the hits of a view.
+/// These passes follow those of its colours.
 
 #include <gart/channels/passes.hpp>
 #include <gart/channels/pixel_hits.hpp>
@@ -63,7 +63,7 @@ class view_channels {
   /// Of the view that is shown without a context.
   view_hits<E>& hits() { return hits_; }
 
-  /// Adds to the moments of the Gaussians what channels bring to them, and depth and transmittance where the colours'
+  /// Adds the channels' part to the moments of the Gaussians, and that of depth and transmittance where the colours'
   /// pass left them out.
   template <class Frame>
   void add_moments(Frame& frame, view_hits<E>& hits, output_gradients const& by, span<float> moments) {

@@ -45,7 +45,7 @@ inline image_rows rows_in(work_unit const& unit, int height) {
   return {unit.rows.first, std::max(std::min(unit.rows.end, height), unit.rows.first)};
 }
 
-/// Gives each rank the rows that its unit reads, of an image [H][W] of `bytes` a pixel whose rows the units have.
+/// Gives each rank the rows that its unit reads of an image [H][W], `bytes` a pixel. The units have the image's rows.
 template <execution E, class Comm>
 requires communicator<Comm, E> u64 share_strips(E& exec, Comm& comm, std::vector<work_unit> const& units, void* image,
                                                 camera const& view, std::size_t bytes, auto const& reads) {

@@ -106,7 +106,7 @@ struct pack_sums_body {
   }
 };
 
-// Finished gradients of geometry in place of moments: a row's columns, the error in its place among moments, and last
+// Finished gradients of geometry, instead of moments: a row's columns, the error in its place among moments, and last
 // the opacity's gradient.
 static_assert(error_place == geometry_columns && moment_stride == geometry_columns + 2);
 

@@ -125,7 +125,7 @@ class sharded_rows final : public all_rows<E> {
     return sharded_rows(gathered_.exec(), comm_, std::max<index_t>(owners_.block / run, 1)).gather_all(mine, width);
   }
 
-  /// Sends rows leave[r] of `from` to rank r, and rows of rank s to arrive[s] of `to`, in the same order.
+  /// Sends rows leave[r] of `from` to rank r. Rows of rank s arrive at arrive[s] of `to`, in the same order.
   void move_rows(E& exec, gaussians<E> const& from, std::vector<std::vector<u32>> const& leave, gaussians<E>& to,
                  std::vector<std::vector<u32>> const& arrive) {
     index_t const width = row_width(from.sh_degree());

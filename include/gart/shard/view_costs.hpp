@@ -4,7 +4,7 @@
 /// is cut by these costs (work_units.hpp). So no rank waits for the counts of others before it knows its part. A view
 /// changes little between two visits. Images and gradients do not depend on the cut.
 ///
-/// box_kernel gives the costs: for each view, the difference of each row's cost to the row above, in wrapping
+/// box_kernel gives the costs. For each view they are the difference of each row's cost to the row above, in wrapping
 /// arithmetic, and one more number at the end. Views follow one another. Memory: 8 bytes a row of tiles.
 
 #include <gart/core/isa.hpp>

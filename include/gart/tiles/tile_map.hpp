@@ -4,8 +4,8 @@
 /// a primitive's box overlaps, in primitive order, and radix sorted by tile. Pairs that fail the test
 /// (tiles/pair_test.hpp) come last, in no tile. A tile's list begins where its number first stands in a key.
 ///
-/// One 32-bit key sorts by tile, and within a tile by an order (tiles/tile_order.hpp) in the bits that the tile's
-/// number leaves free. Ties stay in primitive order, since the sort is stable.
+/// One 32-bit key sorts by tile, and within a tile by an order (tiles/tile_order.hpp). The order has the bits that the
+/// tile's number leaves free. Ties stay in primitive order, since the sort is stable.
 
 #include <gart/algorithm/sort_pairs.hpp>
 #include <gart/tiles/footprints.hpp>
@@ -38,7 +38,7 @@ inline int bits_for(u32 count) {
 
 namespace tile_kernels {
 
-// A team takes some primitives; its lanes take the pairs of all of them in turn, since boxes differ in size by orders
+// A team takes some primitives. Its lanes take the pairs of all of them in turn, since boxes differ in size by orders
 // of magnitude. A host's one lane takes them box by box.
 template <execution E, int Size, tile_order Order, pair_test Test>
 struct emit_pairs {
@@ -110,8 +110,7 @@ struct emit_pairs {
 };
 
 // Of sorted keys: where a tile's list begins, the first key that is not of a tile before it. Each lane looks for its
-// own tile: most tiles may have no list, as in a strip of an image, and whoever found the next one would fill all of
-// them.
+// own tile. Most tiles may have no list, as in a strip of an image: whoever found the next one would fill them all.
 struct begin_lists {
   span<u32 const> keys;
   int order_bits;

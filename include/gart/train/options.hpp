@@ -46,8 +46,8 @@ struct train_options {
   index_t max_gaussians = 1'000'000;           ///< never more than these
   index_t random_points = 100'000;             ///< where the capture has no points
   densify_kind densify = densify_kind::error;  ///< how their number grows
-  /// Weight of the square of the bands of colour above the first, halved and in the mean over the Gaussians, in the
-  /// loss (optim/adam.hpp). Rates of bands can then be eight times those of 3DGS without noise.
+  /// Weight in the loss of the square of the bands of colour above the first, halved, the mean over the Gaussians
+  /// (optim/adam.hpp). Rates of bands can then be eight times those of 3DGS without noise.
   float sh_penalty = 0.01f;
   int sh_every = 1000;  ///< a degree more after so many steps (or iterations / (10 * degrees) in shorter runs)
   std::vector<std::size_t> held_out = {};               ///< training views, by index, that are not trained on

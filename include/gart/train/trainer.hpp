@@ -8,8 +8,8 @@
 ///   while (run.steps_done() < options.iterations) run.step();
 ///   write_splat_ply("model.ply", run.model());
 ///
-/// A program may bring its own loss (step()), densifier (densify_by(), train/densify/densifier.hpp), learned part
-/// (learn(), train/learned/part.hpp), and hooks between the parts of a step.
+/// A program may bring its own loss (step()), densifier (densify_by(), train/densify/densifier.hpp) and learned part
+/// (learn(), train/learned/part.hpp). It may set hooks between the parts of a step.
 ///
 /// A step is a plan of units: on one rank a whole view (train/plan/whole_view.hpp). Several ranks share the Gaussians
 /// and their moments (comm/row_owners.hpp). Each rank takes a part of every step: strips of one view, or views of a
