@@ -117,9 +117,15 @@ drawing drawing_of(gart::renderer& renderer, int samples) {
           &renderer.profile(), [&renderer] { return renderer.peak_bytes(); }};
 }
 
-drawing drawing_of(path_scene& scene, int samples) {
+// Layers take another trace, where an image needs them.
+drawing drawing_of(path_scene& scene, int samples, image_choice const& images) {
+  auto const& names = image_choice::names();
+  bool const layers = std::any_of(names.begin(), names.end(),
+                                  [&](std::string const& name) { return name != "colour" && images.has(name); });
   return {scene.renderer().configuration(),
-          [&scene, samples](auto const& view, auto const& options) { return scene.draw(view, options, samples); },
+          [&scene, samples, layers](auto const& view, auto const& options) {
+            return scene.draw(view, options, samples, layers);
+          },
           &scene.renderer().profile(), [] { return std::size_t{0}; }};
 }
 
@@ -168,7 +174,7 @@ int run_render(render_arguments a) {
     renderer = gart::make_renderer(configuration_request_for(file, a.model, a.configuration.request()));
     renderer->set_model(file.model);
   }
-  drawing const how = has_scene ? drawing_of(*scene, samples) : drawing_of(*renderer, samples);
+  drawing const how = has_scene ? drawing_of(*scene, samples, images) : drawing_of(*renderer, samples);
   gart::render_options options = file.render;
   options.background = background_color(a.background != "auto" ? a.background : background_of_run(a.model));
   if (has_scene && a.background == "auto" && scene->file().background) options.background = *scene->file().background;

@@ -64,14 +64,16 @@ path_scene::path_scene(scene_options const& o, fs::path const& model, configurat
   }
 }
 
-gart::rendered path_scene::draw(gart::camera const& view, gart::render_options options, int samples) {
+gart::rendered path_scene::draw(gart::camera const& view, gart::render_options options, int samples, bool with_layers) {
   gart::light::path_options paths = file_.paths;
   paths.samples = samples;
   renderer_->begin(view, options, paths);
   renderer_->add(samples);
-  layers_ = renderer_->layers();
   gart::rendered out;
-  out.color = renderer_->picture(), out.depth = layers_.depth, out.transmittance = layers_.transmittance;
+  out.color = renderer_->picture();
+  if (!with_layers) return out;
+  layers_ = renderer_->layers();
+  out.depth = layers_.depth, out.transmittance = layers_.transmittance;
   for (std::size_t i = 0; i < layers_.mesh.data.size(); ++i)  // nothing is seen behind a surface
     if (layers_.mesh.data[i] != gart::no_number) out.transmittance.data[i] = 0;
   return out;

@@ -37,9 +37,9 @@ class path_scene {
   gart::path_renderer& renderer() { return *renderer_; }
   int samples() const { return file_.paths.samples; }
 
-  // What is around is what the background is, unless `background` says otherwise.
-  gart::rendered draw(gart::camera const& view, gart::render_options options, int samples);
-  // Of the last draw.
+  // What is around is what the background is, unless `background` says otherwise. Without layers the colour alone.
+  gart::rendered draw(gart::camera const& view, gart::render_options options, int samples, bool with_layers = true);
+  // Of the last draw with them.
   gart::path_layers const& layers() const { return layers_; }
 
  private:
