@@ -12,6 +12,7 @@
 #include <gart/core/version.hpp>
 #include <gart/exec/cuda.hpp>
 #include <gart/exec/parallel.hpp>
+#include <gart/instances/instance_set.hpp>
 #include <gart/io/camera_file.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/image_file.hpp>
@@ -31,6 +32,7 @@
 #include <gart/runtime/choose.hpp>
 #include <gart/runtime/evaluate.hpp>
 #include <gart/runtime/initial.hpp>
+#include <gart/runtime/instances.hpp>
 #include <gart/runtime/model_file.hpp>
 #include <gart/runtime/path_renderer.hpp>
 #include <gart/runtime/renderer.hpp>
