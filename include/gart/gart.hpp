@@ -13,6 +13,7 @@
 #include <gart/exec/cuda.hpp>
 #include <gart/exec/parallel.hpp>
 #include <gart/instances/instance_set.hpp>
+#include <gart/instances/instance_track.hpp>
 #include <gart/io/camera_file.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/image_file.hpp>
