@@ -9,6 +9,8 @@
 #include <gart/comm/self_comm.hpp>
 #include <gart/exec/cuda.hpp>
 #include <gart/exec/parallel.hpp>
+#include <gart/instances/instance_set.hpp>
+#include <gart/instances/instance_track.hpp>
 #include <gart/lens/differentiate_lens.hpp>
 #include <gart/light/path_tracer.hpp>
 #include <gart/pose/differentiate_pose.hpp>

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <thread>
+#include <utility>
 
 using namespace gart_test;
 using gart::index_t;
@@ -184,6 +186,58 @@ TEST_CASE_TEMPLATE("one tree serves rays of any frame with the same bits", E, GA
     fresh.set_scene(scene.view(), 1);
     CHECK(same(trace_all(exec, kept, batch.rays(), options), trace_all(exec, fresh, batch.rays(), options)));
   }
+}
+
+TEST_CASE_TEMPLATE("tracers of several threads share one tree", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  gart::gaussian_model model = cloud(seed, 1, 500);
+  gart::gaussians<E> scene(exec, model);
+  gart::render_options options;
+  gart::shared_index<E> const tree(exec, scene.view(), options.alpha_min, {0.5, 0, 0});
+  constexpr std::size_t threads = 3;
+  std::vector<gart::traced_rays> got(threads), expected(threads);
+  std::vector<gart::gaussian_model> gradients(threads), wanted(threads);
+  std::vector<char> shares(threads, 0);
+  auto const run = [&](std::size_t k, gart::shared_index<E> const* by, gart::traced_rays& out,
+                       gart::gaussian_model& back) {
+    E own;
+    gart::ray_tracer<E> tracer(own);
+    tracer.share(by);
+    tracer.set_scene(std::as_const(scene).view(), 1);
+    random_rays const some(seed + 1 + k, 150, 1.0f);
+    batch_memory<E> const batch(own, {static_cast<double>(k), 0, 0}, some.origins, some.directions);
+    gart::buffer<float, E> const by_color(own, some.origins);
+    gart::gaussians<E> by_gaussians(own, scene.size(), 1);
+    for (int again = 0; again < 3; ++again) {
+      out = trace_all(own, tracer, batch.rays(), options);
+      auto context = tracer.forward(batch.rays(), options);
+      tracer.backward(context, {by_color}, by_gaussians.view());
+    }
+    back = by_gaussians.to_host();
+    shares[k] = by && &tracer.index() == &by->index();
+  };
+  std::vector<std::thread> all;
+  for (std::size_t k = 0; k < threads; ++k) all.emplace_back([&, k] { run(k, &tree, got[k], gradients[k]); });
+  for (auto& t : all) t.join();
+  for (std::size_t k = 0; k < threads; ++k) {
+    CHECK(shares[k]);
+    run(k, nullptr, expected[k], wanted[k]);
+    CHECK(same(got[k], expected[k]));
+    CHECK(gradients[k].mean == wanted[k].mean);
+    CHECK(gradients[k].sh == wanted[k].sh);
+    CHECK(*std::max_element(got[k].hits.begin(), got[k].hits.end()) > 5);
+  }
+
+  // One that no longer fits is not looked at.
+  for (auto& m : model.mean) m += 0.5f;
+  scene.assign(model);
+  run(0, &tree, got[0], gradients[0]), run(0, nullptr, expected[0], wanted[0]);
+  CHECK(same(got[0], expected[0]));
+  options.alpha_min = 0.1f;
+  run(0, &tree, got[0], gradients[0]);
+  CHECK(!shares[0]);
 }
 
 TEST_CASE_TEMPLATE("rays that meet nothing see the background", E, GART_TEST_POLICIES) {

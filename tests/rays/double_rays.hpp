@@ -18,6 +18,8 @@ namespace gart_test {
 struct double_model {
   std::size_t count = 0, bands = 0, width = 0;
   std::vector<double> mean, log_scale, quaternion, opacity, sh, features;
+  std::vector<double>
+      turns;  // [count][3][3]: from directions of rays to those that harmonics take; empty: they are one
 
   explicit double_model(gart::gaussian_model const& m)
       : count(m.size()),
@@ -108,6 +110,11 @@ inline seen see(double_model const& m, double_ray const& ray, ray_weights const&
   std::sort(hits.begin(), hits.end());
   double basis[16];
   harmonics(d, basis);
+  auto const turn = [&](std::size_t id) {
+    double own[3] = {};
+    for (std::size_t k = 0; k < 9; ++k) own[k / 3] += m.turns[9 * id + k] * d[k % 3];
+    harmonics(own, basis);
+  };
   seen out;
   double transmittance = 1;
   gart::u32 count = 0;
@@ -115,6 +122,7 @@ inline seen see(double_model const& m, double_ray const& ray, ray_weights const&
   for (hit const& h : hits) {
     double const weight = transmittance * h.alpha;
     std::uint64_t clamps = h.clamped;
+    if (!m.turns.empty()) turn(h.id);
     for (std::size_t c = 0; c < 3; ++c) {
       double color = 0.5;
       for (std::size_t k = 0; k < m.bands; ++k) color += basis[k] * m.sh[3 * (m.bands * h.id + k) + c];

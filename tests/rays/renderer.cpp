@@ -1,10 +1,13 @@
 // Batches of rays and contexts of forward passes behind the run-time interface: the numbers of the templates, whatever
 // runs in between.
+#include <gart/instances/instance_set.hpp>
+#include <gart/runtime/instances.hpp>
 #include <gart/runtime/ray_service.hpp>
 #include <gart/runtime/renderer.hpp>
 
 #include <rays/view_rays.hpp>
 
+#include <algorithm>
 #include <utility>
 
 using namespace gart_test;
@@ -131,6 +134,72 @@ TEST_CASE_TEMPLATE("bound arrays that change are seen by batches", E, GART_TEST_
   gart::gaussians<E> gradients(exec, scene.size(), 1);
   gart::buffer<float, E> const by_color(exec, some.origins);
   refused([&] { context->backward({by_color}, {.gaussians = gradients.view()}); }, "have changed since forward()");
+}
+
+TEST_CASE_TEMPLATE("a renderer shows scenes of instances", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  E exec;
+  std::vector<gart::gaussian_model> models{cloud(seed, 1, 90), cloud(seed + 1, 1, 40)};
+  models[0].feature_count = models[1].feature_count = 2;
+  for (auto& m : models) m.features.assign(2 * m.size(), 0.5f);
+  std::vector<gart::instance> instances{
+      {0}, {1, gart::turn_of({0.1, 0.8, 0}), {1, 0, 0}}, {1, gart::mat3d(1.0), {-1, 0, 0}}};
+  auto const request = request_of(exec, 1);
+  auto const actors = gart::make_instances(request);
+  auto const renderer = gart::make_renderer(request);
+  random_rays const some(seed + 2, 200, 1.0f);
+  gart::ray_batch const on_host{{}, some.origins, some.directions, {}};
+  batch_memory<E> const batch(exec, {}, some.origins, some.directions);
+
+  gart::gaussians<E> const first(exec, models[0]), second(exec, models[1]);
+  gart::instance_set<E> set(exec, 1);
+  gart::ray_tracer<E> tracer(exec);
+  set.set({first.view(), second.view()}, instances);
+  actors->set_models(models, instances);
+  renderer->bind(actors->scene());
+  renderer->bind_channels({actors->features()});
+  for (int step = 0; step < 2; ++step) {
+    CAPTURE(step);
+    actors->wait();
+    tracer.set_scene(set.scene(), 1);
+    gart::traced_rays const got = renderer->trace(on_host, {}, true);
+    CHECK(same(got, trace_all(exec, tracer, batch.rays(), {})));
+    for (std::size_t r = 0; r < 200; ++r)
+      CHECK(got.features[2 * r] == doctest::Approx(0.5f * (1 - got.transmittance[r])).epsilon(1e-4));
+    instances[1].position.y += 0.3;
+    actors->move(instances), set.move(instances);
+  }
+  CHECK(actors->of(130).instance == 2);
+  CHECK(actors->of(130).gaussian == 0);
+  refused([&] { actors->of(170); }, "has 170 Gaussians, and none of number 170");
+
+  // From a view to models and poses.
+  gart::image_float const by = renderer->render(view_at(0), {}).color;
+  gart::buffer<float, E> by_color(exec), poses(exec, 18), expected(exec, 18);
+  by_color.assign(gart::span<float const>(by.data.data(), by.data.size()));
+  gart::gaussians<E> by_scene(exec, 170, 1), by_second(exec, 40, 1), by_first(exec, 90, 1);
+  renderer->forward(view_at(0), {}, gart::render_targets{})
+      ->backward(by_image(by_color), {.gaussians = by_scene.view()});
+  renderer->wait();
+  std::vector<gart::gaussians_view<float>> const targets{by_first.view(), by_second.view()};
+  gart::instance_gradients to;
+  to.models = targets, to.poses = poses.data();
+  actors->backward(std::as_const(by_scene).view(), to);
+  actors->wait();
+  gart::gaussian_model const got = by_second.to_host();
+  to.poses = expected.data();
+  set.backward(std::as_const(by_scene).view(), to);
+  CHECK(same_bits(by_second.to_host(), got));
+  CHECK(poses.to_host() == expected.to_host());
+  CHECK(*std::max_element(got.mean.begin(), got.mean.end()) > 0);
+
+  models[1].opacity.pop_back();
+  refused([&] { actors->set_models(models, instances); }, "instance_scene.set_models: gaussian_model.");
+  refused([&] { actors->bind_models({{nullptr, nullptr, nullptr, nullptr, nullptr, 3, 1}}, {{}}); }, "is null");
+  auto no_backend = request;
+  no_backend.backend = gart::backend_kind::automatic;
+  CHECK_THROWS_WITH_AS(gart::make_instances(no_backend), doctest::Contains("there are: "), gart::unsupported);
 }
 
 TEST_CASE_TEMPLATE("contexts of views wait for their gradients side by side", E, GART_TEST_POLICIES) {

@@ -39,19 +39,26 @@ class sh_rotation {
   }
 
   /// Turns coefficients [K][3] to `degree` where they stand.
-  void apply(float* coefficients, int degree) const {
+  GART_HD void apply(float* coefficients, int degree) const { turn<false>(coefficients, degree); }
+  /// The other way: also from the gradient by turned coefficients to that by those that were turned.
+  GART_HD void apply_back(float* coefficients, int degree) const { turn<true>(coefficients, degree); }
+
+ private:
+  template <bool Back>
+  GART_HD void turn(float* coefficients, int degree) const {
     for (int l = 1; l <= degree; ++l) {
       float* const first = coefficients + 3 * l * l;
       double turned[7][3] = {};
       for (int j = 0; j <= 2 * l; ++j)
-        for (int k = 0; k <= 2 * l; ++k)
-          for (int c = 0; c < 3; ++c) turned[j][c] += band_[l][j][k] * static_cast<double>(first[3 * k + c]);
+        for (int k = 0; k <= 2 * l; ++k) {
+          double const entry = Back ? band_[l][k][j] : band_[l][j][k];
+          for (int c = 0; c < 3; ++c) turned[j][c] += entry * static_cast<double>(first[3 * k + c]);
+        }
       for (int j = 0; j <= 2 * l; ++j)
         for (int c = 0; c < 3; ++c) first[3 * j + c] = static_cast<float>(turned[j][c]);
     }
   }
 
- private:
   double band_[4][7][7] = {};  // of degree l: [to][from]
 };
 

@@ -8,9 +8,9 @@
 /// Cost: a sort of 12 bytes a hit by as many bits as Gaussians and rays need, one read of 20 bytes a hit and 48 of its
 /// ray, and 240 bytes a piece of 32 hits at SH degree 3. The host reads how many pieces there are.
 
-#include <gart/algorithm/exclusive_scan.hpp>
 #include <gart/algorithm/sort_pairs.hpp>
 #include <gart/backward/gather.hpp>
+#include <gart/channels/hit_pieces.hpp>
 #include <gart/rays/batch_gradient.hpp>
 
 #include <bit>
@@ -42,36 +42,10 @@ struct number_places {
   GART_KERNEL void operator()(index_t i) const { places[i] = i; }
 };
 
-// Where each Gaussian's hits begin and end, zero at first: a Gaussian without hits has none.
-struct find_segments {
+struct id_of_key {
   u64 const* keys;
-  index_t hits, gaussians;
   int ray_bits;
-  u32 *begins, *ends;
-  GART_HD u64 id(index_t k) const { return keys[k] >> ray_bits; }
-  GART_KERNEL void operator()(index_t k) const {
-    u64 const here = id(k);
-    if (here >= gaussians) return;
-    if (k == 0 || id(k - 1) != here) begins[here] = k;
-    if (k + 1 == hits || id(k + 1) != here) ends[here] = k + 1;
-  }
-};
-
-struct count_pieces {
-  u32 const *begins, *ends;
-  u32* counts;
-  GART_KERNEL void operator()(index_t i) const { counts[i] = (ends[i] - begins[i] + piece_hits - 1) / piece_hits; }
-};
-
-// Whose a piece is, and where it begins.
-struct cut_pieces {
-  u32 const *begins, *ends;
-  u64 const* offsets;
-  u32* firsts;
-  GART_KERNEL void operator()(index_t i) const {
-    u64 piece = offsets[i];
-    for (u32 k = begins[i]; k < ends[i]; k += piece_hits) firsts[piece++] = k;
-  }
+  GART_HD u64 operator()(index_t k) const { return keys[k] >> ray_bits; }
 };
 
 // Rows are laid out as pair_gradient has them, so that sum_pairs adds them up.
@@ -143,8 +117,7 @@ template <execution E, class Response>
 class batch_gather {
  public:
   /// Allocates nothing; `exec` must outlive it.
-  explicit batch_gather(E& exec)
-      : begins_(exec), ends_(exec), counts_(exec), offsets_(exec), firsts_(exec), rows_(exec) {}
+  explicit batch_gather(E& exec) : pieces_(exec), rows_(exec) {}
 
   /// Overwrites gradients.sh, and moments, [N][moment_stride]. `records`: the Gaussians in the batch's frame. Sorts
   /// the hits, where they are not.
@@ -153,26 +126,15 @@ class batch_gather {
     index_t const n = static_cast<index_t>(hits.count), gaussians = gradients.count;
     if (gaussians == 0) return;
     sort(exec, hits, n, gaussians);
-    begins_.resize(gaussians), ends_.resize(gaussians), counts_.resize(gaussians), offsets_.resize(gaussians + 1);
-    begins_.zero(), ends_.zero();
-    parallel_for(
-        exec, "rays/segments", n,
-        ray_kernels::find_segments{hits.keys.data(), n, gaussians, hits.ray_bits, begins_.data(), ends_.data()});
-    parallel_for(exec, "rays/pieces", gaussians,
-                 ray_kernels::count_pieces{begins_.data(), ends_.data(), counts_.data()});
-    span<u64> const offsets = offsets_.view();
-    exclusive_scan(exec, span<u32 const>(counts_), offsets.subspan(0, gaussians), offsets.subspan(gaussians, 1));
-    u64 pieces = 0;
-    exec.copy_out(&pieces, offsets_.data() + gaussians, sizeof pieces);
-    firsts_.resize(pieces);
-    parallel_for(exec, "rays/pieces", gaussians,
-                 ray_kernels::cut_pieces{begins_.data(), ends_.data(), offsets_.data(), firsts_.data()});
+    pieces_.cut(exec, "rays/pieces", ray_kernels::id_of_key{hits.keys.data(), hits.ray_bits}, n, gaussians,
+                ray_kernels::piece_hits);
+    index_t const pieces = pieces_.count();
     int const sh_floats = gradients.sh_stride();
-    rows_.resize(pieces * static_cast<u64>((sh_floats + 3) / 4 + moment_stride / 4));
+    rows_.resize(u64{pieces} * static_cast<u64>((sh_floats + 3) / 4 + moment_stride / 4));
     parallel_for(
-        exec, "rays/gather", static_cast<index_t>(pieces),
+        exec, "rays/gather", pieces,
         ray_kernels::sum_piece<Response>{hits.keys.data(), hits.places.data(), hits.entries.data(), hits.depths.data(),
-                                         firsts_.data(), ends_.data(), hits.ray_bits, rays.data(), records.data(),
+                                         pieces_.firsts(), pieces_.ends(), hits.ray_bits, rays.data(), records.data(),
                                          sh_floats, 3 * sh_coefficients(active_degree), rows_.data()});
     switch (gradients.sh_degree) {
       case 0:
@@ -198,13 +160,11 @@ class batch_gather {
   template <int Degree>
   void add_up(E& exec, u64 pieces, gaussians_view<float> gradients, span<float> moments) {
     parallel_for(exec, "rays/sum", gradients.count * static_cast<index_t>(pair_gradient<Degree>::quads),
-                 sum_pairs<Degree, terms<term::color, term::geometry>>{
-                     offsets_.view().subspan(0, gradients.count), pieces, rows_.data(), gradients.sh, moments.data()});
+                 sum_pairs<Degree, terms<term::color, term::geometry>>{pieces_.offsets().subspan(0, gradients.count), pieces,
+                                                           rows_.data(), gradients.sh, moments.data()});
   }
 
-  buffer<u32, E> begins_, ends_, counts_;
-  buffer<u64, E> offsets_;
-  buffer<u32, E> firsts_;
+  hit_pieces<E> pieces_;
   buffer<quad, E> rows_;
 };
 

@@ -56,6 +56,28 @@ inline lidar_pattern spinning_lidar(std::vector<float> const& elevations, int co
   return out;
 }
 
+/// Some rays of a pattern.
+struct lidar_slice {
+  lidar_pattern pattern;  ///< these alone
+  std::vector<u32> rays;  ///< their numbers in the whole pattern
+};
+
+/// The rays of times from `from` to before `to`: those that see moving actors at poses of one time
+/// (instances/instance_track.hpp). Errors: invalid_argument for a pattern without times.
+inline lidar_slice rays_during(lidar_pattern const& pattern, float from, float to) {
+  if (pattern.directions.size() != 3 * pattern.times.size())
+    throw invalid_argument("rays_during: there are " + std::to_string(pattern.times.size()) +
+                           " times in lidar_pattern, and " + std::to_string(pattern.directions.size()) +
+                           " numbers of directions: give each ray a time");
+  lidar_slice out;
+  for (std::size_t i = 0; i < pattern.times.size(); ++i) {
+    if (!(pattern.times[i] >= from && pattern.times[i] < to)) continue;
+    out.rays.push_back(static_cast<u32>(i)), out.pattern.times.push_back(pattern.times[i]);
+    for (std::size_t k = 0; k < 3; ++k) out.pattern.directions.push_back(pattern.directions[3 * i + k]);
+  }
+  return out;
+}
+
 /// The pattern's rays in the world, in its order. t_max: where they end; 0: nowhere.
 inline ray_list rays_of(lidar_pattern const& pattern, sensor_pose const& pose, float t_max = 0) {
   std::size_t const n = pattern.directions.size() / 3;

@@ -9,7 +9,8 @@
 ///   auto context = tracer.forward(rays, options, {.color = color});     // the same, and what the gradient needs
 ///   tracer.backward(context, {by_color, by_depth}, gradients.view(), {.directions = by_direction});
 ///
-/// One tree serves all batches until the Gaussians change (rays/world_index.hpp). Hits, their order and what they add
+/// One tree serves all batches until the Gaussians change (rays/world_index.hpp), and several tracers
+/// (rays/shared_index.hpp has the rule of threads). Hits, their order and what they add
 /// up to are those of an image's pixels. options.antialias must be 0: rays have no pixels to filter by; options.rows is
 /// not looked at.
 ///
@@ -25,8 +26,7 @@
 #include <gart/backward/finish.hpp>
 #include <gart/channels/passes.hpp>
 #include <gart/rays/batch_gather.hpp>
-#include <gart/rays/fingerprint.hpp>
-#include <gart/rays/world_index.hpp>
+#include <gart/rays/shared_index.hpp>
 #include <gart/render/frame.hpp>
 
 #include <algorithm>
@@ -87,6 +87,9 @@ class ray_tracer {
     require_channels(channels, scene_.count, "ray_tracer.set_channels");
     channels_ = channels;
   }
+
+  /// A tree to trace by where it is that of the Gaussians; null: none. It must stay until another is given.
+  void share(shared_index<E, Response> const* tree) { shared_ = tree; }
 
   /// What the rays see, to the targets that are wanted.
   void trace(ray_batch const& rays, render_options const& options, batch_targets const& out) {
@@ -190,7 +193,7 @@ class ray_tracer {
   }
 
   /// The tree that batches are traced by.
-  world_index<E, Response> const& index() const { return index_; }
+  world_index<E, Response> const& index() const { return shares_ ? shared_->index() : index_; }
 
  private:
   color_rows colors() const { return {scene_.sh, scene_.sh_degree, active_degree_}; }
@@ -201,7 +204,7 @@ class ray_tracer {
   }
   template <class P>
   void launch(char const* label, ray_batch const& rays, P const& program, float near) {
-    trace_batch<Response>(*exec_, label, index_.seen_from(rays.frame), {gaussians_.data(), scene_.count, near},
+    trace_batch<Response>(*exec_, label, index().seen_from(rays.frame), {gaussians_.data(), scene_.count, near},
                           rays.count(), order_, program);
   }
   template <class P>
@@ -218,13 +221,14 @@ class ray_tracer {
     require_rays(*exec_, rays, options.near);
     near_ = options.near;
     stand_at(rays.frame, options);
-    world_view const tree = index_.seen_from(rays.frame);
+    world_view const tree = index().seen_from(rays.frame);
     order_.make(*exec_, rays, tree.tree, tree.shift);
   }
   // The tree over the Gaussians as they are, and the Gaussians in that frame.
   void stand_at(vec3d const& frame, render_options const& options) {
+    shares_ = shared_ && shared_->fits(scene_print_, scene_.count, options.alpha_min);
     bool const other_boxes = index_.count() != scene_.count || index_.alpha_min() != options.alpha_min;
-    if (index_is_old_ || other_boxes) {
+    if (!shares_ && (index_is_old_ || other_boxes)) {
       stage_scope stage(*exec_, "rays index");
       if (other_boxes || ++age_ >= options.rebuild_every) {
         index_.build(*exec_, scene_, options.alpha_min, frame);
@@ -305,7 +309,9 @@ class ray_tracer {
   u64 number_ = 0;       // of the scene; 0: none
   u64 scene_print_ = 0;  // of its parameters
   world_index<E, Response> index_;
-  ray_order<E> order_;  // of the last batch; of as many rays it is one too
+  shared_index<E, Response> const* shared_ = nullptr;
+  bool shares_ = false;  // the last batch was traced by it
+  ray_order<E> order_;   // of the last batch; of as many rays it is one too
   fingerprint<E> print_;
   bool index_is_old_ = true, records_are_old_ = true;
   int age_ = 0;

@@ -5,6 +5,7 @@
 ///   GART_REGISTER_CONFIGURATIONS(my_rays, gart::register_rays<gart::openmp_exec, gart::generalized_gaussian<4>>())
 
 #include <gart/rays/ray_tracer.hpp>
+#include <gart/runtime/compiled_instances.hpp>
 #include <gart/runtime/configuration_of.hpp>
 #include <gart/runtime/ray_service.hpp>
 #include <gart/runtime/registry.hpp>
@@ -82,13 +83,14 @@ class compiled_rays final : public ray_service {
   int features_ = 0;  // of a Gaussian
 };
 
-/// The service of a policy and a response, for all renderers of theirs.
+/// The service of a policy and a response, for all renderers of theirs, and scenes of instances.
 template <execution E, class Response = generalized_gaussian<>>
 void register_rays() {
   register_ray_service(from_string(E::name, backend_kind::automatic), Response::degree,
                        [](configuration_request const& request) -> std::unique_ptr<ray_service> {
                          return std::make_unique<compiled_rays<E, Response>>(request);
                        });
+  register_instances<E>();
 }
 
 }}  // namespace gart::GART_ISA

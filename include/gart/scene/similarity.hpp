@@ -23,7 +23,7 @@ struct similarity {
   vec3d translation{0.0};  ///< world units
 
   /// Of a point.
-  vec3d operator()(vec3d const& p) const { return scale * (rotation * p) + translation; }
+  GART_HD vec3d operator()(vec3d const& p) const { return scale * (rotation * p) + translation; }
 };
 
 /// First b, then a.
@@ -58,6 +58,14 @@ inline std::array<double, 4> quaternion_of(mat3d const& r) {
   return by_each[largest];
 }
 
+/// Whether it is one, to 1e-4: orthonormal, without reflection, and finite.
+inline bool is_rotation(mat3d const& r) {
+  bool sound = glm::dot(glm::cross(r[0], r[1]), r[2]) > 0;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) sound = sound && std::abs(glm::dot(r[i], r[j]) - (i == j ? 1.0 : 0.0)) < 1e-4;
+  return sound;
+}
+
 /// The similarity of a matrix given row by row, its last row 0 0 0 1.
 inline similarity similarity_of(std::array<double, 16> const& m) {
   similarity s;
@@ -66,15 +74,10 @@ inline similarity similarity_of(std::array<double, 16> const& m) {
     for (int column = 0; column < 3; ++column) a[column][row] = m[static_cast<std::size_t>(4 * row + column)];
     s.translation[row] = m[static_cast<std::size_t>(4 * row + 3)];
   }
-  auto const dot = [](vec3d const& u, vec3d const& v) { return u.x * v.x + u.y * v.y + u.z * v.z; };
-  vec3d const cross(a[0].y * a[1].z - a[0].z * a[1].y, a[0].z * a[1].x - a[0].x * a[1].z,
-                    a[0].x * a[1].y - a[0].y * a[1].x);
-  double const volume = dot(cross, a[2]);
+  double const volume = glm::dot(glm::cross(a[0], a[1]), a[2]);
   s.scale = std::cbrt(volume);
   bool sound = volume > 0 && std::isfinite(volume) && m[12] == 0 && m[13] == 0 && m[14] == 0 && m[15] == 1;
-  for (int i = 0; sound && i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      sound = sound && std::abs(dot(a[i], a[j]) / (s.scale * s.scale) - (i == j ? 1.0 : 0.0)) < 1e-4;
+  sound = sound && is_rotation(a / s.scale);
   if (!sound)
     throw invalid_argument(
         "the matrix is no rotation, scale and translation: its columns must be of one length and "
@@ -83,25 +86,68 @@ inline similarity similarity_of(std::array<double, 16> const& m) {
   return s;
 }
 
+/// What a similarity does to Gaussians, one at a time, on any policy: kernels hold one by value.
+class gaussian_mover {
+ public:
+  /// Of a similarity.
+  explicit gaussian_mover(similarity const& by)
+      : by_(by),
+        turn_(by.rotation),
+        log_scale_(static_cast<float>(std::log(by.scale))),
+        turns_(by.rotation != mat3d(1.0)) {
+    std::array<double, 4> const q = quaternion_of(by.rotation);
+    for (std::size_t k = 0; k < 4; ++k) q_[k] = q[k];
+  }
+
+  /// Turns, scales and moves Gaussian i where it stands.
+  GART_HD void move(gaussians_view<float> const& g, index_t i) const {
+    float *const mean = g.mean + std::size_t{3} * i, *const log_scale = g.log_scale + std::size_t{3} * i;
+    vec3d const p = by_(vec3d(mean[0], mean[1], mean[2]));
+    for (int k = 0; k < 3; ++k) mean[k] = static_cast<float>(p[k]), log_scale[k] += log_scale_;
+    if (!turns_) return;  // bits stay
+    multiply({q_[0], q_[1], q_[2], q_[3]}, g.quaternion + std::size_t{4} * i);
+    turn_.apply(row_of(g, i), g.sh_degree);
+  }
+  /// From the gradient by moved Gaussian i to that by Gaussian i, where it stands.
+  GART_HD void pull_back(gaussians_view<float> const& g, index_t i) const {
+    float* const mean = g.mean + std::size_t{3} * i;
+    vec3d const by_mean = by_.scale * (vec3d(mean[0], mean[1], mean[2]) * by_.rotation);
+    for (int k = 0; k < 3; ++k) mean[k] = static_cast<float>(by_mean[k]);
+    if (!turns_) return;
+    multiply({q_[0], -q_[1], -q_[2], -q_[3]}, g.quaternion + std::size_t{4} * i);
+    turn_.apply_back(row_of(g, i), g.sh_degree);
+  }
+
+ private:
+  struct quaternion_of_doubles {
+    double w, x, y, z;
+  };
+  // b becomes a b.
+  GART_HD static void multiply(quaternion_of_doubles const& a, float* b) {
+    double const w = b[0], x = b[1], y = b[2], z = b[3];
+    b[0] = static_cast<float>(a.w * w - a.x * x - a.y * y - a.z * z);
+    b[1] = static_cast<float>(a.w * x + a.x * w + a.y * z - a.z * y);
+    b[2] = static_cast<float>(a.w * y - a.x * z + a.y * w + a.z * x);
+    b[3] = static_cast<float>(a.w * z + a.x * y - a.y * x + a.z * w);
+  }
+  GART_HD static float* row_of(gaussians_view<float> const& g, index_t i) {
+    return g.sh + static_cast<std::size_t>(g.sh_stride()) * i;
+  }
+
+  similarity by_;
+  sh_rotation turn_;
+  double q_[4];
+  float log_scale_;
+  bool turns_;
+};
+
 /// Turns, scales and moves the Gaussians.
 inline void apply(similarity const& s, gaussian_model& model) {
-  sh_rotation const turn(s.rotation);
-  auto const q = quaternion_of(s.rotation);
-  std::size_t const width = 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));
-  float const log_scale = static_cast<float>(std::log(s.scale));
-  for (std::size_t i = 0; i < model.size(); ++i) {
-    float* const mean = &model.mean[3 * i];
-    vec3d const p = s(vec3d(mean[0], mean[1], mean[2]));
-    float* const g = &model.quaternion[4 * i];
-    std::array<double, 4> const b{g[0], g[1], g[2], g[3]};
-    std::array<double, 4> const turned{
-        q[0] * b[0] - q[1] * b[1] - q[2] * b[2] - q[3] * b[3], q[0] * b[1] + q[1] * b[0] + q[2] * b[3] - q[3] * b[2],
-        q[0] * b[2] - q[1] * b[3] + q[2] * b[0] + q[3] * b[1], q[0] * b[3] + q[1] * b[2] - q[2] * b[1] + q[3] * b[0]};
-    for (int k = 0; k < 3; ++k)
-      mean[k] = static_cast<float>(p[k]), model.log_scale[3 * i + static_cast<std::size_t>(k)] += log_scale;
-    for (std::size_t k = 0; k < 4; ++k) g[k] = static_cast<float>(turned[k]);
-    turn.apply(&model.sh[width * i], model.sh_degree);
-  }
+  gaussian_mover const by(s);
+  gaussians_view<float> const all{model.mean.data(),    model.log_scale.data(), model.quaternion.data(),
+                                  model.opacity.data(), model.sh.data(),        static_cast<index_t>(model.size()),
+                                  model.sh_degree};
+  for (index_t i = 0; i < all.count; ++i) by.move(all, i);
 }
 
 }}  // namespace gart::GART_ISA
