@@ -81,6 +81,8 @@ http_answer requests::answer(http_request const& asked) const {
   std::string const name = path.rest.empty() ? "index.html" : path.rest.substr(0, path.rest.find('?'));
   if (page_file const* const file = find_page_file(name))
     return {200, content_type_of(name), std::string(reinterpret_cast<char const*>(file->bytes), file->size), {}};
+  if (auto const scene = all_.scene(); name == "scene.json" && !scene->scene_json.empty())
+    return {200, "application/json", scene->scene_json, {}};
   try {
     std::vector<u8> const jpeg = photograph(name);
     if (!jpeg.empty()) return {200, "image/jpeg", std::string(jpeg.begin(), jpeg.end()), {}};

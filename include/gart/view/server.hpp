@@ -88,6 +88,10 @@ class view_server {
   std::optional<train_action> next_action();
   /// The one of view_scene.models that a client with that right wants opened, since the last call.
   std::optional<int> next_model();
+  /// What a client with that right changed of view_scene.parts, one part at a time.
+  std::optional<part_edit> next_edit();
+  /// What the parts are by now, and the text that saves them. Views at rest are rendered again.
+  void set_parts(std::vector<view_part> parts, std::string scene_json);
   /// The share of time that a client with that right asked for, since the last call.
   std::optional<double> next_share();
 
