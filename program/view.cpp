@@ -9,12 +9,14 @@
 #include "view_options.hpp"
 
 #include <gart/io/dataset.hpp>
+#include <gart/io/file.hpp>
 #include <gart/view/edited_scene.hpp>
 #include <gart/view/model_view.hpp>
 #include <gart/view/path_view.hpp>
 #include <gart/view/server.hpp>
 
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 
@@ -116,6 +118,32 @@ int serve(view_arguments const& a, gart::view_scene scene, gart::dataset const& 
   return 0;
 }
 
+// Files that a page sent, for as long as they are looked at.
+class sent_files {
+ public:
+  sent_files() = default;
+  sent_files(sent_files const&) = delete;
+  ~sent_files() {
+    std::error_code ignored;
+    if (!folder_.empty()) fs::remove_all(folder_, ignored);
+  }
+  // Where it lies.
+  fs::path keep(gart::added_file const& file) {
+    if (folder_.empty()) {
+      std::string name = (fs::temp_directory_path() / "gart-view-XXXXXX").string();
+      if (!::mkdtemp(name.data())) throw gart::error(name + ": no folder can be made there");
+      folder_ = name;
+    }
+    fs::path const path = folder_ / (std::to_string(++count_) + fs::path(file.name).extension().string());
+    gart::write_file(path, std::string_view(reinterpret_cast<char const*>(file.bytes.data()), file.bytes.size()));
+    return path;
+  }
+
+ private:
+  fs::path folder_;
+  int count_ = 0;
+};
+
 // Paths of light through Gaussians, meshes and lights, which the page may move.
 int view_scene(view_arguments const& a) {
   path_scene scene(a.scene, a.model, a.configuration);
@@ -139,6 +167,7 @@ int view_scene(view_arguments const& a) {
   shown.background = options.background, shown.origin = file.origin, shown.traced = true;
   gart::edited_scene edited(a.scene.file, read, file.origin, a.model, 0.5f * (shown.bounds.low + shown.bounds.high),
                             gart::extent_of(shown));
+  sent_files sent;
   shown.parts = edited.parts(), shown.scene_json = edited.text();
   auto const render = gart::render_of(scene.renderer(), file.model, options, read.paths);
   return serve(a, std::move(shown), data, a.model, render, [&](gart::view_server& server) {
@@ -149,6 +178,15 @@ int view_scene(view_arguments const& a) {
         changed = true;
       } catch (std::exception const& e) {
         server.tell(std::string("It could not be changed: ") + e.what());
+      }
+    }
+    while (auto const file = server.next_file()) {
+      try {
+        edited.add(sent.keep(*file), file->name);
+        server.tell(file->name + " is in the scene.");
+        changed = true;
+      } catch (std::exception const& e) {
+        server.tell(file->name + " could not be added: " + e.what());
       }
     }
     if (!changed) return;

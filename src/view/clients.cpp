@@ -43,8 +43,8 @@ void clients::remove(int id) {
 
 void clients::counted() {
   count_ = static_cast<int>(clients_.size());
-  wishes_ =
-      static_cast<int>(clients_.size() + actions_.size() + share_.has_value() + model_.has_value() + edits_.size());
+  wishes_ = static_cast<int>(clients_.size() + actions_.size() + share_.has_value() + model_.has_value() +
+                             edits_.size() + file_.has_value());
 }
 
 verdict clients::receive(int id, std::string_view text, double now) {
@@ -236,7 +236,7 @@ std::optional<job> clients::next_job(double now, double wait_seconds) {
   std::unique_lock lock(mutex_);
   for (;;) {
     double const passed = std::chrono::duration<double>(clock::now() - began).count();
-    if (!edits_.empty()) return {};  // they come before the views that follow them
+    if (!edits_.empty() || file_) return {};  // they come before the views that follow them
     if (auto found = choose(now + passed)) return found;
     double const left = std::min(wait_seconds - passed, next_rest(now + passed) + 1e-3);
     if (passed >= wait_seconds) return {};
@@ -334,6 +334,27 @@ std::optional<part_edit> clients::next_edit() {
   edits_.erase(edits_.begin());
   counted();
   return first;
+}
+
+std::optional<added_file> clients::next_file() {
+  std::lock_guard const lock(mutex_);
+  auto taken = std::exchange(file_, {});
+  counted();
+  return taken;
+}
+bool clients::file_waits() const {
+  std::lock_guard const lock(mutex_);
+  return file_.has_value();
+}
+bool clients::add_file(added_file file) {
+  {
+    std::lock_guard const lock(mutex_);
+    if (file_) return false;
+    file_ = std::move(file);
+    counted();
+  }
+  changed_.notify_all();
+  return true;
 }
 
 // Views at rest are rendered anew.

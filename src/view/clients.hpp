@@ -59,6 +59,9 @@ class clients {
   std::optional<double> next_share();
   std::optional<int> next_model();
   std::optional<part_edit> next_edit();
+  std::optional<added_file> next_file();
+  bool file_waits() const;
+  bool add_file(added_file file);  // false: another one waits
   void set_status(view_status const& status);
   void set_curve(view_curve const& curve);
   void set_scores(std::vector<std::pair<int, double>> const& scores);
@@ -115,6 +118,7 @@ class clients {
   std::optional<double> share_;
   std::optional<int> model_;
   std::map<int, part_edit> edits_;  // of each part the newest
+  std::optional<added_file> file_;
 };
 
 }  // namespace gart::view

@@ -174,6 +174,7 @@ void view_server::tell_at_end(std::string why) { state_->all.set_end(std::move(w
 void view_server::set_scene(view_scene scene) { state_->all.set_scene(std::move(scene)); }
 std::optional<int> view_server::next_model() { return state_->all.next_model(); }
 std::optional<part_edit> view_server::next_edit() { return state_->all.next_edit(); }
+std::optional<added_file> view_server::next_file() { return state_->all.next_file(); }
 void view_server::set_parts(std::vector<view_part> parts, std::string scene_json) {
   state_->all.set_parts(std::move(parts), std::move(scene_json));
 }

@@ -115,4 +115,36 @@ const changed = onEach({
   },
 });
 
-export const scene = {...traced, ...changed};
+const added = onEach({
+  async 'a mesh that is dropped or chosen is in the scene, what is wrong is said'(world, screen) {
+    const server = await serve(world), {browser} = world;
+    const p = await openPage(browser, server.control, screen);
+    await p.tab('scene');
+    const said = (part) => p.until(`"${part}"`, async () => (await p.page.textContent('#say')).includes(part));
+    const drop = (name, text) => p.page.evaluate(([file, content]) => {
+      const data = new DataTransfer();
+      data.items.add(new File([content], file));
+      document.getElementById('stage').dispatchEvent(new DragEvent('drop', {dataTransfer: data, bubbles: true, cancelable: true}));
+    }, [name, text]);
+    const before = await p.rest();
+    await drop('wedge one.obj', 'v -1 -1 0\nv 1 -1 0\nv 0 -2 0\nf 1 2 3\nf 3 2 1\n');
+    await said('wedge one.obj is in the scene');
+    await p.page.waitForSelector('#scene-list button:has-text("wedge one")');
+    await p.until('another image', async () => !(await p.rest()).jpeg.equals(before.jpeg));
+    await p.page.setInputFiles('#add-file', {name: 'again.obj', mimeType: 'text/plain', buffer: Buffer.from('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n')});
+    await said('again.obj is in the scene');
+    assert.equal(await p.page.locator('#scene-list li').count(), 5);
+    await drop('broken.obj', 'v 0 0\nf 1 2 3\n');
+    await said('broken.obj could not be added');
+    await drop('notes.txt', 'hello');
+    await said('notes.txt: a scene takes');
+    const file = JSON.parse(fs.readFileSync(await (await p.saved(() => p.page.click('#save-scene'))).path()));
+    assert.deepEqual(file.meshes.slice(2).map((m) => m.file), ['wedge one.obj', 'again.obj']);
+    await p.close();
+    const status = await fetch(`${server.look}add/a.obj`, {method: 'POST', body: 'v 0 0 0', headers: {origin: new URL(server.look).origin}});
+    assert.equal(status.status, 403);
+    await end(server);
+  },
+});
+
+export const scene = {...traced, ...changed, ...added};

@@ -16,6 +16,7 @@ import {featureLegend, featurePanel} from './features.js';
 import {imagePanel} from './image.js';
 import {cropBox} from './crop.js';
 import {scenePanel} from './scene.js';
+import {fileDrop} from './drop.js';
 import {ruler} from './measure.js';
 import {commandPanel} from './command.js';
 import {keyframes} from './path.js';
@@ -99,6 +100,7 @@ function welcome(message) {
   panel.offer('training', hello.training);
   panel.offer('scene', hello.scene !== null);
   scene.fill(hello.scene, hello);
+  $('add-row').hidden = hello.right !== 'control';
   training.rights(hello.right);
   modeChoice.offer((name) => hello.modes.includes(name));
   look.model(hello.background);
@@ -327,6 +329,7 @@ const scene = scenePanel({
   lightRows: $('light-rows'), strength: $('light-strength'), strengthNow: $('light-strength-now'), color: $('light-color'),
   place: $('scene-place'), onlooker: $('scene-onlooker'),
 }, {send: (message) => connection.send(message), changed: (moving) => view.changed(moving), redraw: draw}, say);
+fileDrop(stage, $('add-file'), () => (!hello?.scene ? 'gart view --scene opens a scene, this is a model' : hello.right === 'control' ? '' : 'this address may look, and not control'), say);
 const command = commandPanel({part: $('export'), text: $('command'), copy: $('copy')}, say);
 const measure = ruler({
   button: $('measure'), output: $('distance'), length: $('length'), scale: $('scale'), forget: $('forget-scale'),
