@@ -44,8 +44,9 @@ placed_splats placed(record const& r) {
 
 class scene_reader {
  public:
-  explicit scene_reader(fs::path const& path)
-      : path_(path), root_(io::read_json(path)), top_{root_, nullptr, path.string()} {
+  explicit scene_reader(fs::path const& path) : scene_reader(path, io::read_json(path)) {}
+  scene_reader(fs::path const& path, json root)
+      : path_(path), root_(std::move(root)), top_{root_, nullptr, path.string()} {
     require_keys(top_,
                  {"models", "up", "background", "meshes", "materials", "lights", "environment", "cameras", "options"});
   }
@@ -139,6 +140,7 @@ class scene_reader {
 
   void read_meshes() {
     named_ = out_.scene.materials.size();
+    int entry = 0;
     each("meshes", "mesh", [&](record const& r) {
       require_keys(r, {"name", "file", "shape", "translation", "rotation", "scale", "material"});
       if (r.has("file") == r.has("shape"))
@@ -168,6 +170,7 @@ class scene_reader {
       } else {
         io::append(out_.scene, std::move(part));
       }
+      out_.mesh_entries.resize(out_.scene.meshes.size(), entry++);
     });
   }
 
@@ -335,6 +338,12 @@ std::vector<placed_splats> read_scene_splats(fs::path const& path) {
   }
   if (ending_of(path) != ".json") return {};
   return scene_reader(path).splats();
+}
+
+scene_file read_scene_text(std::string const& text, fs::path const& path, vec3d const& origin) {
+  json root = json::parse(text, nullptr, false);
+  if (root.is_discarded()) throw io_error(path.string(), "is not valid JSON", "correct it");
+  return scene_reader(path, std::move(root)).read(origin);
 }
 
 scene_file read_scene(fs::path const& path, vec3d const& origin) {

@@ -30,7 +30,23 @@ json pairs_of(std::vector<std::pair<int, double>> const& points) {
   return list;
 }
 
+json parts_of(std::vector<view_part> const& parts) {
+  json list = json::array();
+  for (view_part const& p : parts) {
+    list.push_back({{"light", p.light}, {"name", p.name}, {"kind", p.kind}, {"place", list_of(p.place)}});
+    if (p.light)
+      list.back()["color"] = list_of(p.color);
+    else
+      list.back()["min"] = list_of(p.low), list.back()["max"] = list_of(p.high);
+  }
+  return list;
+}
+
 }  // namespace
+
+std::string scene_text(std::vector<view_part> const& parts) {
+  return text_of({{"type", "scene"}, {"parts", parts_of(parts)}});
+}
 
 std::string hello_text(view_scene const& scene, bool control) {
   vec3 const low = scene.bounds.low, high = scene.bounds.high, half = 0.5f * (high - low);
@@ -42,9 +58,14 @@ std::string hello_text(view_scene const& scene, bool control) {
     cameras.push_back(
         {{"index", i}, {"name", c.name}, {"test", c.test}, {"photo", c.photo}, {"camera", object_of(c.view, c.name)}});
   }
+  auto const offered = [&](view_mode mode) {
+    if (mode == view_mode::error) return photos && !scene.traced;
+    if (mode == view_mode::features) return scene.features > 0 && !scene.traced;
+    return mode != view_mode::hits || !scene.traced;
+  };
   json modes = json::array();
   for (auto const& one : names_of(view_mode{}))
-    if (one.value != view_mode::error || photos) modes.push_back(one.name);
+    if (offered(one.value)) modes.push_back(one.name);
   return text_of({{"type", "hello"},
                   {"version", 1},
                   {"gart", version},
@@ -54,6 +75,7 @@ std::string hello_text(view_scene const& scene, bool control) {
                     {"gaussians", scene.gaussians},
                     {"sh_degree", scene.sh_degree},
                     {"kernel_degree", scene.kernel_degree},
+                    {"features", scene.features},
                     {"min", list_of(low)},
                     {"max", list_of(high)},
                     {"center", list_of(low + half)},
@@ -65,6 +87,7 @@ std::string hello_text(view_scene const& scene, bool control) {
                   {"models", control ? scene.models : std::vector<std::string>()},
                   {"open", scene.model},
                   {"training", scene.training},
+                  {"scene", scene.traced ? parts_of(scene.parts) : json()},
                   {"background", list_of(scene.background)}});
 }
 
@@ -126,6 +149,7 @@ std::vector<u8> frame_bytes(frame_header const& h, std::vector<u8> const& image)
                                       {"mode", to_string(h.mode)},
                                       {"ms", h.milliseconds},
                                       {"still", h.still},
+                                      {"samples", {h.samples, h.samples_of}},
                                       {"scale", {h.low, h.high}}});
   static_assert(std::endian::native == std::endian::little);
   u32 const length = static_cast<u32>(header.size());

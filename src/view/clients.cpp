@@ -43,7 +43,8 @@ void clients::remove(int id) {
 
 void clients::counted() {
   count_ = static_cast<int>(clients_.size());
-  wishes_ = static_cast<int>(clients_.size() + actions_.size() + share_.has_value() + model_.has_value());
+  wishes_ = static_cast<int>(clients_.size() + actions_.size() + share_.has_value() + model_.has_value() +
+                             edits_.size() + file_.has_value());
 }
 
 verdict clients::receive(int id, std::string_view text, double now) {
@@ -59,11 +60,18 @@ verdict clients::receive(int id, std::string_view text, double now) {
   client& c = found->second;
   auto const index_in_range = [&](int i) { return i < static_cast<int>(scene_->cameras.size()); };
   auto const no_camera = verdict{policy_violation, "'photo' is no camera of the scene"};
+  auto const features_there = [&](view_settings const& s) {
+    return !s.features ||
+           std::all_of(s.features->begin(), s.features->end(), [&](int k) { return k < scene_->features; });
+  };
+  auto const no_feature = verdict{policy_violation, "'features' is no feature of the model"};
   if (auto* const view = std::get_if<view_message>(&message)) {
     if (view->photo && !index_in_range(*view->photo)) return no_camera;
-    c.view = std::move(*view), c.view_time = now, c.dirty = true, c.still_done = false, ++c.serial;
+    if (!features_there(view->settings)) return no_feature;
+    c.view = std::move(*view), c.view_time = now, c.dirty = true, c.still_done = c.growing = false, ++c.serial;
   } else if (auto* const image = std::get_if<image_message>(&message)) {
     if (image->photo && !index_in_range(*image->photo)) return no_camera;
+    if (!features_there(image->settings)) return no_feature;
     c.image = std::move(*image);
   } else if (auto* const pick = std::get_if<pick_message>(&message)) {
     c.pick = std::move(*pick);
@@ -72,6 +80,16 @@ verdict clients::receive(int id, std::string_view text, double now) {
   } else if (auto const* const model = std::get_if<model_message>(&message)) {
     bool const there = model->index < static_cast<int>(scene_->models.size());
     if (controls(c, "model", there, "there is no such model to open")) model_ = model->index;
+  } else if (auto const* const part = std::get_if<part_message>(&message)) {
+    part_edit const& e = part->edit;
+    bool const there = e.index < static_cast<int>(scene_->parts.size());
+    if (controls(c, "part", there, "there is no such part of the scene")) {
+      part_edit& kept = edits_[e.index];
+      kept.index = e.index;
+      if (e.place) kept.place = e.place;
+      if (e.material) kept.material = e.material;
+      if (e.color) kept.color = e.color;
+    }
   } else if (auto const* const train = std::get_if<train_message>(&message)) {
     if (controls(c, "train", scene_->training, "there is no training here") && actions_.size() < actions_most)
       actions_.push_back(train->action);
@@ -101,7 +119,10 @@ bool clients::take_text(int id, std::string& to) {
     changed_.notify_all();
     return true;
   }
-  std::string& newest = !c.status.empty() ? c.status : !c.curve.empty() ? c.curve : c.scores;
+  std::string& newest = !c.status.empty()  ? c.status
+                        : !c.curve.empty() ? c.curve
+                        : !c.parts.empty() ? c.parts
+                                           : c.scores;
   to = std::exchange(newest, std::string());
   return !to.empty();
 }
@@ -122,8 +143,8 @@ bool clients::take_frame(int id, std::vector<u8>& to, double now) {
 }
 
 bool clients::waits(client const& c) {
-  return !c.texts.empty() || !c.status.empty() || !c.curve.empty() || !c.scores.empty() || !c.frame.empty() ||
-         !c.file.empty();
+  return !c.texts.empty() || !c.status.empty() || !c.curve.empty() || !c.scores.empty() || !c.parts.empty() ||
+         !c.frame.empty() || !c.file.empty();
 }
 
 bool clients::has_output(int id) const {
@@ -153,7 +174,8 @@ int clients::moving(double now) const {
   return n;
 }
 
-// Single requests come first, then moving views, then views at rest, which take longer, and files last.
+// Single requests come first, then moving views, then views at rest, which take longer, then their further samples, and
+// files last.
 std::optional<job> clients::job_of(int id, client& c, double now, int urgency) {
   if (urgency == 0) {
     if (c.texts.size() >= answers_most) return {};
@@ -161,24 +183,27 @@ std::optional<job> clients::job_of(int id, client& c, double now, int urgency) {
     if (c.path) return job{id, *std::exchange(c.path, {})};
     return {};
   }
-  if (urgency == 3 && c.image && c.file.empty()) return job{id, *std::exchange(c.image, {})};
+  if (urgency == 4 && c.image && c.file.empty()) return job{id, *std::exchange(c.image, {})};
   if (!c.view || !c.frame.empty()) return {};
   int const width = c.view->view.width, height = c.view->view.height;
   if (urgency == 1 && c.dirty && !at_rest(c, now)) {
     c.dirty = false;
     c.pacing.start_from(pacing_);
     auto const [w, h] = c.pacing.size(width, height, 1000 * options_.frame_seconds / std::max(1, moving(now)));
-    return job{id, *c.view, c.serial, false, w, h};
+    return job{id, *c.view, c.serial, false, false, w, h};
   }
-  if (urgency == 2 && at_rest(c, now) && !c.still_done) {
+  if (urgency == 2 + c.growing && at_rest(c, now) && !c.still_done) {
+    // One goes on to its end before the next: two in turn would begin anew each time.
+    auto const grown = clients_.find(last_grown_);
+    if (c.growing && last_grown_ != id && grown != clients_.end() && grown->second.growing) return {};
     c.dirty = false, c.still_done = true;
-    return job{id, *c.view, c.serial, true, width, height};
+    return job{id, *c.view, c.serial, true, c.growing, width, height};
   }
   return {};
 }
 
 std::optional<job> clients::choose(double now) {
-  for (int urgency = 0; urgency < 4; ++urgency) {
+  for (int urgency = 0; urgency < 5; ++urgency) {
     // Each in turn, from the one after the last that was served.
     auto const first = clients_.upper_bound(last_served_);
     auto const serve = [&](auto from, auto to) -> std::optional<job> {
@@ -211,6 +236,7 @@ std::optional<job> clients::next_job(double now, double wait_seconds) {
   std::unique_lock lock(mutex_);
   for (;;) {
     double const passed = std::chrono::duration<double>(clock::now() - began).count();
+    if (!edits_.empty() || file_) return {};  // they come before the views that follow them
     if (auto found = choose(now + passed)) return found;
     double const left = std::min(wait_seconds - passed, next_rest(now + passed) + 1e-3);
     if (passed >= wait_seconds) return {};
@@ -241,16 +267,20 @@ void clients::finish_image(job const& done, std::vector<u8> bytes) {
   wake();
 }
 
-void clients::finish_frame(job const& done, std::vector<u8> bytes, double milliseconds) {
+void clients::finish_frame(job const& done, std::vector<u8> bytes, double milliseconds, bool unfinished) {
   {
     std::lock_guard const lock(mutex_);
     double const pixels = static_cast<double>(done.width) * done.height;
     pacing_.measured(milliseconds, pixels);
     auto const found = clients_.find(done.client);
     if (found == clients_.end()) return;
-    found->second.pacing.measured(milliseconds, pixels);
-    if (!found->second.view) return;  // the scene is another one by now
-    found->second.frame = std::move(bytes);
+    client& c = found->second;
+    c.pacing.measured(milliseconds, pixels);
+    if (!c.view) return;  // the scene is another one by now
+    c.frame = std::move(bytes);
+    bool const newest = c.serial == done.serial;
+    if (unfinished && newest) c.still_done = false, c.growing = true, last_grown_ = done.client;
+    if (!unfinished && newest) c.growing = false;
   }
   wake();
 }
@@ -296,15 +326,62 @@ std::optional<int> clients::next_model() {
   return asked;
 }
 
+// What comes from many moves of a handle is the last of them.
+std::optional<part_edit> clients::next_edit() {
+  std::lock_guard const lock(mutex_);
+  if (edits_.empty()) return {};
+  part_edit const first = edits_.begin()->second;
+  edits_.erase(edits_.begin());
+  counted();
+  return first;
+}
+
+std::optional<added_file> clients::next_file() {
+  std::lock_guard const lock(mutex_);
+  auto taken = std::exchange(file_, {});
+  counted();
+  return taken;
+}
+bool clients::file_waits() const {
+  std::lock_guard const lock(mutex_);
+  return file_.has_value();
+}
+bool clients::add_file(added_file file) {
+  {
+    std::lock_guard const lock(mutex_);
+    if (file_) return false;
+    file_ = std::move(file);
+    counted();
+  }
+  changed_.notify_all();
+  return true;
+}
+
+// Views at rest are rendered anew.
+void clients::set_parts(std::vector<view_part> parts, std::string scene_json) {
+  {
+    std::lock_guard const lock(mutex_);
+    view_scene next = *scene_;
+    next.parts = std::move(parts), next.scene_json = std::move(scene_json);
+    scene_ = std::make_shared<view_scene const>(std::move(next));
+    for (auto& [id, c] : clients_) {
+      c.parts = scene_text(scene_->parts);
+      c.dirty = c.view.has_value(), c.still_done = c.growing = false, ++c.serial;
+    }
+  }
+  changed_.notify_all();
+  wake();
+}
+
 // Cameras, photographs and picks of the scene before are no longer what they were.
 void clients::set_scene(view_scene scene) {
   {
     std::lock_guard const lock(mutex_);
     scene_ = std::make_shared<view_scene const>(std::move(scene));
-    scores_.clear();
+    scores_.clear(), edits_.clear();
     for (auto& [id, c] : clients_) {
       ++c.serial;
-      c.view = {}, c.image = {}, c.pick = {}, c.path = {}, c.frame = {}, c.scores = {}, c.dirty = false;
+      c.view = {}, c.image = {}, c.pick = {}, c.path = {}, c.frame = {}, c.scores = {}, c.parts = {}, c.dirty = false;
       c.texts.push_back(hello_text(*scene_, c.control));
     }
   }

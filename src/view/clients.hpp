@@ -21,6 +21,7 @@ struct job {
   std::variant<view_message, image_message, pick_message, path_message> wanted;
   u64 serial = 0;             // of the view among those of its client
   bool still = false;         // a view of full size
+  bool more = false;          // of one that was rendered before with fewer samples
   int width = 0, height = 0;  // that it is rendered at
 };
 
@@ -50,16 +51,22 @@ class clients {
   bool waited_for(job const& j) const;
   // Milliseconds that so many pixels of a view are expected to take; 0 where nothing is known.
   double expected_ms(double pixels) const;
-  void finish_frame(job const& done, std::vector<u8> bytes, double milliseconds);
+  // `milliseconds` are 0 where they say nothing of other views. Unfinished: more samples are to come.
+  void finish_frame(job const& done, std::vector<u8> bytes, double milliseconds, bool unfinished = false);
   void finish_image(job const& done, std::vector<u8> bytes);
   void send(int client, std::string text);
   std::optional<train_action> next_action();
   std::optional<double> next_share();
   std::optional<int> next_model();
+  std::optional<part_edit> next_edit();
+  std::optional<added_file> next_file();
+  bool file_waits() const;
+  bool add_file(added_file file);  // false: another one waits
   void set_status(view_status const& status);
   void set_curve(view_curve const& curve);
   void set_scores(std::vector<std::pair<int, double>> const& scores);
   void set_scene(view_scene scene);
+  void set_parts(std::vector<view_part> parts, std::string scene_json);
   void set_end(std::string why);
   std::string why_it_ends() const;
 
@@ -78,12 +85,13 @@ class clients {
     u64 serial = 0;                    // of it
     bool dirty = false;                // not rendered in any size
     bool still_done = false;           // rendered whole
+    bool growing = false;              // rendered whole, and better with every sample to come
     std::optional<image_message> image;
     std::optional<pick_message> pick;
     std::optional<path_message> path;
     std::deque<std::string> texts;
-    std::string status, curve, scores;  // the newest, to be sent
-    std::vector<u8> frame, file;        // the newest, to be sent
+    std::string status, curve, scores, parts;  // the newest, to be sent
+    std::vector<u8> frame, file;               // the newest, to be sent
     frame_pacing pacing;
   };
   static bool waits(client const& c);  // whether there is something to send to it
@@ -103,11 +111,14 @@ class clients {
   std::map<int, client> clients_;
   std::atomic<int> count_ = 0, wishes_ = 0;  // clients; they and what they asked of the training
   int next_id_ = 1, last_served_ = 0;
+  int last_grown_ = 0;   // the client whose view the last samples were of
   frame_pacing pacing_;  // of all: what a new client starts from
   std::string status_, curve_, scores_, end_ = "gart ends";
   std::deque<train_action> actions_;
   std::optional<double> share_;
   std::optional<int> model_;
+  std::map<int, part_edit> edits_;  // of each part the newest
+  std::optional<added_file> file_;
 };
 
 }  // namespace gart::view

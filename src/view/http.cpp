@@ -1,6 +1,7 @@
 #include "http.hpp"
 
 #include <algorithm>
+#include <charconv>
 
 namespace gart::view {
 
@@ -33,6 +34,8 @@ char const* reason_of(int status) {
       return "Switching Protocols";
     case 200:
       return "OK";
+    case 202:
+      return "Accepted";
     case 400:
       return "Bad Request";
     case 403:
@@ -41,6 +44,10 @@ char const* reason_of(int status) {
       return "Not Found";
     case 405:
       return "Method Not Allowed";
+    case 413:
+      return "Content Too Large";
+    case 415:
+      return "Unsupported Media Type";
     default:
       return "Service Unavailable";
   }
@@ -94,8 +101,11 @@ head_state take_request(std::string& came, http_request& to) {
   }
   to.last = to.last || to.lists("connection", "close");
   std::string_view const length = to.header("content-length");
-  bool const body = !to.header("transfer-encoding").empty() || !(length.empty() || length == "0");
-  return body ? head_state::wrong : head_state::whole;
+  if (!to.header("transfer-encoding").empty()) return head_state::wrong;
+  if (length.empty() || length == "0") return head_state::whole;
+  auto const [stop, fault] = std::from_chars(length.data(), length.data() + length.size(), to.body_bytes);
+  bool const known = fault == std::errc() && stop == length.data() + length.size();
+  return known && to.method == "POST" ? head_state::whole : head_state::wrong;
 }
 
 std::string answer_head(int status, std::vector<std::string> const& headers) {

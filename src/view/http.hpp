@@ -1,6 +1,6 @@
 #pragma once
-// Reads requests of HTTP/1.1 (browsers) and HTTP/1.0 (some proxies) strictly, and writes heads of answers. No request
-// has a body here.
+// Reads requests of HTTP/1.1 (browsers) and HTTP/1.0 (some proxies) strictly, and writes heads of answers. A POST alone
+// has a body.
 
 #include <cstddef>
 #include <string>
@@ -17,6 +17,7 @@ struct http_request {
   std::string method, path;
   std::vector<std::pair<std::string, std::string>> headers;  // names in small letters
   bool last = false;                                         // whether the connection ends with its answer
+  std::size_t body_bytes = 0;                                // that follow the head
 
   // Empty where there is none.
   std::string_view header(std::string_view name) const;
@@ -27,7 +28,7 @@ struct http_request {
 enum class head_state { unfinished, whole, wrong };
 
 // Takes a request's head off the front of what came, once it is all there. Wrong: no HTTP/1, too long, two hosts or
-// origins, or with a body.
+// origins, or a body that is no POST's or of no known length.
 head_state take_request(std::string& came, http_request& to);
 
 // The head of an answer: "HTTP/1.1 200 OK" and its headers, one a line, "Name: value".

@@ -146,6 +146,19 @@ image8 error_in_colors(image_float const& map, float high) {
   return out;
 }
 
+image8 features_in_colors(rendered const& r) {
+  image_float out(r.transmittance.width, r.transmittance.height, 3);
+  std::size_t const channels = static_cast<std::size_t>(r.features.channels);
+  for (std::size_t p = 0; p < r.transmittance.data.size(); ++p) {
+    float const seen = 1 - r.transmittance.data[p];
+    if (!(seen >= 0.5f)) continue;
+    float const* const own = &r.features.data[channels * p];
+    vec3 const c = channels == 1 ? shade_of(own[0] / seen) : vec3(own[0], own[1], own[2]) / seen;
+    for (int k = 0; k < 3; ++k) out.data[3 * p + static_cast<std::size_t>(k)] = std::clamp(c[k], 0.0f, 1.0f);
+  }
+  return to_8bit(out);
+}
+
 image_float error_between(image_float const& color, image8 const& photo, vec3 background) {
   image_float out(color.width, color.height, 1);
   float const sx = static_cast<float>(photo.width) / static_cast<float>(color.width),
@@ -192,6 +205,12 @@ shown_image shown(rendered const& r, camera const& view, view_mode mode, image8 
         throw invalid_argument("view_mode::error: there is no photograph of this view (name a camera that has one)");
       out.high = default_error_scale;
       out.image = error_in_colors(error_between(r.color, *photo, background), out.high);
+      break;
+    case view_mode::features:
+      if (r.features.channels != 1 && r.features.channels != 3)
+        throw invalid_argument("view_mode::features: there are no features to show (give one or three)");
+      out.high = 1;
+      out.image = features_in_colors(r);
       break;
   }
   return out;

@@ -2,6 +2,8 @@
 
 #include <gart/core/error.hpp>
 #include <gart/io/camera_file.hpp>
+#include <gart/light/scene.hpp>
+#include <gart/scene/features.hpp>
 #include <gart/view/message.hpp>
 
 #include <nlohmann/json.hpp>
@@ -117,6 +119,19 @@ class fields {
     if (json const* const shape = find("shape"); shape && !shape->is_null()) s.shape = name<view_shape>("shape");
     return s;
   }
+  // Of a view in the mode of features: the places of one or three; of none, principal directions.
+  std::optional<std::vector<int>> features(view_mode mode) {
+    std::vector<int> places;
+    if (json const* const list = find("features"); list && !list->is_null()) {
+      if (!list->is_array() || (list->size() != 1 && list->size() != 3)) refuse("features", "is not a list of 1 or 3");
+      for (json const& one : *list) {
+        double const place = in_range(one, "features", 0, most_features - 1);
+        if (place != std::floor(place)) refuse("features", "holds a number that is not whole");
+        places.push_back(static_cast<int>(place));
+      }
+    }
+    return mode == view_mode::features ? std::optional(places) : std::nullopt;
+  }
   std::optional<int> photo() {
     json const* const index = find("photo");
     return index && !index->is_null() ? std::optional(whole("photo", 0, 1 << 24)) : std::nullopt;
@@ -167,14 +182,14 @@ client_message parse_message(std::string_view text) {
   if (type == "view") {
     view_message m;
     m.id = f.id(), m.view = f.view("camera"), m.mode = f.name<view_mode>("mode"), m.moving = f.flag("moving");
-    m.settings = f.settings(), m.photo = f.photo();
+    m.settings = f.settings(), m.photo = f.photo(), m.settings.features = f.features(m.mode);
     out = m;
   } else if (type == "image") {
     image_message m;
     m.id = f.id(), m.view = f.view("camera", image_size_most), m.mode = f.name<view_mode>("mode");
     if (static_cast<double>(m.view.width) * m.view.height > image_pixels_most)
       refuse("camera", "has more than " + std::to_string(image_pixels_most) + " pixels");
-    m.settings = f.settings(), m.photo = f.photo();
+    m.settings = f.settings(), m.photo = f.photo(), m.settings.features = f.features(m.mode);
     out = m;
   } else if (type == "pick") {
     pick_message m;
@@ -193,12 +208,25 @@ client_message parse_message(std::string_view text) {
     out = m;
   } else if (type == "model") {
     out = model_message{f.whole("index", 0, 1 << 24)};
+  } else if (type == "part") {
+    part_edit e;
+    e.index = f.whole("index", 0, 1 << 24);
+    if (json const* const place = f.find("place")) e.place = fields::point(*place, "place");
+    if (f.find("material")) {
+      e.material = f.text("material");
+      if (*e.material != "own") f.name<light::material_kind>("material");
+    }
+    if (json const* const color = f.find("color")) {
+      e.color = fields::point(*color, "color");
+      for (int k = 0; k < 3; ++k) fields::in_range((*color)[static_cast<std::size_t>(k)], "color", 0, 1e12);
+    }
+    out = part_message{e};
   } else if (type == "train") {
     out = train_message{f.name<train_action>("action")};
   } else if (type == "share") {
     out = share_message{f.number("value", 0.01, 1)};
   } else {
-    refuse("type", "is none of view, image, pick, path, model, train, share");
+    refuse("type", "is none of view, image, pick, path, model, part, train, share");
   }
   f.done();
   return out;

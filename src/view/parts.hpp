@@ -34,6 +34,7 @@ void take_rows(basic_image<T>& to, basic_image<T> const& from, image_rows rows) 
 inline void take_rows(rendered& to, rendered const& from, image_rows rows) {
   take_rows(to.color, from.color, rows), take_rows(to.transmittance, from.transmittance, rows);
   take_rows(to.depth, from.depth, rows), take_rows(to.hits, from.hits, rows);
+  if (!from.features.empty()) take_rows(to.features, from.features, rows);
 }
 
 // By render(settings), part by part while it is wanted; none where it is not.

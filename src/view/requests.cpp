@@ -6,11 +6,14 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iterator>
 
 namespace gart::view {
 
 namespace {
 
+// What a scene takes: one file each, which names no others.
+constexpr char const* added_endings[] = {".glb", ".obj", ".ply", ".hdr", ".exr"};
 constexpr int thumbnail_side = 192;  // pixels, at most, of the longer side
 
 image8 opaque(image8 const& image, vec3 background) {
@@ -81,6 +84,8 @@ http_answer requests::answer(http_request const& asked) const {
   std::string const name = path.rest.empty() ? "index.html" : path.rest.substr(0, path.rest.find('?'));
   if (page_file const* const file = find_page_file(name))
     return {200, content_type_of(name), std::string(reinterpret_cast<char const*>(file->bytes), file->size), {}};
+  if (auto const scene = all_.scene(); name == "scene.json" && !scene->scene_json.empty())
+    return {200, "application/json", scene->scene_json, {}};
   try {
     std::vector<u8> const jpeg = photograph(name);
     if (!jpeg.empty()) return {200, "image/jpeg", std::string(jpeg.begin(), jpeg.end()), {}};
@@ -88,6 +93,42 @@ http_answer requests::answer(http_request const& asked) const {
     return refusal(404, "this photograph cannot be read", "a photograph could not be sent: " + std::string(e.what()));
   }
   return refusal(404, "there is no such file");
+}
+
+// The name of a file as its sender has it, without a folder.
+std::string requests::sent_name(http_request const& asked) const {
+  std::string const coded = gate_.path_of(asked.path).rest.substr(std::string_view("add/").size());
+  std::string name;
+  for (std::size_t i = 0; i < coded.size(); ++i) {
+    unsigned value = 0;
+    bool const is_code = coded[i] == '%' && i + 2 < coded.size() &&
+                         std::from_chars(&coded[i + 1], &coded[i + 1] + 2, value, 16).ptr == &coded[i + 1] + 2;
+    name += is_code ? static_cast<char>(value) : coded[i];
+    if (is_code) i += 2;
+  }
+  name = name.substr(name.find_last_of("/\\") + 1);
+  std::erase_if(name, [](unsigned char c) { return c < ' ' || c == 0x7f; });
+  return name.size() > 100 ? name.substr(name.size() - 100) : name;
+}
+
+http_answer requests::may_send(http_request const& asked) const {
+  auto const refusal = [](int status, std::string const& why) {
+    return http_answer{status, "text/plain; charset=utf-8", why + "\n", {}};
+  };
+  request_path const path = gate_.path_of(asked.path);
+  if (path.of == access_right::none || !from_here(asked, true)) return refusal(403, "403: not let in");
+  if (path.of != access_right::control) return refusal(403, "this address may look, and not control");
+  if (!path.rest.starts_with("add/")) return refusal(405, "files are sent to add/NAME");
+  if (!all_.scene()->traced) return refusal(403, "there is no scene to add to");
+  std::string const name = lower(sent_name(asked));
+  if (std::none_of(std::begin(added_endings), std::end(added_endings),
+                   [&](char const* e) { return name.ends_with(e); }))
+    return refusal(415, "a scene takes .glb, .obj and .ply meshes and .hdr and .exr images");
+  if (asked.body_bytes == 0) return refusal(400, "the file is empty");
+  if (asked.body_bytes > added_bytes_most)
+    return refusal(413, "the file is larger than " + std::to_string(added_bytes_most >> 20) + " MiB");
+  if (all_.file_waits()) return refusal(503, "another file is on its way: send this one again in a moment");
+  return {202, "text/plain; charset=utf-8", "taken\n", {}};
 }
 
 int requests::upgrade(http_request const& asked) const {

@@ -22,6 +22,10 @@ class requests {
       : gate_(gate), all_(all), options_(options) {}
 
   http_answer answer(http_request const& asked) const;
+  // Before the body of a POST is read: 202 where it is taken.
+  http_answer may_send(http_request const& asked) const;
+  // That of a file that was sent.
+  std::string sent_name(http_request const& asked) const;
   // The status by which a WebSocket is refused; 101 where it is let in.
   int upgrade(http_request const& asked) const;
   access_right right_of(http_request const& asked) const { return gate_.path_of(asked.path).of; }

@@ -1,5 +1,7 @@
 // What a viewer is told of a model, and a part of a model.
 
+#include "bulk_range.hpp"
+
 #include <gart/view/scene.hpp>
 
 #include <algorithm>
@@ -7,23 +9,6 @@
 #include <tuple>
 
 namespace gart {
-
-namespace {
-
-// The values between which all but a hundredth on either side lie.
-std::pair<float, float> robust_range(std::vector<float> values) {
-  std::erase_if(values, [](float v) { return !std::isfinite(v); });
-  if (values.empty()) return {-1.0f, 1.0f};
-  auto const at = [&](std::size_t hundredth) {
-    auto const place = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) * hundredth / 100);
-    std::nth_element(values.begin(), place, values.end());
-    return *place;
-  };
-  float const low = at(1);
-  return {low, at(99)};
-}
-
-}  // namespace
 
 float extent_of(view_scene const& scene) {
   vec3 const half = 0.5f * (scene.bounds.high - scene.bounds.low);
@@ -38,7 +23,7 @@ view_scene scene_of(std::string name, gaussian_model const& model, int kernel_de
   std::vector<float> along(model.size());
   for (int k = 0; k < 3; ++k) {
     for (std::size_t i = 0; i < model.size(); ++i) along[i] = model.mean[3 * i + static_cast<std::size_t>(k)];
-    std::tie(scene.bounds.low[k], scene.bounds.high[k]) = robust_range(along);
+    std::tie(scene.bounds.low[k], scene.bounds.high[k]) = view::bulk_range(along, {-1.0f, 1.0f});
   }
   vec3 up(0.0f);
   for (view_camera const& c : cameras) up -= c.view.rotation[1];

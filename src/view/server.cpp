@@ -11,6 +11,7 @@
 #include <gart/view/server.hpp>
 
 #include <chrono>
+#include <tuple>
 
 namespace gart {
 
@@ -56,6 +57,10 @@ struct view_server::state {
   view_server_options options;
   view::clients all;
   view::sockets listener;
+  struct {
+    int client = 0;
+    u64 serial = 0;
+  } grown;  // the view that the renderer has samples of
 
   state(view_scene scene, view_server_options const& o)
       : options(o), all(std::move(scene), options), listener(all, options) {}
@@ -75,30 +80,48 @@ struct view_server::state {
     auto const all_of_it =
         in_parts(parts, wanted, m.settings, [&](view_settings const& s) { return render.images(view, s); });
     if (!all_of_it) return {};
-    return shown(*all_of_it, view, m.mode, photo ? &*photo : nullptr,
-                 m.settings.background.value_or(all.scene()->background));
+    shown_image out = shown(*all_of_it, view, m.mode, photo ? &*photo : nullptr,
+                            m.settings.background.value_or(all.scene()->background));
+    if (m.mode == view_mode::features && render.feature_range)
+      std::tie(out.low, out.high) = render.feature_range(m.settings);
+    return out;
   }
 
-  void answer(view::job const& j, view_message const& m, view_render const& render) {
+  void answer(view::job const& j, view_message const& asked, view_render const& render) {
+    view_message m = asked;
+    bool const grows = m.mode == view_mode::colour && render.samples;
+    bool const goes_on = j.more && grown.client == j.client && grown.serial == j.serial;
+    m.settings.effort = !j.still ? view_effort::draft : goes_on ? view_effort::more : view_effort::begun;
     camera const view = j.still ? m.view : resized(m.view, j.width, j.height);
     auto const start = clock::now();
     auto const image = seen(j, m, view, render);
     if (!image) return;
     std::vector<u8> const jpeg = encode_jpeg(image->image, j.still ? quality_still : quality_moving);
     double const ms = std::chrono::duration<double, std::milli>(clock::now() - start).count();
-    frame_header const header{m.id, view.width, view.height, m.view.width, m.view.height, m.mode,
-                              ms,   j.still,    false,       image->low,   image->high};
-    all.finish_frame(j, frame_bytes(header, jpeg), ms);
+    frame_header header{m.id, view.width, view.height, m.view.width, m.view.height, m.mode,
+                        ms,   j.still,    false,       image->low,   image->high};
+    if (grows) std::tie(header.samples, header.samples_of) = render.samples();
+    bool const unfinished = j.still && header.samples < header.samples_of;
+    header.still = j.still && !unfinished;
+    if (unfinished) grown = {j.client, j.serial};
+    all.finish_frame(j, frame_bytes(header, jpeg), grows && j.still ? 0 : ms, unfinished);
   }
 
-  void answer(view::job const& j, image_message const& m, view_render const& render) {
+  void answer(view::job const& j, image_message const& asked, view_render const& render) {
+    image_message m = asked;
     auto const start = clock::now();
-    auto const image = seen(j, m, m.view, render);
+    auto image = seen(j, m, m.view, render);
+    frame_header header{m.id, m.view.width, m.view.height, m.view.width, m.view.height, m.mode, 0, true, true};
+    while (image && m.mode == view_mode::colour && render.samples) {
+      std::tie(header.samples, header.samples_of) = render.samples();
+      if (header.samples >= header.samples_of) break;
+      m.settings.effort = view_effort::more;
+      image = all.waited_for(j) ? seen(j, m, m.view, render) : std::nullopt;
+    }
     if (!image) return;
     std::vector<u8> const png = encode_png(image->image);
-    double const ms = std::chrono::duration<double, std::milli>(clock::now() - start).count();
-    frame_header const header{m.id, m.view.width, m.view.height, m.view.width, m.view.height, m.mode,
-                              ms,   true,         true,          image->low,   image->high};
+    header.milliseconds = std::chrono::duration<double, std::milli>(clock::now() - start).count();
+    header.low = image->low, header.high = image->high;
     all.finish_image(j, frame_bytes(header, png));
   }
 
@@ -131,6 +154,7 @@ double view_server::render_next(view_render const& render, double wait_seconds) 
   auto const job = state_->all.next_job(seconds_now(), wait_seconds);
   if (!job) return 0;
   double const start = seconds_now();
+  if (!job->more) state_->grown = {};
   try {
     std::visit([&](auto const& message) { state_->answer(*job, message, render); }, job->wanted);
   } catch (std::exception const& e) {
@@ -149,6 +173,11 @@ void view_server::tell(std::string const& note) { state_->all.send_all(note_text
 void view_server::tell_at_end(std::string why) { state_->all.set_end(std::move(why)); }
 void view_server::set_scene(view_scene scene) { state_->all.set_scene(std::move(scene)); }
 std::optional<int> view_server::next_model() { return state_->all.next_model(); }
+std::optional<part_edit> view_server::next_edit() { return state_->all.next_edit(); }
+std::optional<added_file> view_server::next_file() { return state_->all.next_file(); }
+void view_server::set_parts(std::vector<view_part> parts, std::string scene_json) {
+  state_->all.set_parts(std::move(parts), std::move(scene_json));
+}
 std::optional<double> view_server::next_share() { return state_->all.next_share(); }
 
 }  // namespace gart

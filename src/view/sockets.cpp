@@ -19,6 +19,7 @@
 #include <cerrno>
 #include <chrono>
 #include <list>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -69,11 +70,12 @@ struct connection {
   double said = 0;      // when the viewer's last message came
   bool pinged = false;  // since it was heard
   phase now = open;
-  double ends = 0;       // when a close is given up
-  std::string came;      // what is not read yet
-  std::string out;       // what is not sent yet
-  std::size_t sent = 0;  // of it
-  double moved = 0;      // when the system took some of it, or it began
+  double ends = 0;                    // when a close is given up
+  std::string came;                   // what is not read yet
+  std::string out;                    // what is not sent yet
+  std::size_t sent = 0;               // of it
+  double moved = 0;                   // when the system took some of it, or it began
+  std::optional<http_request> sends;  // a file: what came is its body
   ws::reader messages{message_bytes};
 };
 
@@ -173,12 +175,13 @@ struct sockets::state {
     if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) return drop(c);
     if (n <= 0 || c.now != connection::open) return;
     c.came.append(bytes, static_cast<std::size_t>(n));
-    if (c.client) c.heard = seconds_now(), c.pinged = false;
+    if (c.client || c.sends) c.heard = seconds_now(), c.pinged = false;
     understand(c);
   }
 
   void understand(connection& c) {
     while (c.now == connection::open && !c.client && c.out.empty()) {
+      if (c.sends && !take_file(c)) return;
       http_request asked;
       head_state const is = take_request(c.came, asked);
       if (is == head_state::unfinished) return;
@@ -194,8 +197,27 @@ struct sockets::state {
     }
   }
 
+  // Whether all of it is there.
+  bool take_file(connection& c) {
+    if (c.came.size() < c.sends->body_bytes) return false;
+    http_request const asked = *std::exchange(c.sends, {});
+    auto const end = c.came.begin() + static_cast<std::ptrdiff_t>(asked.body_bytes);
+    bool const taken = all.add_file({answers.sent_name(asked), std::vector<u8>(c.came.begin(), end)});
+    std::string(end, c.came.end()).swap(c.came);
+    http_answer a{202, "text/plain; charset=utf-8", "taken\n", {}};
+    if (!taken) a.status = 503, a.body = "another file is on its way: send this one again in a moment\n";
+    respond(c, asked, a);
+    return c.now == connection::open && c.out.empty();
+  }
+
   void request(connection& c, http_request const& asked) {
     c.heard = seconds_now();
+    if (asked.method == "POST") {
+      http_answer const a = answers.may_send(asked);
+      if (a.status != 202) return respond(c, asked, a);
+      c.sends = asked;
+      return;
+    }
     if (asked.header("upgrade").empty()) return respond(c, asked, answers.answer(asked));
     int status = answers.upgrade(asked);
     if (status == 101 && !has_room()) status = 503;
@@ -207,7 +229,7 @@ struct sockets::state {
 
   void respond(connection& c, http_request const& asked, http_answer const& a) {
     if (!a.log.empty()) log(a.log);
-    bool const stays = (a.status == 200 || a.status == 404) && !asked.last;
+    bool const stays = (a.status == 200 || a.status == 202 || a.status == 404) && !asked.last;
     auto headers = answers.safe_headers(asked);
     headers.insert(headers.end(), {"content-type: " + a.type, "content-length: " + std::to_string(a.body.size()),
                                    stays ? "connection: keep-alive" : "connection: close"});

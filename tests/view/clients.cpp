@@ -100,6 +100,20 @@ TEST_CASE("another model is opened by who may control, and its scene told to all
   CHECK(texts_of(looks) == R"({"psnr":[[3,21.5]],"type":"scores"})");
 }
 
+TEST_CASE("features that the model has not close the connection") {
+  gart::view_server_options const options;
+  gart::view_scene with = scene();
+  with.features = 3;
+  gart::view::clients all(with, options);
+  int const a = all.add(false);
+  auto const asked = [&](std::string const& places) {
+    std::string text = view_text(camera_at({0, 0, 0}), false, 1, ",\"features\":" + places);
+    return all.receive(a, text.replace(text.find("colour"), 6, "features"), 0).reason;
+  };
+  CHECK(asked("[2]").empty());
+  CHECK(asked("[0,1,3]").find("'features'") != std::string::npos);
+}
+
 TEST_CASE("parts are whole tiles, cover every row once, and end where nobody waits") {
   for (int height : {1, 31, 32, 33, 500, 4096})
     for (double ms : {0.0, 100.0, 1100.0, 1e6}) {

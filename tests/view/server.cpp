@@ -367,6 +367,39 @@ TEST_CASE("a page that is silent makes room where all places are taken") {
   CHECK(is(fourth.ask(r.upgrade(r.path() + "socket", r.host(), "http://" + r.host())), 503));
 }
 
+TEST_CASE("files for a scene are taken from who may control, whole and by their size") {
+  running plain;
+  auto const post = [](running const& r, std::string const& name, std::string const& body, bool control = true,
+                       std::string const& length = "") {
+    return "POST " + r.path(control) + "add/" + name + " HTTP/1.1\r\nHost: " + r.host() + "\r\nOrigin: http://" +
+           r.host() + "\r\nContent-Length: " + (length.empty() ? std::to_string(body.size()) : length) + "\r\n\r\n" +
+           body;
+  };
+  auto const answer = [](running const& r, std::string const& request) {
+    socket_client c(r.server.port());
+    return c.ask(request);
+  };
+  CHECK(is(answer(plain, post(plain, "a.obj", "v 0 0 0")), 403));  // there is no scene
+  gart::view_scene scene = running::scene_with(false);
+  scene.traced = true;
+  plain.server.set_scene(scene);
+  CHECK(is(answer(plain, post(plain, "a.obj", "v 0 0 0", false)), 403));
+  CHECK(is(answer(plain, post(plain, "a.txt", "v 0 0 0")), 415));
+  CHECK(is(answer(plain, post(plain, "a.obj", "", true, "67108865")), 413));
+  CHECK(is(answer(plain, post(plain, "a.obj", "")), 400));
+  std::string foreign = post(plain, "a.obj", "v 0 0 0");
+  foreign.replace(foreign.find("Origin: http://"), 15, "Origin: http://evil.");
+  CHECK(is(answer(plain, foreign), 403));
+  CHECK_FALSE(plain.server.next_file());
+  CHECK(is(answer(plain, post(plain, "..%2Fa%20b.OBJ", "v 0 0 0\n")), 202));
+  CHECK(is(answer(plain, post(plain, "b.obj", "v")), 503));  // one waits at a time
+  auto const file = plain.server.next_file();
+  REQUIRE(file);
+  CHECK(file->name == "a b.OBJ");
+  CHECK(std::string(file->bytes.begin(), file->bytes.end()) == "v 0 0 0\n");
+  CHECK(is(answer(plain, post(plain, "b.obj", "v")), 202));
+}
+
 TEST_CASE("connections that say nothing, or half of it, lock nobody out") {
   running r;
   auto const watches = r.client();

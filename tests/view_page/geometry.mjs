@@ -23,16 +23,18 @@ export function isRotation(camera, within = 1e-9) {
   return apart(cross, f) < within && Math.abs(length(r) - 1) < within && Math.abs(dot(r, d)) < within;
 }
 
-// A splat PLY of round, opaque Gaussians of SH degree 0: [x, y, z, radius, [r, g, b]] each.
+// A splat PLY of round, opaque Gaussians of SH degree 0: [x, y, z, radius, [r, g, b], features] each.
 export function splatPly(gaussians) {
+  const features = (gaussian) => gaussian[5] ?? [];
   const names = ['x', 'y', 'z', 'f_dc_0', 'f_dc_1', 'f_dc_2', 'opacity', 'scale_0', 'scale_1', 'scale_2', 'rot_0', 'rot_1',
-    'rot_2', 'rot_3'];
+    'rot_2', 'rot_3', ...features(gaussians[0]).map((_, i) => `feature_${i}`)];
   const head = `ply\nformat binary_little_endian 1.0\nelement vertex ${gaussians.length}\n` +
     names.map((name) => `property float ${name}\n`).join('') + 'end_header\n';
   const body = Buffer.alloc(4 * names.length * gaussians.length);
-  gaussians.forEach(([x, y, z, radius, color], i) => {
+  gaussians.forEach((gaussian, i) => {
+    const [x, y, z, radius, color] = gaussian;
     const s = Math.log(radius), dc = color.map((c) => (c - 0.5) / 0.28209479177387814);
-    [x, y, z, ...dc, 8, s, s, s, 1, 0, 0, 0].forEach((v, k) => body.writeFloatLE(v, 4 * (i * names.length + k)));
+    [x, y, z, ...dc, 8, s, s, s, 1, 0, 0, 0, ...features(gaussian)].forEach((v, k) => body.writeFloatLE(v, 4 * (i * names.length + k)));
   });
   return Buffer.concat([Buffer.from(head), body]);
 }

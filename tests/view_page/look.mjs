@@ -1,7 +1,10 @@
 // How the model is drawn, and that every mode and control is in reach.
 
 import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import path from 'node:path';
 import {meanOf, openPage} from './browser.mjs';
+import {splatPly} from './geometry.mjs';
 import {onEach} from './screens.mjs';
 
 // A slider has powers of two.
@@ -62,6 +65,63 @@ export const look = onEach({
       assert.equal((await p.rest()).header.mode, mode);
     }
     await p.close();
+  },
+
+  async 'features are shown as one scale, as three colours and as directions'({browser, server, gart, work}, screen) {
+    const ball = (x, i) => [x, 0, 0, 0.3, [0.5, 0.5, 0.5], [i, 10 - i, i % 2, 5]];
+    fs.writeFileSync(path.join(work, 'features.ply'), splatPly([-1.5, -0.5, 0.5, 1.5].map(ball)));
+    const own = await gart.serve('view', 'features.ply', '--backend', 'serial');
+    const p = await openPage(browser, own.look, screen);
+    assert.equal(p.received[0].model.features, 4);
+    if (!(await p.page.isVisible('#panel-view'))) await p.tab('view');
+    assert.equal(await p.page.isVisible('#feature-choice'), false);
+    const colour = await p.rest();
+    await p.choose('features');
+    const directions = await p.rest();
+    assert.equal(directions.view.features, null);
+    assert.ok(!directions.jpeg.equals(colour.jpeg));
+    const what = () => p.page.textContent('#legend .what');
+    assert.match(await what(), /first three principal directions of 4 features/);
+    assert.equal(await p.page.isVisible('#legend .bar'), false);
+
+    await p.page.selectOption('#feature-kind', 'one');
+    const first = await p.rest();
+    assert.deepEqual(first.view.features, [0]);
+    assert.match(await what(), /feature 0, mean along the ray/);
+    assert.deepEqual(await p.page.$$eval('#legend .ends span', (all) => all.map((e) => e.textContent)), ['0', '2']);
+    await p.page.locator('#feature-places input').first().fill('1');
+    await p.page.keyboard.press('Enter');
+    const second = await p.rest();
+    assert.deepEqual(second.view.features, [1]);
+    assert.ok(!second.jpeg.equals(first.jpeg));
+    // A number that no feature has is put right.
+    await p.page.locator('#feature-places input').first().fill('4');
+    await p.page.keyboard.press('Enter');
+    assert.equal(await p.page.locator('#feature-places input').first().inputValue(), '1');
+
+    await p.page.selectOption('#feature-kind', 'three');
+    const three = await p.rest();
+    assert.deepEqual(three.view.features, [1, 1, 2]);
+    assert.match(await what(), /Red, green and blue: features 1, 1, 2/);
+    assert.equal(await p.page.locator('#feature-places input:visible').count(), 3);
+    const places = await p.page.locator('#feature-places').boundingBox();
+    assert.ok(places.x + places.width <= screen.viewport.width);
+    await p.page.screenshot({path: path.join(work, `features-${screen.viewport.width}.png`)});
+
+    // A reload keeps them; colours are as before.
+    await p.page.reload();
+    await p.message('hello');
+    assert.deepEqual((await p.rest()).view.features, [1, 1, 2]);
+    if (!(await p.page.isVisible('#panel-view'))) await p.tab('view');
+    await p.choose('colour');
+    await p.close();
+    const other = await openPage(browser, server.look, screen);
+    if (!(await other.page.isVisible('#panel-view'))) await other.tab('view');
+    assert.equal(await other.page.locator('#modes label:has(input[value=hits])').isVisible(), true);
+    assert.equal(await other.page.locator('#modes label:has(input[value=features])').isVisible(), false);
+    await other.close();
+    own.child.kill('SIGTERM');
+    await own.ended;
   },
 
   async 'nothing is wider than its place, and all of it can be scrolled to'({browser, server}, screen) {

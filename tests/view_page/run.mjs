@@ -15,6 +15,7 @@ import {look} from './look.mjs';
 import {kept} from './kept.mjs';
 import {files} from './files.mjs';
 import {report} from './report.mjs';
+import {scene} from './scene.mjs';
 
 const [, , program, folder, executablePath, ...wanted] = process.argv;
 const {chromium} = createRequire(path.join(path.resolve(folder), 'here.js'))('playwright-core');
@@ -39,7 +40,7 @@ const server = await gart.serve('view', 'run/model.ply', 'capture', '--backend',
 const world = {gart, browser, server, work};
 
 let failed = 0;
-for (const [name, body] of Object.entries({...navigation, ...images, ...cameras, ...tools, ...paths, ...people, ...look, ...files, ...kept, ...report, ...training})) {
+for (const [name, body] of Object.entries({...navigation, ...images, ...cameras, ...tools, ...paths, ...people, ...look, ...files, ...kept, ...scene, ...report, ...training})) {
   if (wanted.length && !wanted.some((word) => name.includes(word))) continue;
   const from = Date.now();
   try {

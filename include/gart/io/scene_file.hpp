@@ -31,6 +31,7 @@ struct placed_splats {
 /// The contents of a scene's file besides its splats.
 struct scene_file {
   light::scene scene;                 ///< its meshes and lights, less the origin
+  std::vector<int> mesh_entries;      ///< [scene.meshes]: places in the "meshes" of a scene.json; else empty
   light::path_options paths;          ///< by its "options", else the defaults
   std::optional<vec3> background;     ///< linear RGB
   std::vector<named_camera> cameras;  ///< in the world; may be none
@@ -42,5 +43,8 @@ std::vector<placed_splats> read_scene_splats(std::filesystem::path const& path);
 
 /// All but the splats, which stand in the world less `origin` (io/origin.hpp).
 scene_file read_scene(std::filesystem::path const& path, vec3d const& origin = vec3d(0.0));
+/// The same of the text of a scene.json that would lie at `path`.
+scene_file read_scene_text(std::string const& text, std::filesystem::path const& path,
+                           vec3d const& origin = vec3d(0.0));
 
 }  // namespace gart

@@ -39,12 +39,17 @@ inline constexpr float default_error_scale = 0.25f;  ///< the error at the end o
 /// another size; alpha in it is laid over the background.
 image_float error_between(image_float const& color, image8 const& photo, vec3 background);
 
+/// Features from 0 to 1 in colours: those of in_colors for one, red, green and blue for three. Means along the ray;
+/// black where a pixel sees less than half.
+image8 features_in_colors(rendered const& r);
+
 /// An image to be looked at.
 struct shown_image {
   image8 image;             ///< 1 or 3 channels
   float low = 0, high = 0;  ///< values at the ends of its colour map, where it has one
 };
-/// What a mode shows of a view. Errors: invalid_argument for view_mode::error without a photograph.
+/// What a mode shows of a view. Errors: invalid_argument for view_mode::error without a photograph, and for
+/// view_mode::features where `r` has none.
 shown_image shown(rendered const& r, camera const& view, view_mode mode, image8 const* photo = nullptr,
                   vec3 background = vec3(0.0f));
 

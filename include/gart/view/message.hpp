@@ -90,15 +90,22 @@ struct share_message {
   double value = 0;  ///< 0.01 to 1
 };
 
+/// Changes one of view_scene.parts; needs the right of control.
+struct part_message {
+  part_edit edit;  ///< what of it
+};
+
 /// Anything that a client may send.
-using client_message =
-    std::variant<view_message, image_message, pick_message, path_message, model_message, train_message, share_message>;
+using client_message = std::variant<view_message, image_message, pick_message, path_message, model_message,
+                                    train_message, share_message, part_message>;
 
 /// Reads a client's text.
 client_message parse_message(std::string_view text);
 
 /// The first text to a client: the scene's contents, and whether the client may control.
 std::string hello_text(view_scene const& scene, bool control);
+/// What there is in a scene of meshes and lights, as it is now.
+std::string scene_text(std::vector<view_part> const& parts);
 /// The state of a training.
 std::string status_text(view_status const& status);
 /// A training's losses and scores so far.
@@ -128,6 +135,7 @@ struct frame_header {
   bool still = false;                   ///< full size, not to be replaced by a better one
   bool file = false;                    ///< the answer to an image_message: a PNG follows, no JPEG
   float low = 0, high = 0;              ///< values at the ends of the colour map, where it has one
+  int samples = 1, samples_of = 1;      ///< paths a pixel that it has, and that it is to have at rest
 };
 /// The bytes of a frame.
 std::vector<u8> frame_bytes(frame_header const& header, std::vector<u8> const& image);

@@ -22,6 +22,11 @@ struct view_render {
   /// The view's colours as to_8bit of `images`, [H][W][3]; view_mode::colour uses it where it is given. On a device it
   /// spares the copy of the rest.
   std::function<image8(camera const& view, view_settings const& settings)> colours;
+  /// The values of the one feature of `settings` that are at the ends of its colours. None: features are not shown.
+  std::function<std::pair<float, float>(view_settings const& settings)> feature_range;
+  /// Samples that the last of `colours` has, and those that it is to have at rest: settings.effort is heeded. None: a
+  /// view is done at once.
+  std::function<std::pair<int, int>()> samples;
   /// Whether settings.rows is heeded: then a view that takes long is asked for in parts. Else each part is the whole.
   bool in_parts = false;
 

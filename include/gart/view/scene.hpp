@@ -18,21 +18,23 @@ namespace gart {
 
 /// What of a view is shown.
 enum class view_mode {
-  colour,  ///< as a photograph would be
-  depth,   ///< the mean distance along the ray, in colours
-  normal,  ///< of the surface that the distances make, in the world's axes, (n + 1) / 2
-  alpha,   ///< how much of the ray is stopped, in grey
-  hits,    ///< Gaussians met, in colours
-  error,   ///< the absolute difference to a photograph, mean over the colours, in colours
+  colour,    ///< as a photograph would be
+  depth,     ///< the mean distance along the ray, in colours
+  normal,    ///< of the surface that the distances make, in the world's axes, (n + 1) / 2
+  alpha,     ///< how much of the ray is stopped, in grey
+  hits,      ///< Gaussians met, in colours
+  error,     ///< the absolute difference to a photograph, mean over the colours, in colours
+  features,  ///< one or three features of the Gaussians, in colours (view/shown_features.hpp)
 };
 /// Their names.
 constexpr auto names_of(view_mode) {
-  return std::array<name_of<view_mode>, 6>{{{view_mode::colour, "colour"},
+  return std::array<name_of<view_mode>, 7>{{{view_mode::colour, "colour"},
                                             {view_mode::depth, "depth"},
                                             {view_mode::normal, "normal"},
                                             {view_mode::alpha, "alpha"},
                                             {view_mode::hits, "hits"},
-                                            {view_mode::error, "error"}}};
+                                            {view_mode::error, "error"},
+                                            {view_mode::features, "features"}}};
 }
 
 /// A box along the axes of the world.
@@ -54,7 +56,15 @@ constexpr auto names_of(view_shape) {
       {{view_shape::gaussians, "gaussians"}, {view_shape::ellipsoids, "ellipsoids"}, {view_shape::points, "points"}}};
 }
 
-/// How a view differs from what the model is. All but `background` and `rows` change the Gaussians that are traced.
+/// What is wanted of views that are means of random samples.
+enum class view_effort {
+  draft,  ///< little: it moves, and another follows soon
+  begun,  ///< the first samples of a view at rest
+  more,   ///< more samples of the view that was rendered last
+};
+
+/// How a view differs from what the model is. All but `background`, `rows` and `effort` change the Gaussians that are
+/// traced.
 struct view_settings {
   std::optional<view_box> crop;              ///< Gaussians whose mean lies outside are left out
   std::optional<float> near;                 ///< hits nearer than that along the ray are left out
@@ -62,7 +72,10 @@ struct view_settings {
   float opacity = 1;                         ///< times that of every Gaussian; 0.001 to 1000
   float size = 1;                            ///< times every standard deviation; 0.001 to 1000
   view_shape shape = view_shape::gaussians;  ///< what is drawn
-  image_rows rows = {};                      ///< the part that is traced, in whole tiles, where that is heeded
+  /// Features that are traced too: the places of one or three, or none for the first three principal directions.
+  std::optional<std::vector<int>> features = {};
+  view_effort effort = view_effort::begun;  ///< where that is heeded
+  image_rows rows = {};                     ///< the part that is traced, in whole tiles, where that is heeded
 
   /// Whether the Gaussians are traced as they are.
   bool own_gaussians() const { return !crop && opacity == 1 && size == 1 && shape == view_shape::gaussians; }
@@ -76,20 +89,42 @@ struct view_camera {
   bool photo = false;  ///< whether it has a photograph
 };
 
+/// A mesh or a light of a scene that a viewer may change.
+struct view_part {
+  bool light = false;          ///< else it is a mesh
+  std::string name;            ///< as people call it
+  std::string kind;            ///< of a light: point, directional, sphere, rectangle. Of a mesh: its material, or "own"
+  vec3 place{0.0f};            ///< the middle of a mesh; of a directional light a point that it comes from
+  vec3 low{0.0f}, high{0.0f};  ///< of a mesh: its corners
+  vec3 color{0.0f};            ///< of a light
+};
+
+/// What is changed of one of them.
+struct part_edit {
+  int index = 0;                             ///< which of view_scene.parts
+  std::optional<vec3> place = {};            ///< where it is to stand
+  std::optional<std::string> material = {};  ///< of a mesh: a name of light::material_kind, or "own", as its file says
+  std::optional<vec3> color = {};            ///< of a light, in the units of light::light
+};
+
 /// What there is to see.
 struct view_scene {
-  std::string name;                  ///< of the model, as people call it
-  std::size_t gaussians = 0;         ///< their number
-  int sh_degree = 0;                 ///< of their colours
-  int kernel_degree = 2;             ///< of their response
-  view_box bounds;                   ///< from the 1st to the 99th hundredth of the means, along each axis
-  vec3 up{0.0f, -1.0f, 0.0f};        ///< away from the ground
-  vec3d origin{0.0};                 ///< of all coordinates (io/origin.hpp)
-  std::vector<view_camera> cameras;  ///< of the capture
-  std::vector<std::string> models;   ///< what else may be opened, and this one; for clients with the right of control
-  int model = 0;                     ///< which of them this is
-  bool training = false;             ///< whether it changes
-  vec3 background{0.0f};             ///< behind the last hit
+  std::string name;                   ///< of the model, as people call it
+  std::size_t gaussians = 0;          ///< their number
+  int sh_degree = 0;                  ///< of their colours
+  int kernel_degree = 2;              ///< of their response
+  int features = 0;                   ///< of each that can be shown
+  std::vector<view_part> parts = {};  ///< of a scene of meshes and lights (view/edited_scene.hpp)
+  std::string scene_json = {};        ///< its text, to be saved
+  bool traced = false;                ///< whether views are paths of light, which count no hits
+  view_box bounds;                    ///< from the 1st to the 99th hundredth of the means, along each axis
+  vec3 up{0.0f, -1.0f, 0.0f};         ///< away from the ground
+  vec3d origin{0.0};                  ///< of all coordinates (io/origin.hpp)
+  std::vector<view_camera> cameras;   ///< of the capture
+  std::vector<std::string> models;    ///< what else may be opened, and this one; for clients with the right of control
+  int model = 0;                      ///< which of them this is
+  bool training = false;              ///< whether it changes
+  vec3 background{0.0f};              ///< behind the last hit
 };
 
 /// Half the diagonal of its bounds.

@@ -51,6 +51,13 @@ struct view_server_options {
   std::function<void(std::string)> log;  ///< a line: clients that were closed, and why; from the server's thread
 };
 
+/// A mesh or an image of light that a page sent, to be added to a scene.
+struct added_file {
+  std::string name;       ///< as its sender has it, without a folder: .glb, .obj, .ply, .hdr or .exr
+  std::vector<u8> bytes;  ///< at most added_bytes_most
+};
+inline constexpr std::size_t added_bytes_most = std::size_t{64} << 20;  ///< of one
+
 /// Serves views of one scene.
 class view_server {
  public:
@@ -88,6 +95,12 @@ class view_server {
   std::optional<train_action> next_action();
   /// The one of view_scene.models that a client with that right wants opened, since the last call.
   std::optional<int> next_model();
+  /// What a client with that right changed of view_scene.parts, one part at a time.
+  std::optional<part_edit> next_edit();
+  /// What a client with that right sent to be added to the scene. One waits at a time.
+  std::optional<added_file> next_file();
+  /// What the parts are by now, and the text that saves them. Views at rest are rendered again.
+  void set_parts(std::vector<view_part> parts, std::string scene_json);
   /// The share of time that a client with that right asked for, since the last call.
   std::optional<double> next_share();
 

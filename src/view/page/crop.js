@@ -3,12 +3,13 @@
 
 import {add, scale} from './vector.js';
 import {stroked} from './overlay.js';
+import {handles} from './handles.js';
 
 const axes = ['x', 'y', 'z'];
-const grip = 16;  // pixels about a handle that are the handle
 
 export function cropBox(form, toggle, resetButton, changed) {
-  let whole = {min: [-1, -1, -1], max: [1, 1, 1]}, box = null, handles = [];
+  let whole = {min: [-1, -1, -1], max: [1, 1, 1]}, box = null;
+  const grips = handles();
   const fields = [];
   for (const side of ['min', 'max'])
     axes.forEach((axis, k) => {
@@ -58,35 +59,16 @@ export function cropBox(form, toggle, resetButton, changed) {
     },
     value: () => box,
     draw(pen, color) {
-      handles = [];
+      grips.clear();
       if (!box) return;
       const corner = (i) => axes.map((_, k) => (i >> k & 1 ? box.max[k] : box.min[k]));
       stroked(pen, color, 1.5, () => {
         for (let i = 0; i < 8; ++i)
           for (let k = 0; k < 3; ++k) if (!(i >> k & 1)) pen.line(corner(i), corner(i | 1 << k));
       });
-      for (const {side, k} of fields) {
-        pen.draw.fillStyle = color;
-        const middle = middleOf(side, k), at = pen.dot(middle, 6);
-        const ahead = [...middle];
-        ahead[k] += 1e-2 * (whole.max[k] - whole.min[k]);
-        const next = at && pen.place(ahead);
-        if (next) handles.push({side, k, at, perUnit: [next[0] - at[0], next[1] - at[1]], unit: ahead[k] - middle[k]});
-      }
+      for (const {side, k} of fields)
+        grips.add(pen, color, middleOf(side, k), k, 1e-2 * (whole.max[k] - whole.min[k]), (by) => set(side, k, box[side][k] + by));
     },
-    // The drag of the handle at that place; null where there is none.
-    grab({x, y}) {
-      const far = ({at}) => Math.hypot(at[0] - x, at[1] - y);
-      const one = handles.reduce((best, handle) => (!best || far(handle) < far(best) ? handle : best), null);
-      if (!one || far(one) > grip) return null;
-      const length2 = one.perUnit[0] ** 2 + one.perUnit[1] ** 2;
-      if (length2 < 1e-6) return null;
-      return {
-        drag(_, [dx, dy]) {
-          const steps = (dx * one.perUnit[0] + dy * one.perUnit[1]) / length2;
-          set(one.side, one.k, box[one.side][one.k] + steps * one.unit);
-        },
-      };
-    },
+    grab: (place) => grips.grab(place),
   };
 }

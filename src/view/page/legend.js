@@ -10,12 +10,14 @@ export const modes = {
   alpha: {title: 'Alpha', stops: ['#000', '#fff'], unit: 'share of the light that the Gaussians hold', range: [0, 1]},
   hits: {title: 'Hits', stops: near, unit: 'Gaussians that a ray met'},
   error: {title: 'Error', stops: error, unit: 'mean difference from the photograph, of 1'},
+  features: {title: 'Features', stops: near},
 };
 
 const short = (x) => (x === 0 ? '0' : Math.abs(x) >= 1000 ? Math.round(x).toString() : Number(x.toPrecision(3)).toString());
 
-export function showLegend(legend, mode, frameScale) {
-  const {stops, unit, note, range} = modes[mode], [low, high] = range ?? frameScale ?? [0, 1];
+// of: {stops, unit, note} in place of the mode's own.
+export function showLegend(legend, mode, frameScale, of = {}) {
+  const {stops, unit, note, range} = {...modes[mode], ...of}, [low, high] = range ?? frameScale ?? [0, 1];
   legend.hidden = !stops && !note;
   if (legend.hidden) return;
   const [bar, from, to, what] = ['bar', 'from', 'to', 'what'].map((name) => legend.querySelector(`.${name}`));

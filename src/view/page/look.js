@@ -1,12 +1,10 @@
 // How the model is drawn: as Gaussians, ellipsoids or points, fainter or larger, before another background.
 
+import {colorOf, hex} from './colors.js';
 import {radios} from './radios.js';
 
 const own = {shape: 'gaussians', opacity: 1, size: 1, background: null};
 const shapes = {gaussians: 'Gaussians', ellipsoids: 'Ellipsoids', points: 'Points'};
-
-const hex = (color) => `#${color.map((c) => Math.round(255 * c).toString(16).padStart(2, '0')).join('')}`;
-const colorOf = (text) => [1, 3, 5].map((i) => parseInt(text.slice(i, i + 2), 16) / 255);
 
 // changed(moving): the look is another one.
 export function lookPanel(ui, changed) {

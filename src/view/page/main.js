@@ -12,8 +12,11 @@ import {styles} from './navigation.js';
 import {modes, showLegend} from './legend.js';
 import {lensPanel} from './lenspanel.js';
 import {lookPanel} from './look.js';
+import {featureLegend, featurePanel} from './features.js';
 import {imagePanel} from './image.js';
 import {cropBox} from './crop.js';
+import {scenePanel} from './scene.js';
+import {fileDrop} from './drop.js';
 import {ruler} from './measure.js';
 import {commandPanel} from './command.js';
 import {keyframes} from './path.js';
@@ -52,6 +55,7 @@ const connection = connect({
   },
   curve: (message) => training.curve(message),
   scores: ({psnr}) => list.scores(psnr),
+  scene: ({parts}) => scene.parts(parts),
   note: ({what}) => say(what),
   refused: ({what, why}) => say(`Refused: ${what}, ${why}`),
   // A question that failed is told where it was asked.
@@ -94,6 +98,9 @@ function welcome(message) {
   models.fill(hello.models, hello.open);
   panel.offer('cameras', cameras.length > 0);
   panel.offer('training', hello.training);
+  panel.offer('scene', hello.scene !== null);
+  scene.fill(hello.scene, hello);
+  $('add-row').hidden = hello.right !== 'control';
   training.rights(hello.right);
   modeChoice.offer((name) => hello.modes.includes(name));
   look.model(hello.background);
@@ -108,9 +115,10 @@ const modelKey = () => `${hello.open} ${hello.model.name}`;
 function begin(before) {
   crop.bounds(hello.model.min, hello.model.max, before?.crop);
   look.restore(before?.look);
+  features.restore(hello.model.features, before?.features);
   measure.restore(before?.factor);
   lens.fill(cameras);
-  Object.assign(view, {crop: crop.value(), look: look.value(), style: before?.style ?? 'orbit', mode: before?.mode ?? 'colour'});
+  Object.assign(view, {crop: crop.value(), look: look.value(), features: features.value(), style: before?.style ?? 'orbit', mode: before?.mode ?? 'colour'});
   view.start(hello, before?.view);
   const through = cameras.find((c) => c.index === before?.view.through);
   if (through) jump(through);
@@ -123,7 +131,7 @@ function begin(before) {
   if ($('image-width').value === '') $('image-like').click();
 }
 const keepAll = () => hello && keep(modelKey(), {
-  view: view.state(), look: look.value(), crop: crop.value(), factor: measure.factor(), path: path.state(), style: view.style, mode: view.mode,
+  view: view.state(), look: look.value(), features: features.value(), crop: crop.value(), factor: measure.factor(), path: path.state(), style: view.style, mode: view.mode,
 });
 addEventListener('pagehide', keepAll);
 
@@ -143,14 +151,15 @@ function frameShown(header) {
   const {rect} = shown;
   Object.assign(frame.style, {left: `${rect.x}px`, top: `${rect.y}px`, width: `${rect.width}px`, height: `${rect.height}px`});
   photo.layout(shown.through ? rect : null);
-  showLegend($('legend'), header.mode, header.scale);
+  showLegend($('legend'), header.mode, header.scale, header.mode === 'features' ? featureLegend(shown.features, features.count()) : {});
   meter.add();
   const [w, h] = header.full, part = header.width !== w || header.height !== h;
   $('size').textContent = part ? `${header.width} × ${header.height} of ${w} × ${h}` : `${w} × ${h}`;
   $('ms').textContent = `${header.ms < 10 ? header.ms.toFixed(1) : Math.round(header.ms)} ms`;
-  $('fps').textContent = header.still ? 'at rest' : `${Math.round(meter.rate())} fps`;
+  const [have, of] = header.samples, growing = of > 1 && !part && (have > 1 || header.still);
+  $('fps').textContent = growing ? `${have} of ${of} samples` : header.still ? 'at rest' : `${Math.round(meter.rate())} fps`;
   $('frame-id').textContent = `#${header.id}`;
-  Object.assign(stage.dataset, {frame: header.id, still: header.still, mode: header.mode, size: `${header.width}x${header.height}`});
+  Object.assign(stage.dataset, {frame: header.id, still: header.still, mode: header.mode, size: `${header.width}x${header.height}`, samples: header.samples[0]});
   if (header.still && view.upTo(header.id)) {
     stage.setAttribute('aria-busy', false);
     for (const resolve of waiting.splice(0)) resolve();
@@ -174,6 +183,7 @@ function draw() {
     tips = drawFrusta(pen, frusta.filter((f) => norm(sub(f.place, shown.pose.place)) > near), colors, pointed);
   }
   crop.draw(pen, '#7fd1ae');
+  scene.draw(pen, '#ffd166');
   path.draw(pen, '#8fc4ff');
   measure.draw(pen, '#ffd166');
   pen.done();
@@ -226,7 +236,7 @@ listenTo(stage, {
     if (view.style === 'orbit') setStyle('fly');
     view.step(step);
   }),
-  grab: (place) => (measure.active() ? null : crop.grab(place)),
+  grab: (place) => (measure.active() ? null : crop.grab(place) ?? scene.grab(place)),
   hover(place) {
     const over = measure.active() ? null : pointedAt(tips, place);
     stage.classList.toggle('pointing', over !== null);
@@ -265,6 +275,7 @@ function setMode(mode) {
   }
   view.mode = mode;
   modeChoice.set(mode);
+  features.show(mode === 'features');
   view.changed();
   aloud(modes[mode].title);
 }
@@ -276,6 +287,10 @@ const look = lookPanel({
 }, (moving) => {
   view.look = look.value();
   view.changed(moving);
+});
+const features = featurePanel({part: $('feature-choice'), kind: $('feature-kind'), places: $('feature-places')}, () => {
+  view.features = features.value();
+  view.changed();
 });
 imagePanel({width: $('image-width'), height: $('image-height'), like: $('image-like'), save: $('save-image')}, {
   size: () => view.stage,
@@ -309,6 +324,12 @@ const crop = cropBox($('crop'), $('crop-on'), $('crop-reset'), () => {
   writeCommand();
   draw();
 });
+const scene = scenePanel({
+  list: $('scene-list'), none: $('scene-none'), part: $('scene-part'), material: $('material'), materialRow: $('material-row'),
+  lightRows: $('light-rows'), strength: $('light-strength'), strengthNow: $('light-strength-now'), color: $('light-color'),
+  place: $('scene-place'), onlooker: $('scene-onlooker'),
+}, {send: (message) => connection.send(message), changed: (moving) => view.changed(moving), redraw: draw}, say);
+fileDrop(stage, $('add-file'), () => (!hello?.scene ? 'gart view --scene opens a scene, this is a model' : hello.right === 'control' ? '' : 'this address may look, and not control'), say);
 const command = commandPanel({part: $('export'), text: $('command'), copy: $('copy')}, say);
 const measure = ruler({
   button: $('measure'), output: $('distance'), length: $('length'), scale: $('scale'), forget: $('forget-scale'),

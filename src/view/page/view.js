@@ -16,6 +16,7 @@ export class View {
   mode = 'colour';
   crop = null;
   look = {};  // as look.js has it
+  features = null;  // as features.js has them
   lens = {name: 'pinhole', angle: 60};
   through = null;  // the camera of the capture that is looked through
   stage = {width: 2, height: 2, cssWidth: 2, cssHeight: 2};
@@ -88,7 +89,8 @@ export class View {
   // With the photograph that the mode is of.
   get shown() {
     const photo = this.through?.photo ? this.through.index : null;
-    return {mode: this.mode === 'error' && photo === null ? 'colour' : this.mode, photo, ...this.settings};
+    const features = this.mode === 'features' ? {features: this.features} : {};
+    return {mode: this.mode === 'error' && photo === null ? 'colour' : this.mode, photo, ...features, ...this.settings};
   }
 
   // Where a camera's image lies on the stage, in CSS pixels.
@@ -188,7 +190,7 @@ export class View {
     this.#dirty = false;
     this.#sentAt = now;
     const sent = this.connection.send({type: 'view', id, camera, moving: this.#moving, ...this.shown});
-    if (sent) this.#sent.set(id, {camera, pose: this.pose, rect: this.rectOf(camera), through: this.through});
+    if (sent) this.#sent.set(id, {camera, pose: this.pose, rect: this.rectOf(camera), through: this.through, features: this.features});
   }
 
   // Whether the frame of that number is the newest wanted one.

@@ -1,0 +1,150 @@
+// A scene of meshes and lights among the Gaussians: traced by samples that add up, and changed by hand.
+
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import path from 'node:path';
+import {linesOf, openPage, psnr} from './browser.mjs';
+import {pixelOf, splatPly} from './geometry.mjs';
+import {onEach} from './screens.mjs';
+
+const samples = 2;
+const description = {
+  models: [{file: 'among.ply'}],
+  meshes: [{name: 'ball', shape: 'sphere', scale: 0.4}, {name: 'floor', shape: 'plane', translation: [0, 1, 0], scale: 2}],
+  lights: [{name: 'lamp', kind: 'point', position: [0.5, -2, -1], color: [8, 8, 8]}],
+  options: {samples, bounces: 2, tone_map: 'srgb'},
+};
+
+async function serve({gart, work}) {
+  // Each twice: the bounds leave out the last in a hundred.
+  const balls = [[-1, 0, 0, 0.2, [0.9, 0.2, 0.2]], [1, 0.3, 0.4, 0.25, [0.2, 0.6, 0.9]], [0, -1, 0, 0.15, [0.3, 0.8, 0.3]]];
+  fs.writeFileSync(path.join(work, 'among.ply'), splatPly([...balls, ...balls]));
+  fs.writeFileSync(path.join(work, 'scene.json'), JSON.stringify(description));
+  return gart.serve('view', '--scene', 'scene.json', '--backend', 'openmp');
+}
+async function end(server) {
+  server.child.kill('SIGTERM');
+  assert.equal(await server.ended, 0);
+}
+
+const traced = {
+  async 'a scene is path traced: a draft as it moves, samples that add up at rest'(world) {
+    const server = await serve(world), {browser, gart, work} = world;
+    const p = await openPage(browser, server.look, {viewport: {width: 520, height: 300}});
+    assert.deepEqual(p.received[0].modes, ['colour', 'depth', 'normal', 'alpha']);
+    assert.deepEqual(p.received[0].scene.map((one) => one.name), ['ball', 'floor', 'lamp']);
+    const {header, view, jpeg} = await p.rest();
+    assert.deepEqual(header.samples, [samples, samples]);
+    assert.equal(await p.page.textContent('#fps'), `${samples} of ${samples} samples`);
+    const grown = p.frames.filter((f) => f.header.id === header.id).map((f) => f.header.samples[0]);
+    assert.deepEqual(grown, [...grown].sort((a, b) => a - b));
+    fs.writeFileSync(path.join(work, 'lit.json'), JSON.stringify([{...view.camera, name: 'lit'}]));
+    await gart.run('render', '--scene', 'scene.json', 'lit.json', '--out', 'lit', '--backend', 'openmp', '--quiet');
+    const value = await psnr(browser, jpeg, fs.readFileSync(path.join(work, 'lit', 'lit.png')));
+    console.log(`           ${value.toFixed(1)} dB`);
+    assert.ok(value > 32, `${value} dB`);
+    const before = p.frames.length;
+    await p.drag([150, 150], [60, 0]);
+    await p.rest();
+    const drafts = p.frames.slice(before).filter((f) => !f.header.still && f.header.width < f.header.full[0]);
+    assert.ok(drafts.every((f) => f.header.samples[0] === 1));
+    for (const mode of ['depth', 'normal', 'alpha']) {
+      await p.choose(mode);
+      assert.equal((await p.rest()).header.mode, mode);
+    }
+    await p.close();
+    await end(server);
+  },
+};
+
+const changed = onEach({
+  async 'a mesh is moved by its handle and made a mirror, a light is dimmed, the scene is saved'(world, screen) {
+    const server = await serve(world), {browser, work} = world;
+    const p = await openPage(browser, server.control, screen);
+    await p.tab('scene');
+    await p.page.click('#scene-list button:has-text("ball")');
+    await p.until('the box about it', async () => (await linesOf(p.page, [255, 209, 102])) > 100);
+    const {view: {camera}} = await p.rest(), {model, scene: [ball]} = p.received[0];
+    // The handle that goes farthest over the screen.
+    const stage = await p.page.locator('#stage').boundingBox();
+    const reach = (k) => 0.14 * model.extent + (ball.max[k] - ball.min[k]) / 2;
+    const tip = (k, more = 0) => ball.place.map((x, i) => (i === k ? x + reach(k) + more : x));
+    const at = (k, more) => pixelOf(camera, tip(k, more)).slice(0, 2).map((x) => (x * stage.width) / camera.width);
+    const way = (k) => at(k, 0.02).map((x, i) => (x - at(k)[i]) / 0.02), far = (k) => Math.hypot(...way(k));
+    const k = [0, 1, 2].reduce((best, i) => (far(i) > far(best) ? i : best));
+    await p.drag(at(k), way(k).map((x) => 0.3 * x));
+    const moved = await p.until('the scene to say so', () => p.received.filter((m) => m.type === 'scene').map((m) => m.parts[0].place)
+      .find((place) => Math.abs(place[k] - ball.place[k] - 0.3) < 0.05));
+    moved.forEach((x, i) => i === k || assert.ok(Math.abs(x - ball.place[i]) < 1e-4, 'it moved along one axis'));
+    const still = await p.rest();
+    assert.deepEqual(still.view.camera, camera, 'the camera moved with the handle');
+
+    await p.page.selectOption('#material', 'mirror');
+    await p.until('a mirror', () => p.received.some((m) => m.type === 'scene' && m.parts[0].kind === 'mirror'));
+    const mirror = await p.rest();
+    assert.ok(!mirror.jpeg.equals(still.jpeg));
+    await p.page.screenshot({path: path.join(work, `scene-mesh-${screen.viewport.width}.png`)});
+
+    await p.page.click('#scene-list button:has-text("lamp")');
+    assert.equal(await p.page.textContent('#light-strength-now'), '8');
+    await p.page.$eval('#light-strength', (input) => {
+      input.value = 1;
+      input.dispatchEvent(new Event('input', {bubbles: true}));
+    });
+    await p.page.fill('#light-color', '#ff0000');
+    await p.until('a dim red lamp', () => p.received.some((m) => m.type === 'scene' && String(m.parts[2].color) === '2,0,0'));
+    assert.ok(!(await p.rest()).jpeg.equals(mirror.jpeg));
+    await p.page.screenshot({path: path.join(work, `scene-light-${screen.viewport.width}.png`)});
+    const wide = await p.page.$eval('#panel-scene', (panel) => panel.scrollWidth - panel.clientWidth);
+    assert.equal(wide, 0);
+
+    const file = JSON.parse(fs.readFileSync(await (await p.saved(() => p.page.click('#save-scene'))).path()));
+    assert.ok(Math.abs(file.meshes[0].translation[k] - moved[k]) < 0.05);
+    assert.equal(file.materials.find((m) => m.name === file.meshes[0].material).kind, 'mirror');
+    assert.deepEqual(file.lights[0].color, [2, 0, 0]);
+    assert.deepEqual(file.models, description.models);
+    await p.close();
+
+    const onlooker = await openPage(browser, server.look, screen);
+    await onlooker.tab('scene');
+    assert.equal(await onlooker.page.isVisible('#scene-onlooker'), true);
+    await onlooker.page.click('#scene-list button:has-text("ball")');
+    assert.equal(await onlooker.page.isDisabled('#material'), true);
+    await onlooker.close();
+    await end(server);
+  },
+});
+
+const added = onEach({
+  async 'a mesh that is dropped or chosen is in the scene, what is wrong is said'(world, screen) {
+    const server = await serve(world), {browser} = world;
+    const p = await openPage(browser, server.control, screen);
+    await p.tab('scene');
+    const said = (part) => p.until(`"${part}"`, async () => (await p.page.textContent('#say')).includes(part));
+    const drop = (name, text) => p.page.evaluate(([file, content]) => {
+      const data = new DataTransfer();
+      data.items.add(new File([content], file));
+      document.getElementById('stage').dispatchEvent(new DragEvent('drop', {dataTransfer: data, bubbles: true, cancelable: true}));
+    }, [name, text]);
+    const before = await p.rest();
+    await drop('wedge one.obj', 'v -1 -1 0\nv 1 -1 0\nv 0 -2 0\nf 1 2 3\nf 3 2 1\n');
+    await said('wedge one.obj is in the scene');
+    await p.page.waitForSelector('#scene-list button:has-text("wedge one")');
+    await p.until('another image', async () => !(await p.rest()).jpeg.equals(before.jpeg));
+    await p.page.setInputFiles('#add-file', {name: 'again.obj', mimeType: 'text/plain', buffer: Buffer.from('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n')});
+    await said('again.obj is in the scene');
+    assert.equal(await p.page.locator('#scene-list li').count(), 5);
+    await drop('broken.obj', 'v 0 0\nf 1 2 3\n');
+    await said('broken.obj could not be added');
+    await drop('notes.txt', 'hello');
+    await said('notes.txt: a scene takes');
+    const file = JSON.parse(fs.readFileSync(await (await p.saved(() => p.page.click('#save-scene'))).path()));
+    assert.deepEqual(file.meshes.slice(2).map((m) => m.file), ['wedge one.obj', 'again.obj']);
+    await p.close();
+    const status = await fetch(`${server.look}add/a.obj`, {method: 'POST', body: 'v 0 0 0', headers: {origin: new URL(server.look).origin}});
+    assert.equal(status.status, 403);
+    await end(server);
+  },
+});
+
+export const scene = {...traced, ...changed, ...added};
