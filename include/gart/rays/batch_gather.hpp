@@ -159,9 +159,10 @@ class batch_gather {
   }
   template <int Degree>
   void add_up(E& exec, u64 pieces, gaussians_view<float> gradients, span<float> moments) {
-    parallel_for(exec, "rays/sum", gradients.count * static_cast<index_t>(pair_gradient<Degree>::quads),
-                 sum_pairs<Degree, terms<term::color, term::geometry>>{pieces_.offsets().subspan(0, gradients.count), pieces,
-                                                           rows_.data(), gradients.sh, moments.data()});
+    parallel_for(
+        exec, "rays/sum", gradients.count * static_cast<index_t>(pair_gradient<Degree>::quads),
+        sum_pairs<Degree, terms<term::color, term::geometry>>{pieces_.offsets().subspan(0, gradients.count), pieces,
+                                                              rows_.data(), gradients.sh, moments.data()});
   }
 
   hit_pieces<E> pieces_;
