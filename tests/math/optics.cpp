@@ -21,7 +21,7 @@ double reflected_part(double in, double out) {
 
 }  // namespace
 
-TEST_CASE("refraction keeps Snell's law, and all is reflected beyond it") {
+TEST_CASE("refraction keeps Snell's law; beyond it all is reflected") {
   vec3 const n(0, 0, 1);
   for (double const ratio : {1 / 1.5, 1 / 2.4, 1.0001, 1.33, 1.5}) {
     for (double degrees = 1; degrees < 90; degrees += 1.7) {

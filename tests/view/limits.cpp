@@ -7,7 +7,7 @@
 #include <doctest/doctest.h>
 #include <http.hpp>
 
-TEST_CASE("the longest path is read, and none that is longer") {
+TEST_CASE("the longest path is read, and none longer") {
   std::string const c = gart_test::json_of(gart_test::camera_at({1, 2, 3}, 0.5));
   auto const path = [&](int frames) {
     return gart::parse_message(R"({"type":"path","id":2,"frames":)" + std::to_string(frames) +
@@ -17,7 +17,7 @@ TEST_CASE("the longest path is read, and none that is longer") {
   CHECK_THROWS_WITH_AS(path(gart::path_frames_most + 1), doctest::Contains("'frames'"), gart::invalid_argument);
 }
 
-TEST_CASE("the longest head of a request is read, and none that is longer") {
+TEST_CASE("the longest head of a request is read, and none longer") {
   std::string const before = "GET / HTTP/1.1\r\nCookie: ";
   for (std::size_t const longer : {0u, 1u}) {
     CAPTURE(longer);
