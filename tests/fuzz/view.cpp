@@ -49,6 +49,12 @@ struct check {
   void operator()(gart::share_message const& m) const {
     promise(m.value >= 0.01 && m.value <= 1, "a share out of its range");
   }
+  void operator()(gart::part_message const& m) const {
+    promise(m.edit.index >= 0, "a part of no number");
+    if (auto const& place = m.edit.place) promise(finite(gart::vec3d(*place)), "a place that is none");
+    if (auto const& color = m.edit.color)
+      for (int k = 0; k < 3; ++k) promise((*color)[k] >= 0 && (*color)[k] <= 1e12f, "a colour that is none");
+  }
 };
 
 }  // namespace
