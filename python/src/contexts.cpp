@@ -58,8 +58,7 @@ gart::ray_batch rays_of(std::string const& call, py::object const& directions, p
 std::unique_ptr<context> forward_rays(shared_renderer const& r, py::object const& directions, py::object const& origins,
                                       py::object const& t_max, std::array<double, 3> const& frame,
                                       py::object const& color, py::object const& transmittance, py::object const& depth,
-                                      py::object const& features, py::object const& options,
-                                      py::kwargs const& given) {
+                                      py::object const& features, py::object const& options, py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r->usual);
   auto out = std::make_unique<context>();
   out->owner = r, out->features = r->features, out->bound_features = r->bound_features;
@@ -144,7 +143,7 @@ py::dict list_hits(python_renderer& r, py::object const& directions, py::object 
 void bind_contexts(py::module_& m) {
   auto const none = py::none();
   std::array<double, 3> const origin{0, 0, 0};
-  py::class_<context>(m, "Context",
+  py::class_<context>(m, "Context", py::module_local(),
                       R"(What a forward pass leaves for its backward pass, of Renderer.forward or forward_rays.
 
 Others may run in between. Bound Gaussians, features and rays must stay as they are until the last backward; where the
@@ -185,8 +184,7 @@ features                                 [N, F], dL/d features, overwritten)");
           },
           py::arg("camera"), py::arg("options") = none, py::kw_only(), py::arg("color") = none,
           py::arg("transmittance") = none, py::arg("depth") = none, py::arg("hits") = none, py::arg("rgba") = none,
-          py::arg("features") = none,
-          "As render_to, with what gradients need: returns a Context.")
+          py::arg("features") = none, "As render_to, with what gradients need: returns a Context.")
       .def("forward_rays", &forward_rays, py::arg("directions"), py::arg("origins") = none, py::arg("t_max") = none,
            py::arg("frame") = origin, py::kw_only(), py::arg("color") = none, py::arg("transmittance") = none,
            py::arg("depth") = none, py::arg("features") = none, py::arg("options") = none,

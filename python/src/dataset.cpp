@@ -95,7 +95,8 @@ Raises IoError, Unsupported for a camera model that gart does not trace, Invalid
 
 void bind_dataset(py::module_& m) {
   using view = gart::dataset_view;
-  py::class_<view, std::shared_ptr<view>>(m, "View", R"(A photograph and its camera: View(name, camera, image).
+  py::class_<view, std::shared_ptr<view>>(m, "View", py::module_local(),
+                                          R"(A photograph and its camera: View(name, camera, image).
 
 image  uint8 [H, W, 3], or [H, W, 4] with straight alpha)")
       .def(py::init([](std::string name, gart::camera const& camera, py::object const& image) {
@@ -130,7 +131,8 @@ image  uint8 [H, W, 3], or [H, W, 4] with straight alpha)")
     };
   };
   py::class_<gart::dataset, shared_dataset>(
-      m, "Dataset", R"(A capture in host memory: Dataset(train, test=[], points=None, colors=None), or load_dataset.
+      m, "Dataset", py::module_local(),
+      R"(A capture in host memory: Dataset(train, test=[], points=None, colors=None), or load_dataset.
 
 train, test  lists of View
 points       float32 [N, 3], where training starts; none: at random

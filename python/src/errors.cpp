@@ -7,9 +7,12 @@ namespace gart_python {
 
 namespace {
 
+// Of this module: another gart may be in the process. Kept to the end.
+PyObject* errors = nullptr;
+
 template <class... Attributes>
 void raise(char const* type, std::string const& message, Attributes const&... attributes) {
-  py::object const error = py::module_::import("gart.errors").attr(type)(message);
+  py::object const error = py::handle(errors).attr(type)(message);
   (py::setattr(error, attributes.first, py::cast(attributes.second)), ...);
   PyErr_SetObject(py::type::of(error).ptr(), error.ptr());
 }
@@ -17,7 +20,8 @@ void raise(char const* type, std::string const& message, Attributes const&... at
 }  // namespace
 
 void bind_errors(py::module_&) {
-  py::register_exception_translator([](std::exception_ptr thrown) {
+  errors = py::module_::import("gart.errors").release().ptr();
+  py::register_local_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);
     } catch (gart::io_error const& e) {

@@ -99,7 +99,8 @@ gart::render_options options_of(py::handle options, py::kwargs const& given, gar
 void bind_options(py::module_& m) {
   using render = gart::render_options;
   using triple = std::array<float, 3>;
-  py::class_<render>(m, "RenderOptions", R"(How one view is rendered: RenderOptions(near=0.1) sets what is named.
+  py::class_<render>(m, "RenderOptions", py::module_local(),
+                     R"(How one view is rendered: RenderOptions(near=0.1) sets what is named.
 
 alpha_min          a Gaussian is hit where its alpha is at least this (1/255)
 transmittance_min  a ray ends after the hit that brings the transmittance below this (1e-4)
@@ -123,7 +124,8 @@ background         three numbers behind the last hit)")
           [](render& o, triple const& b) { o.background = gart::vec3(b[0], b[1], b[2]); });
 
   using train = gart::train_options;
-  py::class_<option_group>(m, "OptionGroup", "Some options of TrainOptions: options.rates has options.rates.mean.")
+  py::class_<option_group>(m, "OptionGroup", py::module_local(),
+                           "Some options of TrainOptions: options.rates has options.rates.mean.")
       .def("__getattr__", &get_field)
       .def("__setattr__",
            [](option_group const& g, std::string const& name, py::handle value) {
@@ -136,7 +138,8 @@ background         three numbers behind the last hit)")
           if (begins(f.name, g.prefix)) out.append(std::string(f.name.substr(g.prefix.size())));
         return out;
       });
-  py::class_<train> c(m, "TrainOptions", R"(The options of a run, by the names of `gart train --set`; fields() has each.
+  py::class_<train> c(m, "TrainOptions", py::module_local(),
+                      R"(The options of a run, by the names of `gart train --set`; fields() has each.
 
 TrainOptions(iterations=2000, densify="mcmc", **{"rates.opacity": 0.05}) sets those that are named; so does
 options.rates.opacity = 0.05.)");

@@ -234,7 +234,7 @@ py::dict as_dict(gart::configuration_info const& info) {
 
 void bind_renderer(py::module_& m) {
   auto const none = py::none();
-  py::class_<self, std::shared_ptr<self>>(m, "Renderer", class_text)
+  py::class_<self, std::shared_ptr<self>>(m, "Renderer", py::module_local(), class_text)
       .def(py::init(&make), py::arg("model") = none)
       .def("set_model", &set_model, py::arg("model"), "Copies the model; arrays that were bound are let go.")
       .def(

@@ -130,7 +130,7 @@ gart::camera camera_of(int width, int height, double fx, double fy, std::optiona
 }
 
 void bind_scene(py::module_& m) {
-  py::class_<gart::camera>(m, "Camera", camera_text)
+  py::class_<gart::camera>(m, "Camera", py::module_local(), camera_text)
       .def(py::init(&camera_of), py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"),
            py::arg("cx") = py::none(), py::arg("cy") = py::none(), py::arg("c2w") = py::none(),
            py::arg("model") = "PINHOLE")
@@ -178,11 +178,10 @@ void bind_scene(py::module_& m) {
       });
 
   using file = gart::model_file;
-  py::class_<file, std::shared_ptr<file>> model(m, "Model", model_text);
+  py::class_<file, std::shared_ptr<file>> model(m, "Model", py::module_local(), model_text);
   model
       .def(py::init([](py::object const& mean, py::object const& log_scale, py::object const& quaternion,
-                       py::object const& opacity, py::object const& sh, int kernel_degree,
-                       py::object const& features) {
+                       py::object const& opacity, py::object const& sh, int kernel_degree, py::object const& features) {
              file out;
              out.model = model_of(mean, log_scale, quaternion, opacity, sh, "Model");
              out.total = out.model.size(), out.kernel_degree = kernel_degree;

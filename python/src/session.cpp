@@ -114,7 +114,7 @@ Model to begin with, else the dataset's points or random ones. Calls drop the in
 }  // namespace
 
 void bind_session(py::module_& m) {
-  py::class_<gart::step_report>(m, "StepReport", "What a step says of itself.")
+  py::class_<gart::step_report>(m, "StepReport", py::module_local(), "What a step says of itself.")
       .def_readonly("step", &gart::step_report::step, "steps done, this one included")
       .def_readonly("loss", &gart::step_report::loss, "of this step's view")
       .def_readonly("psnr", &gart::step_report::psnr, "of this step's view, dB")
@@ -126,7 +126,7 @@ void bind_session(py::module_& m) {
         return "gart.StepReport(step=" + std::to_string(r.step) + ", loss=" + std::to_string(r.loss) +
                ", psnr=" + std::to_string(r.psnr) + ", gaussians=" + std::to_string(r.gaussians) + ")";
       });
-  py::class_<self>(m, "Session", class_text)
+  py::class_<self>(m, "Session", py::module_local(), class_text)
       .def(py::init(&make), py::arg("dataset"), py::arg("options") = py::none(), py::arg("start") = py::none())
       .def("step", &step, py::arg("steps") = 1, "Steps of training; the report of the last.")
       .def_property_readonly(
