@@ -54,7 +54,7 @@ TEST_CASE("train and eval score the same training views, evenly spread") {
         doctest::Approx((training["views"][0]["psnr"].get<double>() + training["views"][1]["psnr"].get<double>()) / 2));
   auto const page = text_of(here / "run/report.html");
   CHECK(has(page, "Training, 2 of 6, evenly spread"));
-  CHECK(has(page, "a diagnostic, no score"));
+  CHECK(has(page, "a diagnostic, not a score"));
 
   auto const eval = here.gart("eval run/model.ply capture --out scores.json --backend serial");
   REQUIRE_MESSAGE(eval.code == 0, eval.err);
