@@ -17,7 +17,7 @@
 /// Sums go in the order of the list: the same bits in every run.
 ///
 /// Memory: 44 bytes and 12 a coefficient for each Gaussian of each instance, 236 at SH degree 3. Cost: one launch an
-/// instance that has moved, three an instance back. Errors: invalid_argument as instance.hpp has it.
+/// instance that has moved, three an instance back. Errors: those of instance.hpp.
 
 #include <gart/exec/parallel.hpp>
 #include <gart/instances/instance.hpp>

@@ -3,8 +3,7 @@
 /// One tree over Gaussians that stay as they are, for any number of tracers:
 ///
 ///   shared_index<E> const tree(exec, scene.view(), options.alpha_min, frame);
-///   one.share(&tree), other.share(&tree);                    // ray_tracers, each with a policy and a thread of its
-///   own
+///   one.share(&tree), other.share(&tree);                    // ray_tracers, each with a policy and a thread
 ///
 /// The rule of threads: a policy, and so a tracer, a context or a renderer, is used by one thread at a time. Arrays of
 /// Gaussians and a shared tree are only read, by as many as like. A tracer whose Gaussians or alpha_min are others than
