@@ -257,7 +257,7 @@ TEST_CASE_TEMPLATE("a Gaussian cut by a surface counts whole or not at all", E, 
   CHECK(worst > 0.8 * (1 - std::sqrt(1 - double{alpha})));
 }
 
-TEST_CASE("numbers are drawn evenly, and angles are what they should be") {
+TEST_CASE("numbers are drawn evenly, and so are angles") {
   using namespace gart::light_kernels;
   for (u32 const use : {0u, 3u, 17u}) {
     int cells[16][16] = {};

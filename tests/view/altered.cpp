@@ -57,7 +57,7 @@ TEST_CASE("opacity and size are factors") {
   CHECK(view.alpha({}, 0, 0) == doctest::Approx(0.5).epsilon(1e-3));
 }
 
-TEST_CASE("an ellipsoid is solid to one standard deviation and ends there") {
+TEST_CASE("an ellipsoid is solid to one standard deviation") {
   shown const view(one());
   auto const solid = with([](auto& s) { s.shape = gart::view_shape::ellipsoids; });
   CHECK(view.alpha(solid, 0, 0) > 0.98f);
@@ -87,7 +87,7 @@ TEST_CASE("a point is a ball of one size, of 0.004 of the extent") {
   for (double r : {-0.0105, 0.0105}) CHECK(view.alpha(points, 0, r) == 0);
 }
 
-TEST_CASE("a background of the view's own, and parts that are the whole's bits") {
+TEST_CASE("a view has its own background, and parts the whole's bits") {
   shown const view(one());
   gart::camera const c = gart_test::camera_at({0, 0, -2}, 0.05, 70, 100);
   auto const white = view.render.images(c, with([](auto& s) { s.background = gart::vec3(1.0f); }));

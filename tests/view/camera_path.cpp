@@ -89,7 +89,7 @@ TEST_CASE("neither place nor direction jumps, and the axes stay axes") {
   }
 }
 
-TEST_CASE("keyframes that are evenly turned are turned evenly between, the short way") {
+TEST_CASE("even turns of keyframes stay even between, the short way") {
   std::vector<gart::camera> keys;
   for (int i = 0; i < 6; ++i) keys.push_back(camera_at({1.0 * i, 0, 0}, 1.2 * i));
   gart::camera_path const path(keys);
@@ -110,7 +110,7 @@ TEST_CASE("frames: the ends of an open path, each once of a closed one") {
   CHECK(away(closed.back().position, keys.front().position) > 0.05);
 }
 
-TEST_CASE("times that are given are those of the keyframes, and of the end") {
+TEST_CASE("given times are those of the keyframes and the end") {
   auto const keys = some_keyframes();
   for (bool closed : {false, true}) {
     std::vector<double> times = {0, 1, 1.5, 4, 5};
@@ -127,7 +127,7 @@ TEST_CASE("times that are given are those of the keyframes, and of the end") {
     CHECK_THROWS_AS(gart::camera_path(keys, false, wrong), gart::invalid_argument);
 }
 
-TEST_CASE("keyframes in one place turn, in one pose stand; what is no path is refused") {
+TEST_CASE("keyframes in one place turn; one pose alone is refused") {
   auto const turning = gart::smooth_path({camera_at({1, 1, 1}, 0), camera_at({1, 1, 1}, 1)}, 5);
   CHECK(turned_between(turning[2].rotation, camera_at({}, 0.5).rotation) < 1e-3);
   auto const standing = gart::smooth_path({camera_at({1, 1, 1}), camera_at({1, 1, 1}), camera_at({1, 1, 1})}, 7);

@@ -50,7 +50,7 @@ TEST_CASE("a view is let go that was replaced, or whose client left") {
   CHECK_FALSE(all.waited_for(*moving));
 }
 
-TEST_CASE("an image to be saved comes after the views, and is sent to who asked") {
+TEST_CASE("a saved image comes after the views, to its client") {
   gart::view_server_options const options;
   gart::view::clients all(scene(), options);
   int const a = all.add(false), b = all.add(false);
@@ -70,7 +70,7 @@ TEST_CASE("an image to be saved comes after the views, and is sent to who asked"
   CHECK(bytes.size() == 3);
 }
 
-TEST_CASE("another model is opened by who may control, and its scene told to all") {
+TEST_CASE("control opens another model, and all hear of its scene") {
   gart::view_server_options const options;
   gart::view::clients all(scene(), options);
   int const controls = all.add(true), looks = all.add(false);
@@ -114,7 +114,7 @@ TEST_CASE("features that the model has not close the connection") {
   CHECK(asked("[0,1,3]").find("'features'") != std::string::npos);
 }
 
-TEST_CASE("parts are whole tiles, cover every row once, and end where nobody waits") {
+TEST_CASE("parts are whole tiles, each row once, while one waits") {
   for (int height : {1, 31, 32, 33, 500, 4096})
     for (double ms : {0.0, 100.0, 1100.0, 1e6}) {
       CAPTURE(height);

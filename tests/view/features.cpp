@@ -52,7 +52,7 @@ std::string refusal(auto const& act) {
 
 }  // namespace
 
-TEST_CASE("principal directions are those that the features were made of") {
+TEST_CASE("principal directions are those of the features") {
   constexpr std::size_t n = 4000, width = 40;
   std::mt19937_64 engine(11);
   std::normal_distribution<double> normal;
@@ -81,7 +81,7 @@ TEST_CASE("principal directions are those that the features were made of") {
   }
 }
 
-TEST_CASE("one feature, three, and directions go from 0 to 1 over the bulk of the Gaussians") {
+TEST_CASE("features go from 0 to 1 over the bulk of the Gaussians") {
   std::vector<float> values;
   for (int i = 0; i <= 100; ++i) values.insert(values.end(), {static_cast<float>(i), 4.0f});
   values[0] = -1e6f, values[200] = 1e6f;  // strays
@@ -102,7 +102,7 @@ TEST_CASE("one feature, three, and directions go from 0 to 1 over the bulk of th
   CHECK(refusal([&] { gart::features_to_show({}, {0}); }).find("no features") != std::string::npos);
 }
 
-TEST_CASE("a pixel has the mean of its Gaussians' features, and colours stay") {
+TEST_CASE("a pixel has the mean feature, and colours stay") {
   gart::gaussian_model const m = cloud(5);
   gart::camera const view = gart_test::camera_at({0, 0, -3}, 0, 32, 70);
   auto const by = serial(), alone = serial();

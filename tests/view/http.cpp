@@ -57,7 +57,7 @@ TEST_CASE("what is no request is wrong") {
   CHECK(read("GET / HTTP/1.1\r\nCookie: " + std::string(20000, 'c') + "\r\n\r\n") == head_state::whole);
 }
 
-TEST_CASE("a request that is damaged anywhere is taken, refused or waited for") {
+TEST_CASE("a damaged request is taken, refused or waited for") {
   std::string const good =
       "GET /0123456789abcdef0123456789abcdef/socket HTTP/1.1\r\nHost: 127.0.0.1:8765\r\nOrigin: a\r\n\r\n";
   std::mt19937 engine(7);
@@ -77,7 +77,7 @@ TEST_CASE("a request that is damaged anywhere is taken, refused or waited for") 
   }
 }
 
-TEST_CASE("hosts and origins: the server's own, and those of proxies that are allowed") {
+TEST_CASE("hosts and origins are the server's or an allowed proxy's") {
   access const gate({"127.0.0.1", "localhost"}, {"Viewer.example.org", "lan:9000"}, 8765);
   for (char const* host :
        {"127.0.0.1:8765", "LOCALHOST:8765", "viewer.example.org", "viewer.example.org:444", "lan:9000"}) {

@@ -92,7 +92,7 @@ struct edited {
 
 }  // namespace
 
-TEST_CASE("a view that moves is one sample of one bounce, at rest samples add up") {
+TEST_CASE("a moving view is one sample, at rest samples add up") {
   folder const in;
   gart::scene_file const file = gart::read_scene(in.write("scene.json", two_things));
   gart::gaussian_model const m = cloud();
@@ -140,7 +140,7 @@ TEST_CASE("a view that moves is one sample of one bounce, at rest samples add up
   CHECK(cropped.data == expected(1, 1));
 }
 
-TEST_CASE("things of a scene are listed, moved, made of other materials, lit otherwise") {
+TEST_CASE("parts of a scene are listed, moved and changed") {
   edited e;
   auto const parts = e.scene.parts();
   REQUIRE(parts.size() == 4);
@@ -170,7 +170,7 @@ TEST_CASE("things of a scene are listed, moved, made of other materials, lit oth
   CHECK_THROWS_AS(e.scene.change({.index = 4}), gart::invalid_argument);
 }
 
-TEST_CASE("a mesh is added, and one that cannot be read leaves the scene as it was") {
+TEST_CASE("a mesh is added, and a damaged one changes nothing") {
   edited e;
   fs::path const tri = e.in.write("up.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   e.scene.add(tri, "tri.obj");
@@ -184,7 +184,7 @@ TEST_CASE("a mesh is added, and one that cannot be read leaves the scene as it w
   e.scene.change({.index = 2, .place = vec3(0.0f)});
 }
 
-TEST_CASE("a mesh by itself is a scene, and a model that is named beside it stands in it") {
+TEST_CASE("a mesh is a scene, with or without a model") {
   folder const in;
   fs::path const file = in.write("tri.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   gart::edited_scene scene(file, gart::read_scene(file), gart::vec3d(0.0), in.path / "run" / "model.ply", vec3(0.0f),
@@ -198,7 +198,7 @@ TEST_CASE("a mesh by itself is a scene, and a model that is named beside it stan
         gart::light::material_kind::mirror);
 }
 
-TEST_CASE("a part is changed by who may control; many moves are one; views at rest begin anew") {
+TEST_CASE("control changes parts, and views at rest begin anew") {
   gart::view_server_options const options;
   gart::view_scene scene;
   scene.traced = true;
@@ -247,7 +247,7 @@ TEST_CASE("a part is changed by who may control; many moves are one; views at re
     CHECK_FALSE(all.receive(controls, std::string(R"({"type":"part","index":1,)") + wrong + "}", 0).reason.empty());
 }
 
-TEST_CASE("samples of one view are gathered to the end before another's") {
+TEST_CASE("samples of one view end before another's begin") {
   gart::view_server_options const options;
   gart::view::clients all(gart::view_scene{}, options);
   int const a = all.add(false), b = all.add(false);

@@ -157,7 +157,7 @@ TEST_CASE("what is no message at all is refused") {
   CHECK(refusal(R"({"type":"share","value":1e999})") != "accepted");
 }
 
-TEST_CASE("a frame's bytes are its header's length, its header and the JPEG") {
+TEST_CASE("a frame is its header's length, its header and a JPEG") {
   gart::frame_header header;
   header.id = 5, header.width = 3, header.height = 2, header.full_width = 6, header.full_height = 4;
   header.mode = gart::view_mode::depth, header.low = 1, header.high = 2, header.still = true;

@@ -3,7 +3,7 @@
 
 #include <doctest/doctest.h>
 
-TEST_CASE("moving views come to the time that they are to take, whatever they cost") {
+TEST_CASE("moving views come to their time, whatever they cost") {
   for (double fixed_cost : {0.0, 5.0, 40.0}) {
     for (double per_pixel : {1e-6, 1e-4, 5e-4}) {
       CAPTURE(fixed_cost);
@@ -29,7 +29,7 @@ TEST_CASE("moving views come to the time that they are to take, whatever they co
   }
 }
 
-TEST_CASE("what cannot be in time is an eighth of the sides, and nothing is smaller than a pixel") {
+TEST_CASE("sides shrink to an eighth, and to no less than a pixel") {
   gart::frame_pacing pacing;
   pacing.measured(1e6, 100);
   CHECK(pacing.size(640, 480, 80) == std::pair(80, 60));
@@ -74,7 +74,7 @@ TEST_CASE("views keep to their share of the time, whatever one takes") {
   }
 }
 
-TEST_CASE("what the step after a view takes beyond the usual is of the views' share") {
+TEST_CASE("a slower step after a view counts as the view's share") {
   gart::time_share time(0.1);
   double usual = 0, views = 0;
   bool after = false;
@@ -90,7 +90,7 @@ TEST_CASE("what the step after a view takes beyond the usual is of the views' sh
   CHECK(views >= 0.095 * usual);
 }
 
-TEST_CASE("of a share that nobody used only a moment is kept, and all of the time is all") {
+TEST_CASE("an unused share is kept for a moment only") {
   gart::time_share time(0.1);
   CHECK_FALSE(time.may_view());
   time.worked(10000);

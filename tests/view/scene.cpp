@@ -25,7 +25,7 @@ gart::gaussian_model row_of(std::size_t n) {
 
 }  // namespace
 
-TEST_CASE("the bounds leave out a hundredth on either side, and what is no number") {
+TEST_CASE("bounds leave out a hundredth on each side, and NaN") {
   gart::gaussian_model m = row_of(1001);
   m.mean[0] = -1e9f, m.mean[3 * 1000] = 1e9f, m.mean[3 * 500] = std::nanf("");
   gart::view_scene const scene = gart::scene_of("row", m, 2);

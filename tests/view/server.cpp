@@ -140,7 +140,7 @@ bool is(std::string const& answer, int status) {
 
 }  // namespace
 
-TEST_CASE("addresses hold tokens of 128 bits that differ, here and in every run") {
+TEST_CASE("addresses hold tokens of 128 bits, new in each run") {
   running const a, b;
   CHECK(a.path(true).size() == 34);
   CHECK(a.path(false).size() == 34);
@@ -197,7 +197,7 @@ TEST_CASE("another token, Host or Origin is forbidden") {
   CHECK(r.server.clients() == 0);
 }
 
-TEST_CASE("a photograph is there for the cameras that have one, nothing for other names") {
+TEST_CASE("photographs are there for cameras that have one") {
   running r;
   auto const ask = [&](std::string const& name) {
     socket_client c(r.server.port());
@@ -214,7 +214,7 @@ TEST_CASE("a photograph is there for the cameras that have one, nothing for othe
   CHECK_FALSE(is(c.ask("POST " + r.path() + " HTTP/1.1\r\nHost: " + r.host() + "\r\nContent-Length: 0\r\n\r\n"), 200));
 }
 
-TEST_CASE("what is seen at rest is the render, before and as JPEG; while it moves it may be smaller") {
+TEST_CASE("a view at rest is the render, a moving one may be smaller") {
   running r;
   auto const c = r.client();
   gart::camera const view = camera_at({0, 0, -2}, 0, 96, 64);
@@ -272,7 +272,7 @@ TEST_CASE("points, paths, errors") {
   CHECK(c->hear().opcode == 2);
 }
 
-TEST_CASE("who may look may not control, and nobody where nothing trains") {
+TEST_CASE("no control by looking, or where nothing trains") {
   running still, training(true);
   auto const stop = R"({"type":"train","action":"stop"})", share = R"({"type":"share","value":0.5})";
   for (auto* const r : {&still, &training}) {
@@ -304,7 +304,7 @@ TEST_CASE("who may look may not control, and nobody where nothing trains") {
   }
 }
 
-TEST_CASE("what is malformed, binary or too long closes its own connection, and is logged") {
+TEST_CASE("a malformed message closes its connection, and is logged") {
   running r;
   auto const stays = r.client();
   auto const closed_by = [&](std::string const& payload, int opcode) {
@@ -367,7 +367,7 @@ TEST_CASE("a page that is silent makes room where all places are taken") {
   CHECK(is(fourth.ask(r.upgrade(r.path() + "socket", r.host(), "http://" + r.host())), 503));
 }
 
-TEST_CASE("files for a scene are taken from who may control, whole and by their size") {
+TEST_CASE("files of a scene need control, and come whole") {
   running plain;
   auto const post = [](running const& r, std::string const& name, std::string const& body, bool control = true,
                        std::string const& length = "") {
@@ -400,7 +400,7 @@ TEST_CASE("files for a scene are taken from who may control, whole and by their 
   CHECK(is(answer(plain, post(plain, "b.obj", "v")), 202));
 }
 
-TEST_CASE("connections that say nothing, or half of it, lock nobody out") {
+TEST_CASE("silent connections lock nobody out") {
   running r;
   auto const watches = r.client();
   std::vector<std::unique_ptr<socket_client>> silent;
@@ -479,7 +479,7 @@ TEST_CASE("notes go to all, and the reason of the end with it") {
   CHECK(c->hear().opcode == 8);
 }
 
-TEST_CASE("one of four that takes nothing is rendered for no more, and the others go on") {
+TEST_CASE("a stalled client gets no more views, others go on") {
   running r;
   auto const stalled = r.client(true, 4096);
   std::vector<std::unique_ptr<socket_client>> others;
@@ -503,7 +503,7 @@ TEST_CASE("one of four that takes nothing is rendered for no more, and the other
   CHECK(std::count(r.widths.begin(), r.widths.end(), 64) == 3 * rounds);
 }
 
-TEST_CASE("what cannot be listened at is refused by the name of the option") {
+TEST_CASE("a bad address to listen at names its option") {
   running r;
   gart::view_server_options o;
   o.port = r.server.port();
@@ -523,7 +523,7 @@ TEST_CASE("a server that ends says so") {
   CHECK(json::parse(c->hear().payload)["type"] == "bye");
 }
 
-TEST_CASE("a client that asks and reads nothing is closed before what waits for it grows") {
+TEST_CASE("a client that reads nothing is closed in time") {
   running r;
   auto const c = r.client(true, 4096);
   gart::camera const view = camera_at({0, 0, 0}, 0, 1024, 512);
