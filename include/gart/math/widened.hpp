@@ -1,14 +1,14 @@
 #pragma once
 /// \file
 /// A Gaussian as a filter of standard deviation r sees it from the frame's origin. Every axis is widened by r, and the
-/// response is lowered so that the covered area, seen from there, keeps its sum.
+/// response is lowered so that its integral across the line of sight stays the same.
 ///   S'^2 = S^2 + r^2,   sigma' = sigma sqrt(F),   F = prod S^2 d^T C^-1 d / (prod S'^2 d^T C'^-1 d),
 /// C = R S^2 R^T the covariance in world axes, d the direction of the mean. For the largest response along rays of
-/// direction d is a Gaussian of the plane across d. Its covariance is the section of C there, of determinant det C d^T
-/// C^-1 d. A filter adds r^2 to it. F is the ratio of the determinants, the square of that of the areas. With u the
-/// direction in the Gaussian's axes and a_k = s_k^2 / r^2 both are sums of positive terms:
+/// direction d is a Gaussian of the plane across d. Its covariance is the projection of C onto that plane, whose
+/// determinant is det C d^T C^-1 d. A filter adds r^2 to it. F is the ratio of the determinants, the square of that of
+/// the areas. With u the direction in the Gaussian's axes and a_k = s_k^2 / r^2 both are sums of positive terms:
 ///   F = N / N',   N = sum u_k^2 a_i a_j,   N' = sum u_k^2 (1 + a_i)(1 + a_j)   ({i, j, k} all three axes).
-/// Responses of another degree than 2 keep their own shape, and so their own covered area.
+/// Responses of another degree than 2 keep their own shape, and so their own integral.
 ///
 /// The result is a gaussian_parameters again, so records, boxes and footprints take one and the same widened Gaussian.
 /// Its arithmetic is fixed. Where it would be no Gaussian it is left alone, to be culled.
