@@ -4,6 +4,7 @@
 #include <support/policies.hpp>
 
 #include <algorithm>
+#include <numeric>
 #include <random>
 
 namespace {
@@ -32,6 +33,29 @@ struct count_visits {
   GART_KERNEL void operator()(gart::index_t i) const {
     counting_visitor v{boxes, gart::slab_ray(rays[i]), visits + static_cast<std::size_t>(i) * tree.count, from, to};
     gart::walk(tree, rays[i], v);
+  }
+};
+
+// Of a node's children, how many are entered later by enter_child than by cross_children: a walk would prune those
+// behind such a child wrongly.
+struct count_late {
+  gart::bvh_node const* nodes;
+  gart::index_t count;
+  gart::ray const* rays;
+  u32* late;  // [rays][nodes]
+  GART_KERNEL void operator()(gart::index_t i) const {
+    gart::bvh_node const& n = nodes[i % count];
+    gart::slab_ray const slab(rays[i / count]);
+    float entry[gart::bvh_width];
+    u32 const crossed = gart::cross_children(gart::load_bounds(n), slab, 0, 1e9f, entry);
+    for (int c = 0; c < gart::bvh_width; ++c) {
+      if (!(crossed >> c & 1u)) continue;
+      float room = 1e-6f * entry[c];
+      for (int k = 0; k < 3; ++k)
+        room = fmaxf(room,
+                     fabsf(slab.inverse[k]) * (1e-4f * n.axis(k).step() + 2e-7f * fabsf(n.origin[k] - slab.origin[k])));
+      late[i] += gart::enter_child(n, c, slab, 0) > entry[c] + room;
+    }
   }
 };
 
@@ -216,6 +240,25 @@ TEST_CASE_TEMPLATE("a walk visits every box a ray crosses, once", E, GART_TEST_P
   random_boxes source(gart_test::seed());
   E exec;
   for (std::size_t n : {0, 1, 2, 3, 4, 5, 17, 100, 1000, 20000}) check_boxes(exec, source, source.many(n));
+}
+
+TEST_CASE_TEMPLATE("a walk prunes by the order it sorted by", E, GART_TEST_POLICIES) {
+  CAPTURE(gart_test::seed());
+  random_boxes source(gart_test::seed());
+  E exec;
+  gart::buffer<box, E> boxes(exec, source.many(2000));
+  gart::bvh<E> tree(exec);
+  tree.build(exec, std::as_const(boxes).view());
+  std::vector<gart::ray> rays;
+  for (int i = 0; i < 100; ++i) rays.push_back(source.towards(source.point(10)));
+  gart::buffer<gart::ray, E> on_device(exec, rays);
+  auto const nodes = static_cast<gart::index_t>(tree.view().count / 8);  // of the upper ones
+  gart::buffer<u32, E> late(exec, rays.size() * nodes);
+  late.zero();
+  gart::parallel_for(exec, "late", static_cast<u32>(late.size()),
+                     count_late{tree.view().nodes, nodes, on_device.data(), late.data()});
+  auto const all = late.to_host();
+  CHECK(std::accumulate(all.begin(), all.end(), 0u) == 0);
 }
 
 TEST_CASE_TEMPLATE("boxes that share a centre, a code or nothing at all", E, GART_TEST_POLICIES) {

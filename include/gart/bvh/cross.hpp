@@ -73,9 +73,19 @@ GART_HD GART_INLINE float smaller(float a, float b) {
 #endif
 }
 
-/// A node's grid along a ray: it crosses plane q of axis k at q * step[k] + enter[k], or + leave[k] on the way out. The
-/// two lie apart by more than all roundings of either: a few of the distance to the far end of the grid. What overflows
-/// ends as an infinity on the safe side or as no number, and that prunes nothing.
+/// A plane's number as rays read it. A device reads 1 + q / 2^15, whose bits need no conversion.
+GART_HD GART_INLINE float plane_number(u32 q) {
+#if defined(__CUDA_ARCH__)
+  return __uint_as_float(0x3f800000u | q << 8);
+#else
+  return static_cast<float>(q);
+#endif
+}
+
+/// A node's grid along a ray: it crosses plane q of axis k at plane_number(q) * step[k] + enter[k], or + leave[k] on
+/// the way out. The two lie apart by more than all roundings of either: a few of the distance to the far end of the
+/// grid, and on a device 2^-9 of a step. What overflows ends as an infinity on the safe side or as no number, and that
+/// prunes nothing.
 struct grid_crossing {
   float step[3], enter[3], leave[3];  ///< a number an axis
 
@@ -88,6 +98,11 @@ struct grid_crossing {
       step[k] = a.step() * r.inverse[k];
       float const slack = 4.8e-7f * (fabsf(begin) + 256.0f * fabsf(step[k])) - r.narrower[k];
       enter[k] = begin - slack, leave[k] = begin + slack;
+#if defined(__CUDA_ARCH__)
+      float const more = 0.01f * fabsf(step[k]);
+      step[k] *= 32768.0f;
+      enter[k] = enter[k] - step[k] - more, leave[k] = leave[k] - step[k] + more;
+#endif
     }
   }
 };
@@ -139,7 +154,6 @@ GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, flo
                                        float (&entry)[bvh_width]) {
   grid_crossing const grid(n, r);
   u32 first[3][bvh_width / 4], last[3][bvh_width / 4];
-  float step[3], enter[3], leave[3];
   GART_UNROLL
   for (int k = 0; k < 3; ++k) {
     GART_UNROLL
@@ -147,20 +161,12 @@ GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, flo
       u32 const lower = n.plane[0][k][w], upper = n.plane[1][k][w];
       first[k][w] = r.inverse[k] < 0 ? upper : lower, last[k][w] = r.inverse[k] < 0 ? lower : upper;
     }
-#if defined(__CUDA_ARCH__)
-    // Planes are read as 1 + q / 2^15, which needs no conversion of a number. That costs 2^-9 of a step in roundings.
-    step[k] = 32768.0f * grid.step[k];
-    float const slack = 0.01f * fabsf(grid.step[k]);
-    enter[k] = grid.enter[k] - step[k] - slack, leave[k] = grid.leave[k] - step[k] + slack;
-#else
-    step[k] = grid.step[k], enter[k] = grid.enter[k], leave[k] = grid.leave[k];
-#endif
   }
   auto const plane = [](u32 const(&side)[bvh_width / 4], int c) {
 #if defined(__CUDA_ARCH__)
     return __uint_as_float(__byte_perm(side[c / 4], 0x3f800000u, 0x7604u | static_cast<u32>(c % 4) << 4));
 #else
-    return static_cast<float>(side[c / 4] >> 8 * (c % 4) & 0xffu);
+    return plane_number(side[c / 4] >> 8 * (c % 4) & 0xffu);
 #endif
   };
   u32 crossed = 0;
@@ -169,8 +175,8 @@ GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, flo
     float from = near, to = far;
     GART_UNROLL
     for (int k = 0; k < 3; ++k) {
-      from = larger(plane(first[k], c) * step[k] + enter[k], from);
-      to = smaller(plane(last[k], c) * step[k] + leave[k], to);
+      from = larger(plane(first[k], c) * grid.step[k] + grid.enter[k], from);
+      to = smaller(plane(last[k], c) * grid.step[k] + grid.leave[k], to);
     }
     entry[c] = from;
     crossed |= (from <= to ? 1u : 0u) << c;
@@ -179,14 +185,15 @@ GART_HD GART_INLINE u32 cross_children(bvh_node const& n, slab_ray const& r, flo
 }
 #endif
 
-/// Where the ray enters child c, at least near: the value of cross_children, to a rounding.
+/// Where the ray enters child c, at least near: the value of cross_children, to a rounding. Children are ordered by
+/// that value, so another bound, even a closer one, would prune those behind it wrongly.
 GART_HD GART_INLINE float enter_child(bvh_node const& n, int c, slab_ray const& r, float near) {
   grid_crossing const grid(n, r);
   float from = near;
   GART_UNROLL
   for (int k = 0; k < 3; ++k) {
     u8 const plane = reinterpret_cast<u8 const*>(n.plane[r.inverse[k] < 0][k])[c];
-    from = larger(static_cast<float>(plane) * grid.step[k] + grid.enter[k], from);
+    from = larger(plane_number(plane) * grid.step[k] + grid.enter[k], from);
   }
   return from;
 }
