@@ -233,6 +233,27 @@ struct add_samples {
   }
 };
 
+// From sums of samples to their mean, exposed and in a tone. An index is a number of a colour.
+struct show_samples {
+  float const* sums;
+  float share, gain;  // one over the samples; of the exposure
+  light::tone_kind tone;
+  float* to;
+  GART_KERNEL void operator()(index_t i) const {
+    using enum light::tone_kind;
+    float x = sums[i] * share * gain;
+    if (tone == filmic) x = rolled_off(x);
+    to[i] = tone == none ? x : displayed(clamped(x, 0.0f, 1.0f));
+  }
+
+ private:
+  // Narkowicz, "ACES filmic tone mapping curve", 2015.
+  GART_HD static float rolled_off(float x) {
+    x = fmaxf(x, 0.0f);
+    return x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f);
+  }
+};
+
 // How far each Gaussian is in the shadow of meshes, at its centre.
 struct shade_gaussians {
   scene_view scene;
