@@ -79,7 +79,8 @@ GART_HD GART_INLINE vec3 bounded(vec3 const& c, float most, u32 bounces) {
   return most > 0 && bounces > 0 && top > most ? c * (most / top) : c;
 }
 
-// A shadow ray from the surface that each path has come to, to one of the lights; the last is what lies around.
+// A shadow ray from the surface that each path has come to, to one of the lights; the last is what lies around. Alone:
+// no path goes on from a surface to meet a light by chance.
 struct aim_at_light {
   scene_view scene;
   path const* paths;
@@ -90,6 +91,7 @@ struct aim_at_light {
   float firefly;
   u64 seed;
   u32 sample, step;
+  bool alone = false;
   GART_KERNEL void operator()(index_t i) const {
     rays[i].far = 0;
     path const p = paths[i];
@@ -106,7 +108,7 @@ struct aim_at_light {
     vec3 const out = about.to_local(-p.direction);
     rough_surface const m(s.base, s.metallic, s.roughness, s.ior, out.z, scene.specular);
     auto const a = m.of(out, about.to_local(g.direction));
-    float const share = g.density > 0 ? balance(g.density, a.density) : 1.0f;
+    float const share = g.density > 0 && !alone ? balance(g.density, a.density) : 1.0f;
     vec3 const radiance = bounded(p.throughput * a.thrown * g.radiance * share, firefly, p.bounces());
     if (!(luminance(radiance) > 0)) return;
     vec3 const origin = s.leave(g.direction);

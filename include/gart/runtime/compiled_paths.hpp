@@ -94,9 +94,10 @@ class compiled_mirrors final : public mirror_service {
 
   void show(gaussians_view<float const> model, int active_degree, camera const& view, render_options const& options,
             float* image) override {
-    constexpr int bounces = 4;
+    light::path_options as_captured;
+    as_captured.shadows = light::shadow_kind::none;
     paths_.set_model(model, active_degree);
-    paths_.forward(view, options, bounces, image, mirror_pixels::mirrors);
+    paths_.forward(view, options, as_captured, image, mirror_pixels::mirrors);
   }
   void take_out(span<float> image) override { paths_.take_out(image); }
   void backward(span<float const> by_image, gaussians_view<float> gradients) override {
