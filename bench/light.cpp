@@ -88,7 +88,7 @@ void frame(benchmark::State& state, E& exec) {
   gart::camera view = gart_bench::the_scene().view();
   gart::gaussians<E> const model(exec, gart_bench::the_scene().model);
   gart::path_tracer<E> tracer(exec);
-  tracer.set_model(model.view(), gart_bench::sh_degree);
+  tracer.set_model(model.view(), model.sh_degree());
   tracer.set_scene(scene);
   light::path_options options = among ? among->paths : light::path_options{};
   options.bounces = Bounces;

@@ -104,7 +104,7 @@ scene make_scene(scene_options const& options) {
     s.cameras = s.among->cameras;
     for (auto& [name, view] : s.cameras) view = gart::resized(view, options.width, options.height);
   }
-  if (s.model.sh_degree != options.degree)
+  if (options.scene.empty() && s.model.sh_degree != options.degree)
     throw gart::io_error(options.model.string(), "has SH degree " + std::to_string(s.model.sh_degree),
                          "name a model of degree " + std::to_string(options.degree));
   if (s.cameras.empty())

@@ -28,7 +28,7 @@ struct scene_options {
   std::size_t gaussians = 20000;
   int width = 320, height = 240;
   int copies = 1;          // of the discs, above each other: a camera sees one of them
-  int degree = sh_degree;  // of the discs' colours, and what a model must have
+  int degree = sh_degree;  // of the discs' colours, and what a model without a scene must have
 };
 
 scene make_scene(scene_options const& options);
