@@ -1,8 +1,13 @@
 // A sample of paths through all pixels of the view: of Gaussians alone, and with a mirror ball on a rough floor under a
-// sun before the camera, by the number of bounces. What shadows cost, once a Gaussian and at each hit.
+// sun before the camera, by the number of bounces. What shadows cost, once a Gaussian and at each hit. Frames as a
+// viewer that moves asks for them, wall time from a camera to bytes on the host, and the times of their stages; of the
+// run's scene where it has one.
 #include "support/frame.hpp"
 
 #include <gart/light/path_tracer.hpp>
+#include <gart/render/bytes.hpp>
+
+#include <chrono>
 
 namespace {
 
@@ -76,6 +81,44 @@ void sample(benchmark::State& state, E& exec) {
   gart_bench::measure(state, exec, [&] { p.tracer.add(1); });
 }
 
+template <int Bounces, gart::execution E>
+void frame(benchmark::State& state, E& exec) {
+  auto const& among = gart_bench::the_scene().among;
+  light::scene const scene = among ? among->scene : ball_on_floor();
+  gart::camera view = gart_bench::the_scene().view();
+  gart::gaussians<E> const model(exec, gart_bench::the_scene().model);
+  gart::path_tracer<E> tracer(exec);
+  tracer.set_model(model.view(), model.sh_degree());
+  tracer.set_scene(scene);
+  light::path_options options = among ? among->paths : light::path_options{};
+  options.bounces = Bounces;
+  std::size_t const values =
+      std::size_t{3} * static_cast<std::size_t>(view.width) * static_cast<std::size_t>(view.height);
+  gart::buffer<float, E> shown(exec, values);
+  gart::buffer<gart::u8, E> bytes(exec, values);
+  auto const draw = [&] {
+    view.position.x += 1e-3;
+    tracer.begin(view, {}, options);
+    tracer.add(1);
+    tracer.show(options.exposure, options.tone, shown.data());
+    gart::color_to_bytes(exec, shown.data(), tracer.pixels(), bytes.data(), 3);
+    benchmark::DoNotOptimize(bytes.to_host().data());
+  };
+  draw(), draw();
+  using clock = std::chrono::steady_clock;
+  for (auto _ : state) {
+    auto const start = clock::now();
+    draw();
+    state.SetIterationTime(std::chrono::duration<double>(clock::now() - start).count());
+  }
+  constexpr int timed = 5;
+  exec.profile.clear(), exec.profile.enable(true);
+  for (int i = 0; i < timed; ++i) draw();
+  exec.synchronize();
+  for (auto const& [label, time] : exec.profile.stages()) state.counters[label + "_ms"] = time.milliseconds / timed;
+  exec.profile.enable(false), exec.profile.clear();
+}
+
 template <gart::execution E>
 void shade(benchmark::State& state, E& exec) {
   paths<E> p(exec, ball_on_floor(), 0, light::shadow_kind::per_gaussian);
@@ -95,5 +138,10 @@ GART_BENCH("light/bounces_3", sample<3, gart::light::shadow_kind::per_gaussian>)
 GART_BENCH("light/bounces_4", sample<4, gart::light::shadow_kind::per_gaussian>)
 GART_BENCH("light/bounces_5", sample<5, gart::light::shadow_kind::per_gaussian>)
 GART_BENCH("light/bounces_6", sample<6, gart::light::shadow_kind::per_gaussian>)
+GART_BENCH("light/frame/bounces_0", frame<0>)
+GART_BENCH("light/frame/bounces_1", frame<1>)
+GART_BENCH("light/frame/bounces_2", frame<2>)
+GART_BENCH("light/frame/bounces_4", frame<4>)
+GART_BENCH("light/frame/bounces_6", frame<6>)
 GART_BENCH("light/bounces_1/per_hit", sample<1, gart::light::shadow_kind::per_hit>)
 GART_BENCH("light/shade_gaussians", shade)

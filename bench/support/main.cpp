@@ -16,10 +16,12 @@ namespace {
 scene const* current = nullptr;
 
 constexpr char const* usage =
-    "usage: gart_bench [--model FILE.ply --cameras FILE.json | --gaussians N --size WxH] [--write STEM]\n"
+    "usage: gart_bench [--model FILE.ply --cameras FILE.json | --model FILE.ply --scene SCENE.json --size WxH |\n"
+    "                   --gaussians N --size WxH] [--write STEM]\n"
     "                  [--benchmark_filter=REGEX and Google Benchmark's other options]\n\n"
     "Times every stage of a training step on one view: the first camera of CAMERAS, or of a scene of N discs (default\n"
-    "20000 at 320x240). --write makes STEM.ply and STEM.json of that scene instead. Names: stage/policy.\n";
+    "20000 at 320x240). Paths of light meet the meshes and lights of SCENE. --write makes STEM.ply and STEM.json of "
+    "that scene instead. Names: stage/policy.\n";
 
 struct arguments {
   scene_options scene;
@@ -38,6 +40,8 @@ std::optional<arguments> parse(int argc, char** argv) {
       out.scene.model = value;
     else if (name == "--cameras")
       out.scene.cameras = value;
+    else if (name == "--scene")
+      out.scene.scene = value;
     else if (name == "--write")
       out.write = value;
     else if (name == "--gaussians" && std::sscanf(value, "%llu", &n) == 1 && n > 0)
@@ -48,7 +52,8 @@ std::optional<arguments> parse(int argc, char** argv) {
     else
       return {};
   }
-  if (out.scene.model.empty() != out.scene.cameras.empty()) return {};
+  if (out.scene.model.empty() != (out.scene.cameras.empty() && out.scene.scene.empty())) return {};
+  if (!out.scene.cameras.empty() && !out.scene.scene.empty()) return {};
   return out;
 }
 

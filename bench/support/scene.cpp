@@ -97,12 +97,19 @@ scene make_scene(scene_options const& options) {
     return s;
   }
   s.model = gart::read_splat_ply(options.model);
-  s.cameras = gart::load_cameras(options.cameras);
-  if (s.model.sh_degree != options.degree)
+  if (options.scene.empty()) {
+    s.cameras = gart::load_cameras(options.cameras);
+  } else {
+    s.among = gart::read_scene(options.scene);
+    s.cameras = s.among->cameras;
+    for (auto& [name, view] : s.cameras) view = gart::resized(view, options.width, options.height);
+  }
+  if (options.scene.empty() && s.model.sh_degree != options.degree)
     throw gart::io_error(options.model.string(), "has SH degree " + std::to_string(s.model.sh_degree),
                          "name a model of degree " + std::to_string(options.degree));
   if (s.cameras.empty())
-    throw gart::io_error(options.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
+    throw gart::io_error((options.scene.empty() ? options.cameras : options.scene).string(), "has no cameras",
+                         "name a dataset or a camera JSON");
   return s;
 }
 

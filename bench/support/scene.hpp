@@ -4,9 +4,11 @@
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/io/dataset.hpp>
+#include <gart/io/scene_file.hpp>
 #include <gart/scene/gaussians.hpp>
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 namespace gart_bench {
@@ -16,15 +18,17 @@ inline constexpr int sh_degree = 3;  // of what is timed stage by stage
 struct scene {
   gart::gaussian_model model;
   std::vector<gart::named_camera> cameras;
+  std::optional<gart::scene_file> among;  // meshes and lights
   gart::camera const& view() const { return cameras.front().view; }
 };
 
 struct scene_options {
   std::filesystem::path model, cameras;  // empty: discs
+  std::filesystem::path scene;           // of meshes, lights and cameras, in place of a file of cameras
   std::size_t gaussians = 20000;
   int width = 320, height = 240;
   int copies = 1;          // of the discs, above each other: a camera sees one of them
-  int degree = sh_degree;  // of the discs' colours, and what a model must have
+  int degree = sh_degree;  // of the discs' colours, and what a model without a scene must have
 };
 
 scene make_scene(scene_options const& options);

@@ -50,7 +50,7 @@ int main(int argc, char** argv) try {
   tracer->begin(view, options, {});
   while (tracer->samples() < 64) {
     tracer->add(8);
-    gart::write_png(argv[7], gart::to_8bit(tracer->picture()));
+    gart::write_png(argv[7], tracer->picture_8bit());
     std::printf("%d samples a pixel -> %s\n", tracer->samples(), argv[7]);
   }
   return 0;

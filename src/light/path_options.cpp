@@ -1,34 +1,11 @@
-// What of the options cannot be traced by, and the tones.
+// What of the options cannot be traced by.
 #include <gart/core/error.hpp>
 #include <gart/light/path_options.hpp>
-#include <gart/math/srgb.hpp>
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 
 namespace gart::light {
-
-namespace {
-
-float encoded(float x) { return displayed(std::clamp(x, 0.0f, 1.0f)); }
-// Narkowicz, "ACES filmic tone mapping curve", 2015.
-float rolled_off(float x) {
-  x = std::max(x, 0.0f);
-  return x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f);
-}
-
-}  // namespace
-
-image_float toned(image_float linear, path_options const& o) {
-  float const gain = std::exp2(o.exposure);
-  for (float& x : linear.data) {
-    x *= gain;
-    if (o.tone == tone_kind::srgb) x = encoded(x);
-    if (o.tone == tone_kind::filmic) x = encoded(rolled_off(x));
-  }
-  return linear;
-}
 
 void require_path_options(path_options const& o) {
   auto const require = [](bool good, char const* field, char const* range, auto value) {

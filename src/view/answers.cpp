@@ -37,7 +37,10 @@ json parts_of(std::vector<view_part> const& parts) {
     if (p.light)
       list.back()["color"] = list_of(p.color);
     else
-      list.back()["min"] = list_of(p.low), list.back()["max"] = list_of(p.high);
+      list.back().update({{"min", list_of(p.low)},
+                          {"max", list_of(p.high)},
+                          {"rotation", p.rotation},
+                          {"scale", {p.scale.x, p.scale.y, p.scale.z}}});
   }
   return list;
 }

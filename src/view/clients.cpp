@@ -89,6 +89,9 @@ verdict clients::receive(int id, std::string_view text, double now) {
       if (e.place) kept.place = e.place;
       if (e.material) kept.material = e.material;
       if (e.color) kept.color = e.color;
+      if (e.rotation) kept.rotation = e.rotation;
+      if (e.scale) kept.scale = e.scale;
+      if (e.about) kept.about = e.about;
     }
   } else if (auto const* const train = std::get_if<train_message>(&message)) {
     if (controls(c, "train", scene_->training, "there is no training here") && actions_.size() < actions_most)

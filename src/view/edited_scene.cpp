@@ -1,10 +1,12 @@
 #include <gart/core/error.hpp>
 #include <gart/io/file.hpp>
+#include <gart/scene/similarity.hpp>
 #include <gart/view/edited_scene.hpp>
 
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <limits>
@@ -25,6 +27,19 @@ vec3d three(json const& object, char const* key, vec3d const& otherwise) {
   auto const it = object.find(key);
   if (it == object.end() || !it->is_array() || it->size() != 3) return otherwise;
   return {(*it)[0].get<double>(), (*it)[1].get<double>(), (*it)[2].get<double>()};
+}
+std::array<double, 4> rotation_in(json const& mesh) {
+  auto const it = mesh.find("rotation");
+  return it == mesh.end() ? std::array<double, 4>{1, 0, 0, 0} : it->get<std::array<double, 4>>();
+}
+vec3d scale_in(json const& mesh) {
+  auto const it = mesh.find("scale");
+  return it == mesh.end() || it->is_array() ? three(mesh, "scale", vec3d(1.0)) : vec3d(it->get<double>());
+}
+mat3d linear_of(json const& mesh) {
+  mat3d out = rotation_of(rotation_in(mesh));
+  for (int c = 0; c < 3; ++c) out[c] *= scale_in(mesh)[c];
+  return out;
 }
 std::string text_of(json const& object, char const* key) {
   auto const it = object.find(key);
@@ -93,6 +108,7 @@ struct edited_scene::state {
           out.low = glm::min(out.low, p), out.high = glm::max(out.high, p);
     if (!(out.low.x <= out.high.x)) out.low = out.high = vec3(0.0f);
     out.place = 0.5f * (out.low + out.high);
+    out.rotation = rotation_in(entry), out.scale = scale_in(entry);
     return out;
   }
   view_part light_part(std::size_t i) const {
@@ -109,14 +125,28 @@ struct edited_scene::state {
   void change_mesh(std::size_t i, part_edit const& edit) {
     json changed = document;
     json& entry = changed["meshes"][i];
-    if (edit.place) {
-      vec3 const by = *edit.place - mesh_part(i).place;
-      entry["translation"] = list_of(three(entry, "translation", vec3d(0.0)) + vec3d(by));
-      bool const alone = first_light() == 0;  // else lights of its file would move with it
+    if (edit.place || edit.rotation || edit.scale) {
+      vec3 const stood = mesh_part(i).place, stands = edit.place.value_or(stood);
+      mat3d const before = linear_of(entry);
+      if (edit.rotation) entry["rotation"] = *edit.rotation;
+      if (edit.scale) entry["scale"] = list_of(*edit.scale);
+      bool const turns = edit.rotation || edit.scale;
+      mat3d const linear = turns ? linear_of(entry) * glm::inverse(before) : mat3d(1.0);
+      vec3d const by(stands - stood), about(edit.about.value_or(stands));
+      auto const moved = [&](vec3d const& p) { return turns ? linear * (p + by - about) + about : p + by; };
+      vec3d const at = three(entry, "translation", vec3d(0.0));
+      entry["translation"] = list_of(turns ? moved(at - origin) + origin : at + by);
+      // Else lights of its file would move with it, or triangles show their other side.
+      bool const alone = first_light() == 0 && glm::determinant(linear) > 0;
       if (alone && !edit.material) {
-        for (std::size_t k = 0; k < now.scene.meshes.size(); ++k)
-          if (now.mesh_entries[k] == static_cast<int>(i))
-            for (vec3& p : now.scene.meshes[k].positions) p += by;
+        mat3d const of_normals = glm::transpose(glm::inverse(linear));
+        for (std::size_t k = 0; k < now.scene.meshes.size(); ++k) {
+          if (now.mesh_entries[k] != static_cast<int>(i)) continue;
+          for (vec3& p : now.scene.meshes[k].positions) p = vec3(moved(vec3d(p)));
+          if (!turns) continue;
+          for (vec3& n : now.scene.meshes[k].normals)
+            if (n != vec3(0.0f)) n = vec3(glm::normalize(of_normals * vec3d(n)));
+        }
         document = std::move(changed);
         return;
       }

@@ -8,6 +8,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <initializer_list>
 #include <utility>
@@ -90,12 +92,16 @@ class fields {
     if (!(v >= least && v <= most)) refuse(field, "is out of its range");
     return v;
   }
+  template <std::size_t N>
+  static std::array<double, N> numbers(json const& value, std::string const& field, double most) {
+    if (!value.is_array() || value.size() != N) refuse(field, "is not a list of " + std::to_string(N) + " numbers");
+    std::array<double, N> out;
+    for (std::size_t k = 0; k < N; ++k) out[k] = in_range(value[k], field, -most, most);
+    return out;
+  }
   static vec3 point(json const& value, std::string const& field) {
-    if (!value.is_array() || value.size() != 3) refuse(field, "is not a list of 3 numbers");
-    vec3 p;
-    for (int k = 0; k < 3; ++k)
-      p[k] = static_cast<float>(in_range(value[static_cast<std::size_t>(k)], field, -1e18, 1e18));
-    return p;
+    auto const [x, y, z] = numbers<3>(value, field, 1e18);
+    return vec3(vec3d(x, y, z));
   }
   view_settings settings() {
     view_settings s;
@@ -220,6 +226,17 @@ client_message parse_message(std::string_view text) {
       e.color = fields::point(*color, "color");
       for (int k = 0; k < 3; ++k) fields::in_range((*color)[static_cast<std::size_t>(k)], "color", 0, 1e12);
     }
+    if (json const* const rotation = f.find("rotation")) {
+      e.rotation = fields::numbers<4>(*rotation, "rotation", 1e9);
+      auto const [w, x, y, z] = *e.rotation;
+      if (!(w * w + x * x + y * y + z * z > 1e-12)) refuse("rotation", "is all zero");
+    }
+    if (json const* const scale = f.find("scale")) {
+      auto const [x, y, z] = fields::numbers<3>(*scale, "scale", 1e9);
+      e.scale = vec3d(x, y, z);
+      if (!(std::min({std::fabs(x), std::fabs(y), std::fabs(z)}) >= 1e-9)) refuse("scale", "has a zero");
+    }
+    if (json const* const about = f.find("about")) e.about = fields::point(*about, "about");
     out = part_message{e};
   } else if (type == "train") {
     out = train_message{f.name<train_action>("action")};

@@ -1,6 +1,5 @@
 #include "held_model.hpp"
 
-#include <gart/io/image_file.hpp>
 #include <gart/view/path_view.hpp>
 
 #include <algorithm>
@@ -40,7 +39,7 @@ struct path_view {
       while (by.samples() < most && clock::now() < end);
       samples = by.samples();
     }
-    return to_8bit(by.picture());
+    return by.picture_8bit();
   }
 
   rendered images(camera const& view, view_settings const& settings) {

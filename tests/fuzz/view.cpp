@@ -52,6 +52,14 @@ struct check {
   void operator()(gart::part_message const& m) const {
     promise(m.edit.index >= 0, "a part of no number");
     if (auto const& place = m.edit.place) promise(finite(gart::vec3d(*place)), "a place that is none");
+    if (auto const& about = m.edit.about) promise(finite(gart::vec3d(*about)), "a point that is none");
+    if (auto const& scale = m.edit.scale)
+      promise(finite(*scale) && scale->x != 0 && scale->y != 0 && scale->z != 0, "a scale that is none");
+    if (auto const& q = m.edit.rotation) {
+      double sum = 0;
+      for (double const x : *q) sum += x * x;
+      promise(sum > 0 && std::isfinite(sum), "a rotation that is none");
+    }
     if (auto const& color = m.edit.color)
       for (int k = 0; k < 3; ++k) promise((*color)[k] >= 0 && (*color)[k] <= 1e12f, "a colour that is none");
   }

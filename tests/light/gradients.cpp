@@ -1,4 +1,4 @@
-// Gradients through mirrors: of the light by definition, in double, by finite differences.
+// Gradients through mirrors and shadows: of the light by definition, in double, by finite differences.
 #include <gart/camera/models.hpp>
 #include <gart/light/mirror_paths.hpp>
 
@@ -7,26 +7,22 @@
 
 using namespace gart_test;
 
-TEST_CASE_TEMPLATE("mirrors pass gradients on to what they show", E, GART_TEST_POLICIES) {
-  auto const seed = gart_test::seed();
-  CAPTURE(seed);
+namespace {
+
+// A scene's image, and the gradients of a random loss of it.
+template <class E>
+void check_gradients(std::uint64_t seed, gart::gaussian_model const& model, light::scene const& scene,
+                     light::path_options const& paths, double bar) {
   E exec;
-  gart::gaussian_model const model = cloud(seed, 25, {0, 0, 4}, 0.7f, true, 1);
-  light::scene scene;
-  scene.meshes = {quad({1.2f, 0, 4.5f}, {1, 0, -1}, {0, -2, 0}, 0), quad({-1.2f, 0, 4.5f}, {1, 0, 1}, {0, -2, 0}, 0),
-                  quad({0, 1.2f, 4}, {0.7f, 0, 0}, {0, 0, 0.7f}, 1)};
-  scene.materials = {material_of(light::material_kind::mirror, {0.9f, 0.8f, 0.7f}), glowing({0.2f, 0.5f, 0.3f})};
   gart::camera const view = camera_at({0.1, -0.063, 0}, 16, 12, 14);
   gart::render_options options;
   options.alpha_min = 1e-7f, options.transmittance_min = 0, options.background = vec3(0.3f, 0.4f, 0.1f);
-  int const bounces = 3;
   std::size_t const pixels = 16 * 12;
   std::mt19937_64 engine(seed + 1);
   std::normal_distribution<float> normal;
   std::vector<float> weights(3 * pixels);
   for (float& w : weights) w = normal(engine);
 
-  light::path_options const paths = through_middles(bounces);
   auto const image = [&](gart::gaussian_model const& m) {
     double_light const light(m, scene, options, paths);
     std::vector<double> out;
@@ -49,14 +45,15 @@ TEST_CASE_TEMPLATE("mirrors pass gradients on to what they show", E, GART_TEST_P
   gart::mirror_paths<E> mirrors(exec);
   mirrors.set_scene(scene), mirrors.set_model(there.view(), 1);
   gart::buffer<float, E> color(exec, 3 * pixels);
-  gart::buffer<float, E> const by(exec, weights);
-  mirrors.forward(view, options, bounces, color.data());
-  mirrors.backward(by, gradients.view());
+  mirrors.forward(view, options, paths, color.data());
   std::vector<double> const expected = image(model);
   auto const got = color.to_host();
-  long wrong = 0;
-  for (std::size_t i = 0; i < got.size(); ++i) wrong += std::fabs(double{got[i]} - expected[i]) > 1e-4;
-  CHECK(wrong <= 6);
+  // Where floats put a hit on the other side of a surface, or of another hit, than doubles, both are right.
+  long aside = 0;
+  for (std::size_t i = 0; i < got.size(); ++i)
+    if (std::fabs(double{got[i]} - expected[i]) > 1e-5 * (1 + expected[i])) weights[i] = 0, ++aside;
+  CHECK(aside <= 18);
+  mirrors.backward(gart::buffer<float, E>(exec, weights), gradients.view());
 
   gart::gaussian_model const analytic = gradients.to_host();
   auto const check = [&](char const* name, std::vector<float> gart::gaussian_model::*array, std::size_t each) {
@@ -71,18 +68,67 @@ TEST_CASE_TEMPLATE("mirrors pass gradients on to what they show", E, GART_TEST_P
         a -= h, b += h;
         return (loss(image(more)) - loss(image(less))) / (double{b} - double{a});
       };
-      double const wide = slope(2e-3f), narrow = slope(1e-3f), g = double{(analytic.*array)[i]};
+      double const wide = slope(5e-4f), narrow = slope(2.5e-4f), expected_slope = (4 * narrow - wide) / 3,
+                   g = double{(analytic.*array)[i]};
       // Across a step both are wrong, each in its way.
-      if (std::fabs(wide - narrow) > 1e-3 * (std::fabs(narrow) + 0.1 * largest)) continue;
+      if (std::fabs(wide - narrow) > 2e-4 * (std::fabs(narrow) + 0.1 * largest)) continue;
       ++compared;
-      bad += std::fabs(narrow - g) > 5e-3 * (std::fabs(g) + 0.1 * largest);
+      bad += std::fabs(expected_slope - g) > bar * (std::fabs(g) + 0.1 * largest);
     }
     CHECK(compared > 5);
-    CHECK(bad <= compared / 20);
+    CHECK(bad == 0);
   };
   check("mean", &gart::gaussian_model::mean, 4);
   check("log_scale", &gart::gaussian_model::log_scale, 4);
   check("quaternion", &gart::gaussian_model::quaternion, 7);
   check("opacity", &gart::gaussian_model::opacity, 2);
   check("sh", &gart::gaussian_model::sh, 17);
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("mirrors pass gradients on to what they show", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  light::scene scene;
+  scene.meshes = {quad({1.2f, 0, 4.5f}, {1, 0, -1}, {0, -2, 0}, 0), quad({-1.2f, 0, 4.5f}, {1, 0, 1}, {0, -2, 0}, 0),
+                  quad({0, 1.2f, 4}, {0.7f, 0, 0}, {0, 0, 0.7f}, 1)};
+  scene.materials = {material_of(light::material_kind::mirror, {0.9f, 0.8f, 0.7f}), glowing({0.2f, 0.5f, 0.3f})};
+  check_gradients<E>(seed, cloud(seed, 25, {0, 0, 4}, 0.7f, true, 1), scene, through_middles(3), 1e-3);
+}
+
+// A floor and a wall of a mirror, and a board above that hides the lights from some of the Gaussians.
+TEST_CASE_TEMPLATE("shadows on meshes pass gradients on to Gaussians", E, GART_TEST_POLICIES) {
+  auto const seed = gart_test::seed();
+  CAPTURE(seed);
+  light::scene scene;
+  scene.meshes = {quad({0, 1.1f, 4}, {2.5f, 0, 0}, {0, 0, 2.5f}, 1), quad({1.3f, 0, 4.5f}, {1, 0, -1}, {0, -2, 0}, 0),
+                  quad({-0.4f, -1.3f, 4}, {0.5f, 0, 0}, {0, 0, 0.6f}, 1)};
+  scene.materials = {material_of(light::material_kind::mirror, {0.9f, 0.8f, 0.7f}), matt({0.7f, 0.9f, 0.8f})};
+  gart::gaussian_model const model = cloud(seed, 25, {0, 0, 4}, 0.6f, true, 1);
+  light::path_options paths = through_middles(2);
+  SUBCASE("as they were captured") {
+    scene.lights = {sun({0.2f, 1, 0.1f}, {2, 3, 2.5f}), point_light({0.4f, -1.2f, 3.2f}, {4, 2, 3})};
+    check_gradients<E>(seed, model, scene, paths, 1e-3);
+  }
+  // The light on a Gaussian counts as constant, which that of suns is but for steps.
+  scene.lights = {sun({0.2f, 1, 0.1f}, {2, 3, 2.5f}), sun({-0.4f, 1, 0.2f}, {1, 0.5f, 1.5f})};
+  paths.shadows = light::shadow_kind::per_gaussian;
+  SUBCASE("in the shadow of meshes") { check_gradients<E>(seed, model, scene, paths, 1e-3); }
+  SUBCASE("lit anew") {
+    paths.relight = true;
+    check_gradients<E>(seed, model, scene, paths, 1e-3);
+  }
+}
+
+TEST_CASE("gradients refuse what has none") {
+  gart::serial_exec exec;
+  gart::mirror_paths<gart::serial_exec> mirrors(exec);
+  light::path_options paths;
+  paths.shadows = light::shadow_kind::per_hit;
+  CHECK_THROWS_WITH_AS(mirrors.forward(camera_at({0, 0, 0}), {}, paths, nullptr), doctest::Contains("per-hit"),
+                       gart::invalid_argument);
+  paths = {}, paths.linear = true;
+  CHECK_THROWS_WITH_AS(mirrors.forward(camera_at({0, 0, 0}), {}, paths, nullptr),
+                       doctest::Contains("path_options.linear"), gart::invalid_argument);
 }

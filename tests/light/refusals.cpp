@@ -1,5 +1,6 @@
 // What is refused, by the field that is wrong; and the run-time interface.
 #include <gart/core/error.hpp>
+#include <gart/io/image_file.hpp>
 #include <gart/runtime/path_renderer.hpp>
 
 #include <light/small_scenes.hpp>
@@ -114,6 +115,16 @@ TEST_CASE("a renderer of paths adds samples to a picture") {
     float const x = std::min(2 * got.data[i], 1.0f);
     CHECK(shown.data[i] ==
           doctest::Approx(x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1 / 2.4f) - 0.055f).epsilon(1e-5));
+  }
+  CHECK(renderer->picture_8bit().data == gart::to_8bit(shown).data);
+  paths.tone = light::tone_kind::filmic, paths.exposure = -1;
+  renderer->begin(view, {}, paths);
+  renderer->add(5);
+  gart::image_float const filmic = renderer->picture();
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    double const x = 0.5 * double{expected[i]}, y = x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14);
+    CHECK(filmic.data[i] ==
+          doctest::Approx(y <= 0.0031308 ? 12.92 * y : 1.055 * std::pow(y, 1 / 2.4) - 0.055).epsilon(1e-4));
   }
 
   // The layers: the wall behind the Gaussians.

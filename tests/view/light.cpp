@@ -13,6 +13,8 @@
 #include <nlohmann/json.hpp>
 
 #include <unistd.h>
+#include <array>
+#include <cmath>
 #include <fstream>
 #include <random>
 
@@ -68,6 +70,10 @@ void check_same(gart::light::scene const& a, gart::light::scene const& b) {
     for (std::size_t i = 0; i < a.meshes[m].positions.size(); ++i)
       for (int k = 0; k < 3; ++k)
         CHECK(a.meshes[m].positions[i][k] == doctest::Approx(b.meshes[m].positions[i][k]).epsilon(1e-5));
+    REQUIRE(a.meshes[m].normals.size() == b.meshes[m].normals.size());
+    for (std::size_t i = 0; i < a.meshes[m].normals.size(); ++i)
+      CHECK(glm::dot(a.meshes[m].normals[i], b.meshes[m].normals[i]) > 0.99999f);
+    CHECK(a.meshes[m].triangles == b.meshes[m].triangles);
     CHECK(a.materials[a.meshes[m].triangle_material[0]].kind == b.materials[b.meshes[m].triangle_material[0]].kind);
   }
   REQUIRE(a.lights.size() == b.lights.size());
@@ -170,6 +176,31 @@ TEST_CASE("parts of a scene are listed, moved and changed") {
   CHECK_THROWS_AS(e.scene.change({.index = 4}), gart::invalid_argument);
 }
 
+TEST_CASE("a mesh is turned and made larger about a point") {
+  edited e;
+  double const half = std::sqrt(0.5);
+  // A quarter about z, through a point a unit before the ball.
+  e.change({.index = 0, .rotation = {{half, 0, 0, half}}, .about = vec3(-10, 0, 0)});
+  auto ball = e.scene.parts()[0];
+  CHECK(std::fabs(ball.place.x + 10) < 1e-5);
+  CHECK(ball.place.y == doctest::Approx(1));
+  CHECK(ball.rotation[3] == half);
+  // Longer along its own x, which is now the world's y; its middle stays.
+  e.change({.index = 0, .scale = gart::vec3d(1.5, 0.5, 0.5)});
+  ball = e.scene.parts()[0];
+  CHECK(ball.place.y == doctest::Approx(1));
+  CHECK(ball.high.y == doctest::Approx(2.5));
+  CHECK(ball.high.x == doctest::Approx(-9.5));
+  CHECK(ball.scale == gart::vec3d(1.5, 0.5, 0.5));
+  for (int k = 1; k <= 8; ++k)
+    e.change(
+        {.index = 1, .rotation = {{std::cos(0.3 * k), std::sin(0.3 * k), 0.1, 0}}, .scale = gart::vec3d(1 + 0.1 * k)});
+  e.change({.index = 1, .place = vec3(1, 2, 3), .rotation = {{1, 0, 0, 0}}, .scale = gart::vec3d(-1, 1, 1)});
+  CHECK(e.scene.parts()[1].place.y == doctest::Approx(2));
+  e.change({.index = 1, .material = "mirror", .scale = gart::vec3d(2)});
+  CHECK(e.scene.parts()[1].high.z == doctest::Approx(5));
+}
+
 TEST_CASE("a mesh is added, and a damaged one changes nothing") {
   edited e;
   fs::path const tri = e.in.write("up.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
@@ -230,12 +261,16 @@ TEST_CASE("control changes parts, and views at rest begin anew") {
   for (int i = 0; i < 5; ++i)
     all.receive(controls, R"({"type":"part","index":1,"place":[)" + std::to_string(i) + ",0,0]}", 0);
   all.receive(controls, R"({"type":"part","index":1,"material":"mirror"})", 0);
+  all.receive(controls, R"({"type":"part","index":1,"rotation":[0,2,0,0],"scale":[1,2,-3],"about":[7,8,9]})", 0);
   CHECK_FALSE(all.next_job(1, 0));  // the change comes first
   auto const edit = all.next_edit();
   REQUIRE(edit);
   CHECK(edit->index == 1);
   CHECK(edit->place->x == 4);
   CHECK(*edit->material == "mirror");
+  CHECK(*edit->rotation == std::array{0.0, 2.0, 0.0, 0.0});
+  CHECK(*edit->scale == gart::vec3d(1, 2, -3));
+  CHECK(*edit->about == vec3(7, 8, 9));
   CHECK_FALSE(all.next_edit());
   all.set_parts(scene.parts, "{}");
   CHECK(last_text(looks).find(R"("type":"scene")") != std::string::npos);
@@ -243,7 +278,8 @@ TEST_CASE("control changes parts, and views at rest begin anew") {
   auto const anew = all.next_job(1, 0);
   REQUIRE(anew);
   CHECK_FALSE(anew->more);
-  for (char const* wrong : {R"("place":[1,2])", R"("material":"wood")", R"("color":[-1,0,0])", R"("size":1)"})
+  for (char const* wrong : {R"("place":[1,2])", R"("material":"wood")", R"("color":[-1,0,0])", R"("size":1)",
+                            R"("rotation":[0,0,0,0])", R"("rotation":[1,0,0])", R"("scale":[1,0,1])", R"("about":1)"})
     CHECK_FALSE(all.receive(controls, std::string(R"({"type":"part","index":1,)") + wrong + "}", 0).reason.empty());
 }
 

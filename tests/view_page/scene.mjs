@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import path from 'node:path';
 import {linesOf, openPage, psnr} from './browser.mjs';
-import {pixelOf, splatPly} from './geometry.mjs';
+import {along, minus, pixelOf, splatPly} from './geometry.mjs';
 import {onEach} from './screens.mjs';
 
 const samples = 2;
@@ -115,6 +115,59 @@ const changed = onEach({
   },
 });
 
+const turned = onEach({
+  async 'a mesh is turned and made larger by its handles, the scene is saved'(world, screen) {
+    const server = await serve(world), {browser, work} = world;
+    const p = await openPage(browser, server.control, screen);
+    await p.tab('scene');
+    await p.page.click('#scene-list button:has-text("ball")');
+    await p.until('the box about it', async () => (await linesOf(p.page, [255, 209, 102])) > 100);
+    const {view: {camera}} = await p.rest(), {model, scene: [ball]} = p.received[0];
+    assert.deepEqual([ball.rotation, ball.scale], [[1, 0, 0, 0], [0.4, 0.4, 0.4]]);
+    const stage = await p.page.locator('#stage').boundingBox();
+    const at = (point) => pixelOf(camera, point).slice(0, 2).map((x) => (x * stage.width) / camera.width);
+    const way = (from, to, times) => minus(at(along(from, minus(to, from), 0.02)), at(from)).map((x) => (times * x) / 0.02);
+    const part = () => p.received.filter((m) => m.type === 'scene').at(-1)?.parts[0] ?? ball;
+    const near = (a, b, within) => a.every((x, i) => Math.abs(x - b[i]) < within);
+
+    // The ring whose handle goes farthest over the screen, by half a radian.
+    await p.page.click('#scene-ways label:has-text("Turn")');
+    const radius = 0.14 * model.extent + (ball.max[0] - ball.min[0]) / 2, half = radius / Math.SQRT2;
+    const on = (k, ahead) => ball.place.map((x, i) => x + (i === k ? 0 : i === (k + 1) % 3 ? half - ahead : half + ahead));
+    const length2 = (v) => v[0] ** 2 + v[1] ** 2, step = 0.5 * half;
+    const ring = [0, 1, 2].map((k) => way(on(k, 0), on(k, step), 1));
+    const k = [0, 1, 2].reduce((best, i) => (length2(ring[i]) > length2(ring[best]) ? i : best));
+    await p.drag(at(on(k, 0)), ring[k]);
+    const quarter = [0, 1, 2, 3].map((i) => (i === 0 ? Math.cos(0.25) : i === k + 1 ? Math.sin(0.25) : 0));
+    await p.until('the scene to say that it turned', () => near(part().rotation, quarter, 0.03));
+    assert.ok(near(part().place, ball.place, 0.01), 'it turned about its middle');
+    assert.deepEqual((await p.rest()).view.camera, camera, 'the camera moved with the handle');
+    await p.page.screenshot({path: path.join(work, `scene-turn-${screen.viewport.width}.png`)});
+
+    await p.page.click('#scene-ways label:has-text("Resize")');
+    const before = await p.rest(), now = part();
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [0, 1, 2].map((j) => (i >> j & 1 ? now.max[j] : now.min[j])));
+    const far = (corner) => length2(minus(at(corner), at(now.place)));
+    const corner = corners.reduce((best, one) => (far(one) > far(best) ? one : best));
+    const out = minus(corner, now.place);  // from the middle to the handle
+    await p.drag(at(corner), way(corner, along(corner, out, 1), 0.5));
+    await p.until('the scene to say that it grew', () => near(part().scale, [0.6, 0.6, 0.6], 0.02));
+    assert.ok(near(part().place, now.place, 0.01), 'it grew about its middle');
+    assert.ok(!(await p.rest()).jpeg.equals(before.jpeg));
+    await p.page.screenshot({path: path.join(work, `scene-size-${screen.viewport.width}.png`)});
+    const wide = await p.page.$eval('#panel-scene', (panel) => panel.scrollWidth - panel.clientWidth);
+    assert.equal(wide, 0);
+
+    const file = JSON.parse(fs.readFileSync(await (await p.saved(() => p.page.click('#save-scene'))).path()));
+    assert.ok(near(file.meshes[0].rotation, part().rotation, 1e-6) && near(file.meshes[0].scale, part().scale, 1e-6));
+    assert.equal(file.meshes[1].rotation, undefined);
+    await p.page.click('#scene-list button:has-text("lamp")');
+    assert.equal(await p.page.isVisible('#scene-ways'), false);
+    await p.close();
+    await end(server);
+  },
+});
+
 const added = onEach({
   async 'a mesh that is dropped or chosen is in the scene, what is wrong is said'(world, screen) {
     const server = await serve(world), {browser} = world;
@@ -147,4 +200,4 @@ const added = onEach({
   },
 });
 
-export const scene = {...traced, ...changed, ...added};
+export const scene = {...traced, ...changed, ...turned, ...added};

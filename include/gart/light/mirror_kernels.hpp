@@ -48,6 +48,70 @@ struct follow_mirrors {
   }
 };
 
+// Shadow rays as a batch, and what each brings where nothing is in between.
+struct batch_shadows {
+  shadow_ray const* rays;
+  float near;
+  float *origins, *directions, *t_max;
+  vec3* radiance;
+  GART_KERNEL void operator()(index_t i) const {
+    shadow_ray const r = rays[i];
+    bool const any = r.far > 0;
+    vec3 const direction = any ? r.direction : vec3(0.0f, 0.0f, 1.0f);
+    for (int k = 0; k < 3; ++k) {
+      origins[std::size_t{3} * i + static_cast<std::size_t>(k)] = any ? r.origin[k] : 0.0f;
+      directions[std::size_t{3} * i + static_cast<std::size_t>(k)] = direction[k];
+    }
+    t_max[i] = fmaxf(r.far, 2.0f * near);
+    radiance[i] = any ? r.radiance : vec3(0.0f);
+  }
+};
+struct add_light {
+  float const* transmittance;
+  vec3 const* radiance;
+  vec3* behind;
+  GART_KERNEL void operator()(index_t i) const { behind[i] += transmittance[i] * radiance[i]; }
+};
+// From the gradient by what a segment sees to that by what a shadow ray lets through.
+struct light_gradient {
+  vec3 const *by_seen, *radiance;
+  float const* transmittance;  // of the segment
+  float* by_transmittance;
+  GART_KERNEL void operator()(index_t i) const {
+    by_transmittance[i] = transmittance[i] * glm::dot(by_seen[i], radiance[i]);
+  }
+};
+
+// The coefficients of Gaussians in shadow: factor * (1/2 + sum of basis * sh) is again such a sum. And the way back.
+struct shade_coefficients {
+  float const* sh;
+  vec3 const* factors;
+  int coefficients;
+  bool first_band;  // the others count nothing
+  float* shaded;
+  GART_KERNEL void operator()(index_t i) const {
+    vec3 const f = factors[i];
+    std::size_t const row = static_cast<std::size_t>(3 * coefficients) * i;
+    for (int k = 0; k < 3 * coefficients; ++k) {
+      std::size_t const at = row + static_cast<std::size_t>(k);
+      shaded[at] = k < 3        ? f[k] * sh[at] + (f[k] - 1.0f) * (0.5f / static_cast<float>(sh_constant))
+                   : first_band ? 0.0f
+                                : f[k % 3] * sh[at];
+    }
+  }
+};
+struct unshade_gradient {
+  vec3 const* factors;
+  int coefficients;
+  bool first_band;
+  float* by_sh;
+  GART_KERNEL void operator()(index_t i) const {
+    std::size_t const row = static_cast<std::size_t>(3 * coefficients) * i;
+    for (int k = 0; k < 3 * coefficients; ++k)
+      by_sh[row + static_cast<std::size_t>(k)] *= k >= 3 && first_band ? 0.0f : factors[i][k % 3];
+  }
+};
+
 // What a segment sees, from the last one to the first; `behind` becomes all that comes from its end.
 struct blend_segment {
   float const *color, *transmittance;

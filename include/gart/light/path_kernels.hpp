@@ -79,7 +79,8 @@ GART_HD GART_INLINE vec3 bounded(vec3 const& c, float most, u32 bounces) {
   return most > 0 && bounces > 0 && top > most ? c * (most / top) : c;
 }
 
-// A shadow ray from the surface that each path has come to, to one of the lights; the last is what lies around.
+// A shadow ray from the surface that each path has come to, to one of the lights; the last is what lies around. Alone:
+// no path goes on from a surface to meet a light by chance.
 struct aim_at_light {
   scene_view scene;
   path const* paths;
@@ -90,6 +91,7 @@ struct aim_at_light {
   float firefly;
   u64 seed;
   u32 sample, step;
+  bool alone = false;
   GART_KERNEL void operator()(index_t i) const {
     rays[i].far = 0;
     path const p = paths[i];
@@ -106,7 +108,7 @@ struct aim_at_light {
     vec3 const out = about.to_local(-p.direction);
     rough_surface const m(s.base, s.metallic, s.roughness, s.ior, out.z, scene.specular);
     auto const a = m.of(out, about.to_local(g.direction));
-    float const share = g.density > 0 ? balance(g.density, a.density) : 1.0f;
+    float const share = g.density > 0 && !alone ? balance(g.density, a.density) : 1.0f;
     vec3 const radiance = bounded(p.throughput * a.thrown * g.radiance * share, firefly, p.bounces());
     if (!(luminance(radiance) > 0)) return;
     vec3 const origin = s.leave(g.direction);
@@ -230,6 +232,27 @@ struct add_samples {
     if (paths[i].pixel == path::no_pixel) return;
     if (!(is_finite(c.x) && is_finite(c.y) && is_finite(c.z))) return;
     for (int k = 0; k < 3; ++k) sums[std::size_t{3} * paths[i].pixel + static_cast<std::size_t>(k)] += c[k];
+  }
+};
+
+// From sums of samples to their mean, exposed and in a tone. An index is a number of a colour.
+struct show_samples {
+  float const* sums;
+  float share, gain;  // one over the samples; of the exposure
+  light::tone_kind tone;
+  float* to;
+  GART_KERNEL void operator()(index_t i) const {
+    using enum light::tone_kind;
+    float x = sums[i] * share * gain;
+    if (tone == filmic) x = rolled_off(x);
+    to[i] = tone == none ? x : displayed(clamped(x, 0.0f, 1.0f));
+  }
+
+ private:
+  // Narkowicz, "ACES filmic tone mapping curve", 2015.
+  GART_HD static float rolled_off(float x) {
+    x = fmaxf(x, 0.0f);
+    return x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f);
   }
 };
 

@@ -5,7 +5,6 @@
 
 #include <gart/core/names.hpp>
 #include <gart/core/types.hpp>
-#include <gart/scene/image.hpp>
 
 namespace gart::light {
 
@@ -51,9 +50,6 @@ struct path_options {
   float exposure = 0;    ///< stops
   tone_kind tone = tone_kind::none;  ///< of path_renderer::picture
 };
-
-/// Linear radiance [H][W][3], exposed and in the tone of the options.
-image_float toned(image_float linear, path_options const& o);
 
 /// Throws invalid_argument, with the option and its value, where one is out of its range.
 void require_path_options(path_options const& o);

@@ -100,6 +100,15 @@ class path_tracer {
   /// The sum of the samples, [H][W][3].
   buffer<float, E> const& sums() const { return sums_; }
 
+  /// Their mean, exposed and in a tone, to [H][W][3] in memory of the policy.
+  void show(float exposure, light::tone_kind tone, float* to) {
+    require_begun("path_tracer.show");
+    if (samples_ == 0) throw invalid_argument("path_tracer.show: there is no sample; call add first");
+    parallel_for(
+        *exec_, "light/show", 3 * pixels_,
+        light_kernels::show_samples{sums_.data(), 1.0f / static_cast<float>(samples_), std::exp2(exposure), tone, to});
+  }
+
   /// The layers of rays through the middles of the pixels; targets in memory of the policy.
   void layers(light_kernels::layer_targets const& out) {
     require_begun("path_tracer.layers");

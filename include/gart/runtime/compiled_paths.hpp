@@ -7,6 +7,7 @@
 #include <gart/light/mirror_paths.hpp>
 #include <gart/light/mirror_service.hpp>
 #include <gart/light/path_tracer.hpp>
+#include <gart/render/bytes.hpp>
 #include <gart/runtime/configuration_of.hpp>
 #include <gart/runtime/path_renderer.hpp>
 #include <gart/runtime/registry.hpp>
@@ -19,7 +20,7 @@ class compiled_paths final : public path_renderer {
  public:
   /// Makes the policy that the request asks for.
   explicit compiled_paths(configuration_request const& request)
-      : exec_(policy_of<E>(request)), model_(exec_, 0, 0), tracer_(exec_) {}
+      : exec_(policy_of<E>(request)), model_(exec_, 0, 0), tracer_(exec_), shown_(exec_), bytes_(exec_) {}
 
   void set_model(gaussian_model const& model) override {
     model_.assign(model);
@@ -32,13 +33,13 @@ class compiled_paths final : public path_renderer {
   }
   void add(int samples) override { tracer_.add(samples); }
   int samples() const override { return tracer_.samples(); }
-  image_float radiance() const override {
-    if (tracer_.samples() == 0)
-      throw invalid_argument("path_renderer.radiance: there is no sample; call begin and add first");
-    image_float out = filled(3, tracer_.sums());
-    float const share = 1.0f / static_cast<float>(tracer_.samples());
-    for (float& x : out.data) x *= share;
-    return out;
+  image_float radiance() override { return show(0, light::tone_kind::none), filled(3, shown_); }
+  image_float picture() override { return show(paths_.exposure, paths_.tone), filled(3, shown_); }
+  image8 picture_8bit() override {
+    show(paths_.exposure, paths_.tone);
+    bytes_.resize(shown_.size());
+    color_to_bytes(exec_, shown_.data(), tracer_.pixels(), bytes_.data(), 3);
+    return filled(3, bytes_);
   }
   path_layers layers() override {
     std::size_t const n = tracer_.pixels();
@@ -62,6 +63,12 @@ class compiled_paths final : public path_renderer {
   }
 
  private:
+  void show(float exposure, light::tone_kind tone) {
+    if (tracer_.samples() == 0)
+      throw invalid_argument("path_renderer: there is no sample to show; call begin and add first");
+    shown_.resize(std::size_t{3} * tracer_.pixels());
+    tracer_.show(exposure, tone, shown_.data());
+  }
   template <class T>
   basic_image<T> filled(int channels, buffer<T, E> const& from) const {
     basic_image<T> out(width_, height_, channels);
@@ -72,6 +79,9 @@ class compiled_paths final : public path_renderer {
   mutable E exec_;
   gaussians<E> model_;
   path_tracer<E, Response> tracer_;
+  light::path_options paths_;  // of the last begin
+  buffer<float, E> shown_;     // the last picture
+  buffer<u8, E> bytes_;
   int width_ = 0, height_ = 0;
 };
 
@@ -84,9 +94,10 @@ class compiled_mirrors final : public mirror_service {
 
   void show(gaussians_view<float const> model, int active_degree, camera const& view, render_options const& options,
             float* image) override {
-    constexpr int bounces = 4;
+    light::path_options as_captured;
+    as_captured.shadows = light::shadow_kind::none;
     paths_.set_model(model, active_degree);
-    paths_.forward(view, options, bounces, image, mirror_pixels::mirrors);
+    paths_.forward(view, options, as_captured, image, mirror_pixels::mirrors);
   }
   void take_out(span<float> image) override { paths_.take_out(image); }
   void backward(span<float const> by_image, gaussians_view<float> gradients) override {

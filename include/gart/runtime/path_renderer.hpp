@@ -61,9 +61,11 @@ class path_renderer {
   virtual int samples() const = 0;
 
   /// The mean so far, linear: [H][W][3].
-  virtual image_float radiance() const = 0;
+  virtual image_float radiance() = 0;
   /// The same exposed and in the tone of the options.
-  image_float picture() const { return light::toned(radiance(), paths_); }
+  virtual image_float picture() = 0;
+  /// The picture as to_8bit makes it. The policy converts it, so 3 bytes a pixel are copied in place of 12.
+  virtual image8 picture_8bit() = 0;
   /// The layers, for a denoiser or a compositor.
   virtual path_layers layers() = 0;
 
@@ -71,9 +73,6 @@ class path_renderer {
   virtual profiler& profile() = 0;
   /// The configuration chosen for the request.
   virtual configuration_info configuration() const = 0;
-
- protected:
-  light::path_options paths_;  ///< of the last begin
 };
 
 /// The best backend that meets the request: its backend, threads and device count, and its kernel degree.

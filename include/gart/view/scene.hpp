@@ -96,7 +96,9 @@ struct view_part {
   std::string kind;            ///< of a light: point, directional, sphere, rectangle. Of a mesh: its material, or "own"
   vec3 place{0.0f};            ///< the middle of a mesh; of a directional light a point that it comes from
   vec3 low{0.0f}, high{0.0f};  ///< of a mesh: its corners
-  vec3 color{0.0f};            ///< of a light
+  std::array<double, 4> rotation{1, 0, 0, 0};  ///< of a mesh: w, x, y, z, as its file has it
+  vec3d scale{1.0};                            ///< of a mesh, along its own axes
+  vec3 color{0.0f};                            ///< of a light
 };
 
 /// What is changed of one of them.
@@ -105,6 +107,9 @@ struct part_edit {
   std::optional<vec3> place = {};            ///< where it is to stand
   std::optional<std::string> material = {};  ///< of a mesh: a name of light::material_kind, or "own", as its file says
   std::optional<vec3> color = {};            ///< of a light, in the units of light::light
+  std::optional<std::array<double, 4>> rotation = {};  ///< of a mesh: in place of view_part's
+  std::optional<vec3d> scale = {};                     ///< of a mesh: in place of view_part's, no number is zero
+  std::optional<vec3> about = {};                      ///< the point that both leave where it is; else the place
 };
 
 /// What there is to see.

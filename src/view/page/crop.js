@@ -3,7 +3,7 @@
 
 import {add, scale} from './vector.js';
 import {stroked} from './overlay.js';
-import {handles} from './handles.js';
+import {along, handles} from './handles.js';
 
 const axes = ['x', 'y', 'z'];
 
@@ -66,8 +66,10 @@ export function cropBox(form, toggle, resetButton, changed) {
         for (let i = 0; i < 8; ++i)
           for (let k = 0; k < 3; ++k) if (!(i >> k & 1)) pen.line(corner(i), corner(i | 1 << k));
       });
-      for (const {side, k} of fields)
-        grips.add(pen, color, middleOf(side, k), k, 1e-2 * (whole.max[k] - whole.min[k]), (by) => set(side, k, box[side][k] + by));
+      for (const {side, k} of fields) {
+        const step = 1e-2 * (whole.max[k] - whole.min[k]);
+        grips.add(pen, color, middleOf(side, k), along(k, step), (by) => set(side, k, box[side][k] + by * step));
+      }
     },
     grab: (place) => grips.grab(place),
   };

@@ -6,7 +6,7 @@ const turnPerPixel = 0.006;
 
 export function listenTo(stage, moves) {
   const pointers = new Map();
-  let travelled = 0, pinch = null, held = null, lastTap = {time: 0, x: 0, y: 0};
+  let travelled = 0, unused = [0, 0], pinch = null, held = null, lastTap = {time: 0, x: 0, y: 0};
   const at = (event) => {
     const box = stage.getBoundingClientRect();
     return {x: event.clientX - box.left, y: event.clientY - box.top};
@@ -21,7 +21,7 @@ export function listenTo(stage, moves) {
     stage.setPointerCapture(event.pointerId);
     stage.focus({preventScroll: true});
     pointers.set(event.pointerId, at(event));
-    if (pointers.size === 1) travelled = 0, held = moves.grab(at(event));
+    if (pointers.size === 1) travelled = 0, unused = [0, 0], held = moves.grab(at(event));
     pinch = pointers.size === 2 ? spread() : null;
   });
 
@@ -31,6 +31,7 @@ export function listenTo(stage, moves) {
     const dx = now.x - before.x, dy = now.y - before.y;
     pointers.set(event.pointerId, now);
     travelled += Math.hypot(dx, dy);
+    if (pointers.size === 1) unused = [unused[0] + dx, unused[1] + dy];
     if (travelled < still) return;
     if (pointers.size === 2 && pinch) {
       const next = spread();
@@ -38,7 +39,8 @@ export function listenTo(stage, moves) {
       moves.shift([next.x - pinch.x, next.y - pinch.y]);
       pinch = next;
     } else if (pointers.size === 1 && held) {
-      held.drag(now, [dx, dy]);
+      held.drag(now, unused);
+      unused = [0, 0];
     } else if (pointers.size === 1) {
       const shifts = event.shiftKey || event.buttons & 6;
       if (shifts) moves.shift([dx, dy]);

@@ -327,7 +327,7 @@ const crop = cropBox($('crop'), $('crop-on'), $('crop-reset'), () => {
 const scene = scenePanel({
   list: $('scene-list'), none: $('scene-none'), part: $('scene-part'), material: $('material'), materialRow: $('material-row'),
   lightRows: $('light-rows'), strength: $('light-strength'), strengthNow: $('light-strength-now'), color: $('light-color'),
-  place: $('scene-place'), onlooker: $('scene-onlooker'),
+  place: $('scene-place'), ways: $('scene-ways'), onlooker: $('scene-onlooker'),
 }, {send: (message) => connection.send(message), changed: (moving) => view.changed(moving), redraw: draw}, say);
 fileDrop(stage, $('add-file'), () => (!hello?.scene ? 'gart view --scene opens a scene, this is a model' : hello.right === 'control' ? '' : 'this address may look, and not control'), say);
 const command = commandPanel({part: $('export'), text: $('command'), copy: $('copy')}, say);

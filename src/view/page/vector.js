@@ -12,6 +12,12 @@ export const cross = (a, b) => [
 export const norm = (a) => Math.hypot(a[0], a[1], a[2]);
 export const unit = (a) => scale(a, 1 / (norm(a) || 1));
 
+// Of quaternions w, x, y, z: first b turns, then a.
+export const after = (a, b) => [
+  a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+  ...add(add(scale(b.slice(1), a[0]), scale(a.slice(1), b[0])), cross(a.slice(1), b.slice(1))),
+];
+
 // Rodrigues' formula: v turned about a unit axis.
 export function turned(v, axis, angle) {
   const c = Math.cos(angle), s = Math.sin(angle);
