@@ -30,6 +30,20 @@ bool optix_is_there() {
   return there;
 }
 
+// What a list lacks of another, or has twice.
+std::string difference(std::vector<gart::hit> const& got, std::vector<gart::hit> const& expected) {
+  auto const in = [](std::vector<gart::hit> const& list, gart::u32 id) {
+    return std::count_if(list.begin(), list.end(), [id](gart::hit const& h) { return h.id == id; });
+  };
+  for (gart::hit const& h : expected)
+    if (in(got, h.id) == 0)
+      return "lacks Gaussian " + std::to_string(h.id) + " at " + std::to_string(h.t) + ", alpha " +
+             std::to_string(h.alpha);
+  for (gart::hit const& h : got)
+    if (in(got, h.id) != in(expected, h.id)) return "has Gaussian " + std::to_string(h.id) + " too often";
+  return "another order or other bits";
+}
+
 bool same(std::vector<gart::hit> const& a, std::vector<gart::hit> const& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](gart::hit const& one, gart::hit const& other) {
     return one.id == other.id && std::memcmp(&one.t, &other.t, sizeof one.t) == 0 &&
@@ -92,8 +106,7 @@ TEST_CASE("OptiX gives the hit lists of tile lists") {
       hits += got[i].size();
       if (same(got[i], expected[i])) continue;
       if (different++ == 0)
-        std::printf("%s, pixel %zu: %zu hits, of tile lists %zu\n", s.name.c_str(), i, got[i].size(),
-                    expected[i].size());
+        std::printf("%s, pixel %zu: %s\n", s.name.c_str(), i, difference(got[i], expected[i]).c_str());
     }
     CHECK(different == 0);
   }
