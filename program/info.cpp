@@ -14,6 +14,9 @@
 #if defined(GART_WITH_CUDA)
 #include <gart/exec/cuda.hpp>
 #endif
+#if defined(GART_WITH_OPTIX)
+#include <gart/trace/optix_tracer.hpp>
+#endif
 #if defined(GART_WITH_NCCL)
 #include <gart/comm/nccl_comm.hpp>
 #endif
@@ -112,6 +115,12 @@ void print_devices(std::vector<std::string> const& places) {
   std::puts("embree     " GART_EMBREE_VERSION);
 #else
   std::puts("embree     not in this build");
+#endif
+#if defined(GART_WITH_OPTIX)
+  std::string const missing = gart::optix_available(&reason) ? "" : " (" + reason + ")";
+  std::printf("optix      %s%s\n", gart::optix_scene::version(), missing.c_str());
+#else
+  std::puts("optix      not in this build");
 #endif
   print_ranks(places);
   std::string formats;

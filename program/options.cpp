@@ -82,7 +82,8 @@ void add_configuration_options(CLI::App& app, configuration_options& options) {
       ->type_name("NAME")
       ->capture_default_str()
       ->check(name_of_a<gart::backend_kind>());
-  app.add_option("--tracer", options.tracer, "Tracer: tiles, bvh, or embree (CPU);\nthe images are the same")
+  app.add_option("--tracer", options.tracer,
+                 "Tracer: tiles, bvh, embree (CPU), or optix (CUDA);\nthe images are the same")
       ->type_name("NAME")
       ->capture_default_str()
       ->check(name_of_a<gart::tracer_kind>());

@@ -164,7 +164,8 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--backend", a.backend, "NAME",
                  "Backend: serial, openmp (CPU) or cuda;\nauto: the fastest there is"))
       ->check(name_of_a<gart::backend_kind>());
-  in_group(r.add(train, "--tracer", a.tracer, "NAME", "Tracer: tiles, bvh, or embree (CPU);\nthe images are the same"))
+  in_group(r.add(train, "--tracer", a.tracer, "NAME",
+                 "Tracer: tiles, bvh, embree (CPU), or optix (CUDA);\nthe images are the same"))
       ->check(name_of_a<gart::tracer_kind>());
   in_group(r.add(train, "--backward", a.backward, "NAME",
                  "How gradients are summed: primitive (one sum a Gaussian and\ntile), hybrid (a quarter of the "
@@ -293,7 +294,8 @@ gart::train_options train_options_of(train_arguments const& a) {
   o.background = gart::from_string(a.background, gart::background_kind::black);
   o.render.antialias = a.antialias ? gart::default_antialias : 0;
   // The other tracers build no tree, and the images are the same.
-  if (a.tracer != gart::to_string(gart::tracer_kind::bvh)) o.render.rebuild_every = 1;
+  if (a.tracer != gart::to_string(gart::tracer_kind::bvh) && a.tracer != gart::to_string(gart::tracer_kind::optix))
+    o.render.rebuild_every = 1;
   a.set.apply(o);
   return o;
 }

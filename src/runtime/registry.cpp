@@ -78,7 +78,7 @@ compiled_configuration const& find_configuration(configuration_request const& re
   compiled_configuration const* best = nullptr;
   std::string reason, unavailable;
   for (auto const& r : configurations()) {
-    if (!matches(request, r.info)) continue;
+    if (!matches(request, r.info) || (best && r.rank < best->rank)) continue;
     if (!r.available(&reason)) {
       unavailable = to_string(r.info.backend);
       continue;
@@ -88,9 +88,16 @@ compiled_configuration const& find_configuration(configuration_request const& re
     if (!best || r.rank > best->rank || stores_less) best = &r;
   }
   if (best) return *best;
+  bool const by_optix = request.tracer == tracer_kind::optix;
   if (!unavailable.empty())
     throw unsupported("backend " + unavailable + ": " + reason +
-                      "; use configuration_request.backend = openmp, which needs no device");
+                      (by_optix ? "; use configuration_request.tracer = bvh, which gives the same image"
+                                : "; use configuration_request.backend = openmp, which needs no device"));
+  if (by_optix && std::none_of(configurations().begin(), configurations().end(),
+                               [](auto const& r) { return r.info.tracer == tracer_kind::optix; }))
+    throw unsupported(
+        "tracer optix is not in this build: configure gart with -DGART_OPTIX=ON -DOptiX_ROOT=FOLDER, NVIDIA's OptiX "
+        "SDK, or use configuration_request.tracer = bvh, which gives the same image");
   throw unsupported("no compiled configuration for " + as_text(request) +
                     "; there are (backend / tracer / backward): " + list_configurations() +
                     ". A program compiles configurations of its own with GART_REGISTER_CONFIGURATIONS: "

@@ -99,7 +99,7 @@ with tempfile.TemporaryDirectory() as temporary:
         binary = build(here / "downstream" / component)
         expect(run(binary / f"use_{component}"), component)
     told = configure(here / "downstream" / "missing", fails=True)
-    expect(" ".join(told.split()), "has no component optix, telepathy", "it has: headers, io, runtime, reference, cpu")
+    expect(" ".join(told.split()), "has no component levitation, telepathy", "it has: headers, io, runtime, reference, cpu")
 
     examples = {path.name: build(path) for path in sorted((a.source / "examples").glob("[0-9]_*"))}
     image = folder / "image.png"

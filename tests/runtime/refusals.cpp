@@ -65,6 +65,12 @@ TEST_CASE_TEMPLATE("arrays that disagree are refused by name", E, GART_TEST_POLI
   CHECK(renderer->render(some_view(), {}).color.data == before.color.data);
 }
 
+TEST_CASE("a tracer that is not in the build is refused by name") {
+  gart::configuration_request request;
+  request.tracer = gart::tracer_kind::optix;
+  CHECK_THROWS_WITH_AS(gart::make_renderer(request), doctest::Contains("-DGART_OPTIX=ON"), gart::unsupported);
+}
+
 TEST_CASE_TEMPLATE("a pose's gradient is of the view that was differentiated", E, GART_TEST_POLICIES) {
   auto const renderer = gart::make_renderer(request_of<E>());
   gart::camera const view = some_view();

@@ -129,33 +129,38 @@ gart::gaussian_model depth_gradients_by(E& exec, gart::gaussian_model const& mod
   return gradients.to_host();
 }
 
+template <class Tracer, class E>
+std::vector<std::vector<gart::hit>> hit_lists_by(E& exec, gart::gaussian_model const& model, gart::camera const& view,
+                                                 gart::render_options const& options) {
+  // A list has no colours: of whichever degree.
+  gart::gaussians<E> const scene(exec, gart::with_sh_degree(model, 0));
+  frame_by<0, Tracer, E> frame(exec);
+  std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
+  gart::buffer<gart::u32, E> counts(exec, pixels), starts(exec);
+  gart::buffer<gart::hit, E> list(exec);
+  frame.prepare(scene.view(), view, options);
+  gart::pixel_order const order{view.width, view.height};
+  list_program program{{},      frame.rays(), order, options.transmittance_min, options.max_hits, counts.data(),
+                       nullptr, nullptr};
+  frame.trace("count", order.launch_size(), program);
+  std::vector<gart::u32> const count = counts.to_host();
+  std::vector<gart::u32> offset(pixels + 1, 0);
+  for (std::size_t i = 0; i < pixels; ++i) offset[i + 1] = offset[i] + count[i];
+  starts.assign(offset);
+  list.resize(offset.back() + 1);
+  program.offsets = starts.data(), program.list = list.data();
+  frame.trace("list", order.launch_size(), program);
+  std::vector<gart::hit> const flat = list.to_host();
+  std::vector<std::vector<gart::hit>> lists(pixels);
+  for (std::size_t i = 0; i < pixels; ++i) lists[i].assign(flat.begin() + offset[i], flat.begin() + offset[i + 1]);
+  return lists;
+}
+
 template <class Response, class E>
 std::vector<std::vector<gart::hit>> hit_lists_of(E& exec, gart::gaussian_model const& model, gart::camera const& view,
                                                  gart::render_options const& options, tracer_kind kind) {
-  return detail::with_tracer<E, Response>(kind, [&]<class Tracer>(std::type_identity<Tracer>) {
-    // A list has no colours: of whichever degree.
-    gart::gaussians<E> const scene(exec, gart::with_sh_degree(model, 0));
-    frame_by<0, Tracer, E> frame(exec);
-    std::size_t const pixels = static_cast<std::size_t>(view.width) * view.height;
-    gart::buffer<gart::u32, E> counts(exec, pixels), starts(exec);
-    gart::buffer<gart::hit, E> list(exec);
-    frame.prepare(scene.view(), view, options);
-    gart::pixel_order const order{view.width, view.height};
-    list_program program{{},      frame.rays(), order, options.transmittance_min, options.max_hits, counts.data(),
-                         nullptr, nullptr};
-    frame.trace("count", order.launch_size(), program);
-    std::vector<gart::u32> const count = counts.to_host();
-    std::vector<gart::u32> offset(pixels + 1, 0);
-    for (std::size_t i = 0; i < pixels; ++i) offset[i + 1] = offset[i] + count[i];
-    starts.assign(offset);
-    list.resize(offset.back() + 1);
-    program.offsets = starts.data(), program.list = list.data();
-    frame.trace("list", order.launch_size(), program);
-    std::vector<gart::hit> const flat = list.to_host();
-    std::vector<std::vector<gart::hit>> lists(pixels);
-    for (std::size_t i = 0; i < pixels; ++i) lists[i].assign(flat.begin() + offset[i], flat.begin() + offset[i + 1]);
-    return lists;
-  });
+  return detail::with_tracer<E, Response>(
+      kind, [&]<class Tracer>(std::type_identity<Tracer>) { return hit_lists_by<Tracer>(exec, model, view, options); });
 }
 
 }  // namespace gart_test

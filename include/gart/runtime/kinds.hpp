@@ -18,12 +18,12 @@ constexpr auto names_of(backend_kind) {
 }
 
 /// What finds a ray's hits; `own`: a program's own tracer.
-enum class tracer_kind { automatic, bvh, embree, tiles, own };
+enum class tracer_kind { automatic, bvh, embree, tiles, optix, own };
 /// Their names.
 constexpr auto names_of(tracer_kind) {
   using enum tracer_kind;
-  return std::array<name_of<tracer_kind>, 5>{
-      {{automatic, "auto"}, {bvh, "bvh"}, {embree, "embree"}, {tiles, "tiles"}, {own, "own"}}};
+  return std::array<name_of<tracer_kind>, 6>{
+      {{automatic, "auto"}, {bvh, "bvh"}, {embree, "embree"}, {tiles, "tiles"}, {optix, "optix"}, {own, "own"}}};
 }
 
 /// The record of a hit by the forward pass (backward/hit_slot.hpp): nothing for pixel, its weight for hybrid.

@@ -29,9 +29,10 @@ void register_configuration(compiled_configuration const& entry);
 /// The highest ranked entry that meets a request. Errors: unsupported, naming the compiled configurations.
 compiled_configuration const& find_configuration(configuration_request const& request);
 
-/// Only the bvh tracer has a tree to rebuild.
+/// Only the tracers bvh and optix have a tree to refit.
 inline void require_tree(int rebuild_every, tracer_kind tracer) {
-  if (rebuild_every != 1 && tracer != tracer_kind::bvh && tracer != tracer_kind::own)
+  bool const has_tree = tracer == tracer_kind::bvh || tracer == tracer_kind::optix || tracer == tracer_kind::own;
+  if (rebuild_every != 1 && !has_tree)
     throw invalid_argument(std::string("render_options.rebuild_every is ") + std::to_string(rebuild_every) +
                            ", and the tracer " + to_string(tracer) +
                            " builds no tree: leave it at 1, or use configuration_request.tracer = bvh");

@@ -1,0 +1,17 @@
+# OptiX::OptiX: the headers of the OptiX SDK, from OptiX_ROOT. There is nothing to link: the driver has the library.
+find_path(OptiX_INCLUDE_DIR optix.h PATH_SUFFIXES include)
+mark_as_advanced(OptiX_INCLUDE_DIR)
+if(OptiX_INCLUDE_DIR)
+  file(STRINGS ${OptiX_INCLUDE_DIR}/optix.h _line REGEX "^#define OPTIX_VERSION [0-9]+")
+  string(REGEX MATCH "[0-9]+$" _number "${_line}")
+  math(EXPR OptiX_VERSION_MAJOR "${_number} / 10000")
+  math(EXPR OptiX_VERSION_MINOR "${_number} % 10000 / 100")
+  set(OptiX_VERSION ${OptiX_VERSION_MAJOR}.${OptiX_VERSION_MINOR})
+endif()
+include(FindPackageHandleStandardArgs)
+find_package_handle_standard_args(OptiX REQUIRED_VARS OptiX_INCLUDE_DIR VERSION_VAR OptiX_VERSION
+  REASON_FAILURE_MESSAGE "set OptiX_ROOT to a folder with include/optix.h of OptiX 7.7 or later, from NVIDIA's OptiX SDK")
+if(OptiX_FOUND AND NOT TARGET OptiX::OptiX)
+  add_library(OptiX::OptiX INTERFACE IMPORTED)
+  set_target_properties(OptiX::OptiX PROPERTIES INTERFACE_INCLUDE_DIRECTORIES ${OptiX_INCLUDE_DIR})
+endif()
