@@ -105,6 +105,45 @@ void backward(context& c, py::object const& color, py::object const& depth, py::
   without_gil(c.owner->mutex, [&] { c.it->backward(all, to); });
 }
 
+// Memory by its address, of tensors that gart.torch made itself: their types, shapes and places are known. 0: none.
+using addresses = std::array<std::uintptr_t, 4>;  // of colour, transmittance, depth, features
+
+float* at(std::uintptr_t address) { return reinterpret_cast<float*>(address); }
+
+std::unique_ptr<context> forward_at(shared_renderer const& r, gart::camera const& view, gart::render_options const& o,
+                                    addresses const& to, bool record) {
+  gart::render_targets const targets{at(to[0]), at(to[1]), at(to[2]), nullptr, nullptr, {at(to[3])}};
+  if (!record) {
+    without_gil(r->mutex, [&] { r->it->render_to(view, o, targets); });
+    return nullptr;
+  }
+  auto out = std::make_unique<context>();
+  out->owner = r, out->shape = {view.height, view.width};
+  out->features = r->features, out->bound_features = r->bound_features;
+  out->it = without_gil(r->mutex, [&] { return r->it->forward(view, o, targets); });
+  return out;
+}
+
+// To the five arrays of Gaussians, features, the pose, directions and origins.
+void backward_at(context& c, addresses const& by, std::array<std::uintptr_t, 9> const& out) {
+  auto const elements = static_cast<std::size_t>(c.shape.size() == 2 ? c.shape[0] * c.shape[1] : c.shape[0]);
+  auto const span = [&](std::size_t k, std::size_t channels) {
+    return gart::span<float const>{at(by[k]), by[k] ? elements * channels : 0};
+  };
+  auto const n = static_cast<gart::index_t>(c.owner->count);
+  gart::gradient_targets to;
+  if (out[0]) {
+    to.gaussians.mean = at(out[0]), to.gaussians.log_scale = at(out[1]), to.gaussians.quaternion = at(out[2]);
+    to.gaussians.opacity = at(out[3]), to.gaussians.sh = at(out[4]);
+    to.gaussians.count = n, to.gaussians.sh_degree = c.owner->request.sh_degree;
+  }
+  if (out[5]) to.channels.features = {at(out[5]), n, static_cast<int>(c.features)};
+  to.pose = at(out[6]), to.rays = {at(out[8]), at(out[7])};
+  auto const channels = static_cast<std::size_t>(c.features);
+  gart::output_gradients const all{span(0, 3), span(2, 1), span(1, 1), {span(3, channels), false}};
+  without_gil(c.owner->mutex, [&] { c.it->backward(all, to); });
+}
+
 py::dict trace(python_renderer& r, py::object const& directions, py::object const& origins, py::object const& t_max,
                std::array<double, 3> const& frame, py::object const& options, bool features, py::kwargs const& given) {
   gart::render_options const o = options_of(options, given, r.usual);
@@ -171,11 +210,12 @@ mean, log_scale, quaternion, opacity, sh dL/d each, of Model's shapes, overwritt
 pose                                     [6], of a view: dL/d the camera's position, world units, then by a small turn w
                                          of the camera about it, world axes: a direction d becomes d + w x d
 origins, directions                      [R, 3], dL/d rays
-features                                 [N, F], dL/d features, overwritten)");
+features                                 [N, F], dL/d features, overwritten)")
+      .def("_backward_at", &backward_at);
 
   // Renderer is bound before this.
   auto renderer = py::reinterpret_borrow<py::class_<python_renderer, shared_renderer>>(m.attr("Renderer"));
-  renderer
+  renderer.def("_forward_at", &forward_at)
       .def(
           "forward",
           [](shared_renderer const& r, gart::camera const& view, py::object const& options, py::object a, py::object b,

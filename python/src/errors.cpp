@@ -19,8 +19,10 @@ void raise(char const* type, std::string const& message, Attributes const&... at
 
 }  // namespace
 
-void bind_errors(py::module_&) {
-  errors = py::module_::import("gart.errors").release().ptr();
+void bind_errors(py::module_& m) {
+  // Of the package that this module lies in, whose name need not be gart.
+  auto const name = m.attr("__name__").cast<std::string>();
+  errors = py::module_::import((name.substr(0, name.rfind('.')) + ".errors").c_str()).release().ptr();
   py::register_local_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);

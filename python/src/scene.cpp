@@ -172,6 +172,7 @@ void bind_scene(py::module_& m) {
       .def_static(
           "from_json", [](std::string const& text) { return gart::parse_camera_json(text, "Camera.from_json").view; },
           py::arg("text"))
+      .def("__copy__", [](gart::camera const& c) { return c; })
       .def("__repr__", [](gart::camera const& c) {
         return "gart.Camera(" + std::to_string(c.width) + " x " + std::to_string(c.height) + ", " +
                gart::fields_of(c).model + ")";

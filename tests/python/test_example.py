@@ -56,7 +56,7 @@ class Example(unittest.TestCase):
             scores = [float(s) for s in re.findall(r"test PSNR ([\d.]+)", done.stdout)]
             self.assertEqual(len(scores), 11)
             self.assertGreater(scores[-1], scores[0] + 6, done.stdout)
-            self.assertEqual(len(gart.load_model(folder / "model.ply")), 10_000)
+            self.assertIn(len(gart.load_model(folder / "model.ply")), (10_000, 100_000))
 
 
 if __name__ == "__main__":

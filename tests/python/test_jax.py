@@ -1,4 +1,6 @@
-"""gart.jax with a stand-in for the three names of JAX that it calls."""
+"""gart.jax with a stand-in for the three names of JAX that it calls, and with JAX where it is."""
+import importlib.util
+import os
 import sys
 import types
 import unittest
@@ -90,6 +92,52 @@ class Jax(unittest.TestCase):
         before = renderer.render(scenes.camera())["color"]
         arrays[4][:] = 0.5
         self.assertGreater(np.abs(renderer.render(scenes.camera())["color"] - before).max(), 0.05)
+
+
+@unittest.skipIf(importlib.util.find_spec("jax") is None, "no jax")
+class RealJax(unittest.TestCase):
+    def setUp(self):
+        os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")
+        sys.modules.pop("gart.jax", None)
+        import gart.jax
+        import jax
+        self.jax, self.render = jax, gart.jax.render
+
+    def test_images_and_gradients_are_the_reference(self):
+        """By hand and under jit, of colour alone and with depth."""
+        model, view, numbers = scenes.model(n=30, degree=1), scenes.camera(), scenes.parameters(n=30, degree=1)
+        arrays = [self.jax.numpy.asarray(a) for a in numbers]
+        random = np.random.default_rng(4)
+        by_color, by_depth = (random.normal(0, 1, s).astype(np.float32) for s in ((32, 40, 3), (32, 40)))
+        expected = gart.reference(model, view, **scenes.SMOOTH)
+
+        def see(*arrays):
+            return self.render(*arrays, view, **scenes.SMOOTH)
+
+        for images in (see(*arrays), self.jax.jit(see)(*arrays)):
+            for got, name in zip(images, ("color", "transmittance", "depth")):
+                np.testing.assert_allclose(got, expected[name], atol=3e-4)
+        for share in (0.0, 1.0):
+            def loss(*arrays):
+                color, _, depth = see(*arrays)
+                return (by_color * color).sum() + share * (by_depth * depth).sum()
+
+            expected = gart.reference(model, view, by_color, share * by_depth, **scenes.SMOOTH)["gradients"]
+            gradient = self.jax.grad(loss, argnums=tuple(range(5)))
+            for got in (gradient(*arrays), self.jax.jit(gradient)(*arrays)):
+                for array, name in zip(got, ("mean", "log_scale", "quaternion", "opacity", "sh")):
+                    most = np.abs(expected[name]).max()
+                    np.testing.assert_allclose(array, expected[name], rtol=2e-3, atol=2e-3 * most)
+
+    def test_a_renderer_is_lent_jaxs_memory(self):
+        """On JAX's device where gart was built for it, else on the host."""
+        on_device = self.jax.default_backend() == "gpu" and gart.resolve()["backend"] == "cuda"
+        device = self.jax.devices("gpu" if on_device else "cpu")[0]
+        arrays = [self.jax.device_put(a, device) for a in scenes.parameters()]
+        renderer = gart.Renderer(sh_degree=1, backend="cuda" if on_device else "openmp")
+        renderer.bind(*arrays)
+        expected = gart.Renderer(scenes.model(), backend=renderer.configuration["backend"]).render(scenes.camera())
+        np.testing.assert_array_equal(renderer.render(scenes.camera())["color"], expected["color"])
 
 
 if __name__ == "__main__":

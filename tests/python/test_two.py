@@ -1,4 +1,4 @@
-"""Two modules of gart in one process: each renders, and raises its own errors."""
+"""Two gart in one process, one of them inside another package: each renders, and raises its own errors."""
 import pathlib
 import shutil
 import subprocess
@@ -9,17 +9,12 @@ import unittest
 import gart
 
 PROGRAM = """import sys
-modules = []
-for folder in sys.argv[1:]:
-    for name in [name for name in sys.modules if name.split(".")[0] == "gart"]:
-        del sys.modules[name]
-    sys.path.insert(0, folder)
-    import gart
-    modules.append(gart)
-    assert gart.__file__.startswith(folder), gart.__file__
-one, other = modules
+sys.path[:0] = sys.argv[1:]
+import gart as one
+import other.gart as other
+assert one.__file__.startswith(sys.argv[2]) and other.__file__.startswith(sys.argv[1]), (one.__file__, other.__file__)
 assert one.Camera is not other.Camera and one.InvalidArgument is not other.InvalidArgument
-for gart in modules:
+for gart in (one, other):
     renderer = gart.Renderer(backend="serial", sh_degree=0)
     try:
         renderer.render(gart.Camera(4, 4, 5, 5), near=-1.0)
@@ -33,8 +28,8 @@ class Two(unittest.TestCase):
         here = pathlib.Path(gart.__file__).resolve().parent
         with tempfile.TemporaryDirectory() as folder:
             folder = str(pathlib.Path(folder).resolve())
-            shutil.copytree(here, pathlib.Path(folder) / "gart")
-            done = subprocess.run([sys.executable, "-c", PROGRAM, str(here.parent), folder], capture_output=True, text=True)
+            shutil.copytree(here, pathlib.Path(folder) / "other" / "gart")
+            done = subprocess.run([sys.executable, "-c", PROGRAM, folder, str(here.parent)], capture_output=True, text=True)
         self.assertEqual(done.stdout.split(), ["render_options.near"] * 2, done.stderr)
 
 

@@ -6,32 +6,34 @@ from ..errors import InvalidArgument
 from . import _operators, _passes
 
 
-def _gradients(ctx, gaussians, seen, rest, gradients, names):
-    """dL/d the inputs of a function: six of the Gaussians, then those of `names`."""
-    needs = ctx.needs_input_grad
-    wanted = {name for name, need in zip(("features", *names), needs[5:]) if need}
-    if any(needs[:5]):
-        wanted.add("gaussians")
-    out = _passes.backward(gaussians, seen, *rest, gradients, wanted)
-    return [out.get(name) for name in (*_passes.PARAMETERS, "features", *names)]
+def _once(backward):
+    """once_differentiable, which takes time where no graph is made of a backward pass."""
+    refusing = torch.autograd.function.once_differentiable(backward)
+    return lambda ctx, *gradients: (refusing if torch.is_grad_enabled() else backward)(ctx, *gradients)
+
+
+def _of_gaussians(needs):
+    return needs[0] or needs[1] or needs[2] or needs[3] or needs[4]
 
 
 class _Render(torch.autograd.Function):
     @staticmethod
     def forward(ctx, mean, log_scale, quaternion, opacity, sh, features, c2w, camera, options, kernel_degree, record):
-        gaussians = [t.detach() for t in (mean, log_scale, quaternion, opacity, sh, features)]
+        gaussians = mean, log_scale, quaternion, opacity, sh, features
         images, kept = _passes.forward(gaussians, camera, options, kernel_degree, record)
         if record:
-            ctx.save_for_backward(mean, log_scale, quaternion, opacity, sh, features, c2w)
-            ctx.camera, ctx.rest = camera, (options, kernel_degree, kept)
+            ctx.save_for_backward(*gaussians, c2w)
+            ctx.rest = camera, options, kernel_degree, kept
             ctx.set_materialize_grads(False)
-        return images
+        return images if features is not None else images[:3]
 
     @staticmethod
-    @torch.autograd.function.once_differentiable
+    @_once
     def backward(ctx, *gradients):
         *gaussians, c2w = ctx.saved_tensors
-        *out, turned = _gradients(ctx, [t.detach() for t in gaussians], ctx.camera, ctx.rest, gradients, ("pose",))
+        needs = ctx.needs_input_grad
+        wanted = _of_gaussians(needs), needs[5], needs[6], False, False
+        *out, turned, _, _ = _passes.backward(gaussians, *ctx.rest, gradients, wanted)
         return (*out, None if turned is None else _passes.by_c2w(c2w, turned), None, None, None, None)
 
 
@@ -39,33 +41,33 @@ class _Trace(torch.autograd.Function):
     @staticmethod
     def forward(ctx, mean, log_scale, quaternion, opacity, sh, features, directions, origins, t_max, options,
                 kernel_degree):
-        tensors = (mean, log_scale, quaternion, opacity, sh, features, directions, origins, t_max)
-        plain = [None if t is None else t.detach() for t in tensors]
-        images, kept = _passes.forward(plain[:6], plain[6:], options, kernel_degree, True)
-        ctx.save_for_backward(*tensors)
+        gaussians, rays = (mean, log_scale, quaternion, opacity, sh, features), (directions, origins, t_max)
+        images, kept = _passes.forward(gaussians, rays, options, kernel_degree, True)
+        ctx.save_for_backward(*gaussians, *rays)
         ctx.rest = options, kernel_degree, kept
         ctx.set_materialize_grads(False)
-        return images
+        return images if features is not None else images[:3]
 
     @staticmethod
-    @torch.autograd.function.once_differentiable
+    @_once
     def backward(ctx, *gradients):
-        plain = [None if t is None else t.detach() for t in ctx.saved_tensors]
-        out = _gradients(ctx, plain[:6], plain[6:], ctx.rest, gradients, ("directions", "origins"))
-        return (*out, None, None, None)
+        tensors, needs = ctx.saved_tensors, ctx.needs_input_grad
+        wanted = _of_gaussians(needs), needs[5], False, needs[6], needs[7]
+        *out, _, directions, origins = _passes.backward(tensors[:6], tensors[6:], *ctx.rest, gradients, wanted)
+        return (*out, directions, origins, None, None, None)
 
 
 def _checked(parameters, features):
-    """Six tensors of which gart can be lent the memory."""
-    if features is None:
-        features = parameters[0].new_empty((parameters[0].shape[0], 0))
-    for name, t in zip((*_passes.PARAMETERS, "features"), (*parameters, features)):
-        if t.dtype != torch.float32:
-            raise InvalidArgument(f"gart.torch: {name} must be float32, not {t.dtype}")
-    if features.dim() != 2 or features.shape[0] != parameters[0].shape[0]:
+    """Tensors of which gart can be lent the memory; the last may be None."""
+    tensors = parameters if features is None else (*parameters, features)
+    for k, t in enumerate(tensors):
+        if t.dtype is not torch.float32:
+            raise InvalidArgument(f"gart.torch: {(*_passes.PARAMETERS, 'features')[k]} must be float32, not {t.dtype}")
+    if features is not None and (features.dim() != 2 or features.shape[0] != parameters[0].shape[0]):
         raise InvalidArgument(f"gart.torch: features must be [N, F] with the Gaussians' N, {parameters[0].shape[0]}; "
                               f"they are {list(features.shape)}")
-    return [t.contiguous() for t in (*parameters, features)]
+    out = [t if t.is_contiguous() else t.contiguous() for t in tensors]
+    return out if features is not None else [*out, None]
 
 
 def render(mean, log_scale, quaternion, opacity, sh, camera, *, features=None, c2w=None, options=None, kernel_degree=2,
@@ -88,12 +90,14 @@ def render(mean, log_scale, quaternion, opacity, sh, camera, *, features=None, c
     if _operators.render is not None and torch.compiler.is_compiling():
         text = camera if isinstance(camera, str) else camera.json()
         pose = mean.new_empty((0,)) if c2w is None else c2w
+        if gaussians[5] is None:
+            gaussians[5] = mean.new_empty((mean.shape[0], 0))  # an operator takes no None in its place
         images = _operators.render(*gaussians, pose, text, _operators.numbers_of(options, settings), kernel_degree)
     else:
         camera = _operators.camera_of(camera) if isinstance(camera, str) else camera
         camera = camera if c2w is None else _passes.placed(camera, c2w)
         options = _gart.RenderOptions(**settings) if options is None else options
-        record = torch.is_grad_enabled() and any(t is not None and t.requires_grad for t in (*gaussians, c2w))
+        record = torch.is_grad_enabled() and any([t is not None and t.requires_grad for t in (*gaussians, c2w)])
         images = _Render.apply(*gaussians, c2w, camera, options, kernel_degree, record)
     return images[:3] if features is None else images
 

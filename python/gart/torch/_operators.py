@@ -1,6 +1,7 @@
 """gart::render and gart::render_backward, where torch has torch.library.custom_op (2.4): what torch.compile sees whole.
 
-The camera is text and options are numbers, because an operator takes nothing else. A c2w without numbers stands for none.
+The camera is text and options are numbers, because an operator takes nothing else. A c2w without numbers stands for none,
+and so do features.
 """
 import functools
 from typing import List, Tuple
@@ -8,6 +9,7 @@ from typing import List, Tuple
 import torch
 
 from .. import _gart
+from ..errors import InvalidArgument
 from . import _passes
 
 _usual = _gart.RenderOptions()
@@ -41,8 +43,8 @@ def make(library):
     """The operator of such a torch.library."""
     Tensor = torch.Tensor
 
-    def plain(*tensors):
-        return [t.detach().contiguous() for t in tensors]
+    def plain(*gaussians):
+        return [t.contiguous() if t.numel() or k < 5 else None for k, t in enumerate(gaussians)]
 
     def seen_by(camera, c2w):
         view = camera_of(camera)
@@ -52,8 +54,9 @@ def make(library):
     def render(mean: Tensor, log_scale: Tensor, quaternion: Tensor, opacity: Tensor, sh: Tensor, features: Tensor,
                c2w: Tensor, camera: str, options: List[float],
                kernel_degree: int) -> Tuple[Tensor, Tensor, Tensor, Tensor]:
-        gaussians = plain(mean, log_scale, quaternion, opacity, sh, features)
-        return _passes.forward(gaussians, seen_by(camera, c2w), _options_of(options), kernel_degree, False)[0]
+        gaussians, view = plain(mean, log_scale, quaternion, opacity, sh, features), seen_by(camera, c2w)
+        *images, wide = _passes.forward(gaussians, view, _options_of(options), kernel_degree, False)[0]
+        return (*images, mean.new_empty((view.height, view.width, 0)) if wide is None else wide)
 
     @render.register_fake
     def _(mean, log_scale, quaternion, opacity, sh, features, c2w, camera, options, kernel_degree):
@@ -68,13 +71,16 @@ def make(library):
              by_transmittance: Tensor, by_depth: Tensor,
              by_features: Tensor) -> Tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor]:
         gaussians = plain(mean, log_scale, quaternion, opacity, sh, features)
-        gradients = [g.detach() for g in (by_color, by_transmittance, by_depth, by_features)]
-        wanted = {"gaussians", "features", *(["pose"] if c2w.numel() else [])}
-        out = _passes.backward(gaussians, seen_by(camera, c2w), _options_of(options), kernel_degree, (None, None),
-                               gradients, wanted)
-        turned = out.pop("pose", None)
-        return (*(out[name] for name in _passes.PARAMETERS), out.get("features", torch.empty_like(gaussians[5])),
-                torch.empty_like(c2w) if turned is None else _passes.by_c2w(*plain(c2w), turned))
+        view = seen_by(camera, c2w)
+        for g, channels in ((by_color, (3,)), (by_transmittance, ()), (by_depth, ()), (by_features, features.shape[1:])):
+            if g.numel() and (g.shape, g.dtype, g.device) != ((view.height, view.width, *channels), mean.dtype, mean.device):
+                raise InvalidArgument(f"gart::render_backward: gradients must be of the images' shapes, type and device; "
+                                      f"one is {g.dtype} {list(g.shape)} on {g.device}")
+        *out, turned, _, _ = _passes.backward(gaussians, view, _options_of(options), kernel_degree, (None, None),
+                                              (by_color, by_transmittance, by_depth, by_features),
+                                              (True, True, c2w.numel() > 0, False, False))
+        out[5] = torch.empty_like(features) if out[5] is None else out[5]
+        return (*out, torch.empty_like(c2w) if turned is None else _passes.by_c2w(c2w.contiguous(), turned))
 
     @back.register_fake
     def _(mean, log_scale, quaternion, opacity, sh, features, c2w, camera, options, kernel_degree, by_color,

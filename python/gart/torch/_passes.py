@@ -1,8 +1,9 @@
 """The passes forward and backward, without torch's autograd: tensors are lent to renderers that calls share.
 
-Gaussians are six tensors: mean, log_scale, quaternion, opacity, sh, and features [N, F], where F may be 0. What sees them
-is a gart.Camera, or rays as (directions, origins or None, t_max or None).
+Gaussians are six tensors: mean, log_scale, quaternion, opacity, sh, and features [N, F] or None. What sees them is a
+gart.Camera, or rays as (directions, origins or None, t_max or None). Tensors that are made here are lent by their address.
 """
+import copy
 import threading
 
 import torch
@@ -12,7 +13,7 @@ from .. import _gart
 from ..errors import InvalidArgument
 
 PARAMETERS = ("mean", "log_scale", "quaternion", "opacity", "sh")
-IMAGES = ("color", "transmittance", "depth", "features")
+TARGETS = (*PARAMETERS, "features", "pose", "directions", "origins")  # of a backward pass
 
 
 class _Shared:
@@ -26,39 +27,46 @@ class _Shared:
 
     def bind(self, gaussians):
         # Memory that is bound is kept, so that its address is of nothing else.
-        *parameters, features = gaussians
-        key = [(p.data_ptr(), p.shape) for p in parameters]
+        mean, log_scale, quaternion, opacity, sh, features = gaussians
+        key = (mean.data_ptr(), log_scale.data_ptr(), quaternion.data_ptr(), opacity.data_ptr(), sh.data_ptr(),
+               mean.shape, log_scale.shape, quaternion.shape, opacity.shape, sh.shape)
         if key != self.bound:
             self.bound = self.bound_features = None
-            self.renderer.bind(*map(lend, parameters))
+            self.renderer.bind(*(lend(p.detach()) for p in gaussians[:5]))
             self.bound = key
-        key = (features.data_ptr(), features.shape) if features.shape[1] else None
+        key = None if features is None else (features.data_ptr(), features.shape)
         if key != self.bound_features:
             self.bound_features = None
-            self.renderer.bind_features(lend(features) if key else None)
+            self.renderer.bind_features(None if features is None else lend(features.detach()))
             self.bound_features = key
 
 
 _shared = {}
 _lock = threading.Lock()
+_stream_of = getattr(torch._C, "_cuda_getCurrentRawStream",
+                     lambda index: torch.cuda.current_stream(index).cuda_stream)
 
 
 def _shared_for(gaussians, kernel_degree, depth=False):
     """The renderer for such Gaussians; once depth had a gradient, the one that has it."""
-    mean = gaussians[0]
-    request = {"sh_degree": int(round(gaussians[4].shape[1] ** 0.5)) - 1, "kernel_degree": kernel_degree}
+    mean, coefficients = gaussians[0], gaussians[4].shape[1]
+    place = None
     if mean.is_cuda:
-        stream = torch.cuda.current_stream(mean.device).cuda_stream
-        request.update(backend="cuda", device=mean.device.index, stream=stream)
-    elif mean.device.type == "cpu":
-        request.update(backend="openmp")
-    else:
+        index = mean.get_device()
+        place = index, _stream_of(index)
+    elif mean.device.type != "cpu":
         raise InvalidArgument(f"gart.torch: tensors must be on the CPU or on a CUDA device, not on {mean.device}")
-    key = tuple(request.items())
-    with _lock:
-        if key not in _shared or (depth and not _shared[key].depth):
-            _shared[key] = _Shared(depth, request)
-        return _shared[key]
+    key = coefficients, kernel_degree, place
+    shared = _shared.get(key)
+    if shared is None or (depth and not shared.depth):
+        request = {"sh_degree": int(round(coefficients ** 0.5)) - 1, "kernel_degree": kernel_degree}
+        request.update({"backend": "openmp"} if place is None else
+                       {"backend": "cuda", "device": place[0], "stream": place[1]})
+        with _lock:
+            shared = _shared.get(key)
+            if shared is None or (depth and not shared.depth):
+                shared = _shared[key] = _Shared(depth, request)
+    return shared
 
 
 def release():
@@ -67,72 +75,63 @@ def release():
         _shared.clear()
 
 
-def _is_view(seen):
-    return isinstance(seen, _gart.Camera)
+def _addresses(tensors):
+    return [0 if t is None else t.data_ptr() for t in tensors]
 
 
-def _context(shared, gaussians, seen, options, images={}):
+def _context(shared, gaussians, seen, options, images=(None,) * 4, record=True):
     """A forward pass, into images where they are given: its context."""
-    lent = {name: lend(image) for name, image in images.items()}
     shared.bind(gaussians)
-    if _is_view(seen):
-        return shared.renderer.forward(seen, options, **lent)
-    directions, origins, t_max = (None if r is None else lend(r) for r in seen)
-    return shared.renderer.forward_rays(directions, origins, t_max, options=options, **lent)
+    if isinstance(seen, _gart.Camera):
+        return shared.renderer._forward_at(seen, options, _addresses(images), record)
+    directions, origins, t_max = (None if r is None else lend(r.detach()) for r in seen)
+    color, transmittance, depth, features = (None if i is None else lend(i) for i in images)
+    return shared.renderer.forward_rays(directions, origins, t_max, options=options, color=color,
+                                        transmittance=transmittance, depth=depth, features=features)
 
 
 def forward(gaussians, seen, options, kernel_degree, record):
-    """The tensors of IMAGES, of features [..., F], and what backward wants where `record` is true."""
-    mean, width = gaussians[0], gaussians[5].shape[1]
-    shape = (seen.height, seen.width) if _is_view(seen) else (seen[0].shape[0],)
-    images = [mean.new_empty(s) for s in ((*shape, 3), shape, shape, (*shape, width))]
-    to = dict(zip(IMAGES, images if width else images[:3]))
+    """Colour, transmittance, depth and features [..., F] or None, and what backward wants where `record` is true."""
+    make, features = gaussians[0].new_empty, gaussians[5]
+    shape = (seen.height, seen.width) if isinstance(seen, _gart.Camera) else (seen[0].shape[0],)
+    images = (make((*shape, 3)), make(shape), make(shape),
+              None if features is None else make((*shape, features.shape[1])))
     shared = _shared_for(gaussians, kernel_degree)
     with shared.lock:
-        if record or not _is_view(seen):
-            context = _context(shared, gaussians, seen, options, to)
-        else:
-            context = None
-            shared.bind(gaussians)
-            shared.renderer.render_to(seen, options, **{name: lend(image) for name, image in to.items()})
-    return tuple(images), (shared, context)
+        return images, (shared, _context(shared, gaussians, seen, options, images, record))
 
 
 def backward(gaussians, seen, options, kernel_degree, kept, gradients, wanted):
-    """From dL/d the images, each of them a tensor or None, to dL/d what is wanted, by name: "gaussians" for all five of
-    PARAMETERS, "features", "pose" (six numbers), "directions", "origins". kept: of forward, or (None, None)."""
-    by = {f"{name}_gradient": g.contiguous() for name, g in zip(IMAGES, gradients) if g is not None and g.numel()}
+    """From dL/d the images, each of them a tensor or None, to dL/d what is wanted, as tensors or None in the order of
+    TARGETS. wanted: whether the Gaussians, features, the pose, directions, origins are. kept: of forward, or (None, None)."""
+    by = [None if g is None or not g.numel() else g.contiguous() for g in gradients]
+    by += [None] * (4 - len(by))
     shared, context = kept
+    is_view = isinstance(seen, _gart.Camera)
     # By lists of hits, which features have anyway, or by a renderer that has depth's gradient.
-    depth = _is_view(seen) and "features_gradient" not in by and len(by) > ("color_gradient" in by)
+    depth = is_view and by[3] is None and not (by[1] is None and by[2] is None)
     if shared is None or (depth and not shared.depth):
         shared, context = _shared_for(gaussians, kernel_degree, depth), None
-    out = {}
-    if "gaussians" in wanted:
-        out.update((name, torch.empty_like(p)) for name, p in zip(PARAMETERS, gaussians))
-    if "features" in wanted and gaussians[5].shape[1]:
-        out["features"] = torch.empty_like(gaussians[5])
-    if "pose" in wanted:
-        out["pose"] = gaussians[0].new_empty(6)
-    if not _is_view(seen):
-        out.update((name, torch.empty_like(r)) for name, r in zip(("directions", "origins"), seen) if name in wanted)
-
-    def go(context):
-        context.backward(**{name: lend(t) for name, t in {**by, **out}.items()})
-
+    make = torch.empty_like
+    out = [make(p) for p in gaussians[:5]] if wanted[0] else [None] * 5
+    out += (make(gaussians[5]) if wanted[1] and gaussians[5] is not None else None,
+            gaussians[0].new_empty(6) if wanted[2] else None,
+            make(seen[0]) if wanted[3] else None, make(seen[1]) if wanted[4] else None)
+    from_, to = _addresses(by), _addresses(out)
     with shared.lock:
         try:
-            go(context or _context(shared, gaussians, seen, options))
+            (context or _context(shared, gaussians, seen, options))._backward_at(from_, to)
         except InvalidArgument:
             if context is None:
                 raise
-            go(_context(shared, gaussians, seen, options))  # the renderer has had other Gaussians since
+            # The renderer has had other Gaussians since.
+            _context(shared, gaussians, seen, options)._backward_at(from_, to)
     return out
 
 
 def placed(camera, c2w):
     """The camera at another pose."""
-    out = _gart.Camera.from_json(camera.json())
+    out = copy.copy(camera)
     out.c2w = c2w.detach().double().cpu().numpy()
     return out
 
