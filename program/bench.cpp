@@ -1,13 +1,12 @@
 #include "commands.hpp"
 #include "options.hpp"
 #include "output.hpp"
-#include "processor_time.hpp"
 #include "progress.hpp"
+#include "timing.hpp"
 
 #include <gart/io/dataset.hpp>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <numeric>
@@ -26,12 +25,6 @@ struct bench_arguments {
   bool quiet = false;
 };
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  std::size_t const n = values.size();
-  return n == 0 ? 0 : n % 2 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
-}
-
 // A capture of one view. Its photograph is noise, so that every pixel has a gradient.
 gart::dataset noise_capture(gart::named_camera const& camera) {
   gart::dataset data;
@@ -49,9 +42,7 @@ gart::dataset noise_capture(gart::named_camera const& camera) {
 
 int run_bench(bench_arguments const& a) {
   gart::model_file const file = gart::load_model(a.model);
-  auto cameras = gart::load_cameras(a.cameras);
-  for (auto& [name, view] : cameras) view.position -= file.origin;
-  if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
+  auto cameras = cameras_from(a.cameras, file.origin);
   if (static_cast<int>(cameras.size()) > a.views) cameras.resize(static_cast<std::size_t>(a.views));
   if (!a.json.empty()) prepare_file(a.json);
 
@@ -83,9 +74,9 @@ int run_bench(bench_arguments const& a) {
       // Times by stage and the whole step's wall time are taken in turns: timing the stages costs a little itself.
       session->profile().enable(false);
       double const before = processor_ms();
-      auto const start = std::chrono::steady_clock::now();
+      stopwatch const step;
       session->step();
-      double const ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+      double const ms = step.milliseconds();
       double const used = processor_ms() - before;
       session->profile().enable(true);
       session->profile().clear();
@@ -141,34 +132,19 @@ int run_bench(bench_arguments const& a) {
 void add_bench(CLI::App& app, command& selected) {
   auto a = std::make_shared<bench_arguments>();
   CLI::App* bench = app.add_subcommand("bench", "Time every stage of a training step on a model, camera by camera.");
-  bench->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")
-      ->type_name("")
-      ->required();
-  bench->add_option("CAMERAS", a->cameras, "A dataset, or a camera JSON as for gart render")->type_name("")->required();
-  bench
-      ->add_option("--backward", a->backward,
-                   "Gradient method: auto, pixel, hybrid, primitive or\ndeterministic (sums in a fixed order)")
-      ->type_name("NAME")
-      ->capture_default_str()
+  add_model(*bench, a->model)->required();
+  add_open(*bench, "CAMERAS", a->cameras, "", "A dataset, or a camera JSON as for gart render")->required();
+  add_value(*bench, "--backward", a->backward, "NAME",
+            "Gradient method: auto, pixel, hybrid, primitive or\ndeterministic (sums in a fixed order)")
       ->check(one_of_methods());
-  bench->add_option("--views", a->views, "The first so many cameras")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(1, 10000));
-  bench->add_option("--warmups", a->warmups, "Steps before the measured ones, each view")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(0, 1000));
-  bench->add_option("--repeats", a->repeats, "Measured steps, each view; the median counts")
-      ->type_name("N")
-      ->capture_default_str()
+  add_value(*bench, "--views", a->views, "N", "The first so many cameras")->check(between(1, 10000));
+  add_value(*bench, "--warmups", a->warmups, "N", "Steps before the measured ones, each view")->check(between(0, 1000));
+  add_value(*bench, "--repeats", a->repeats, "N", "Measured steps, each view; the median counts")
       ->check(between(1, 1000));
-  bench->add_option("--json", a->json, "Write the figures to this file")->type_name("FILE");
-  bench->add_flag("--quiet", a->quiet, "No progress line");
+  add_open(*bench, "--json", a->json, "FILE", "Write the figures to this file");
+  add_quiet(*bench, a->quiet);
   add_configuration_options(*bench, a->configuration);
-  bench->add_option("--hit-format", a->hit_format, "Record of a hit: float4 or half")
-      ->type_name("NAME")
-      ->capture_default_str()
+  add_value(*bench, "--hit-format", a->hit_format, "NAME", "Record of a hit: float4 or half")
       ->check(name_of_a<gart::hit_format_kind>());
   bench->footer(
       "\nStages nest: \"backward\" is everything between the image's gradient and the parameters', \"backward/...\" "

@@ -7,6 +7,7 @@
 #include <gart/core/error.hpp>
 #include <gart/io/origin.hpp>
 #include <gart/math/logit.hpp>
+#include <gart/scene/select.hpp>
 #include <gart/scene/similarity.hpp>
 #include <gart/view/scene.hpp>
 
@@ -70,17 +71,12 @@ gart::similarity similarity_named(std::string const& text) {
                     " numbers, not 16 (a matrix), 7 (quaternion, translation) or 8 (and a scale)");
 }
 
-// The Gaussians with keep(i), in their order.
-gart::gaussian_model kept(gart::gaussian_model const& model, auto const& keep) {
-  gart::gaussian_model some;
-  some.sh_degree = model.sh_degree, some.feature_count = model.feature_count;
-  gart::for_each_row_array(
-      [&](std::size_t width, auto& to, auto const& from) {
-        for (std::size_t i = 0; i < model.size(); ++i)
-          if (keep(i)) to.insert(to.end(), from.data() + i * width, from.data() + (i + 1) * width);
-      },
-      model, some, model);
-  return some;
+gart::gaussian_model pruned(gart::gaussian_model const& model, double least_opacity) {
+  std::vector<gart::u32> kept;
+  for (std::size_t i = 0; i < model.size(); ++i)
+    if (gart::sigmoid_in_double(static_cast<double>(model.opacity[i])) >= least_opacity)
+      kept.push_back(static_cast<gart::u32>(i));
+  return gart::selected(model, kept);
 }
 
 int run_convert(convert_arguments const& a) {
@@ -116,10 +112,7 @@ int run_convert(convert_arguments const& a) {
     auto const corner = [&](std::size_t at) { return gart::vec3(gart::vec3d(box[at], box[at + 1], box[at + 2])); };
     model = gart::cropped(model, {corner(0), corner(3)});
   }
-  if (a.prune > 0)
-    model = kept(model, [&](std::size_t i) {
-      return gart::sigmoid_in_double(static_cast<double>(model.opacity[i])) >= a.prune;
-    });
+  if (a.prune > 0) model = pruned(model, a.prune);
   if (model.size() == 0)
     throw gart::io_error(a.in.string(), "no Gaussian is left", "a larger --crop, or a smaller --prune, keeps some");
   model = gart::with_sh_degree(std::move(model), std::min(a.sh_degree, model.sh_degree));
@@ -149,45 +142,31 @@ int run_convert(convert_arguments const& a) {
 void add_convert(CLI::App& app, command& selected) {
   auto a = std::make_shared<convert_arguments>();
   CLI::App* convert = app.add_subcommand("convert", "Write a model in another format, cropped, pruned or moved.");
-  convert->add_option("IN", a->in, "Gaussians in any format; its first bytes say which")->type_name("")->required();
-  convert
-      ->add_option("OUT", a->out,
-                   "Where they go; the ending says the format: .ply, .compressed.ply,\n.spz, .sog, .splat or .glb")
-      ->type_name("")
+  add_open(*convert, "IN", a->in, "", "Gaussians in any format; its first bytes say which")->required();
+  add_open(*convert, "OUT", a->out, "",
+           "Where they go; the ending says the format: .ply, .compressed.ply,\n.spz, .sog, .splat or .glb")
       ->required();
-  convert->add_option("--sh-degree", a->sh_degree, "Keep spherical harmonics to this degree, 0 to 3")
-      ->type_name("D")
+  add_open(*convert, "--sh-degree", a->sh_degree, "D", "Keep spherical harmonics to this degree, 0 to 3")
       ->check(between(0, 3));
-  convert
-      ->add_option("--crop", a->crop,
-                   "Keep the Gaussians whose means lie in this box: its least and its\ngreatest corner")
-      ->type_name("x,y,z,X,Y,Z");
-  convert->add_option("--prune", a->prune, "Leave out Gaussians of less opacity than this, 0 to 1")
-      ->type_name("A")
+  add_open(*convert, "--crop", a->crop, "x,y,z,X,Y,Z",
+           "Keep the Gaussians whose means lie in this box: its least and its\ngreatest corner");
+  add_open(*convert, "--prune", a->prune, "A", "Leave out Gaussians of less opacity than this, 0 to 1")
       ->check(between(0, 1));
-  convert
-      ->add_option("--transform", a->transform,
-                   "Turn, scale and move: a 4x4 matrix row by row, or a quaternion,\na translation "
-                   "and perhaps a scale: w,x,y,z,X,Y,Z,S")
-      ->type_name("NUMBERS");
-  convert
-      ->add_option("--origin", a->origin,
-                   "What IN's coordinates are from, in those of the capture, where IN\ndoes not say it")
-      ->type_name("X,Y,Z");
+  add_open(*convert, "--transform", a->transform, "NUMBERS",
+           "Turn, scale and move: a 4x4 matrix row by row, or a quaternion,\na translation "
+           "and perhaps a scale: w,x,y,z,X,Y,Z,S");
+  add_open(*convert, "--origin", a->origin, "X,Y,Z",
+           "What IN's coordinates are from, in those of the capture, where IN\ndoes not say it");
   convert->add_flag("--world", a->packing.world,
                     "PLY and GLB: in the coordinates of the capture, in double, and not\nfrom an origin");
   convert->add_flag("--spz", a->packing.spz,
                     "GLB: packed as SPZ 2, a tenth of the size; not all programs that\nread GLB know it");
-  convert
-      ->add_option("--sh-bits", a->sh_bits,
-                   "SPZ: bits of a coefficient of degree 1, and of those above, 1 to 8\n(default: 6,6)")
-      ->type_name("A,B");
-  convert
-      ->add_option("--palette", a->packing.palette,
-                   "SOG: rows of coefficients that all Gaussians share, to 65536\n(default: one for four of them)")
-      ->type_name("N")
+  add_open(*convert, "--sh-bits", a->sh_bits, "A,B",
+           "SPZ: bits of a coefficient of degree 1, and of those above, 1 to 8\n(default: 6,6)");
+  add_open(*convert, "--palette", a->packing.palette, "N",
+           "SOG: rows of coefficients that all Gaussians share, to 65536\n(default: one for four of them)")
       ->check(between(1, 65536));
-  convert->add_flag("--quiet", a->quiet, "Say nothing but errors");
+  add_quiet(*convert, a->quiet);
   convert->footer(
       "\nWrites OUT whole or not at all. The box and the opacity are IN's own; the rest is moved after.\n"
       "Properties that OUT's format cannot hold are reported, or refused where the image would change without them.\n"

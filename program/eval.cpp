@@ -162,39 +162,25 @@ int run_eval(eval_arguments const& a) {
 void add_eval(CLI::App& app, command& selected) {
   auto a = std::make_shared<eval_arguments>();
   CLI::App* eval = app.add_subcommand("eval", "Score a model against the test views of a capture: PSNR and SSIM.");
-  eval->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")
-      ->type_name("")
-      ->required();
-  eval->add_option("DATASET", a->dataset, "The capture, as gart train reads it")->type_name("")->required();
-  eval->add_option("--out", a->out, "Where the scores go")->type_name("METRICS.json")->required();
-  eval->add_option("--renders", a->renders, "Also keep NAME.png and NAME_truth.png of each view here")
-      ->type_name("DIR");
-  eval->add_option(
-          "--pairs", a->pairs,
-          "Also keep DIR/render/NAME.png and DIR/truth/NAME.png of each\nview, for LPIPS and what else compares "
-          "two folders")
-      ->type_name("DIR");
+  add_model(*eval, a->model)->required();
+  add_open(*eval, "DATASET", a->dataset, "", "The capture, as gart train reads it")->required();
+  add_open(*eval, "--out", a->out, "METRICS.json", "Where the scores go")->required();
+  add_open(*eval, "--renders", a->renders, "DIR", "Also keep NAME.png and NAME_truth.png of each view here");
+  add_open(*eval, "--pairs", a->pairs, "DIR",
+           "Also keep DIR/render/NAME.png and DIR/truth/NAME.png of each\nview, for LPIPS and what else compares "
+           "two folders");
   add_exposures(*eval, a->exposures);
-  eval->add_option("--background", a->background, "white or black; auto: as gart train chooses")
-      ->type_name("NAME")
-      ->capture_default_str()
+  add_value(*eval, "--background", a->background, "NAME", "white or black; auto: as gart train chooses")
       ->check(one_of({"auto", "white", "black"}));
   add_photo_options(*eval, a->photos);
-  eval->add_option("--downscale", a->downscale, "Shrink images by this whole factor")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(1, 64));
-  eval->add_option("--test-every", a->test_every, "Each Nth view is for testing, where the capture does not say")
-      ->type_name("N")
-      ->capture_default_str()
+  add_downscale(*eval, a->downscale);
+  add_value(*eval, "--test-every", a->test_every, "N", "Each Nth view is for testing, where the capture does not say")
       ->check(between(1, 1e6));
-  eval->add_option("--test-split", a->test_split,
-                   "Which views are for testing: nth or sector (see gart train --help-all)")
-      ->type_name("NAME")
-      ->capture_default_str()
+  add_value(*eval, "--test-split", a->test_split, "NAME",
+            "Which views are for testing: nth or sector (see gart train --help-all)")
       ->check(name_of_a<gart::split_kind>());
   add_max_hits(*eval, a->max_hits);
-  eval->add_flag("--quiet", a->quiet, "Say nothing but errors");
+  add_quiet(*eval, a->quiet);
   add_configuration_options(*eval, a->configuration);
   eval->footer(
       "\nWrites METRICS.json: psnr (dB) and ssim, their means over the test views and each view's, and how they were "

@@ -2,6 +2,8 @@
 // How options look in --help ("--iterations N   Steps (default: 30000)"), and checks whose messages name the valid
 // values.
 
+#include <gart/core/words.hpp>
+
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -67,15 +69,25 @@ class help_formatter : public CLI::Formatter {
   mutable bool all_ = true;
 };
 
+// An option with a value; `type` stands for it in the help: N, FILE. Left open it keeps what it has.
+template <class T>
+CLI::Option* add_open(CLI::App& app, std::string const& flag, T& value, std::string const& type,
+                      std::string const& help) {
+  return app.add_option(flag, value, help)->type_name(type);
+}
+// One whose default the help shows.
+template <class T>
+CLI::Option* add_value(CLI::App& app, std::string const& flag, T& value, std::string const& type,
+                       std::string const& help) {
+  return add_open(app, flag, value, type, help)->capture_default_str();
+}
+inline void add_quiet(CLI::App& app, bool& quiet) { app.add_flag("--quiet", quiet, "Say nothing but errors"); }
+
 inline CLI::Validator one_of(std::vector<std::string> const& names) {
   return CLI::Validator(
       [names](std::string& value) {
-        std::string list;
-        for (auto const& name : names) {
-          if (value == name) return std::string();
-          list += (list.empty() ? "" : ", ") + name;
-        }
-        return "'" + value + "' is none of " + list;
+        if (std::find(names.begin(), names.end(), value) != names.end()) return std::string();
+        return "'" + value + "' is none of " + gart::joined(names);
       },
       "");
 }
@@ -86,9 +98,7 @@ inline CLI::Validator between(double low, double high) {
         double value = 0;
         if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
         auto const show = [](double v) {
-          std::string s =
-              v == static_cast<long long>(v) ? std::to_string(static_cast<long long>(v)) : std::to_string(v);
-          return s;
+          return v == static_cast<long long>(v) ? std::to_string(static_cast<long long>(v)) : std::to_string(v);
         };
         return "'" + text + "' is not a number from " + show(low) + " to " + show(high);
       },

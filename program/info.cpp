@@ -1,4 +1,5 @@
 #include "commands.hpp"
+#include "help.hpp"
 #include "printable.hpp"
 #include "progress.hpp"
 #include "ranks.hpp"
@@ -6,6 +7,7 @@
 
 #include <gart/core/error.hpp>
 #include <gart/core/version.hpp>
+#include <gart/core/words.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/origin.hpp>
 #include <gart/io/splat_file.hpp>
@@ -123,9 +125,8 @@ void print_devices(std::vector<std::string> const& places) {
   std::puts("optix      not in this build");
 #endif
   print_ranks(places);
-  std::string formats;
-  for (auto const* format : gart::splat_formats()) formats += std::string(formats.empty() ? "" : ", ") + format->name;
-  std::printf("models     %s\n", formats.c_str());
+  auto const name = [](gart::splat_format const* format) { return format->name; };
+  std::printf("models     %s\n", gart::joined(gart::splat_formats(), name).c_str());
 }
 
 // From the least to the greatest of all but a hundredth, an axis.
@@ -232,7 +233,7 @@ void add_info(CLI::App& app, command& selected) {
       "  gart info --self-test                    after an installation: seconds\n"
       "  mpirun -n 4 gart info");
   auto path = std::make_shared<std::filesystem::path>();
-  info->add_option("PATH", *path, "Of this model or capture instead: what is in it")->type_name("");
+  add_open(*info, "PATH", *path, "", "Of this model or capture instead: what is in it");
   info->callback([tests, path, &selected] {
     selected = [tests, path] {
       return path->empty() ? run_info(*tests) : names_capture(*path) ? print_capture(*path) : print_model(*path);

@@ -7,8 +7,8 @@
 #include "ranks.hpp"
 #include "threads.hpp"
 
-#include <gart/core/suggestion.hpp>
 #include <gart/core/version.hpp>
+#include <gart/core/words.hpp>
 
 #include <cstdio>
 #include <exception>

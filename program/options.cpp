@@ -70,46 +70,55 @@ gart::configuration_request configuration_options::request() const {
   return wanted;
 }
 
+CLI::Option* add_model(CLI::App& app, std::filesystem::path& model) {
+  return add_open(app, "MODEL", model, "", "Gaussians in any format, from gart or another program");
+}
+
+void add_downscale(CLI::App& app, int& factor) {
+  add_value(app, "--downscale", factor, "N", "Shrink images by this whole factor")->check(between(1, 64));
+}
+
+std::vector<gart::named_camera> cameras_from(std::filesystem::path const& file, gart::vec3d const& origin,
+                                             int downscale) {
+  auto cameras = gart::load_cameras(file);
+  if (cameras.empty()) throw gart::io_error(file.string(), "has no cameras", "name a dataset or a camera JSON");
+  for (auto& [name, view] : cameras) {
+    view.position -= origin;
+    if (downscale > 1) view = gart::downscaled(view, downscale, "the camera " + name);
+  }
+  return cameras;
+}
+
 void add_threads(CLI::App& app, int& threads) {
-  app.add_option("--threads", threads, "Threads of the openmp backend, 0: all cores")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(0, 4096));
+  add_value(app, "--threads", threads, "N", "Threads of the openmp backend, 0: all cores")->check(between(0, 4096));
 }
 
 void add_configuration_options(CLI::App& app, configuration_options& options) {
-  app.add_option("--backend", options.backend, "Backend: serial, openmp (CPU) or cuda;\nauto: the fastest there is")
-      ->type_name("NAME")
-      ->capture_default_str()
+  add_value(app, "--backend", options.backend, "NAME",
+            "Backend: serial, openmp (CPU) or cuda;\nauto: the fastest there is")
       ->check(name_of_a<gart::backend_kind>());
-  app.add_option("--tracer", options.tracer,
-                 "Tracer: tiles, bvh, embree (CPU), or optix (CUDA);\nthe images are the same")
-      ->type_name("NAME")
-      ->capture_default_str()
+  add_value(app, "--tracer", options.tracer, "NAME",
+            "Tracer: tiles, bvh, embree (CPU), or optix (CUDA);\nthe images are the same")
       ->check(name_of_a<gart::tracer_kind>());
   add_threads(app, options.threads);
 }
 
 void add_max_hits(CLI::App& app, int& max_hits) {
-  app.add_option("--max-hits", max_hits,
-                 "Hits after which a ray ends, 0: no cap\n(default: what the model says, else 0)")
-      ->type_name("N")
+  add_open(app, "--max-hits", max_hits, "N",
+           "Hits after which a ray ends, 0: no cap\n(default: what the model says, else 0)")
       ->check(between(0, gart::max_hits_most));
 }
 
 void add_exposures(CLI::App& app, std::filesystem::path& file) {
-  app.add_option("--exposures", file,
-                 "exposures.json of the model's training: each view gets the exposure\nof the training views about it, "
-                 "and its lens's vignetting")
-      ->type_name("FILE");
+  add_open(app, "--exposures", file, "FILE",
+           "exposures.json of the model's training: each view gets the exposure\nof the training views about it, "
+           "and its lens's vignetting");
 }
 
 void add_photo_options(CLI::App& command, photo_options& o) {
-  command
-      .add_option("--photos", o.photos,
-                  "The folder that the photographs' names are in (default: where the\ncapture has it, as images beside "
-                  "sparse)")
-      ->type_name("DIR");
+  add_open(command, "--photos", o.photos, "DIR",
+           "The folder that the photographs' names are in (default: where the\ncapture has it, as images beside "
+           "sparse)");
   command.add_flag("--no-masks", o.no_masks,
                    "Leave out the masks that the capture names, or that are in a\nfolder masks beside its photographs");
 }

@@ -23,7 +23,7 @@ class recorded_options {
  public:
   template <class T>
   CLI::Option* add(CLI::App& app, std::string const& flag, T& value, std::string const& type, std::string const& help) {
-    CLI::Option* option = app.add_option(flag, value, help)->capture_default_str()->type_name(type);
+    CLI::Option* option = add_value(app, flag, value, type, help);
     entries_.push_back({flag.substr(2), option, [&value] { return nlohmann::json(value); }});
     return option;
   }
@@ -76,6 +76,12 @@ struct configuration_options {
 
   gart::configuration_request request() const;
 };
+// MODEL, which every command reads alike.
+CLI::Option* add_model(CLI::App& app, std::filesystem::path& model);
+void add_downscale(CLI::App& app, int& factor);
+// Those of a dataset or a camera JSON, from the model's origin, their images shrunk. io_error where there are none.
+std::vector<gart::named_camera> cameras_from(std::filesystem::path const& file, gart::vec3d const& origin,
+                                             int downscale = 1);
 void add_threads(CLI::App& app, int& threads);
 void add_configuration_options(CLI::App& app, configuration_options& options);
 // --max-hits of a model to be rendered: negative where the model says.

@@ -8,6 +8,7 @@
 #include "render_scene.hpp"
 #include "run_folder.hpp"
 #include "samples.hpp"
+#include "timing.hpp"
 
 #include <gart/io/camera_file.hpp>
 #include <gart/io/dataset.hpp>
@@ -16,7 +17,6 @@
 #include <gart/view/camera_path.hpp>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -89,8 +89,7 @@ std::vector<gart::named_camera> cameras_of(render_arguments const& a) {
 // With a scene that names its models the one file is that of the cameras; so is a folder or a list of them.
 void settle_files(render_arguments& a) {
   if (a.scene.file.empty()) {
-    if (!a.scene.given.empty()) throw usage_error(a.scene.given + " is of a scene: name it by --scene FILE");
-    if (a.model.empty()) throw usage_error("MODEL is missing (see gart render --help)");
+    a.scene.require_none(a.model, "render");
     for (char const* name : {"albedo", "surface", "ids"})
       if (a.images.has(name)) throw usage_error(std::string("--images ") + name + " is of a --scene");
     return;
@@ -203,10 +202,10 @@ int run_render(render_arguments a) {
     auto& [name, view] = cameras[i];
     if (!a.camera.empty()) view = gart::seen_through(view, a.camera);
     if (a.downscale > 1) view = gart::downscaled(view, a.downscale, "the camera " + name);
-    auto const start = std::chrono::steady_clock::now();
+    stopwatch const drawn;
     gart::rendered image = how.draw(view, options);
     if (!exposures.empty()) apply(exposures.at(view), image.color);
-    double const ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    double const ms = drawn.milliseconds();
     if (images.has("colour")) files.png(a.out / (name + ".png"), gart::to_8bit(image.color));
     nlohmann::json entry = {{"name", name}, {"width", view.width}, {"height", view.height}, {"milliseconds", ms}};
     write_images(a.out, name, image, view, images, entry);
@@ -238,78 +237,50 @@ int run_render(render_arguments a) {
 void add_render(CLI::App& app, command& selected) {
   auto a = std::make_shared<render_arguments>();
   CLI::App* render = app.add_subcommand("render", "Render a model from every camera of a dataset or a camera file.");
-  render->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")->type_name("");
-  render
-      ->add_option("CAMERAS", a->cameras,
-                   "A dataset (all its views), or a JSON list of {\"name\", \"width\",\n"
-                   "\"height\", \"fx\", \"fy\", \"cx\", \"cy\", \"c2w\"}, in pixels, camera to world\nwith x right, y "
-                   "down, z forward")
-      ->type_name("");
-  render
-      ->add_option("--path", a->path,
-                   "In place of CAMERAS: keyframes, as a camera JSON. The images are\nframe_00000 and so on along a "
-                   "smooth path through them. A \"time\" of each\nkeyframe says when, as the viewer saves it")
-      ->type_name("FILE");
-  render->add_option("--frames", a->frames, "Images along --path, evenly in time")
-      ->type_name("N")
-      ->check(between(2, 1e6));
+  add_model(*render, a->model);
+  add_open(*render, "CAMERAS", a->cameras, "",
+           "A dataset (all its views), or a JSON list of {\"name\", \"width\",\n"
+           "\"height\", \"fx\", \"fy\", \"cx\", \"cy\", \"c2w\"}, in pixels, camera to world\nwith x right, y "
+           "down, z forward");
+  add_open(*render, "--path", a->path, "FILE",
+           "In place of CAMERAS: keyframes, as a camera JSON. The images are\nframe_00000 and so on along a "
+           "smooth path through them. A \"time\" of each\nkeyframe says when, as the viewer saves it");
+  add_open(*render, "--frames", a->frames, "N", "Images along --path, evenly in time")->check(between(2, 1e6));
   render->add_flag("--closed", a->closed, "--path goes on from the last keyframe to the first");
-  render->add_option("--out", a->out, "Folder of the images; made where there is none")->type_name("DIR")->required();
-  render
-      ->add_option("--camera", a->camera,
-                   "Through another camera in the same places: COLMAP's name of a\nmodel and its parameters, as "
-                   "EQUIRECTANGULAR, FISHEYE,angle=200 or\nOPENCV_FISHEYE,fx=90,k1=0.02; angle is across the shorter "
-                   "side")
-      ->type_name("MODEL");
+  add_open(*render, "--out", a->out, "DIR", "Folder of the images; made where there is none")->required();
+  add_open(*render, "--camera", a->camera, "MODEL",
+           "Through another camera in the same places: COLMAP's name of a\nmodel and its parameters, as "
+           "EQUIRECTANGULAR, FISHEYE,angle=200 or\nOPENCV_FISHEYE,fx=90,k1=0.02; angle is across the shorter "
+           "side");
   add_exposures(*render, a->exposures);
-  render
-      ->add_option("--background", a->background,
-                   "black or white. auto: by the config.json of a run beside the\nmodel, else black")
-      ->type_name("NAME")
-      ->capture_default_str()
+  add_value(*render, "--background", a->background, "NAME",
+            "black or white. auto: by the config.json of a run beside the\nmodel, else black")
       ->check(one_of({"auto", "black", "white"}));
-  render->add_option("--downscale", a->downscale, "Shrink images by this whole factor")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(1, 64));
-  render
-      ->add_option("--samples", a->samples,
-                   "Rays a pixel each way, N x N in all: the mean over the pixel\nitself, in N x N times the time. Of "
-                   "--scene: paths a pixel\n(default: 1; of a scene what it says, else 16)")
-      ->type_name("N")
+  add_downscale(*render, a->downscale);
+  add_open(*render, "--samples", a->samples, "N",
+           "Rays a pixel each way, N x N in all: the mean over the pixel\nitself, in N x N times the time. Of "
+           "--scene: paths a pixel\n(default: 1; of a scene what it says, else 16)")
       ->check(between(1, 65536));
-  render
-      ->add_option("--alpha-min", a->alpha_min,
-                   "Opacity below which a Gaussian is not hit, 0 to 1\n(default: what the model says, else 1/255)")
-      ->type_name("A")
+  add_open(*render, "--alpha-min", a->alpha_min, "A",
+           "Opacity below which a Gaussian is not hit, 0 to 1\n(default: what the model says, else 1/255)")
       ->check(between(1e-6, 0.99));
-  render
-      ->add_option("--transmittance-min", a->transmittance_min,
-                   "Transmittance below which a ray ends, 0 to 1\n(default: what the model says, else 1e-4)")
-      ->type_name("T")
+  add_open(*render, "--transmittance-min", a->transmittance_min, "T",
+           "Transmittance below which a ray ends, 0 to 1\n(default: what the model says, else 1e-4)")
       ->check(between(0, 0.99));
   add_max_hits(*render, a->max_hits);
-  render
-      ->add_option("--images", a->images.images,
-                   "Which images, by commas: colour (NAME.png), depth (mean distance\nalong the ray, 0 where less than "
-                   "half is seen), normal (of the\ndepth, in the world's axes, (n + 1) / 2), alpha, hits (Gaussians "
-                   "met):\nNAME_depth.png and so on; depth and hits of 16 bits, with a\nNAME_depth_preview.png in "
-                   "colours. Of --scene also albedo, surface (its normals), and ids of\nGaussian, mesh and triangle")
-      ->type_name("LIST")
-      ->capture_default_str();
-  render
-      ->add_option("--format", a->images.format,
-                   "Of all but colour: png, or floats as they are: npy, or exr, which\nhas the colour too, NAME.exr")
-      ->type_name("NAME")
-      ->capture_default_str()
+  add_value(*render, "--images", a->images.images, "LIST",
+            "Which images, by commas: colour (NAME.png), depth (mean distance\nalong the ray, 0 where less than "
+            "half is seen), normal (of the\ndepth, in the world's axes, (n + 1) / 2), alpha, hits (Gaussians "
+            "met):\nNAME_depth.png and so on; depth and hits of 16 bits, with a\nNAME_depth_preview.png in "
+            "colours. Of --scene also albedo, surface (its normals), and ids of\nGaussian, mesh and triangle");
+  add_value(*render, "--format", a->images.format, "NAME",
+            "Of all but colour: png, or floats as they are: npy, or exr, which\nhas the colour too, NAME.exr")
       ->check(one_of({"png", "npy", "exr"}));
-  render->add_option("--depth-unit", a->images.depth_unit, "Distance of a step of NAME_depth.png")
-      ->type_name("U")
-      ->capture_default_str()
+  add_value(*render, "--depth-unit", a->images.depth_unit, "U", "Distance of a step of NAME_depth.png")
       ->check(between(1e-9, 1e9));
   render->add_flag("--depth", a->depth, "The depth too: adds it to --images");
-  render->add_option("--json", a->json, "Write timings of each view and stage in milliseconds")->type_name("FILE");
-  render->add_flag("--quiet", a->quiet, "Say nothing but errors");
+  add_open(*render, "--json", a->json, "FILE", "Write timings of each view and stage in milliseconds");
+  add_quiet(*render, a->quiet);
   add_scene_options(*render, a->scene);
   add_configuration_options(*render, a->configuration);
   render->footer(
@@ -320,11 +291,7 @@ void add_render(CLI::App& app, command& selected) {
       "  gart render --scene scene.json --out images --samples 64 --tone-map filmic\n"
       "  gart render run/model.ply --path keyframes.json --frames 240 --out film\n"
       "  ffmpeg -framerate 30 -i film/frame_%05d.png film.mp4      makes a video of it");
-  render->callback([a, render, &selected] {
-    for (char const* name : {"--bounces", "--shadows", "--aperture", "--focus", "--exposure", "--tone-map", "--seed"})
-      if (render->count(name) > 0) a->scene.given = name;
-    selected = [a] { return run_render(*a); };
-  });
+  render->callback([a, render, &selected] { selected = [a] { return run_render(*a); }; });
 }
 
 }  // namespace gart_cli

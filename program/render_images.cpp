@@ -2,6 +2,7 @@
 
 #include "commands.hpp"
 
+#include <gart/core/words.hpp>
 #include <gart/io/depth_file.hpp>
 #include <gart/io/exr_file.hpp>
 #include <gart/io/image_file.hpp>
@@ -49,8 +50,7 @@ bool image_choice::has(std::string const& name) const {
 void check_images(image_choice const& choice) {
   auto const& names = image_choice::names();
   auto const chosen = parts_of(choice.images);
-  std::string all;
-  for (std::string const& name : names) all += (all.empty() ? "" : ", ") + name;
+  std::string const all = gart::joined(names);
   if (chosen.empty()) throw usage_error("--images: name one of " + all);
   for (std::string const& one : chosen)
     if (std::find(names.begin(), names.end(), one) == names.end())

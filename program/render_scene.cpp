@@ -7,32 +7,37 @@ namespace gart_cli {
 namespace fs = std::filesystem;
 
 void add_scene_options(CLI::App& app, scene_options& o) {
-  app.add_option("--scene", o.file,
-                 "Paths of light through Gaussians, meshes and lights: a scene.json,\nor a mesh (.glb, .gltf, .obj, "
-                 ".ply). MODEL is left out where the\nscene names its models, CAMERAS where it has cameras")
-      ->type_name("FILE");
-  app.add_option("--bounces", o.bounces,
-                 "Of --scene: surfaces that a path goes on from\n(default: the scene's, else 4)")
-      ->type_name("N")
+  add_open(app, "--scene", o.file, "FILE",
+           "Paths of light through Gaussians, meshes and lights: a scene.json,\nor a mesh (.glb, .gltf, .obj, "
+           ".ply). MODEL is left out where the\nscene names its models, CAMERAS where it has cameras");
+  add_open(app, "--bounces", o.bounces, "N",
+           "Of --scene: surfaces that a path goes on from\n(default: the scene's, else 4)")
       ->check(between(0, 64));
-  app.add_option("--shadows", o.shadows,
-                 "Of --scene: shadows of meshes on Gaussians, none, per-gaussian (one\nvisibility each and light) or "
-                 "per-hit (sharper, slower)")
-      ->type_name("KIND")
+  add_open(app, "--shadows", o.shadows, "KIND",
+           "Of --scene: shadows of meshes on Gaussians, none, per-gaussian (one\nvisibility each and light) or "
+           "per-hit (sharper, slower)")
       ->check(name_of_a<gart::light::shadow_kind>());
-  app.add_option("--aperture", o.aperture, "Of --scene: radius of the lens, world units; 0: all is sharp")
-      ->type_name("R")
+  add_open(app, "--aperture", o.aperture, "R", "Of --scene: radius of the lens, world units; 0: all is sharp")
       ->check(between(0, 1e9));
-  app.add_option("--focus", o.focus, "Of --scene: distance along the axis that is sharp")
-      ->type_name("D")
+  add_open(app, "--focus", o.focus, "D", "Of --scene: distance along the axis that is sharp")
       ->check(between(1e-9, 1e9));
-  app.add_option("--exposure", o.exposure, "Of --scene: stops that the picture is made brighter by")
-      ->type_name("S")
+  add_open(app, "--exposure", o.exposure, "S", "Of --scene: stops that the picture is made brighter by")
       ->check(between(-30, 30));
-  app.add_option("--tone-map", o.tone_map, "Of --scene: none, srgb or filmic, from light to what a screen shows")
-      ->type_name("NAME")
+  add_open(app, "--tone-map", o.tone_map, "NAME", "Of --scene: none, srgb or filmic, from light to what a screen shows")
       ->check(name_of_a<gart::light::tone_kind>());
-  app.add_option("--seed", o.seed, "Of --scene: of all that is random")->type_name("N");
+  add_open(app, "--seed", o.seed, "N", "Of --scene: of all that is random");
+}
+
+void scene_options::require_none(fs::path const& model, char const* command) const {
+  for (auto const& [flag, given] : {std::pair{"--bounces", bounces.has_value()},
+                                    {"--shadows", !shadows.empty()},
+                                    {"--aperture", aperture.has_value()},
+                                    {"--focus", focus.has_value()},
+                                    {"--exposure", exposure.has_value()},
+                                    {"--tone-map", !tone_map.empty()},
+                                    {"--seed", seed.has_value()}})
+    if (given) throw usage_error(std::string(flag) + " is of a scene: name it by --scene FILE");
+  if (model.empty()) throw usage_error(std::string("MODEL is missing (see gart ") + command + " --help)");
 }
 
 path_scene::path_scene(scene_options const& o, fs::path const& model, configuration_options const& configuration) {

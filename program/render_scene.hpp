@@ -22,7 +22,9 @@ struct scene_options {
   std::optional<gart::u64> seed;
   std::string shadows, tone_map;
   std::optional<float> aperture, focus, exposure;
-  std::string given;  // the first of the options that ask for a scene
+
+  // usage_error for one of them, and for no model, where no scene is named.
+  void require_none(std::filesystem::path const& model, char const* command) const;
 };
 void add_scene_options(CLI::App& app, scene_options& options);
 

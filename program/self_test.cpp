@@ -1,10 +1,11 @@
 #include "self_test.hpp"
 
+#include "timing.hpp"
+
 #include <gart/reference/reference.hpp>
 #include <gart/runtime/renderer.hpp>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -126,7 +127,7 @@ differences measure(gart::configuration_info const& c) {
 
 int self_test() {
   int wrong = 0, right = 0;
-  auto const start = std::chrono::steady_clock::now();
+  stopwatch const whole;
   std::puts("backend  tracer  backward            kernel  hit format  SH  image    gradients");
   for (gart::configuration_info const& c : gart::compiled_configurations()) {
     if (c.ranks || c.tracer == gart::tracer_kind::own) continue;  // ranks train, and have the others' kernels
@@ -145,8 +146,7 @@ int self_test() {
     }
     std::fflush(stdout);
   }
-  std::chrono::duration<double> const took = std::chrono::steady_clock::now() - start;
-  std::printf("\n%d configurations agree with the definition, %d do not; %.1f s\n", right, wrong, took.count());
+  std::printf("\n%d configurations agree with the definition, %d do not; %.1f s\n", right, wrong, whole.seconds());
   return wrong;
 }
 

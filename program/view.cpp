@@ -39,8 +39,7 @@ struct view_arguments {
 // With a scene that names its models the one file is the capture.
 void settle_files(view_arguments& a) {
   if (a.scene.file.empty()) {
-    if (!a.scene.given.empty()) throw usage_error(a.scene.given + " is of a scene: name it by --scene FILE");
-    if (a.model.empty()) throw usage_error("MODEL is missing (see gart view --help)");
+    a.scene.require_none(a.model, "view");
     return;
   }
   bool const named = !gart::read_scene_splats(a.scene.file).empty();
@@ -135,7 +134,7 @@ class sent_files {
       folder_ = name;
     }
     fs::path const path = folder_ / (std::to_string(++count_) + fs::path(file.name).extension().string());
-    gart::write_file(path, std::string_view(reinterpret_cast<char const*>(file.bytes.data()), file.bytes.size()));
+    gart::write_file(path, file.bytes);
     return path;
   }
 
@@ -231,26 +230,17 @@ void add_view(CLI::App& app, command& selected) {
       "Look at a model in the browser, traced as it is, on this machine's CPU or GPU. Writes no file: what\n"
       "is kept (cameras, images, paths, videos) is saved by the browser. The page can open other models that\n"
       "lie beside MODEL, and the model.ply of runs beside its run.");
-  view->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")->type_name("");
-  view->add_option(
-          "CAPTURE", a->capture,
-          "The capture it was trained on, for its cameras and photographs:\na folder or file as for gart train")
-      ->type_name("");
+  add_model(*view, a->model);
+  add_open(*view, "CAPTURE", a->capture, "",
+           "The capture it was trained on, for its cameras and photographs:\na folder or file as for gart train");
   add_view_options(*view, a->view, "");
-  view->add_option("--background", a->background,
-                   "black or white. auto: by the config.json of a run beside the\nmodel, else as gart train chooses "
-                   "for the capture, else black")
-      ->type_name("NAME")
-      ->capture_default_str()
+  add_value(*view, "--background", a->background, "NAME",
+            "black or white. auto: by the config.json of a run beside the\nmodel, else as gart train chooses "
+            "for the capture, else black")
       ->check(one_of({"auto", "black", "white"}));
   add_photo_options(*view, a->photos);
-  view->add_option("--downscale", a->downscale, "Shrink photographs and their cameras by this whole factor")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(1, 64));
-  view->add_option("--test-every", a->test_every, "Every so many photographs is marked as a test view")
-      ->type_name("N")
-      ->capture_default_str()
+  add_downscale(*view, a->downscale);
+  add_value(*view, "--test-every", a->test_every, "N", "Every so many photographs is marked as a test view")
       ->check(between(0, 1e9));
   add_scene_options(*view, a->scene);
   add_configuration_options(*view, a->configuration);
@@ -269,11 +259,7 @@ void add_view(CLI::App& app, command& selected) {
       "  gart view run/model.ply capture\n"
       "  gart view scene.spz --port 8765\n"
       "  gart view run/model.ply --scene teapot.glb      lit, mirrored and moved on the page");
-  view->callback([a, view, &selected] {
-    for (char const* name : {"--bounces", "--shadows", "--aperture", "--focus", "--exposure", "--tone-map", "--seed"})
-      if (view->count(name) > 0) a->scene.given = name;
-    selected = [a] { return run_view(*a); };
-  });
+  view->callback([a, view, &selected] { selected = [a] { return run_view(*a); }; });
 }
 
 }  // namespace gart_cli

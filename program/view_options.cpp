@@ -7,19 +7,13 @@
 namespace gart_cli {
 
 void add_view_options(CLI::App& app, view_options& options, std::string const& prefix) {
-  app.add_option("--" + prefix + "listen", options.listen,
-                 "Address or name of this machine that the viewer is served at;\n0.0.0.0 is all of them: any who have "
-                 "the printed address get in,\nand nothing is encrypted")
-      ->type_name("ADDRESS")
-      ->capture_default_str();
-  app.add_option("--" + prefix + "port", options.port, "Its port, 0: one that is free")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(0, 65535));
-  app.add_option("--" + prefix + "allow-host", options.allowed_hosts,
-                 "Another host that a browser may ask for, of a container, a proxy\n(https too) or a network: NAME, or "
-                 "NAME:PORT for one port alone;\nby commas, or once for each")
-      ->type_name("NAME")
+  add_value(app, "--" + prefix + "listen", options.listen, "ADDRESS",
+            "Address or name of this machine that the viewer is served at;\n0.0.0.0 is all of them: any who have "
+            "the printed address get in,\nand nothing is encrypted");
+  add_value(app, "--" + prefix + "port", options.port, "N", "Its port, 0: one that is free")->check(between(0, 65535));
+  add_open(app, "--" + prefix + "allow-host", options.allowed_hosts, "NAME",
+           "Another host that a browser may ask for, of a container, a proxy\n(https too) or a network: NAME, or "
+           "NAME:PORT for one port alone;\nby commas, or once for each")
       ->delimiter(',');
   app.add_flag("--" + prefix + "open", options.open, "Open the address in this machine's browser");
 }

@@ -1,7 +1,7 @@
 #include "commands.hpp"
-#include "help.hpp"
 #include "mesh_distance.hpp"
 #include "mesh_fusion.hpp"
+#include "options.hpp"
 #include "output.hpp"
 #include "printable.hpp"
 #include "progress.hpp"
@@ -63,14 +63,9 @@ int run_mesh(mesh_arguments const& a) {
   if (file.kernel_degree != 2)
     throw gart::unsupported(a.model.string() + ": is of kernel degree " + std::to_string(file.kernel_degree) +
                             "; gart mesh traces Gaussians (2)");
-  auto cameras = gart::load_cameras(a.cameras);
-  if (cameras.empty()) throw gart::io_error(a.cameras.string(), "has no cameras", "name a dataset or a camera JSON");
+  auto const cameras = cameras_from(a.cameras, file.origin, a.downscale);
   prepare_file(a.out);
   if (!a.json.empty()) prepare_file(a.json);
-  for (auto& [name, view] : cameras) {
-    view.position -= file.origin;
-    if (a.downscale > 1) view = gart::downscaled(view, a.downscale, "the camera " + name);
-  }
   gart::triangle_mesh const reference =
       a.against.empty() ? gart::triangle_mesh() : gart::read_mesh_ply(a.against, file.origin);
   progress say(a.quiet);
@@ -113,42 +108,28 @@ int run_mesh(mesh_arguments const& a) {
 void add_mesh(CLI::App& app, command& selected) {
   auto a = std::make_shared<mesh_arguments>();
   CLI::App* mesh = app.add_subcommand("mesh", "Make a mesh of the surfaces that a model shows to the cameras.");
-  mesh->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")
-      ->type_name("")
+  add_model(*mesh, a->model)->required();
+  add_open(*mesh, "CAMERAS", a->cameras, "", "A dataset (all its views), or a camera JSON, as for gart render")
       ->required();
-  mesh->add_option("CAMERAS", a->cameras, "A dataset (all its views), or a camera JSON, as for gart render")
-      ->type_name("")
-      ->required();
-  mesh->add_option("--out", a->out, "The mesh to write, a PLY of triangles")->type_name("MESH.ply")->required();
-  mesh->add_option(
-          "--voxel", a->fusion.voxel,
-          "Side of a voxel, in the capture's units (default: a pixel's width\nwhere the first camera meets the "
-          "scene)")
-      ->type_name("U")
+  add_open(*mesh, "--out", a->out, "MESH.ply", "The mesh to write, a PLY of triangles")->required();
+  add_open(*mesh, "--voxel", a->fusion.voxel, "U",
+           "Side of a voxel, in the capture's units (default: a pixel's width\nwhere the first camera meets the "
+           "scene)")
       ->check(between(1e-9, 1e9));
-  mesh->add_option("--truncation", a->fusion.truncation, "Voxels on both sides of a surface that a ray tells of")
-      ->type_name("N")
-      ->capture_default_str()
+  add_value(*mesh, "--truncation", a->fusion.truncation, "N", "Voxels on both sides of a surface that a ray tells of")
       ->check(between(1, 64));
-  mesh->add_option("--least-part", a->fusion.smallest, "Leave out parts of fewer triangles that hang together")
-      ->type_name("N")
-      ->capture_default_str()
+  add_value(*mesh, "--least-part", a->fusion.smallest, "N", "Leave out parts of fewer triangles that hang together")
       ->check(whole_number());
-  mesh->add_option("--downscale", a->downscale, "Shrink the cameras' images by this whole factor")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(1, 64));
-  mesh->add_option("--against", a->against,
-                   "Measure its distance to this mesh, both ways, where the cameras\nsee it; gart synth "
-                   "--mesh writes the mesh of its scene")
-      ->type_name("REFERENCE.ply");
-  mesh->add_option("--threshold", a->threshold,
-                   "Distance within which the F-score takes a point for right\n(default: 0.005 of the extent of the "
-                   "cameras)")
-      ->type_name("U")
+  add_downscale(*mesh, a->downscale);
+  add_open(*mesh, "--against", a->against, "REFERENCE.ply",
+           "Measure its distance to this mesh, both ways, where the cameras\nsee it; gart synth "
+           "--mesh writes the mesh of its scene");
+  add_open(*mesh, "--threshold", a->threshold, "U",
+           "Distance within which the F-score takes a point for right\n(default: 0.005 of the extent of the "
+           "cameras)")
       ->check(between(1e-12, 1e12));
-  mesh->add_option("--json", a->json, "Write these scores")->type_name("FILE");
-  mesh->add_flag("--quiet", a->quiet, "Say nothing but errors");
+  add_open(*mesh, "--json", a->json, "FILE", "Write these scores");
+  add_quiet(*mesh, a->quiet);
   mesh->footer(
       "\nA ray meets the scene at its median hit: behind it less than half of the light is left.\n"
       "Distances are averaged a voxel, and the mesh is where they are zero. Runs on the CPU; needs OpenVDB.\n"

@@ -1,5 +1,6 @@
 #include "commands.hpp"
 #include "compare_page.hpp"
+#include "help.hpp"
 #include "output.hpp"
 
 #include <gart/io/file.hpp>
@@ -34,9 +35,9 @@ int run_compare(compare_arguments const& a) {
 void add_compare(CLI::App& app, command& selected) {
   auto a = std::make_shared<compare_arguments>();
   CLI::App* compare = app.add_subcommand("compare", "One page of several trainings: scores, curves, options, views.");
-  compare->add_option("RUN", a->runs, "Folders that gart train finished in, 2 to 6")->type_name("")->required();
-  compare->add_option("--out", a->out, "The page")->type_name("FILE")->capture_default_str();
-  compare->add_flag("--quiet", a->quiet, "Say nothing but errors");
+  add_open(*compare, "RUN", a->runs, "", "Folders that gart train finished in, 2 to 6")->required();
+  add_value(*compare, "--out", a->out, "FILE", "The page");
+  add_quiet(*compare, a->quiet);
   compare->footer(
       "\nThe page needs no other file and no network. It shows the scores side by side, the options that "
       "differ, and curves over\nsteps and seconds. Test views that all runs have follow, the most different "

@@ -1,6 +1,7 @@
 #include "svg_axis.hpp"
 
 #include "progress.hpp"
+#include "svg_chart.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -59,6 +60,28 @@ chart_axis log_axis(double low, double high) {
     }
   }
   return a;
+}
+
+std::string svg_number(double v) { return fixed(v, 1); }
+
+std::string chart_area::begin(std::string const& title, std::string const& x_label, bool upright) const {
+  auto const n = svg_number;
+  std::string svg = "<svg viewBox=\"0 0 " + fixed(width, 0) + " " + fixed(height, 0) + "\" role=\"img\" aria-label=\"" +
+                    html_escape(title) + "\">";
+  for (auto const& [value, text] : y.ticks) {
+    svg += "<line class=\"grid\" x1=\"" + n(left) + "\" x2=\"" + n(width - right) + "\" y1=\"" + n(at_y(value)) +
+           "\" y2=\"" + n(at_y(value)) + "\"/><text class=\"tick\" text-anchor=\"end\" x=\"" + n(left - 7) + "\" y=\"" +
+           n(at_y(value) + 3.5) + "\">" + text + "</text>";
+  }
+  for (auto const& [value, text] : x.ticks) {
+    if (upright)
+      svg += "<line class=\"grid\" y1=\"" + n(top) + "\" y2=\"" + n(height - bottom) + "\" x1=\"" + n(at_x(value)) +
+             "\" x2=\"" + n(at_x(value)) + "\"/>";
+    svg += "<text class=\"tick\" text-anchor=\"middle\" x=\"" + n(at_x(value)) + "\" y=\"" + n(height - bottom + 16) +
+           "\">" + text + "</text>";
+  }
+  return svg + "<text class=\"tick\" text-anchor=\"end\" x=\"" + n(width - right) + "\" y=\"" + n(height - 3) + "\">" +
+         html_escape(x_label) + "</text>";
 }
 
 }  // namespace gart_cli

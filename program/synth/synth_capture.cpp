@@ -132,10 +132,6 @@ std::string transforms_json(std::vector<gart::camera> cameras, std::string const
   return json + "\n  ]\n}\n";
 }
 
-}  // namespace
-
-namespace {
-
 gart::triangle_mesh mesh_of(synth_scene const& scene) {
   gart::triangle_mesh all;
   for (synth_mesh const& part : scene) {
@@ -146,10 +142,6 @@ gart::triangle_mesh mesh_of(synth_scene const& scene) {
   }
   return all;
 }
-
-}  // namespace
-
-namespace {
 
 // A ray that misses all is as white in the mirror as the photographs' background.
 std::string scene_with(synth_mirror mirror, gart::vec3d const& origin) {

@@ -2,8 +2,8 @@
 #include "field_names.hpp"
 #include "options.hpp"
 #include "output.hpp"
-#include "processor_time.hpp"
 #include "progress.hpp"
+#include "timing.hpp"
 #include "tradeoff_page.hpp"
 #include "tradeoff_settings.hpp"
 #include "tradeoff_views.hpp"
@@ -11,7 +11,6 @@
 #include <gart/io/file.hpp>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <random>
@@ -37,20 +36,10 @@ struct tradeoff_arguments {
   bool quiet = false;
 };
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  std::size_t const n = values.size();
-  return n == 0 ? 0 : n % 2 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
-}
-
 double mean(std::vector<double> const& values) {
   double sum = 0;
   for (double const v : values) sum += v;
   return values.empty() ? 0 : sum / static_cast<double>(values.size());
-}
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 // The geometry after one more step of training, about: every number moves by up to Adam's rate for it.
@@ -68,7 +57,7 @@ class tradeoff_run {
   explicit tradeoff_run(tradeoff_arguments const& a) : a_(a), say_(a.quiet) {}
 
   int run() {
-    auto const start = std::chrono::steady_clock::now();
+    stopwatch const whole;
     prepare();
     json result = description();
     result["settings"] = json::array(), result["absent"] = json::array();
@@ -92,7 +81,7 @@ class tradeoff_run {
       result["settings"].push_back(measure(settings_[i]));
     }
     mark_fronts(result);
-    result["seconds"] = seconds_since(start), result["reference_seconds"] = reference_seconds_;
+    result["seconds"] = whole.seconds(), result["reference_seconds"] = reference_seconds_;
     std::string const table = tradeoff_table(result);
     write_json(a_.out / "tradeoff.json", result);
     gart::write_file(a_.out / "table.txt", table);
@@ -140,9 +129,9 @@ class tradeoff_run {
       auto& v = set_.views[i];
       set_color_gradient(v, renderer->render(v.view, settings_.front().use.render).color, reference_.background,
                          ssim_weight);
-      auto const start = std::chrono::steady_clock::now();
+      stopwatch const reference;
       trace_reference(v, file_, reference_);
-      reference_seconds_ += seconds_since(start);
+      reference_seconds_ += reference.seconds();
     }
   }
 
@@ -302,67 +291,38 @@ void add_tradeoff(CLI::App& app, command& selected) {
   CLI::App* tradeoff = app.add_subcommand(
       "tradeoff",
       "Measure what each approximation costs and buys: errors against a reference in double, times, bytes.");
-  tradeoff->add_option("MODEL", a->model, "Gaussians in any format, from gart or another program")
-      ->type_name("")
+  add_model(*tradeoff, a->model)->required();
+  add_open(*tradeoff, "CAMERAS", a->cameras, "",
+           "A capture, whose photographs give the loss that is\ndifferentiated; or a camera JSON as for gart "
+           "render")
       ->required();
-  tradeoff
-      ->add_option("CAMERAS", a->cameras,
-                   "A capture, whose photographs give the loss that is\ndifferentiated; or a camera JSON as for gart "
-                   "render")
-      ->type_name("")
-      ->required();
-  tradeoff->add_option("--out", a->out, "Folder of the results; made if missing")->type_name("DIR")->required();
-  tradeoff
-      ->add_option(
-          "--settings", a->settings,
-          "Only these knobs or settings, comma-separated: transmittance_min,\ntracer=bvh and so on; exact is always "
-          "measured")
-      ->type_name("A,B")
+  add_open(*tradeoff, "--out", a->out, "DIR", "Folder of the results; made if missing")->required();
+  add_open(*tradeoff, "--settings", a->settings, "A,B",
+           "Only these knobs or settings, comma-separated: transmittance_min,\ntracer=bvh and so on; exact is always "
+           "measured")
       ->delimiter(',');
-  tradeoff->add_option("--views", a->views.count, "Views, evenly spread; more for a mean over more of the scene")
-      ->type_name("N")
-      ->capture_default_str()
+  add_value(*tradeoff, "--views", a->views.count, "N", "Views, evenly spread; more for a mean over more of the scene")
       ->check(between(1, 10000));
-  tradeoff
-      ->add_option("--pixels", a->views.pixels,
-                   "Pixels of each view that are compared, at random; times\nare of whole views")
-      ->type_name("N")
-      ->capture_default_str()
+  add_value(*tradeoff, "--pixels", a->views.pixels, "N",
+            "Pixels of each view that are compared, at random; times\nare of whole views")
       ->check(between(1, 1e9));
-  tradeoff->add_option("--repeats", a->repeats, "Timed runs a view and setting; the median counts")
-      ->type_name("N")
-      ->capture_default_str()
+  add_value(*tradeoff, "--repeats", a->repeats, "N", "Timed runs a view and setting; the median counts")
       ->check(between(1, 1000));
-  tradeoff->add_option("--downscale", a->views.downscale, "Shrink images by this whole factor")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(between(1, 64));
-  tradeoff->add_option("--background", a->background, "white or black; auto: as gart train chooses")
-      ->type_name("NAME")
-      ->capture_default_str()
+  add_downscale(*tradeoff, a->views.downscale);
+  add_value(*tradeoff, "--background", a->background, "NAME", "white or black; auto: as gart train chooses")
       ->check(one_of({"auto", "white", "black"}));
-  tradeoff
-      ->add_option(
-          "--backward", a->backward,
-          "Gradient method of all settings that do not name one:\nauto, pixel, hybrid, primitive or deterministic")
-      ->type_name("NAME")
-      ->capture_default_str()
+  add_value(*tradeoff, "--backward", a->backward, "NAME",
+            "Gradient method of all settings that do not name one:\nauto, pixel, hybrid, primitive or deterministic")
       ->check(one_of_methods());
-  tradeoff
-      ->add_option("--reference-alpha-min", a->reference_alpha_min,
-                   "Opacity below which the reference sees no hit, 0: the\nmodel's own, with which it was trained; "
-                   "1e-5 shows what\nthat cut-off itself leaves out")
-      ->type_name("A")
-      ->capture_default_str()
+  add_value(*tradeoff, "--reference-alpha-min", a->reference_alpha_min, "A",
+            "Opacity below which the reference sees no hit, 0: the\nmodel's own, with which it was trained; "
+            "1e-5 shows what\nthat cut-off itself leaves out")
       ->check(between(0, 0.99));
-  tradeoff
-      ->add_option("--clock", a->clock,
-                   "Time axis of the fronts: wall, or processor, the time of all\nthreads together, for a CPU "
-                   "with other work")
-      ->type_name("NAME")
-      ->capture_default_str()
+  add_value(*tradeoff, "--clock", a->clock, "NAME",
+            "Time axis of the fronts: wall, or processor, the time of all\nthreads together, for a CPU "
+            "with other work")
       ->check(one_of({"wall", "processor"}));
-  tradeoff->add_flag("--quiet", a->quiet, "Say nothing but errors");
+  add_quiet(*tradeoff, a->quiet);
   add_configuration_options(*tradeoff, a->configuration);
   tradeoff->footer(
       "\nThe reference traces in double, ends no ray early and evaluates every band of colour. Each setting turns one\n"

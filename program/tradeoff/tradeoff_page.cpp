@@ -1,11 +1,9 @@
 #include "tradeoff_page.hpp"
 
 #include "progress.hpp"
-#include "report/report_style.hpp"
+#include "report/page_parts.hpp"
 #include "report/svg_chart.hpp"
 #include "report/svg_scatter.hpp"
-
-#include <gart/core/version.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -157,12 +155,9 @@ std::string tradeoff_table(json const& result) {
 std::string tradeoff_page(json const& result) {
   json const& settings = result["settings"];
   std::string const title = "What speed costs: " + html_escape(result["cameras"].get<std::string>());
-  std::string page = "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>" + title +
-                     " - gart</title><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><style>";
-  page += report_style;
-  page += "</style></head><body><main><header><h1>" + title + "</h1><p class=\"soft\">" +
-          html_escape(subject_of(result)) +
-          ". A setting that another one beats in error and in time is grey.</p></header>";
+  std::string page = page_start(title) + "<header><h1>" + title + "</h1><p class=\"soft\">" +
+                     html_escape(subject_of(result)) +
+                     ". A setting that another one beats in error and in time is grey.</p></header>";
   page += "<h2>Image</h2>" + figure_of(result, "image", "Error of the image against time",
                                        "root mean square error of the colour, 0 to 1", image_error);
   page += "<h2>Gradients</h2>" + figure_of(result, "gradients", "Error of the gradients against time",
@@ -175,7 +170,7 @@ std::string tradeoff_page(json const& result) {
       page += html_escape(absent["name"].get<std::string>()) + (absent == result["absent"].back() ? "." : ", ");
     page += "</p>";
   }
-  return page + "<footer>gart " + std::string(gart::version) + "</footer></main></body></html>\n";
+  return page + page_end();
 }
 
 }  // namespace gart_cli

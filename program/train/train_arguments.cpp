@@ -65,15 +65,13 @@ gart::vec3d origin_in(nlohmann::json const& config, fs::path const& file) {
 
 void add_arguments(CLI::App& train, train_arguments& a) {
   auto& r = a.recorded;
-  train
-      .add_option("DATASET", a.dataset,
-                  "Capture: a folder with COLMAP's sparse/ and images/, Blender's\n"
-                  "transforms_train.json, or a transforms.json; or such a file")
-      ->type_name("");
-  train.add_option("--out", a.out, "Folder of the results; made if missing")->type_name("DIR")->required();
+  add_open(train, "DATASET", a.dataset, "",
+           "Capture: a folder with COLMAP's sparse/ and images/, Blender's\n"
+           "transforms_train.json, or a transforms.json; or such a file");
+  add_open(train, "--out", a.out, "DIR", "Folder of the results; made if missing")->required();
   train.add_flag("--resume", a.resume,
                  "Continue the run in DIR from its last checkpoint, with its\noptions; DATASET may be left out");
-  train.add_flag("--quiet", a.quiet, "Say nothing but errors");
+  add_quiet(train, a.quiet);
 
   std::string group = "Training";
   auto const in_group = [&group](CLI::Option* option) { return option->group(group); };
@@ -176,18 +174,13 @@ void add_arguments(CLI::App& train, train_arguments& a) {
                  "quarter, or else\nby pixel, which needs none. 0: half of the memory free\n"
                  "at the start (deterministic: no limit)"))
       ->check(between(0, 1e6));
-  in_group(
-      train.add_option("--parallel", a.parallel,
-                       "How ranks share a step (mpirun -n 4 gart train ...,\ndocs/backends.md): strips of one view, "
-                       "the training of one\nrank itself, or views, a --batch of one for each"))
-      ->type_name("NAME")
-      ->capture_default_str()
+  in_group(add_value(train, "--parallel", a.parallel, "NAME",
+                     "How ranks share a step (mpirun -n 4 gart train ...,\ndocs/backends.md): strips of one view, "
+                     "the training of one\nrank itself, or views, a --batch of one for each"))
       ->check(one_of({"strips", "views"}));
-  in_group(train.add_option("--gpus", a.gpus,
-                            "GPUs of this host that train together: starts a rank for\neach, as mpirun -n N gart "
-                            "train ... does"))
-      ->type_name("N")
-      ->capture_default_str()
+  in_group(add_value(train, "--gpus", a.gpus, "N",
+                     "GPUs of this host that train together: starts a rank for\neach, as mpirun -n N gart "
+                     "train ... does"))
       ->check(between(1, 1024));
   add_threads(train, a.threads);
   in_group(train.get_option("--threads"));
@@ -206,26 +199,20 @@ void add_arguments(CLI::App& train, train_arguments& a) {
   in_group(r.add(train, "--eval-every", a.eval_every, "N",
                  "Steps between tests on the test views, 0: only at the end,\n-1: five in the run"))
       ->check(between(-1, 1e9));
-  in_group(
-      train.add_option("--checkpoint-every", a.checkpoint_minutes, "Minutes between checkpoints, 0: only at the end"))
-      ->type_name("M")
-      ->capture_default_str()
+  in_group(add_value(train, "--checkpoint-every", a.checkpoint_minutes, "M",
+                     "Minutes between checkpoints, 0: only at the end"))
       ->check(between(0, 1e6));
-  in_group(train.add_option("--stop-at", a.stop_at,
-                            "Stop after this step as Ctrl-C would, 0: do not; the run can\nthen be resumed"))
-      ->type_name("N")
-      ->capture_default_str()
+  in_group(add_value(train, "--stop-at", a.stop_at, "N",
+                     "Stop after this step as Ctrl-C would, 0: do not; the run can\nthen be resumed"))
       ->check(between(0, 1e9));
 
   group = "Viewer";
   in_group(train.add_flag("--view", a.viewed,
                           "Look at the training in a browser, at the addresses printed\n(see gart view --help); pause, "
                           "step, save and stop it there"));
-  in_group(train.add_option("--view-share", a.view_share,
-                            "Time that views may take while it trains, as a share of the\ntraining's own; with nobody "
-                            "looking they take none"))
-      ->type_name("X")
-      ->capture_default_str()
+  in_group(add_value(train, "--view-share", a.view_share, "X",
+                     "Time that views may take while it trains, as a share of the\ntraining's own; with nobody "
+                     "looking they take none"))
       ->check(between(0.01, 1));
   add_view_options(train, a.view, "view-");
   in_group(train.get_option("--view-listen")), in_group(train.get_option("--view-port"));

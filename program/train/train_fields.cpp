@@ -2,7 +2,7 @@
 
 #include "commands.hpp"
 
-#include <gart/core/suggestion.hpp>
+#include <gart/core/words.hpp>
 #include <gart/train/option_fields.hpp>
 
 #include <cmath>

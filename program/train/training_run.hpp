@@ -7,26 +7,17 @@
 #include "report/history.hpp"
 #include "run_folder.hpp"
 #include "scores.hpp"
+#include "timing.hpp"
 #include "train_arguments.hpp"
 #include "training_view.hpp"
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/runtime/session.hpp>
 
-#include <chrono>
 #include <memory>
 #include <optional>
 
 namespace gart_cli {
-
-class stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(clock::now() - start_).count(); }
-
- private:
-  using clock = std::chrono::steady_clock;
-  clock::time_point start_ = clock::now();
-};
 
 // The running means that the progress line shows.
 struct recent_steps {

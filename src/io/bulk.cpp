@@ -7,14 +7,7 @@ namespace gart::io {
 
 namespace {
 
-constexpr double most_of_all = 0.99;
 constexpr double scale_reach = 4;  // of the others' scales, below which a stray's would take bits from them
-
-float quantile(std::vector<float>& values, double q) {
-  auto const at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 double distance(gaussian_model const& m, std::size_t i, vec3d const& from) {
   double most = 0;

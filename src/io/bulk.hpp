@@ -5,10 +5,21 @@
 #include <gart/math/glm.hpp>
 #include <gart/scene/gaussians.hpp>
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
 namespace gart::io {
+
+inline constexpr double most_of_all = 0.99;
+
+// The value that a share q of the others are below, which are put in another order.
+template <class T>
+T quantile(std::vector<T>& values, double q) {
+  auto const at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
 
 // The median, and the distance from it that all but a hundredth of the numbers keep.
 struct spread {

@@ -65,6 +65,16 @@ class byte_reader {
   std::size_t position_ = 0;
 };
 
+// A float of 16 bits (IEEE 754's binary16).
+inline float from_half(u16 bits) {
+  u32 const sign = static_cast<u32>(bits & 0x8000u) << 16, exponent = (bits >> 10) & 31u, fraction = bits & 1023u;
+  if (exponent == 0) {  // zero and what is smaller than a normal number
+    float const value = static_cast<float>(fraction) * 0x1p-24f;
+    return sign ? -value : value;
+  }
+  return std::bit_cast<float>(sign | (exponent == 31 ? 255u : exponent + 112u) << 23 | fraction << 13);
+}
+
 // The bytes of a number at the end of the text.
 template <class T>
 void put(std::string& out, T value) {

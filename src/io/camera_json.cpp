@@ -3,7 +3,7 @@
 #include "bytes.hpp"
 #include "camera_formats.hpp"
 #include "capture.hpp"
-#include "json_record.hpp"
+#include "json_checks.hpp"
 
 #include <gart/io/camera_file.hpp>
 
@@ -90,9 +90,8 @@ void read_shutter(record const& r, char const* key, bool opengl_axes, camera& vi
   auto const* const found = std::find_if(std::begin(shutter_names), std::end(shutter_names),
                                          [&](shutter_name const& s) { return name == s.name; });
   if (found == std::end(shutter_names)) {
-    std::string all;
-    for (shutter_name const& s : shutter_names) all += (all.empty() ? "" : ", ") + std::string(s.name);
-    throw io_error(r.where, "'shutter_type' is " + name.substr(0, 60), "write one of " + all);
+    throw io_error(r.where, "'shutter_type' is " + name.substr(0, 60),
+                   "write one of " + joined(shutter_names, [](shutter_name const& s) { return s.name; }));
   }
   if (found->kind == shutter_kind::global) return;
   if (!r.has(key))
@@ -136,18 +135,6 @@ void read_position_and_rotation(record const& r, camera& view) {
   read_pose({whole, nullptr, r.where}, "rotation", false, view);
 }
 
-vec3d read_origin(record const& r) {
-  json const& list = r.at("origin");
-  vec3d origin(0.0);
-  for (int k = 0; k < 3; ++k) {
-    bool const there = list.is_array() && list.size() == 3 && list[static_cast<std::size_t>(k)].is_number();
-    if (there) origin[k] = list[static_cast<std::size_t>(k)].get<double>();
-    if (!there || !(std::abs(origin[k]) <= 1e18))
-      throw io_error(r.where, "'origin' is not a list of 3 numbers", "write [x, y, z], what c2w is from");
-  }
-  return origin;
-}
-
 named_camera camera_of(record const& r) {
   named_camera c;
   c.view.width = r.size("width"), c.view.height = r.size("height");
@@ -164,7 +151,7 @@ named_camera camera_of(record const& r) {
   else
     read_pose(r, "c2w", false, c.view);
   read_shutter(r, "c2w_end", false, c.view);
-  if (r.has("origin")) c.view.position += read_origin(r);
+  c.view.position += three(r, "origin", vec3d(0.0), -1e18, 1e18);
   check_camera(c.view, r.where);
   return c;
 }

@@ -36,10 +36,7 @@ void check_camera(camera const& c, std::string const& where) {
 }
 
 void set_pose(camera& view, mat3d const& axes, vec3d const& center, std::string const& where) {
-  auto const dot = [](vec3d const& a, vec3d const& b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
-  auto const cross = [](vec3d const& a, vec3d const& b) {
-    return vec3d(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
-  };
+  using glm::cross, glm::dot;
   double const length[3] = {std::sqrt(dot(axes[0], axes[0])), std::sqrt(dot(axes[1], axes[1])),
                             std::sqrt(dot(axes[2], axes[2]))};
   // Past this the squares of distances leave the range of a float.

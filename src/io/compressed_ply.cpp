@@ -162,11 +162,8 @@ class compressed_reader {
     for (element const& e : file_.head.elements) {
       for (property const& p : e.properties)
         if (p.list) file_.refuse("element " + e.name + " has a list, property " + p.name, "export it again");
-      u64 const width = e.smallest(encoding::little), left = file_.bytes.size() - at;
-      if (width && e.count > left / width)
-        file_.refuse("the header promises " + std::to_string(e.count) + " of '" + e.name + "', more than the " +
-                         std::to_string(left) + " bytes that follow can hold",
-                     "the file is truncated: copy or export it again");
+      u64 const width = e.smallest(encoding::little);
+      require_room(file_, e, file_.bytes.size() - at);
       if (e.name == name) return {e, file_.bytes.data() + at, static_cast<std::size_t>(width)};
       at += width * e.count;
     }
@@ -196,7 +193,7 @@ void widen(float const* v, float* low, float* high, bool first) {
 void write_compressed(fs::path const& path, gaussian_model const& given, splat_traits const& traits,
                       splat_packing const&) {
   require_packable(path, given);
-  gaussian_model m = in_order(given, along_a_curve(given));
+  gaussian_model m = selected(given, along_a_curve(given));
   draw_in_strays(m, chunk_reach);
   for (float& s : m.log_scale) s = std::clamp(s, -scale_limit, scale_limit);
   std::size_t const n = m.size(), chunks = (n + chunk_size - 1) / chunk_size;

@@ -3,6 +3,7 @@
 #include "exif.hpp"
 #include "file_names.hpp"
 #include "host_images.hpp"
+#include "parallel.hpp"
 #include "test_split.hpp"
 #include "view_maps.hpp"
 
@@ -14,47 +15,15 @@
 #include <gart/io/origin.hpp>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
 #include <mutex>
 #include <system_error>
-#include <thread>
 
 namespace gart {
 namespace io {
 namespace fs = std::filesystem;
 
 namespace {
-
-// f(i) for i < n on all processors; the first exception stops the rest and is thrown again here.
-template <class F>
-void for_each_parallel(std::size_t n, F const& f) {
-  std::atomic<std::size_t> next{0};
-  std::exception_ptr failure;
-  std::mutex guard;
-  auto const work = [&] {
-    for (std::size_t i; (i = next++) < n;) {
-      try {
-        f(i);
-      } catch (...) {
-        std::lock_guard const lock(guard);
-        if (!failure) failure = std::current_exception();
-        next = n;
-      }
-    }
-  };
-  std::vector<std::thread> threads;
-  std::size_t const processors = std::max(1u, std::thread::hardware_concurrency());
-  try {
-    for (std::size_t i = 1; i < std::min(n, processors); ++i) threads.emplace_back(work);
-  } catch (std::system_error const&) {
-    // Fewer threads than processors do the same work.
-  }
-  work();
-  for (std::thread& thread : threads) thread.join();
-  if (failure) std::rethrow_exception(failure);
-}
 
 // Where its EXIF says that the photo is to be turned by a quarter, that.
 std::string turned_by_exif(fs::path const& photo) {
@@ -169,7 +138,7 @@ void measure_bounds(dataset& data) {
   for (camera const* c : cameras) {
     vec3d const d(c->rotation[2]), p = c->position - mean;
     forward += d / n;
-    double const along = d.x * p.x + d.y * p.y + d.z * p.z;
+    double const along = glm::dot(d, p);
     for (int i = 0; i < 3; ++i) {
       b[i] += (p[i] - along * d[i]) / n;
       for (int j = 0; j < 3; ++j) a[j][i] += ((i == j ? 1.0 : 0.0) - d[i] * d[j]) / n;
@@ -195,7 +164,7 @@ void measure_bounds(dataset& data) {
     for (camera const* c : cameras) {
       vec3d const to = x + mean - c->position, d(c->rotation[2]);
       distance += length(to) / n;
-      in_front += to.x * d.x + to.y * d.y + to.z * d.z > 0;
+      in_front += glm::dot(to, d) > 0;
     }
     looks_inwards = distance > 0 && 2 * in_front > cameras.size();
     if (looks_inwards) center = x + mean, radius = distance;

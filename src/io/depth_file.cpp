@@ -114,8 +114,7 @@ void write_depth_png(fs::path const& path, image_float const& map, double unit) 
     double const value = map.data[i] / unit;
     steps.data[i] = value > 0 ? static_cast<u16>(std::lround(std::min(value, 65535.0))) : u16{0};
   }
-  std::vector<u8> const bytes = io::encode_png16(steps);
-  write_file(path, std::string_view(reinterpret_cast<char const*>(bytes.data()), bytes.size()));
+  write_file(path, io::encode_png16(steps));
 }
 
 void write_npy(fs::path const& path, image_float const& image) {

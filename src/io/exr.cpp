@@ -1,5 +1,6 @@
 // OpenEXR files: one part of scan lines (https://openexr.com/en/latest/OpenEXRFileLayout.html).
 
+#include "bytes.hpp"
 #include "compression.hpp"
 
 #include <gart/core/error.hpp>
@@ -7,8 +8,6 @@
 #include <gart/io/file.hpp>
 
 #include <algorithm>
-#include <bit>
-#include <cstring>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -16,17 +15,10 @@
 namespace gart {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "numbers are copied as they lie in the file");
-
 constexpr int lines_together = 16;  // of compression ZIP
 constexpr char zip = 3;
 
-template <class T>
-void put(std::string& out, T value) {
-  char bytes[sizeof value];
-  std::memcpy(bytes, &value, sizeof value);
-  out.append(bytes, sizeof value);
-}
+using io::put;
 
 void put_attribute(std::string& out, char const* name, char const* type, std::string const& value) {
   out.append(name).push_back('\0');

@@ -3,6 +3,7 @@
 #include "bytes.hpp"
 #include "compression.hpp"
 
+#include <gart/core/words.hpp>
 #include <gart/io/exr_file.hpp>
 #include <gart/io/file.hpp>
 
@@ -27,15 +28,6 @@ struct exr_channel {
   std::size_t offset;  // within a line's bytes, a pixel wide
   std::size_t size() const { return kind == float_16 ? 2 : 4; }
 };
-
-float from_half(u16 bits) {
-  u32 const sign = static_cast<u32>(bits & 0x8000u) << 16, exponent = (bits >> 10) & 31u, fraction = bits & 1023u;
-  if (exponent == 0) {  // zero and what is smaller than a normal number
-    float const value = static_cast<float>(fraction) * 0x1p-24f;
-    return sign ? -value : value;
-  }
-  return std::bit_cast<float>(sign | (exponent == 31 ? 255u : exponent + 112u) << 23 | fraction << 13);
-}
 
 class exr_reader {
  public:
@@ -146,8 +138,7 @@ class exr_reader {
     if (std::string_view("RGB").find(letter) != std::string_view::npos && channels_.size() == 1 &&
         channels_[0].name == "Y")
       return channels_[0];
-    std::string all;
-    for (exr_channel const& c : channels_) all += (all.empty() ? "" : ", ") + c.name.substr(0, 60);
+    std::string const all = joined(channels_, [](exr_channel const& c) { return c.name.substr(0, 60); });
     refuse(std::string("has no channel ") + letter + ", only " + (all.empty() ? "none" : all), "save it with one");
   }
 

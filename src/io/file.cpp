@@ -98,4 +98,8 @@ void write_file(fs::path const& path, std::string_view bytes) {
   write_file(path, [bytes](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
 }
 
+void write_file(fs::path const& path, std::vector<u8> const& bytes) {
+  write_file(path, std::string_view(reinterpret_cast<char const*>(bytes.data()), bytes.size()));
+}
+
 }  // namespace gart

@@ -1,7 +1,8 @@
 #include "file_names.hpp"
 
+#include <gart/core/words.hpp>
+
 #include <algorithm>
-#include <numeric>
 #include <system_error>
 
 namespace gart::io {
@@ -11,12 +12,6 @@ namespace {
 
 constexpr int deepest = 6;
 constexpr std::size_t most_files = 1'000'000, most_compared = 20'000;
-
-std::string lower(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
 
 std::string last_part(std::string const& path) { return path.substr(path.rfind('/') + 1); }
 
@@ -45,20 +40,6 @@ bool is_passed_over(std::string const& name) {
   std::string const n = lower(name);
   return n.starts_with(".") || n.starts_with("mask") || n.starts_with("depth") || n.starts_with("normal") ||
          n == "sparse" || n == "renders";
-}
-
-std::size_t letters_changed(std::string const& a, std::string const& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t before = row[0]++;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      std::size_t const changed = before + (a[i] != b[j]);
-      before = row[j + 1];
-      row[j + 1] = std::min({changed, row[j] + 1, before + 1});
-    }
-  }
-  return row.back();
 }
 
 }  // namespace
@@ -142,7 +123,7 @@ std::string file_names::nearest(std::string const& name) {
   std::size_t least = 0, compared = 0;
   for (auto const& [stem, path] : paths_) {
     if (++compared > most_compared) break;
-    std::size_t const changed = letters_changed(wanted, lower(last_part(path)).substr(0, 256));
+    std::size_t const changed = letters_between(wanted, lower(last_part(path)).substr(0, 256));
     if (best.empty() || changed < least) best = path, least = changed;
   }
   return best;

@@ -44,7 +44,6 @@ class glb_reader {
   }
 
   gaussian_model from(json const& document, splat_traits* traits, std::vector<std::string>* notes) {
-    document_ = &document;
     if (document.contains("extensionsRequired"))
       for (auto const& needed : document["extensionsRequired"])
         if (needed != extension && needed != spz_extension)
@@ -52,11 +51,14 @@ class glb_reader {
                  std::string("gart reads ") + extension + ", and SPZ within it: export it without other compression");
     gaussian_model all;
     notes_ = notes, traits_ = traits;
-    if (document.contains("scenes")) {
-      auto const& scene = document["scenes"].at(document.value("scene", std::size_t{0}));
-      if (scene.contains("nodes"))
-        for (auto const& node : scene["nodes"]) visit(node.get<std::size_t>(), {}, 0, all);
-    }
+    file_.each_node(similarity(), [&](json const& node, std::size_t number, similarity const& above) {
+      similarity const here = above * placement(node, number);
+      if (node.contains("mesh"))
+        for (auto const& primitive : document.at("meshes").at(node["mesh"].get<std::size_t>()).at("primitives"))
+          if (primitive.contains("extensions") && primitive["extensions"].contains(extension))
+            add(primitive, primitive["extensions"][extension], here, all);
+      return here;
+    });
     if (!seen_)
       refuse(std::string("has no mesh with the extension ") + extension + " in its scene", "name a GLB of Gaussians");
     keep_usable(name_, all, notes);
@@ -66,23 +68,6 @@ class glb_reader {
       for (auto const& [key, value] : asset["extras"]["gart"].items()) (*traits)[key] = value.get<std::string>();
     if (traits && origin_ != vec3d(0.0)) *traits = with_origin(*traits, origin_of(*traits, name_) + turned(origin_));
     return all;
-  }
-
-  void visit(std::size_t number, similarity const& above, int depth, gaussian_model& all) {
-    if (depth > deepest_gltf_node)
-      refuse("has nodes within each other more than " + std::to_string(deepest_gltf_node) + " deep");
-    json const& node = document_->at("nodes").at(number);
-    // glTF's nodes are trees; in a graph that is no tree, paths can be as many as names.
-    visited_.resize(document_->at("nodes").size());
-    if (visited_[number]) refuse("node " + std::to_string(number) + " is below two others, or itself");
-    visited_[number] = true;
-    similarity const here = above * placement(node, number);
-    if (node.contains("mesh"))
-      for (auto const& primitive : document_->at("meshes").at(node["mesh"].get<std::size_t>()).at("primitives"))
-        if (primitive.contains("extensions") && primitive["extensions"].contains(extension))
-          add(primitive, primitive["extensions"][extension], here, all);
-    if (node.contains("children"))
-      for (auto const& child : node["children"]) visit(child.get<std::size_t>(), here, depth + 1, all);
   }
 
   similarity placement(json const& node, std::size_t number) const {
@@ -161,17 +146,10 @@ class glb_reader {
   }
 
   void append(gaussian_model part, similarity const& placed, gaussian_model& all) {
-    int const degree = part.sh_degree;
-    require_plausible(name_, part.size() + all.size(), std::max(degree, all.sh_degree), file_.all_bytes());
+    require_plausible(name_, part.size() + all.size(), std::max(part.sh_degree, all.sh_degree), file_.all_bytes());
     apply_placement(from_origin(placed, part), part);
     seen_ = true;
-    if (all.size() == 0) return void(all = std::move(part));
-    // Meshes may differ in degree; the highest holds all.
-    int const most = std::max(degree, all.sh_degree);
-    part = with_sh_degree(std::move(part), most), all = with_sh_degree(std::move(all), most);
-    for_each_array(
-        [](parameter_array const&, auto& to, auto const& from) { to.insert(to.end(), from.begin(), from.end()); }, all,
-        part);
+    gart::append(all, std::move(part));  // meshes may differ in degree
   }
 
   // A node that puts its Gaussians too far from zero for floats becomes the origin.
@@ -195,8 +173,6 @@ class glb_reader {
 
   gltf_document file_;
   std::string name_;
-  json const* document_ = nullptr;
-  std::vector<bool> visited_;
   splat_traits* traits_ = nullptr;
   std::vector<std::string>* notes_ = nullptr;
   bool seen_ = false;

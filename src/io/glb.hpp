@@ -11,11 +11,9 @@
 
 namespace gart::io::glb {
 
-inline constexpr u32 magic = 0x46546c67, json_chunk = 0x4e4f534a, binary_chunk = 0x004e4942;
 inline constexpr char const *extension = "KHR_gaussian_splatting",
                             *spz_extension = "KHR_gaussian_splatting_compression_spz_2";
 inline constexpr char const *kernel = "ellipse", *color_space = "srgb_rec709_display";
-inline constexpr char const* shapes[] = {"SCALAR", "VEC2", "VEC3", "VEC4"};  // by width less one
 inline constexpr int up_axis = 2;  // half a turn about z is from a splat file's axes to glTF's
 
 inline std::string attribute(std::string const& name) { return std::string(extension) + ":" + name; }

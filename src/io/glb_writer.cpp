@@ -42,13 +42,13 @@ struct glb_buffer {
     views.push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", bytes.size() - at}, {"target", array_buffer}});
     attributes[name] = accessors.size();
     accessors.push_back(
-        {{"bufferView", views.size() - 1}, {"componentType", type}, {"count", n}, {"type", shapes[width - 1]}});
+        {{"bufferView", views.size() - 1}, {"componentType", type}, {"count", n}, {"type", gltf_shapes[width - 1]}});
     return accessors.back();
   }
   // An attribute whose numbers are in the SPZ.
   json& name(std::string const& attribute, std::size_t n, std::size_t width, int type) {
     attributes[attribute] = accessors.size();
-    accessors.push_back({{"componentType", type}, {"count", n}, {"type", shapes[width - 1]}});
+    accessors.push_back({{"componentType", type}, {"count", n}, {"type", gltf_shapes[width - 1]}});
     return accessors.back();
   }
 };
@@ -152,11 +152,11 @@ void io::glb::write(fs::path const& path, gaussian_model const& given, splat_tra
     throw io_error(path.string(), "would be larger than the 4 GB of a GLB file",
                    "keep fewer Gaussians or a lower SH degree");
   std::string head;
-  for (std::size_t const v : {std::size_t{magic}, std::size_t{2}, whole, text.size(), std::size_t{json_chunk}})
+  for (std::size_t const v : {std::size_t{glb_magic}, std::size_t{2}, whole, text.size(), std::size_t{glb_json_chunk}})
     put(head, static_cast<u32>(v));
   head += text;
   put(head, static_cast<u32>(out.bytes.size()));
-  put(head, binary_chunk);
+  put(head, glb_binary_chunk);
   write_file(path, [&](std::ostream& file) { file << head << out.bytes; });
 }
 

@@ -11,7 +11,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr u32 magic = 0x46546c67, json_chunk = 0x4e4f534a, binary_chunk = 0x004e4942;
 constexpr char const* cut = "the file is truncated: copy or export it again";
 
 int digit_of(char c, std::string_view digits) {
@@ -56,7 +55,7 @@ gltf_document::gltf_document(std::filesystem::path const& path)
     : name_(path.string()), folder_(path.parent_path()), bytes_(read_file(path)) {
   byte_reader in(bytes_, name_);
   try {
-    if (bytes_.size() < 4 || in.get<u32>("the magic number") != magic) {
+    if (bytes_.size() < 4 || in.get<u32>("the magic number") != glb_magic) {
       root_ = json::parse(bytes_.begin(), bytes_.end());
       if (!root_.is_object()) refuse("is no JSON object", "name a glTF file");
       return;
@@ -69,8 +68,8 @@ gltf_document::gltf_document(std::filesystem::path const& path)
       u32 const size = in.get<u32>("a chunk"), type = in.get<u32>("a chunk");
       u8 const* const at = bytes_.data() + (bytes_.size() - in.remaining());
       in.skip(size, "a chunk");
-      if (type == json_chunk && !known) root_ = json::parse(at, at + size), known = true;
-      if (type == binary_chunk && !binary_) binary_ = at, binary_size_ = size;
+      if (type == glb_json_chunk && !known) root_ = json::parse(at, at + size), known = true;
+      if (type == glb_binary_chunk && !binary_) binary_ = at, binary_size_ = size;
     }
     if (!known || !root_.is_object()) refuse("has no JSON chunk");
   } catch (json::exception const& e) {
@@ -130,10 +129,9 @@ gltf_document::accessor gltf_document::accessor_of(json const& number, std::stri
                                                    std::size_t width) {
   json const& a = root_.at("accessors").at(number.get<std::size_t>());
   accessor out{nullptr, 0, 0, a.at("componentType").get<int>(), a.value("normalized", false)};
-  static constexpr char const* shapes[] = {"SCALAR", "VEC2", "VEC3", "VEC4"};
-  if (a.at("type") != shapes[width - 1] || a.at("count").get<std::size_t>() != n || a.contains("sparse") ||
+  if (a.at("type") != gltf_shapes[width - 1] || a.at("count").get<std::size_t>() != n || a.contains("sparse") ||
       !a.contains("bufferView"))
-    refuse(what + " is not " + std::to_string(n) + " " + shapes[width - 1] + " of a buffer");
+    refuse(what + " is not " + std::to_string(n) + " " + gltf_shapes[width - 1] + " of a buffer");
   switch (out.type) {
     case gltf_i8:
     case gltf_u8:

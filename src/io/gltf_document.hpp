@@ -17,7 +17,8 @@
 
 namespace gart::io {
 
-inline constexpr int deepest_gltf_node = 64;
+inline constexpr u32 glb_magic = 0x46546c67, glb_json_chunk = 0x4e4f534a, glb_binary_chunk = 0x004e4942;
+inline constexpr char const* gltf_shapes[] = {"SCALAR", "VEC2", "VEC3", "VEC4"};  // by width less one
 enum gltf_component {
   gltf_i8 = 5120,
   gltf_u8 = 5121,
@@ -59,7 +60,35 @@ class gltf_document {
         store(i, c, number_at(a.at + a.stride * i + a.size * c, a.type, a.normalized));
   }
 
+  // here = visit(node, number, above) for each node of the file's scene, or of all where it has none: `above` is that
+  // of the node above, at the top the one given.
+  template <class Place>
+  void each_node(Place const& above, auto const& visit) {
+    if (root_.contains("scenes")) {
+      auto const& scene = root_["scenes"].at(root_.value("scene", std::size_t{0}));
+      if (scene.contains("nodes"))
+        for (auto const& node : scene["nodes"]) each_below(node.get<std::size_t>(), above, 0, visit);
+    } else if (root_.contains("nodes")) {
+      for (std::size_t i = 0; i < root_["nodes"].size(); ++i)
+        if (visited_.size() <= i || !visited_[i]) each_below(i, above, 0, visit);
+    }
+  }
+
  private:
+  template <class Place>
+  void each_below(std::size_t number, Place const& above, int depth, auto const& visit) {
+    constexpr int deepest = 64;
+    if (depth > deepest) refuse("has nodes within each other more than " + std::to_string(deepest) + " deep");
+    nlohmann::json const& node = root_.at("nodes").at(number);
+    // glTF's nodes are trees; in a graph that is no tree, paths can be as many as names.
+    visited_.resize(root_["nodes"].size());
+    if (visited_[number]) refuse("node " + std::to_string(number) + " is below two others, or itself");
+    visited_[number] = true;
+    Place const here = visit(node, number, above);
+    if (node.contains("children"))
+      for (auto const& child : node["children"]) each_below(child.get<std::size_t>(), here, depth + 1, visit);
+  }
+
   struct accessor {
     u8 const* at;
     u64 stride;
@@ -99,6 +128,7 @@ class gltf_document {
   u8 const* binary_ = nullptr;  // of a GLB
   std::size_t binary_size_ = 0;
   nlohmann::json root_;
+  std::vector<bool> visited_;             // nodes
   std::vector<std::vector<u8>> outside_;  // buffers with a "uri", once read
 };
 

@@ -56,14 +56,7 @@ class gltf_reader {
             file_.refuse("requires the extension " + needed.get<std::string>().substr(0, 60),
                          "export it without (compression is packed, and gart reads plain buffers)");
       read_materials();
-      if (root.contains("scenes")) {
-        auto const& scene = root["scenes"].at(root.value("scene", std::size_t{0}));
-        if (scene.contains("nodes"))
-          for (auto const& node : scene["nodes"]) visit(node.get<std::size_t>(), place_.where, 0);
-      } else if (root.contains("nodes")) {
-        for (std::size_t i = 0; i < root["nodes"].size(); ++i)
-          if (visited_.size() <= i || !visited_[i]) visit(i, place_.where, 0);
-      }
+      file_.each_node(place_.where, [&](auto const&... of_node) { return visit(of_node...); });
       for (auto const& [what, n] : left_out_)
         notes_.push_back(counted(n, what.c_str()) + " of " + file_.name() + " left out");
       return std::move(out_);
@@ -182,21 +175,14 @@ class gltf_reader {
     return decode_image(file_.uri_bytes(uri, name), file_.uri_name(uri) + ": " + name);
   }
 
-  void visit(std::size_t number, placing const& above, int depth) {
-    if (depth > deepest_gltf_node)
-      file_.refuse("has nodes within each other more than " + std::to_string(deepest_gltf_node) + " deep");
-    json const& node = file_.root().at("nodes").at(number);
-    visited_.resize(file_.root().at("nodes").size());
-    if (visited_[number]) file_.refuse("node " + std::to_string(number) + " is below two others, or itself");
-    visited_[number] = true;
+  placing visit(json const& node, std::size_t number, placing const& above) {
     placing const here = above * placement(node, number);
     if (node.contains("skin")) ++left_out_["skin"];
     if (node.contains("mesh")) add_mesh(node["mesh"].get<std::size_t>(), here);
     if (has_extension(node, "KHR_lights_punctual"))
       add_light(node["extensions"]["KHR_lights_punctual"].at("light").get<std::size_t>(), here);
     if (node.contains("camera")) add_camera(node["camera"].get<std::size_t>(), here, node, number);
-    if (node.contains("children"))
-      for (auto const& child : node["children"]) visit(child.get<std::size_t>(), here, depth + 1);
+    return here;
   }
 
   placing placement(json const& node, std::size_t number) const {
@@ -318,7 +304,7 @@ class gltf_reader {
     }
     l.position = vec3(where.translation - place_.origin);
     vec3d const d = where.linear * vec3d(0, 0, -1);
-    l.direction = vec3(d / std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z));
+    l.direction = vec3(d / glm::length(d));
     if (!std::isfinite(l.direction.x + l.direction.y + l.direction.z + l.position.x + l.position.y + l.position.z))
       file_.refuse(what + " is placed by no finite numbers, or turned by none", "correct the node that it is of");
     out_.scene.lights.push_back(l);
@@ -332,9 +318,9 @@ class gltf_reader {
     named_camera c;
     c.name = node.value("name", "camera_" + std::to_string(at));
     vec3d x = where.linear[0], z = -where.linear[2];
-    x /= std::sqrt(x.x * x.x + x.y * x.y + x.z * x.z), z /= std::sqrt(z.x * z.x + z.y * z.y + z.z * z.z);
-    vec3d const y(z.y * x.z - z.z * x.y, z.z * x.x - z.x * x.z, z.x * x.y - z.y * x.x);
-    double const skew = std::abs(x.x * z.x + x.y * z.y + x.z * z.z);
+    x /= glm::length(x), z /= glm::length(z);
+    vec3d const y = glm::cross(z, x);
+    double const skew = std::abs(glm::dot(x, z));
     if (!(angle > 0.001 && angle < 3.1) || !(aspect > 0.01 && aspect < 100) || !(skew < 1e-3))
       file_.refuse("camera " + std::to_string(number) + " has no angle and shape that can be, or leans",
                    "correct 'yfov', 'aspectRatio' and its node");
@@ -349,7 +335,6 @@ class gltf_reader {
   mesh_place place_;
   std::vector<std::string>& notes_;
   gltf_parts out_;
-  std::vector<bool> visited_;
   std::map<std::tuple<std::size_t, bool, bool, bool>, int> textures_;
   std::map<std::string, std::size_t> left_out_;
   std::size_t triangles_ = 0;

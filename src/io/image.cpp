@@ -35,10 +35,7 @@ io::image_size io::read_image_size(std::filesystem::path const& path) {
   refuse_kind(path.string());
 }
 
-void write_png(std::filesystem::path const& path, image8 const& image) {
-  std::vector<u8> const bytes = encode_png(image);
-  write_file(path, std::string_view(reinterpret_cast<char const*>(bytes.data()), bytes.size()));
-}
+void write_png(std::filesystem::path const& path, image8 const& image) { write_file(path, encode_png(image)); }
 
 image8 box_downscale(image8 const& image, int factor) {
   if (factor < 1) throw invalid_argument("box_downscale: factor must be at least 1");

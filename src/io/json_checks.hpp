@@ -5,7 +5,7 @@
 #include "json_record.hpp"
 
 #include <gart/core/names.hpp>
-#include <gart/core/suggestion.hpp>
+#include <gart/core/words.hpp>
 #include <gart/math/glm.hpp>
 
 #include <algorithm>
@@ -20,9 +20,8 @@ inline void require_keys(record const& r, std::vector<std::string> const& names)
   if (!r.own.is_object()) throw io_error(r.where, "is not a JSON object", "write {\"...\": ...}");
   for (auto const& [key, value] : r.own.items()) {
     if (std::find(names.begin(), names.end(), key) != names.end()) continue;
-    std::string all;
-    for (std::string const& name : names) all += (all.empty() ? "" : ", ") + name;
-    throw io_error(r.where, "has no field '" + key.substr(0, 60) + "'" + did_you_mean(key, names), "there are " + all);
+    throw io_error(r.where, "has no field '" + key.substr(0, 60) + "'" + did_you_mean(key, names),
+                   "there are " + joined(names));
   }
 }
 

@@ -19,10 +19,7 @@ class mesh_reader {
     bool vertices = false, faces = false;
     for (element const& e : file_.head.elements) {
       u64 const smallest = e.smallest(file_.head.format);
-      if (smallest && e.count > (body_.remaining() + 1) / smallest)
-        file_.refuse("the header promises " + std::to_string(e.count) + " of '" + e.name + "', more than the " +
-                         std::to_string(body_.remaining()) + " bytes that follow can hold",
-                     "the file is truncated: copy or export it again");
+      require_room(file_, e, body_.remaining());
       if (e.name == "vertex") {
         for (char const* name : {"x", "y", "z"})
           if (!find(e, name)) file_.refuse(std::string("property '") + name + "' is missing", "name a PLY of a mesh");

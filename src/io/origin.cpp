@@ -1,3 +1,4 @@
+#include "bulk.hpp"
 #include "bytes.hpp"
 
 #include <gart/core/error.hpp>
@@ -13,14 +14,9 @@ namespace gart {
 namespace {
 
 constexpr double farthest = 64;  // spreads from zero, where a float's step is 8e-6 of one at the most
-constexpr double most_of_all = 0.99;
 constexpr char key[] = "origin";
 
-double quantile(std::vector<double>& values, double q) {
-  auto const at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
+using io::quantile;
 
 // What most of the places keep from the middle, along the axis that is worst; place(i) for i < n.
 template <class F>
@@ -30,7 +26,7 @@ double spread_around(vec3d const& middle, std::size_t n, F const& place) {
     vec3d const d = glm::abs(place(i) - middle);
     distance[i] = std::max({d.x, d.y, d.z});
   }
-  return n ? quantile(distance, most_of_all) : 0;
+  return n ? quantile(distance, io::most_of_all) : 0;
 }
 
 }  // namespace

@@ -1,13 +1,13 @@
 #include "packing.hpp"
 
 #include "bulk.hpp"
+#include "parallel.hpp"
 #include "unusable.hpp"
 
 #include <gart/bvh/morton.hpp>
 #include <gart/math/logit.hpp>
 #include <gart/math/sh.hpp>
 
-#include <exception>
 #include <thread>
 #include <utility>
 
@@ -94,19 +94,6 @@ std::vector<u32> along_a_curve(gaussian_model const& model) {
   return order;
 }
 
-gaussian_model in_order(gaussian_model const& model, std::vector<u32> const& order) {
-  gaussian_model sorted;
-  sorted.feature_count = model.feature_count;
-  sorted.resize(order.size(), model.sh_degree);
-  for_each_row_array(
-      [&](std::size_t width, std::vector<float>& to, std::vector<float> const& from) {
-        for (std::size_t i = 0; i < order.size(); ++i)
-          std::copy_n(from.data() + order[i] * width, width, to.data() + i * width);
-      },
-      model, sorted, model);
-  return sorted;
-}
-
 void half_turn(gaussian_model& model, int axis) {
   auto const signs = signs_of_half_turn(axis);
   std::size_t const n = model.size(), coefficients = static_cast<std::size_t>(sh_coefficients(model.sh_degree));
@@ -124,20 +111,7 @@ void half_turn(gaussian_model& model, int axis) {
 
 void in_parts(std::size_t n, std::function<void(std::size_t, std::size_t)> const& f) {
   std::size_t const parts = std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, n / 4096 + 1);
-  std::vector<std::exception_ptr> failed(parts);
-  auto const part = [&](std::size_t i) {
-    try {
-      f(n * i / parts, n * (i + 1) / parts);
-    } catch (...) {
-      failed[i] = std::current_exception();
-    }
-  };
-  std::vector<std::thread> threads;
-  for (std::size_t i = 1; i < parts; ++i) threads.emplace_back(part, i);
-  part(0);
-  for (std::thread& t : threads) t.join();
-  for (std::exception_ptr const& e : failed)
-    if (e) std::rethrow_exception(e);
+  for_each_parallel(parts, [&](std::size_t i) { f(n * i / parts, n * (i + 1) / parts); });
 }
 
 void require_plausible(std::string const& file, u64 gaussians, int sh_degree, u64 bytes) {
@@ -180,7 +154,7 @@ void keep_usable(std::string const& file, gaussian_model& model, std::vector<std
     if (no_rotation(&model.quaternion[4 * i]))
       bad.add(i, [&] { return named() + "rotation is all zero, which is no rotation"; });
   }
-  if (!bad.records().empty()) model = in_order(model, bad.others(model.size(), "Gaussian", file, notes));
+  if (!bad.records().empty()) model = selected(model, bad.others(model.size(), "Gaussian", file, notes));
 }
 
 void require_packable(std::filesystem::path const& path, gaussian_model const& model) {

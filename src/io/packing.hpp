@@ -3,6 +3,7 @@
 
 #include <gart/core/error.hpp>
 #include <gart/scene/gaussians.hpp>
+#include <gart/scene/select.hpp>
 
 #include <algorithm>
 #include <array>
@@ -51,7 +52,6 @@ int largest_positive(std::array<double, 4>& q);
 
 // The Gaussians by their place on a curve through space: neighbours stand together, and so do like values.
 std::vector<u32> along_a_curve(gaussian_model const& model);
-gaussian_model in_order(gaussian_model const& model, std::vector<u32> const& order);
 
 // Turned by half a turn about an axis (0, 1, 2: x, y, z), with the colours that depend on direction. Applied twice it
 // changes nothing; every number keeps its bits, to signs.

@@ -172,7 +172,7 @@ gaussian_model splats_of(ply_file const& file, std::vector<std::string>* notes, 
   if (bad.records().empty()) return model;
   // A Gaussian's owner follows from its number in the file.
   if (file.owners.ranks > 1) file.refuse(bad.first(), "gart convert leaves it out: start with what that writes");
-  return io::in_order(model, bad.others(model.size(), "Gaussian", file.name, notes));
+  return selected(model, bad.others(model.size(), "Gaussian", file.name, notes));
 }
 
 std::string header_of(std::filesystem::path const& path, gaussian_model const& model, u64 count,

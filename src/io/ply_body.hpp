@@ -124,12 +124,7 @@ void read_vertices(ply_file const& file, std::vector<std::string> const& columns
     bool const wanted = e.name == "vertex";
     u64 const smallest = e.smallest(file.head.format);
     if (!smallest && !wanted) continue;
-    // The last ascii value needs no separator.
-    if (e.count > (body.remaining() + 1) / smallest) {
-      file.refuse("the header promises " + std::to_string(e.count) + " of '" + e.name + "', more than the " +
-                      std::to_string(body.remaining()) + " bytes that follow can hold",
-                  "the file is truncated: copy or export it again");
-    }
+    require_room(file, e, body.remaining());
     std::vector<int> column_of(e.properties.size(), -1);
     for (std::size_t i = 0; wanted && i < e.properties.size(); ++i) {
       auto const found = std::find(columns.begin(), columns.end(), e.properties[i].name);

@@ -59,6 +59,16 @@ struct ply_file {
   }
 };
 
+// Refuses an element whose records need more than the bytes that are left, before any memory is taken.
+inline void require_room(ply_file const& file, element const& e, u64 left) {
+  u64 const smallest = e.smallest(file.head.format);
+  u64 const room = left + (file.head.format == encoding::ascii);  // the last number needs no separator
+  if (smallest && e.count > room / smallest)
+    file.refuse("the header promises " + std::to_string(e.count) + " of '" + e.name + "', more than the " +
+                    std::to_string(left) + " bytes that follow can hold",
+                "the file is truncated: copy or export it again");
+}
+
 ply_file open(std::filesystem::path const& path);
 // Reads the header and the owners' vertices of `total` in the file; all vertices if their places are unknown without
 // reading.

@@ -63,53 +63,35 @@ void push(png_structp png, png_bytep data, std::size_t count) {
 
 void flush(png_structp) {}
 
-bool decode(png_structp png, png_infop info, png_state& state, image8& image) {
+// Pixels of bytes, whatever the file has; or of 16 bits, little-endian, of which it must have one channel.
+template <class T>
+bool decode(png_structp png, png_infop info, png_state& state, basic_image<T>& image) {
+  constexpr bool bytes = sizeof(T) == 1;
   if (setjmp(png_jmpbuf(png))) return false;
   png_set_read_fn(png, &state, pull);
   // Nothing but the pixels: libpng would allocate whatever length a text or profile promises, for a warning.
   png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
   png_read_info(png, info);
+  int const kind = png_get_color_type(png, info);
+  if (!bytes && (kind != PNG_COLOR_TYPE_GRAY || png_get_bit_depth(png, info) != 16))
+    png_error(png, "it is not one channel of 16 bits");
   // Deflate expands at most 1032 times: a size beyond that is a lie, and must not be allocated.
   if (png_get_rowbytes(png, info) > (state.source->size() * 1040 + 4096) / png_get_image_height(png, info)) {
     png_error(png, "the size in its header is larger than its data can hold");
   }
-  png_set_expand(png);  // palette to RGB, fewer than 8 bits to 8, tRNS to alpha
-  png_set_scale_16(png);
-  bool const alpha = (png_get_color_type(png, info) & PNG_COLOR_MASK_ALPHA) || png_get_valid(png, info, PNG_INFO_tRNS);
-  if (alpha) png_set_gray_to_rgb(png);
+  if (bytes) {
+    png_set_expand(png);  // palette to RGB, fewer than 8 bits to 8, tRNS to alpha
+    png_set_scale_16(png);
+    if ((kind & PNG_COLOR_MASK_ALPHA) || png_get_valid(png, info, PNG_INFO_tRNS)) png_set_gray_to_rgb(png);
+  } else {
+    png_set_swap(png);
+  }
   int const passes = png_set_interlace_handling(png);
   png_read_update_info(png, info);
-  std::size_t const row = png_get_rowbytes(png, info);
   image.width = static_cast<int>(png_get_image_width(png, info));
   image.height = static_cast<int>(png_get_image_height(png, info));
   image.channels = png_get_channels(png, info);
-  image.data.resize(row * static_cast<std::size_t>(image.height));
-  for (int pass = 0; pass < passes; ++pass) {
-    for (int y = 0; y < image.height; ++y)
-      png_read_row(png, image.data.data() + row * static_cast<std::size_t>(y), nullptr);
-  }
-  png_read_end(png, nullptr);
-  return true;
-}
-
-// As decode, for one channel of 16 bits.
-bool decode16(png_structp png, png_infop info, png_state& state, basic_image<u16>& image) {
-  if (setjmp(png_jmpbuf(png))) return false;
-  png_set_read_fn(png, &state, pull);
-  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
-  png_read_info(png, info);
-  if (png_get_color_type(png, info) != PNG_COLOR_TYPE_GRAY || png_get_bit_depth(png, info) != 16)
-    png_error(png, "it is not one channel of 16 bits");
-  if (png_get_rowbytes(png, info) > (state.source->size() * 1040 + 4096) / png_get_image_height(png, info)) {
-    png_error(png, "the size in its header is larger than its data can hold");
-  }
-  png_set_swap(png);  // little-endian
-  int const passes = png_set_interlace_handling(png);
-  png_read_update_info(png, info);
-  image.width = static_cast<int>(png_get_image_width(png, info));
-  image.height = static_cast<int>(png_get_image_height(png, info));
-  image.channels = 1;
-  std::size_t const row = static_cast<std::size_t>(image.width);
+  std::size_t const row = png_get_rowbytes(png, info) / sizeof(T);
   image.data.resize(row * static_cast<std::size_t>(image.height));
   for (int pass = 0; pass < passes; ++pass) {
     for (int y = 0; y < image.height; ++y)
@@ -117,6 +99,17 @@ bool decode16(png_structp png, png_infop info, png_state& state, basic_image<u16
   }
   png_read_end(png, nullptr);
   return true;
+}
+
+template <class T>
+basic_image<T> decoded(std::vector<u8> const& bytes, std::string const& where, char const* fault, char const* remedy) {
+  png_state state;
+  state.source = &bytes;
+  basic_image<T> image;
+  png_reader const reader(state);
+  if (!reader.info || !decode(reader.png, reader.info, state, image))
+    throw io_error(where, std::string(fault) + state.message, remedy);
+  return image;
 }
 
 // bits: of a channel, whose rows follow each other at `data`; 16 are little-endian.
@@ -152,24 +145,12 @@ std::vector<u8> encoded(int width, int height, int channels, int bits, u8 const*
 bool is_png(std::vector<u8> const& bytes) { return bytes.size() >= 8 && png_sig_cmp(bytes.data(), 0, 8) == 0; }
 
 image8 decode_png(std::vector<u8> const& bytes, std::string const& where) {
-  png_state state;
-  state.source = &bytes;
-  image8 image;
-  png_reader const reader(state);
-  if (!reader.info || !decode(reader.png, reader.info, state, image))
-    throw io_error(where, std::string("is not a readable PNG: ") + state.message, "replace the file");
-  return image;
+  return decoded<u8>(bytes, where, "is not a readable PNG: ", "replace the file");
 }
 
 basic_image<u16> decode_png16(std::vector<u8> const& bytes, std::string const& where) {
-  png_state state;
-  state.source = &bytes;
-  basic_image<u16> image;
-  png_reader const reader(state);
-  if (!reader.info || !decode16(reader.png, reader.info, state, image))
-    throw io_error(where, std::string("is not a depth map in PNG: ") + state.message,
-                   "store one channel of 16 bits, 0 where nothing was measured");
-  return image;
+  return decoded<u16>(bytes, where,
+                      "is not a depth map in PNG: ", "store one channel of 16 bits, 0 where nothing was measured");
 }
 
 std::vector<u8> encode_png16(basic_image<u16> const& image) {

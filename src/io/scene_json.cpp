@@ -4,7 +4,7 @@
 #include "json_checks.hpp"
 #include "scene_parts.hpp"
 
-#include <gart/core/suggestion.hpp>
+#include <gart/core/words.hpp>
 #include <gart/io/camera_file.hpp>
 #include <gart/io/dataset.hpp>
 #include <gart/io/exr_file.hpp>
@@ -13,7 +13,6 @@
 #include <gart/scene/similarity.hpp>
 
 #include <algorithm>
-#include <cctype>
 #include <numbers>
 
 namespace gart {
@@ -22,11 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace io;
 
-std::string ending_of(fs::path const& path) {
-  std::string e = path.extension().string();
-  std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return e;
-}
+std::string ending_of(fs::path const& path) { return lower(path.extension().string()); }
 
 bool is_gltf(fs::path const& path) { return ending_of(path) == ".glb" || ending_of(path) == ".gltf"; }
 
@@ -176,12 +171,10 @@ class scene_reader {
 
   [[noreturn]] void refuse_material(record const& r) const {
     std::vector<std::string> names;
-    std::string all;
-    for (std::size_t i = 0; i < named_; ++i)
-      names.push_back(out_.scene.materials[i].name), all += (i ? ", " : "") + names.back();
+    for (std::size_t i = 0; i < named_; ++i) names.push_back(out_.scene.materials[i].name);
     throw io_error(r.where,
                    "'material' is '" + r.text("material").substr(0, 60) + "'" + did_you_mean(r.text("material"), names),
-                   all.empty() ? "describe it in 'materials'" : "there are " + all);
+                   names.empty() ? "describe it in 'materials'" : "there are " + joined(names));
   }
 
   light::scene shape_of(record const& r, io::placing const& where) {

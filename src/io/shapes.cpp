@@ -10,7 +10,7 @@ namespace {
 
 bool apart(raw_mesh const& m, u32 a, u32 b) {
   vec3d const d = m.position[a] - m.position[b];
-  return d.x * d.x + d.y * d.y + d.z * d.z > 1e-20;
+  return glm::dot(d, d) > 1e-20;
 }
 
 // point(u, v) over [0, 1]^2, with its normal; borders are there twice, for the uvs.
@@ -83,8 +83,7 @@ raw_mesh shape_named(std::string_view name) {
 }
 
 mat3d turn_from_y(vec3d const& up) {
-  double const length = std::sqrt(up.x * up.x + up.y * up.y + up.z * up.z);
-  vec3d const b = up / length;
+  vec3d const b = up / glm::length(up);
   mat3d m(1.0);
   if (b.y < -1 + 1e-12) {
     m[0].x = m[1].y = -1;

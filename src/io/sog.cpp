@@ -329,7 +329,7 @@ splat_format const sog_format = {
     },
     [](fs::path const& path, gaussian_model const& model, splat_traits const& traits, splat_packing const& packing) {
       require_packable(path, model);
-      gaussian_model sorted = in_order(model, along_a_curve(model));
+      gaussian_model sorted = selected(model, along_a_curve(model));
       draw_in_strays(sorted, far_reach);
       sog_writer(path, sorted).write(traits, packing);
     }};

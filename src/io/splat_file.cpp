@@ -1,12 +1,11 @@
 #include "bulk.hpp"
-#include "unusable.hpp"
 
 #include <gart/core/error.hpp>
+#include <gart/core/words.hpp>
 #include <gart/io/ply.hpp>
 #include <gart/io/splat_file.hpp>
 
 #include <algorithm>
-#include <cctype>
 #include <fstream>
 #include <iterator>
 
@@ -21,17 +20,13 @@ splat_format const* const formats[] = {&compressed_ply_format, &ply_format, &spz
                                        &splat_bytes_format,    &glb_format};
 
 std::string listed(bool written) {
-  std::string all;
-  for (auto const* format : formats)
-    if (!written || format->write)
-      all += std::string(all.empty() ? "" : ", ") + format->name + " (" + format->extension + ")";
-  return all;
+  std::vector<splat_format const*> all(std::begin(formats), std::end(formats));
+  std::erase_if(all, [&](splat_format const* format) { return written && !format->write; });
+  return joined(all, [](splat_format const* f) { return std::string(f->name) + " (" + f->extension + ")"; });
 }
 
 splat_format const* by_name(std::filesystem::path const& path) {
-  std::string name = path.filename().string();
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::string const name = lower(path.filename().string());
   for (auto const* format : formats)
     if (name.ends_with(format->extension)) return format;
   return nullptr;
@@ -141,9 +136,9 @@ std::vector<std::string> left_out(std::filesystem::path const& path, gaussian_mo
     lines.push_back("spherical harmonics above degree " + std::to_string(format.capabilities.sh_degree) +
                     " (the model has degree " + std::to_string(model.sh_degree) + ")");
   if (model.feature_count > 0 && !format.capabilities.features)
-    lines.push_back(io::counted(static_cast<std::size_t>(model.feature_count), "feature") + " of each Gaussian");
+    lines.push_back(counted(static_cast<std::size_t>(model.feature_count), "feature") + " of each Gaussian");
   if (std::size_t const strays = format.capabilities.strays && !packing.spz ? 0 : io::bulk_of(model).strays.size())
-    lines.push_back("the distance of " + io::counted(strays, "Gaussian") + ", over " +
+    lines.push_back("the distance of " + counted(strays, "Gaussian") + ", over " +
                     std::to_string(static_cast<int>(io::far_reach)) +
                     " times as far out as 99 of 100: nearer, and as much smaller, they look the same from the middle");
   for (auto const& [key, value] : traits) {

@@ -41,14 +41,6 @@ std::array<std::size_t, streams> widths(header const& h) {
   return {h.version == 1 ? 6u : 9u, 1, 3, 3, h.version < 3 ? 3u : 4u, rest};
 }
 
-double from_half(u16 h) {
-  int const exponent = h >> 10 & 31, mantissa = h & 1023;
-  double const size = exponent == 0    ? std::ldexp(mantissa, -24)
-                      : exponent == 31 ? (mantissa ? std::nan("") : HUGE_VAL)
-                                       : std::ldexp(1024 + mantissa, exponent - 25);
-  return h & 0x8000 ? -size : size;
-}
-
 // Three of a unit quaternion's components in 10 bits each, a sign and a magnitude, and which is the fourth. x, y, z, w.
 u32 pack_rotation(float const* wxyz) {
   std::array<double, 4> q = unit(wxyz);
@@ -111,7 +103,7 @@ gaussian_model unpacked(header const& h, std::array<u8 const*, streams> const& s
       for (std::size_t c = 0; c < 3; ++c) {
         u8 const* p = s[positions] + width[positions] * i + width[positions] / 3 * c;
         if (h.version == 1) {
-          m.mean[3 * i + c] = static_cast<float>(from_half(static_cast<u16>(p[0] | p[1] << 8)));
+          m.mean[3 * i + c] = from_half(static_cast<u16>(p[0] | p[1] << 8));
         } else {
           u32 const fixed = u32{p[0]} << 8 | u32{p[1]} << 16 | u32{p[2]} << 24;  // the sign at the top
           m.mean[3 * i + c] =
@@ -271,7 +263,7 @@ struct packed_model {
 packed_model packed(u32 version, fs::path const& path, gaussian_model const& given, splat_traits const& traits,
                     splat_packing const& packing) {
   require_packable(path, given);
-  gaussian_model m = in_order(given, along_a_curve(given));
+  gaussian_model m = selected(given, along_a_curve(given));
   draw_in_strays(m, far_reach);
   packed_model out;
   header& h = out.h;

@@ -11,12 +11,6 @@ namespace {
 
 constexpr double furthest = 1e15;  // squares of distances still are floats
 
-vec3d cross_of(vec3d const& a, vec3d const& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-
-double length_of(vec3d const& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
-
 bool near_enough(vec3d const& p) {  // NaN is not
   return std::abs(p.x) <= furthest && std::abs(p.y) <= furthest && std::abs(p.z) <= furthest;
 }
@@ -37,14 +31,14 @@ void add_placed(light::scene& to, raw_mesh const& raw, mesh_place const& place, 
     out.positions.push_back(near_enough(p) ? vec3(p) : vec3(0.0f));
   }
   mat3d const& m = where.linear;
-  vec3d const across[3] = {cross_of(m[1], m[2]), cross_of(m[2], m[0]), cross_of(m[0], m[1])};
-  bool const mirrored = m[0].x * across[0].x + m[0].y * across[0].y + m[0].z * across[0].z < 0;
+  vec3d const across[3] = {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])};
+  bool const mirrored = glm::dot(m[0], across[0]) < 0;
   out.normals.reserve(raw.normal.size());
   for (vec3 const& local : raw.normal) {  // by the cofactors, which keep it across the surface
     vec3d const v = (across[0] * static_cast<double>(local.x) + across[1] * static_cast<double>(local.y) +
                      across[2] * static_cast<double>(local.z)) *
                     (mirrored ? -1.0 : 1.0);
-    double const length = length_of(v);
+    double const length = glm::length(v);
     out.normals.push_back(length > 0 && std::isfinite(length) ? vec3(v / length) : vec3(0.0f));
   }
   for (vec2 const& uv : raw.uv) out.uvs.push_back(std::abs(uv.x) < 1e6f && std::abs(uv.y) < 1e6f ? uv : vec2(0.0f));
@@ -58,8 +52,8 @@ void add_placed(light::scene& to, raw_mesh const& raw, mesh_place const& place, 
       continue;
     }
     vec3d const at(out.positions[a]);
-    vec3d const face = cross_of(vec3d(out.positions[b]) - at, vec3d(out.positions[c]) - at);
-    double const area = length_of(face);
+    vec3d const face = glm::cross(vec3d(out.positions[b]) - at, vec3d(out.positions[c]) - at);
+    double const area = glm::length(face);
     if (!(area > 0)) {
       ++thin;
       continue;

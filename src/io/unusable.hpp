@@ -4,16 +4,12 @@
 
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>
+#include <gart/core/words.hpp>
 
 #include <string>
 #include <vector>
 
 namespace gart::io {
-
-// "1 Gaussian", "3 Gaussians".
-inline std::string counted(std::size_t n, char const* noun) {
-  return std::to_string(n) + " " + noun + (n == 1 ? "" : "s");
-}
 
 class unusable {
  public:

@@ -1,4 +1,5 @@
 #include <gart/camera/models.hpp>
+#include <gart/core/words.hpp>
 #include <gart/runtime/capture_defaults.hpp>
 #include <gart/train/densify/error_growth.hpp>
 
@@ -21,8 +22,6 @@ std::string percent(double share) {
   std::snprintf(text, sizeof text, share > 0 && share < 0.001 ? "%.2g%%" : "%.1f%%", 100 * share);
   return text;
 }
-
-std::string counted(std::size_t n, char const* noun) { return std::to_string(n) + " " + noun + (n == 1 ? "" : "s"); }
 
 // f(pixel, channels) for the outermost pixels of some training images; images have 3 or 4 channels.
 template <class F>

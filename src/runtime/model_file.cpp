@@ -1,6 +1,7 @@
 #include <gart/core/error.hpp>
 #include <gart/runtime/kinds.hpp>
 #include <gart/runtime/model_file.hpp>
+#include <gart/scene/select.hpp>
 #include <gart/scene/similarity.hpp>
 
 #include <algorithm>
@@ -77,12 +78,7 @@ model_file load_models(std::vector<placed_splats> const& splats) {
         throw unsupported(one.file.string() + ": its kernel degree is " + std::to_string(part.kernel_degree) +
                           ", and that of the scene's first model " + std::to_string(all.kernel_degree) +
                           " (models of one scene have one)");
-      int const degree = std::max(all.model.sh_degree, part.model.sh_degree);
-      all.model = with_sh_degree(std::move(all.model), degree);
-      part.model = with_sh_degree(std::move(part.model), degree);
-      for_each_array(
-          [](parameter_array const&, auto& to, auto const& from) { to.insert(to.end(), from.begin(), from.end()); },
-          all.model, part.model);
+      append(all.model, std::move(part.model));
     }
     all.total += part.total;
   }

@@ -1,9 +1,8 @@
 #include "access.hpp"
 
-#include "http.hpp"
-
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>
+#include <gart/core/words.hpp>
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>

@@ -1,6 +1,7 @@
 // What is traced of a model where a viewer wants it otherwise than it is.
 
 #include <gart/math/logit.hpp>
+#include <gart/scene/select.hpp>
 #include <gart/view/scene.hpp>
 
 #include <algorithm>
@@ -22,20 +23,11 @@ float opacity_of(gaussian_model const& model, std::size_t i, float factor) {
   return factor * static_cast<float>(sigmoid_in_double(static_cast<double>(model.opacity[i])));
 }
 
-gaussian_model without_faint(gaussian_model model, float factor) {
-  std::size_t n = 0;
-  for (std::size_t i = 0; i < model.size(); ++i) {
-    if (opacity_of(model, i, factor) < faintest_solid) continue;
-    for_each_row_array(
-        [&](std::size_t width, auto& values) {
-          std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * width), width,
-                      values.begin() + static_cast<std::ptrdiff_t>(n * width));
-        },
-        model, model);
-    ++n;
-  }
-  model.resize(n, model.sh_degree);
-  return model;
+gaussian_model without_faint(gaussian_model const& model, float factor) {
+  std::vector<u32> kept;
+  for (std::size_t i = 0; i < model.size(); ++i)
+    if (opacity_of(model, i, factor) >= faintest_solid) kept.push_back(static_cast<u32>(i));
+  return selected(model, kept);
 }
 
 }  // namespace
@@ -43,7 +35,7 @@ gaussian_model without_faint(gaussian_model model, float factor) {
 gaussian_model altered(gaussian_model model, view_settings const& settings, int kernel_degree, float extent) {
   if (settings.crop) model = cropped(model, *settings.crop);
   bool const solid = settings.shape != view_shape::gaussians;
-  if (solid) model = without_faint(std::move(model), settings.opacity);
+  if (solid) model = without_faint(model, settings.opacity);
   float const larger = std::log(settings.size) - (solid ? std::log(rim(kernel_degree)) : 0.0f);
   if (settings.shape == view_shape::points)
     std::fill(model.log_scale.begin(), model.log_scale.end(), std::log(point_radius * std::max(extent, 1e-20f)));

@@ -1,5 +1,7 @@
 #include "clients.hpp"
 
+#include "websocket.hpp"
+
 #include <algorithm>
 #include <chrono>
 #include <utility>
@@ -10,9 +12,6 @@ namespace {
 
 // What waits for a client that reads nothing is bounded: answers, which may be long, and all texts.
 constexpr std::size_t answers_most = 2, texts_most = 64, actions_most = 64;
-
-// The close of a connection, by RFC 6455: what was said is not what was agreed on.
-constexpr int policy_violation = 1008;
 
 }  // namespace
 
@@ -30,7 +29,7 @@ int clients::add(bool control) {
   client& c = clients_[id];
   c.control = control;
   c.texts.push_back(hello_text(*scene_, control));
-  c.status = status_, c.curve = curve_, c.scores = scores_;
+  c.newest = newest_;
   counted();
   return id;
 }
@@ -52,19 +51,19 @@ verdict clients::receive(int id, std::string_view text, double now) {
   try {
     message = parse_message(text);
   } catch (invalid_argument const& e) {
-    return {policy_violation, e.what()};
+    return {ws::policy_violation, e.what()};
   }
   std::lock_guard const lock(mutex_);
-  auto const found = clients_.find(id);
-  if (found == clients_.end()) return {};
-  client& c = found->second;
+  client* const asking = find(id);
+  if (!asking) return {};
+  client& c = *asking;
   auto const index_in_range = [&](int i) { return i < static_cast<int>(scene_->cameras.size()); };
-  auto const no_camera = verdict{policy_violation, "'photo' is no camera of the scene"};
+  auto const no_camera = verdict{ws::policy_violation, "'photo' is no camera of the scene"};
   auto const features_there = [&](view_settings const& s) {
     return !s.features ||
            std::all_of(s.features->begin(), s.features->end(), [&](int k) { return k < scene_->features; });
   };
-  auto const no_feature = verdict{policy_violation, "'features' is no feature of the model"};
+  auto const no_feature = verdict{ws::policy_violation, "'features' is no feature of the model"};
   if (auto* const view = std::get_if<view_message>(&message)) {
     if (view->photo && !index_in_range(*view->photo)) return no_camera;
     if (!features_there(view->settings)) return no_feature;
@@ -113,47 +112,45 @@ bool clients::controls(client& c, char const* what, bool possible, char const* e
 
 bool clients::take_text(int id, std::string& to) {
   std::lock_guard const lock(mutex_);
-  auto const found = clients_.find(id);
-  if (found == clients_.end()) return false;
-  client& c = found->second;
+  client* const taking = find(id);
+  if (!taking) return false;
+  client& c = *taking;
   if (!c.texts.empty()) {
     to = std::move(c.texts.front());
     c.texts.pop_front();
     changed_.notify_all();
     return true;
   }
-  std::string& newest = !c.status.empty()  ? c.status
-                        : !c.curve.empty() ? c.curve
-                        : !c.parts.empty() ? c.parts
-                                           : c.scores;
-  to = std::exchange(newest, std::string());
-  return !to.empty();
+  for (auto const which : newest_texts::all)
+    if (to = std::exchange(c.newest.*which, {}); !to.empty()) return true;
+  return false;
 }
 
 bool clients::take_frame(int id, std::vector<u8>& to, double now) {
   std::lock_guard const lock(mutex_);
-  auto const found = clients_.find(id);
-  if (found == clients_.end()) return false;
-  if (!found->second.file.empty()) {
-    to = std::exchange(found->second.file, {});
+  client* const c = find(id);
+  if (!c) return false;
+  if (!c->file.empty()) {
+    to = std::exchange(c->file, {});
     return true;
   }
-  if (found->second.frame.empty()) return false;
-  to = std::exchange(found->second.frame, {});
-  found->second.view_time = now;  // a moving page sends its next view when it has this frame
-  changed_.notify_all();          // the next one may be rendered
+  if (c->frame.empty()) return false;
+  to = std::exchange(c->frame, {});
+  c->view_time = now;     // a moving page sends its next view when it has this frame
+  changed_.notify_all();  // the next one may be rendered
   return true;
 }
 
 bool clients::waits(client const& c) {
-  return !c.texts.empty() || !c.status.empty() || !c.curve.empty() || !c.scores.empty() || !c.parts.empty() ||
-         !c.frame.empty() || !c.file.empty();
+  return !c.texts.empty() || !c.frame.empty() || !c.file.empty() ||
+         std::any_of(std::begin(newest_texts::all), std::end(newest_texts::all),
+                     [&](auto const which) { return !(c.newest.*which).empty(); });
 }
 
 bool clients::has_output(int id) const {
   std::lock_guard const lock(mutex_);
-  auto const found = clients_.find(id);
-  return found != clients_.end() && waits(found->second);
+  client const* const c = find(id);
+  return c && waits(*c);
 }
 
 bool clients::has_output() const {
@@ -163,8 +160,8 @@ bool clients::has_output() const {
 
 bool clients::overflows(int id) const {
   std::lock_guard const lock(mutex_);
-  auto const found = clients_.find(id);
-  return found != clients_.end() && found->second.texts.size() > texts_most;
+  client const* const c = find(id);
+  return c && c->texts.size() > texts_most;
 }
 
 bool clients::at_rest(client const& c, double now) const {
@@ -197,8 +194,8 @@ std::optional<job> clients::job_of(int id, client& c, double now, int urgency) {
   }
   if (urgency == 2 + c.growing && at_rest(c, now) && !c.still_done) {
     // One goes on to its end before the next: two in turn would begin anew each time.
-    auto const grown = clients_.find(last_grown_);
-    if (c.growing && last_grown_ != id && grown != clients_.end() && grown->second.growing) return {};
+    client const* const grown = find(last_grown_);
+    if (c.growing && last_grown_ != id && grown && grown->growing) return {};
     c.dirty = false, c.still_done = true;
     return job{id, *c.view, c.serial, true, c.growing, width, height};
   }
@@ -249,10 +246,9 @@ std::optional<job> clients::next_job(double now, double wait_seconds) {
 
 bool clients::waited_for(job const& j) const {
   std::lock_guard const lock(mutex_);
-  auto const found = clients_.find(j.client);
-  if (found == clients_.end()) return false;
+  client const* const c = find(j.client);
   // One that moves is always followed by another: without it nothing would be seen.
-  return !j.still || found->second.serial == j.serial;
+  return c && (!j.still || c->serial == j.serial);
 }
 
 double clients::expected_ms(double pixels) const {
@@ -263,9 +259,9 @@ double clients::expected_ms(double pixels) const {
 void clients::finish_image(job const& done, std::vector<u8> bytes) {
   {
     std::lock_guard const lock(mutex_);
-    auto const found = clients_.find(done.client);
-    if (found == clients_.end()) return;
-    found->second.file = std::move(bytes);
+    client* const c = find(done.client);
+    if (!c) return;
+    c->file = std::move(bytes);
   }
   wake();
 }
@@ -275,9 +271,9 @@ void clients::finish_frame(job const& done, std::vector<u8> bytes, double millis
     std::lock_guard const lock(mutex_);
     double const pixels = static_cast<double>(done.width) * done.height;
     pacing_.measured(milliseconds, pixels);
-    auto const found = clients_.find(done.client);
-    if (found == clients_.end()) return;
-    client& c = found->second;
+    client* const shown = find(done.client);
+    if (!shown) return;
+    client& c = *shown;
     c.pacing.measured(milliseconds, pixels);
     if (!c.view) return;  // the scene is another one by now
     c.frame = std::move(bytes);
@@ -291,9 +287,9 @@ void clients::finish_frame(job const& done, std::vector<u8> bytes, double millis
 void clients::send(int id, std::string text) {
   {
     std::lock_guard const lock(mutex_);
-    auto const found = clients_.find(id);
-    if (found == clients_.end()) return;
-    found->second.texts.push_back(std::move(text));
+    client* const c = find(id);
+    if (!c) return;
+    c->texts.push_back(std::move(text));
   }
   wake();
 }
@@ -368,7 +364,7 @@ void clients::set_parts(std::vector<view_part> parts, std::string scene_json) {
     next.parts = std::move(parts), next.scene_json = std::move(scene_json);
     scene_ = std::make_shared<view_scene const>(std::move(next));
     for (auto& [id, c] : clients_) {
-      c.parts = scene_text(scene_->parts);
+      c.newest.parts = scene_text(scene_->parts);
       c.dirty = c.view.has_value(), c.still_done = c.growing = false, ++c.serial;
     }
   }
@@ -381,10 +377,11 @@ void clients::set_scene(view_scene scene) {
   {
     std::lock_guard const lock(mutex_);
     scene_ = std::make_shared<view_scene const>(std::move(scene));
-    scores_.clear(), edits_.clear();
+    newest_.scores.clear(), edits_.clear();
     for (auto& [id, c] : clients_) {
       ++c.serial;
-      c.view = {}, c.image = {}, c.pick = {}, c.path = {}, c.frame = {}, c.scores = {}, c.parts = {}, c.dirty = false;
+      c.view = {}, c.image = {}, c.pick = {}, c.path = {}, c.frame = {}, c.dirty = false;
+      c.newest.scores.clear(), c.newest.parts.clear();
       c.texts.push_back(hello_text(*scene_, c.control));
     }
   }
@@ -401,31 +398,21 @@ std::string clients::why_it_ends() const {
   return end_;
 }
 
+void clients::set_newest(std::string newest_texts::*which, std::string text) {
+  {
+    std::lock_guard const lock(mutex_);
+    newest_.*which = std::move(text);
+    for (auto& [id, c] : clients_) c.newest.*which = newest_.*which;
+  }
+  wake();
+}
+
 void clients::set_scores(std::vector<std::pair<int, double>> const& scores) {
-  {
-    std::lock_guard const lock(mutex_);
-    scores_ = scores_text(scores);
-    for (auto& [id, c] : clients_) c.scores = scores_;
-  }
-  wake();
+  set_newest(&newest_texts::scores, scores_text(scores));
 }
 
-void clients::set_status(view_status const& status) {
-  {
-    std::lock_guard const lock(mutex_);
-    status_ = status_text(status);
-    for (auto& [id, c] : clients_) c.status = status_;
-  }
-  wake();
-}
+void clients::set_status(view_status const& status) { set_newest(&newest_texts::status, status_text(status)); }
 
-void clients::set_curve(view_curve const& curve) {
-  {
-    std::lock_guard const lock(mutex_);
-    curve_ = curve_text(curve);
-    for (auto& [id, c] : clients_) c.curve = curve_;
-  }
-  wake();
-}
+void clients::set_curve(view_curve const& curve) { set_newest(&newest_texts::curve, curve_text(curve)); }
 
 }  // namespace gart::view

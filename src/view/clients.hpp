@@ -7,6 +7,7 @@
 #include <gart/view/server.hpp>
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <map>
@@ -14,6 +15,10 @@
 #include <mutex>
 
 namespace gart::view {
+
+inline double seconds_now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 // What is to be rendered or found for a client.
 struct job {
@@ -29,6 +34,13 @@ struct job {
 struct verdict {
   int code = 0;  // of the close, where there is a reason
   std::string reason;
+};
+
+// The newest texts of their kinds, which replace those before; empty: nothing to send.
+struct newest_texts {
+  std::string status, curve, parts, scores;
+  static constexpr std::string newest_texts::*all[] = {&newest_texts::status, &newest_texts::curve,
+                                                       &newest_texts::parts, &newest_texts::scores};
 };
 
 class clients {
@@ -90,12 +102,18 @@ class clients {
     std::optional<pick_message> pick;
     std::optional<path_message> path;
     std::deque<std::string> texts;
-    std::string status, curve, scores, parts;  // the newest, to be sent
-    std::vector<u8> frame, file;               // the newest, to be sent
+    newest_texts newest;          // to be sent
+    std::vector<u8> frame, file;  // the newest, to be sent
     frame_pacing pacing;
   };
+  void set_newest(std::string newest_texts::*which, std::string text);
   static bool waits(client const& c);  // whether there is something to send to it
   // All with mutex_ held.
+  client* find(int id) {
+    auto const found = clients_.find(id);
+    return found == clients_.end() ? nullptr : &found->second;
+  }
+  client const* find(int id) const { return const_cast<clients*>(this)->find(id); }
   bool at_rest(client const& c, double now) const;
   std::optional<job> job_of(int id, client& c, double now, int urgency);
   std::optional<job> choose(double now);
@@ -113,7 +131,8 @@ class clients {
   int next_id_ = 1, last_served_ = 0;
   int last_grown_ = 0;   // the client whose view the last samples were of
   frame_pacing pacing_;  // of all: what a new client starts from
-  std::string status_, curve_, scores_, end_ = "gart ends";
+  newest_texts newest_;  // what a new client is told; parts are in its hello
+  std::string end_ = "gart ends";
   std::deque<train_action> actions_;
   std::optional<double> share_;
   std::optional<int> model_;

@@ -1,4 +1,5 @@
 #include <gart/core/error.hpp>
+#include <gart/core/words.hpp>
 #include <gart/io/file.hpp>
 #include <gart/scene/similarity.hpp>
 #include <gart/view/edited_scene.hpp>
@@ -7,7 +8,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -51,9 +51,7 @@ std::size_t size_of(json const& document, char const* list) {
 }
 
 bool has_ending(fs::path const& file, std::initializer_list<char const*> endings) {
-  std::string e = file.extension().string();
-  std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::find(endings.begin(), endings.end(), e) != endings.end();
+  return std::find(endings.begin(), endings.end(), lower(file.extension().string())) != endings.end();
 }
 
 }  // namespace

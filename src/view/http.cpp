@@ -1,5 +1,7 @@
 #include "http.hpp"
 
+#include <gart/core/words.hpp>
+
 #include <algorithm>
 #include <charconv>
 
@@ -29,38 +31,21 @@ bool take_first_line(std::string_view line, http_request& to) {
 }
 
 char const* reason_of(int status) {
-  switch (status) {
-    case 101:
-      return "Switching Protocols";
-    case 200:
-      return "OK";
-    case 202:
-      return "Accepted";
-    case 400:
-      return "Bad Request";
-    case 403:
-      return "Forbidden";
-    case 404:
-      return "Not Found";
-    case 405:
-      return "Method Not Allowed";
-    case 413:
-      return "Content Too Large";
-    case 415:
-      return "Unsupported Media Type";
-    default:
-      return "Service Unavailable";
-  }
+  static constexpr std::pair<int, char const*> reasons[] = {{101, "Switching Protocols"},
+                                                            {200, "OK"},
+                                                            {202, "Accepted"},
+                                                            {400, "Bad Request"},
+                                                            {403, "Forbidden"},
+                                                            {404, "Not Found"},
+                                                            {405, "Method Not Allowed"},
+                                                            {413, "Content Too Large"},
+                                                            {415, "Unsupported Media Type"}};
+  for (auto const& [code, reason] : reasons)
+    if (code == status) return reason;
+  return "Service Unavailable";
 }
 
 }  // namespace
-
-std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return out;
-}
 
 std::string_view http_request::header(std::string_view name) const {
   for (auto const& [own, value] : headers)

@@ -34,7 +34,4 @@ head_state take_request(std::string& came, http_request& to);
 // The head of an answer: "HTTP/1.1 200 OK" and its headers, one a line, "Name: value".
 std::string answer_head(int status, std::vector<std::string> const& headers);
 
-// In small letters, where they are of ASCII.
-std::string lower(std::string_view text);
-
 }  // namespace gart::view

@@ -2,6 +2,7 @@
 
 #include "page.hpp"
 
+#include <gart/core/words.hpp>
 #include <gart/io/image_file.hpp>
 
 #include <algorithm>

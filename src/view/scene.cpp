@@ -2,6 +2,7 @@
 
 #include "bulk_range.hpp"
 
+#include <gart/scene/select.hpp>
 #include <gart/view/scene.hpp>
 
 #include <algorithm>
@@ -35,26 +36,16 @@ view_scene scene_of(std::string name, gaussian_model const& model, int kernel_de
 }
 
 gaussian_model cropped(gaussian_model const& model, view_box const& box) {
-  std::vector<std::size_t> kept;
+  std::vector<u32> kept;
   for (std::size_t i = 0; i < model.size(); ++i) {
     bool inside = true;
     for (std::size_t k = 0; k < 3; ++k) {
       int const axis = static_cast<int>(k);
       inside = inside && model.mean[3 * i + k] >= box.low[axis] && model.mean[3 * i + k] <= box.high[axis];
     }
-    if (inside) kept.push_back(i);
+    if (inside) kept.push_back(static_cast<u32>(i));
   }
-  gaussian_model out;
-  out.feature_count = model.feature_count;
-  out.resize(kept.size(), model.sh_degree);
-  for_each_row_array(
-      [&](std::size_t width, auto& to, auto const& from) {
-        for (std::size_t i = 0; i < kept.size(); ++i)
-          std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(kept[i] * width), width,
-                      to.begin() + static_cast<std::ptrdiff_t>(i * width));
-      },
-      model, out, model);
-  return out;
+  return selected(model, kept);
 }
 
 }  // namespace gart

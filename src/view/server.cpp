@@ -20,8 +20,7 @@ namespace {
 using clock = std::chrono::steady_clock;
 using view::in_parts;
 using view::parts_of;
-
-double seconds_now() { return std::chrono::duration<double>(clock::now().time_since_epoch()).count(); }
+using view::seconds_now;
 
 constexpr int quality_moving = 80, quality_still = 95;
 

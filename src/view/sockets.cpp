@@ -37,10 +37,6 @@ constexpr std::size_t requests_most = 64;
 constexpr double request_seconds = 15, ping_seconds = 20, unheard_seconds = 60, stalled_seconds = 30, close_seconds = 2;
 constexpr int tick_ms = 250;
 
-double seconds_now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 class descriptor {
  public:
   explicit descriptor(int number) : number_(number) {}

@@ -1,6 +1,7 @@
 #pragma once
 // The policies a test body runs over: TEST_CASE_TEMPLATE("...", E, GART_TEST_POLICIES). Compiled by a host compiler
-// they are the two host policies; by nvcc, with GART_TEST_CUDA, cuda_exec. GART_TEST_EACH_POLICY(X) is X(E) for each:
+// they are the two host policies; by nvcc, with GART_TEST_CUDA, cuda_exec. Where no policy decides what is tested, but
+// templates are many, GART_TEST_ONE_POLICY leaves openmp_exec on the host. GART_TEST_EACH_POLICY(X) is X(E) for each:
 // explicit instantiations of what several tests use.
 
 #include <doctest/doctest.h>
@@ -9,6 +10,10 @@
 #include <gart/exec/cuda_launch.cuh>
 #define GART_TEST_POLICIES gart::cuda_exec
 #define GART_TEST_EACH_POLICY(X) X(gart::cuda_exec)
+#elif defined(GART_TEST_ONE_POLICY)
+#include <gart/exec/parallel.hpp>
+#define GART_TEST_POLICIES gart::openmp_exec
+#define GART_TEST_EACH_POLICY(X) X(gart::openmp_exec)
 #else
 #include <gart/exec/parallel.hpp>
 #define GART_TEST_POLICIES gart::serial_exec, gart::openmp_exec

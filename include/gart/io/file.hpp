@@ -16,8 +16,10 @@ namespace gart {
 
 /// All bytes of a file.
 std::vector<u8> read_file(std::filesystem::path const& path);
-/// Writes these bytes.
+/// @{ Writes these bytes.
 void write_file(std::filesystem::path const& path, std::string_view bytes);
+void write_file(std::filesystem::path const& path, std::vector<u8> const& bytes);
+/// @}
 /// For contents too large to hold: `body` writes to the stream; it is checked and renamed after.
 void write_file(std::filesystem::path const& path, std::function<void(std::ostream&)> const& body);
 

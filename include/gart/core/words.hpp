@@ -1,13 +1,40 @@
 #pragma once
 /// \file
-/// The name that was meant: the known name nearest to what was typed.
+/// Words of messages: lists, counts, and the known name nearest to what was typed.
 
 #include <algorithm>
 #include <numeric>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace gart {
+
+/// "1 view", "3 views".
+inline std::string counted(std::size_t n, char const* noun) {
+  return std::to_string(n) + " " + noun + (n == 1 ? "" : "s");
+}
+
+/// "a, b, c": of(x), a text, for each x of a list.
+template <class List, class Of>
+std::string joined(List const& list, Of const& of, std::string_view between = ", ") {
+  std::string all;
+  for (auto const& x : list) (all += all.empty() ? "" : between) += of(x);
+  return all;
+}
+/// The same of texts.
+template <class List>
+std::string joined(List const& list) {
+  return joined(list, [](auto const& text) { return std::string_view(text); });
+}
+
+/// In small letters, where they are of ASCII.
+inline std::string lower(std::string_view text) {
+  std::string out(text);
+  for (char& c : out)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return out;
+}
 
 /// Letters to add, remove, exchange or swap with the next (the restricted Damerau-Levenshtein distance).
 inline std::size_t letters_between(std::string const& a, std::string const& b) {
