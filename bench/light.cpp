@@ -81,7 +81,7 @@ void sample(benchmark::State& state, E& exec) {
   gart_bench::measure(state, exec, [&] { p.tracer.add(1); });
 }
 
-template <int Bounces, gart::execution E>
+template <int Bounces, gart::first_hits First, gart::execution E>
 void frame(benchmark::State& state, E& exec) {
   auto const& among = gart_bench::the_scene().among;
   light::scene const scene = among ? among->scene : ball_on_floor();
@@ -90,6 +90,7 @@ void frame(benchmark::State& state, E& exec) {
   gart::path_tracer<E> tracer(exec);
   tracer.set_model(model.view(), model.sh_degree());
   tracer.set_scene(scene);
+  tracer.find_first(First);
   light::path_options options = among ? among->paths : light::path_options{};
   options.bounces = Bounces;
   std::size_t const values =
@@ -138,10 +139,11 @@ GART_BENCH("light/bounces_3", sample<3, gart::light::shadow_kind::per_gaussian>)
 GART_BENCH("light/bounces_4", sample<4, gart::light::shadow_kind::per_gaussian>)
 GART_BENCH("light/bounces_5", sample<5, gart::light::shadow_kind::per_gaussian>)
 GART_BENCH("light/bounces_6", sample<6, gart::light::shadow_kind::per_gaussian>)
-GART_BENCH("light/frame/bounces_0", frame<0>)
-GART_BENCH("light/frame/bounces_1", frame<1>)
-GART_BENCH("light/frame/bounces_2", frame<2>)
-GART_BENCH("light/frame/bounces_4", frame<4>)
-GART_BENCH("light/frame/bounces_6", frame<6>)
+GART_BENCH("light/frame/bounces_0", frame<0, gart::first_hits::tiles>)
+GART_BENCH("light/frame/bounces_1", frame<1, gart::first_hits::tiles>)
+GART_BENCH("light/frame/bounces_2", frame<2, gart::first_hits::tiles>)
+GART_BENCH("light/frame/bounces_4", frame<4, gart::first_hits::tiles>)
+GART_BENCH("light/frame/bounces_6", frame<6, gart::first_hits::tiles>)
+GART_BENCH("light/frame/bounces_1/tree", frame<1, gart::first_hits::tree>)
 GART_BENCH("light/bounces_1/per_hit", sample<1, gart::light::shadow_kind::per_hit>)
 GART_BENCH("light/shade_gaussians", shade)

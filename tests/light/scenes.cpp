@@ -171,6 +171,53 @@ TEST_CASE_TEMPLATE("samples are the same whatever they are added by", E, GART_TE
   CHECK(tracer.sums().to_host() != at_once);
 }
 
+TEST_CASE_TEMPLATE("first segments by tiles are those by the tree", E, GART_TEST_POLICIES) {
+  E exec;
+  gart::camera view = camera_at({0.1, -0.05, 0}, 40, 29, 30);
+  auto cases = small_cases();
+  cases.resize(5);
+  for (auto& c : cases) {
+    gart::gaussians<E> const there(exec, c.model);
+    std::vector<float> sums[2];
+    for (bool const jitter : {false, true})
+      for (float const k1 : {0.0f, 0.1f}) {
+        c.paths.jitter = jitter, view.lens.k1 = k1;
+        for (auto const by : {gart::first_hits::tree, gart::first_hits::tiles}) {
+          gart::path_tracer<E> tracer(exec);
+          tracer.find_first(by);
+          tracer.set_model(there.view(), c.model.sh_degree), tracer.set_scene(c.scene);
+          tracer.begin(view, {}, c.paths);
+          tracer.add(3);
+          sums[by == gart::first_hits::tiles] = tracer.sums().to_host();
+        }
+        CHECK(sums[0] == sums[1]);
+      }
+  }
+}
+
+// Samples of one pixel fill it: an edge through its middle is half of it.
+TEST_CASE_TEMPLATE("jitter fills the pixels", E, GART_TEST_POLICIES) {
+  E exec;
+  light::scene scene;
+  scene.meshes = {quad({10, 0, 4}, {10, 0, 0}, {0, 10, 0}, 0)};
+  scene.materials = {glowing(vec3(1.0f))};
+  gart::gaussian_model const none = cloud(1, 1, {0, 0, -5}, 0.1f);
+  light::path_options paths = through_middles(0);
+  paths.jitter = true;
+  for (float const k1 : {0.0f, 1e-6f}) {  // all pixels together, each by itself
+    gart::camera view = camera_at({0, 0, 0}, 9, 5, 20);
+    view.cx = 4.75f, view.lens.k1 = k1;  // the edge is at 4.75
+    auto const seen = picture(exec, none, scene, view, {}, paths, 64);
+    for (int y = 0; y < view.height; ++y)
+      for (int x = 0; x < view.width; ++x)
+        CHECK(double{seen[static_cast<std::size_t>(3 * (9 * y + x))]} == doctest::Approx(x < 4   ? 0.0
+                                                                                         : x > 4 ? 1.0
+                                                                                                 : 0.25)
+                                                                             .epsilon(0.03)
+                                                                             .scale(1.0));
+  }
+}
+
 #if !defined(GART_TEST_CUDA)
 TEST_CASE("policies of hosts draw the same bits") {
   gart::serial_exec serial;

@@ -10,22 +10,30 @@
 ///   tracer.begin(view, options, paths);
 ///   tracer.add(16);
 ///
+/// Where all rays of a sample have one centre and no lens bends them, a sample's jitter is one for all pixels: the
+/// image of a pinhole whose principal point is moved. Devices then find the hits of first segments by tiles
+/// (trace/tile_tracer.hpp), which are the same as those by the tree.
+///
 /// Gaussians alone, without jitter, give the colours of the renderers, bit for bit. Of one seed every policy draws the
 /// same numbers; what follows from them is the same bits on hosts, and on a device compiled with -fmad=false.
 ///
 /// Samples that are not finite count as black, so that one broken texel or Gaussian does not spoil its pixel.
 ///
 /// Memory: the tree over the Gaussians and 64 bytes each, 12 more for shadows per Gaussian; 150 bytes a triangle; 150
-/// bytes a pixel. Cost of a sample: a walk through triangles and one through Gaussians a segment, and the same a light
-/// at each rough surface.
+/// bytes a pixel; the lists of tiles. Cost of a sample: a walk through triangles and one through Gaussians a segment,
+/// and the same a light at each rough surface.
 /// Errors: invalid_argument for a camera, options or a scene that nothing can be traced by, and for calls out of order.
 
 #include <gart/light/path_kernels.hpp>
 #include <gart/light/placed_scene.hpp>
 #include <gart/math/turn.hpp>
 #include <gart/render/frame.hpp>
+#include <gart/trace/tile_tracer.hpp>
 
 namespace gart { inline namespace GART_ISA {
+
+/// By what first segments find their hits, where both can.
+enum class first_hits { tree, tiles };
 
 /// Traces paths for one picture at a time.
 template <execution E, class Response = generalized_gaussian<>>
@@ -35,6 +43,7 @@ class path_tracer {
   explicit path_tracer(E& exec)
       : exec_(&exec),
         beams_(exec),
+        tiles_(exec),
         placed_(exec),
         index_(exec),
         gaussians_(exec),
@@ -65,6 +74,9 @@ class path_tracer {
     samples_ = pixels_ = 0;
   }
 
+  /// The same hits, in another time: of pictures that are begun from here on.
+  void find_first(first_hits by) { first_ = by, samples_ = pixels_ = 0; }
+
   /// A picture anew.
   void begin(camera const& view, render_options const& options, light::path_options const& paths) {
     if (!has_model_) throw invalid_argument("path_tracer.begin: there are no Gaussians; call set_model first");
@@ -83,6 +95,8 @@ class path_tracer {
     samples_ = 0;
     paths_.resize(rays_), ends_.resize(rays_), sums_.resize(std::size_t{3} * pixels_);
     sums_.zero();
+    is_pinhole_ = view.kind == camera_kind::perspective && view.shutter == shutter_kind::global && !view.lens.any() &&
+                  paths.aperture == 0 && paths.blur == 0;
   }
   /// So many samples more a pixel.
   void add(int samples) {
@@ -163,8 +177,15 @@ class path_tracer {
   }
 
   // Each sample is of one moment: their moments fill the exposure evenly.
-  void cast(u32 sample, bool jitter, float aperture, float blur) {
+  // The camera by which.
+  camera cast(u32 sample, bool jitter, float aperture, float blur) {
     camera view = view_;
+    bool const together = jitter && is_pinhole_;
+    if (together) {
+      vec2 const at = light_kernels::draws::of(paths_options_.seed, light_kernels::path::no_pixel, sample)
+                          .pair(0, light_kernels::draw_pixel);
+      view.cx += 0.5f - at.x, view.cy += 0.5f - at.y;
+    }
     double const time = (double{light_kernels::unit_interval(light_kernels::reversed(sample))} - 0.5) * double{blur};
     mat3d const rotation(view.rotation);
     vec3 const moved(rotation * (time * vec3d(view.travel)));
@@ -175,8 +196,9 @@ class path_tracer {
     visit_camera(view, [&]<class M>(M const& model) {
       parallel_for(*exec_, "light/cast", rays_,
                    light_kernels::cast_paths<M>{model, order_, lens, options_.near, options_.background,
-                                                paths_options_.seed, sample, jitter, paths_.data()});
+                                                paths_options_.seed, sample, jitter && !together, paths_.data()});
     });
+    return view;
   }
   void end_segments() {
     parallel_for(*exec_, "light/triangles", rays_,
@@ -189,7 +211,9 @@ class path_tracer {
     // A path that catchers let pass goes on as it is, and comes to this many of them.
     u32 const steps = bounces + 1 + (placed_.catches_shadows() ? 4 : 0);
     u32 const lights = scene.light_count + (scene.around.texels ? 1 : 0);
-    cast(sample, o.jitter, o.aperture, o.blur);
+    camera const view = cast(sample, o.jitter, o.aperture, o.blur);
+    if (by_tiles() && (o.jitter || sample == 0))
+      tiles_.prepare(*exec_, model_, gaussians_, view, {options_.alpha_min, options_.near, 1, {}});
     for (u32 step = 0; step < steps; ++step) {
       end_segments();
       if (o.shadows == light::shadow_kind::per_hit)
@@ -212,20 +236,17 @@ class path_tracer {
                                           step});
     }
   }
+  bool by_tiles() const { return first_ == first_hits::tiles && is_pinhole_ && model_.count > 0; }
   template <bool PerHit>
   void blend(u32 sample, u32 step) {
-    trace_batch<Response>(*exec_, "light/gaussians", index_.seen_from(frame_), {gaussians_.data(), model_.count, 0.0f},
-                          rays_, beams_,
-                          light_kernels::segment<PerHit>{{},
-                                                         paths_.data(),
-                                                         ends_.data(),
-                                                         colors(),
-                                                         options_,
-                                                         placed_.stand_at(frame_),
-                                                         rule(),
-                                                         paths_options_.seed,
-                                                         sample,
-                                                         step});
+    light_kernels::segment<PerHit> const program{
+        {},     paths_.data(),       ends_.data(), colors(), options_, placed_.stand_at(frame_),
+        rule(), paths_options_.seed, sample,       step,     order_};
+    if (step == 0 && by_tiles())
+      tiles_.trace(*exec_, "light/gaussians", rays_, program);
+    else
+      trace_batch<Response>(*exec_, "light/gaussians", index_.seen_from(frame_),
+                            {gaussians_.data(), model_.count, 0.0f}, rays_, beams_, program);
   }
   void shadow(u32 light, u32 sample, u32 step) {
     shadows_.resize(rays_);
@@ -239,7 +260,10 @@ class path_tracer {
   }
 
   E* exec_;
-  ray_order<E> beams_;  // of no batch: paths stay in the order of their blocks
+  ray_order<E> beams_;                 // of no batch: paths stay in the order of their blocks
+  tile_tracer<E, 8, Response> tiles_;  // of first segments
+  first_hits first_ = E::device ? first_hits::tiles : first_hits::tree;
+  bool is_pinhole_ = false;
   light_kernels::placed_scene<E> placed_;
   gaussians_view<float const> model_;
   int active_degree_ = 0;

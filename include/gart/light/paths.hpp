@@ -83,8 +83,10 @@ struct segment : ray_program_base {
   shadow_rule rule;
   u64 seed;
   u32 sample, step;
+  pixel_order order;  // of the paths
 
   GART_HD bool active(index_t i) const { return paths[i].is(path::alive); }
+  GART_HD pixel at(index_t i) const { return order.at(i); }
   GART_HD float near(index_t i) const { return paths[i].near; }
   GART_HD float far(index_t i) const { return ends[i].t; }
   GART_HD state begin(index_t i) const {
