@@ -141,7 +141,7 @@ train_options of_trial(train_options options, validation_plan const& plan) {
 
 std::vector<candidate> default_candidates(capture_traits const& traits, train_options const& options) {
   std::vector<candidate> all;
-  all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }});
+  all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }, -2});
   if (!traits.panoramas) all.push_back({"vignetting", "on", [](train_options& o) { o.vignetting = true; }});
   all.push_back({"rates.sh_rest", "0.000125", [](train_options& o) { o.rates.sh_rest = 0.000125f; }});
   error_growth_options more = options.error;
@@ -234,7 +234,7 @@ validation validate(configuration_request const& request, train_options const& o
       std::vector<double> gains;
       for (std::size_t v = 0; v < psnr[i].size(); ++v) gains.push_back(psnr[i][v] - psnr[0][v]);
       tried.gain = mean(gains), tried.noise = standard_error(gains);
-      tried.taken = tried.is_better();
+      tried.taken = tried.is_better(c.least_noises);
       if (tried.taken) c.take(result.options);
     }
     result.trials.push_back(tried);

@@ -68,7 +68,7 @@ gart::train_options options() {
 }
 
 std::vector<gart::candidate> exposures() {
-  return {{"exposure", "on", [](gart::train_options& o) { o.exposure = true; }}};
+  return {gart::default_candidates({}, {}).front()};
 }
 
 }  // namespace
@@ -165,6 +165,10 @@ TEST_CASE("a gain counts above its noise and above a tie") {
   CHECK(!t.is_better());
   t.gain = -1;
   CHECK(!t.is_better());
+  t.noise = 0.6;
+  CHECK(t.is_better(-2));
+  t.noise = 0.4;
+  CHECK(!t.is_better(-2));
 }
 
 TEST_CASE("what changes nothing of a run is no candidate") {
