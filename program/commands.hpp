@@ -1,6 +1,6 @@
 #pragma once
 // The commands of the `gart` program. Each add_* adds one subcommand with its options and help to the app. When the
-// user names the subcommand, it sets `selected`. main runs that after it has parsed the whole command line, so no
+// user names the subcommand, it sets `selected`. main runs that after it has parsed the whole command line. So no
 // command starts work on a line with a mistake.
 //
 //   void add_thing(CLI::App& app, command& selected) {

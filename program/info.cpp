@@ -61,7 +61,7 @@ void print_links(int devices) {
 }
 #endif
 
-// The host and device of each rank, the same for two that share a GPU; empty where no launcher started ranks.
+// The host and device of each rank, the same for two that share a GPU. Empty where no launcher started ranks.
 std::vector<std::string> places_of_ranks() {
 #if defined(GART_WITH_MPI)
   if (gart::mpi_comm const* const all = ranks::comm()) {

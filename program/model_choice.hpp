@@ -10,7 +10,7 @@
 
 namespace gart_cli {
 
-// Finds models by their endings: those in the model's folder, and for a run's model those of the runs beside it.
+// Finds models by their endings, in the model's folder. For a run's model also those of the runs beside it.
 class model_choice {
  public:
   explicit model_choice(std::filesystem::path const& model);

@@ -1,6 +1,6 @@
 #pragma once
-// A command's progress on stderr. On a terminal one line is rewritten; else there is a line for each tenth of the work
-// or half minute.
+// A command's progress on stderr. On a terminal one line is rewritten. Else each tenth of the work, or half minute, has
+// a line.
 
 #include <chrono>
 #include <cstdint>

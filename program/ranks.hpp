@@ -25,7 +25,7 @@ class ranks {
 
   static bool const built;  // with MPI
 
-  // Replaces this process by MPI's launcher, which starts this command line as one rank for each of `gpus` GPUs of this
+  // Replaces this process by MPI's launcher. It starts this command line as one rank for each of `gpus` GPUs of this
   // host. Returns if `gpus` is 1, or if a launcher already started the ranks. usage_error where there are fewer GPUs,
   // or no launcher.
   static void launch_on(int gpus, char** argv);

@@ -43,8 +43,8 @@ struct render_arguments {
   bool depth = false, quiet = false;
 };
 
-// The times of the path's keyframes, from 0 on, where each in the file has a "time" in seconds, as the viewer saves it.
-// A closed path ends one mean interval after the last.
+// The times of the path's keyframes, from 0 on. Each in the file has a "time" in seconds, as the viewer saves it. A
+// closed path ends one mean interval after the last.
 std::vector<double> times_of(fs::path const& keyframes, bool closed) {
   std::ifstream file(keyframes);
   nlohmann::json const all = nlohmann::json::parse(file, nullptr, false);
@@ -86,7 +86,7 @@ std::vector<gart::named_camera> cameras_of(render_arguments const& a) {
   return cameras;
 }
 
-// With a scene that names its models the one file is that of the cameras; so is a folder or a list of them.
+// With a scene that names its models the one file is that of the cameras. So is a folder or a list of them.
 void settle_files(render_arguments& a) {
   if (a.scene.file.empty()) {
     a.scene.require_none(a.model, "render");

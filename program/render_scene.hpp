@@ -1,6 +1,5 @@
 #pragma once
-// What `gart render --scene` and `gart view --scene` share: a scene with its Gaussians, and its pictures by paths of
-// light.
+// What `gart render --scene` and `gart view --scene` share: a scene with its Gaussians, and pictures by paths.
 
 #include "options.hpp"
 

@@ -31,7 +31,7 @@ std::string background_of_run(std::filesystem::path const& model);
 // The unfinished files of a killed run, in the folder and its renders/. For who holds the folder's lock.
 void remove_temporary_files(std::filesystem::path const& folder);
 
-// The files that a run leaves at its end: metrics, the report, the test views' poses and the images of renders/.
+// A run's files from its end: metrics, the report, the test views' poses and the images of renders/.
 void remove_results(std::filesystem::path const& folder);
 // Removes the intermediate files too: model, exposures, poses, checkpoint and history. config.json stays, so that the
 // folder is always known as gart's.

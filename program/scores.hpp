@@ -9,8 +9,8 @@
 
 namespace gart_cli {
 
-// "psnr", "ssim", "psnr_affine_colour" and "views", with exposures "psnr_own_colours", and where views were placed at
-// other poses "psnr_capture_poses"; null for a missing number.
+// "psnr", "ssim", "psnr_affine_colour" and "views". With exposures "psnr_own_colours", and where views were placed at
+// other poses "psnr_capture_poses". A missing number is null.
 nlohmann::json to_json(gart::scores const& result);
 // "test_views" and the scores of the test views. "training_scores": those of the training views that were rendered for
 // comparison, with their number, "scored_views", of "train_views".

@@ -1,8 +1,8 @@
 #pragma once
 // Fuses depth maps to a mesh. A sparse grid of OpenVDB holds a truncated signed distance, averaged in each voxel over
-// its rays (Curless and Levoy, "A volumetric method for building complex models from range images", SIGGRAPH 1996). The
-// mesh is its zero surface. Behind a surface, where others may see another, a ray counts the less the farther it goes.
-// Space that no ray has passed has no surface.
+// its rays. That is Curless and Levoy, "A volumetric method for building complex models from range images", SIGGRAPH
+// 1996. The mesh is its zero surface. Behind a surface, where others may see another, a ray counts the less the farther
+// it goes. Space that no ray has passed has no surface.
 
 #include "mesh_depth.hpp"
 

@@ -1,5 +1,5 @@
 #pragma once
-// The course of a training run, for the curves of its report: a few hundred points for any number of steps.
+// The course of a training run, for the curves of its report. Any number of steps gives a few hundred points.
 // history.json beside the checkpoint keeps it, so a resumed run has the whole curve.
 
 #include <gart/runtime/session.hpp>

@@ -61,7 +61,7 @@ void prepare_folder(fs::path const& out) {
   for (char const* split : {"train", "test"}) fs::remove(out / (std::string("transforms_") + split + ".json"), failed);
 }
 
-// Turns about one of its own axes, row by row, and travels as far as half that angle is at the scene.
+// Turns about one of its own axes, row by row. It travels as far as half that angle is at the scene.
 gart::camera while_moving(gart::camera const& view, double degrees, u64 seed) {
   auto const random = [&](u64 k) { return unit_float(static_cast<u32>(hash(seed, k))); };
   double const angle = degrees * std::numbers::pi / 180, about = 2 * std::numbers::pi * random(0),

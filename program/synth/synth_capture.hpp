@@ -48,8 +48,8 @@ inline constexpr synth_limits synth_views{1, 10000}, synth_size{8, 4096}, synth_
 // Cameras over the upper hemisphere, all looking at the origin: a Fibonacci spiral, the test views between its turns.
 std::vector<gart::camera> synth_cameras(int count, int size, bool test);
 
-// Errors: invalid_argument for an option out of its range, unsupported without Embree, io_error for a folder that
-// cannot be written or that holds something other than an earlier capture of gart's own.
+// Errors: invalid_argument for an option out of its range, unsupported without Embree. io_error for a folder that
+// cannot be written, or that holds anything but an earlier capture of gart's own.
 void write_synth_capture(synth_options const& options, std::function<void(int done, int total)> const& progress = {});
 
 }  // namespace gart_cli

@@ -33,7 +33,7 @@ struct synth_hit {
 class embree_scene {
  public:
   explicit embree_scene(synth_scene const& meshes) {
-    // One thread builds, so that equal inputs give equal trees and a ray along a shared edge always the same triangle.
+    // One thread builds. So equal inputs give equal trees, and a ray along a shared edge always the same triangle.
     device_.reset(rtcNewDevice("threads=1"));
     if (!device_) throw gart::error("Embree did not start: error " + std::to_string(rtcGetDeviceError(nullptr)));
     scene_.reset(rtcNewScene(device_.get()));

@@ -1,6 +1,7 @@
 #pragma once
-// Random numbers of `gart synth` that depend only on their indices, so images are the same for any number of threads:
-// an integer hash, and Owen-scrambled Sobol pairs (B. Burley, "Practical Hash-based Owen Scrambling", JCGT 2020).
+// Random numbers of `gart synth` that depend only on their indices, so images are the same for any number of threads.
+// They are an integer hash, and Owen-scrambled Sobol pairs (B. Burley, "Practical Hash-based Owen Scrambling", JCGT
+// 2020).
 
 #include <gart/core/types.hpp>
 #include <gart/math/glm.hpp>
@@ -29,7 +30,7 @@ inline u32 reverse_bits(u32 x) {
   return ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
 }
 
-// A nested uniform scramble in base 2: every bit is flipped by a hash of the bits above it (Laine and Karras 2011).
+// A nested uniform scramble in base 2 (Laine and Karras 2011). Every bit is flipped by a hash of the bits above it.
 inline u32 owen_scramble(u32 x, u32 seed) {
   x = reverse_bits(x);
   x += seed;

@@ -88,8 +88,8 @@ vec3 steel(vec3, vec2) { return {0.62f, 0.63f, 0.66f}; }
 
 using surface = std::function<vec3(float u, float v)>;
 
-// Adds the surface over [0, 1]^2 as a grid of nu x nv cells. Normals come from differences of the formula, taken a
-// little inside the border so that a pole, where one side vanishes, has one too.
+// Adds the surface over [0, 1]^2 as a grid of nu x nv cells. Normals come from differences of the formula. These are
+// taken a little inside the border: so a pole, where one side vanishes, has one too.
 void add_surface(synth_mesh& mesh, int nu, int nv, surface const& f) {
   u32 const first = static_cast<u32>(mesh.position.size());
   for (int j = 0; j <= nv; ++j)

@@ -1,8 +1,8 @@
 #pragma once
 // The scene of `gart synth`: triangle meshes made by formula, with procedural colours. A capture so needs no other
-// file, and its true scene has no Gaussians. A still life on a disc: a glazed vase with thin leaves, a torus knot, a
-// rounded box with a wire coil, a copper ball in thin brass rings. Units are those of NeRF-Synthetic: everything lies
-// within 1.3 of the origin, z up.
+// file, and its true scene has no Gaussians. A still life on a disc: a glazed vase with thin leaves, and a torus knot.
+// Beside them a rounded box with a wire coil, and a copper ball in thin brass rings. Units are those of NeRF-Synthetic:
+// everything lies within 1.3 of the origin, z up.
 
 #include <gart/core/names.hpp>
 #include <gart/core/types.hpp>
@@ -36,7 +36,7 @@ struct synth_mesh {
 
 using synth_scene = std::vector<synth_mesh>;
 
-// A mirror that stands in the scene: upright at the disc's edge, or a ball in the place of the copper one.
+// A mirror in the scene: upright at the disc's edge, or a ball in place of the copper one.
 enum class synth_mirror { none, plane, ball };
 constexpr auto names_of(synth_mirror) {
   using enum synth_mirror;

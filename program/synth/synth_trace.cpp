@@ -136,7 +136,8 @@ struct synth_renderer::implementation {
     return p;
   }
 
-  // Light of one point of the lamp that the surface reflects to `out`, a unit vector in the frame of its normal.
+  // Light of one point of the lamp that the surface reflects to `out`. That is a unit vector in the frame of its
+  // normal.
   vec3 from_lamp(surface_point const& p, frame const& basis, vec3 out, float fresnel, vec2 u) const {
     vec2 const d = light.radius * unit_disc(u);
     vec3 to_light = light.center + light.axes.x * d.x + light.axes.y * d.y - p.position;
@@ -157,8 +158,8 @@ struct synth_renderer::implementation {
     return light.radiance * reflectance * (in.z * there * pi * light.radius * light.radius / distance2);
   }
 
-  // False where the camera's ray meets nothing. The lamp is reached by sampling the lamp alone: all lobes are wider
-  // than it, and rays that bounce pass through it.
+  // False where the camera's ray meets nothing. The lamp is reached by sampling the lamp alone, since all lobes are
+  // wider. Rays that bounce pass through it.
   bool radiance(vec3 origin, vec3 direction, sample_sequence& random, vec3& result) const {
     vec3 weight(1.0f);
     result = vec3(0.0f);

@@ -28,7 +28,7 @@ class synth_renderer {
   // Distances along the rays through the middles of the pixels; 0 where one meets nothing.
   gart::image_float distances(gart::camera const& view) const;
 
-  // Points on the surfaces, as structure from motion would find: each is seen by at least one camera, and has the
+  // Points on the surfaces, as structure from motion would find. Each is seen by at least one camera, and has the
   // colour that this camera sees.
   gart::point_cloud points(std::vector<gart::camera> const& cameras, std::size_t count, u64 seed) const;
 

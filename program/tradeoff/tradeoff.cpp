@@ -198,7 +198,7 @@ class tradeoff_run {
   static constexpr char const* processor = "processor";
 
   // Milliseconds of every stage, and of the processor, repeat by repeat. A refitted tree is timed over whole intervals
-  // between builds, while the Gaussians move; in the end they are back in place.
+  // between builds, while the Gaussians move. In the end they are back in place.
   std::map<std::string, std::vector<double>> time(gart::renderer& renderer, setting const& s,
                                                   gart::gaussian_model const& model, gart::camera const& view,
                                                   gart::image_float const& gradient) {

@@ -48,7 +48,8 @@ bool is_camera_list(fs::path const& path) {
   return fs::is_regular_file(path, ignored) && path.extension() == ".json" && read_json(path).is_array();
 }
 
-// Where pixel `i` of `to` lies between two pixels of `from`: the first, the second, and the share of the second.
+// Where pixel `i` of `to` lies between two pixels of `from`. They are the first and the second, with the share of the
+// second.
 struct place {
   int first, second;
   float share;

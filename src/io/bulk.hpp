@@ -39,8 +39,8 @@ struct bulk {
 inline constexpr double far_reach = 256;
 bulk bulk_of(gaussian_model const& model);
 
-// Strays, along the line to the middle, to the distance of `reach` halves; as much smaller, they look the same from
-// there. How many they were.
+// Moves strays along the line to the middle, to the distance of `reach` halves. As much smaller, they look the same
+// from there. Returns their number.
 std::size_t draw_in_strays(gaussian_model& model, double reach);
 
 }  // namespace gart::io

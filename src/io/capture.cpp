@@ -130,7 +130,7 @@ std::optional<colmap_place> colmap_in(fs::path const& folder) {
   return std::nullopt;
 }
 
-// COLMAP numbers the parts that it could not join: takes the part with most images, and a note about the others.
+// COLMAP numbers the parts that it could not join. Takes the part with most images, and notes the others.
 std::optional<colmap_place> largest_colmap_below(fs::path const& sparse, std::vector<std::string>& notes) {
   std::error_code code;
   std::vector<fs::path> folders;

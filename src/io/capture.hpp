@@ -66,8 +66,7 @@ void find_photos(capture& c);
 // Masks in a folder `masks` beside that of the photos, where the files of the capture name none.
 void find_masks(capture& c);
 
-// The place of a kind of maps: a folder of that name beside the folder of photos, then the photo's path within the
-// latter.
+// The place of a kind of maps: a folder of that name beside the photos', then the photo's path within its own.
 struct place_beside {
   std::filesystem::path folder, below;
 };
@@ -90,7 +89,7 @@ struct pose_error : io_error {
 // Sizes and intrinsics that can be traced, a finite pose; `where` names the file and the camera in errors.
 void check_camera(camera const& view, std::string const& where);
 
-// Sets the pose from columns that must be the axes of a right-handed frame, up to one scale common to all.
+// Sets the pose from columns. These must be the axes of a right-handed frame, up to one scale common to all.
 void set_pose(camera& view, mat3d const& camera_to_world, vec3d const& center, std::string const& where);
 
 // Names that are fit for files and differ from each other: folders flattened, extensions dropped.

@@ -13,7 +13,7 @@ namespace gart::io {
 class codebook {
  public:
   explicit codebook(std::vector<float> const& values);
-  // Numbers a step apart, with 0 among them, if 256 of them reach from the least to the greatest value; else as above.
+  // Numbers a step apart, with 0 among them, if 256 of them reach from the least to the greatest value. Else as above.
   // They compress better, since middle numbers are more frequent.
   static codebook even(std::vector<float> const& values, double step);
   u8 nearest(float value) const;
@@ -32,8 +32,8 @@ struct palette {
 };
 
 // At most `count` rows near the given ones [n][width], nearer for larger weights [n]. The set with the largest squared
-// error is halved at its mean, along its most varied column, until there are `count` sets. A few rounds of k-means
-// follow. For many rows the search for the nearest mean keeps to a branch of the sets, so it takes seconds.
+// error is halved at its mean, along its most varied column. So on until there are `count` sets. A few rounds of
+// k-means follow. For many rows the search for the nearest mean keeps to a branch of the sets, so it takes seconds.
 palette shared_rows(std::vector<float> const& rows, std::vector<float> const& weights, std::size_t width,
                     std::size_t count);
 

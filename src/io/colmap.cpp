@@ -239,7 +239,7 @@ fs::path photo_folder_of(fs::path const& model, std::vector<pose> const& poses) 
   return best;
 }
 
-// The points of a model: beside it as its own format, as the other, or as the PLY that other programs leave.
+// The points of a model, beside it: in its own format, the other, or the PLY that other programs leave.
 exact_points points_of(fs::path const& folder, bool text, std::vector<std::string>& notes) {
   std::error_code ignored;
   for (bool const kind : {text, !text}) {

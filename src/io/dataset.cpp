@@ -125,7 +125,7 @@ void measure_extent(dataset& data) {
   }
 }
 
-// The box around the point nearest to all view axes: the minimum of sum |(I - d d^T)(x - p)|^2, by Cramer's rule.
+// The box around the point nearest to all view axes. By Cramer's rule: the minimum of sum |(I - d d^T)(x - p)|^2.
 void measure_bounds(dataset& data) {
   std::vector<camera const*> cameras;
   for (auto const* views : {&data.train, &data.test}) {

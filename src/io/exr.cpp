@@ -55,7 +55,8 @@ std::string header_of(image_float const& image, std::string_view channels, std::
   return out;
 }
 
-// The even bytes, then the odd ones, each as its difference from the one before: alike bytes of floats stand together.
+// The even bytes, then the odd ones, each as its difference from the one before. So alike bytes of floats stand
+// together.
 std::vector<u8> predicted(std::string const& raw) {
   std::vector<u8> out(raw.size());
   std::size_t const half = (raw.size() + 1) / 2;

@@ -29,8 +29,8 @@ class file_names {
     std::filesystem::path file;  // empty: none, or several alike
     bool as_named = false;       // but for an extension that the name lacks
   };
-  // The file of that name. Else one whose name differs by case, by a photo's extension, by folders before it, or by
-  // another folder of photos.
+  // The file of that name. Else one whose name differs by case, a photo's extension, folders before it, or another
+  // folder of photos.
   match find(std::string const& name);
 
   std::filesystem::path const& folder() const { return folder_; }

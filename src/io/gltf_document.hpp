@@ -1,7 +1,7 @@
 #pragma once
-// What readers of glTF 2.0 share (https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html): a file's JSON and its
-// buffers, within a GLB, in the JSON as base64, or beside it; the numbers of accessors. A wrong type in the JSON is an
-// exception of its library; readers make it an error of the file.
+// What readers of glTF 2.0 share (https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html). That is a file's JSON,
+// and its buffers within a GLB, in the JSON as base64, or beside it. Also the nodes of its scene, and the numbers of
+// accessors. A wrong type in the JSON is an exception of its library; readers make it an error of the file.
 
 #include <gart/core/error.hpp>
 #include <gart/core/types.hpp>

@@ -110,8 +110,8 @@ inline void read_pose(record const& r, char const* key, bool opengl_axes, camera
   set_pose(view, axes, center, r.where);
 }
 
-// Where 'shutter_type' names a rolling one, `view` has the pose of the first line and `key` that of the last: sets the
-// motion. The view's size must be known.
+// Sets the motion where 'shutter_type' names a rolling one: `view` has the first line's pose, `key` the last's. The
+// view's size must be known.
 void read_shutter(record const& r, char const* key, bool opengl_axes, camera& view);
 
 // The model that 'camera_model' names; refuses one that is not traced.

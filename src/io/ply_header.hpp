@@ -70,8 +70,7 @@ inline void require_room(ply_file const& file, element const& e, u64 left) {
 }
 
 ply_file open(std::filesystem::path const& path);
-// Reads the header and the owners' vertices of `total` in the file; all vertices if their places are unknown without
-// reading.
+// Reads the header and the owners' vertices of `total` in the file. Reads all vertices if their places are unknown.
 ply_file open_rows(std::filesystem::path const& path, row_owners const& owners, u64& total);
 
 // The first lines of a binary splat file of these traits, as comments. invalid_argument for one that is no line.

@@ -30,7 +30,7 @@ light::scene read_obj_scene(std::filesystem::path const& path, mesh_place const&
 light::scene read_ply_scene(std::filesystem::path const& path, mesh_place const& place,
                             std::vector<std::string>& notes);
 
-// From -1 to 1 in each axis that they have, +y up: a sphere, a box, a plane that faces up, a torus about y.
+// From -1 to 1 in each axis that they have, +y up. The plane faces up, the torus is about y.
 inline constexpr char const* shape_names[] = {"sphere", "box", "plane", "torus"};
 raw_mesh shape_named(std::string_view name);
 

@@ -1,5 +1,5 @@
 // SPZ, versions 1 to 4 read, 4 written, and 2 for GLB. Streams of fixed-point numbers. The first three versions have
-// them one after the other in a gzip file, the fourth each in a frame of zstd. Axes: x right, y up, z back.
+// them one after the other in a gzip file. The fourth has each in a frame of zstd. Axes: x right, y up, z back.
 // https://github.com/nianticlabs/spz
 
 #include "spz.hpp"

@@ -1,6 +1,5 @@
 #pragma once
-// The parts that readers of meshes share: where a file's triangles are placed, which can be traced, and their images as
-// textures.
+// What readers of meshes share: where a file's triangles stand, which can be traced, and images as textures.
 
 #include <gart/light/scene.hpp>
 #include <gart/math/glm.hpp>
@@ -37,8 +36,8 @@ struct mesh_place {
   placing where;
   vec3d origin{0.0};
 };
-// Adds it to the meshes. Triangles with a corner that is not finite or further than 1e15 away, and those without an
-// area, are left out. A note counts them, and meshes without any left. Corners must be vertices.
+// Adds it to the meshes. Triangles without an area are left out. So are those with a corner that is not finite or
+// further than 1e15 away. A note counts them, and meshes without any left. Corners must be vertices.
 void add_placed(light::scene& to, raw_mesh const& raw, mesh_place const& place, std::string const& file,
                 std::vector<std::string>& notes);
 // io_error, naming `file` and the last note, if there is no mesh.

@@ -9,7 +9,8 @@ namespace gart::io {
 
 namespace {
 
-// Where each camera stands around the mean of all, as the angle to the first: about the mean of their upward axes.
+// Where each camera stands around the mean of all, as the angle to the first. The axis is the mean of their upward
+// axes.
 std::vector<double> angles_around(std::vector<frame> const& frames) {
   vec3d middle(0.0), up(0.0);
   for (frame const& f : frames) {
@@ -28,7 +29,7 @@ std::vector<double> angles_around(std::vector<frame> const& frames) {
   return angles;
 }
 
-// The cameras on both sides of the first by name: a part of the scene that training sees from elsewhere alone.
+// The cameras on both sides of the first by name: training sees this part of the scene from elsewhere alone.
 std::string split_sector(std::vector<frame>& frames, int test_every) {
   std::vector<double> const angle = angles_around(frames);
   std::vector<std::size_t> order(frames.size());

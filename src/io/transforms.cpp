@@ -58,7 +58,7 @@ void read_lens(record const& r, frame& f) {
   if (r.has("w")) f.set_size(r.size("w"), r.size("h"));
 }
 
-// A map's settings, of a frame or the whole file: the file, the length of a step, and the measured quantity.
+// A map's settings, of a frame or all: the file, the length of a step, and the measured quantity.
 void read_depth_fields(record const& r, fs::path const& folder, frame& f) {
   if (r.own.contains("depth_file_path") && !r.own["depth_file_path"].is_null())
     f.depth = from_text(folder, r.text("depth_file_path"));

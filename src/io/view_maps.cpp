@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// The map of a photo in the folder `depths` beside that of the photos; the PNG's path if there is none.
+// A photo's map in the folder `depths` beside that of the photos. The PNG's path if there is none.
 fs::path depth_beside(fs::path const& photo) {
   auto const [folder, below] = beside_photos(photo, "depths");
   file_names maps(folder, {".png", ".npy"});

@@ -51,8 +51,8 @@ double mean_square(image_float const& image) {
   return sum / static_cast<double>(image.data.size());
 }
 
-// A ray of a grid over the image, in the camera's axes, and the sphere's directions that are dual to a pixel to the
-// right and one down.
+// A ray of a grid over the image, in the camera's axes. `right` and `down` are the sphere's directions that are dual to
+// a pixel to the right and one down.
 struct grid_ray {
   int x, y;
   vec3d direction, right, down;

@@ -112,9 +112,9 @@ void run_trials(validation_plan const& plan, validation_progress const& progress
 }
 
 // A trial's options: as many Gaussians a pixel as in the run, and all counts of steps shortened alike. Short runs raise
-// the rate of the bands above the first like those of geometry (optim/schedule.hpp), at most to the first band's.
-// Otherwise a fast rate would seem to pay. A step has one view, without learned poses or depth: held-out views have no
-// learned pose, and shrunk ones no depth map.
+// the rate of the bands above the first like those of geometry (optim/schedule.hpp). They raise it at most to the first
+// band's. Otherwise a fast rate would seem to pay. A step has one view, without learned poses or depth. Held-out views
+// have no learned pose, and shrunk ones no depth map.
 train_options of_trial(train_options options, validation_plan const& plan) {
   int const area = plan.shrink * plan.shrink;
   double const shorter = static_cast<double>(plan.steps) / options.iterations;

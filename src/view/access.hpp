@@ -20,8 +20,8 @@ struct request_path {
 
 class access {
  public:
-  // `hosts` are the names by which this machine may be called at the port where it listens; `allowed` are others, of
-  // containers and proxies that pass requests on: at any port where they name none, and through https too.
+  // `hosts` are the names by which this machine may be called at the port where it listens. `allowed` are others, of
+  // containers and proxies that pass requests on. These are at any port where they name none, and through https too.
   access(std::vector<std::string> hosts, std::vector<std::string> allowed, int port);
 
   request_path path_of(std::string_view path) const;

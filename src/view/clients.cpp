@@ -174,8 +174,8 @@ int clients::moving(double now) const {
   return n;
 }
 
-// Single requests come first, then moving views, then views at rest, which take longer, then their further samples, and
-// files last.
+// Single requests come first, then moving views, then views at rest, which take longer. Their further samples follow,
+// and files are last.
 std::optional<job> clients::job_of(int id, client& c, double now, int urgency) {
   if (urgency == 0) {
     if (c.texts.size() >= answers_most) return {};

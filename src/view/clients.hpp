@@ -1,6 +1,6 @@
 #pragma once
-// The state that the thread of the sockets shares with the one that renders: each client's newest wanted view, and the
-// data waiting to be sent to it. All calls may come from any thread; times are seconds of one clock.
+// The state that the thread of the sockets shares with the one that renders. Each client has its newest wanted view,
+// and the data waiting to be sent to it. All calls may come from any thread; times are seconds of one clock.
 
 #include <gart/view/message.hpp>
 #include <gart/view/pacing.hpp>

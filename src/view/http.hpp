@@ -28,7 +28,7 @@ struct http_request {
 enum class head_state { unfinished, whole, wrong };
 
 // Takes a request's head off the front of what came, once it is all there. Wrong: no HTTP/1, too long, two hosts or
-// origins, or a body that is no POST's or of no known length.
+// origins, a body of no POST or of unknown length.
 head_state take_request(std::string& came, http_request& to);
 
 // The head of an answer: "HTTP/1.1 200 OK" and its headers, one a line, "Name: value".

@@ -32,8 +32,8 @@ constexpr char const* protocol_name = "gart-view";
 constexpr int send_buffer = 256 * 1024;
 // Connections that are no viewers: the one that was longest of no use makes room for the next.
 constexpr std::size_t requests_most = 64;
-// Limits in seconds: a request's head and each part of its answer; a silent viewer until it is asked, and until it is
-// closed; a viewer that reads nothing; a close.
+// Limits in seconds: a request's head and each part of its answer; a silent viewer until it is asked; until it is
+// closed. Then a viewer that reads nothing, and a close.
 constexpr double request_seconds = 15, ping_seconds = 20, unheard_seconds = 60, stalled_seconds = 30, close_seconds = 2;
 constexpr int tick_ms = 250;
 
@@ -267,7 +267,7 @@ struct sockets::state {
     if (all.overflows(c.client)) close(c, ws::policy_violation, "nothing of what was sent is read");
   }
 
-  // Sends what the system takes now; a viewer that has it all is given its next text or its newest frame.
+  // Sends what the system takes now. A viewer that has it all is given its next text or its newest frame.
   void send(connection& c) const {
     while (c.now == connection::open || c.now == connection::closing) {
       if (c.out.empty() && !fill(c)) break;
@@ -363,7 +363,7 @@ struct sockets::state {
 
   void serve() {
     while (!ends) turn(tick_ms);
-    // Waits a moment until clients take the remaining data and answer the close: the system would withdraw the last
+    // Waits a moment until clients take the remaining data and answer the close. The system would withdraw the last
     // message if answers stayed unread.
     all.send_all(bye_text(all.why_it_ends()));
     double const until = seconds_now() + close_seconds;

@@ -10,11 +10,11 @@
 ///   trainer<cuda_exec, traits, tracer, primitive_method, nccl_comm> run(exec, options, data, start, all);
 ///
 /// NCCL wants a GPU for each rank. Where two ranks share a device, all messages go through pinned host memory and MPI
-/// (`transport` says so): correct, but slow. A rank's messages to itself are copies. Messages contain no sums, so both
-/// transports give the same bits.
+/// (`transport` says so). That is correct, but slow. A rank's messages to itself are copies. Messages contain no sums,
+/// so both transports give the same bits.
 ///
 /// Memory: NCCL's buffers, some hundred MB of each device; by the host, pinned memory for one group of messages.
-/// Errors: invalid_argument for a rank that does not exist, or a transport that is not available; gart::error with
+/// Errors: invalid_argument for a rank that does not exist, or a transport that is not available. gart::error with
 /// NCCL's own words. NCCL's environment variables hold. Multicast (NCCL_NVLS_ENABLE) is off by default: it serves sums,
 /// which are not used here.
 

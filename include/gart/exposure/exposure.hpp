@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// The exposure of a photograph relative to the scene's colours: x' = M x + b on the composited colour, with a 3 x 3
-/// matrix M, as in 3DGS. Cameras with automatic exposure and white balance take neighbouring photographs of different
-/// brightness. Gaussians alone can only learn that as haze in front of the cameras.
+/// The exposure of a photograph relative to the scene's colours. It is x' = M x + b on the composited colour, with a 3
+/// x 3 matrix M, as in 3DGS. Cameras with automatic exposure and white balance take neighbouring photographs of
+/// different brightness. Gaussians alone can only learn that as haze in front of the cameras.
 
 #include <gart/core/macros.hpp>
 #include <gart/math/arith.hpp>

@@ -30,7 +30,7 @@ camera_fields fields_of(camera const& view);
 /// "GLOBAL", "ROLLING_TOP_TO_BOTTOM" and so on, the names in files.
 std::string shutter_type_of(camera const& view);
 
-/// The same pose and height through another camera, given by COLMAP's name of its model and any parameters: "FISHEYE",
+/// The same pose and height through another camera: COLMAP's name of its model, and any parameters. As "FISHEYE",
 /// "OPENCV_FISHEYE,k1=0.02,fx=90", "EQUIRECTANGULAR". Without focal lengths `angle` counts: the degrees across the
 /// image's shorter side. Its default is 180 for models that can see that, else 60. Parallel rays take `extent`, the
 /// world units across that side. The sphere is twice as wide as high. Errors: unsupported; invalid_argument for text

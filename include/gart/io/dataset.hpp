@@ -2,16 +2,16 @@
 /// \file
 /// A capture in host memory: views with cameras and 8-bit images, a split, starting points where the files have them.
 ///
-/// load_dataset recognises, in a folder or by the file named: COLMAP (sparse/0 or its larger neighbour, sparse, the
-/// same below colmap, or the folder itself, .bin before .txt; photos in images/, images_N/ or input/), Blender
-/// (transforms_train.json and transforms_test.json, points3d.ply where it is there), nerfstudio / instant-ngp
-/// (transforms.json). A folder that holds COLMAP and transforms.json is read as COLMAP. Photos are found although names
-/// differ in case, slashes, extension or folders; masks lie in a folder masks beside them (docs/formats.md). Survey
-/// coordinates count from an origin among the cameras (io/origin.hpp). Images are decoded in parallel and kept as 8
-/// bits: width * height * channels bytes each. Frames without a photo or with an invalid pose are left out with a note.
-/// So are points that are not finite, and points in a camera's centre. Errors: io_error naming the file, the field and
-/// the remedy; unsupported, naming the model, for a camera that gart does not trace; invalid_argument for an option out
-/// of its range.
+/// load_dataset recognises, in a folder or by the file named: COLMAP, Blender, and nerfstudio / instant-ngp. COLMAP:
+/// sparse/0 or its larger neighbour, sparse, the same below colmap, or the folder itself. Of its files .bin goes before
+/// .txt; photos are in images/, images_N/ or input/. Blender: transforms_train.json and transforms_test.json, and
+/// points3d.ply where there is one. nerfstudio: transforms.json. A folder that holds COLMAP and transforms.json is read
+/// as COLMAP. Photos are found although names differ in case, slashes, extension or folders. Masks lie in a folder
+/// masks beside them (docs/formats.md). Survey coordinates count from an origin among the cameras (io/origin.hpp).
+/// Images are decoded in parallel and kept as 8 bits: width * height * channels bytes each. Frames without a photo or
+/// with an invalid pose are left out with a note. So are points that are not finite, and points in a camera's centre.
+/// Errors: io_error naming the file, the field and the remedy. unsupported, naming the model, for a camera that gart
+/// does not trace. invalid_argument for an option out of its range.
 
 #include <gart/comm/host_group.hpp>
 #include <gart/core/names.hpp>
@@ -109,8 +109,8 @@ struct dataset_options {
 dataset load_dataset(std::filesystem::path const& path, dataset_options const& options = {});
 
 /// The camera of an image shrunk by dataset_options.downscale. A partial last block of pixels is cropped, so the scale
-/// is exactly 1 / factor. Errors: invalid_argument, naming `where`, for an empty result, or for a view of the whole
-/// sphere that the factor does not divide.
+/// is exactly 1 / factor. Errors: invalid_argument, naming `where`, for an empty result. The same for a view of the
+/// whole sphere that the factor does not divide.
 camera downscaled(camera const& c, int factor, std::string const& where);
 
 /// The cameras alone, from a dataset (all its views, test views first) or a camera JSON (io/camera_file.hpp);

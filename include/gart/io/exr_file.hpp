@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// Images of floats as OpenEXR files (https://openexr.com), as programs of compositing read them: one part of scan
-/// lines. Written as 32-bit floats, packed without loss (ZIP, 16 lines at a time); read of 16 or 32 bits, unpacked or
+/// lines. Written as 32-bit floats, packed without loss (ZIP, 16 lines at a time). Read of 16 or 32 bits, unpacked or
 /// packed by RLE, ZIPS or ZIP. Needs zlib, no other library.
 
 #include <gart/scene/image.hpp>
@@ -16,9 +16,9 @@ namespace gart {
 /// letters or an empty image, io_error for a file that cannot be written.
 void write_exr(std::filesystem::path const& path, image_float const& image, std::string_view channels);
 
-/// These channels of a file, in this order; of a file that has Y alone, Y for R, G and B. Numbers stay as they are, NaN
-/// too. Errors: io_error naming the file and the field, for a file that is damaged, tiled, deep, of several parts, of
-/// another compression, or without a channel.
+/// These channels of a file, in this order. A file that has Y alone gives Y for R, G and B. Numbers stay as they are,
+/// NaN too. Errors: io_error naming the file and the field, for a damaged file or one without a channel. Also for a
+/// tiled or deep one, one of several parts, or of another compression.
 image_float read_exr(std::filesystem::path const& path, std::string_view channels = "RGB");
 
 /// Linear RGB of all directions as EXR or Radiance HDR (RGBE), told by the first bytes. Values that are not finite or

@@ -9,9 +9,10 @@
 /// kernel_degree 2"). A model with the trait antialias also gets other programs' mark, "comment SplatRenderMode: mip".
 /// A file with that mark or "comment antialiased 1", and without gart's trait, is read as antialiased without a value.
 ///
-/// Errors: io_error naming the file, the property and the remedy, for a truncated body, a missing property, a count of
-/// f_rest that is no degree from 0 to 3, a 2D Gaussian file (no scale_2), a file of which no Gaussian can be used (with
-/// the first one's vertex and property); invalid_argument for a model whose arrays disagree in size.
+/// Errors: io_error naming the file, the property and the remedy. It is thrown for a truncated body, a missing
+/// property, and a count of f_rest that is no degree from 0 to 3. Also for a 2D Gaussian file (no scale_2), and where
+/// no Gaussian can be used (naming the first one's vertex and property). invalid_argument for a model whose arrays
+/// disagree in size.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/comm/shared_file.hpp>
@@ -36,7 +37,7 @@ bool is_splat_ply(std::filesystem::path const& path);
 /// is for messages. Memory: a few MB.
 void write_splat_ply_rows(shared_file& file, std::filesystem::path const& path, gaussian_model const& mine,
                           row_owners const& owners, u64 total, splat_traits const& traits = {});
-/// This rank's rows of a splat PLY, and how many Gaussians there are. Of a binary file no other rows are read; an ascii
+/// This rank's rows of a splat PLY, and how many Gaussians there are. Of a binary file no other rows are read. An ascii
 /// file, or one with lists before its vertices, is read whole.
 gaussian_model read_splat_ply_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
                                    splat_traits* traits = nullptr);

@@ -4,9 +4,9 @@
 /// glTF 2.0 (.gltf, .glb), OBJ with its MTL, and PLY. Files that one names lie beside it. glTF's +y goes up: meshes are
 /// turned from it to `up`. Others stand in the world's axes.
 ///
-/// Errors: io_error naming the file, the part, the field and the remedy: for damaged or missing parts, unknown fields,
-/// and extensions that gart does not have. Triangles without an area or with corners that are not finite are left out,
-/// and said in a note. Memory is taken only for counts whose bytes the file has.
+/// Errors: io_error naming the file, the part, the field and the remedy. It is thrown for damaged or missing parts,
+/// unknown fields, and extensions that gart does not have. Triangles without an area or with corners that are not
+/// finite are left out, and said in a note. Memory is taken only for counts whose bytes the file has.
 
 #include <gart/light/path_options.hpp>
 #include <gart/light/scene.hpp>

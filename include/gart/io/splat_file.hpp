@@ -6,10 +6,10 @@
 /// Every model is in the axes of a splat PLY. Formats with other axes (SPZ: y up, z back; GLB: y up, x left) are turned
 /// as they are read and written, with the colours that depend on direction.
 ///
-/// Errors: io_error naming the file and the supported formats, where it has none of them; naming a property that
-/// changes the image and that the format cannot hold; naming the package to install, where gart was built without it;
-/// else as the format's reader and writer (io/ply.hpp). invalid_argument for a model whose arrays disagree in size, and
-/// for a packing out of its range.
+/// Errors: io_error naming the file and the supported formats, where it has none of them. io_error naming a property
+/// that changes the image and that the format cannot hold. io_error naming the package to install, where gart was built
+/// without it. Else as the format's reader and writer (io/ply.hpp). invalid_argument for a model whose arrays disagree
+/// in size, and for a packing out of its range.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/core/span.hpp>
@@ -73,7 +73,7 @@ gaussian_model read_splats(std::filesystem::path const& path, splat_traits* trai
                            std::vector<std::string>* notes = nullptr);
 /// A rank's rows of a whole model.
 gaussian_model rows_of(gaussian_model const& all, row_owners const& owners);
-/// Reads this rank's Gaussians of the file's `total`. Of a binary splat PLY no others are read; several ranks therefore
+/// Reads this rank's Gaussians of the file's `total`. Of a binary splat PLY no others are read. Several ranks therefore
 /// refuse a bad Gaussian in place of leaving it out.
 gaussian_model read_splat_rows(std::filesystem::path const& path, row_owners const& owners, u64& total,
                                splat_traits* traits = nullptr, std::vector<std::string>* notes = nullptr);

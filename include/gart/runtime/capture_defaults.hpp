@@ -53,7 +53,7 @@ decision<tracer_kind> choose_tracer(capture_traits const& traits);
 /// The method for choose_tracer's tracer.
 decision<std::string> choose_backward(capture_traits const& traits);
 
-/// The capture's points; without points, those that depth maps measured where depth is trained on; else random ones in
+/// The capture's points. Without points, those that depth maps measured where depth is trained on. Else random ones in
 /// the capture's bounds. A capture's points lie on surfaces. Opacity 0.1 and a scale of 1.0 (times the distance to the
 /// neighbours) fill the gaps between them. Random points mostly lie in empty space. With MCMC, which moves them, 0.5
 /// and 0.1 let rays through from the first step. Values that the options give stay.

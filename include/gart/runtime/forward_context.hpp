@@ -25,8 +25,8 @@ class forward_context {
   virtual ~forward_context() = default;
   /// The gradients from dL/d image; may be called again. Gradients by features come from the hits, which are listed
   /// once: up to two traces more. So do those of a view by depth and transmittance where configuration_request.depth
-  /// did not ask for them. Errors: invalid_argument where the renderer has had another model since, for gradients of
-  /// another size, and for targets that do not fit a view or a batch.
+  /// did not ask for them. Errors: invalid_argument where the renderer has had another model since. The same for
+  /// gradients of another size, and for targets that do not fit a view or a batch.
   virtual void backward(output_gradients const& by, gradient_targets const& to) = 0;
 };
 

@@ -1,11 +1,11 @@
 #pragma once
 /// \file
 /// A model and the settings that it was trained with, in any format of io/splat_file.hpp. Settings that differ from the
-/// defaults stand in a splat PLY's header as "comment gart KEY VALUE": alpha_min, transmittance_min (older: t_min),
-/// near, max_hits, antialias, kernel_degree, origin. A model with the defaults is byte for byte an ordinary file.
-/// Models of other programs are read with the defaults.
+/// defaults stand in a splat PLY's header as "comment gart KEY VALUE". Keys: alpha_min, transmittance_min (older:
+/// t_min), near, max_hits, antialias, kernel_degree, origin. A model with the defaults is byte for byte an ordinary
+/// file. Models of other programs are read with the defaults.
 ///
-/// Errors: load_model throws io_error for a file that is no splat file, or whose header has a wrong value, naming the
+/// Errors: load_model throws io_error for a file that is no splat file, or whose header has a wrong value. It names the
 /// file, the key and the remedy. save_model: as write_splats (io/splat_file.hpp).
 
 #include <gart/io/origin.hpp>

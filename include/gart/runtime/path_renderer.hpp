@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Light among the Gaussians behind one host-safe interface: a model, a scene of meshes and lights, and pictures that
-/// improve with each sample.
+/// Light among the Gaussians behind one host-safe interface. It takes a model and a scene of meshes and lights; its
+/// pictures improve with each sample.
 ///
 ///   auto tracer = make_path_renderer(request);
 ///   tracer->set_model(model);

@@ -13,8 +13,9 @@
 /// view or of a batch; any number of contexts may wait.
 ///
 /// Errors: unsupported where no compiled configuration meets the request, naming those that exist and how to compile
-/// one. invalid_argument for Gaussians of another SH degree, for arrays that disagree in size, for options out of
-/// range, and for options.rebuild_every with a tracer that builds no tree. out_of_memory; other errors of the policy.
+/// one. invalid_argument for Gaussians of another SH degree, for arrays that disagree in size, and for options out of
+/// range. The same for options.rebuild_every with a tracer that builds no tree. out_of_memory; other errors of the
+/// policy.
 
 #include <gart/exec/profile.hpp>
 #include <gart/pose/pose.hpp>

@@ -4,7 +4,7 @@
 /// at run time from the compiled ones. Code that no device compiler sees, such as the `gart` program, uses it.
 ///
 /// Errors: unsupported where no compiled configuration meets the request, naming those that exist and how to compile
-/// one; out_of_memory; other errors of the policy.
+/// one. out_of_memory; other errors of the policy.
 
 #include <gart/exec/profile.hpp>
 #include <gart/exposure/exposure_field.hpp>

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The pose of a photograph, from a model of the scene and a guess: it makes the image nearest to the photograph.
+/// The pose of a photograph, from a model of the scene and a guess. It makes the image nearest to the photograph.
 ///
 ///   auto const renderer = make_renderer({});
 ///   renderer->set_model(model);
@@ -9,9 +9,9 @@
 /// Method: least squares of the colours by a quasi-Newton method, from coarse to fine. Image and photograph are
 /// blurred, by half as much in each round and in the last not at all. So a guess that is some tens of pixels off still
 /// finds the right minimum. The whole renderer gives the gradient (pose/differentiate_pose.hpp). The image alone gives
-/// the first curvature, which BFGS then updates. Let d be a pixel's ray in the camera's axes, n the slope of the image
-/// at d on the sphere of directions, and q one over the pixel's depth. The colour changes by q n . t + (d x n) . w as
-/// the camera moves by t and turns by w. Any camera with one centre.
+/// the first curvature, which BFGS then updates. Let d be a pixel's ray in the camera's axes, and q one over the
+/// pixel's depth. Let n be the slope of the image at d, on the sphere of directions. The colour changes by q n.t + (d x
+/// n).w as the camera moves by t and turns by w. Any camera with one centre.
 ///
 /// Cost of a step: two forward passes, a backward pass and a few passes over the image on the host. Errors:
 /// invalid_argument for a photograph, mask or camera of another size; errors of the renderer.

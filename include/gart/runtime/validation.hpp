@@ -16,7 +16,7 @@
 /// 1.5 dB worse than a whole run does (bench/results/leave_one_out.json).
 ///
 /// Cost: about a tenth of a run's time (plan_validation), more where the run's own images are small. Trials have a
-/// fixed number of steps, so on the serial policy the choice does not depend on the machine's load. On a GPU the trials
+/// fixed number of steps: on the serial policy the choice does not depend on the machine's load. On a GPU the trials
 /// run in parallel, one thread and stream each. With the caller's stream, or where memory ends, they run one after
 /// another. Memory: the training views once more, shrunk, and a session for each running trial. With several ranks let
 /// one rank measure and tell the others. Errors: as make_session.

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// The channels of a renderer's views (channels/): the values of its Gaussians, and the passes over the hits of a view.
-/// These passes follow those of its colours.
+/// The channels of a renderer's views (channels/): its Gaussians' values, and the passes over a view's hits. These
+/// passes follow those of its colours.
 
 #include <gart/channels/passes.hpp>
 #include <gart/channels/pixel_hits.hpp>

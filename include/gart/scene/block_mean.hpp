@@ -24,7 +24,7 @@ struct pixel_blocks {
 };
 
 /// Writes the mean of a block of an image, [H][W][channels], to `out`, [channels]. Returns the mean of its mask's
-/// weights, [H][W] or null, in parts of 255: not 0 where one of them is not. What counts for nothing is black.
+/// weights, [H][W] or null, in parts of 255. It is not 0 where one of them is not. What counts for nothing is black.
 GART_HD GART_INLINE u8 block_mean(u8 const* image, int channels, u8 const* mask, pixel_blocks const& blocks,
                                   std::size_t block, u8* out) {
   bool const alpha = channels == 4;

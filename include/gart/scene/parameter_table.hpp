@@ -1,8 +1,7 @@
 #pragma once
 /// \file
 /// The table of a scene's parameter arrays (scene/gaussians.hpp). Sizes, Adam and its rates, checks, rows and
-/// checkpoints walk it. An array that a scene gains is a line here, a member of the types that hold them, and a rate
-/// (optim/adam.hpp).
+/// checkpoints walk it. A new array is a line here, a member of the types that hold them, and a rate (optim/adam.hpp).
 
 #include <gart/core/macros.hpp>
 #include <gart/core/types.hpp>

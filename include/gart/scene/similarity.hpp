@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// A scene turned, scaled and moved: p -> scale R p + translation, of means, scales, rotations and of the colours that
-/// depend on direction. Its image from a camera moved alike is the same one. Other maps (a reflection, another scale
-/// an axis) make no Gaussians of Gaussians' parameters, or no colours, and are refused.
+/// A scene turned, scaled and moved: p -> scale R p + translation. So are means, scales, rotations and the colours that
+/// depend on direction. Its image from a camera moved alike is the same one. Other maps (a reflection, another scale an
+/// axis) make no Gaussians of Gaussians' parameters, or no colours, and are refused.
 ///
 /// Errors: invalid_argument for a matrix that is none of these.
 

@@ -8,8 +8,8 @@
 /// (io/crc32c.hpp) of everything before it. So one flipped bit is found. Files that begin with "gart checkpoint 1\\n",
 /// whose arrays have neither version nor checksum, are read too.
 ///
-/// Errors: io_error naming the file and the array that is missing, truncated, damaged, of another size, or of a version
-/// that is newer than the reader.
+/// Errors: io_error naming the file and the array that is missing, truncated, damaged or of another size. The same for
+/// a version that is newer than the reader.
 
 #include <gart/comm/row_owners.hpp>
 #include <gart/comm/shared_file.hpp>

@@ -1,9 +1,9 @@
 #pragma once
 /// \file
 /// The share of a capture's pixels that show the scene. The loss is a mean over all pixels. So an object's gradients
-/// are proportional to the share of pixels that it covers: a fiftieth on views of the whole sphere. A penalty beside
-/// the loss must shrink as much, or it fades the object. The penalties were measured on captures that fill a quarter of
-/// their images or more (penalty_scale). Cost: a pass over the pixels of at most 32 images, once a run.
+/// are proportional to the share of pixels that it covers. On views of the whole sphere that is a fiftieth. A penalty
+/// beside the loss must shrink as much, or it fades the object. The penalties were measured on captures that fill a
+/// quarter of their images or more (penalty_scale). Cost: a pass over the pixels of at most 32 images, once a run.
 
 #include <gart/core/isa.hpp>
 #include <gart/io/dataset.hpp>
@@ -15,8 +15,9 @@
 
 namespace gart { inline namespace GART_ISA {
 
-/// The share of pixels of data.train's `views`, by index, that count in the loss and differ from the background, at
-/// least a thousandth. Reads some views, evenly spread. Before a random background only transparent pixels are empty.
+/// The share of pixels of data.train's `views`, by index, that count in the loss and differ from the background. It is
+/// at least a thousandth. Reads some views, evenly spread. Before a random background only transparent pixels are
+/// empty.
 inline double foreground_fraction(dataset const& data, std::vector<std::size_t> const& views,
                                   background_kind background) {
   constexpr std::size_t most_views = 32;

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// The calls of a program within a step of training: its own loss, and hooks between the parts of a step.
+/// A program's calls within a step of training: its own loss, and hooks between the step's parts.
 
 #include <gart/exec/concepts.hpp>
 #include <gart/io/dataset.hpp>

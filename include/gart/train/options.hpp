@@ -14,7 +14,7 @@
 
 namespace gart {
 
-/// How the number of Gaussians changes: not at all, by the images' error (train/densify/error_growth.hpp), by MCMC
+/// How the number of Gaussians changes, if at all. By the images' error (train/densify/error_growth.hpp), by MCMC
 /// (train/densify/mcmc.hpp), or by adaptive density control (train/densify/adc.hpp).
 enum class densify_kind { none, error, mcmc, adc };
 /// Their names.

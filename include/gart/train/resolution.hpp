@@ -1,8 +1,9 @@
 #pragma once
 /// \file
 /// The size of a step's images. Early in a run Gaussians are few and large. Images of a quarter or half of the width
-/// place them as well, for a sixteenth or a quarter of the rays. Detail is learned at full size (compare Chen et al.,
-/// DashGaussian, CVPR 2025). Each size is half the next, so a pixel is the mean of a block of the photograph's pixels.
+/// place them as well. They take a sixteenth or a quarter of the rays. Detail is learned at full size (compare Chen et
+/// al., DashGaussian, CVPR 2025). Each size is half the next, so a pixel is the mean of a block of the photograph's
+/// pixels.
 
 #include <gart/scene/camera.hpp>
 #include <gart/train/options.hpp>

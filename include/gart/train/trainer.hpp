@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Training, one step at a time: a view, the forward pass, the loss, the backward pass by the method, Adam,
-/// densification. Each of these parts can be replaced.
+/// Training, one step at a time: a view, forward pass, loss, backward pass by the method, Adam, densification. Each of
+/// these parts can be replaced.
 ///
 ///   openmp_exec exec;
 ///   trainer<openmp_exec, scene_traits<3>, bvh_tracer<openmp_exec>, pixel_method> run(exec, options, data, start);
@@ -58,7 +58,7 @@ class basic_trainer {
   using frame_type = frame<E, Traits, Tracer>;         ///< the frame of a step's image
 
   /// Starts from `start`, whose degree the run keeps: sh_degree or lower. Errors: invalid_argument for a higher degree,
-  /// for no view to train on, and for options that several ranks do not support; out_of_memory.
+  /// for no view to train on, and for options that several ranks do not support. out_of_memory.
   basic_trainer(E& exec, train_options const& options, dataset const& data, start_model const& start,
                 Comm comm = Comm());
   /// The dataset must outlive the trainer.

@@ -38,7 +38,7 @@ class camera_path {
   bool closed_;
 };
 
-/// `frames` cameras along the path, evenly in time, with both ends; a closed path leaves out its end, which is the
+/// `frames` cameras along the path, evenly in time, with both ends. A closed path leaves out its end, which is the
 /// start.
 std::vector<camera> smooth_path(std::vector<camera> const& keyframes, int frames, bool closed = false,
                                 std::vector<double> const& times = {});

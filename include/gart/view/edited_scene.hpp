@@ -1,10 +1,9 @@
 #pragma once
 /// \file
-/// A scene of meshes and lights (io/scene_file.hpp) that a viewer changes: things are moved, turned, made larger,
-/// made of another material, lit otherwise, added. It stays a scene.json all the time, so that what is seen can be
-/// saved.
+/// A scene of meshes and lights (io/scene_file.hpp) that a viewer changes. Things are moved, turned, made larger, made
+/// of another material, lit otherwise, added. It stays a scene.json all the time, so that what is seen can be saved.
 ///
-/// Cost: a move or a turn touches the positions of one mesh; any other change of a mesh reads the scene's files again.
+/// Cost: a move or a turn touches the positions of one mesh. Any other change of a mesh reads the scene's files again.
 /// Errors: io_error naming the file, the part and the field; what was there before stays.
 
 #include <gart/io/scene_file.hpp>

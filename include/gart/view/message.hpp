@@ -3,9 +3,9 @@
 /// The messages between a viewer's page and its server, without sockets. Texts are one JSON object each; frames and
 /// images are bytes. docs/rendering.md has the fields of each.
 ///
-/// parse_message reads a client's message strictly: at most message_bytes, objects no deeper than message_depth, every
-/// field present and in its range, no others. Errors: invalid_argument naming the field. Texts to clients are whole
-/// JSON objects. A frame is {u32 length of the header, header JSON, JPEG}.
+/// parse_message reads a client's message strictly: at most message_bytes, and objects no deeper than message_depth.
+/// Every field is present and in its range, with no others. Errors: invalid_argument naming the field. Texts to clients
+/// are whole JSON objects. A frame is {u32 length of the header, header JSON, JPEG}.
 
 #include <gart/core/names.hpp>
 #include <gart/core/types.hpp>

@@ -28,9 +28,9 @@ class frame_pacing {
     if (!(rate_ > 0)) rate_ = other.rate_;
   }
 
-  /// The size, in the full size's shape, that takes about so many milliseconds: at most the full size, at least an
-  /// eighth of its sides. Sides are whole parts in 32 of the full ones, so that a size does not change with every view.
-  /// With nothing measured it is a quarter of the sides.
+  /// The size, in the full size's shape, that takes about so many milliseconds. It is at most the full size, at least
+  /// an eighth of its sides. Sides are whole parts in 32 of the full ones, so that a size does not change with every
+  /// view. With nothing measured it is a quarter of the sides.
   std::pair<int, int> size(int full_width, int full_height, double milliseconds) const {
     double const pixels = static_cast<double>(full_width) * full_height;
     double const wanted = rate_ > 0 ? std::sqrt(milliseconds / (rate_ * pixels)) : 0.25;

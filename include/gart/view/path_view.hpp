@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Views of Gaussians among meshes and lights, by paths of light, for a viewer: one sample and at most one bounce while
-/// a view moves; at rest samples that add up to `paths.samples`, some of them at a time. Shown as the options' tone
+/// Views of Gaussians among meshes and lights, by paths of light, for a viewer. While a view moves: one sample and at
+/// most one bounce. At rest: samples that add up to `paths.samples`, some of them at a time. Shown as the options' tone
 /// maps it. Distances, normals and opacity are those that a path through the middle of a pixel meets first.
 ///
 /// Cost: view_render.colours of a view at rest takes 0.4 s, or as long as one sample takes. Errors: as path_renderer.
@@ -13,7 +13,7 @@
 
 namespace gart {
 
-/// By a path renderer that is used for nothing else, outlives it, and has a scene or is given one before a view.
+/// By a path renderer that is used for nothing else and outlives it. It has a scene or is given one before a view.
 /// Gaussians need not be there.
 view_render render_of(path_renderer& by, gaussian_model model, render_options options, light::path_options paths);
 

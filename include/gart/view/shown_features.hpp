@@ -1,11 +1,11 @@
 #pragma once
 /// \file
-/// Which numbers stand for the features of Gaussians in a view: one of them or three, or the first three principal
-/// directions of all. Each goes from 0 to 1 between its 1st and its 99th hundredth over the Gaussians, so colours do
-/// not change as a camera moves.
+/// Which numbers stand for the features of Gaussians in a view. They are one of them or three, or the first three
+/// principal directions of all. Each goes from 0 to 1 between its 1st and its 99th hundredth over the Gaussians. So
+/// colours do not change as a camera moves.
 ///
-/// Directions are eigenvectors of the covariance of an even sample of the Gaussians, by orthogonal iteration in double;
-/// the largest entry of each is positive. Cost: at most 2e8 products for the covariance, and a pass over the features.
+/// Directions are eigenvectors of the covariance of an even sample of the Gaussians, by orthogonal iteration in double.
+/// The largest entry of each is positive. Cost: at most 2e8 products for the covariance, and a pass over the features.
 /// Errors: invalid_argument where there are no features, or none of that number.
 
 #include <gart/scene/features.hpp>

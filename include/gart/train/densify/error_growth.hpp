@@ -10,11 +10,11 @@
 ///
 /// A densification draws Gaussians without replacement, in proportion to share times opacity. The least values of
 /// -ln(u) / weight, u uniform, are drawn (Efraimidis and Spirakis 2006). Each is split along its long axis
-/// (long_axis_split.hpp). One is drawn for each dead Gaussian, whose row the second child takes, and for each that the
-/// count grows by. The count follows a square-root curve to the budget at the share `growth_end` of the run. It at most
-/// doubles at a time. Few pixels in the capture lower the budget (growth_budget). Gaussians of a pixel or two learn the
-/// noise and pose errors of photographs. First children keep Adam's moments, second ones start with none. After
-/// `growth_end` only the dead are replaced, after `until` nothing moves.
+/// (long_axis_split.hpp). One is drawn for each dead Gaussian, whose row the second child takes. So is one for each
+/// that the count grows by. The count follows a square-root curve to the budget at the share `growth_end` of the run.
+/// It at most doubles at a time. Few pixels in the capture lower the budget (growth_budget). Gaussians of a pixel or
+/// two learn the noise and pose errors of photographs. First children keep Adam's moments, second ones start with none.
+/// After `growth_end` only the dead are replaced, after `until` nothing moves.
 ///
 /// A small penalty on the mean opacity fades Gaussians that no view needs, until they are dead. A Gaussian whose
 /// opacity or geometry is not finite counts as dead. Where no error is attributed, or none is alive, nothing is moved.
