@@ -67,9 +67,7 @@ gart::train_options options() {
   return of;
 }
 
-std::vector<gart::candidate> exposures() {
-  return {gart::default_candidates({}, {}).front()};
-}
+std::vector<gart::candidate> exposures() { return {gart::default_candidates({}, {}).front()}; }
 
 }  // namespace
 
