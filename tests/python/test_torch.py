@@ -513,6 +513,8 @@ print(min(timeit.repeat(call, number=200, repeat=7, timer=time.process_time)) / 
             seen = (*gart.torch.render(*arrays, view, features=f, c2w=c2w), *gart.torch.trace(*arrays, d, o, features=f),
                     *gart.torch.rasterization(mean, quaternion, log_scale.exp(), torch.sigmoid(opacity), f, w2c.to(device),
                                               k.to(device), 40, 32, render_mode="RGB+D")[:2])
+            placed = gart.torch.place(*arrays, torch.tensor([0.9, 0.1, 0.2, 0.0], device=device), c2w[:3, 3] * 0.1, 0.8)
+            seen = (*seen, gart.torch.render(*placed, view)[0])
             sum(image.square().sum() for image in seen).backward()
             return [t.detach().cpu() for t in seen], [t.grad.cpu() for t in learned]
 
