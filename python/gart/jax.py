@@ -1,7 +1,7 @@
 """gart as a function of JAX, in host memory: differentiable by the Gaussians, under jit too.
 
 jax is imported with this module. Arrays of JAX on the CPU are lent by the buffer protocol or DLPack; from a device they
-come as JAX's callbacks bring them. Written to JAX's documentation and tried with a stand-in: not yet with JAX.
+come as JAX's callbacks bring them.
 """
 import threading
 

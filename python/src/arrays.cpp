@@ -38,6 +38,20 @@ bool c_order(std::vector<std::int64_t> const& shape, Stride const* strides, std:
   return true;
 }
 
+// None where there is no buffer, and where one is refused by what has DLPack: arrays of CuPy and JAX on a device.
+std::unique_ptr<Py_buffer> buffer_of(py::handle argument, bool& writable) {
+  if (!PyObject_CheckBuffer(argument.ptr())) return nullptr;
+  auto out = std::make_unique<Py_buffer>();
+  int const flags = PyBUF_FORMAT | PyBUF_STRIDES;
+  writable = PyObject_GetBuffer(argument.ptr(), out.get(), flags | PyBUF_WRITABLE) == 0;
+  if (writable) return out;
+  PyErr_Clear();
+  if (PyObject_GetBuffer(argument.ptr(), out.get(), flags) == 0) return out;
+  py::error_already_set const refused;
+  if (!py::hasattr(argument, "__dlpack__")) throw refused;
+  return nullptr;
+}
+
 // The capsule itself, as torch.utils.dlpack.to_dlpack makes it, where the caller keeps the order of work.
 py::object capsule_of(py::handle argument, wanted const& w, place const& where) {
   if (PyCapsule_IsValid(argument.ptr(), "dltensor")) return py::reinterpret_borrow<py::object>(argument);
@@ -60,14 +74,7 @@ std::size_t lent::size() const {
 
 lent lent::take(py::handle argument, wanted const& w, place const& where) {
   lent out;
-  if (PyObject_CheckBuffer(argument.ptr())) {
-    auto buffer = std::make_unique<Py_buffer>();
-    int const flags = PyBUF_FORMAT | PyBUF_STRIDES;
-    out.writable_ = PyObject_GetBuffer(argument.ptr(), buffer.get(), flags | PyBUF_WRITABLE) == 0;
-    if (!out.writable_) {
-      PyErr_Clear();
-      if (PyObject_GetBuffer(argument.ptr(), buffer.get(), flags) != 0) throw py::error_already_set();
-    }
+  if (auto buffer = buffer_of(argument, out.writable_)) {
     Py_buffer const& b = *buffer;
     out.data_ = b.buf;
     out.shape_.assign(b.shape, b.shape + b.ndim);

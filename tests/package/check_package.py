@@ -92,6 +92,11 @@ with tempfile.TemporaryDirectory() as temporary:
     capture, model = folder / "capture", folder / "model.ply"
     expect(run(host / "use_headers"), f"version {a.version}")
     expect(run(host / "use_cpu", capture, model), "serial", "openmp")
+    tiles = host / "use_tiles"
+    if tiles.exists():
+        expect(run(tiles, model, folder / "tiles.png"), "Gaussians on openmp")
+        if tiles.stat().st_size > 0.6 * (host / "use_cpu").stat().st_size:
+            sys.exit("use_tiles should have the configurations of one tracer, and is about as large as use_cpu")
 
     expect(run(build(here / "downstream" / "shared") / "use_shared"), "a plugin rendered")
 

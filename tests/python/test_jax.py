@@ -108,7 +108,7 @@ class RealJax(unittest.TestCase):
         model, view, numbers = scenes.model(n=30, degree=1), scenes.camera(), scenes.parameters(n=30, degree=1)
         arrays = [self.jax.numpy.asarray(a) for a in numbers]
         random = np.random.default_rng(4)
-        by_color, by_depth = (random.normal(0, 1, s).astype(np.float32) for s in ((32, 40, 3), (32, 40)))
+        by_color, by_depth = random.normal(0, 1, (32, 40, 3)), random.normal(0, 1, (32, 40))
         expected = gart.reference(model, view, **scenes.SMOOTH)
 
         def see(*arrays):
@@ -120,7 +120,7 @@ class RealJax(unittest.TestCase):
         for share in (0.0, 1.0):
             def loss(*arrays):
                 color, _, depth = see(*arrays)
-                return (by_color * color).sum() + share * (by_depth * depth).sum()
+                return (np.float32(by_color) * color).sum() + share * (np.float32(by_depth) * depth).sum()
 
             expected = gart.reference(model, view, by_color, share * by_depth, **scenes.SMOOTH)["gradients"]
             gradient = self.jax.grad(loss, argnums=tuple(range(5)))

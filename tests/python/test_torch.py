@@ -259,6 +259,40 @@ class Torch(unittest.TestCase):
                     return loss(*[values if j == k else r.detach() for j, r in enumerate(rays)]).item()
             self.assert_close(rays[k].grad, finite_differences(moved, rays[k], 5e-3), 0.05)
 
+    def test_placed_models_are_seen_as_from_elsewhere(self):
+        """A model at a pose is, by definition, what a camera moved the other way sees; so are its gradients."""
+        arrays, view, scale = tensors(n=12, degree=3), scenes.camera(), 1.7
+        rotation = torch.tensor([0.9, -0.7, 0.4, 1.1], dtype=torch.float64).requires_grad_()
+        position = torch.tensor([0.3, -1.2, 2.0], dtype=torch.float64).requires_grad_()
+
+        def moved(rotation, position):
+            """The camera in the model's axes, with lengths of the world."""
+            turn = _rasterization._rotations(rotation[None])[0]
+            w2c = torch.eye(4, dtype=torch.float64)
+            w2c[:3, :3], w2c[:3, 3] = turn, position
+            return torch.linalg.inv(w2c) @ pose
+        with torch.no_grad():  # a camera that sees the model where it stands
+            pose = torch.from_numpy(scenes.C2W).clone()
+            turn = _rasterization._rotations(rotation[None])[0]
+            pose[:3, :3], pose[:3, 3] = turn @ pose[:3, :3], turn @ (scale * pose[:3, 3]) + position
+        placed = gart.torch.place(*arrays, rotation, position, scale)
+        color, transmittance, depth = gart.torch.render(*placed, view, c2w=pose)
+        model = [arrays[0] * scale, arrays[1] + np.log(scale), *arrays[2:]]
+        expected = gart.torch.render(*model, view, c2w=moved(rotation.detach(), position.detach()))
+        self.assertGreater(1 - transmittance.min(), 0.5)
+        for got, image in zip((color, transmittance, depth), expected):
+            torch.testing.assert_close(got, image, rtol=1e-3, atol=1e-3)
+
+        weight = torch.from_numpy(np.random.default_rng(3).normal(0, 1, (32, 40, 3)).astype(np.float32))
+        inputs = (*arrays, rotation, position)
+        got = torch.autograd.grad((weight * color).sum(), inputs)
+        c2w = moved(rotation, position)
+        whole = torch.autograd.grad((weight * gart.torch.render(*model, view, c2w=c2w)[0]).sum(), inputs)
+        for a, b in zip(got, whole):
+            self.assert_close(a, b.double())
+        with self.assertRaisesRegex(gart.InvalidArgument, r"rotation must be \[4\] and position \[3\]"):
+            gart.torch.place(*arrays, torch.eye(3), position)
+
     def test_tensors_are_refused_by_name(self):
         arrays = tensors()
         with self.assertRaisesRegex(gart.InvalidArgument, "log_scale must be float32"):
@@ -479,6 +513,8 @@ print(min(timeit.repeat(call, number=200, repeat=7, timer=time.process_time)) / 
             seen = (*gart.torch.render(*arrays, view, features=f, c2w=c2w), *gart.torch.trace(*arrays, d, o, features=f),
                     *gart.torch.rasterization(mean, quaternion, log_scale.exp(), torch.sigmoid(opacity), f, w2c.to(device),
                                               k.to(device), 40, 32, render_mode="RGB+D")[:2])
+            placed = gart.torch.place(*arrays, torch.tensor([0.9, 0.1, 0.2, 0.0], device=device), c2w[:3, 3] * 0.1, 0.8)
+            seen = (*seen, gart.torch.render(*placed, view)[0])
             sum(image.square().sum() for image in seen).backward()
             return [t.detach().cpu() for t in seen], [t.grad.cpu() for t in learned]
 

@@ -102,8 +102,9 @@ def forward(gaussians, seen, options, kernel_degree, record):
 
 
 def backward(gaussians, seen, options, kernel_degree, kept, gradients, wanted):
-    """From dL/d the images, each of them a tensor or None, to dL/d what is wanted, as tensors or None in the order of
-    TARGETS. wanted: whether the Gaussians, features, the pose, directions, origins are. kept: of forward, or (None, None)."""
+    """From dL/d the images, each of them a tensor or None, to dL/d what is wanted, as tensors or None in the order
+    of TARGETS. wanted: whether the Gaussians, features, the pose, directions, origins are. kept: of forward, or
+    (None, None)."""
     by = [None if g is None or not g.numel() else g.contiguous() for g in gradients]
     by += [None] * (4 - len(by))
     shared, context = kept
