@@ -1,7 +1,7 @@
 // Rays: a view's, by tile lists, by the tree and as a batch; a lidar of 64 x 1024 at the view's place; rays without any
 // order from places near it. What they see, their hits, and their gradients in each form. `alone` is the walk that
-// takes rays one by one, `width` beams of other widths than the library's. Beside the times: whether the batch shows
-// the same bits as what it is compared with.
+// takes rays one by one, `groups` the one by eight lanes a ray, `choice` beams of other widths than the library's.
+// Beside the times: whether the batch shows the same bits as what it is compared with.
 #include "support/frame.hpp"
 
 #include <gart/rays/lidar.hpp>
@@ -89,9 +89,9 @@ void trace(benchmark::State& state, E& exec) {
 }
 
 // The same rays by the walks themselves: all of them one by one (widest: 0), or in beams of a width and a number of
-// candidates at most.
+// candidates at most. grouped: those that are no beams by eight lanes each.
 template <gart::ray_list (*Rays)(), gart::execution E>
-void walks(benchmark::State& state, E& exec, float widest, int most, bool ordered = true) {
+void walks(benchmark::State& state, E& exec, float widest, int most, bool ordered = true, bool grouped = false) {
   using response = gart::generalized_gaussian<>;
   using program_type = gart::batch_composite<>;
   batch<E> b(exec, Rays());
@@ -118,8 +118,11 @@ void walks(benchmark::State& state, E& exec, float widest, int most, bool ordere
     if (beamed)
       gart::parallel_for(exec, "beams", gart::tile_range{beams, static_cast<gart::index_t>(gart::beam_lanes)},
                          together);
-    gart::trace_kernels::trace_alone<response>(exec, "alone", index, traced, rays, neighbours,
-                                               beamed ? apart.data() : nullptr, program);
+    gart::u32 const* const others = beamed ? apart.data() : nullptr;
+    if (grouped)
+      gart::trace_kernels::trace_groups<response>(exec, "groups", index, traced, rays, neighbours, others, program);
+    else
+      gart::trace_kernels::trace_alone<response>(exec, "alone", index, traced, rays, neighbours, others, program);
   });
   state.counters["rays"] = rays;
   state.counters["same"] = color.to_host() == b.color.to_host();
@@ -172,8 +175,10 @@ GART_BENCH("rays/view/tiles", image<gart_bench::by_tiles<8>>)
 GART_BENCH("rays/view/tree", image<gart_bench::by_bvh>)
 GART_BENCH("rays/view/trace", trace<view>)
 GART_BENCH("rays/view/alone", [](auto& state, auto& exec) { walks<view>(state, exec, 0, 0); })
+GART_BENCH("rays/view/groups", [](auto& state, auto& exec) { walks<view>(state, exec, 0, 0, true, true); })
 GART_BENCH("rays/lidar/trace", trace<lidar>)
 GART_BENCH("rays/lidar/alone", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0, 0); })
+GART_BENCH("rays/lidar/groups", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0, 0, true, true); })
 GART_BENCH("rays/lidar/list", list<lidar>)
 GART_BENCH("rays/lidar/backward/primitive", backward<lidar, gradient_form::primitive>)
 GART_BENCH("rays/lidar/backward/scatter", backward<lidar, gradient_form::scatter>)
@@ -181,16 +186,18 @@ GART_BENCH("rays/lidar/both/primitive", both<lidar, gradient_form::primitive>)
 GART_BENCH("rays/lidar/both/scatter", both<lidar, gradient_form::scatter>)
 GART_BENCH("rays/incoherent/trace", trace<incoherent>)
 GART_BENCH("rays/incoherent/alone", [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0, 0); })
+GART_BENCH("rays/incoherent/groups", [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0, 0, true, true); })
 GART_BENCH("rays/incoherent/list", list<incoherent>)
 GART_BENCH("rays/incoherent/backward/primitive", backward<incoherent, gradient_form::primitive>)
 GART_BENCH("rays/incoherent/backward/scatter", backward<incoherent, gradient_form::scatter>)
 // What the library chooses, against other widths and numbers.
 GART_BENCH("rays/choice/view/all", [](auto& state, auto& exec) { walks<view>(state, exec, 100, 1 << 30); })
-GART_BENCH("rays/choice/lidar/512", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0.25f, 512); })
-GART_BENCH("rays/choice/lidar/2048", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0.25f, 2048); })
-GART_BENCH("rays/choice/lidar/4096", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0.25f, 4096); })
+GART_BENCH("rays/choice/lidar/0.03",
+           [](auto& state, auto& exec) { walks<lidar>(state, exec, 0.03f, 2048, true, true); })
+GART_BENCH("rays/choice/lidar/0.06",
+           [](auto& state, auto& exec) { walks<lidar>(state, exec, 0.06f, 2048, true, true); })
+GART_BENCH("rays/choice/lidar/0.25", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0.25f, 2048); })
+GART_BENCH("rays/choice/lidar/unordered", [](auto& state, auto& exec) { walks<lidar>(state, exec, 0, 0, false, true); })
 GART_BENCH("rays/choice/incoherent/unordered",
            [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0, 0, false); })
 GART_BENCH("rays/choice/incoherent/narrow", [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0.1f, 1024); })
-GART_BENCH("rays/choice/incoherent/1024", [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0.25f, 1024); })
-GART_BENCH("rays/choice/incoherent/4096", [](auto& state, auto& exec) { walks<incoherent>(state, exec, 0.25f, 4096); })

@@ -198,4 +198,19 @@ GART_HD GART_INLINE float enter_child(bvh_node const& n, int c, slab_ray const& 
   return from;
 }
 
+/// Whether the ray crosses child c somewhere in [near, far], and where it enters it: one of cross_children's.
+GART_HD GART_INLINE bool cross_child(bvh_node const& n, int c, slab_ray const& r, float near, float far, float& entry) {
+  grid_crossing const grid(n, r);
+  float from = near, to = far;
+  GART_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    bool const backwards = r.inverse[k] < 0;
+    auto const plane = [&](int side) { return static_cast<float>(reinterpret_cast<u8 const*>(n.plane[side][k])[c]); };
+    from = larger(plane(backwards) * grid.step[k] + grid.enter[k], from);
+    to = smaller(plane(!backwards) * grid.step[k] + grid.leave[k], to);
+  }
+  entry = from;
+  return from <= to;
+}
+
 }}  // namespace gart::GART_ISA

@@ -111,10 +111,14 @@ struct batch_composite : ray_program_base {
   /// Ray i, in the batch's frame.
   GART_HD ray ray_of(index_t, state const& s) const { return s.own; }
 
+  /// The colour of a Gaussian as the ray sees it, before the clamp.
+  GART_HD GART_INLINE vec3 shade(state const& s, u32 id) const { return colors.unclamped(s.basis, id); }
   /// Composites a hit. False: the ray ends.
-  GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h) const {
+  GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h) const { return on_hit(s, h, shade(s, h.id)); }
+  /// The same, of that colour.
+  GART_KERNEL GART_INLINE bool on_hit(state& s, hit const& h, vec3 const& unclamped) const {
     if (h.t > s.far) return false;
-    vec3 const unclamped = colors.unclamped(s.basis, h.id), c = clamped_color(unclamped);
+    vec3 const c = clamped_color(unclamped);
     [[maybe_unused]] vec3 const opaque = opaque_color(c, s.color, s.transmittance);
     [[maybe_unused]] float const depth = opaque_depth(h.t, s.depth, s.transmittance);
     float const weight = blend(h.alpha, h.t, c, s.color, s.depth, s.transmittance);

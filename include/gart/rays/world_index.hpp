@@ -9,6 +9,7 @@
 
 #include <gart/rays/ray_order.hpp>
 #include <gart/trace/bvh_tracer.hpp>
+#include <gart/trace/group_walk.hpp>
 
 namespace gart { inline namespace GART_ISA {
 
@@ -79,7 +80,21 @@ template <class Response, execution E, ray_program P>
 void trace_batch(E& exec, char const* label, world_view const& index, traced_scene const& scene, index_t rays,
                  ray_order<E>& order, P const& program) {
   static_assert(std::same_as<typename P::ray_type, ray>);
-  trace_beams<Response>(exec, label, index, scene, rays, order.of(rays), order.apart, program);
+  u32 const* const neighbours = order.of(rays);
+  if constexpr (!E::device) {
+    trace_beams<Response>(exec, label, index, scene, rays, neighbours, order.apart, program);
+  } else {
+    // Rays of a batch lie farther apart than pixels do. Where they are too few to fill a device, lanes share them.
+    constexpr float widest = 0.03f;
+    constexpr index_t few = 1u << 18;
+    trace_beams<Response>(
+        exec, label, index, scene, rays, neighbours, order.apart, widest, program, [&](u32 const* others) {
+          if (rays <= few)
+            trace_kernels::trace_groups<Response>(exec, label, index, scene, rays, neighbours, others, program);
+          else
+            trace_kernels::trace_alone<Response>(exec, label, index, scene, rays, neighbours, others, program);
+        });
+  }
 }
 
 }}  // namespace gart::GART_ISA

@@ -310,18 +310,27 @@ void trace_alone(E& exec, char const* label, Index const& index, traced_scene co
 }  // namespace trace_kernels
 
 /// Feeds `program` the hits of rays 0 to `rays`. Neighbours in `order`, a permutation of them (null: in their own), go
-/// through the tree together where they stay close. `apart`: memory, a word for each beam_lanes of them.
-template <class Response, execution E, class Index, ray_program P>
+/// through the tree together where they stay close: where they differ by no more than `widest` (trace/beam_rays.hpp).
+/// `apart`: memory, a word for each beam_lanes of them. alone(apart) traces the others.
+template <class Response, execution E, class Index, ray_program P, class Alone>
 void trace_beams(E& exec, char const* label, Index const& index, traced_scene const& scene, index_t rays,
-                 u32 const* order, buffer<u32, E>& apart, P const& program) {
+                 u32 const* order, buffer<u32, E>& apart, float widest, P const& program, Alone const& alone) {
   // Where a beam is slower than its rays, for all the candidates that most of them miss.
   constexpr int most = E::device ? 2048 : 8192;
   index_t const beams = rays / beam_lanes + (rays % beam_lanes != 0);
   apart.resize(beams);
-  parallel_for(exec, label, tile_range{beams, static_cast<index_t>(beam_lanes)},
-               trace_kernels::walk_beams<Response, Index, P>{index, scene, program, rays, order, apart.data(),
-                                                             widest_beam, most});
-  trace_kernels::trace_alone<Response>(exec, label, index, scene, rays, order, apart.data(), program);
+  parallel_for(
+      exec, label, tile_range{beams, static_cast<index_t>(beam_lanes)},
+      trace_kernels::walk_beams<Response, Index, P>{index, scene, program, rays, order, apart.data(), widest, most});
+  alone(apart.data());
+}
+/// The same, the others one by one.
+template <class Response, execution E, class Index, ray_program P>
+void trace_beams(E& exec, char const* label, Index const& index, traced_scene const& scene, index_t rays,
+                 u32 const* order, buffer<u32, E>& apart, P const& program) {
+  trace_beams<Response>(exec, label, index, scene, rays, order, apart, widest_beam, program, [&](u32 const* others) {
+    trace_kernels::trace_alone<Response>(exec, label, index, scene, rays, order, others, program);
+  });
 }
 
 }}  // namespace gart::GART_ISA

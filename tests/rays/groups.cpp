@@ -1,0 +1,72 @@
+// Rays that eight lanes take each: the same bits as by any other walk, with few hits or with more than there is room
+// for, and of rays that end.
+#include <rays/view_rays.hpp>
+
+#include <algorithm>
+
+using namespace gart_test;
+
+namespace {
+
+using response = gart::generalized_gaussian<>;
+
+// Rays by groups, on any policy.
+template <class E>
+gart::traced_rays by_groups(E& exec, gart::gaussians<E> const& scene, gart::ray_tracer<E> const& tracer,
+                            gart::ray_batch const& rays, gart::render_options const& options) {
+  gart::gaussians_view<float const> const view = scene.view();
+  gart::buffer<gart::ray_gaussian, E> records(exec, view.count);
+  gart::parallel_for(
+      exec, "records", view.count,
+      gart::render_kernels::prepare_gaussians<response>{view, rays.frame, options.alpha_min, records.view()});
+  target_memory<E> out(exec, rays.count());
+  gart::batch_composite<> const program{{},      gart::batch_rays(rays), {view.sh, view.sh_degree, view.sh_degree},
+                                        options, out.targets(),          {}};
+  gart::trace_kernels::trace_groups<response>(exec, "groups", tracer.index().seen_from(rays.frame),
+                                              gart::traced_scene{records.data(), view.count, options.near},
+                                              rays.count(), nullptr, nullptr, program);
+  return out.to_host();
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("eight lanes a ray see the same as one", E, GART_TEST_POLICIES) {
+  E exec;
+  gart::render_options options;
+  // Of 20000 all but transparent Gaussians a ray hits hundreds: more than wait at a time.
+  for (bool const many : {false, true}) {
+    CAPTURE(many);
+    auto model = cloud(5, 2, many ? 20000 : 2000);
+    if (many)
+      for (float& x : model.opacity) x = -4.5f;
+    gart::gaussians<E> const scene(exec, model);
+    gart::ray_tracer<E> tracer(exec);
+    tracer.set_scene(scene.view(), 2);
+    random_rays const rays(7, many ? 203 : 999, 2.0f);
+    std::vector<float> ends;
+    for (std::size_t i = 0; i < rays.directions.size() / 3; ++i) ends.push_back(0.5f + static_cast<float>(i % 9));
+    for (bool const ended : {false, true}) {
+      CAPTURE(ended);
+      batch_memory<E> const batch(exec, {0.2, 0.1, -0.3}, rays.origins, rays.directions,
+                                  ended ? ends : std::vector<float>{});
+      auto const wanted = trace_all(exec, tracer, batch.rays(), options);
+      CHECK(same(by_groups(exec, scene, tracer, batch.rays(), options), wanted));
+      CHECK(*std::max_element(wanted.hits.begin(), wanted.hits.end()) > (many ? 200 : 24));
+    }
+  }
+}
+
+TEST_CASE_TEMPLATE("eight lanes a ray meet boxes that all overlap", E, GART_TEST_POLICIES) {
+  E exec;
+  auto model = cloud(3, 0, 6000);
+  for (float& x : model.log_scale) x += 3;
+  for (float& x : model.opacity) x = -5;
+  gart::gaussians<E> const scene(exec, model);
+  gart::ray_tracer<E> tracer(exec);
+  tracer.set_scene(scene.view(), 0);
+  random_rays const rays(9, 41, 0.2f);
+  batch_memory<E> const batch(exec, {}, rays.origins, rays.directions);
+  auto const wanted = trace_all(exec, tracer, batch.rays(), {});
+  CHECK(same(by_groups(exec, scene, tracer, batch.rays(), {}), wanted));
+  CHECK(*std::max_element(wanted.hits.begin(), wanted.hits.end()) > 500);
+}
