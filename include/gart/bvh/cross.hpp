@@ -205,7 +205,7 @@ GART_HD GART_INLINE bool cross_child(bvh_node const& n, int c, slab_ray const& r
   GART_UNROLL
   for (int k = 0; k < 3; ++k) {
     bool const backwards = r.inverse[k] < 0;
-    auto const plane = [&](int side) { return static_cast<float>(reinterpret_cast<u8 const*>(n.plane[side][k])[c]); };
+    auto const plane = [&](int side) { return plane_number(reinterpret_cast<u8 const*>(n.plane[side][k])[c]); };
     from = larger(plane(backwards) * grid.step[k] + grid.enter[k], from);
     to = smaller(plane(!backwards) * grid.step[k] + grid.leave[k], to);
   }
