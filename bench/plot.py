@@ -106,13 +106,13 @@ class Pages:
         scores, names = {}, []
         for r in result["runs"]:
             scores.setdefault(r["capture"], {}).setdefault(r["setting"], []).append(r["psnr"])
-            if r["setting"] not in names and r["setting"] != "chosen":
+            if r["setting"] not in names and not r["setting"].startswith("chosen"):
                 names.append(r["setting"])
         tuned = {r["capture"]: r["tuned"] for r in result["summary"]}
         rows = []
         for capture, of in scores.items():
             means = {setting: sum(values) / len(values) for setting, values in of.items()}
-            rows.append([capture, means["chosen"], tuned[capture]] + [means[n] for n in names])
+            rows.append([capture, means["chosen"], tuned[capture]] + [means.get(n, means["usual"]) for n in names])
         average = ["mean"] + [sum(column) / len(rows) for column in list(zip(*rows))[1:]]
         cells = []
         for row in rows:
@@ -120,7 +120,8 @@ class Pages:
             cells.append([row[0]] + [f"{v:.2f}" for v in row[1:3]] +
                          [f"**{v:.2f}**" if v == best else f"{v:.2f}" for v in row[3:]])
         cells.append([average[0]] + [f"{v:.2f}" for v in average[1:]])
-        short = [n.replace("exposure", "E").replace("vignetting", "V").replace("bands", "B").replace(", ", " ") for n in names]
+        letters = {"exposure": "E", "vignetting": "V", "twentieth": "T", "pixels 100": "P", "usual": "usual"}
+        short = [" ".join(letters[part] for part in n.split(", ")) for n in names]
         self.tables["leave_one_out"] = table(["capture", "as chosen", "tuned on the others"] + short, cells)
 
     def write_tables(self):
