@@ -112,14 +112,15 @@ class Pages:
         rows = []
         for capture, of in scores.items():
             means = {setting: sum(values) / len(values) for setting, values in of.items()}
-            rows.append([capture, means["chosen"], tuned[capture]] + [means.get(n, means["usual"]) for n in names])
-        average = ["mean"] + [sum(column) / len(rows) for column in list(zip(*rows))[1:]]
+            rows.append([capture, means["chosen"], tuned[capture]] + [means.get(n) for n in names])
+        average = ["mean"] + [None if None in column else sum(column) / len(rows) for column in list(zip(*rows))[1:]]
+        shown = lambda v: "-" if v is None else f"{v:.2f}"  # of runs that were not made
         cells = []
         for row in rows:
-            best = max(row[3:])
-            cells.append([row[0]] + [f"{v:.2f}" for v in row[1:3]] +
-                         [f"**{v:.2f}**" if v == best else f"{v:.2f}" for v in row[3:]])
-        cells.append([average[0]] + [f"{v:.2f}" for v in average[1:]])
+            best = max(v for v in row[3:] if v is not None)
+            cells.append([row[0]] + [shown(v) for v in row[1:3]] +
+                         [f"**{shown(v)}**" if v == best else shown(v) for v in row[3:]])
+        cells.append([average[0]] + [shown(v) for v in average[1:]])
         letters = {"exposure": "E", "vignetting": "V", "twentieth": "T", "pixels 100": "P", "usual": "usual"}
         short = [" ".join(letters[part] for part in n.split(", ")) for n in names]
         self.tables["leave_one_out"] = table(["capture", "as chosen", "tuned on the others"] + short, cells)

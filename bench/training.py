@@ -108,11 +108,12 @@ def left_out(runs):
     scores = {c: {s: sum(v) / len(v) for s, v in of.items()} for c, of in scores.items()}
     rows = []
     for capture, of in scores.items():
-        fixed = [s for s in of if s != "chosen"]
-        others = [o for c, o in scores.items() if c != capture and all(s in o for s in fixed)]
-        if "chosen" not in of or not fixed or not others:
+        fixed = [s for s in of if not s.startswith("chosen")]
+        tunable = [s for s in fixed if all(s in o for o in scores.values())]
+        others = [o for c, o in scores.items() if c != capture]
+        if "chosen" not in of or not tunable or not others:
             continue
-        tuned = max(fixed, key=lambda s: sum(o[s] for o in others))
+        tuned = max(tunable, key=lambda s: sum(o[s] for o in others))
         best = max(fixed, key=lambda s: of[s])
         rows.append({"capture": capture, "chosen": of["chosen"], "usual": of.get("usual"),
                      "tuned_on_others": tuned, "tuned": of[tuned], "best": best, "best_psnr": of[best]})
