@@ -144,7 +144,8 @@ void settle(train_arguments& a, nlohmann::json const& measured, nlohmann::json& 
     if (t["taken"] && own) *own = value;
     if (t["taken"] && !own) a.set.set(setting, value);
     say((own ? "--" : "--set ") + setting + " " + value, t["taken"] ? "taken" : "left",
-        (gain < 0 ? "" : "+") + fixed(gain, 2) + " dB, give or take " + fixed(t["noise"].get<double>(), 2));
+        (gain < 0 ? "" : "+") + fixed(gain, 2) + " dB, give or take " + fixed(t["noise"].get<double>(), 2) +
+            (t["taken"] && gain <= 0 ? "; a trial shows it worse than a whole run" : ""));
   }
   // Settings that were not measured keep the usual values.
   for (auto const& [own, given] : {std::pair{&a.exposure, "off"}, {&a.vignetting, "off"}, {&a.densify, "error"}})
