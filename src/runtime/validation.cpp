@@ -25,6 +25,8 @@ constexpr int fewest_steps = 700, most_steps = 2000;
 // A trial's step on shrunk images takes about this share of a run's step. Images have a quarter of the pixels or less,
 // but kernels cost as much to start.
 constexpr double step_share = 0.4, run_share = 0.1;
+// Adam's rate of exposures in a trial, at most. A trial visits a view a few times, where whole steps overshoot.
+constexpr float trial_exposure_rate = 0.015f;
 // Small images leave a GPU idle between kernels. Trials beside each other fill it: each adds about this share of the
 // time that it takes alone.
 constexpr double beside_share = 0.5;
@@ -128,6 +130,7 @@ train_options of_trial(train_options options, validation_plan const& plan) {
   options.error.min_gaussians = options.error.min_gaussians / area;
   options.random_points = std::min(options.random_points, options.max_gaussians);
   sooner(options.adc.opacity_reset_every);
+  options.rates.exposure = std::min(options.rates.exposure, trial_exposure_rate);
   float& rest = options.rates.sh_rest;
   rest = std::max(rest, std::min(rest / static_cast<float>(std::sqrt(shorter)), options.rates.sh_dc));
   for (int* from : {&options.error.from, &options.mcmc.from, &options.adc.from})
@@ -141,7 +144,7 @@ train_options of_trial(train_options options, validation_plan const& plan) {
 
 std::vector<candidate> default_candidates(capture_traits const& traits, train_options const& options) {
   std::vector<candidate> all;
-  all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }, -3});
+  all.push_back({"exposure", "on", [](train_options& o) { o.exposure = true; }, -1});
   if (!traits.panoramas) all.push_back({"vignetting", "on", [](train_options& o) { o.vignetting = true; }});
   all.push_back({"rates.sh_rest", "0.000125", [](train_options& o) { o.rates.sh_rest = 0.000125f; }});
   error_growth_options more = options.error;

@@ -41,9 +41,10 @@ struct row_adam_kernel {
 template <execution E, int Floats>
 class adam_table {
  public:
-  /// [rows][Floats] to begin with.
-  adam_table(E& exec, std::vector<float> const& start)
+  /// [rows][Floats] to begin with. Gradients far below `epsilon` hardly move a row (adam.hpp).
+  adam_table(E& exec, std::vector<float> const& start, float epsilon = adam_options::epsilon)
       : exec_(&exec),
+        epsilon_(epsilon),
         value_(exec, start),
         first_(exec, std::vector<float>(start.size())),
         second_(exec, std::vector<float>(start.size())),
@@ -61,10 +62,12 @@ class adam_table {
     std::size_t const from = row * Floats;
     int const visit = static_cast<int>(++visits_[row]);
     adam_options const adam;
-    parallel_for(*exec_, "row_adam", Floats,
-                 detail::row_adam_kernel{gradient_.data(), value_.data() + from, first_.data() + from,
-                                         second_.data() + from, adam_rule(adam, visit),
-                                         static_cast<float>(rate * adam_rule::first_correction(adam, visit))});
+    adam_rule rule(adam, visit);
+    rule.epsilon = epsilon_;
+    parallel_for(
+        *exec_, "row_adam", Floats,
+        detail::row_adam_kernel{gradient_.data(), value_.data() + from, first_.data() + from, second_.data() + from,
+                                rule, static_cast<float>(rate * adam_rule::first_correction(adam, visit))});
   }
   /// The same by another rank's sum, [Floats], in host memory.
   void move(std::size_t row, span<float const> gradient, float rate) {
@@ -116,6 +119,7 @@ class adam_table {
   static constexpr index_t runs = E::device ? 128 : 8;  // of as many lanes: two short sums, not a long one
 
   E* exec_;
+  float epsilon_;
   buffer<float, E> value_, first_, second_;
   std::vector<u32> visits_;
   buffer<float, E> sums_, gradient_;

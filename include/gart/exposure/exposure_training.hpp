@@ -6,6 +6,10 @@
 ///
 /// The identity shows the scene's colours. Only the start at the identity keeps the views' mean exposure near it.
 ///
+/// Adam's epsilon is 0.03, large beside the usual one. The loss is a mean over pixels, so a photograph a tenth too
+/// bright gives gradients of a few tenths at any size. Smaller gradients come mostly from Gaussians that have not
+/// settled. Adam alone would scale these up to whole steps.
+///
 /// Buffers and cost: those of adam_table.hpp, a copy of the image and another pass over it.
 
 #include <gart/exposure/adam_table.hpp>
@@ -58,7 +62,10 @@ template <execution E>
 class exposure_training : public adam_table<E, exposure::floats> {
  public:
   /// An identity for each view.
-  exposure_training(E& exec, std::size_t views) : base(exec, identities(views)), exec_(&exec), exposed_(exec) {}
+  exposure_training(E& exec, std::size_t views)
+      : base(exec, identities(views), epsilon), exec_(&exec), exposed_(exec) {}
+
+  static constexpr float epsilon = 0.03f;  ///< Adam's
 
   /// Exposes the image [H][W][3] as the view's photograph; the result lasts until the next call.
   span<float const> expose(std::size_t view, span<float const> image) {
