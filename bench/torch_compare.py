@@ -145,13 +145,14 @@ def passes(show, gaussians, view, gradient, background, device, times=20):
     return out
 
 
-def compare_training(args, device):
+def compare_training(args, device, save):
     data = gart.load_dataset(args.capture, downscale=args.downscale)
     views = [[View(v.camera, device, v.image) for v in part] for part in (data.train, data.test)]
     out = {"capture": os.path.basename(args.capture.rstrip("/")), "gaussians": args.gaussians,
            "views": [len(v) for v in views], "width": views[0][0].camera.width, "height": views[0][0].camera.height}
     for name, show in operators().items():
         out[name] = tried(lambda: train(show, views, args, device))
+        save("training", out)  # a time limit from outside may come in the next
         gart.torch.release()
         print(name, {k: v for k, v in out[name].items() if k != "curve"}, flush=True)
     return out
@@ -310,9 +311,12 @@ def main():
 
     def part(name, call):
         begin = time.perf_counter()
-        result[name] = tried(call)
-        if "error" not in result[name]:
-            result[name]["part_seconds"] = round(time.perf_counter() - begin, 1)
+        out = tried(call)
+        out["part_seconds"] = round(time.perf_counter() - begin, 1)
+        save(name, out)
+
+    def save(name, out):
+        result[name] = out
         with open(args.out + ".part", "w") as f:
             json.dump(result, f, indent=1)
             f.write("\n")
@@ -329,7 +333,7 @@ def main():
         del gaussians
         gart.torch.release()
     if args.capture:
-        part("training", lambda: compare_training(args, device))
+        part("training", lambda: compare_training(args, device, save))
 
 
 if __name__ == "__main__":
