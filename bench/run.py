@@ -15,6 +15,7 @@ What (comma-separated; default tests and paper):
   paper       methods, memory and stages
   tradeoff    `gart tradeoff` on the first scene and on every --model: what each approximation costs and buys
   formats     every --model in each format and setting, by its test views: bytes, PSNR, SSIM (bench/formats.py)
+  paths       frames of meshes and light among the Gaussians of the first scene, by bounces (bench/paths.py)
   view        every --model served by `gart view`, and what a viewer takes from training every --capture (bench/view.py)
   rules       `gart train` with each rule of docs/training.md changed alone (--rules names some), --seeds of each (3):
               a file rules_NAME.json a capture, written after each rule
@@ -49,12 +50,13 @@ import tempfile
 from checks import Checks
 from common import Failure, command_line, commit_of, last_line, machine, now, run, write_json
 from formats import Formats
+from paths import Paths
 from training import LONG_PARTS, RULES, Trainings
 from view import View
 
 TRAININGS = ("rules", "leave-one-out", "curves", "long")
 PARTS = ("tests", "sanitize", "stages", "cpu", "methods", "memory", "traits", "tradeoff", "formats",
-         "view") + TRAININGS
+         "paths", "view") + TRAININGS
 
 # Rows of docs/performance.md: name, SH degree, kernel degree, options of gart bench.
 TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
@@ -63,7 +65,7 @@ TRAIT_ROWS = ([(f"SH {d}", d, 2, {}) for d in (3, 2, 1, 0)] +
                ("hybrid", 3, 2, {"backward": "hybrid"}), ("deterministic", 3, 2, {"backward": "deterministic"})])
 
 
-class Bench(Checks, Trainings, Formats, View):
+class Bench(Checks, Trainings, Formats, Paths, View):
     def __init__(self, a):
         self.a = a
         self.commit = commit_of(a.commit)
@@ -146,9 +148,9 @@ class Bench(Checks, Trainings, Formats, View):
 
     # The parts.
 
-    def google_benchmark(self, what, program, arguments, **more):
+    def google_benchmark(self, what, program, arguments, every=".", **more):
         path = os.path.join(self.temporary, "stages.json")
-        done = run([self.program(program), *arguments, f"--benchmark_filter={self.a.filter}",
+        done = run([self.program(program), *arguments, f"--benchmark_filter={self.a.filter or every}",
                     f"--benchmark_out={path}", "--benchmark_out_format=json",
                     f"--benchmark_min_time={self.a.min_time}"])
         if done.returncode != 0:
@@ -281,15 +283,16 @@ def arguments():
     parser.add_argument("--sanitize", action="store_true", help="the part sanitize besides")
     parser.add_argument("--generator", help="command that makes a missing scene: {dir} {name} {count}")
     parser.add_argument("--counts", type=lambda t: [int(x) for x in listed(t)], default=[1000, 2000, 3000, 4000, 5000],
-                        help="thousands of Gaussians; methods take the first two, stages and tradeoff the first; '' "
+                        help="thousands of Gaussians; methods take the first two, stages, paths and tradeoff the first; '' "
                              "for no scene in tradeoff")
     parser.add_argument("--tracers", type=listed, default=["tiles", "bvh"], help="memory takes the first")
     parser.add_argument("--backwards", type=listed, default=["pixel", "hybrid", "primitive"])
     parser.add_argument("--views", type=int, default=4, help="cameras of the methods")
     parser.add_argument("--repeats", type=int, default=20, help="measured steps a camera; the median counts")
-    parser.add_argument("--backend", default="cuda", help="of traits, tradeoff and the trainings")
-    parser.add_argument("--filter", default=".", help="stages and cpu: benchmarks, formats: settings, by regular expression")
-    parser.add_argument("--min-time", type=float, default=0.2, help="stages and cpu: seconds a benchmark")
+    parser.add_argument("--backend", default="cuda", help="of traits, tradeoff, paths and the trainings")
+    parser.add_argument("--filter", default="",
+                        help="stages, cpu and paths: benchmarks, formats: settings, by regular expression")
+    parser.add_argument("--min-time", type=float, default=0.2, help="stages, cpu and paths: seconds a benchmark")
     parser.add_argument("--model", nargs=3, action="append", default=[], metavar=("NAME", "PLY", "CAMERAS"),
                         help="tradeoff, and traits, which takes the first: a trained model and its capture or camera "
                              "JSON; may be repeated")
