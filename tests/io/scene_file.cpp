@@ -149,6 +149,12 @@ TEST_CASE("a glTF that cannot be is refused by its field") {
   CHECK(holds(why(with(gltf(), "\"count\":3", "\"count\":4")), "is not 4 VEC3 of a buffer"));
   CHECK(holds(why(with(gltf(), "\"indices\":3", "\"indices\":9")), "a.gltf"));
   CHECK(holds(why(with(gltf(), "\"material\":0", "\"material\":7")), "'material' is 7"));
+  // Numbers are not cut to fit, and a wrong type is not the default.
+  CHECK(holds(why(with(gltf(), "\"mesh\":0", "\"mesh\":4294967296")), "4294967296 is out of range"));
+  CHECK(holds(why(with(gltf(), "\"indices\":3", "\"indices\":\"3\"")), "must be number, but is string"));
+  CHECK(holds(why(gltf(R"(,"translation":[1,"0",2])")), "must be number, but is string"));
+  CHECK(
+      holds(why(gltf("", "", R"({"pbrMetallicRoughness":{"metallicFactor":"1"}})")), "must be number, but is string"));
   CHECK(holds(why(gltf(R"(,"children":[0])")), "is below two others, or itself"));
   CHECK(holds(why(gltf(R"(,"rotation":[0,0,0,0])")), "node 0: 'rotation' is all zero"));
   CHECK(holds(why(gltf("", R"(,"extensionsRequired":["KHR_draco_mesh_compression"])")), "KHR_draco_mesh_compression"));
@@ -164,6 +170,8 @@ TEST_CASE("a glTF that cannot be is refused by its field") {
   CHECK(holds(why(gltf()), "1 triangle of"));
   folder.put("a b.bin", triangle_bytes().substr(0, 90));
   CHECK(holds(why(gltf()), "reaches past the end"));
+  folder.put("a b.bin", triangle_bytes() + "more");  // may be longer than "byteLength"
+  CHECK(gart::read_scene(folder.put("a.gltf", gltf())).scene.meshes.size() == 1);
 }
 
 TEST_CASE("an OBJ has its faces, its groups and its materials") {
@@ -196,10 +204,14 @@ TEST_CASE("an OBJ has its faces, its groups and its materials") {
 
   auto const why = [&](std::string const& changed) { return refusal(folder.put("b.obj", changed)); };
   CHECK(holds(why(with(text, "f -4", "f -5")), "b.obj, line 14: a face has the vertex '-5', and there are 4"));
+  CHECK(holds(why(with(text, "f -4", "f 4294967297")), "the vertex '4294967297'"));
+  CHECK(holds(why(with(text, "f -4", "f 1x")), "the vertex '1x'"));
   CHECK(holds(why(with(text, "1/1/1", "1/2/1")), "the texture coordinate '2'"));
   CHECK(holds(why(with(text, "v 1 0 0", "v 1 x 0")), "line 4: a coordinate is 'x'"));
   CHECK(holds(why(with(text, "a.mtl", "b.mtl")), "mtllib 'b.mtl' is not there"));
   CHECK(holds(why("v 0 0 0\n"), "no triangle"));
+  folder.put("a.mtl", "newmtl paint\nKd red 0.2 0.3\n");
+  CHECK(holds(why(text), "a.mtl, line 2: Kd is 'red'"));
   folder.put("a.mtl", "newmtl paint\nmap_Kd none.png\n");
   CHECK(holds(why(text), "a.mtl, line 2: the texture 'none.png' is not there"));
 }
