@@ -24,6 +24,13 @@ inline std::vector<gart::u32> words(gart::training_state const& s, char const* n
   return s.parts.get<gart::u32>(name);
 }
 
+template <class E>
+std::vector<float> on_host(E& exec, gart::span<float const> values) {
+  std::vector<float> all(values.size());
+  exec.copy_out(all.data(), values.data(), all.size() * sizeof(float));
+  return all;
+}
+
 // The rows of an adam_table (exposure/adam_table.hpp).
 struct table_state {
   std::vector<float> value, first, second;

@@ -36,10 +36,8 @@ TEST_CASE_TEMPLATE("exposed images and gradients match the matrix in double", E,
     auto const image = values(random, 3 * pixels), weights = values(random, 3 * pixels);
     gart::buffer<float, E> const x(exec, image), g(exec, weights);
 
-    gart::span<float const> const exposed = training.expose(1, x);
-    std::vector<float> shown(exposed.size());
-    exec.copy_out(shown.data(), exposed.data(), shown.size() * sizeof(float));
-    training.step(1, x, g, 0.01f);
+    auto const shown = on_host(exec, training.expose(1, x));
+    training.move(1, on_host(exec, training.differentiate(1, x, g)), 0.01f);
     auto const turned = g.to_host();
     auto const state = state_of(training);
 
@@ -79,7 +77,7 @@ TEST_CASE_TEMPLATE("a non-finite gradient leaves its number of an exposure", E, 
   gart::exposure_training<E> training(exec, 1);
   gart::buffer<float, E> const x(exec, std::vector<float>{0.5f, 0.25f, 0.75f});
   gart::buffer<float, E> const g(exec, std::vector<float>{std::numeric_limits<float>::quiet_NaN(), 1, 1});
-  training.step(0, x, g, 0.1f);
+  training.move(0, on_host(exec, training.differentiate(0, x, g)), 0.1f);
   auto const state = state_of(training);
   gart::exposure const identity;
   for (int k = 0; k < 4; ++k) CHECK(state.value[k] == identity.m[k]);

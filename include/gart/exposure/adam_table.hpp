@@ -1,11 +1,12 @@
 #pragma once
 /// \file
-/// A table of a few learned numbers a row: the exposure of a view, the vignetting of a lens. A step moves one row by
-/// Adam. The gradient of a row is a sum over the pixels of an image.
+/// A table of learned maps of an image's colours, a few numbers a row: the exposure of a view, the vignetting of a
+/// lens. Each maps the rendered image before the loss. The gradient of a row is a sum over the pixels of an image. A
+/// step moves one row by Adam.
 ///
-/// Buffers: 3 Floats + 1 words a row, and a few sums. Cost: a pass over the image and three launches over a few numbers
-/// a step; no host read. The order of all sums depends on the image's size only. A number whose gradient is not finite
-/// keeps its value.
+/// Buffers: 3 Floats + 1 words a row, a few sums, and a copy of the image. Cost: two passes over the image and three
+/// launches over a few numbers a step; no host read. The order of all sums depends on the image's size only. A number
+/// whose gradient is not finite keeps its value.
 
 #include <gart/algorithm/segmented_reduce.hpp>
 #include <gart/core/named_arrays.hpp>
@@ -35,47 +36,80 @@ struct row_adam_kernel {
   }
 };
 
+template <class Map>
+struct map_kernel {
+  Map map;
+  typename Map::row const* row;
+  float const* image;
+  float* mapped;
+  GART_KERNEL void operator()(index_t pixel) const {
+    std::size_t const at = std::size_t{3} * pixel;
+    map.apply(*row, pixel, image + at, mapped + at);
+  }
+};
+
+// A lane takes every lanes-th pixel, turns its gradient, and sums the row's.
+template <class Map>
+struct map_gradient_kernel {
+  Map map;
+  typename Map::row const* row;
+  float const* image;
+  float* gradient;  // in: dL/d mapped, out: dL/d image
+  index_t pixels, lanes;
+  float* sums;  // [lanes][floats]
+
+  GART_KERNEL void operator()(index_t lane) const {
+    constexpr int floats = Map::row::floats;
+    typename Map::row const numbers = *row;
+    float sum[floats] = {};
+    for (index_t pixel = lane; pixel < pixels; pixel += lanes) {
+      std::size_t const at = std::size_t{3} * pixel;
+      map.differentiate(numbers, pixel, image + at, gradient + at, sum);
+    }
+    for (int k = 0; k < floats; ++k) sums[std::size_t{floats} * lane + k] = sum[k];
+  }
+};
+
 }  // namespace detail
 
-/// Rows of so many floats, and Adam's moments of them.
-template <execution E, int Floats>
+/// Map (detail::exposure_map) has the type of a row and Adam's epsilon: gradients far below it hardly move a row
+/// (adam.hpp). For kernels it has how a row maps the colour of a pixel.
+template <execution E, class Map>
 class adam_table {
+  static constexpr int floats = Map::row::floats;
+
  public:
-  /// [rows][Floats] to begin with. Gradients far below `epsilon` hardly move a row (adam.hpp).
-  adam_table(E& exec, std::vector<float> const& start, float epsilon = adam_options::epsilon)
+  /// [rows][floats] to begin with.
+  adam_table(E& exec, std::vector<float> const& start)
       : exec_(&exec),
-        epsilon_(epsilon),
         value_(exec, start),
         first_(exec, std::vector<float>(start.size())),
         second_(exec, std::vector<float>(start.size())),
-        visits_(start.size() / Floats),
+        visits_(start.size() / floats),
+        mapped_(exec),
         sums_(exec),
-        gradient_(exec, Floats),
+        gradient_(exec, floats),
         ends_(exec, std::vector<u32>(runs + 1)) {
     std::vector<u32> ends(runs + 1);
     for (u32 r = 0; r <= runs; ++r) ends[r] = r * runs;
     ends_.assign(ends);
   }
 
-  /// Adam's step of a row, by the last sum.
-  void move(std::size_t row, float rate) {
-    std::size_t const from = row * Floats;
+  /// Adam's step of a row by its gradient, [floats] in host memory.
+  void move(std::size_t row, span<float const> gradient, float rate) {
+    gradient_.assign(std::vector<float>(gradient.begin(), gradient.end()));
+    std::size_t const from = row * floats;
     int const visit = static_cast<int>(++visits_[row]);
     adam_options const adam;
     adam_rule rule(adam, visit);
-    rule.epsilon = epsilon_;
+    rule.epsilon = Map::epsilon;
     parallel_for(
-        *exec_, "row_adam", Floats,
+        *exec_, "row_adam", floats,
         detail::row_adam_kernel{gradient_.data(), value_.data() + from, first_.data() + from, second_.data() + from,
                                 rule, static_cast<float>(rate * adam_rule::first_correction(adam, visit))});
   }
-  /// The same by another rank's sum, [Floats], in host memory.
-  void move(std::size_t row, span<float const> gradient, float rate) {
-    gradient_.assign(std::vector<float>(gradient.begin(), gradient.end()));
-    move(row, rate);
-  }
 
-  /// For a checkpoint: [rows][Floats] each, and how many steps moved a row.
+  /// For a checkpoint: [rows][floats] each, and how many steps moved a row.
   void save(named_arrays& to, std::string const& name) const {
     to.set(name, value_.to_host()), to.set(name + "/first", first_.to_host());
     to.set(name + "/second", second_.to_host()), to.set(name + "/visits", visits_);
@@ -92,37 +126,44 @@ class adam_table {
   void for_each_learned(F const& f) const {
     std::vector<float> const value = value_.to_host();
     for (std::size_t row = 0; row < visits_.size(); ++row)
-      if (visits_[row]) f(row, value.data() + row * Floats);
+      if (visits_[row]) f(row, value.data() + row * floats);
   }
 
  protected:
-  /// A row.
-  float* at(std::size_t row) { return value_.data() + row * Floats; }
+  /// The image [H][W][3] mapped by a row, until the next call.
+  span<float const> apply(std::size_t row, Map const& map, span<float const> image) {
+    mapped_.resize(image.size());
+    parallel_for(*exec_, Map::label, static_cast<index_t>(image.size() / 3),
+                 detail::map_kernel<Map>{map, at(row), image.data(), mapped_.data()});
+    return mapped_;
+  }
 
-  /// Sums a row's gradient over an image: lane i of kernel.lanes writes its part to kernel.sums[Floats * i]. The sum
-  /// lasts until the next call.
-  template <class Kernel>
-  span<float const> sum(char const* label, Kernel kernel) {
+  /// Turns dL/d mapped into dL/d image. The row's gradient, [floats], lasts until the next call.
+  span<float const> differentiate(std::size_t row, Map const& map, span<float const> image, span<float> gradient) {
     constexpr index_t lanes = runs * runs;
-    sums_.resize(std::size_t{lanes + runs} * Floats);
-    auto const by_lane = sums_.view().subspan(0, std::size_t{lanes} * Floats);
-    auto const by_run = sums_.view().subspan(by_lane.size(), std::size_t{runs} * Floats);
-    kernel.lanes = lanes, kernel.sums = by_lane.data();
-    parallel_for(*exec_, label, lanes, kernel);
+    sums_.resize(std::size_t{lanes + runs} * floats);
+    auto const by_lane = sums_.view().subspan(0, std::size_t{lanes} * floats);
+    auto const by_run = sums_.view().subspan(by_lane.size(), std::size_t{runs} * floats);
+    parallel_for(*exec_, Map::gradient_label, lanes,
+                 detail::map_gradient_kernel<Map>{map, at(row), image.data(), gradient.data(),
+                                                  static_cast<index_t>(image.size() / 3), lanes, by_lane.data()});
     span<u32 const> const ends = ends_;
-    segmented_reduce(*exec_, by_lane, Floats, ends, by_run);
-    segmented_reduce(*exec_, by_run, Floats, ends.subspan(0, 2), gradient_.view());
+    segmented_reduce(*exec_, by_lane, floats, ends, by_run);
+    segmented_reduce(*exec_, by_run, floats, ends.subspan(0, 2), gradient_.view());
     return gradient_;
   }
 
  private:
   static constexpr index_t runs = E::device ? 128 : 8;  // of as many lanes: two short sums, not a long one
 
+  typename Map::row const* at(std::size_t row) const {
+    return reinterpret_cast<typename Map::row const*>(value_.data() + row * floats);
+  }
+
   E* exec_;
-  float epsilon_;
   buffer<float, E> value_, first_, second_;
   std::vector<u32> visits_;
-  buffer<float, E> sums_, gradient_;
+  buffer<float, E> mapped_, sums_, gradient_;
   buffer<u32, E> ends_;
 };
 

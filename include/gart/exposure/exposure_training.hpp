@@ -10,7 +10,7 @@
 /// bright gives gradients of a few tenths at any size. Smaller gradients come mostly from Gaussians that have not
 /// settled. Adam alone would scale these up to whole steps.
 ///
-/// Buffers and cost: those of adam_table.hpp, a copy of the image and another pass over it.
+/// Buffers and cost: those of adam_table.hpp.
 
 #include <gart/exposure/adam_table.hpp>
 #include <gart/exposure/exposure.hpp>
@@ -19,39 +19,22 @@ namespace gart { inline namespace GART_ISA {
 
 namespace detail {
 
-struct expose_kernel {
-  exposure const* view;
-  float const* image;
-  float* exposed;
-  GART_KERNEL void operator()(index_t pixel) const {
-    float const* const x = image + std::size_t{3} * pixel;
-    exposure const e = *view;
-    for (int c = 0; c < 3; ++c) exposed[std::size_t{3} * pixel + c] = e.channel(c, x[0], x[1], x[2]);
+struct exposure_map {
+  using row = exposure;
+  static constexpr char const *label = "expose", *gradient_label = "exposure_gradient";
+  static constexpr float epsilon = 0.03f;
+
+  GART_HD void apply(exposure const& e, index_t, float const* x, float* exposed) const {
+    for (int c = 0; c < 3; ++c) exposed[c] = e.channel(c, x[0], x[1], x[2]);
   }
-};
-
-// A lane takes every lanes-th pixel, turns its gradient, and sums the exposure's gradient.
-struct exposure_gradient_kernel {
-  exposure const* view;
-  float const* image;
-  float* gradient;  // in: dL/dx', out: dL/dx
-  index_t pixels, lanes = 0;
-  float* sums = nullptr;  // [lanes][12]
-
-  GART_KERNEL void operator()(index_t lane) const {
-    exposure const e = *view;
-    float sum[exposure::floats] = {};
-    for (index_t pixel = lane; pixel < pixels; pixel += lanes) {
-      float const* const x = image + std::size_t{3} * pixel;
-      float* const g = gradient + std::size_t{3} * pixel;
-      float const d[3] = {g[0], g[1], g[2]};
-      for (int c = 0; c < 3; ++c) {
-        for (int k = 0; k < 3; ++k) sum[4 * c + k] = fma(d[c], x[k], sum[4 * c + k]);
-        sum[4 * c + 3] += d[c];
-        g[c] = fma(e.m[c], d[0], fma(e.m[4 + c], d[1], e.m[8 + c] * d[2]));
-      }
+  // g: in dL/dx', out dL/dx. Adds to the sum of dL/dM.
+  GART_HD void differentiate(exposure const& e, index_t, float const* x, float* g, float* sum) const {
+    float const d[3] = {g[0], g[1], g[2]};
+    for (int c = 0; c < 3; ++c) {
+      for (int k = 0; k < 3; ++k) sum[4 * c + k] = fma(d[c], x[k], sum[4 * c + k]);
+      sum[4 * c + 3] += d[c];
+      g[c] = fma(e.m[c], d[0], fma(e.m[4 + c], d[1], e.m[8 + c] * d[2]));
     }
-    for (int k = 0; k < exposure::floats; ++k) sums[std::size_t{exposure::floats} * lane + k] = sum[k];
   }
 };
 
@@ -59,47 +42,27 @@ struct exposure_gradient_kernel {
 
 /// The exposures of a run, and Adam's moments of them.
 template <execution E>
-class exposure_training : public adam_table<E, exposure::floats> {
+class exposure_training : public adam_table<E, detail::exposure_map> {
  public:
   /// An identity for each view.
-  exposure_training(E& exec, std::size_t views)
-      : base(exec, identities(views), epsilon), exec_(&exec), exposed_(exec) {}
-
-  static constexpr float epsilon = 0.03f;  ///< Adam's
+  exposure_training(E& exec, std::size_t views) : base(exec, identities(views)) {}
 
   /// Exposes the image [H][W][3] as the view's photograph; the result lasts until the next call.
-  span<float const> expose(std::size_t view, span<float const> image) {
-    exposed_.resize(image.size());
-    parallel_for(*exec_, "expose", static_cast<index_t>(image.size() / 3),
-                 detail::expose_kernel{of(view), image.data(), exposed_.data()});
-    return exposed_;
-  }
+  span<float const> expose(std::size_t view, span<float const> image) { return this->apply(view, {}, image); }
 
-  /// Turns dL/d exposed into dL/d image, and takes Adam's step for the view.
-  void step(std::size_t view, span<float const> image, span<float> gradient, float rate) {
-    differentiate(view, image, gradient);
-    this->move(view, rate);
-  }
-
-  /// The first half of a step: turns dL/d exposed into dL/d image. The exposure's gradient, [12], lasts until the next
-  /// call.
+  /// Turns dL/d exposed into dL/d image. The exposure's gradient, [12], lasts until the next call.
   span<float const> differentiate(std::size_t view, span<float const> image, span<float> gradient) {
-    return this->sum("exposure_gradient", detail::exposure_gradient_kernel{of(view), image.data(), gradient.data(),
-                                                                           static_cast<index_t>(image.size() / 3)});
+    return base::differentiate(view, {}, image, gradient);
   }
 
  private:
-  using base = adam_table<E, exposure::floats>;
+  using base = adam_table<E, detail::exposure_map>;
   static std::vector<float> identities(std::size_t views) {
     exposure const identity;
     std::vector<float> all;
     for (std::size_t v = 0; v < views; ++v) all.insert(all.end(), identity.m, identity.m + exposure::floats);
     return all;
   }
-  exposure const* of(std::size_t view) { return reinterpret_cast<exposure const*>(this->at(view)); }
-
-  E* exec_;
-  buffer<float, E> exposed_;
 };
 
 }}  // namespace gart::GART_ISA
