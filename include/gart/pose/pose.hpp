@@ -33,14 +33,6 @@ struct pose_gradient {
 /// Six numbers of a pose: t, then w.
 using pose_numbers = std::array<double, 6>;
 
-/// The learned poses of all training views and their moments, as in a checkpoint.
-struct pose_state {
-  std::vector<double> value;          ///< [views][6]: arguments of `moved`; empty: no poses are learned
-  std::vector<double> first, second;  ///< [views][6]: in the numbers of the metric
-  std::vector<double> metric;         ///< [views][6][6] (pose/pose_metric.hpp), zeros before the first visit
-  std::vector<u32> visits;            ///< [views] steps that moved the view
-};
-
 }  // namespace gart
 
 namespace gart { inline namespace GART_ISA {
@@ -51,13 +43,6 @@ inline camera moved(camera view, pose_numbers const& by, double unit) {
   view.position += axes * vec3d(by[0], by[1], by[2]) * unit;
   for (int k = 0; k < 3; ++k) view.rotation[k] = vec3(turned[k]);
   return view;
-}
-
-/// The argument of `moved` that leads from one camera's pose to another's.
-inline pose_numbers pose_between(camera const& from, camera const& to, double unit) {
-  mat3d const back = glm::transpose(axes_of(from));
-  vec3d const t = back * (to.position - from.position) / unit, w = angles_of(back * axes_of(to));
-  return {t.x, t.y, t.z, w.x, w.y, w.z};
 }
 
 /// The gradient by the argument of `moved`, from that by the resulting pose. Turns do not commute: dL/dw is J^T times

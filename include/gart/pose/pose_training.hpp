@@ -1,8 +1,8 @@
 #pragma once
 /// \file
-/// Poses of the training views, learned with the Gaussians. Adam runs on the host, on the six numbers of the step's
-/// view (pose/pose.hpp), scaled by the metric of its image (pose/pose_metric.hpp). The loss holds a pull to the
-/// capture's poses, with translations in units of the scene's extent.
+/// Poses of the training views, learned with the Gaussians. Adam moves the six numbers of the step's view
+/// (pose/pose.hpp) on the host (optim/host_adam.hpp), scaled by the metric of its image (pose/pose_metric.hpp). The
+/// loss holds a pull to the capture's poses, with translations in units of the scene's extent.
 ///
 /// Moving, turning and scaling the whole capture with its scene changes no image, so no loss holds the views. So once
 /// an epoch the similarity nearest to their increments is removed from them,
@@ -12,111 +12,69 @@
 ///
 /// A gradient that is not finite moves nothing. Cost: none that shows; memory: 440 bytes a view.
 
-#include <gart/core/named_arrays.hpp>
-#include <gart/optim/options.hpp>
-#include <gart/optim/schedule.hpp>
+#include <gart/optim/host_adam.hpp>
 #include <gart/pose/options.hpp>
 #include <gart/pose/pose.hpp>
 #include <gart/pose/pose_metric.hpp>
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 namespace gart { inline namespace GART_ISA {
 
 /// The poses of a run.
-class pose_training {
+class pose_training : public host_adam<pose_options, 6> {
  public:
   /// From the capture's cameras; `extent` is the scene's.
   pose_training(pose_options const& options, std::vector<camera> captured, double extent)
-      : options_(options), captured_(std::move(captured)), extent_(extent) {
-    std::size_t const n = captured_.size();
-    state_ = {std::vector<double>(6 * n), std::vector<double>(6 * n), std::vector<double>(6 * n),
-              std::vector<double>(36 * n), std::vector<u32>(n)};
-  }
+      : host_adam(options, captured.size()),
+        captured_(std::move(captured)),
+        extent_(extent),
+        metric_(36 * captured_.size()) {}
 
   /// A view's learned camera.
-  camera view(std::size_t i) const {
-    return state_.visits[i] ? moved(captured_[i], numbers(i), extent_) : captured_[i];
-  }
-
-  /// Whether poses move in step `step` of so many.
-  bool learns(int step, int iterations) const { return step >= warm_up(iterations); }
+  camera view(std::size_t i) const { return visits_[i] ? moved(captured_[i], numbers(i), extent_) : captured_[i]; }
 
   /// Whether view i has no metric yet.
-  bool wants_metric(std::size_t i) const { return state_.metric[36 * i] == 0; }
+  bool wants_metric(std::size_t i) const { return metric_[36 * i] == 0; }
   /// The metric, from depth and transmittance of an image by the view's learned camera.
   std::array<double, 36> metric_of(camera const& view, span<float const> depth, span<float const> transmittance) const {
     return pose_metric(view, depth, transmittance, extent_);
   }
   /// Sets the metric, before the view's first step.
   void set_metric(std::size_t i, std::array<double, 36> const& metric) {
-    std::copy(metric.begin(), metric.end(), state_.metric.begin() + static_cast<std::ptrdiff_t>(36 * i));
+    std::copy(metric.begin(), metric.end(), metric_.begin() + static_cast<std::ptrdiff_t>(36 * i));
   }
 
   /// Moves view i by the gradient at its pose.
   void step(std::size_t i, pose_gradient const& by, int step, int iterations) {
     pose_numbers const at = numbers(i);
-    pose_numbers slope = pull_back(captured_[i], at, extent_, by), move;
-    int const from = warm_up(iterations), until = static_cast<int>(options_.until * static_cast<float>(iterations));
-    auto const between = [&](float first, float last) {
-      return double{exponential_decay(first, last, step - from, until - from)};
-    };
-    metric_root const metric(state_.metric.data() + 36 * i, between(options_.damping, options_.damping_final));
+    pose_numbers slope = pull_back(captured_[i], at, extent_, by);
+    metric_root const metric(metric_.data() + 36 * i,
+                             between(options_.damping, options_.damping_final, step, iterations));
     for (std::size_t k = 0; k < 6; ++k) slope[k] += double{options_.prior} * at[k];
     slope = metric.gradient(slope);
     for (double const x : slope)
       if (!std::isfinite(x)) return;
-    int const visit = static_cast<int>(++state_.visits[i]);
-    double const rate = between(options_.rate, options_.rate_final);
-    double const beta1 = options_.beta1, beta2 = options_.beta2;
-    double const first = 1 / (1 - std::pow(beta1, visit)), second = 1 / (1 - std::pow(beta2, visit));
-    for (std::size_t k = 0; k < 6; ++k) {
-      double &m = state_.first[6 * i + k], &v = state_.second[6 * i + k];
-      m = beta1 * m + (1 - beta1) * slope[k], v = beta2 * v + (1 - beta2) * slope[k] * slope[k];
-      move[k] = rate * first * m / (std::sqrt(second * v) + 1e-15);
-    }
-    move = metric.step(move);
-    for (std::size_t k = 0; k < 6; ++k) state_.value[6 * i + k] -= move[k];
+    pose_numbers const moves = metric.step(move(i, slope, step, iterations));
+    for (std::size_t k = 0; k < 6; ++k) value_[6 * i + k] -= moves[k];
     u64 visits = 0;  // the only clock: a resumed run knows no other
-    for (u32 const v : state_.visits) visits += v;
-    if (visits % state_.visits.size() == 0) take_out_similarity();
+    for (u32 const v : visits_) visits += v;
+    if (visits % visits_.size() == 0) take_out_similarity();
   }
 
   /// For a checkpoint.
-  void save(named_arrays& to) const {
-    for_each_array(state_, [&](char const* name, auto const& values) { to.set(name, values); });
-  }
-  ///@{
-  /// The same in memory.
-  pose_state const& state() const { return state_; }
-  void set_state(pose_state const& s) { state_ = s; }
-  ///@}
+  void save(named_arrays& to) const { host_adam::save(to, "pose"), to.set("pose/metric", metric_); }
   /// From a checkpoint of as many.
   void load(named_arrays const& from) {
-    pose_state taken = state_;
-    for_each_array(taken, [&](char const* name, auto& values) { from.take(name, values); });
-    state_ = std::move(taken);
+    pose_training taken = *this;
+    taken.host_adam::load(from, "pose"), from.take("pose/metric", taken.metric_);
+    *this = std::move(taken);
   }
 
  private:
-  template <class State, class F>
-  static void for_each_array(State& s, F const& f) {
-    f("pose", s.value), f("pose/first", s.first), f("pose/second", s.second), f("pose/visits", s.visits);
-    f("pose/metric", s.metric);
-  }
-  int warm_up(int iterations) const {
-    return std::min(500, static_cast<int>(options_.warm_up * static_cast<float>(iterations)));
-  }
-  pose_numbers numbers(std::size_t i) const {
-    pose_numbers out;
-    std::copy_n(state_.value.data() + 6 * i, 6, out.data());
-    return out;
-  }
   std::size_t visited() const {
-    return static_cast<std::size_t>(
-        std::count_if(state_.visits.begin(), state_.visits.end(), [](u32 v) { return v > 0; }));
+    return static_cast<std::size_t>(std::count_if(visits_.begin(), visits_.end(), [](u32 v) { return v > 0; }));
   }
 
   void take_out_similarity() {
@@ -129,10 +87,10 @@ class pose_training {
     vec3d middle(0.0), shift(0.0);
     auto const each = [&](auto const& f) {
       for (std::size_t i = 0; i < n; ++i)
-        if (state_.visits[i]) f(i, all[i]);
+        if (visits_[i]) f(i, all[i]);
     };
     each([&](std::size_t i, increment& at) {
-      double const* const x = state_.value.data() + 6 * i;
+      double const* const x = value_.data() + 6 * i;
       mat3d const axes = axes_of(captured_[i]);
       at = {captured_[i].position / extent_, axes * vec3d(x[0], x[1], x[2]), axes * vec3d(x[3], x[4], x[5])};
       middle += at.arm / static_cast<double>(seen), shift += at.shift / static_cast<double>(seen);
@@ -156,16 +114,15 @@ class pose_training {
       mat3d const back = glm::transpose(axes_of(captured_[i]));
       vec3d const t = back * at.shift, w = back * at.turn;
       for (int k = 0; k < 3; ++k) {
-        state_.value[6 * i + static_cast<std::size_t>(k)] = t[k];
-        state_.value[6 * i + 3 + static_cast<std::size_t>(k)] = w[k];
+        value_[6 * i + static_cast<std::size_t>(k)] = t[k];
+        value_[6 * i + 3 + static_cast<std::size_t>(k)] = w[k];
       }
     });
   }
 
-  pose_options options_;
   std::vector<camera> captured_;
   double extent_;
-  pose_state state_;
+  std::vector<double> metric_;  // [views][6][6] (pose/pose_metric.hpp), zeros before the first visit
 };
 
 }}  // namespace gart::GART_ISA

@@ -17,13 +17,6 @@ namespace gart {
 /// Three numbers of a lens: f, x, y.
 using lens_numbers = std::array<double, 3>;
 
-/// The lenses of a run and their moments, as in a checkpoint.
-struct lens_state {
-  std::vector<double> value;          ///< [cameras][3]; empty: no lenses are learned
-  std::vector<double> first, second;  ///< [cameras][3]
-  std::vector<u32> visits;            ///< [cameras] steps that moved the lens
-};
-
 }  // namespace gart
 
 namespace gart { inline namespace GART_ISA {
