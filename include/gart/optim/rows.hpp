@@ -142,6 +142,16 @@ struct number_rows {
   GART_KERNEL void operator()(index_t i) const { rows[i] = first + i; }
 };
 
+// The marked rows in order; place[i]: how many are before row i.
+struct list_rows {
+  u32 const* marked;
+  u64 const* place;
+  u32* rows;
+  GART_KERNEL void operator()(index_t i) const {
+    if (marked[i]) rows[place[i]] = i;
+  }
+};
+
 }  // namespace detail
 
 /// Sets Adam's moments of these Gaussians, by number, to zero, for those that are here.

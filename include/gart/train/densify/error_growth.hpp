@@ -75,15 +75,6 @@ struct error_key_kernel {
   }
 };
 
-struct error_target_kernel {
-  u32 const* dead;
-  u64 const* place;
-  u32* target;
-  GART_KERNEL void operator()(index_t i) const {
-    if (dead[i]) target[place[i]] = i;
-  }
-};
-
 // Row k becomes a child of its Gaussian.
 struct error_split_kernel {
   gaussians_view<float> model;
@@ -221,8 +212,7 @@ class error_growth final : public densifier<E> {
       index_t const draws = change.relocated + change.added;
       target_.resize(std::max(dead, draws));
       if (dead)
-        parallel_for(*exec_, "error_targets", n,
-                     detail::error_target_kernel{dead_.data(), place_.data(), target_.data()});
+        parallel_for(*exec_, "error_targets", n, detail::list_rows{dead_.data(), place_.data(), target_.data()});
       // Past the dead, the rows that are new.
       parallel_for(*exec_, "error_append", change.added, detail::number_rows{target_.data() + change.relocated, n});
       g.resize(rows.here(n + change.added));

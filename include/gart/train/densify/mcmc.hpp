@@ -67,15 +67,6 @@ struct mcmc_weight_kernel {
   }
 };
 
-struct mcmc_list_kernel {
-  u32 const* dead;
-  u64 const* place;
-  u32* target;
-  GART_KERNEL void operator()(index_t i) const {
-    if (dead[i]) target[place[i]] = i;
-  }
-};
-
 template <execution E>
 struct mcmc_draw_kernel {
   u64 const* before;  // exclusive sums of the weights
@@ -242,7 +233,7 @@ class mcmc final : public densifier<E> {
     change.relocated = static_cast<index_t>(totals[1]);
     if (change.relocated) {
       target_.resize(change.relocated);
-      parallel_for(*exec_, "mcmc_list", n, detail::mcmc_list_kernel{dead_.data(), dead_before_.data(), target_.data()});
+      parallel_for(*exec_, "mcmc_list", n, detail::list_rows{dead_.data(), dead_before_.data(), target_.data()});
       draw(g, n, change.relocated, {seed_, step, random_use::relocation}, rows);
     }
 
