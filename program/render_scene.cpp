@@ -75,12 +75,8 @@ gart::rendered path_scene::draw(gart::camera const& view, gart::render_options o
   renderer_->begin(view, options, paths);
   renderer_->add(samples);
   gart::rendered out;
+  if (with_layers) out = gart::depth_of(layers_ = renderer_->layers());
   out.color = renderer_->picture();
-  if (!with_layers) return out;
-  layers_ = renderer_->layers();
-  out.depth = layers_.depth, out.transmittance = layers_.transmittance;
-  for (std::size_t i = 0; i < layers_.mesh.data.size(); ++i)  // nothing is seen behind a surface
-    if (layers_.mesh.data[i] != gart::no_number) out.transmittance.data[i] = 0;
   return out;
 }
 

@@ -23,6 +23,14 @@ std::vector<entry>& entries() {
 
 }  // namespace
 
+rendered depth_of(path_layers const& layers) {
+  rendered out;
+  out.depth = layers.depth, out.transmittance = layers.transmittance;
+  for (std::size_t i = 0; i < layers.mesh.data.size(); ++i)
+    if (layers.mesh.data[i] != no_number) out.transmittance.data[i] = 0;
+  return out;
+}
+
 void register_path_renderer(backend_kind backend, int kernel_degree, bool (*available)(std::string*),
                             path_renderer_maker make) {
   entries().push_back({backend, kernel_degree, available, make});

@@ -44,12 +44,8 @@ struct path_view {
 
   rendered images(camera const& view, view_settings const& settings) {
     begin(view, settings, paths);
-    path_layers layers = by.layers();
-    rendered out;
+    rendered out = depth_of(by.layers());
     out.color = image_float(view.width, view.height, 3);
-    out.depth = std::move(layers.depth), out.transmittance = std::move(layers.transmittance);
-    for (std::size_t i = 0; i < layers.mesh.data.size(); ++i)  // nothing is seen behind a surface
-      if (layers.mesh.data[i] != no_number) out.transmittance.data[i] = 0;
     return out;
   }
 };

@@ -18,6 +18,7 @@
 #include <gart/light/path_options.hpp>
 #include <gart/light/scene.hpp>
 #include <gart/render/options.hpp>
+#include <gart/render/rendered.hpp>
 #include <gart/runtime/request.hpp>
 #include <gart/scene/camera.hpp>
 #include <gart/scene/gaussians.hpp>
@@ -41,6 +42,9 @@ struct path_layers {
   basic_image<u32> mesh;      ///< [H][W][1]: of the surface
   basic_image<u32> triangle;  ///< [H][W][1]: of that mesh
 };
+
+/// Depth and transmittance of the layers, without a colour. Nothing is seen behind a surface.
+rendered depth_of(path_layers const& layers);
 
 /// Traces paths.
 class path_renderer {
