@@ -27,6 +27,24 @@ async function end(server) {
   assert.equal(await server.ended, 0);
 }
 
+// A page whose list has the ball chosen; at(): where the stage shows a point.
+async function openBall(world, screen) {
+  const server = await serve(world);
+  const p = await openPage(world.browser, server.control, screen);
+  await p.tab('scene');
+  await p.page.click('#scene-list button:has-text("ball")');
+  await p.until('the box about it', async () => (await linesOf(p.page, [255, 209, 102])) > 100);
+  const {view: {camera}} = await p.rest(), {model, scene: [ball]} = p.received[0];
+  const stage = await p.page.locator('#stage').boundingBox();
+  const at = (point) => pixelOf(camera, point).slice(0, 2).map((x) => (x * stage.width) / camera.width);
+  return {server, p, camera, model, ball, at};
+}
+// The scene's file, saved from a panel that shows all its width.
+async function savedScene(p) {
+  assert.equal(await p.page.$eval('#panel-scene', (panel) => panel.scrollWidth - panel.clientWidth), 0);
+  return JSON.parse(fs.readFileSync(await (await p.saved(() => p.page.click('#save-scene'))).path()));
+}
+
 const traced = {
   async 'a scene is path traced: a draft as it moves, samples that add up at rest'(world) {
     const server = await serve(world), {browser, gart, work} = world;
@@ -59,20 +77,13 @@ const traced = {
 
 const changed = onEach({
   async 'a mesh is moved by its handle and made a mirror, a light is dimmed, the scene is saved'(world, screen) {
-    const server = await serve(world), {browser, work} = world;
-    const p = await openPage(browser, server.control, screen);
-    await p.tab('scene');
-    await p.page.click('#scene-list button:has-text("ball")');
-    await p.until('the box about it', async () => (await linesOf(p.page, [255, 209, 102])) > 100);
-    const {view: {camera}} = await p.rest(), {model, scene: [ball]} = p.received[0];
+    const {browser, work} = world, {server, p, camera, model, ball, at} = await openBall(world, screen);
     // The handle that goes farthest over the screen.
-    const stage = await p.page.locator('#stage').boundingBox();
     const reach = (k) => 0.14 * model.extent + (ball.max[k] - ball.min[k]) / 2;
     const tip = (k, more = 0) => ball.place.map((x, i) => (i === k ? x + reach(k) + more : x));
-    const at = (k, more) => pixelOf(camera, tip(k, more)).slice(0, 2).map((x) => (x * stage.width) / camera.width);
-    const way = (k) => at(k, 0.02).map((x, i) => (x - at(k)[i]) / 0.02), far = (k) => Math.hypot(...way(k));
+    const way = (k) => minus(at(tip(k, 0.02)), at(tip(k))).map((x) => x / 0.02), far = (k) => Math.hypot(...way(k));
     const k = [0, 1, 2].reduce((best, i) => (far(i) > far(best) ? i : best));
-    await p.drag(at(k), way(k).map((x) => 0.3 * x));
+    await p.drag(at(tip(k)), way(k).map((x) => 0.3 * x));
     const moved = await p.until('the scene to say so', () => p.received.filter((m) => m.type === 'scene').map((m) => m.parts[0].place)
       .find((place) => Math.abs(place[k] - ball.place[k] - 0.3) < 0.05));
     moved.forEach((x, i) => i === k || assert.ok(Math.abs(x - ball.place[i]) < 1e-4, 'it moved along one axis'));
@@ -95,10 +106,8 @@ const changed = onEach({
     await p.until('a dim red lamp', () => p.received.some((m) => m.type === 'scene' && String(m.parts[2].color) === '2,0,0'));
     assert.ok(!(await p.rest()).jpeg.equals(mirror.jpeg));
     await p.page.screenshot({path: path.join(work, `scene-light-${screen.viewport.width}.png`)});
-    const wide = await p.page.$eval('#panel-scene', (panel) => panel.scrollWidth - panel.clientWidth);
-    assert.equal(wide, 0);
 
-    const file = JSON.parse(fs.readFileSync(await (await p.saved(() => p.page.click('#save-scene'))).path()));
+    const file = await savedScene(p);
     assert.ok(Math.abs(file.meshes[0].translation[k] - moved[k]) < 0.05);
     assert.equal(file.materials.find((m) => m.name === file.meshes[0].material).kind, 'mirror');
     assert.deepEqual(file.lights[0].color, [2, 0, 0]);
@@ -117,15 +126,8 @@ const changed = onEach({
 
 const turned = onEach({
   async 'a mesh is turned and made larger by its handles, the scene is saved'(world, screen) {
-    const server = await serve(world), {browser, work} = world;
-    const p = await openPage(browser, server.control, screen);
-    await p.tab('scene');
-    await p.page.click('#scene-list button:has-text("ball")');
-    await p.until('the box about it', async () => (await linesOf(p.page, [255, 209, 102])) > 100);
-    const {view: {camera}} = await p.rest(), {model, scene: [ball]} = p.received[0];
+    const {work} = world, {server, p, camera, model, ball, at} = await openBall(world, screen);
     assert.deepEqual([ball.rotation, ball.scale], [[1, 0, 0, 0], [0.4, 0.4, 0.4]]);
-    const stage = await p.page.locator('#stage').boundingBox();
-    const at = (point) => pixelOf(camera, point).slice(0, 2).map((x) => (x * stage.width) / camera.width);
     const way = (from, to, times) => minus(at(along(from, minus(to, from), 0.02)), at(from)).map((x) => (times * x) / 0.02);
     const part = () => p.received.filter((m) => m.type === 'scene').at(-1)?.parts[0] ?? ball;
     const near = (a, b, within) => a.every((x, i) => Math.abs(x - b[i]) < within);
@@ -155,10 +157,8 @@ const turned = onEach({
     assert.ok(near(part().place, now.place, 0.01), 'it grew about its middle');
     assert.ok(!(await p.rest()).jpeg.equals(before.jpeg));
     await p.page.screenshot({path: path.join(work, `scene-size-${screen.viewport.width}.png`)});
-    const wide = await p.page.$eval('#panel-scene', (panel) => panel.scrollWidth - panel.clientWidth);
-    assert.equal(wide, 0);
 
-    const file = JSON.parse(fs.readFileSync(await (await p.saved(() => p.page.click('#save-scene'))).path()));
+    const file = await savedScene(p);
     assert.ok(near(file.meshes[0].rotation, part().rotation, 1e-6) && near(file.meshes[0].scale, part().scale, 1e-6));
     assert.equal(file.meshes[1].rotation, undefined);
     await p.page.click('#scene-list button:has-text("lamp")');
