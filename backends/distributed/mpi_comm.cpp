@@ -84,8 +84,8 @@ struct mpi_comm::state {
   }
 };
 
-// The ranks of this host. A window is not freed: all would have to do it at once, and one that ends by an error does it
-// alone. It goes with the processes.
+// The ranks of this host. A window is not freed. All ranks would have to do it at once, and one that ends by an error
+// does it alone. It goes with the processes.
 class mpi_comm::host_ranks final : public host_group {
  public:
   explicit host_ranks(std::shared_ptr<state> all) : state_(std::move(all)) {}
@@ -129,7 +129,7 @@ class mpi_comm::host_ranks final : public host_group {
 mpi_comm::mpi_comm() : state_(std::make_shared<state>()) {}
 int mpi_comm::rank() const { return state_->rank; }
 int mpi_comm::size() const { return state_->size; }
-int mpi_comm::ranks_on_host() const { return state_->on_host; }
+int mpi_comm::sharers() const { return state_->on_host; }
 int mpi_comm::rank_on_host() const { return state_->rank_on_host; }
 std::shared_ptr<host_group> mpi_comm::on_host() const { return std::make_shared<host_ranks>(state_); }
 

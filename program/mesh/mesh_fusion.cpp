@@ -18,6 +18,8 @@ namespace gart_cli {
 
 namespace {
 
+constexpr float least_weight = 2;  // rays that a voxel must have been passed by
+
 openvdb::Coord below(gart::vec3d const& p) {
   return {static_cast<int>(std::floor(p.x)), static_cast<int>(std::floor(p.y)), static_cast<int>(std::floor(p.z))};
 }
@@ -70,8 +72,7 @@ gart::triangle_mesh fusion::mesh() const {
   auto const seen = [&](openvdb::Vec3s const& p) {
     openvdb::Coord const at = below({p.x(), p.y(), p.z()});
     bool all = true;
-    for (int c = 0; c < 8; ++c)
-      all = all && weight.getValue(at.offsetBy(c & 1, c >> 1 & 1, c >> 2)) >= options_.least_weight;
+    for (int c = 0; c < 8; ++c) all = all && weight.getValue(at.offsetBy(c & 1, c >> 1 & 1, c >> 2)) >= least_weight;
     return all;
   };
   std::vector<char> keep(points.size());

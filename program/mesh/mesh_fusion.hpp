@@ -16,7 +16,6 @@ namespace gart_cli {
 struct fusion_options {
   double voxel = 0;          // world units
   double truncation = 4;     // voxels, on both sides of a surface
-  float least_weight = 2;    // rays that a voxel must have been passed by
   std::size_t smallest = 0;  // connected parts of fewer triangles are left out
 };
 

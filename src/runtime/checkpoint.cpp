@@ -24,14 +24,6 @@ class stream_file final : public shared_file {
 
 }  // namespace
 
-training_state without_rows(training_state const& state) {
-  training_state out;
-  out.origin = state.origin, out.step = state.step, out.seed = state.seed;
-  for (auto const& [name, values] : state.parts.bytes)
-    if (!of_gaussians(name)) out.parts.bytes[name] = values;
-  return out;
-}
-
 void write_checkpoint(std::filesystem::path const& path, training_state const& state) {
   checkpoint_rows rows(state, {});
   rows.place(rows.bytes());

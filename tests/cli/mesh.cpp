@@ -159,8 +159,8 @@ TEST_CASE("rays on a sphere make the mesh of a sphere") {
       CHECK(score.f_score > 0.999);
     }
     // What one side has seen is no closed surface.
-    gart_cli::fusion fused({.voxel = 0.04, .least_weight = 0.5f});
-    fused.add(rays_on_sphere(cameras(1)[0].view, vec3d(0.0)));
+    gart_cli::fusion fused({.voxel = 0.04});
+    for (int i = 0; i < 4; ++i) fused.add(rays_on_sphere(cameras(1)[0].view, vec3d(0.0)));
     for (vec3 const& p : fused.mesh().position) CHECK(std::abs(glm::length(p) - 1) < 0.06f);
     CHECK_THROWS_AS(gart_cli::fusion({.voxel = 0}), gart::invalid_argument);
   } catch (gart::unsupported const& e) {

@@ -72,9 +72,8 @@ std::vector<T> part_of(std::vector<T> const& all, row_owners const& owners) {
   return mine;
 }
 training_state part_of(training_state const& all, row_owners const& owners) {
-  training_state mine = without_rows(all);
-  mine.scene = rows_of(all.scene, owners), mine.first = rows_of(all.first, owners);
-  mine.second = rows_of(all.second, owners);
+  training_state mine = all;
+  for (gaussian_model* each : {&mine.scene, &mine.first, &mine.second}) *each = rows_of(*each, owners);
   for (auto const& [name, values] : all.parts.bytes)
     if (of_gaussians(name)) mine.parts.set(name, part_of(all.parts.get<u32>(name), owners));
   return mine;

@@ -28,12 +28,11 @@ class mpi_comm {
 
   /// All that were started together.
   mpi_comm();
-  int rank() const;                                ///< this process
-  int size() const;                                ///< ranks in all
-  std::string host() const;                        ///< the name of the machine that this rank is on
-  int ranks_on_host() const;                       ///< with this one
-  int rank_on_host() const;                        ///< which of these this is
-  int sharers() const { return ranks_on_host(); }  ///< of the host's memory
+  int rank() const;          ///< this process
+  int size() const;          ///< ranks in all
+  std::string host() const;  ///< the name of the machine that this rank is on
+  int rank_on_host() const;  ///< which of these this is
+  int sharers() const;       ///< ranks of this host, with this one: they share its memory
   /// Those, and the memory that they share.
   std::shared_ptr<host_group> on_host() const;
 

@@ -14,11 +14,7 @@ namespace gart {
 template <class T>
 class span {
  public:
-  ///@{
-  /// Of an element, and without const.
-  using element_type = T;
-  using value_type = std::remove_const_t<T>;
-  ///@}
+  using value_type = std::remove_const_t<T>;  ///< of an element
 
   constexpr span() = default;
   /// Of `size` elements from `data` on.

@@ -31,9 +31,6 @@ inline bool of_gaussians(std::string const& name) {
   return name.starts_with("gaussians/") || name == "error_growth/error_sum" || name.starts_with("adc/");
 }
 
-/// The part of a state that does not grow with the Gaussians.
-training_state without_rows(training_state const& state);
-
 /// Written to a temporary name, then renamed. Errors: io_error.
 void write_checkpoint(std::filesystem::path const& path, training_state const& state);
 /// The state of a checkpoint of any degree.
